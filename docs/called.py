@@ -10,7 +10,8 @@ from griffe import Docstring, Extension, Function, Parameter, ParameterKind, Par
 
 
 class Called(Extension):
-    """Gives a function that `flagdata.options.called` or `verb` made the parameters and docstring of run time."""
+    """Gives a function that `flagdata.verbs.verb_options.called` or `verb` made the parameters and docstring of run
+    time."""
 
     def on_function(self, *, func: Function, **_: Any) -> None:
         """Replaces them; called by griffe, which reads source and runs none."""

@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from flagdata.cli import GROUPS, VERBS, root
-from flagdata.options import LongCommand
+from flagdata.verbs.verb_options import LongCommand
 
 PAGE = Path(__file__).with_name("cli.md")
 _HEAD = """\

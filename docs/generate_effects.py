@@ -7,7 +7,7 @@ import math
 import sys
 from pathlib import Path
 
-from flagdata.registry import Registry
+from flagdata.recipes.registry import Registry
 from sim.effects import EFFECTS, SENSOR_EFFECTS
 from sim.effects.parameter import Parameter, Parametrised
 

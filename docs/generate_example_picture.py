@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 from PIL import Image, ImageDraw
 
 import flagdata
+from flagdata.answer.measured import Measured
 from flagdata.examples import Example
-from flagdata.measured import Measured
 from flagdata.timebase import NANOSECONDS, from_datetime
 from tests.studies.example import START
 

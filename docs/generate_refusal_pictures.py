@@ -23,12 +23,12 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
 import flagdata
+from flagdata.core.findings import Severity
+from flagdata.core.rng import stream
 from flagdata.errors import RefusedError
-from flagdata.film_array import Frames
-from flagdata.findings import Severity
-from flagdata.rng import stream
-from measure.estimate.pictures import steps
-from measure.film.conditioned import ConditionedFilm
+from flagdata.ingest.films.film_array import Frames
+from measure.estimate.measurement_pictures import steps
+from measure.film.conditioned_film import ConditionedFilm
 from measure.film.similarity import FlagSize, sizes
 from tests.drawn import no_flag
 

@@ -15,23 +15,23 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from flagdata.installed_names import step_aside
-from flagdata.lazy import lazy_exports
+from flagdata.packages.installed_names import step_aside
+from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from flagdata.api.lake_verbs import branch, export, query, tag
     from flagdata.api.lakes import open, pairs  # noqa: A004  read as flagdata.open
     from flagdata.api.learning import build, evaluate, train
-    from flagdata.api.measuring import calibrate, close_loop, measure, observe, propose
+    from flagdata.api.measuring_verbs import calibrate, close_loop, measure, observe, propose
     from flagdata.api.physics import render, simulate
     from flagdata.api.recording_verbs import align, ingest, realign
     from flagdata.api.recordings import frames, meshes, motion, wind
-    from flagdata.commands.artifacts import ls, show
-    from flagdata.commands.catalog import catalog
+    from flagdata.commands.catalog_names import catalog
     from flagdata.commands.declare import declare
     from flagdata.commands.declare_cloths import declare_cloths
     from flagdata.commands.label import label
-    from flagdata.commands.lake import diff, init, log, merge, withdraw
+    from flagdata.commands.lake_versions import diff, init, log, merge, withdraw
+    from flagdata.commands.list_artifacts import ls, show
     from flagdata.commands.looking import du, lineage
     from flagdata.commands.transfer import clone, pull, push
     from flagdata.commands.upkeep import doctor, expire, gc, heal, recover, verify

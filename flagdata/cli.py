@@ -11,7 +11,7 @@ from importlib import import_module
 import click
 from click.shell_completion import CompletionItem
 
-from flagdata.console import Aside, document, echo_lines, fail, foreseen, print_help, say
+from flagdata.core.console import Aside, document, echo_lines, fail, foreseen, print_help, say
 from flagdata.errors import UnknownNameError, UsageError
 
 # group → what it is about, and its verbs: where the click command is, one line of help shown without importing it
@@ -36,19 +36,22 @@ GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
     "look": (
         "what a lake holds",
         {
-            "ls": ("flagdata.commands.artifacts:ls", "List artifacts."),
-            "show": ("flagdata.commands.artifacts:show", "Show one artifact, its parents and its report."),
+            "ls": ("flagdata.commands.list_artifacts:ls", "List artifacts."),
+            "show": ("flagdata.commands.list_artifacts:show", "Show one artifact, its parents and its report."),
             "lineage": ("flagdata.commands.looking:lineage", "Show what an artifact was made from, and what from it."),
             "view": (
                 "flagdata.commands.looking:view",
                 "Look at a lake in the browser: artifacts, films beside winds, SQL.",
             ),
             "query": ("flagdata.commands.query:query", "Select rows of the catalog by filter or SQL."),
-            "log": ("flagdata.commands.lake:log", "List commits."),
-            "diff": ("flagdata.commands.lake:diff", "Rows and objects added and removed between two versions."),
+            "log": ("flagdata.commands.lake_versions:log", "List commits."),
+            "diff": (
+                "flagdata.commands.lake_versions:diff",
+                "Rows and objects added and removed between two versions.",
+            ),
             "du": ("flagdata.commands.looking:du", "Show what takes space, by kind and by version."),
             "catalog": (
-                "flagdata.commands.catalog:catalog",
+                "flagdata.commands.catalog_names:catalog",
                 "List the scenes, sensors, effects, materials, data sets and models by name.",
             ),
         },
@@ -74,7 +77,7 @@ GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             ),
             "propose": ("measure.commands.propose:propose", "Propose an effect that the library lacks, and test it."),
             "simulate": (
-                "sim.commands:simulate",
+                "sim.run.simulate_command:simulate",
                 "Simulate cloth in the wind: mesh sequences from a recipe or a scene.",
             ),
         },
@@ -83,12 +86,12 @@ GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
         "data sets and networks",
         {
             "build": (
-                "sim.datasets.command:build",
+                "sim.datasets.build_command:build",
                 "Build a data set: sequences, their films, ground truth and a card.",
             ),
-            "train": ("models.training.command:train", "Train a network on the clips of a lake, and commit it."),
+            "train": ("models.training.train_command:train", "Train a network on the clips of a lake, and commit it."),
             "evaluate": (
-                "models.evaluation.command:evaluate",
+                "models.evaluation.evaluate_command:evaluate",
                 "Evaluate trained networks on test clips, in one table.",
             ),
         },
@@ -96,12 +99,15 @@ GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
     "lake": (
         "versions, copies and upkeep",
         {
-            "init": ("flagdata.commands.lake:init", "Create an empty lake."),
-            "tag": ("flagdata.commands.lake:tag", "Name a version for good, list or delete tags."),
-            "branch": ("flagdata.commands.lake:branch", "Begin, list or delete branches."),
-            "merge": ("flagdata.commands.lake:merge", "Commit on main what a branch changed."),
+            "init": ("flagdata.commands.lake_versions:init", "Create an empty lake."),
+            "tag": ("flagdata.commands.lake_versions:tag", "Name a version for good, list or delete tags."),
+            "branch": ("flagdata.commands.lake_versions:branch", "Begin, list or delete branches."),
+            "merge": ("flagdata.commands.lake_versions:merge", "Commit on main what a branch changed."),
             "label": ("flagdata.commands.label:label", "Put columns of your own on artifacts."),
-            "withdraw": ("flagdata.commands.lake:withdraw", "Hide artifacts from a branch; tags still show them."),
+            "withdraw": (
+                "flagdata.commands.lake_versions:withdraw",
+                "Hide artifacts from a branch; tags still show them.",
+            ),
             "export": (
                 "flagdata.commands.export:export",
                 "Write WebDataset, Parquet, LeRobot, Zarr, MP4 + CSV, MCAP, CSV of the wind or OBJ folders.",
@@ -119,8 +125,11 @@ GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
     "project": (
         "this installation",
         {
-            "demo": ("measure.demo.command:demo", "Make a synthetic recording and run every step on it."),
-            "blender-setup": ("sim.blender.command:blender_setup", "Make the environment that Blender renders in."),
+            "demo": ("measure.demo.demo_command:demo", "Make a synthetic recording and run every step on it."),
+            "blender-setup": (
+                "sim.blender.blender_setup:blender_setup",
+                "Make the environment that Blender renders in.",
+            ),
             "completion": ("flagdata.commands.completion:completion", "Print the completion of commands for a shell."),
             "help": ("flagdata.commands.help:help_", "Show the help of flagdata, or of a command."),
         },
@@ -131,17 +140,17 @@ VERBS: dict[str, tuple[str, str]] = {verb: entry for _, verbs in GROUPS.values()
 
 # what `flagdata catalog` lists → (where the names are, what takes one)
 NAMES: dict[str, tuple[str, str]] = {
-    "scenes": ("sim.run.reading:SCENES", "simulate RECIPE"),
-    "materials": ("sim.material:MATERIALS", "close-loop --material, measure --material, [material] of a recipe"),
+    "scenes": ("sim.run.simulation_toml:SCENES", "simulate RECIPE"),
+    "materials": ("sim.cloth.material:MATERIALS", "close-loop --material, measure --material, [material] of a recipe"),
     "effects": ("sim.effects:EFFECTS", "[effects] of a recipe"),
     "sensor-effects": ("sim.effects:SENSOR_EFFECTS", "[sensor] of a recipe"),
-    "sensors": ("flagdata.ingest.anemometer.recipe:SENSORS", "ingest --sensor, close-loop --sensor"),
-    "log-formats": ("flagdata.ingest.anemometer.formats.registry:FORMATS", "ingest --as"),
-    "datasets": ("sim.datasets.reading:DATASETS", "build RECIPE"),
-    "renders": ("sim.render.prior:PRIORS", "[render] prior of a data set's recipe"),
-    "training": ("models.training.recipe:TRAININGS", "train RECIPE"),
-    "models": ("models.estimator:SHIPPED", "measure --model, calibrate --model"),
-    "exports": ("flagdata.export.plan:FORMATS", "export FORMAT"),
+    "sensors": ("flagdata.ingest.anemometer.sensor_recipe:SENSORS", "ingest --sensor, close-loop --sensor"),
+    "log-formats": ("flagdata.ingest.anemometer.formats.log_formats:FORMATS", "ingest --as"),
+    "datasets": ("sim.datasets.dataset_toml:DATASETS", "build RECIPE"),
+    "renders": ("sim.render.render_prior:PRIORS", "[render] prior of a data set's recipe"),
+    "training": ("models.training.training_recipe:TRAININGS", "train RECIPE"),
+    "models": ("models.trained.estimator:SHIPPED", "measure --model, calibrate --model"),
+    "exports": ("flagdata.export.export_plan:FORMATS", "export FORMAT"),
 }
 
 _HELP = "see the command's --help"

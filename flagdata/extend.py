@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from flagdata.parts import attribute
+from flagdata.core.parts import attribute
 
 GROUPS = {
     "flagdata.effects": "a subclass of one of the kinds of effect",
@@ -33,23 +33,23 @@ _PLACES = {
     "NOT_NEGATIVE": "sim.effects.parameter:NOT_NEGATIVE",
     "AirDensity": "sim.effects.quantities:AirDensity",
     "AIR_DENSITY": "sim.effects.quantities:AIR_DENSITY",
-    "Cloth": "sim.cloth:Cloth",
-    "face_wind": "sim.air:face_wind",
+    "Cloth": "sim.cloth.cloth_batch:Cloth",
+    "face_wind": "sim.cloth.air:face_wind",
     # formats of wind logs
-    "Format": "flagdata.ingest.anemometer.formats.registry:Format",
+    "Format": "flagdata.ingest.anemometer.formats.log_formats:Format",
     "Head": "flagdata.ingest.anemometer.sniffing:Head",
     "Guess": "flagdata.ingest.anemometer.sniffing:Guess",
-    "TextFile": "flagdata.ingest.anemometer.text.source:TextFile",
-    "WindOptions": "flagdata.ingest.anemometer.options:WindOptions",
-    "Reading": "flagdata.ingest.anemometer.reading:Reading",
-    "Sensor": "flagdata.signals:Sensor",
-    "SampleFlag": "flagdata.schema:SampleFlag",
+    "TextFile": "flagdata.ingest.anemometer.text.text_file:TextFile",
+    "WindOptions": "flagdata.ingest.anemometer.wind_options:WindOptions",
+    "Reading": "flagdata.ingest.anemometer.log_reading:Reading",
+    "Sensor": "flagdata.record.signals:Sensor",
+    "SampleFlag": "flagdata.core.schema:SampleFlag",
     # networks
-    "Network": "models.network:Network",
-    "INPUTS": "models.network:INPUTS",
+    "Network": "models.networks.network:Network",
+    "INPUTS": "models.networks.network:INPUTS",
     # renderers
     "Renderer": "sim.render.renderer:Renderer",
-    "Meshes": "sim.render.meshes:Meshes",
+    "Meshes": "sim.render.rendered_meshes:Meshes",
     "RenderParameters": "sim.render.parameters:RenderParameters",
     "Assets": "sim.assets:Assets",
     "stage": "sim.render.staging:stage",

@@ -19,7 +19,7 @@ import warnings
 from importlib.resources import files
 from pathlib import Path
 
-from flagdata.caches import user_cache
+from flagdata.core.files.caches import user_cache
 from flagdata.errors import UsageError
 
 _FLAGS = (

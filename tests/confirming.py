@@ -6,7 +6,7 @@ from flagdata.ingest import Accepting, Drafted
 
 
 class Confirming(Accepting):
-    """See `flagdata.ingest.anemometer.confirm.Confirm`."""
+    """See `flagdata.ingest.anemometer.log_confirmation.Confirm`."""
 
     def __call__(self, drafted: Drafted) -> str:
         return "in a test"

@@ -13,7 +13,7 @@ import hypothesis
 import pytest
 
 from flagdata.errors import NotFoundError
-from flagdata.lake import probing
+from flagdata.lake import place_probing
 from flagdata.storage import connection
 from sim.blender import environment
 from tests.evidence import REFERENCE
@@ -29,12 +29,12 @@ LONGEST = (
     "test_readme.py",
     "sim/datasets/test_build.py",
     "measure/loop/test_run.py",
-    "measure/propose/test_propose.py",
+    "measure/propose/test_term_search.py",
     "flagdata/lake/test_object_storage.py",
     "test_hostile.py",
     "flagdata/test_failing_calls.py",
     "docs/test_notebooks.py",
-    "models/training/test_command.py",
+    "models/training/test_train_command.py",
     "flagdata/lake/test_unfinished.py",
     "measure/loop/test_carried.py",
     "flagdata/lake/test_integrity.py",
@@ -100,7 +100,7 @@ def use_store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Calla
     def forget() -> None:
         connection.settings.cache_clear()
         connection._client.cache_clear()
-        probing.probe.cache_clear()
+        place_probing.probe.cache_clear()
 
     def use(address: str) -> None:
         forget()

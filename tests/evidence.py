@@ -11,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from flagdata.provenance import code_version
+from flagdata.core.provenance import code_version
 from flagdata.timebase import NANOSECONDS, iso
 
 REFERENCE = Path(os.environ.get("FLAGDATA_REFERENCE", Path(__file__).resolve().parents[2] / "shared" / "data"))

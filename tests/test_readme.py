@@ -18,10 +18,10 @@ from click.testing import CliRunner
 from PIL import Image, ImageSequence
 
 from docs.generate_example_picture import MOST_BYTES
-from flagdata.outputs import check_folder
+from flagdata.core.files.outputs import check_folder
 from measure.commands.measure import measure
 from measure.demo import MINUTES, RecordingRecipe, Story
-from measure.demo.command import SCHEMA
+from measure.demo.demo_command import SCHEMA
 from tests.docs.pages import Shell
 from tests.pools import Here
 from tests.program import invoke
@@ -56,7 +56,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         small = partial(RecordingRecipe, rate=25, columns=8, step=8e-3, width=240, rows=180, samples=1)
         patch.setattr("measure.demo.story.RecordingRecipe", small)
-        patch.setattr("measure.camera.ProcessPoolExecutor", Here)
+        patch.setattr("measure.simulated_camera.ProcessPoolExecutor", Here)
         patch.setattr("measure.demo.transcript.subprocess", SimpleNamespace(run=started, PIPE=subprocess.PIPE))
         Shell(patch=patch).run(f"flagdata demo --out {out}")
     return out

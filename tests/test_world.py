@@ -11,15 +11,15 @@ from click.testing import CliRunner
 
 import flagdata
 from flagdata.cli import root
-from measure.refine.command import LEARNED
-from models.targets import TARGETS, Scaling
+from measure.refine.refine_command import LEARNED
+from models.networks.targets import TARGETS, Scaling
 from models.training import TrainingRecipe, load, parse, prepare_films, sides_of
-from models.training.recipe import TRAININGS
+from models.training.training_recipe import TRAININGS
 from sim.assets import Assets
 from sim.datasets import DATASETS
 from sim.datasets import load as load_dataset
 from sim.render import named
-from sim.run.reading import SCENES
+from sim.run.simulation_toml import SCENES
 
 SIDE = 96
 """Of the small films [px]."""

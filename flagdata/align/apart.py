@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flagdata.findings import Finding
+from flagdata.core.findings import Finding
 from flagdata.timebase import NANOSECONDS, iso
 
 HOURS_APART = 1800.0

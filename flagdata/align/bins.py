@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtri
 
-from flagdata.align.motion import MotionSeries
-from flagdata.arrays import FloatArray
+from flagdata.align.film_motion import MotionSeries
+from flagdata.core.arrays import FloatArray
 from flagdata.errors import InputError
-from flagdata.signals import Instants, Series, WindAverage
+from flagdata.record.signals import Instants, Series, WindAverage
 from flagdata.timebase import NANOSECONDS
 
 STEPS = 10

@@ -16,8 +16,7 @@ from typing import Any, cast
 import numpy as np
 
 from flagdata.align.declared import by_stamps
-from flagdata.align.present import find_made, provenance
-from flagdata.align.recording import (
+from flagdata.align.film_recording import (
     MARGIN_AFTER,
     MARGIN_BEFORE,
     Alignment,
@@ -29,13 +28,14 @@ from flagdata.align.recording import (
     recorded,
     session_of,
 )
+from flagdata.align.present import find_made, provenance
+from flagdata.core.findings import Finding, Severity, quality_flags
+from flagdata.core.schema import Kind
 from flagdata.errors import UsageError
-from flagdata.findings import Finding, Severity, quality_flags
 from flagdata.lake import Artifact, Lake, Transaction
 from flagdata.record import RecordWriter
 from flagdata.record.metadata import PROVENANCE
-from flagdata.schema import Kind
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 from flagdata.timebase import NANOSECONDS, iso
 
 REPORT_SCHEMA = "flagdata.declared-wind-report/1"
@@ -102,7 +102,7 @@ def declared_recording(
 
     Args:
         recipe: what else the recording's identity depends on.
-        findings, parameters: see `flagdata.align.recording.Alignment`.
+        findings, parameters: see `flagdata.align.film_recording.Alignment`.
         name: what people call the recording; the camera's name if `None`.
         session: one set-up at one place; the camera's if `None`.
         progress: called with 1 for each frame copied.

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from flagdata.clock import ClockModel, Segment
+from flagdata.core.clock_model import ClockModel, Segment
 from flagdata.errors import InputError, UsageError
-from flagdata.signals import Instants
+from flagdata.record.signals import Instants
 from flagdata.timebase import NANOSECONDS
 
 QUARTZ = 3e-5

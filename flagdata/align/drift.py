@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flagdata.align.declared import PRIOR_DRIFT, QUARTZ
+from flagdata.align.film_motion import MotionSeries
 from flagdata.align.lag import LagEstimate, LagSearch, estimate_offset
-from flagdata.align.motion import MotionSeries
+from flagdata.core.findings import Finding
 from flagdata.errors import InputError
-from flagdata.findings import Finding
-from flagdata.signals import Series, WindAverage
+from flagdata.record.signals import Series, WindAverage
 from flagdata.timebase import NANOSECONDS
 
 PART = 600.0  # s

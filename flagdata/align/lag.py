@@ -34,12 +34,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flagdata.align.bins import STEPS, LagBins
-from flagdata.align.motion import MotionSeries
+from flagdata.align.film_motion import MotionSeries
 from flagdata.align.whitened import FEWEST_BINS, Whitened, fit, longest_compared
-from flagdata.clock import NINETY
+from flagdata.core.clock_model import NINETY
+from flagdata.core.findings import Finding, Severity
 from flagdata.errors import InputError
-from flagdata.findings import Finding, Severity
-from flagdata.signals import Series, WindAverage
+from flagdata.record.signals import Series, WindAverage
 
 _WIDEST = 7200.0  # s
 _WINDS_AT_ONCE = 25

@@ -23,15 +23,15 @@ import numpy as np
 
 from flagdata.align.declared import QUARTZ, stamp_sigma
 from flagdata.align.drift import FEWEST_PARTS, PART, ClockLine, line_through
+from flagdata.align.film_motion import MotionSeries
 from flagdata.align.lag import LagEstimate, LagSearch, estimate_offset
-from flagdata.align.motion import MotionSeries
 from flagdata.align.whitened import long_run_variance
 from flagdata.align.windbins import SHORTEST, lead, wind_bins
-from flagdata.averaging import average
-from flagdata.clock import ClockModel, Segment
+from flagdata.core.clock_model import ClockModel, Segment
+from flagdata.core.schema import UNUSABLE
 from flagdata.errors import InputError, RefusedError
-from flagdata.schema import UNUSABLE
-from flagdata.signals import Instants, Series, WindAverage, WindSeries
+from flagdata.record.averaging import average
+from flagdata.record.signals import Instants, Series, WindAverage, WindSeries
 from flagdata.timebase import NANOSECONDS
 
 WHOLE = 3600.0  # s over which the offset is searched first

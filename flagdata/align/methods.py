@@ -13,16 +13,16 @@ import numpy as np
 
 from flagdata.align.declared import by_stamps, given, stamp_sigma
 from flagdata.align.drift import ClockLine, clock_line
+from flagdata.align.film_motion import MotionSeries
+from flagdata.align.film_recording import Alignment, Pair
 from flagdata.align.lag import LagEstimate, LagSearch, estimate_offset
-from flagdata.align.motion import MotionSeries
-from flagdata.align.recording import Alignment, Pair
 from flagdata.align.windbins import wind_bins
-from flagdata.clock import NINETY, ClockModel, Segment
+from flagdata.core.clock_model import NINETY, ClockModel, Segment
+from flagdata.core.findings import Finding, Severity
+from flagdata.core.rng import stream
 from flagdata.errors import CorruptError, RefusedError, UsageError
-from flagdata.findings import Finding, Severity
 from flagdata.record.metadata import CAMERA
-from flagdata.rng import stream
-from flagdata.signals import WindAverage
+from flagdata.record.signals import WindAverage
 from flagdata.timebase import NANOSECONDS
 
 Progress = Callable[[int], object]

@@ -17,11 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from flagdata.align.declared import PRIOR_DRIFT, stamp_sigma
-from flagdata.arrays import IntArray
-from flagdata.clock import NINETY, ClockModel, Segment
+from flagdata.core.arrays import IntArray
+from flagdata.core.clock_model import NINETY, ClockModel, Segment
+from flagdata.core.findings import Finding
 from flagdata.errors import InputError
-from flagdata.findings import Finding
-from flagdata.signals import Instants, Series, WindSeries
+from flagdata.record.signals import Instants, Series, WindSeries
 from flagdata.timebase import NANOSECONDS, iso
 
 LEAST_JUMP = 0.1  # s; smaller steps are taken for delays

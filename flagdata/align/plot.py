@@ -13,10 +13,10 @@ from flagdata.align.bins import normal_scores
 from flagdata.align.drift import ClockLine
 from flagdata.align.lag import LagEstimate
 from flagdata.align.methods import Evidence
-from flagdata.clock import NINETY
+from flagdata.core.clock_model import NINETY
+from flagdata.core.files.outputs import check_file, write_file
 from flagdata.errors import InputError
-from flagdata.outputs import check_file, write_file
-from flagdata.signals import Series
+from flagdata.record.signals import Series
 from flagdata.timebase import NANOSECONDS, iso
 
 if TYPE_CHECKING:

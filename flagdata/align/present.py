@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from flagdata.core.provenance import canonical, recipe_hash
+from flagdata.core.schema import Kind
 from flagdata.errors import ConflictError
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.remaking import ABSENT, Present, present
-from flagdata.provenance import canonical, recipe_hash
-from flagdata.schema import Kind
 
 
 def find_made(

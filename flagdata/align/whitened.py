@@ -10,8 +10,8 @@ from scipy.linalg import solve_toeplitz
 from scipy.optimize import nnls
 
 from flagdata.align.bins import STEPS, LagBins
-from flagdata.arrays import FloatArray
-from flagdata.signals import Series
+from flagdata.core.arrays import FloatArray
+from flagdata.record.signals import Series
 
 _ORDER = 4  # of the autoregression; lower leaves noise correlated, higher follows it less certainly
 _WIDTHS = (1.0, 2.0, 4.0, 8.0)  # bins

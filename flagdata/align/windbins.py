@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flagdata.averaging import average
+from flagdata.core.schema import UNUSABLE
 from flagdata.errors import InputError
-from flagdata.schema import UNUSABLE
-from flagdata.signals import Sensor, WindAverage, WindSeries
+from flagdata.record.averaging import average
+from flagdata.record.signals import Sensor, WindAverage, WindSeries
 from flagdata.timebase import NANOSECONDS
 
 SHORTEST = 1.0  # s, of a bin: gusts that flag and sensor share are slower

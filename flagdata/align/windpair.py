@@ -14,14 +14,14 @@ from typing import Any
 
 from flagdata.align.logs import LogClock
 from flagdata.align.present import find_made, provenance
-from flagdata.clock import NINETY
+from flagdata.core.clock_model import NINETY
+from flagdata.core.schema import Kind
 from flagdata.errors import InputError, UsageError
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.remaking import Present, Remade
 from flagdata.record import Record, RecordWriter
 from flagdata.record.metadata import PROVENANCE
-from flagdata.schema import Kind
-from flagdata.signals import WindSeries
+from flagdata.record.signals import WindSeries
 from flagdata.timebase import iso
 
 REPORT_SCHEMA = "flagdata.align-logs-report/1"

@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from flagdata.console import LocalPath
+from flagdata.core.console import LocalPath
+from flagdata.core.parts import call
 from flagdata.errors import UsageError
-from flagdata.option_types import LISTED, POSITIVE
-from flagdata.options import argument, called, option, options
-from flagdata.parts import call
-from flagdata.shared_options import LAKE, AtVersion, OnLake
+from flagdata.verbs.option_types import LISTED, POSITIVE
+from flagdata.verbs.shared_options import LAKE, AtVersion, OnLake
+from flagdata.verbs.verb_options import argument, called, option, options
 
 if TYPE_CHECKING:
-    from flagdata.dataset.source import AnyLake
+    from flagdata.dataset.lake_source import AnyLake
+    from flagdata.lake.catalog_rows import Rows
     from flagdata.lake.refs import Ref
-    from flagdata.rows import Rows
 
 
 @options
@@ -63,7 +63,7 @@ def query(chosen: Querying) -> Rows:
         NotFoundError: no such lake, or no such version.
         LimitError: it takes longer, or gives more, than it may.
     """
-    from flagdata.dataset.source import opened
+    from flagdata.dataset.lake_source import opened
 
     own = {"sql": chosen.sql, "columns": chosen.columns, "order": chosen.order, "limit": chosen.limit}
     return opened(chosen.lake).query(chosen.where, at=chosen.at, **own)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from flagdata.arguments import checked
-from flagdata.dataset.source import AnyLake, Source, opened
+from flagdata.core.arguments import checked
+from flagdata.dataset.lake_source import AnyLake, Source, opened
 from flagdata.storage import Place
 
 if TYPE_CHECKING:

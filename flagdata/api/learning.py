@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from flagdata.addresses import lake_place
-from flagdata.caches import beside
-from flagdata.console import LocalPath
-from flagdata.option_types import POSITIVE, STATED
-from flagdata.options import argument, called, option, options
-from flagdata.parts import attribute
-from flagdata.shared_options import AtVersion, Computed, OnBranch, OnLake, Shared
+from flagdata.core.console import LocalPath
+from flagdata.core.files.addresses import lake_place
+from flagdata.core.files.caches import beside
+from flagdata.core.parts import attribute
+from flagdata.verbs.option_types import POSITIVE, STATED
+from flagdata.verbs.shared_options import AtVersion, Computed, OnBranch, OnLake, Shared
+from flagdata.verbs.verb_options import argument, called, option, options
 
 if TYPE_CHECKING:
+    from flagdata.core.stated import Stated
     from flagdata.lake import Lake
-    from flagdata.stated import Stated
 
 JUDGED, MORE = "What is judged", "More in the table"
 
@@ -72,7 +72,7 @@ def build(chosen: Building) -> Mapping[str, Any]:
         UnknownNameError: no such recipe or renderer.
         UsageError: options that contradict each other.
     """
-    return attribute("sim.datasets.command:build").result(chosen)
+    return attribute("sim.datasets.build_command:build").result(chosen)
 
 
 @options
@@ -131,7 +131,7 @@ def train(chosen: Training) -> Mapping[str, Any]:
         RefusedError: the sides of the data set leak, or one is empty.
         UnknownNameError: no such recipe, or the lake has no such data set.
     """
-    return attribute("models.training.command:train").result(chosen)
+    return attribute("models.training.train_command:train").result(chosen)
 
 
 @options
@@ -197,4 +197,4 @@ def evaluate(chosen: Evaluating) -> Mapping[str, Any]:
         RefusedError: a clip that a network has learned from.
         UnknownNameError: no such network or data set.
     """
-    return attribute("models.evaluation.command:evaluate").result(chosen)
+    return attribute("models.evaluation.evaluate_command:evaluate").result(chosen)

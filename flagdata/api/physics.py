@@ -10,15 +10,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flagdata.option_types import POSITIVE
-from flagdata.options import argument, called, option, options
-from flagdata.parts import call
-from flagdata.shared_options import Computed
+from flagdata.core.parts import call
+from flagdata.verbs.option_types import POSITIVE
+from flagdata.verbs.shared_options import Computed
+from flagdata.verbs.verb_options import argument, called, option, options
 
 if TYPE_CHECKING:
-    from flagdata.film_array import Frames
-    from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence
-    from flagdata.simulated import Simulated
+    from flagdata.answer.simulated import Simulated
+    from flagdata.ingest.films.film_array import Frames
+    from flagdata.lake.mesh_sequences import MeshSequence, RaggedMeshSequence
 
 _TABLES = ("scene", "material", "wind", "contact", "limits", "remeshing", "integrator", "time", "effects")
 _TABLE = "Entries of the recipe's table [{}], SI and radians; each replaces the recipe's entry of the same key."
@@ -82,7 +82,7 @@ def simulate(chosen: Simulating) -> Simulated:
     given = {name: value for name in names if (value := getattr(chosen, name)) is not None}
     source = str(chosen.recipe) if isinstance(chosen.recipe, Path) else chosen.recipe
     workers = chosen.processes if chosen.workers is None else chosen.workers
-    return call("sim.run.arrays:simulated", source, given, device=chosen.device, workers=workers)
+    return call("sim.run.simulate_call:simulated", source, given, device=chosen.device, workers=workers)
 
 
 @options
@@ -126,7 +126,7 @@ def render(chosen: Rendering) -> Frames:
     """
     size = {"width": chosen.width, "height": chosen.height}
     return call(
-        "sim.render.film:rendered",
+        "sim.render.render_call:rendered",
         chosen.sequence,
         look=chosen.look,
         parameters={**size, **(chosen.parameters or {})},

@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from flagdata.console import LocalPath
-from flagdata.option_types import DURATION
-from flagdata.options import argument, called, option, options
-from flagdata.parts import call
-from flagdata.shared_options import RECORDING, NamedRecording, OnBranch, OnLake, Rehearsed
+from flagdata.core.console import LocalPath
+from flagdata.core.parts import call
+from flagdata.verbs.option_types import DURATION
+from flagdata.verbs.shared_options import RECORDING, NamedRecording, OnBranch, OnLake, Rehearsed
+from flagdata.verbs.verb_options import argument, called, option, options
 
 if TYPE_CHECKING:
     from flagdata.align.methods import ClockOptions
-    from flagdata.ingest.store import IngestResult
+    from flagdata.ingest.source_artifacts import IngestResult
 
 CLOCK = "The clock"
 

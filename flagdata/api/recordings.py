@@ -7,21 +7,21 @@ from pathlib import Path
 
 import numpy as np
 
-from flagdata.addresses import local_path
-from flagdata.arguments import checked
-from flagdata.arrays import UInt8Array
-from flagdata.dataset.source import AnyLake, opened
+from flagdata.answer.film_series import Motion, Wind
+from flagdata.core.arguments import checked
+from flagdata.core.arrays import UInt8Array
+from flagdata.core.files.addresses import local_path
+from flagdata.core.findings import Finding
+from flagdata.core.schema import Kind
+from flagdata.dataset.lake_source import AnyLake, opened
 from flagdata.errors import InputError, NotFoundError
 from flagdata.examples import example_of
-from flagdata.film import Film
-from flagdata.film_array import Frames, collected
-from flagdata.findings import Finding
+from flagdata.ingest.films.film import Film
+from flagdata.ingest.films.film_array import Frames, collected
+from flagdata.ingest.films.named_films import film_at, named
 from flagdata.lake import Lake
-from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence, read_meshes
-from flagdata.schema import Kind
-from flagdata.series import Motion, Wind
-from flagdata.signals import WindSeries
-from flagdata.sources import film_at, named
+from flagdata.lake.mesh_sequences import MeshSequence, RaggedMeshSequence, read_meshes
+from flagdata.record.signals import WindSeries
 from flagdata.timebase import NANOSECONDS
 
 _BLOWN = (Kind.RECORDING, Kind.WIND)
@@ -60,9 +60,9 @@ def wind(
         UnconfirmedError: nobody confirmed how a file without a recipe is read.
         ZoneMissingError: wall-clock stamps whose zone nobody gave.
     """
+    from flagdata.core.provenance import file_hash
     from flagdata.ingest.anemometer import WindOptions, read_log
-    from flagdata.ingest.anemometer.confirm import Accepting, confirmed
-    from flagdata.provenance import file_hash
+    from flagdata.ingest.anemometer.log_confirmation import Accepting, confirmed
     from flagdata.record import Record
 
     example = example_of(source)
@@ -141,7 +141,7 @@ def motion(
         NotFoundError: no such film or lake.
         InputError: a file that is no film, or fewer than two frames.
     """
-    from flagdata.align.motion import motion_energy
+    from flagdata.align.film_motion import motion_energy
 
     film = source if isinstance(source, Frames) else _film(source, lake=lake, at=at)
 

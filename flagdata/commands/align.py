@@ -9,15 +9,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flagdata.api.recording_verbs import Aligning, ByClock, Realigning
-from flagdata.console import LocalPath, document, echo, progress, say, say_finding
-from flagdata.options import AsJson, command, option, options
-from flagdata.printable import SHORT
+from flagdata.core.console import LocalPath, document, echo, progress, say, say_finding
+from flagdata.core.printable import SHORT
 from flagdata.timebase import NANOSECONDS
+from flagdata.verbs.verb_options import AsJson, command, option, options
 
 if TYPE_CHECKING:
+    from flagdata.align.film_recording import Pair, RecordingResult
     from flagdata.align.logs import LogClock
     from flagdata.align.methods import ClockOptions, Outcome
-    from flagdata.align.recording import Pair, RecordingResult
     from flagdata.lake import Artifact, Lake
     from flagdata.lake.remaking import Remade
 
@@ -102,7 +102,7 @@ def realigned(chosen: Realigning, *, plot: Path | None = None) -> Report:
     Raises:
         FlagdataError: see `flagdata.realign`.
     """
-    from flagdata.align.recording import Pair, parents_of, truth_recipe, truth_window
+    from flagdata.align.film_recording import Pair, parents_of, truth_recipe, truth_window
 
     lake, clock = _opened(chosen, plot)
     old, parents = parents_of(lake, chosen.recording, at=chosen.branch)
@@ -123,8 +123,8 @@ def aligned(chosen: Aligning, *, plot: Path | None = None) -> Report:
     Raises:
         FlagdataError: see `flagdata.align`.
     """
-    from flagdata.align.recording import Pair, truth_recipe
-    from flagdata.schema import TRUTH_WINDOW, Kind
+    from flagdata.align.film_recording import Pair, truth_recipe
+    from flagdata.core.schema import TRUTH_WINDOW, Kind
 
     lake, clock = _opened(chosen, plot)
     devices = (Kind.CAMERA, Kind.WIND)
@@ -168,9 +168,9 @@ def _of_logs(chosen: Aligning, lake: Lake, clock: ClockOptions, *, unused: tuple
     from flagdata.align.logs import log_clock
     from flagdata.align.methods import Method
     from flagdata.align.windpair import WindPair, find_aligned, make_aligned
+    from flagdata.core.rng import stream
     from flagdata.errors import UsageError
     from flagdata.lake.remaking import ABSENT
-    from flagdata.rng import stream
 
     if clock.by is not Method.ESTIMATE:
         raise UsageError(f"two logs aligned by {clock.by}", where="--by", fix="leave --by out: they are compared")
@@ -229,7 +229,7 @@ def _logs_report(made: Artifact | None, found: LogClock | None, *, created: bool
 
 def sentence(found: LogClock) -> str:
     """Offset and drift of the sensor's clock, and its gain, each with its 90 % interval or σ."""
-    from flagdata.clock import NINETY
+    from flagdata.core.clock_model import NINETY
 
     (segment,), gain = found.model.segments, found.gain
     half = NINETY * segment.sigma_offset
@@ -271,7 +271,7 @@ def _of_film(
     session: str | None,
 ) -> Report:
     """Makes the recording of a film and a wind, unless it is there."""
-    from flagdata.align.recording import find_recording, make_recording, session_of
+    from flagdata.align.film_recording import find_recording, make_recording, session_of
 
     session_of(pair, session_given=session)  # refused before the long part
     _warn_of_clocks(pair, clock)
@@ -335,7 +335,7 @@ def _report(made: RecordingResult | None, outcome: Outcome | None) -> Report:
 
 def _sentence(outcome: Outcome) -> str:
     """`offset +12.31 s [12.02, 12.60] 90 %, confidence 0.99, n = 596 bins of 1 s`."""
-    from flagdata.clock import NINETY
+    from flagdata.core.clock_model import NINETY
 
     (segment,) = outcome.alignment.clock.segments
     half = NINETY * segment.sigma_offset

@@ -5,8 +5,8 @@ from __future__ import annotations
 import click
 from click.shell_completion import BashComplete, FishComplete, ZshComplete
 
-from flagdata.console import document, echo_lines, say
-from flagdata.options import AsJson, argument, command, options
+from flagdata.core.console import document, echo_lines, say
+from flagdata.verbs.verb_options import AsJson, argument, command, options
 
 _SHELLS = {"bash": BashComplete, "zsh": ZshComplete, "fish": FishComplete}
 _WHERE = {

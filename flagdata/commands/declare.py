@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from flagdata.console import echo, progress
-from flagdata.options import Result, argument, option, options, verb
-from flagdata.shared_options import RECORDING, NamedRecording, OnBranch, OnLake
+from flagdata.core.console import echo, progress
+from flagdata.verbs.shared_options import RECORDING, NamedRecording, OnBranch, OnLake
+from flagdata.verbs.verb_options import Result, argument, option, options, verb
 
 
 @options
@@ -26,7 +26,7 @@ def declare(chosen: Declaring) -> Iterator[Result]:
     wind becomes a wind artifact of its own, and recording and clips bear the quality flag wind-declared.
     """
     from flagdata.align.constant import ConstantWind, declared_recording
-    from flagdata.schema import Kind
+    from flagdata.core.schema import Kind
 
     wind = ConstantWind(speed=chosen.speed, sigma=chosen.sigma)
     lake = chosen.opened()

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from flagdata.addresses import local_path
-from flagdata.console import LocalPath, echo, in_steps, progress
-from flagdata.options import Result, argument, option, options, verb
-from flagdata.shared_options import OnBranch, OnLake
+from flagdata.core.console import LocalPath, echo, in_steps, progress
+from flagdata.core.files.addresses import local_path
+from flagdata.verbs.shared_options import OnBranch, OnLake
+from flagdata.verbs.verb_options import Result, argument, option, options, verb
 
 
 @options
@@ -36,11 +36,11 @@ def declare_cloths(chosen: DeclaringCloths) -> Iterator[Result]:
       flagdata declare-cloths fabrics.csv --lake lake
       flagdata query --where "kind = 'clip' and session = 'felt'" --lake lake
     """
-    from flagdata.align.cloth import cloth_recording
+    from flagdata.align.cloth_recording import cloth_recording
     from flagdata.ingest.camera import CameraOptions, parse_crop
-    from flagdata.ingest.camera.start import UNKNOWN
-    from flagdata.ingest.cloths import read_cloths
-    from flagdata.ingest.store import CameraIngest, Labels, ingest_camera
+    from flagdata.ingest.camera.recording_start import UNKNOWN
+    from flagdata.ingest.cloth_films import read_cloths
+    from flagdata.ingest.source_artifacts import CameraIngest, Labels, ingest_camera
     from flagdata.lake.merging import added_since
 
     box, branch = parse_crop(chosen.crop), chosen.branch

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from flagdata.api.lake_verbs import Exporting
-from flagdata.console import document, echo, progress, say
-from flagdata.options import AsJson, command, options
+from flagdata.core.console import document, echo, progress, say
+from flagdata.verbs.verb_options import AsJson, command, options
 
 
 @options
@@ -51,9 +51,9 @@ def exported(chosen: Exporting) -> Mapping[str, Any]:
     Raises:
         FlagdataError: see `flagdata.export`.
     """
-    from flagdata.dataset.source import opened
+    from flagdata.core.files.outputs import check_folder
+    from flagdata.dataset.lake_source import opened
     from flagdata.export import Export, prepare
-    from flagdata.outputs import check_folder
 
     target = Path(chosen.to)
     check_folder(target)

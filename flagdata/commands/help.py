@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import click
 
-from flagdata.console import print_help
+from flagdata.core.console import print_help
 from flagdata.errors import UnknownNameError
-from flagdata.options import AsJson, argument, command, options
+from flagdata.verbs.verb_options import AsJson, argument, command, options
 
 
 @options

@@ -10,12 +10,12 @@ from typing import Any, ClassVar
 import click
 
 from flagdata.api.recording_verbs import SOURCE, FromAnemometer, FromCamera, FromFrames, Ingesting
-from flagdata.commands.confirm import on_command_line
+from flagdata.commands.confirm_recipe import on_command_line
 from flagdata.commands.ingest_options import SNIFF, IngestRequest
 from flagdata.commands.ingest_sources import ingest_sources, sniff_sources
-from flagdata.console import LocalPath
+from flagdata.core.console import LocalPath
 from flagdata.errors import UsageError
-from flagdata.options import AsJson, LongCommand, argument, command, described, option, options, typed
+from flagdata.verbs.verb_options import AsJson, LongCommand, argument, command, described, option, options, typed
 
 
 @options

@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 from flagdata.api.recording_verbs import Clocked, FromAnemometer, FromCamera, FromFrames, Recorded, Scaled
 from flagdata.errors import TimeError, UsageError
-from flagdata.option_types import written_seconds
-from flagdata.options import described, typed
+from flagdata.verbs.option_types import written_seconds
+from flagdata.verbs.verb_options import described, typed
 
 if TYPE_CHECKING:
     from datetime import tzinfo
 
-    from flagdata.ingest.anemometer.confirm import Confirm
+    from flagdata.ingest.anemometer.log_confirmation import Confirm
     from flagdata.ingest.markers import MarkerOptions
-    from flagdata.ingest.meshes.store import MeshIngest
-    from flagdata.ingest.store import CameraIngest, Labels, WindIngest
+    from flagdata.ingest.meshes.mesh_artifacts import MeshIngest
+    from flagdata.ingest.source_artifacts import CameraIngest, Labels, WindIngest
 
 KINDS: dict[str, tuple[str, type]] = {
     "camera": ("a camera file", FromCamera),
@@ -89,8 +89,8 @@ class IngestRequest:
             UsageError: a value that cannot be read, or options that contradict each other.
         """
         from flagdata.ingest.markers import MarkerOptions
-        from flagdata.ingest.meshes.store import MeshIngest
-        from flagdata.ingest.store import CameraIngest, Labels, WindIngest
+        from flagdata.ingest.meshes.mesh_artifacts import MeshIngest
+        from flagdata.ingest.source_artifacts import CameraIngest, Labels, WindIngest
 
         several = chosen.sources
         sources = (Path(several),) if isinstance(several, Path | str) else tuple(map(Path, several))
@@ -119,7 +119,7 @@ class IngestRequest:
 
 
 def _check_picture(chosen: FromCamera) -> None:
-    from flagdata.outputs import check_file
+    from flagdata.core.files.outputs import check_file
 
     if chosen.crop_picture is None:
         return
@@ -139,8 +139,8 @@ def camera_options(chosen: FromCamera, chapters: tuple[Path, ...] = ()) -> Camer
     """
     from flagdata import timebase
     from flagdata.ingest.camera import CameraOptions, parse_crop
-    from flagdata.ingest.camera.start import UNKNOWN
-    from flagdata.ingest.store import CameraIngest
+    from flagdata.ingest.camera.recording_start import UNKNOWN
+    from flagdata.ingest.source_artifacts import CameraIngest
     from flagdata.record import Coding
 
     start, zone, rate = chosen.start, chosen.zone, chosen.rate or "25"
@@ -185,9 +185,9 @@ def wind_options(chosen: FromAnemometer) -> WindIngest:
     import datetime as dt
 
     from flagdata import timebase
+    from flagdata.core.units import unit as unit_of
     from flagdata.ingest.anemometer import WindOptions
-    from flagdata.ingest.store import WindIngest
-    from flagdata.units import unit as unit_of
+    from flagdata.ingest.source_artifacts import WindIngest
 
     start, date, unit, rate = chosen.start, chosen.date, chosen.unit, chosen.rate
     try:
@@ -262,7 +262,7 @@ def _number(text: str, option: str, wanted: str) -> float:
 
 def _check_unit(kinds: Sequence[str | None], name: str | None) -> None:
     """Refuse a unit that is one of no source's: of speed for a log, of length for meshes and markers."""
-    from flagdata.units import unit
+    from flagdata.core.units import unit
 
     wanted = {"anemometer": "m/s", "meshes": "m", "markers": "m"}
     needed = {wanted[kind] for kind in kinds if kind in wanted}
@@ -275,7 +275,7 @@ def _check_unit(kinds: Sequence[str | None], name: str | None) -> None:
 
 def _length_unit(name: str | None) -> str:
     """Returns the unit of positions: metres where none is given, or one of speed for a log beside."""
-    from flagdata.units import unit
+    from flagdata.core.units import unit
 
     return "m" if name is None or unit(name, where="--unit").si == "m/s" else name
 

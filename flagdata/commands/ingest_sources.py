@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from flagdata.api.recording_verbs import FromCamera, Ingesting
 from flagdata.commands.ingest_options import KINDS, IngestRequest, check_applies
-from flagdata.console import document, echo, echo_lines, fail, progress, say
+from flagdata.core.console import document, echo, echo_lines, fail, progress, say
+from flagdata.core.findings import Finding
+from flagdata.core.shell import command_line
 from flagdata.errors import FlagdataError, InputError, UsageError
-from flagdata.findings import Finding
-from flagdata.shell import command_line
 
 if TYPE_CHECKING:
     from flagdata.ingest.anemometer import Guess
-    from flagdata.ingest.anemometer.confirm import Answers
-    from flagdata.ingest.store import IngestResult
+    from flagdata.ingest.anemometer.log_confirmation import Answers
+    from flagdata.ingest.source_artifacts import IngestResult
     from flagdata.lake import Lake
 
 _ONCE = frozenset({"why", "note"})
@@ -202,8 +202,8 @@ def ingested(chosen: Ingesting) -> tuple[IngestResult, ...]:
     Raises:
         FlagdataError: see `flagdata.ingest`.
     """
-    from flagdata.dataset.source import opened
-    from flagdata.ingest.anemometer.confirm import Accepting
+    from flagdata.dataset.lake_source import opened
+    from flagdata.ingest.anemometer.log_confirmation import Accepting
 
     lake = opened(chosen.lake).lake
     lake.check_writable()
@@ -397,9 +397,9 @@ def _exit_on(failures: Sequence[tuple[Path, FlagdataError]], sources: Sequence[P
 
 def _one(lake: Lake, source: Path, kind: Guess, given: IngestRequest) -> tuple[IngestResult, ...]:
     """Artifacts of a source: of a table of markers one a recording, of any other one."""
-    from flagdata.ingest.markers.store import ingest_markers
+    from flagdata.ingest.markers.marker_artifacts import ingest_markers
     from flagdata.ingest.records import ingest_record
-    from flagdata.ingest.store import ingest_camera
+    from flagdata.ingest.source_artifacts import ingest_camera
 
     if kind.kind == "record":
         return (ingest_record(lake, source, labels=given.labels, branch=given.chosen.branch),)
@@ -444,7 +444,7 @@ def _winds(lake: Lake, source: Path, given: IngestRequest) -> tuple[IngestResult
         NothingMeasuredError: no value of any of them can be used.
     """
     from flagdata.ingest.anemometer import anemometers
-    from flagdata.ingest.store import IngestResult, ingest_wind, ingest_winds
+    from flagdata.ingest.source_artifacts import IngestResult, ingest_wind, ingest_winds
 
     found = anemometers(source, given.wind.wind)
     stem = given.labels.name or source.name.removesuffix(".gz").rpartition(".")[0] or source.name
@@ -479,7 +479,7 @@ def _winds(lake: Lake, source: Path, given: IngestRequest) -> tuple[IngestResult
 
 
 def _meshes(lake: Lake, source: Path, kind: Guess, given: IngestRequest) -> IngestResult:
-    from flagdata.ingest.meshes.store import ingest_meshes
+    from flagdata.ingest.meshes.mesh_artifacts import ingest_meshes
 
     with progress(None, label=source.name, unit="mesh") as advance:
         return ingest_meshes(
@@ -520,7 +520,7 @@ class _CropPicture:
             ConflictError: another file is there.
             FlagdataError: the disk refuses it.
         """
-        from flagdata.outputs import write_file
+        from flagdata.core.files.outputs import write_file
 
         if self._path is None:
             return

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from flagdata.console import echo
+from flagdata.core.console import echo
+from flagdata.core.printable import counted
 from flagdata.errors import UsageError
-from flagdata.options import Result, argument, options, verb
-from flagdata.printable import counted
-from flagdata.shared_options import OnBranch, OnLake, Reasoned
+from flagdata.verbs.shared_options import OnBranch, OnLake, Reasoned
+from flagdata.verbs.verb_options import Result, argument, options, verb
 
 
 @options

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flagdata.console import LocalPath, document, echo, say, table
+from flagdata.core.console import LocalPath, document, echo, say, table
+from flagdata.core.printable import SHORT, printable, size_text
 from flagdata.errors import UsageError
-from flagdata.options import AsJson, Result, argument, command, option, options, verb
-from flagdata.printable import SHORT, printable, size_text
-from flagdata.shared_options import AtVersion, InFull, OfGarbage, OnLake
+from flagdata.verbs.shared_options import AtVersion, InFull, OfGarbage, OnLake
+from flagdata.verbs.verb_options import AsJson, Result, argument, command, option, options, verb
 
 if TYPE_CHECKING:
     from flagdata.lake.ancestry import Ancestry, Line, Relative
@@ -37,10 +37,10 @@ class Tracing(InFull, AtVersion, OnLake):
 @verb(Tracing, example='flagdata.lineage("flag", lake="field.lake")["edges"]')
 def lineage(chosen: Tracing) -> Iterator[Result]:
     """Show what an artifact was made from and what was made from it, over all generations."""
+    from flagdata.core.files.outputs import check_file, write_file
     from flagdata.lake.ancestry import ancestry
-    from flagdata.outputs import check_file, write_file
-    from flagdata.pages.lineage import MOST, graph
-    from flagdata.pages.lineage import picture as drawn
+    from flagdata.pages.lineage_picture import MOST, graph
+    from flagdata.pages.lineage_picture import picture as drawn
 
     picture, details = chosen.picture, chosen.details
     kind = "" if picture is None else picture.suffix.lower()
@@ -86,7 +86,7 @@ def _tree_line(line: Line, *, details: bool) -> str:
 
 
 def _relative(relative: Relative, *, details: bool) -> str:
-    from flagdata.pages.lineage import detail_lines
+    from flagdata.pages.lineage_picture import detail_lines
 
     if relative.kind is None:
         return f"{relative.artifact[:SHORT]} not at this version"

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flagdata.api.lake_verbs import Querying
-from flagdata.cells import plain
-from flagdata.console import LocalPath, csv_rows, document, say, table
+from flagdata.core.console import LocalPath, csv_rows, document, say, table
+from flagdata.core.printable import SHORT
 from flagdata.errors import UsageError
-from flagdata.options import AsJson, command, option, options
-from flagdata.printable import SHORT
-from flagdata.sql_process import sql_process
+from flagdata.lake.catalog_cells import plain
+from flagdata.lake.sql_process import sql_process
 from flagdata.timebase import iso
+from flagdata.verbs.verb_options import AsJson, command, option, options
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -100,9 +100,9 @@ def query(chosen: QueryCommand) -> None:
         _describe(as_json=chosen.as_json)
         return
     sql_process()  # starts while the lake is read
-    from flagdata.dataset.source import opened
+    from flagdata.core.files.outputs import check_file
+    from flagdata.dataset.lake_source import opened
     from flagdata.lake.selection import Request, Selection
-    from flagdata.outputs import check_file
 
     if chosen.arrow is not None:
         check_file(chosen.arrow)
@@ -139,7 +139,7 @@ def write_arrow(selection: Selection, path: Path) -> int:
     """
     import pyarrow as pa
 
-    from flagdata.outputs import fresh_file
+    from flagdata.core.files.outputs import fresh_file
 
     count = 0
     with fresh_file(path) as scratch:

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
-from flagdata.console import echo, progress, say, say_finding
-from flagdata.options import Result, argument, options, verb
-from flagdata.printable import counted, size_text
-from flagdata.shared_options import OnLake
+from flagdata.core.console import echo, progress, say, say_finding
+from flagdata.core.printable import counted, size_text
+from flagdata.verbs.shared_options import OnLake
+from flagdata.verbs.verb_options import Result, argument, options, verb
 
 if TYPE_CHECKING:
     from flagdata.lake.copying import Transfer

@@ -6,16 +6,16 @@ from collections.abc import Iterator, Sequence
 from datetime import timedelta
 from pathlib import Path
 
-from flagdata.addresses import local_path
-from flagdata.console import LocalPath, echo, progress, say, table
+from flagdata.core.console import LocalPath, echo, progress, say, table
+from flagdata.core.files.addresses import local_path
+from flagdata.core.files.regular_files import check_input
+from flagdata.core.findings import Finding, Severity
+from flagdata.core.printable import counted, size_text
 from flagdata.errors import UsageError
-from flagdata.files import check_input
-from flagdata.findings import Finding, Severity
-from flagdata.option_types import DURATION, POSITIVE
-from flagdata.options import Result, argument, option, options, verb
-from flagdata.printable import counted, size_text
-from flagdata.shared_options import OfGarbage, OnLake, Reasoned, Rehearsed
 from flagdata.timebase import iso
+from flagdata.verbs.option_types import DURATION, POSITIVE
+from flagdata.verbs.shared_options import OfGarbage, OnLake, Reasoned, Rehearsed
+from flagdata.verbs.verb_options import Result, argument, option, options, verb
 
 _GATE_NOT_MET = 3
 
@@ -66,12 +66,12 @@ def doctor(chosen: Examining) -> Iterator[Result]:
             raise UsageError("--deep cannot be combined with a SOURCE", fix="leave it out: stamps are all that is read")
         yield from _examining(local_path(chosen.source))
         return
+    from flagdata.core.schema import Kind
     from flagdata.ingest.before import unconfirmed
     from flagdata.lake import Artifact
     from flagdata.lake.health import catalog_files, read_refs
     from flagdata.lake.health import doctor as examined
     from flagdata.lake.health import verify as verified
-    from flagdata.schema import Kind
 
     lake = chosen.opened()
     findings = examined(lake, grace=timedelta(seconds=chosen.grace))
@@ -235,8 +235,8 @@ def recover(chosen: Recovering) -> Iterator[Result]:
 
     SOURCE is an .mcap file or an object of the lake (mcap/…); all that can be read goes to the new file TARGET.
     """
+    from flagdata.core.files.outputs import fresh_file
     from flagdata.lake.artifact import OBJECT_NAME
-    from flagdata.outputs import fresh_file
     from flagdata.record import salvage
 
     source, target = str(chosen.source), local_path(chosen.target)

@@ -15,18 +15,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
+from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from flagdata.dataset.cache import DecodedCache
     from flagdata.dataset.clips import clip_rows
+    from flagdata.dataset.lake_source import Source
     from flagdata.dataset.loader import PairLoader
+    from flagdata.dataset.pair_table import COLUMNS, PairTable
     from flagdata.dataset.pairs import Pairs
     from flagdata.dataset.sample import Batch, Sample, collate
     from flagdata.dataset.sides import SideSize
-    from flagdata.dataset.source import Source
     from flagdata.dataset.splits import ExplicitSplit, HashedSplit
-    from flagdata.dataset.table import COLUMNS, PairTable
     from flagdata.dataset.tolerance import Refusal, Tolerance
     from flagdata.dataset.truth import TruthSeries, WindTruth
 

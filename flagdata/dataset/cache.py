@@ -20,12 +20,12 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from flagdata.addresses import local_path
-from flagdata.arguments import checked
-from flagdata.arrays import UInt8Array
-from flagdata.documents import from_json
+from flagdata.core.arguments import checked
+from flagdata.core.arrays import UInt8Array
+from flagdata.core.files.addresses import local_path
+from flagdata.core.files.regular_files import is_beside
 from flagdata.errors import FlagdataError, UsageError
-from flagdata.files import is_beside
+from flagdata.recipes.documents import from_json
 
 _FORMAT = "flagdata.decoded/1"
 _SUFFIX = ".clip"

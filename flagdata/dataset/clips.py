@@ -10,15 +10,15 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from flagdata import provenance
-from flagdata.arguments import checked
-from flagdata.clock import ClockModel
+from flagdata.core import provenance
+from flagdata.core.arguments import checked
+from flagdata.core.clock_model import ClockModel
+from flagdata.core.schema import CLIP_FRAMES, TRUTH_WINDOW, Kind
 from flagdata.dataset.truth import TruthSeries, WindTruth, over_ground
 from flagdata.errors import InputError, UsageError
 from flagdata.lake import Artifact
 from flagdata.record import Record
-from flagdata.schema import CLIP_FRAMES, TRUTH_WINDOW, Kind
-from flagdata.signals import Instants
+from flagdata.record.signals import Instants
 from flagdata.timebase import NANOSECONDS
 
 FRAME_GAP = 1.5  # frame periods; a clip never spans a longer step

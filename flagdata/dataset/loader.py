@@ -15,11 +15,11 @@ import numpy as np
 import torch
 from torch.utils.data import DataLoader, Dataset
 
-from flagdata.arguments import checked, whole
-from flagdata.arrays import IntArray
+from flagdata.core.arguments import checked, whole
+from flagdata.core.arrays import IntArray
+from flagdata.core.rng import stream
 from flagdata.dataset.sample import Batch, Sample, collate
 from flagdata.errors import RefusedError, UsageError
-from flagdata.rng import stream
 
 Order: TypeAlias = Literal["shuffled", "stored"]
 Last: TypeAlias = Literal["keep", "drop"]

@@ -9,15 +9,15 @@ from typing import Any
 
 import torch
 
-from flagdata.arguments import checked
-from flagdata.arrays import FloatArray, UInt8Array
+from flagdata.core.arguments import checked
+from flagdata.core.arrays import FloatArray, UInt8Array
+from flagdata.core.html import table
+from flagdata.core.printable import SHORT
 from flagdata.dataset.cache import DecodedCache
 from flagdata.dataset.loader import Batchable, Last, Memory, Order, PairLoader, RunIn
+from flagdata.dataset.pair_table import PairTable
 from flagdata.dataset.sample import Sample
-from flagdata.dataset.table import PairTable
 from flagdata.dataset.tolerance import Refusal
-from flagdata.html import table
-from flagdata.printable import SHORT
 from flagdata.record import Record
 from flagdata.storage import Place
 from flagdata.timebase import NANOSECONDS

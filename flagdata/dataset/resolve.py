@@ -11,21 +11,21 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.schema import TRUTH_WINDOW
+from flagdata.dataset.clip_lineage import superseded
 from flagdata.dataset.clips import TRUTH_SPEED, clip_truth, truth_series
-from flagdata.dataset.lineage import superseded
+from flagdata.dataset.pair_table import COLUMNS, PairTable
 from flagdata.dataset.sides import SideSize, SplitBy, clips_of, divide, lineage_of
-from flagdata.dataset.table import COLUMNS, PairTable
 from flagdata.dataset.tagged import hashed_split
 from flagdata.dataset.tolerance import Refusal, Tolerance, judge
-from flagdata.documents import column_json
 from flagdata.errors import NotFoundError, RefusedError, UsageError
 from flagdata.lake import Lake
 from flagdata.lake.lineage import labels_of
 from flagdata.lake.matching import Where
 from flagdata.lake.rowfiles import Scan
+from flagdata.recipes.documents import column_json
 from flagdata.record import Record
-from flagdata.schema import TRUTH_WINDOW
 
 
 @dataclass(frozen=True, kw_only=True)

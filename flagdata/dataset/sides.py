@@ -15,13 +15,13 @@ from typing import Any, Literal, TypeAlias
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from flagdata.dataset.lineage import origins_of
+from flagdata.core.schema import Kind
+from flagdata.dataset.clip_lineage import origins_of
 from flagdata.dataset.splits import DEFAULT_FRACTIONS, ExplicitSplit, HashedSplit, Origin, groups, refuse_leaks
 from flagdata.errors import RefusedError, UnknownNameError
 from flagdata.lake.matching import Where, condition
 from flagdata.lake.rowfiles import Scan
 from flagdata.lake.selection import Request, Selection
-from flagdata.schema import Kind
 
 _LOG = logging.getLogger("flagdata")
 COLUMNS = ("artifact", "kind", "recording", "session", "seed", "day", "dataset", "side")

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from flagdata.arrays import IntArray
+from flagdata.core.arrays import IntArray
 from flagdata.errors import RefusedError, UsageError
 from flagdata.lake.matching import Where
 

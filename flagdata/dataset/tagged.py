@@ -9,10 +9,10 @@ import pyarrow.compute as pc
 
 from flagdata.dataset.sides import Catalog, clips_of, hashed_sides, stated_sides
 from flagdata.dataset.splits import HashedSplit
-from flagdata.documents import from_json
 from flagdata.errors import CorruptError, UsageError
 from flagdata.lake import Lake
 from flagdata.lake.refs import Ref
+from flagdata.recipes.documents import from_json
 
 NOTE = "split"
 """Note of a tag that states how clips are divided, JSON: "stated" by data sets, and "hashed" where they state nothing;

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flagdata.dataset.table import PairTable
+from flagdata.dataset.pair_table import PairTable
 from flagdata.dataset.truth import LOW_COVERAGE, STALE
 from flagdata.errors import UsageError
 

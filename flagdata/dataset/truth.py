@@ -18,11 +18,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flagdata.arguments import checked
-from flagdata.arrays import BoolArray
+from flagdata.core.arguments import checked
+from flagdata.core.arrays import BoolArray
+from flagdata.core.schema import TRUTH_WINDOW, UNUSABLE, SampleFlag
 from flagdata.errors import InputError, UsageError
-from flagdata.schema import TRUTH_WINDOW, UNUSABLE, SampleFlag
-from flagdata.signals import Instants, Sensor, Series, WindSeries
+from flagdata.record.signals import Instants, Sensor, Series, WindSeries
 from flagdata.timebase import NANOSECONDS
 
 BLOCK = 1.0  # s, length of the block means whose correlation gives the standard error

@@ -11,10 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from flagdata.addresses import local_path
-from flagdata.arguments import checked
+from flagdata.core.arguments import checked
+from flagdata.core.files.addresses import local_path
+from flagdata.core.html import table
 from flagdata.errors import NotFoundError, UnknownNameError
-from flagdata.html import table
 
 PREFIX = "example:"
 """Before the name of an example, where a film is named by a text."""
@@ -119,7 +119,7 @@ def path_of(source: Path | str) -> Path:
 
     Raises:
         UnknownNameError: no example of that name.
-        UsageError: an address, see `flagdata.addresses.local_path`.
+        UsageError: an address, see `flagdata.core.files.addresses.local_path`.
     """
     named = example_of(source)
     return local_path(source) if named is None else named.film

@@ -2,8 +2,8 @@
 
 import sys
 
-from flagdata.export.plan import FORMATS, Export, ExportResult, Prepared, export, prepare
-from flagdata.verb_package import VerbPackage
+from flagdata.export.export_plan import FORMATS, Export, ExportResult, Prepared, export, prepare
+from flagdata.packages.verb_package import VerbPackage
 
 __all__ = ["FORMATS", "Export", "ExportResult", "Prepared", "export", "prepare"]
 

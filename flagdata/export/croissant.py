@@ -18,7 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from pyarrow.csv import open_csv
 
-from flagdata.schema import CATALOG, CHANNELS
+from flagdata.core.schema import CATALOG, CHANNELS
 
 CROISSANT = "croissant.json"
 CONFORMS_TO = "http://mlcommons.org/croissant/1.0"
@@ -97,7 +97,7 @@ def croissant(folder: Path, manifest: Mapping[str, Any]) -> dict[str, Any]:
 
     Args:
         folder: the export.
-        manifest: its content, see `flagdata.manifest.write_manifest`.
+        manifest: its content, see `flagdata.core.files.manifest.write_manifest`.
     """
     paths = [entry["path"] for entry in manifest["files"]]
     record_sets = [_record_set(folder, path, manifest.get("units", {})) for path in paths]

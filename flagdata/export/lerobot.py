@@ -27,12 +27,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from PIL import Image
 
-from flagdata.arrays import AnyArray, Float32Array, FloatArray, UInt8Array
+from flagdata.core.arrays import AnyArray, Float32Array, FloatArray, UInt8Array
+from flagdata.core.files.regular_files import LEROBOT_LABEL, LEROBOT_OWN
+from flagdata.core.scheduling import kept_scheduling
+from flagdata.core.schema import Kind
 from flagdata.errors import InputError, UsageError
-from flagdata.export.source import FILMED, Entry, ExportRows, label_units
-from flagdata.files import LEROBOT_LABEL, LEROBOT_OWN
-from flagdata.scheduling import kept_scheduling
-from flagdata.schema import Kind
+from flagdata.export.export_source import FILMED, Entry, ExportRows, label_units
 from flagdata.timebase import NANOSECONDS
 
 VERSION = "v3.0"

@@ -20,17 +20,17 @@ from typing import Any, ClassVar, Self
 import numpy as np
 import pyarrow.parquet as pq
 
+from flagdata.core.schema import TOPIC_IMAGE, TOPIC_TRUTH, Kind
 from flagdata.dataset.truth import HISTORY
 from flagdata.errors import CorruptError
-from flagdata.export.source import FILMED, Entry, ExportRows, label_units
+from flagdata.export.export_source import FILMED, Entry, ExportRows, label_units
 from flagdata.record import Coding, messages
-from flagdata.record.checksums import ChecksummedFile
-from flagdata.record.container import Messages, check_parts, read_exact, read_messages, read_summary
 from flagdata.record.key_frames import is_key
+from flagdata.record.mcap_container import Messages, check_parts, read_exact, read_messages, read_summary
 from flagdata.record.metadata import ROWS, SAMPLE
-from flagdata.record.source import open_bytes
+from flagdata.record.record_bytes import open_bytes
+from flagdata.record.record_checksums import ChecksummedFile
 from flagdata.record.writer import PROFILE
-from flagdata.schema import TOPIC_IMAGE, TOPIC_TRUTH, Kind
 from flagdata.timebase import NANOSECONDS
 
 CHUNK_BYTES = 1 << 20  # uncompressed, as in committed records: readers reach a frame directly

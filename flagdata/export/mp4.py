@@ -18,11 +18,11 @@ from av.video.codeccontext import VideoCodecContext
 from av.video.reformatter import ColorRange
 from av.video.stream import VideoStream
 
-from flagdata.arrays import IntArray, UInt8Array
+from flagdata.core.arrays import IntArray, UInt8Array
+from flagdata.core.schema import CATALOG, CHANNELS, FRAME_RATE, Kind
 from flagdata.errors import InputError, UsageError
 from flagdata.export.csv_text import cell, write_csv
-from flagdata.export.source import FILMED, IDENTITY, TRUTH, Entry, ExportRows
-from flagdata.schema import CATALOG, CHANNELS, FRAME_RATE, Kind
+from flagdata.export.export_source import FILMED, IDENTITY, TRUTH, Entry, ExportRows
 from flagdata.timebase import iso
 
 MICROSECOND = Fraction(1, 1_000_000)

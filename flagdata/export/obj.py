@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
-from flagdata.documents import column_json
+from flagdata.core.schema import FRAME_RATE, Kind
 from flagdata.errors import CorruptError
-from flagdata.export.source import ExportRows
+from flagdata.export.export_source import ExportRows
 from flagdata.ingest.meshes import write_folder
-from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence, read_meshes
-from flagdata.schema import FRAME_RATE, Kind
+from flagdata.lake.mesh_sequences import MeshSequence, RaggedMeshSequence, read_meshes
+from flagdata.recipes.documents import column_json
 from flagdata.timebase import NANOSECONDS
 
 

@@ -11,9 +11,9 @@ from typing import Any, Literal
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from flagdata.core.schema import CATALOG, Kind, catalog_schema
 from flagdata.errors import UsageError
-from flagdata.export.source import FILMED, ExportRows
-from flagdata.schema import CATALOG, Kind, catalog_schema
+from flagdata.export.export_source import FILMED, ExportRows
 
 FRAME_COLUMNS = (
     pa.field(

@@ -18,10 +18,10 @@ from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
+from flagdata.core.rng import stream
+from flagdata.core.schema import Kind
 from flagdata.errors import LimitError, UsageError
-from flagdata.export.source import FILMED, Entry, ExportRows, label_units
-from flagdata.rng import stream
-from flagdata.schema import Kind
+from flagdata.export.export_source import FILMED, Entry, ExportRows, label_units
 
 _BLOCK = 512  # a tar member's header, and what its data is padded to [B]
 _RECORD = 20 * _BLOCK  # a tar file is padded to this [B]

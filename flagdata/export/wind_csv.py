@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+from flagdata.core.schema import CHANNELS, Kind, SampleFlag
 from flagdata.errors import InputError
 from flagdata.export.csv_text import cell, write_csv
-from flagdata.export.source import Entry, ExportRows
-from flagdata.schema import CHANNELS, Kind, SampleFlag
-from flagdata.signals import WindSeries
+from flagdata.export.export_source import Entry, ExportRows
+from flagdata.record.signals import WindSeries
 from flagdata.timebase import iso
 
 TIME, DEVICE, FLAGS = "time", "device_time", "flags"

@@ -14,9 +14,9 @@ from typing import Any, ClassVar
 
 import xarray
 
-from flagdata.arrays import AnyArray, IntArray, UInt8Array
-from flagdata.export.source import IDENTITY, TRUTH, Entry, ExportRows, label_units
-from flagdata.schema import CHANNELS, Kind
+from flagdata.core.arrays import AnyArray, IntArray, UInt8Array
+from flagdata.core.schema import CHANNELS, Kind
+from flagdata.export.export_source import IDENTITY, TRUTH, Entry, ExportRows, label_units
 
 _STANDARD = {
     "wind_speed": "wind_speed",
@@ -67,7 +67,7 @@ def _numbers(entry: Entry) -> xarray.Dataset:
             attributes = {"units": about.unit, "long_name": about.about, "comment": about.frame}
             attributes |= {"standard_name": _STANDARD[name]} if name in _STANDARD else {}
             variables[name] = ("time", values[inside], attributes)
-        about_flags = {"long_name": "bits of flagdata.schema.SampleFlag"}
+        about_flags = {"long_name": "bits of flagdata.core.schema.SampleFlag"}
         variables["flags"] = ("time", wind.flags[inside], about_flags)
     means = entry.record.wind_1hz()
     if means is not None:

@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
+from flagdata.core.findings import Finding
+from flagdata.core.printable import SHORT
+from flagdata.core.schema import Kind
+from flagdata.core.shell import command_line
 from flagdata.errors import FlagdataError
-from flagdata.findings import Finding
 from flagdata.lake import Artifact, Lake
-from flagdata.printable import SHORT
 from flagdata.record import Record
-from flagdata.schema import Kind
-from flagdata.shell import command_line
-from flagdata.signals import WindSeries
+from flagdata.record.signals import WindSeries
 
 _CHOOSES = ("wind", "talker", "session")
 """What makes another log of the same file and no other reading of it: one of several anemometers, a second session."""

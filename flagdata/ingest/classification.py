@@ -5,15 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from flagdata.core.files.regular_files import LEROBOT_INFO, check_input, is_folder, is_lerobot
 from flagdata.errors import FlagdataError, InputError, UnknownNameError
-from flagdata.files import LEROBOT_INFO, check_input, is_folder, is_lerobot
 from flagdata.ingest.anemometer import Guess, sniff
-from flagdata.ingest.anemometer.formats.registry import FORMATS
+from flagdata.ingest.anemometer.formats.log_formats import FORMATS
 from flagdata.ingest.markers import COLUMNS, is_marker_table
 from flagdata.ingest.mcap.bags import is_bag, other_bag
 
 if TYPE_CHECKING:
-    from flagdata.ingest.camera.probing import Pictured
+    from flagdata.ingest.camera.camera_probing import Pictured
 
 CAMERA = "camera"
 MESHES = "meshes"
@@ -109,9 +109,9 @@ def classify(
 def _of_mcap(path: Path, topic: str | None) -> tuple[Guess, ...]:
     """Recognises a record of flagdata's, or of another program's file the topic that was named: pictures before
     numbers."""
-    from flagdata.ingest.anemometer.containers.mcap import of_numbers
+    from flagdata.ingest.anemometer.containers.mcap_topic import of_numbers
     from flagdata.ingest.mcap.bags import parts_of
-    from flagdata.ingest.mcap.pictures import of_pictures
+    from flagdata.ingest.mcap.mcap_pictures import of_pictures
     from flagdata.ingest.mcap.topics import profile, topics
     from flagdata.ingest.records import is_ours
     from flagdata.record.writer import PROFILE
@@ -144,7 +144,7 @@ def _of_mcap(path: Path, topic: str | None) -> tuple[Guess, ...]:
 
 
 def _pictured(path: Path) -> Pictured | None:
-    from flagdata.ingest.camera.probing import pictured  # decoders of video, which a wind's log needs none of
+    from flagdata.ingest.camera.camera_probing import pictured  # decoders of video, which a wind's log needs none of
 
     try:
         return pictured(path)

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 import pyarrow.compute as pc
 
-from flagdata.arrays import IntArray
+from flagdata.core.arrays import IntArray
+from flagdata.core.files.regular_files import is_lerobot
+from flagdata.core.findings import Finding, Severity
+from flagdata.core.schema import FRAME_RATE, FRAME_SIZE
 from flagdata.errors import CorruptError, FlagdataError, InputError
-from flagdata.files import is_lerobot
-from flagdata.findings import Finding, Severity
 from flagdata.ingest.mcap.bags import is_bag, other_bag
-from flagdata.schema import FRAME_RATE, FRAME_SIZE
 from flagdata.timebase import NANOSECONDS, iso
 
 _GAP = 1.5  # median steps
@@ -96,8 +96,8 @@ def examine(path: Path) -> Examination:
 
 
 def _mcap(path: Path) -> Examination:
-    from flagdata.ingest.anemometer.containers.mcap import of_numbers
-    from flagdata.ingest.mcap.pictures import of_pictures
+    from flagdata.ingest.anemometer.containers.mcap_topic import of_numbers
+    from flagdata.ingest.mcap.mcap_pictures import of_pictures
     from flagdata.ingest.mcap.topics import index, topics
 
     present = topics(path)
@@ -125,7 +125,7 @@ def _mcap(path: Path) -> Examination:
 
 
 def _lerobot(folder: Path) -> Examination:
-    from flagdata.ingest.camera.lerobot import TIME, cameras, description_of, read, stamps_of, tables
+    from flagdata.ingest.camera.lerobot_camera import TIME, cameras, description_of, read, stamps_of, tables
 
     info = description_of(folder)
     fps = float(info["fps"])

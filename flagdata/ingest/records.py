@@ -18,21 +18,21 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from flagdata.align.recording import truth_window
-from flagdata.clock import ClockModel
+from flagdata.align.film_recording import truth_window
+from flagdata.core.clock_model import ClockModel
+from flagdata.core.files.bounded_parquet import read_parquet
+from flagdata.core.findings import Finding, quality_flags
+from flagdata.core.printable import SHORT
+from flagdata.core.schema import CATALOG, TOPIC_IMAGE, TOPIC_WIND, Kind
 from flagdata.dataset.clips import clip_rows
-from flagdata.documents import column_json, from_json
 from flagdata.errors import CorruptError, InputError
-from flagdata.findings import Finding, quality_flags
-from flagdata.ingest.report import REPORT_SCHEMA
-from flagdata.ingest.source import Source
-from flagdata.ingest.store import IngestResult, Labels, find_same, kept, result_of
+from flagdata.ingest.ingest_report import REPORT_SCHEMA
+from flagdata.ingest.source_artifacts import IngestResult, Labels, find_same, kept, result_of
+from flagdata.ingest.source_file import Source
 from flagdata.lake import Artifact, Lake
-from flagdata.parquet import read_parquet
-from flagdata.printable import SHORT
+from flagdata.recipes.documents import column_json, from_json
 from flagdata.record import Record
 from flagdata.record.metadata import CLOCK, PROVENANCE, ROWS, SAMPLE
-from flagdata.schema import CATALOG, TOPIC_IMAGE, TOPIC_WIND, Kind
 from flagdata.timebase import NANOSECONDS, iso
 
 _AT_ONCE = 64

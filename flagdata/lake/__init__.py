@@ -21,13 +21,14 @@ from typing import TYPE_CHECKING
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.lake import Lake
 from flagdata.lake.transaction import CommitResult, Transaction
-from flagdata.lazy import lazy_exports
+from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from flagdata.lake.artifact import Artifact
     from flagdata.lake.catalog import Catalog
     from flagdata.lake.collection import collect, garbage, usage
     from flagdata.lake.copying import clone, pull, transfer
+    from flagdata.lake.delta_log import Log
     from flagdata.lake.deposit import Deposit
     from flagdata.lake.health import doctor, is_healthy, object_names, read_refs, sampled, verify, verify_catalog
     from flagdata.lake.label_columns import columns
@@ -35,9 +36,8 @@ if TYPE_CHECKING:
     from flagdata.lake.lake import Lake
     from flagdata.lake.leases import Lease, collecting
     from flagdata.lake.lineage import labels_of
-    from flagdata.lake.log import Log
     from flagdata.lake.merging import difference
-    from flagdata.lake.meshes import (
+    from flagdata.lake.mesh_sequences import (
         MarkerSequence,
         Mesh,
         MeshSequence,

@@ -14,10 +14,10 @@ from typing import Any
 
 import pyarrow as pa
 
-from flagdata import provenance
-from flagdata.documents import from_stored_json
+from flagdata.core import provenance
+from flagdata.core.schema import CATALOG, FORMAT_VERSION, Kind
 from flagdata.errors import CorruptError, InputError
-from flagdata.schema import CATALOG, FORMAT_VERSION, Kind
+from flagdata.recipes.documents import from_stored_json
 
 OBJECT_NAME = re.compile(r"(mcap|zarr|model)/[0-9a-f]{64}")
 ARTIFACT_ID = re.compile(r"[0-9a-f]{32}")

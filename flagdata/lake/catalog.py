@@ -34,17 +34,25 @@ import pyarrow.compute as pc
 from deltalake import CommitProperties, DeltaTable
 from deltalake.exceptions import CommitFailedError, DeltaError
 
-from flagdata.durable import HEAL, confirming, disk_errors, flush_file, flush_folder, put_if_absent, write_durably
+from flagdata.core.files.durable import (
+    HEAL,
+    confirming,
+    disk_errors,
+    flush_file,
+    flush_folder,
+    put_if_absent,
+    write_durably,
+)
+from flagdata.core.files.regular_files import is_beside, open_regular
+from flagdata.core.provenance import file_hash
+from flagdata.core.schema import CATALOG, FORMAT_VERSION, catalog_schema
 from flagdata.errors import ConflictError, CorruptError, FlagdataError
-from flagdata.files import is_beside, open_regular
-from flagdata.forks import OneProcess
 from flagdata.lake.attempts import Moved
-from flagdata.lake.log import CHECKPOINT, FILE_HASH, PREVIOUS_HASH, Entry, Log, Summaries, is_stated, names_in
+from flagdata.lake.delta_log import CHECKPOINT, FILE_HASH, PREVIOUS_HASH, Entry, Log, Summaries, is_stated, names_in
 from flagdata.lake.rowfiles import RowFiles, Scan, changed_file, encode_rows
-from flagdata.provenance import file_hash
-from flagdata.schema import CATALOG, FORMAT_VERSION, catalog_schema
 from flagdata.storage import Place, RemotePath
 from flagdata.storage.connection import delta_options, plain
+from flagdata.storage.forks import OneProcess
 from flagdata.storage.refusals import refusal
 
 P = ParamSpec("P")
@@ -77,7 +85,7 @@ def _one_at_a_time(method: Callable[Concatenate[Catalog, P], T]) -> Callable[Con
 class Catalog:
     """The Delta table under `path`; holds no open files. Rows are ordered by commit, then start, then frame.
 
-    `marks` is the folder where the newest version is noted, see `flagdata.lake.log`.
+    `marks` is the folder where the newest version is noted, see `flagdata.lake.delta_log`.
     """
 
     def __init__(self, path: Place, marks: Place) -> None:

@@ -23,15 +23,15 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from flagdata.durable import disk_errors, flush_folder
+from flagdata.core.files.durable import disk_errors, flush_folder
+from flagdata.core.schema import Kind
 from flagdata.lake.artifact import OBJECT_NAME
 from flagdata.lake.lake import Lake
-from flagdata.lake.layout import STORES, check_own
+from flagdata.lake.lake_layout import STORES, check_own
 from flagdata.lake.leases import LeaseState, last_written, leases, looking, unleased
 from flagdata.lake.marking import Marked, catalog_files, mark
 from flagdata.lake.objects import Objects, bytes_at, path_in_lake
 from flagdata.lake.removal import unfinished
-from flagdata.schema import Kind
 from flagdata.storage import Place, RemotePath, StoreError
 from flagdata.storage.uploads import Upload
 

@@ -28,13 +28,13 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from flagdata.core.schema import catalog_schema
 from flagdata.errors import ConflictError, NotFoundError
 from flagdata.lake.label_columns import Labels, check_labels
 from flagdata.lake.lineage import HIDDEN_ON, LABELS, Lineage
 from flagdata.lake.matching import made_from
 from flagdata.lake.refs import DELETED, NOUNS, Key, Ref, Slice, note_made
 from flagdata.lake.store import Store
-from flagdata.schema import catalog_schema
 
 _PARENTAGE = ["artifact", "kind", "name", "parents"]
 

@@ -15,16 +15,16 @@ from contextlib import suppress
 from dataclasses import dataclass
 from datetime import timedelta
 
-from flagdata.durable import confirming, disk_errors
+from flagdata.core.files.durable import confirming, disk_errors
+from flagdata.core.findings import Finding, Severity
+from flagdata.core.printable import counted
+from flagdata.core.shell import command_line
 from flagdata.errors import ConflictError, CorruptError, FlagdataError
-from flagdata.findings import Finding, Severity
 from flagdata.lake.lake import Lake
 from flagdata.lake.marking import Marked, mark
 from flagdata.lake.refs import NOUNS, Deletion, deleted_by
 from flagdata.lake.restoring import Bars, Taken, heal_noted
 from flagdata.lake.transaction import Transaction
-from flagdata.printable import counted
-from flagdata.shell import command_line
 from flagdata.storage import Place
 
 _SHOWN = ("name", "session", "source_name", "code_version", "branch", "kind")

@@ -9,8 +9,8 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from flagdata.checksums import files_of
-from flagdata.durable import disk_errors
+from flagdata.core.files.checksums import files_of
+from flagdata.core.files.durable import disk_errors
 from flagdata.lake.leases import Lease
 from flagdata.lake.store import Store
 

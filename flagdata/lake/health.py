@@ -13,27 +13,27 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from flagdata.durable import HEAL, SCRATCH
+from flagdata.core.files.durable import HEAL, SCRATCH
+from flagdata.core.files.regular_files import is_beside
+from flagdata.core.findings import Finding, Severity
+from flagdata.core.printable import SHORT, counted
+from flagdata.core.schema import FORMAT_VERSION, Kind
+from flagdata.core.shell import command_line
 from flagdata.errors import FlagdataError
-from flagdata.files import is_beside
-from flagdata.findings import Finding, Severity
 from flagdata.lake.artifact import OBJECT_NAME, Artifact
 from flagdata.lake.collection import left_uploads
+from flagdata.lake.delta_log import LogGapError
 from flagdata.lake.label_columns import clashes, shown_labels
 from flagdata.lake.lake import Lake
-from flagdata.lake.layout import FOLDERS, STORES, foreign_entries
+from flagdata.lake.lake_layout import FOLDERS, STORES, foreign_entries
+from flagdata.lake.lake_locks import COLLECT, TURN
 from flagdata.lake.leases import LeaseState, last_written, leases, looking, unleased
 from flagdata.lake.lineage import removals
-from flagdata.lake.locks import COLLECT, TURN
-from flagdata.lake.log import LogGapError
 from flagdata.lake.marking import Marked, catalog_files, mark
 from flagdata.lake.objects import DAMAGED, StoredObject
 from flagdata.lake.refs import MAIN
 from flagdata.lake.removal import Unfinished, erased_objects, unfinished
 from flagdata.lake.removal import left as rows_left
-from flagdata.printable import SHORT, counted
-from flagdata.schema import FORMAT_VERSION, Kind
-from flagdata.shell import command_line
 from flagdata.storage import Place, StoreError
 from flagdata.storage.uploads import Upload
 

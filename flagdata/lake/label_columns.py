@@ -14,10 +14,10 @@ from typing import TypeAlias
 
 import pyarrow as pa
 
+from flagdata.core.shell import command_line
 from flagdata.errors import ConflictError
 from flagdata.lake.lineage import labels_of
 from flagdata.lake.refs import MAIN
-from flagdata.shell import command_line
 
 Value: TypeAlias = bool | int | float | str
 Labels: TypeAlias = Mapping[str, Mapping[str, Value]]

@@ -8,11 +8,11 @@ import json
 from collections.abc import Collection
 from typing import TypeAlias
 
+from flagdata.core.shell import command_line
 from flagdata.errors import ConflictError
 from flagdata.lake.label_columns import Labels, Value, kind
 from flagdata.lake.refs import MAIN, Slice
 from flagdata.lake.store import Store
-from flagdata.shell import command_line
 
 Merged: TypeAlias = dict[str, dict[str, Value]]
 """Artifact → name → value."""

@@ -12,13 +12,13 @@ import re
 import sys
 from collections.abc import Collection, Mapping
 
+from flagdata.core.shell import command_line
 from flagdata.errors import NotFoundError, UsageError
 from flagdata.lake.attempts import persist
 from flagdata.lake.commits import Change, commit
 from flagdata.lake.label_columns import Value
 from flagdata.lake.removal import CLIP_COLUMNS, clips_of
 from flagdata.lake.store import Store
-from flagdata.shell import command_line
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}")
 _LONGEST = 1000  # characters of a text

@@ -11,28 +11,28 @@ from datetime import UTC, datetime
 from pathlib import Path
 from urllib.parse import unquote
 
-from flagdata import provenance
-from flagdata.addresses import lake_place
-from flagdata.documents import from_json
-from flagdata.durable import HEAL, disk_errors, make_folders, put_if_absent
+from flagdata.core import provenance
+from flagdata.core.files.addresses import lake_place
+from flagdata.core.files.durable import HEAL, disk_errors, make_folders, put_if_absent
+from flagdata.core.files.regular_files import is_beside, open_regular
+from flagdata.core.printable import printable
+from flagdata.core.schema import FORMAT_VERSION
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UsageError
-from flagdata.files import is_beside, open_regular
 from flagdata.lake.catalog import newer
+from flagdata.lake.delta_log import names_in
 from flagdata.lake.label_columns import Value
 from flagdata.lake.labels import put
-from flagdata.lake.layout import FOLDERS, STAGING, scratch_files
-from flagdata.lake.locks import MADE, TimedLocks
-from flagdata.lake.log import names_in
+from flagdata.lake.lake_layout import FOLDERS, STAGING, scratch_files
+from flagdata.lake.lake_locks import MADE, TimedLocks
 from flagdata.lake.merging import MergeResult, merge
 from flagdata.lake.objects import Objects
-from flagdata.lake.probing import probe
+from flagdata.lake.place_probing import probe
 from flagdata.lake.ref_commits import delete_ref, make_ref
 from flagdata.lake.refs import MAIN, Ref
 from flagdata.lake.removal import Erasure, Withdrawal, descendants, erase, explained, withdraw
 from flagdata.lake.store import Store
 from flagdata.lake.transaction import Transaction
-from flagdata.printable import printable
-from flagdata.schema import FORMAT_VERSION
+from flagdata.recipes.documents import from_json
 from flagdata.storage import Place, RemotePath
 
 MARKER = "lake.json"
@@ -55,7 +55,7 @@ class Lake(Store):
         Raises:
             ConflictError: a lake, or anything else, is there.
             UsageError: any other address, or a path that the Delta library cannot work in.
-            RefusedError: a disk or store that lacks what every commit relies on, see `flagdata.lake.probing`.
+            RefusedError: a disk or store that lacks what every commit relies on, see `flagdata.lake.place_probing`.
         """
         return cls._make(path, lambda lake: lake._fill())
 

@@ -7,7 +7,7 @@ the making of a ref take the lock `staging/.collect` shared; a collection takes 
 then the catalog, and deletes. A collector therefore either sees the lease, or finds the row committed, or comes before
 the transaction looked for the object.
 
-So it is on a disk; in a bucket, `flagdata.lake.locks` has locks and leases of the same meaning.
+So it is on a disk; in a bucket, `flagdata.lake.lake_locks` has locks and leases of the same meaning.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
-from flagdata.caches import user_cache
-from flagdata.documents import from_json
-from flagdata.files import is_beside
-from flagdata.lake.layout import LinkError
-from flagdata.lake.locks import OF_LOCKS, SHARED, Check, FileNote, locks_of
-from flagdata.locks import check_locks
+from flagdata.core.files.caches import user_cache
+from flagdata.core.files.file_locks import check_locks
+from flagdata.core.files.regular_files import is_beside
+from flagdata.lake.lake_layout import LinkError
+from flagdata.lake.lake_locks import OF_LOCKS, SHARED, Check, FileNote, locks_of
+from flagdata.recipes.documents import from_json
 from flagdata.storage import Place, RemotePath
 
 

@@ -16,10 +16,10 @@ from typing import Any
 
 import pyarrow as pa
 
-from flagdata.documents import from_json
-from flagdata.durable import HEAL
+from flagdata.core.files.durable import HEAL
 from flagdata.errors import CorruptError, NotFoundError
 from flagdata.lake.refs import DELETED, MAIN, Entry, Slice, View, view_from
+from flagdata.recipes.documents import from_json
 
 Life = tuple[str, int]
 """A branch, and the version that deleted the last one of its name; -1 for the first."""

@@ -11,15 +11,15 @@ from math import inf
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from flagdata.durable import HEAL
+from flagdata.core.files.durable import HEAL
+from flagdata.core.findings import Finding, Severity
+from flagdata.core.provenance import file_hash
+from flagdata.core.shell import command_line
 from flagdata.errors import CorruptError, FlagdataError
-from flagdata.findings import Finding, Severity
+from flagdata.lake.delta_log import LogGapError
 from flagdata.lake.lineage import Removal, removals
-from flagdata.lake.log import LogGapError
 from flagdata.lake.refs import ERASED, MAIN, Slice, View, made_by
 from flagdata.lake.store import Store
-from flagdata.provenance import file_hash
-from flagdata.shell import command_line
 from flagdata.storage import Place
 
 _BEHIND = 86_400.0

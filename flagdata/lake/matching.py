@@ -10,8 +10,8 @@ from typing import Any, TypeAlias
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from flagdata.core.schema import CATALOG
 from flagdata.errors import UnknownNameError, UsageError
-from flagdata.schema import CATALOG
 
 Values: TypeAlias = Mapping[str, Any]
 """Column → the value wanted, `None` where the column must be empty, or several values (list, tuple, set), one of which

@@ -17,6 +17,9 @@ from datetime import UTC, datetime
 
 import pyarrow as pa
 
+from flagdata.core.provenance import code_version
+from flagdata.core.schema import catalog_schema
+from flagdata.core.shell import command_line
 from flagdata.errors import ConflictError, NotFoundError, UsageError
 from flagdata.lake.attempts import persist
 from flagdata.lake.commits import Change, commit, labels_after
@@ -26,9 +29,6 @@ from flagdata.lake.matching import made_from, matching
 from flagdata.lake.refs import Slice
 from flagdata.lake.removal import left
 from flagdata.lake.store import Store
-from flagdata.provenance import code_version
-from flagdata.schema import catalog_schema
-from flagdata.shell import command_line
 
 _COLUMNS = ["artifact", "kind", "name", "parents"]
 
@@ -235,7 +235,7 @@ def difference(lake: Store, before: str | None, after: str | None) -> Difference
 
 def added_since(lake: Store, branch: str) -> Callable[[], str]:
     """Returns a call that says what a branch has gained since, in words, such as "on branch main: camera 2, recording
-    1"; "" if nothing. For `flagdata.console.in_steps`.
+    1"; "" if nothing. For `flagdata.core.console.in_steps`.
 
     Raises:
         NotFoundError: no such branch.

@@ -12,8 +12,8 @@ from typing import Any
 
 import pyarrow.compute as pc
 
-from flagdata.documents import column_json
-from flagdata.schema import Kind
+from flagdata.core.schema import Kind
+from flagdata.recipes.documents import column_json
 
 COLUMNS = ("artifact", "kind", "name", "parents", "source_name")
 """Columns that are looked at."""

@@ -2,8 +2,8 @@
 
 In a bucket they are `mcap/<sha256>.mcap`, and folders as `zarr/<treehash>.zarr/…`. A folder's files are put first and
 `.sums`, the lines whose SHA-256 is its name, last: without it the folder is not there. `.sums` is deleted first.
-Objects are read from a local copy, see `flagdata.object_cache`; of large records only the parts that are needed are
-fetched, see `flagdata.object_ranges`.
+Objects are read from a local copy, see `flagdata.core.files.object_cache`; of large records only the parts that are
+needed are fetched, see `flagdata.core.files.object_ranges`.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from flagdata.checksums import content_hash, files_of, read_sums, size_of, sums_of
-from flagdata.durable import HEAL, flush_folder, flush_tree, make_folders
+from flagdata.core.files.checksums import content_hash, files_of, read_sums, size_of, sums_of
+from flagdata.core.files.durable import HEAL, flush_folder, flush_tree, make_folders
+from flagdata.core.files.object_cache import copy_of, fetched, forget, kept
+from flagdata.core.files.regular_files import is_beside
 from flagdata.errors import CorruptError, FlagdataError, InputError, NotFoundError
-from flagdata.files import is_beside
 from flagdata.lake.artifact import OBJECT_NAME
-from flagdata.lake.layout import STORES, LinkError
-from flagdata.object_cache import copy_of, fetched, forget, kept
+from flagdata.lake.lake_layout import STORES, LinkError
 from flagdata.storage import Place, RemotePath
 
 _READ_ONLY = 0o444

@@ -19,7 +19,7 @@ from datetime import UTC, datetime
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from flagdata.durable import confirming
+from flagdata.core.files.durable import confirming
 from flagdata.errors import ConflictError, NotFoundError, UnknownNameError, UsageError
 from flagdata.lake.attempts import persist
 from flagdata.lake.commits import Change, commit

@@ -23,8 +23,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from flagdata.documents import from_json
-from flagdata.durable import (
+from flagdata.core.files.durable import (
     HEAL,
     SCRATCH,
     confirming,
@@ -34,9 +33,10 @@ from flagdata.durable import (
     put_if_absent,
     unreadable,
 )
+from flagdata.core.files.regular_files import open_regular
+from flagdata.core.provenance import recipe_hash
 from flagdata.errors import CorruptError, FlagdataError, NotFoundError, TimeError, UnknownNameError, UsageError
-from flagdata.files import open_regular
-from flagdata.provenance import recipe_hash
+from flagdata.recipes.documents import from_json
 from flagdata.storage import Place
 from flagdata.timebase import NANOSECONDS, from_datetime, names_zone, parse
 

@@ -11,12 +11,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from flagdata.durable import HEAL
+from flagdata.core.files.durable import HEAL
+from flagdata.core.printable import SHORT
+from flagdata.core.provenance import code_version
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.refs import MAIN
 from flagdata.lake.store import Store
-from flagdata.printable import SHORT
-from flagdata.provenance import code_version
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -25,20 +25,20 @@ from datetime import UTC, datetime, timedelta
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from flagdata.durable import disk_errors
+from flagdata.core.files.durable import disk_errors
+from flagdata.core.schema import Kind
+from flagdata.core.shell import command_line
 from flagdata.errors import ConflictError, FlagdataError, NotFoundError
 from flagdata.lake import naming
 from flagdata.lake.attempts import persist
 from flagdata.lake.commits import Change, commit
+from flagdata.lake.lake_locks import Check
 from flagdata.lake.leases import leases, looking
 from flagdata.lake.lineage import Removal, removals
-from flagdata.lake.locks import Check
 from flagdata.lake.marking import catalog_files, mark
 from flagdata.lake.matching import made_from, matching
 from flagdata.lake.refs import MAIN
 from flagdata.lake.store import Store
-from flagdata.schema import Kind
-from flagdata.shell import command_line
 
 BEYOND = (
     "exports that were made of them",

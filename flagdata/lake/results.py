@@ -14,14 +14,14 @@ from pathlib import Path
 
 import pyarrow.compute as pc
 
+from flagdata.core.printable import SHORT
+from flagdata.core.schema import Kind
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.lake import Lake
 from flagdata.lake.naming import REVISION, revised
 from flagdata.lake.refs import MAIN
 from flagdata.lake.remaking import Remade, present
 from flagdata.lake.store import Store
-from flagdata.printable import SHORT
-from flagdata.schema import Kind
 
 
 @dataclass(frozen=True, kw_only=True)

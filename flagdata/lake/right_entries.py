@@ -17,9 +17,9 @@ from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
+from flagdata.core.files.regular_files import open_regular
 from flagdata.errors import CorruptError
-from flagdata.files import open_regular
-from flagdata.lake.log import PREVIOUS_HASH, Log
+from flagdata.lake.delta_log import PREVIOUS_HASH, Log
 from flagdata.storage import Place, StoreError
 
 _HASH = re.compile(r"[0-9a-f]{64}").fullmatch

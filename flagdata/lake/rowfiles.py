@@ -25,14 +25,14 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from flagdata.buffers import owned
-from flagdata.catalog_sql import dataset_of
-from flagdata.documents import column_json
-from flagdata.durable import HEAL
+from flagdata.core.files.bounded_parquet import check_stated
+from flagdata.core.files.buffers import owned
+from flagdata.core.files.durable import HEAL
+from flagdata.core.files.regular_files import open_regular
+from flagdata.core.schema import CATALOG, Kind, catalog_schema
 from flagdata.errors import CorruptError
-from flagdata.files import open_regular
-from flagdata.parquet import check_stated
-from flagdata.schema import CATALOG, Kind, catalog_schema
+from flagdata.lake.catalog_sql import dataset_of
+from flagdata.recipes.documents import column_json
 from flagdata.storage import Place
 
 SINCE = max(CATALOG["dataset"].since, CATALOG["side"].since)

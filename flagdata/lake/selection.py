@@ -1,7 +1,7 @@
 """Rows of the catalog by filter or SQL, at any ref. DuckDB over the Arrow catalog, in a process of its own.
 
-`flagdata.catalog_sql` describes what SQL sees and may do. Its process is ended when the time limit is over and may take
-2 GB; where the rows are to be held at once, these are limited too. The process stays for the next question.
+`flagdata.lake.catalog_sql` describes what SQL sees and may do. Its process is ended when the time limit is over and may
+take 2 GB; where the rows are to be held at once, these are limited too. The process stays for the next question.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from typing import Any, Protocol
 
 import pyarrow as pa
 
-from flagdata.bounded import End, EndedError
-from flagdata.catalog_sql import COLUMNS, Question
+from flagdata.core.files.bounded import End, EndedError
+from flagdata.core.schema import CATALOG, Field, catalog_schema
 from flagdata.errors import FlagdataError, LimitError, UnknownNameError, UsageError
+from flagdata.lake.catalog_sql import COLUMNS, Question
 from flagdata.lake.label_columns import PREFIX, columns
 from flagdata.lake.matching import Where, condition, matching
 from flagdata.lake.refs import View
 from flagdata.lake.rowfiles import Scan
-from flagdata.retired_names import present_query
-from flagdata.schema import CATALOG, Field, catalog_schema
-from flagdata.sql_process import MEMORY, sql_process
+from flagdata.lake.sql_process import MEMORY, sql_process
+from flagdata.recipes.retired_names import present_query
 
 DEFAULT_ORDER = "kind, start NULLS LAST, artifact"
 TIME_LIMIT = 60.0

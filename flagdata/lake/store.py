@@ -12,25 +12,25 @@ from tempfile import TemporaryFile
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from flagdata.durable import disk_errors
+from flagdata.core.files.durable import disk_errors
+from flagdata.core.printable import SHORT
+from flagdata.core.schema import CATALOG, Kind
+from flagdata.core.shell import command_line
 from flagdata.errors import NotFoundError, UnknownNameError
 from flagdata.lake import naming
 from flagdata.lake import refs as references
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.attempts import Moved
 from flagdata.lake.catalog import Catalog
-from flagdata.lake.layout import STAGING, check_writable
+from flagdata.lake.lake_layout import STAGING, check_writable
+from flagdata.lake.lake_locks import Check
 from flagdata.lake.leases import collecting, keeping_collectors_out
 from flagdata.lake.lineage import Lineage, with_labels
-from flagdata.lake.locks import Check
 from flagdata.lake.matching import Values, Where, condition, matching
 from flagdata.lake.objects import Objects, RemoteObjects
-from flagdata.lake.probing import probe
+from flagdata.lake.place_probing import probe
 from flagdata.lake.refs import Refs, Slice, View
 from flagdata.lake.rowfiles import ROW_ORDER, Scan, in_order
-from flagdata.printable import SHORT
-from flagdata.schema import CATALOG, Kind
-from flagdata.shell import command_line
 from flagdata.storage import Place, RemotePath
 
 _ORDER = ", ".join(ROW_ORDER)
@@ -63,7 +63,7 @@ class Store:
 
         Raises:
             LinkError: a folder of the lake is a link, so that what is written would lie elsewhere.
-            RefusedError: the place lacks what every commit relies on, see `flagdata.lake.probing`.
+            RefusedError: the place lacks what every commit relies on, see `flagdata.lake.place_probing`.
             FlagdataError: the lake can only be read.
         """
         check_writable(self.path)

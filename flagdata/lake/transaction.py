@@ -17,7 +17,9 @@ from types import TracebackType
 
 import pyarrow as pa
 
-from flagdata.durable import disk_errors
+from flagdata.core.files.durable import disk_errors
+from flagdata.core.provenance import code_version
+from flagdata.core.schema import catalog_schema
 from flagdata.errors import ConflictError, FlagdataError, NotFoundError, UsageError
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.attempts import persist
@@ -27,8 +29,6 @@ from flagdata.lake.leases import Lease
 from flagdata.lake.refs import Slice
 from flagdata.lake.remaking import Remade, describe_remade
 from flagdata.lake.store import Store
-from flagdata.provenance import code_version
-from flagdata.schema import catalog_schema
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
+from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from flagdata.pages.graph import COLOURS
-    from flagdata.pages.lineage import picture
-    from flagdata.pages.pictures import figure_url, moving
+    from flagdata.pages.lineage_picture import picture
+    from flagdata.pages.page_pictures import figure_url, moving
 
 __getattr__ = lazy_exports(__name__, __file__)

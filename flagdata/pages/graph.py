@@ -13,7 +13,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from flagdata.printable import printable
+from flagdata.core.printable import printable
 
 WIDTH = 184  # px of a box
 _GAP_X, _GAP_Y = 56, 14

@@ -8,9 +8,9 @@ from collections.abc import Collection, Sequence
 
 from PIL import Image, ImageDraw, ImageFont
 
+from flagdata.core.printable import printable
 from flagdata.pages import graph
 from flagdata.pages.graph import Box, Point
-from flagdata.printable import printable
 
 _SCALE = 2  # pixels of the picture a pixel of the drawing
 _LIKE = str.maketrans({"×": "x", "–": "-", "—": "-", "ß": "ss", "ø": "o", "æ": "ae"})

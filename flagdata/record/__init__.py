@@ -23,19 +23,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
+from flagdata.packages.lazy import lazy_exports
 from flagdata.record.reader import Record
 from flagdata.record.salvage import salvage
 from flagdata.record.writer import Chunking, Coding, RecordWriter
 
 if TYPE_CHECKING:
-    from flagdata.record.checksums import CHECKSUMS, ChecksummedFile
-    from flagdata.record.container import read_messages, read_summary
+    from flagdata.record.mcap_container import read_messages, read_summary
     from flagdata.record.metadata import CAMERA, PROVENANCE
     from flagdata.record.reader import Record
-    from flagdata.record.source import open_bytes
+    from flagdata.record.record_bytes import open_bytes
+    from flagdata.record.record_checksums import CHECKSUMS, ChecksummedFile
     from flagdata.record.unpacking import unpacked
-    from flagdata.record.video import VideoEncoder, decode
+    from flagdata.record.video_archive import VideoEncoder, decode
     from flagdata.record.writer import Chunking, Coding, RecordWriter
 
 

@@ -31,7 +31,7 @@ from mcap.records import (
     SummaryOffset,
 )
 
-from flagdata.arrays import BoolArray, IntArray, UInt8Array
+from flagdata.core.arrays import BoolArray, IntArray, UInt8Array
 
 MAGIC = b"\x89MCAP0\r\n"
 MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time

@@ -14,8 +14,8 @@ from foxglove_schemas_protobuf.CompressedVideo_pb2 import CompressedVideo
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
 from google.protobuf.message import Message
 
+from flagdata.core.schema import CHANNELS
 from flagdata.errors import CorruptError
-from flagdata.schema import CHANNELS
 from flagdata.timebase import NANOSECONDS
 
 __all__ = [
@@ -112,7 +112,7 @@ def _build() -> descriptor_pb2.FileDescriptorProto:
         about = CHANNELS[channel]
         frame = f"; {about.frame}" if about.frame else ""
         sample.optional(name, number, _FIELD.TYPE_DOUBLE, f"{about.about} [{about.unit}{frame}]; NaN where missing.")
-    sample.field("flags", _FLAGS_NUMBER, _FIELD.TYPE_UINT32, "Bits of flagdata.schema.SampleFlag; 0 is sound.")
+    sample.field("flags", _FLAGS_NUMBER, _FIELD.TYPE_UINT32, "Bits of flagdata.core.schema.SampleFlag; 0 is sound.")
     sample.field(
         "host_time", _HOST_TIME_NUMBER, _FIELD.TYPE_MESSAGE, "The logging computer's own clock.", type_name=_TIMESTAMP
     )

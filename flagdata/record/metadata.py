@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 
 from flagdata.errors import CorruptError
-from flagdata.signals import CameraInfo, Sensor
+from flagdata.record.signals import CameraInfo, Sensor
 
 SENSOR = "sensor"
 CAMERA = "camera"

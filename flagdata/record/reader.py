@@ -17,17 +17,17 @@ import numpy as np
 import simplejpeg
 from google.protobuf.message import DecodeError
 
-from flagdata.addresses import local_path
-from flagdata.arrays import FloatArray, IntArray, UInt8Array
+from flagdata.core.arrays import FloatArray, IntArray, UInt8Array
+from flagdata.core.files.addresses import local_path
+from flagdata.core.schema import TOPIC_IMAGE, TOPIC_TRUTH, TOPIC_WIND, TOPIC_WIND_1HZ
 from flagdata.errors import CorruptError, InputError, NotFoundError, UsageError
-from flagdata.record import container, messages
+from flagdata.recipes.retired_names import present_names
+from flagdata.record import mcap_container, messages
 from flagdata.record.key_frames import is_key
 from flagdata.record.metadata import sensor_of
-from flagdata.record.source import Bytes, open_bytes
+from flagdata.record.record_bytes import Bytes, open_bytes
+from flagdata.record.signals import WindAverage, WindSeries
 from flagdata.record.writer import ATTACHMENT_LIMIT, GZIP_SUFFIX, Coding, encode_jpeg
-from flagdata.retired_names import present_names
-from flagdata.schema import TOPIC_IMAGE, TOPIC_TRUTH, TOPIC_WIND, TOPIC_WIND_1HZ
-from flagdata.signals import WindAverage, WindSeries
 from flagdata.storage import Place
 
 FRAME_PIXELS = 1 << 26
@@ -78,13 +78,13 @@ class Record:
         return file
 
     @functools.cached_property
-    def _summary(self) -> container.Summary:
-        return container.read_summary(self._file, where=str(self.path))
+    def _summary(self) -> mcap_container.Summary:
+        return mcap_container.read_summary(self._file, where=str(self.path))
 
     @functools.cached_property
     def metadata(self) -> Mapping[str, Mapping[str, str]]:
         """The metadata records by name."""
-        return container.read_metadata(self._file, self._summary, where=str(self.path))
+        return mcap_container.read_metadata(self._file, self._summary, where=str(self.path))
 
     @property
     def has_checksums(self) -> bool:
@@ -96,7 +96,7 @@ class Record:
         return tuple(sorted(self._summary.channels))
 
     @functools.cached_property
-    def _frames(self) -> container.Messages:
+    def _frames(self) -> mcap_container.Messages:
         return self._messages(TOPIC_IMAGE)
 
     @functools.cached_property
@@ -120,7 +120,7 @@ class Record:
     def _in_spans(self) -> bool:
         """Whether frames are found without the heads of all others."""
         remote = not isinstance(self.path, Path)
-        return remote and container.in_order(self._file, self._summary, TOPIC_IMAGE, where=str(self.path))
+        return remote and mcap_container.in_order(self._file, self._summary, TOPIC_IMAGE, where=str(self.path))
 
     @property
     def frame_count(self) -> int:
@@ -268,7 +268,7 @@ class Record:
         for entry in self._summary.attachments:
             if _own_name(entry.name, entry.media_type) != name:
                 continue
-            data = container.read_attachment(self._file, entry, where=str(self.path))
+            data = mcap_container.read_attachment(self._file, entry, where=str(self.path))
             return _unpack(data, name) if entry.media_type.endswith(GZIP_SUFFIX) else data
         raise NotFoundError(
             f"there is no attachment {name!r}",
@@ -284,7 +284,7 @@ class Record:
                 raise CorruptError(f"there is no key frame up to frame {first}", where=str(self.path), fix=_VERIFY)
             key -= 1
             pictures[:0] = self._payloads(key, 1)
-        from flagdata.record.video import decode  # FFmpeg, which a wind's record needs nothing of
+        from flagdata.record.video_archive import decode  # FFmpeg, which a wind's record needs nothing of
 
         return np.stack(decode(pictures, where=str(self.path))[first - key :])
 
@@ -292,8 +292,8 @@ class Record:
         schema = self._summary.schemas.get(self._summary.channels[topic].schema_id)
         return schema.name if schema else "messages without a schema"
 
-    def _messages(self, topic: str) -> container.Messages:
-        return container.read_messages(self._file, self._summary, topic, where=str(self.path))
+    def _messages(self, topic: str) -> mcap_container.Messages:
+        return mcap_container.read_messages(self._file, self._summary, topic, where=str(self.path))
 
     def _payloads(self, first: int, count: int) -> list[memoryview]:
         field = messages.data_field(_CODINGS[self.coding])
@@ -303,7 +303,7 @@ class Record:
         table = self._span(first, count)
         return self._read(TOPIC_IMAGE, table, first - table.first, count)
 
-    def _span(self, first: int, count: int) -> container.Messages:
+    def _span(self, first: int, count: int) -> mcap_container.Messages:
         """Finds where consecutive frames lie, and maybe others.
 
         Raises:
@@ -321,13 +321,13 @@ class Record:
         if not self._in_spans:
             return self._frames
         where, span = str(self.path), (first, count)
-        return container.read_messages(self._file, self._summary, TOPIC_IMAGE, where=where, span=span)
+        return mcap_container.read_messages(self._file, self._summary, TOPIC_IMAGE, where=where, span=span)
 
-    def _read(self, topic: str, table: container.Messages, first: int, count: int) -> Sequence[memoryview]:
+    def _read(self, topic: str, table: mcap_container.Messages, first: int, count: int) -> Sequence[memoryview]:
         """Reads the payloads of consecutive rows, checked; of any channel but that of the frames, all its messages."""
         parts = self._parts(table, first, count)
         if self.has_checksums:
-            container.check_parts(parts, table, topic, first=first, where=str(self.path))
+            mcap_container.check_parts(parts, table, topic, first=first, where=str(self.path))
         else:
             self._check_chunks(table.offset[first : first + count])
         return parts
@@ -336,23 +336,23 @@ class Record:
         starts = np.array([chunk.chunk_start_offset for chunk in self._summary.chunks], dtype=np.int64)
         for index in np.unique(np.searchsorted(starts, offsets, side="right") - 1).tolist():
             if index not in self._sound:
-                container.check_chunk(self._file, self._summary.chunks[index], where=str(self.path))
+                mcap_container.check_chunk(self._file, self._summary.chunks[index], where=str(self.path))
                 self._sound.add(index)
 
-    def _parts(self, table: container.Messages, first: int, count: int) -> Sequence[memoryview]:
+    def _parts(self, table: mcap_container.Messages, first: int, count: int) -> Sequence[memoryview]:
         offsets = table.offset[first : first + count].tolist()
         lengths = table.length[first : first + count].tolist()
         start, end = offsets[0], offsets[-1] + lengths[-1]
         where = str(self.path)
         if offsets == sorted(offsets) and end - start <= sum(lengths) + SPAN_SLACK:
-            block = memoryview(container.read_exact(self._file, end - start, start, where=where))
+            block = memoryview(mcap_container.read_exact(self._file, end - start, start, where=where))
             return [block[o - start : o - start + n] for o, n in zip(offsets, lengths, strict=True)]
         return [
-            memoryview(container.read_exact(self._file, n, o, where=where))
+            memoryview(mcap_container.read_exact(self._file, n, o, where=where))
             for o, n in zip(offsets, lengths, strict=True)
         ]
 
-    def _decode(self, topic: str, kind: Any, table: container.Messages) -> list[Any]:
+    def _decode(self, topic: str, kind: Any, table: mcap_container.Messages) -> list[Any]:
         if self._schema(topic) != kind.DESCRIPTOR.full_name:
             raise InputError(
                 f"{topic} holds {self._schema(topic)}",

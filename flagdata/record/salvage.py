@@ -9,8 +9,8 @@ own. Nothing is invented: every message written is byte for byte one that was re
 Messages of a damaged record that have a right checksum of their own, whatever lies around them.
 
 A record states a checksum of each frame, one of all payloads of any other channel, and one of all heads of a channel,
-see `flagdata.record.checksums`. So where a chunk's own checksum is wrong, it is known which of its messages are as they
-were written.
+see `flagdata.record.record_checksums`. So where a chunk's own checksum is wrong, it is known which of its messages are
+as they were written.
 """
 
 from __future__ import annotations
@@ -33,11 +33,10 @@ from google.protobuf.message import DecodeError
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Message, Metadata, Schema
 
+from flagdata.core.findings import Finding, Severity
 from flagdata.errors import CorruptError, FlagdataError, NotFoundError
-from flagdata.findings import Finding, Severity
 from flagdata.record import messages
-from flagdata.record.checksums import CHECKSUMS, ChecksummedFile
-from flagdata.record.container import (
+from flagdata.record.mcap_container import (
     CHUNK_HEAD,
     MAGIC,
     MESSAGE_HEAD,
@@ -50,8 +49,9 @@ from flagdata.record.container import (
     read_summary,
 )
 from flagdata.record.metadata import SALVAGE
-from flagdata.record.output import Output
-from flagdata.record.source import open_bytes
+from flagdata.record.record_bytes import open_bytes
+from flagdata.record.record_checksums import CHECKSUMS, ChecksummedFile
+from flagdata.record.record_file import Output
 from flagdata.record.unpacking import unpacked
 from flagdata.record.writer import CHUNK_BYTES, PROFILE, Chunking, library_name
 from flagdata.timebase import iso

@@ -23,27 +23,27 @@ import numpy as np
 import simplejpeg
 from mcap.well_known import MessageEncoding, SchemaEncoding
 
-from flagdata.arrays import BoolArray, IntArray, UInt8Array
-from flagdata.averaging import average
-from flagdata.clock import ClockModel
+from flagdata.core.arrays import BoolArray, IntArray, UInt8Array
+from flagdata.core.clock_model import ClockModel
+from flagdata.core.schema import FORMAT_VERSION, TOPIC_IMAGE, TOPIC_TRUTH, TOPIC_WIND, TOPIC_WIND_1HZ
 from flagdata.errors import ConflictError, InputError, LimitError, TimeError, UsageError
 from flagdata.record import messages
-from flagdata.record.checksums import CHECKSUMS, ChecksummedFile
+from flagdata.record.averaging import average
 from flagdata.record.key_frames import is_key
 from flagdata.record.mcap_file import MessageBlock
 from flagdata.record.metadata import CLOCK, SENSOR, sensor_metadata
-from flagdata.record.output import Output
-from flagdata.schema import FORMAT_VERSION, TOPIC_IMAGE, TOPIC_TRUTH, TOPIC_WIND, TOPIC_WIND_1HZ
-from flagdata.signals import WindSeries
+from flagdata.record.record_checksums import CHECKSUMS, ChecksummedFile
+from flagdata.record.record_file import Output
+from flagdata.record.signals import WindSeries
 from flagdata.timebase import NANOSECONDS
 
 if TYPE_CHECKING:
-    from flagdata.record.video import VideoEncoder
+    from flagdata.record.video_archive import VideoEncoder
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from flagdata.signals import Series, WindAverage
+from flagdata.record.signals import Series, WindAverage
 
 _VARINT, _DOUBLE, _LENGTH = 0, 1, 2  # wire types
 
@@ -216,7 +216,7 @@ class Coding(StrEnum):
     JPEG = "jpeg"
     """foxglove.CompressedImage: every frame reached alone."""
     H264 = "h264"
-    """foxglove.CompressedVideo: for archives, see `flagdata.record.video`."""
+    """foxglove.CompressedVideo: for archives, see `flagdata.record.video_archive`."""
 
 
 CHUNK_BYTES = {Chunking.COMMITTED: 1 << 20, Chunking.LIVE: 256 << 10}
@@ -412,7 +412,7 @@ class RecordWriter:
             return image
         if self._video is None:
             _check_image(image)
-            from flagdata.record.video import VideoEncoder  # FFmpeg, which a wind's record needs nothing of
+            from flagdata.record.video_archive import VideoEncoder  # FFmpeg, which a wind's record needs nothing of
 
             self._video = VideoEncoder(height=image.shape[0], width=image.shape[1])
         return self._video.encode(image)

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flagdata.errors import UsageError
-from flagdata.forks import OneProcess
+from flagdata.storage.forks import OneProcess
 
 if TYPE_CHECKING:
     from obstore.store import S3Store

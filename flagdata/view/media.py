@@ -13,16 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.align.recording import CURVE
-from flagdata.arrays import FloatArray
-from flagdata.documents import from_stored_json
+from flagdata.align.film_recording import CURVE
+from flagdata.core.arrays import FloatArray
+from flagdata.core.schema import Kind
 from flagdata.errors import CorruptError, NotFoundError, UsageError
 from flagdata.lake import Lake
 from flagdata.lake.removal import explained
+from flagdata.recipes.documents import from_stored_json
 from flagdata.record import Record
-from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS
-from flagdata.view.films import DRAWN, FilmStrip, film_of, thumbnail
+from flagdata.view.moving_pictures import DRAWN, FilmStrip, film_of, thumbnail
 
 FRAMES_AT_ONCE = 64
 POINTS = 2000

@@ -14,24 +14,24 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from markupsafe import Markup
 
-from flagdata.cells import plain, said
-from flagdata.documents import column_json
+from flagdata.core.printable import SHORT, printable, size_text
+from flagdata.core.schema import Kind
 from flagdata.errors import FlagdataError, NotFoundError, UnknownNameError, UsageError
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.ancestry import ancestry
+from flagdata.lake.catalog_cells import plain, said
 from flagdata.lake.label_columns import PREFIX
 from flagdata.lake.lineage import labels_of
 from flagdata.lake.refs import MAIN, View
 from flagdata.lake.results import versions
 from flagdata.lake.selection import COLUMNS, Request, Selection
 from flagdata.pages.graph import COLOURS
-from flagdata.pages.lineage import picture
+from flagdata.pages.lineage_picture import picture
 from flagdata.pages.render import render, text_of
-from flagdata.printable import SHORT, printable, size_text
-from flagdata.schema import Kind
+from flagdata.recipes.documents import column_json
 from flagdata.timebase import iso
-from flagdata.view.films import DRAWN
 from flagdata.view.media import Media
+from flagdata.view.moving_pictures import DRAWN
 
 _VIEWS = 3
 _ORDER = {"created": "descending", "start": "ascending", "artifact": "ascending"}

@@ -23,7 +23,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, cast
 from urllib.parse import parse_qs, urlsplit
 
-from flagdata.console import foreseen
+from flagdata.core.console import foreseen
 from flagdata.errors import (
     ConflictError,
     FlagdataError,

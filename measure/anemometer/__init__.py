@@ -14,11 +14,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
+from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from measure.anemometer.calibration import Calibrated, Recording, calibrated
-    from measure.anemometer.features import Features, Place
     from measure.anemometer.networks import Network, gate_beside, network
+    from measure.anemometer.reading_calibration import Calibrated, Recording, calibrated
+    from measure.anemometer.window_features import Features, Place
 
 __getattr__ = lazy_exports(__name__, __file__)

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 
 
 def half_width(errors: FloatArray, level: float) -> float:

@@ -13,20 +13,20 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from flagdata.core.findings import quality_flags
+from flagdata.core.provenance import canonical
+from flagdata.core.schema import Kind
+from flagdata.core.workload import one_thread
 from flagdata.errors import InputError
-from flagdata.findings import quality_flags
 from flagdata.lake import Artifact, Lake, results
 from flagdata.lake.results import Placed
-from flagdata.provenance import canonical
-from flagdata.schema import Kind
-from flagdata.workload import one_thread
-from measure.anemometer.calibration import ANSWER, ENOUGH, LEAST, Calibrated, Recording, calibrated, recorded
-from measure.anemometer.features import VERSION
 from measure.anemometer.networks import CALIBRATED, network
-from measure.anemometer.storage import write
-from measure.cloth.recording import usable
+from measure.anemometer.reading_calibration import ANSWER, ENOUGH, LEAST, Calibrated, Recording, calibrated, recorded
+from measure.anemometer.reading_model_folder import write
+from measure.anemometer.window_features import VERSION
+from measure.cloth.observed_recording import usable
+from measure.film.film_source import FilmReading, Subject, subjects
 from measure.film.similarity import FlagSize
-from measure.film.source import FilmReading, Subject, subjects
 from models.conditioning.conditioning import VERSION as CONDITIONED
 
 

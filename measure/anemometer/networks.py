@@ -7,20 +7,20 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from flagdata.addresses import local_path
+from flagdata.core.files.addresses import local_path
+from flagdata.core.provenance import digest, file_hash
+from flagdata.core.schema import Kind
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.naming import OF_RESULTS, meant
-from flagdata.provenance import digest, file_hash
-from flagdata.schema import Kind
-from measure.anemometer.reading import ReadingModel
-from measure.anemometer.storage import read as read_reading_model
-from measure.estimate.gusts import SERIES_KEY
-from measure.gate import storage
+from measure.anemometer.reading_model import ReadingModel
+from measure.anemometer.reading_model_folder import read as read_reading_model
+from measure.estimate.gusty_series import SERIES_KEY
+from measure.gate import gate_file
 from measure.gate.window import CheckedGate, WindowGate, gate_of
-from models import estimator
-from models.estimator import Estimator
-from models.storage import CARD, WEIGHTS, card_bytes, read_card
+from models.trained import estimator
+from models.trained.estimator import Estimator
+from models.trained.model_folder import CARD, WEIGHTS, card_bytes, read_card
 
 CALIBRATED = "anemometer"
 """Key of the recipes of reading models (`measure.anemometer`)."""
@@ -33,9 +33,9 @@ def gate_beside(model: Network, *, false_alarm: float) -> WindowGate:
         CorruptError: the calibrated one is damaged, or another network's.
         InputError: the model has neither.
     """
-    if not (model.folder / storage.GATE).is_file():
+    if not (model.folder / gate_file.GATE).is_file():
         return gate_of(model.estimator)
-    calibrated = storage.read(model.folder, model.estimator)
+    calibrated = gate_file.read(model.folder, model.estimator)
     return CheckedGate(model=model.estimator, calibrated=calibrated, false_alarm=false_alarm)
 
 

@@ -24,10 +24,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.arrays import BoolArray, FloatArray
-from flagdata.findings import Finding, Severity
-from measure.anemometer.features import Place
-from models.outliers import conformal_p, shrunk_covariance, whitening
+from flagdata.core.arrays import BoolArray, FloatArray
+from flagdata.core.findings import Finding, Severity
+from measure.anemometer.window_features import Place
+from models.trained.outliers import conformal_p, shrunk_covariance, whitening
 
 SHIFT, FRAMING, BACKGROUND = 0.45, 0.2, 0.4
 """Levels, fixed on simulated flags of other seeds than those that judge (decision 047)."""

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.arrays import BoolArray, FloatArray
+from flagdata.core.arrays import BoolArray, FloatArray
 
 BLOCK = 20.0
 """Length of a block [s]: gusts last some seconds. Longer makes blocks more independent and leaves fewer of them;

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
+from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from measure.closing.artifacts import VerdictAnswer, answer_of
     from measure.closing.close import close_loop
-    from measure.closing.joint import joined
-    from measure.closing.models import acting
-    from measure.closing.sources import SourceOptions
+    from measure.closing.joint_verdict import joined
+    from measure.closing.model_recipes import acting
+    from measure.closing.verdict_artifacts import VerdictAnswer, answer_of
+    from measure.closing.verdict_sources import SourceOptions
 
 __getattr__ = lazy_exports(__name__, __file__)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from measure.forecasting.setting import Stage
 from measure.loop.run import LoopOptions, solve
 from measure.observe.trajectory import Experiment
-from measure.report.statement import with_sentences
-from measure.verdict.record import Verdict
+from measure.report.verdict_statement import with_sentences
+from measure.verdict.verdict_record import Verdict
 
 
 def close_loop(experiment: Experiment, options: LoopOptions, *, stage: Stage | None = None) -> Verdict:

@@ -9,16 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from flagdata.answer import Quantity
-from flagdata.arrays import FloatArray
-from flagdata.pages.pictures import figure_url, still
+from flagdata.core.arrays import FloatArray
+from flagdata.core.provenance import code_version
+from flagdata.pages.page_pictures import figure_url, still
 from flagdata.pages.render import render
-from flagdata.provenance import code_version
-from flagdata.tables import Range, Scale
-from measure.cloth.calibration import Calibration, Fitted
-from measure.cloth.prior import CLOTH
-from measure.cloth.recording import Observed
-from measure.cloth.simulation import OBSERVED
-from measure.estimate.page import Section
+from flagdata.recipes.typed_tables import Range, Scale
+from measure.cloth.cloth_calibration import Calibration, Fitted
+from measure.cloth.flag_prior import CLOTH
+from measure.cloth.flag_simulation import OBSERVED
+from measure.cloth.observed_recording import Observed
+from measure.estimate.measurement_page import Section
 from measure.observables import OBSERVABLES
 
 

@@ -21,15 +21,16 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from flagdata import workload
-from flagdata.arrays import FloatArray, IntArray, read_arrays
-from flagdata.console import say_beside_bars
+from flagdata.core import workload
+from flagdata.core.arrays import FloatArray, IntArray, read_arrays
+from flagdata.core.console import say_beside_bars
+from flagdata.core.files.outputs import rewrite
+from flagdata.core.provenance import canonical, digest
+from flagdata.core.rng import child_seed, stream
 from flagdata.errors import CorruptError, InputError
-from flagdata.outputs import rewrite
-from flagdata.provenance import canonical, digest
-from flagdata.rng import child_seed, stream
-from flagdata.tables import Range, Scale
-from measure.cloth.prior import (
+from flagdata.recipes.typed_tables import Range, Scale
+from measure.cloth.blown_wind import Log
+from measure.cloth.flag_prior import (
     AZIMUTH,
     CLOTH,
     DISTANCE,
@@ -42,9 +43,8 @@ from measure.cloth.prior import (
     clock_error,
     draws,
 )
-from measure.cloth.recording import Observed, check_in_all
-from measure.cloth.simulation import BATCH, LITTLE, Discretisation, Flag, FlagBatch
-from measure.cloth.wind import Log
+from measure.cloth.flag_simulation import BATCH, LITTLE, Discretisation, Flag, FlagBatch
+from measure.cloth.observed_recording import Observed, check_in_all
 from measure.forecasting.strengths import Strengths, all_strengths
 from measure.observables.observable import WINDOW
 from sim.workers import connected

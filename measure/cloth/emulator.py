@@ -22,11 +22,11 @@ import numpy as np
 from scipy.linalg import block_diag
 from scipy.special import gammaln
 
-from flagdata.arrays import BoolArray, FloatArray
+from flagdata.core.arrays import BoolArray, FloatArray
+from flagdata.core.findings import Finding
+from flagdata.core.rng import stream
 from flagdata.errors import RefusedError
-from flagdata.findings import Finding
-from flagdata.rng import stream
-from measure.cloth.prior import CLOTH, Uncertain
+from measure.cloth.flag_prior import CLOTH, Uncertain
 from measure.refine.metamodel import Metamodel, least
 
 SHOWN_BY = 0.8

@@ -1,7 +1,8 @@
 """Closing the loop on films with logs of the wind: from recordings to all that a verdict is made of.
 
-`recordings` are `measure.cloth.recording.Observed`, of a film or a table of observables (`measure.cloth.sources`), or
-built directly; `calibration` are the options of `flagdata calibrate`. Simulations are kept in the folder by their
+`recordings` are `measure.cloth.observed_recording.Observed`, of a film or a table of observables
+(`measure.cloth.flag_recordings`), or built directly; `calibration` are the options of `flagdata calibrate`. Simulations
+are kept in the folder by their
 design: a run that was interrupted goes on, and a second one simulates nothing.
 """
 
@@ -16,18 +17,18 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.findings import Finding
 from flagdata.errors import InputError, UsageError
-from flagdata.findings import Finding
 from measure.cloth.design import CalibrationOptions, Weighable, weighable
 from measure.cloth.emulator import TAKEN_APART
-from measure.cloth.evidence import Experiments, Fit, Sight, Weighing, fitted, hypothesis, misfits, weigh
-from measure.cloth.prior import CLOTH
-from measure.cloth.recording import Observed, constant_wind
+from measure.cloth.flag_prior import CLOTH
+from measure.cloth.flag_simulation import OBSERVED
+from measure.cloth.model_evidence import Experiments, Fit, Sight, Weighing, fitted, hypothesis, misfits, weigh
+from measure.cloth.observed_recording import Observed, constant_wind
 from measure.cloth.score_test import Judged, directions, judge, score
-from measure.cloth.simulation import OBSERVED
 from measure.cloth.simulations import Simulations, gathered, of_base, of_nulls, of_recordings, shown_by
-from measure.cloth.unseen import Halves, halved
+from measure.cloth.unseen_windows import Halves, halved
 from measure.forecasting.setting import Stage
 from measure.forecasting.strengths import Suspicion
 from measure.verdict.criteria import CRITERIA

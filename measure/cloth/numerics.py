@@ -15,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-from flagdata.arrays import FloatArray, IntArray
-from flagdata.rng import stream
+from flagdata.core.arrays import FloatArray, IntArray
+from flagdata.core.rng import stream
 from measure.cloth.design import Design, readings_of
-from measure.cloth.recording import Observed
-from measure.cloth.simulation import Discretisation, FlagBatch
+from measure.cloth.flag_simulation import Discretisation, FlagBatch
+from measure.cloth.observed_recording import Observed
 
 FLAGS = 32
 """Of each recording that are simulated a second time. More estimate the correction better; each takes `SLOWER` times as

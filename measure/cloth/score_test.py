@@ -30,15 +30,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.special import logsumexp
 
-from flagdata.arrays import BoolArray, FloatArray, IntArray
+from flagdata.core.arrays import BoolArray, FloatArray, IntArray
 from flagdata.errors import InputError
 from measure.cloth.design import Weighable
-from measure.cloth.evidence import Experiments, Misfits, Sight, Weighing
+from measure.cloth.model_evidence import Experiments, Misfits, Sight, Weighing
 from measure.forecasting.strengths import Suspicion
 from measure.nulls.clustered import ClusteredNulls
 from measure.verdict.decided import undecided
-from measure.verdict.record import Conclusion
-from models.outliers import shrunk_covariance
+from measure.verdict.verdict_record import Conclusion
+from models.trained.outliers import shrunk_covariance
 
 ALIKE = 1.0
 """Logarithm of the area weight within which null flags count as alike to a weighed one."""

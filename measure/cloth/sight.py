@@ -23,10 +23,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.special import ndtr
 
-from flagdata.arrays import BoolArray, FloatArray
+from flagdata.core.arrays import BoolArray, FloatArray
 from measure.cloth.design import Weighable
 from measure.cloth.emulator import Emulator
-from measure.cloth.prior import CLOTH, NUISANCES, Uncertain
+from measure.cloth.flag_prior import CLOTH, NUISANCES, Uncertain
 
 BESIDE = ("gain", "scale")
 """Nuisances that are fitted beside the place."""

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from flagdata.arrays import BoolArray, FloatArray, IntArray
-from flagdata.findings import Finding
-from flagdata.rng import child_seed, stream
+from flagdata.core.arrays import BoolArray, FloatArray, IntArray
+from flagdata.core.findings import Finding
+from flagdata.core.rng import child_seed, stream
 from measure.cloth.design import (
     TOGETHER,
     CalibrationOptions,
@@ -24,11 +24,11 @@ from measure.cloth.design import (
     readings_of,
 )
 from measure.cloth.emulator import Emulator, informative
-from measure.cloth.evidence import Experiments, Sight
+from measure.cloth.flag_simulation import OBSERVED
+from measure.cloth.model_evidence import Experiments, Sight
 from measure.cloth.numerics import Correction, Finer, with_errors
-from measure.cloth.recording import Observed, Projection, check_in_all, shown, usable
+from measure.cloth.observed_recording import Observed, Projection, check_in_all, shown, usable
 from measure.cloth.sight import first_of, responded
-from measure.cloth.simulation import OBSERVED
 from measure.forecasting.setting import Stage
 
 

@@ -16,16 +16,16 @@ import numpy as np
 from flagdata.align.declared import given
 from flagdata.align.lag import LagSearch
 from flagdata.align.logs import clock_between
-from flagdata.arrays import FloatArray
-from flagdata.clock import ClockModel
+from flagdata.core.arrays import FloatArray
+from flagdata.core.clock_model import ClockModel
+from flagdata.core.rng import stream
+from flagdata.core.schema import Kind
+from flagdata.core.stated import Stated
 from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.lake import Lake
 from flagdata.record import Record
-from flagdata.rng import stream
-from flagdata.schema import Kind
-from flagdata.signals import Sensor, WindSeries
-from flagdata.stated import Stated
-from measure.cloth.tables import Beside, Columns, instants, rows_of
+from flagdata.record.signals import Sensor, WindSeries
+from measure.cloth.tables_of_observables import Beside, Columns, instants, rows_of
 from measure.film.similarity import FlagSize
 
 _FOLLOWS = (

@@ -15,27 +15,27 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from flagdata.arrays import FloatArray, UInt8Array
-from flagdata.pages.pictures import moving, still
+from flagdata.core.arrays import FloatArray, UInt8Array
+from flagdata.core.rng import child_seed, stream
+from flagdata.pages.page_pictures import moving, still
 from flagdata.pages.render import render
-from flagdata.rng import child_seed, stream
 from measure.cloth.calibration_page import Band, against_wind
 from measure.cloth.design import Weighable
-from measure.cloth.evidence import Fit, Sight, fitted, hypothesis
+from measure.cloth.films_statement import level_of
+from measure.cloth.flag_simulation import OBSERVED, RATE, FlagBatch
 from measure.cloth.loop import SolvedLoop
-from measure.cloth.recording import Observed
-from measure.cloth.simulation import OBSERVED, RATE, FlagBatch
+from measure.cloth.model_evidence import Fit, Sight, fitted, hypothesis
+from measure.cloth.observed_recording import Observed
 from measure.cloth.simulations import of_recordings
-from measure.cloth.statement import level_of
 from measure.observables import View
-from measure.observables.cloth import ClothWindow, edges_of, seen_from
-from measure.observables.film import FilmWindow
+from measure.observables.film_window import FilmWindow
 from measure.observables.observable import WINDOW
-from measure.report import figures, sentences
+from measure.observables.tracked_cloth import ClothWindow, edges_of, seen_from
+from measure.report import figures, verdict_sentences
 from measure.report.report_page import FILTERS, TONES, opening
 from measure.verdict import quantity
 from measure.verdict.criteria import CRITERIA
-from measure.verdict.record import Verdict
+from measure.verdict.verdict_record import Verdict
 
 _SIDE = 300
 """Pixels that a picture is wide and high."""
@@ -200,20 +200,20 @@ _BEFORE, _AFTER, _DOT = "#b4531a", "#1f6f9c", "#444444"
 
 def verdict_page(verdict: Verdict, outcome: SolvedLoop) -> str:
     """Writes the page, HTML."""
-    after = sentences.after_label(verdict) if verdict.named else ""
+    after = verdict_sentences.after_label(verdict) if verdict.named else ""
     values = {
         "verdict": verdict,
         "tone": TONES[verdict.conclusion],
         **opening(verdict),
-        "test_sentence": sentences.test_sentence(verdict),
-        "remark": sentences.test_remark(verdict.test),
-        "named": sentences.named_candidates(verdict),
+        "test_sentence": verdict_sentences.test_sentence(verdict),
+        "remark": verdict_sentences.test_remark(verdict.test),
+        "named": verdict_sentences.named_candidates(verdict),
         "after_label": after,
         "level": level_of(verdict),
         "has_control": any(quantity.known(c.control) for c in verdict.comparisons),
         "null": figures.null_distribution(verdict.test),
         "whole": outcome.judged.scored.whole,
-        "title": lambda c: sentences.candidate_title(verdict, c),
+        "title": lambda c: verdict_sentences.candidate_title(verdict, c),
         "recordings": [
             {
                 "name": recording.name,

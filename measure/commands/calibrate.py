@@ -9,23 +9,23 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flagdata.api.measuring import LENGTHS, Calibrating
-from flagdata.console import LocalPath, document, echo, following, progress, say, say_finding
+from flagdata.api.measuring_verbs import LENGTHS, Calibrating
+from flagdata.core.console import LocalPath, document, echo, following, progress, say, say_finding
+from flagdata.core.findings import Severity
+from flagdata.core.printable import SHORT
+from flagdata.core.shell import command_line
 from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.examples import check_without_lake
-from flagdata.findings import Severity
-from flagdata.options import AsJson, argument, command, described, option, options, typed
-from flagdata.printable import SHORT
-from flagdata.shared_options import FLAG, HOW, WRITTEN, Keeping, Shared
-from flagdata.shell import command_line
+from flagdata.verbs.shared_options import FLAG, HOW, WRITTEN, Keeping, Shared
+from flagdata.verbs.verb_options import AsJson, argument, command, described, option, options, typed
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
     from measure.anemometer.making import Made
-    from measure.cloth.calibration import Calibration
-    from measure.estimate.page import Section
+    from measure.cloth.cloth_calibration import Calibration
+    from measure.estimate.measurement_page import Section
+    from measure.film.film_source import FilmReading
     from measure.film.similarity import FlagSize
-    from measure.film.source import FilmReading
 
 
 @options
@@ -102,21 +102,21 @@ def calibrate(chosen: CalibrateCommand) -> None:
             where="--flag-size",
             fix="give length x height in metres, as in 1.5x1.0",
         )
-    from flagdata.outputs import check_file, write_file
+    from flagdata.core.files.outputs import check_file, write_file
 
     if chosen.report is not None:
         check_file(chosen.report, command="calibrate")
     if chosen.lake is None:
         check_without_lake(*chosen.recordings)
     from flagdata.lake.results import placed
-    from measure.cloth.arrays import folder_of, options_of, sources_of
-    from measure.cloth.artifact import artifact, keep
-    from measure.cloth.calibration import calibrate as calibrated
+    from measure.cloth.calibrate_call import folder_of, options_of, sources_of
+    from measure.cloth.calibration_artifact import artifact, keep
     from measure.cloth.calibration_page import calibration_page as page
+    from measure.cloth.cloth_calibration import calibrate as calibrated
     from measure.cloth.design import announced
     from measure.cloth.numerics import FLAGS, effort
+    from measure.film.film_source import FilmReading
     from measure.film.similarity import FlagSize
-    from measure.film.source import FilmReading
 
     lake = chosen.opened()
     size = FlagSize.of(chosen.flag_size)
@@ -207,7 +207,7 @@ def _check_only(chosen: CalibrateCommand) -> None:
 def _drapes(chosen: CalibrateCommand) -> None:
     """Finds and reports the cloth of drapes."""
     from measure.cloth.calibration_page import shown_quantity as shown
-    from measure.drape.answer import draped
+    from measure.drape.drape_answer import draped
 
     with progress(chosen.simulations, label="drape", unit="drape") as advance:
         found = draped(chosen, workers=chosen.processes, advance=advance)
@@ -225,7 +225,7 @@ def _anemometer(chosen: CalibrateCommand, size: FlagSize, reading: FilmReading, 
     """Makes the reading model; returns None with the reason on stderr where none can be made and the weight was asked
     for as well."""
     from measure.anemometer.making import made
-    from measure.cloth.sources import is_table
+    from measure.cloth.flag_recordings import is_table
 
     if any(is_table(source) for source in chosen.recordings):
         if chosen.only is None and chosen.name is None and chosen.model is None:
@@ -269,15 +269,15 @@ def _anemometer(chosen: CalibrateCommand, size: FlagSize, reading: FilmReading, 
 def _sections(anemometer: Made | None) -> tuple[Section, ...]:
     if anemometer is None:
         return ()
-    from measure.anemometer.section import section
+    from measure.anemometer.anemometer_section import section
 
     return (section(anemometer.result),)
 
 
 def _report(anemometer: Made, report: Path | None, *, as_json: bool) -> None:
     """Report a reading model that was made alone."""
-    from flagdata.outputs import write_file
-    from measure.anemometer.section import page
+    from flagdata.core.files.outputs import write_file
+    from measure.anemometer.anemometer_section import page
 
     if report is not None:
         rows = {recording.name: f"recording {recording.identity}" for recording in anemometer.result.recordings}

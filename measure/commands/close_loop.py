@@ -9,24 +9,24 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flagdata.commands.confirm import on_command_line
-from flagdata.console import LocalPath, document, echo, say
+from flagdata.commands.confirm_recipe import on_command_line
+from flagdata.core.console import LocalPath, document, echo, say
 from flagdata.errors import UnknownNameError, UsageError
-from flagdata.option_types import POSITIVE, STATED
-from flagdata.options import AsJson, argument, command, option, options, typed
-from flagdata.shared_options import BOTH_STATED, TEST, WRITTEN, NamedLake, OnBranch
-from measure.closing.command_line import nulls_given, refuse, stage_bars
-from measure.closing.findings import with_warnings
-from measure.cloth.command_line import JudgingFilms, refuse_of_others
+from flagdata.verbs.option_types import POSITIVE, STATED
+from flagdata.verbs.shared_options import BOTH_STATED, TEST, WRITTEN, NamedLake, OnBranch
+from flagdata.verbs.verb_options import AsJson, argument, command, option, options, typed
+from measure.closing.null_options import nulls_given, refuse, stage_bars
+from measure.closing.verdict_findings import with_warnings
+from measure.cloth.film_options import JudgingFilms, refuse_of_others
 
 if TYPE_CHECKING:
+    from flagdata.core.stated import Stated
     from flagdata.lake import Lake
-    from flagdata.stated import Stated
-    from measure.closing.artifacts import VerdictAnswer
-    from measure.closing.sources import SourceOptions
+    from measure.closing.verdict_artifacts import VerdictAnswer
+    from measure.closing.verdict_sources import SourceOptions
     from measure.observe import Hold, Setup, Up
-    from measure.observe.recipe import ExperimentRecipe
-    from sim.material import Material
+    from measure.observe.experiment_recipe import ExperimentRecipe
+    from sim.cloth.material import Material
 
 MARKERS, WIND = "Markers and meshes", "The wind beside markers"
 _RECIPE = ".toml"
@@ -170,19 +170,19 @@ def close_loop(chosen: CloseLoopCommand) -> None:
       flagdata close-loop flag.toml --lake lake
       flagdata close-loop monday tuesday --lake lake --flag-size 1.5x1.0 --azimuth 70±7
     """
-    from flagdata.dataset.source import lake_of
-    from flagdata.outputs import check_files
-    from measure.closing.artifacts import answer_of
+    from flagdata.core.files.outputs import check_files
+    from flagdata.dataset.lake_source import lake_of
     from measure.closing.close import close_loop as close
-    from measure.closing.models import models
-    from measure.closing.output import FILES, JOINT, KINDS, Delivery, deliver, deliver_joint
-    from measure.closing.sources import read
-    from measure.cloth.sources import films_among
+    from measure.closing.model_recipes import models
+    from measure.closing.verdict_artifacts import answer_of
+    from measure.closing.verdict_output import FILES, JOINT, KINDS, Delivery, deliver, deliver_joint
+    from measure.closing.verdict_sources import read
+    from measure.cloth.flag_recordings import films_among
     from measure.forecasting.strengths import Suspicion, on_markers
     from measure.loop.run import LoopOptions
-    from measure.nulls.workload import of_recordings
+    from measure.nulls.null_workload import of_recordings
     from measure.observe import Setup, observe
-    from measure.observe import recipe as recipes
+    from measure.observe import experiment_recipe as recipes
 
     recipe = None if chosen.recipe is None else recipes.parse(chosen.recipe)
     in_recipe = recipe is not None and bool(recipe.recordings)
@@ -256,7 +256,7 @@ def close_loop(chosen: CloseLoopCommand) -> None:
         return answer, cloth.material
 
     def of_films(level: float | None) -> VerdictAnswer:
-        from measure.cloth.command import close_films
+        from measure.cloth.close_films import close_films
 
         return close_films(films, chosen, lake=lake, branch=branch, name=names["films"], level=level)
 
@@ -264,8 +264,8 @@ def close_loop(chosen: CloseLoopCommand) -> None:
         answer = of_films(chosen.level) if films else of_markers(chosen.level)[0]
         deliver(answer, delivery)
         return
-    from measure.closing.joint import joined
-    from measure.cloth.simulation import mean_bending
+    from measure.closing.joint_verdict import joined
+    from measure.cloth.flag_simulation import mean_bending
     from measure.verdict.criteria import CRITERIA
 
     level_of_both = chosen.level or (None if recipe is None else recipe.level) or CRITERIA.level
@@ -294,7 +294,7 @@ def _refuse_beside(chosen: CloseLoopCommand, sources: tuple[str, ...], *, films:
 
 def _reading(chosen: CloseLoopCommand, recipe: ExperimentRecipe | None, *, joint: bool = False) -> SourceOptions:
     """Returns how sources of the command line are read."""
-    from measure.closing.sources import SourceOptions
+    from measure.closing.verdict_sources import SourceOptions
 
     return SourceOptions(
         rate=chosen.rate,
@@ -331,9 +331,9 @@ def _draft(chosen: CloseLoopCommand, sources: tuple[str, ...], lake: Lake | None
     Raises:
         UsageError: there is a recipe already, or there are no markers or meshes.
     """
-    from flagdata.documents import to_toml
-    from flagdata.outputs import write_file
-    from measure.closing.sources import drafted, filled
+    from flagdata.core.files.outputs import write_file
+    from flagdata.recipes.documents import to_toml
+    from measure.closing.verdict_sources import drafted, filled
     from measure.observe import Setup
 
     if chosen.recipe is not None or chosen.draft is None or not sources:
@@ -404,7 +404,7 @@ def _up(chosen: CloseLoopCommand, recipe: ExperimentRecipe | None) -> Up:
 def _setup(setup: Setup, chosen: CloseLoopCommand, *, joint: bool = False) -> Setup:
     """Replaces what the command line states in a setup."""
     from measure.observe import sheet
-    from sim.material import MATERIALS, named
+    from sim.cloth.material import MATERIALS, named
 
     if chosen.material is not None:
         if chosen.material not in MATERIALS.names():

@@ -10,23 +10,23 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from flagdata.api.measuring import Measuring
-from flagdata.console import LocalPath, csv_rows, document, echo, following, progress, say, say_finding
+from flagdata.api.measuring_verbs import Measuring
+from flagdata.core.console import LocalPath, csv_rows, document, echo, following, progress, say, say_finding
+from flagdata.core.findings import Finding, Severity
+from flagdata.core.printable import SHORT
 from flagdata.errors import RefusedError, UsageError
 from flagdata.examples import check_without_lake
-from flagdata.findings import Finding, Severity
-from flagdata.options import AsJson, argument, command, option, options
-from flagdata.printable import SHORT
-from flagdata.shared_options import FILM, HOW, WRITTEN, Keeping
+from flagdata.verbs.shared_options import FILM, HOW, WRITTEN, Keeping
+from flagdata.verbs.verb_options import AsJson, argument, command, option, options
 
 if TYPE_CHECKING:
+    from flagdata.answer.wind_elsewhere import WindComparison
     from flagdata.lake import Lake
-    from flagdata.wind_elsewhere import WindComparison
     from measure.anemometer.networks import Network
     from measure.commands.measure_film import Request
-    from measure.estimate.measuring import Measurement, Options
-    from measure.estimate.series import Beside
-    from measure.film.source import FilmReading, Subject
+    from measure.estimate.film_measuring import Measurement, Options
+    from measure.estimate.wind_by_window import Beside
+    from measure.film.film_source import FilmReading, Subject
     from measure.refine.refinement import Refinement
 
 
@@ -90,7 +90,7 @@ def measure(chosen: MeasureCommand) -> None:
         raise UsageError("more than one form of output is given", fix="choose one of --json and --csv")
     if chosen.cache is not None and chosen.refine is None:
         raise UsageError("--cache needs --refine", fix="give --refine N, or leave --cache out")
-    from flagdata.outputs import check_file, check_folder
+    from flagdata.core.files.outputs import check_file, check_folder
 
     if chosen.report is not None:
         check_file(chosen.report, command="measure")
@@ -100,7 +100,7 @@ def measure(chosen: MeasureCommand) -> None:
         check_without_lake(chosen.source)
     from measure.anemometer.networks import network
     from measure.commands.measure_film import Request
-    from measure.film.source import subjects
+    from measure.film.film_source import subjects
 
     lake, at = chosen.opened(), chosen.version
     request = Request.of(chosen, lake=lake, at=at, refine=chosen.refine)
@@ -162,12 +162,12 @@ class _Job:
 
     def do(self, subject: Subject) -> _Done:
         """Measure one film; commit and write what is to be shown."""
+        from flagdata.core.files.outputs import fresh_folder, write_file
         from flagdata.lake.results import placed
-        from flagdata.outputs import fresh_folder, write_file
         from measure.commands.measure_film import run, wind_elsewhere
         from measure.commands.measurement_artifact import artifact as artifact_of
         from measure.commands.measurement_artifact import keep, write
-        from measure.estimate.series import beside
+        from measure.estimate.wind_by_window import beside
 
         estimator = self.network.estimator
         with _advancing(("search", "frame"), ("measure", "window")) as (subject.film.searched, advance):
@@ -258,10 +258,10 @@ class _Job:
         Args:
             artifact: id of the measurement in the lake; None where it is not to be there.
         """
+        from measure.estimate.measurement_page import Context, Section, page
+        from measure.estimate.measurement_pictures import steps
         from measure.estimate.nearest import nearest
-        from measure.estimate.page import Context, Section, page
-        from measure.estimate.pictures import steps
-        from measure.refine.section import section
+        from measure.refine.refinement_section import section
 
         model = self.network.estimator
         neighbours, compared = (), 0
@@ -333,7 +333,7 @@ def _warn(findings: Sequence[Finding]) -> None:
 
 
 def _report(done: _Done, *, series: bool) -> None:
-    from measure.estimate.answer import SHORT
+    from measure.estimate.film_answer import SHORT
 
     measured = done.measured
     mark = "refused by the gate, not to be relied on: " if measured.verdict.refused else ""

@@ -8,22 +8,22 @@ from pathlib import Path
 
 import numpy as np
 
-from flagdata.api.measuring import Measuring
-from flagdata.dataset.source import lake_of
+from flagdata.answer.measured import Answer, Measured, Windows
+from flagdata.answer.wind_elsewhere import WindComparison, compared
+from flagdata.api.measuring_verbs import Measuring
+from flagdata.core.findings import Finding, Severity
+from flagdata.core.stated import Stated
+from flagdata.core.workload import one_thread
+from flagdata.dataset.lake_source import lake_of
 from flagdata.errors import UsageError
-from flagdata.film_array import Frames
-from flagdata.findings import Finding, Severity
+from flagdata.ingest.films.film_array import Frames
 from flagdata.lake import Lake
-from flagdata.measured import Answer, Measured, Windows
-from flagdata.stated import Stated
-from flagdata.wind_elsewhere import WindComparison, compared
-from flagdata.workload import one_thread
-from measure.anemometer.measuring import measure_by
+from measure.anemometer.anemometer_measuring import measure_by
 from measure.anemometer.networks import Network, gate_beside, network
 from measure.estimate.combine import of_model
-from measure.estimate.material import weight_of
-from measure.estimate.measuring import Measurement, Options, measure
-from measure.film.source import FilmReading, Subject, size_of, subjects
+from measure.estimate.film_measuring import Measurement, Options, measure
+from measure.estimate.named_cloth import weight_of
+from measure.film.film_source import FilmReading, Subject, size_of, subjects
 
 
 @one_thread()
@@ -37,7 +37,7 @@ def run(
         advance: called after each window with how many there are and 1.
 
     Raises:
-        FlagdataError: see `measure.estimate.measuring.measure`.
+        FlagdataError: see `measure.estimate.film_measuring.measure`.
     """
     if network.reading is not None and network.artifact is not None:
         return measure_by(

@@ -13,18 +13,18 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.findings import quality_flags
+from flagdata.core.findings import quality_flags
+from flagdata.core.provenance import canonical
+from flagdata.core.schema import Kind
 from flagdata.lake import Artifact, Lake, results
-from flagdata.lake.meshes import check_format, read_part, store_errors, write_plain
+from flagdata.lake.mesh_sequences import check_format, read_part, store_errors, write_plain
 from flagdata.lake.results import Placed
-from flagdata.provenance import canonical
-from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS
 from measure.anemometer.networks import Network
-from measure.estimate.gusts import SERIES_KEY
-from measure.estimate.measuring import Measurement
-from measure.estimate.series import WIND, Beside
-from measure.film.source import FilmReading, Subject
+from measure.estimate.film_measuring import Measurement
+from measure.estimate.gusty_series import SERIES_KEY
+from measure.estimate.wind_by_window import WIND, Beside
+from measure.film.film_source import FilmReading, Subject
 
 _FORMAT = 1
 _ANSWER = 4
@@ -144,7 +144,7 @@ def read(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
 
     Raises:
         CorruptError: not such a folder, damaged, or of a newer format.
-        LimitError: arrays larger than the limits of `flagdata.lake.meshes`.
+        LimitError: arrays larger than the limits of `flagdata.lake.mesh_sequences`.
     """
     from flagdata.lake.sized_chunks import open_group
 

@@ -5,20 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from flagdata.api.measuring import Observing
-from flagdata.console import LocalPath, document, echo, progress, say
+from flagdata.api.measuring_verbs import Observing
+from flagdata.core.console import LocalPath, document, echo, progress, say
+from flagdata.core.printable import SHORT
+from flagdata.core.workload import one_thread
 from flagdata.errors import RefusedError, UsageError
 from flagdata.examples import check_without_lake
-from flagdata.options import AsJson, command, option, options
-from flagdata.printable import SHORT
-from flagdata.shared_options import WRITTEN, Keeping
-from flagdata.workload import one_thread
+from flagdata.verbs.shared_options import WRITTEN, Keeping
+from flagdata.verbs.verb_options import AsJson, command, option, options
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
-    from flagdata.rows import Rows
-    from measure.film.source import FilmReading, Subject
-    from measure.observables.table import ObservableTable
+    from flagdata.lake.catalog_rows import Rows
+    from measure.film.film_source import FilmReading, Subject
+    from measure.observables.observables_table import ObservableTable
 
 
 @options
@@ -52,7 +52,7 @@ def observe(chosen: ObserveCommand) -> None:
       flagdata observe clip.mp4 --flag-size 1.5x1.0 --parquet clip.parquet --picture clip.png
       flagdata observe recording-7 --lake lake --flag-size 1.5x1.0 --json
     """
-    from flagdata.outputs import check_file, check_folder, fresh_folder, write_file
+    from flagdata.core.files.outputs import check_file, check_folder, fresh_folder, write_file
 
     if chosen.parquet is not None:
         check_file(chosen.parquet)
@@ -62,9 +62,9 @@ def observe(chosen: ObserveCommand) -> None:
         check_folder(chosen.zarr)
     if chosen.lake is None:
         check_without_lake(str(chosen.source))
-    from flagdata.pages.pictures import png
-    from measure.observables.artifact import keep
-    from measure.observables.picture import picture
+    from flagdata.pages.page_pictures import png
+    from measure.observables.observables_artifact import keep
+    from measure.observables.observables_picture import picture
 
     lake = chosen.opened()
     table, subject, reading = _table(chosen, lake, at=chosen.version)
@@ -97,8 +97,8 @@ def observed(chosen: Observing) -> Rows:
     Raises:
         FlagdataError: see `flagdata.observe`.
     """
-    from flagdata.dataset.source import lake_of
-    from flagdata.rows import Rows
+    from flagdata.dataset.lake_source import lake_of
+    from flagdata.lake.catalog_rows import Rows
 
     table, subject, _ = _table(chosen, lake_of(chosen.lake), at=chosen.at)
     _check_shown(table, subject)
@@ -108,9 +108,9 @@ def observed(chosen: Observing) -> Rows:
 @one_thread()
 def _table(chosen: Observing, lake: Lake | None, *, at: str | None) -> tuple[ObservableTable, Subject, FilmReading]:
     """Returns the observables of a film, with where it is from and how it was read."""
+    from measure.film.film_source import FilmReading, subjects
     from measure.film.similarity import FlagSize
-    from measure.film.source import FilmReading, subjects
-    from measure.observables.table import table_of
+    from measure.observables.observables_table import table_of
     from measure.observables.watching import count_of, watched
 
     if chosen.window < 1.0:

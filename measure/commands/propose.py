@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from flagdata.api.measuring import Proposing
-from flagdata.console import echo_lines, say
-from flagdata.options import Result, verb
-from measure.closing.command_line import nulls_given, refuse, stage_bars
+from flagdata.api.measuring_verbs import Proposing
+from flagdata.core.console import echo_lines, say
+from flagdata.verbs.verb_options import Result, verb
+from measure.closing.null_options import nulls_given, refuse, stage_bars
 
 
 @verb(Proposing, example='flagdata.propose("flag.toml", known=("lift.coefficient",))')
@@ -26,14 +26,14 @@ def propose(chosen: Proposing) -> Iterator[Result]:
       flagdata propose flag.toml --known lift.coefficient
       flagdata propose other.toml --effect out/close-loop/proposal/proposed_1f2e3d.py:UpwardLower
     """
-    from flagdata.dataset.source import lake_of
-    from measure.nulls.plan import NullOptions
-    from measure.nulls.workload import of_recordings
-    from measure.observe import recipe as recipes
+    from flagdata.dataset.lake_source import lake_of
+    from measure.nulls.null_plan import NullOptions
+    from measure.nulls.null_workload import of_recordings
+    from measure.observe import experiment_recipe as recipes
     from measure.propose import candidates, effect_file, proposal_log
-    from measure.propose.propose import propose as seek
+    from measure.propose.proposal_words import words
+    from measure.propose.term_search import propose as seek
     from measure.propose.terms import dictionary
-    from measure.propose.words import words
 
     folder = Path(chosen.out) / "proposal"
     proposal_log.check(folder / "proposals.json")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
+from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from measure.demo.command import MINUTES, Story
+    from measure.demo.demo_command import MINUTES, Story
+    from measure.demo.demo_recording import BEFORE, START, RecordingRecipe
     from measure.demo.logger import CUP, SENSOR
-    from measure.demo.recording import BEFORE, START, RecordingRecipe
     from measure.demo.tracked import TrackedRecipe, make_tracks
     from measure.demo.transcript import Transcript
 

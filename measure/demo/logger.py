@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
-from flagdata.rng import stream
-from sim.datasets.recipe import AnemometerSpec, Truth
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import stream
+from sim.datasets.dataset_recipe import AnemometerSpec, Truth
 
 ZONE = "+02:00"
 """Of the logger's wall clock."""

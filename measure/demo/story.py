@@ -14,14 +14,13 @@ from typing import Any
 import av
 import numpy as np
 
-from flagdata.console import progress, say
+from flagdata.core.console import progress, say
+from flagdata.core.workload import cores
 from flagdata.lake import Lake
-from flagdata.pages.pictures import data_url, figure_url, moving
-from flagdata.workload import cores
+from flagdata.pages.page_pictures import data_url, figure_url, moving
 from measure.commands.measurement_artifact import read
-from measure.demo.cards import Card, Judgement, Truth
-from measure.demo.page import recovered, write_page
-from measure.demo.recording import (
+from measure.demo.demo_cards import Card, Judgement, Truth
+from measure.demo.demo_recording import (
     AIR_RATE,
     BEFORE,
     CLOCK_SIGMA,
@@ -31,8 +30,9 @@ from measure.demo.recording import (
     RecordingRecipe,
     make_recording,
 )
+from measure.demo.recording_page import recovered, write_page
 from measure.demo.transcript import Transcript
-from measure.verdict.record import Conclusion
+from measure.verdict.verdict_record import Conclusion
 
 SIZE = "1.5x1.0"
 """Of the flag, as its maker states it [m]."""

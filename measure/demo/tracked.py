@@ -13,18 +13,18 @@ from pathlib import Path
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import stream
 from flagdata.errors import InputError
-from flagdata.rng import stream
 from measure.observe.interpolation import onto
-from sim import handles
-from sim.batch import Batch, Divergence, after
+from sim.cloth import handles
+from sim.cloth.handles import Handles
+from sim.cloth.material import named
+from sim.cloth.mesh import Diagonals, Mesh, grid
+from sim.cloth.scene import Scene, assemble, roughened
 from sim.effects import EFFECTS, apply
-from sim.handles import Handles
 from sim.integrate.symplectic import Symplectic
-from sim.material import named
-from sim.mesh import Diagonals, Mesh, grid
-from sim.scene import Scene, assemble, roughened
+from sim.run.simulation_loop import Batch, Divergence, after
 
 MATERIAL = "camel-ponte-roma"
 _OUTER = 2e-3  # s, time step of the force beside the base model

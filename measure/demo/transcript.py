@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from flagdata.console import echo_lines, say
+from flagdata.core.console import echo_lines, say
 from flagdata.errors import FlagdataError, RefusedError
-from measure.demo.cards import Card
+from measure.demo.demo_cards import Card
 
 
 @dataclass(kw_only=True)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
+from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from measure.drape.answer import answered
-    from measure.drape.fit import Face, Fit, Model, Surface, fitted, together
-    from measure.drape.shape import rim_of, shape_of
-    from measure.drape.simulation import (
+    from measure.drape.drape_answer import answered
+    from measure.drape.drape_shape import rim_of, shape_of
+    from measure.drape.drape_simulation import (
         BENDING_LENGTH,
         CLOTH,
         CURVATURE,
@@ -20,5 +19,6 @@ if TYPE_CHECKING:
         ratio,
         simulated,
     )
+    from measure.drape.fit import Face, Fit, Model, Surface, fitted, together
 
 __getattr__ = lazy_exports(__name__, __file__)

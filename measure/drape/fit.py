@@ -18,13 +18,13 @@ from enum import StrEnum
 import numpy as np
 from scipy.stats import chi2
 
-from flagdata.arrays import BoolArray, FloatArray, IntArray
+from flagdata.core.arrays import BoolArray, FloatArray, IntArray
+from flagdata.core.rng import stream
 from flagdata.errors import InputError
-from flagdata.rng import stream
-from flagdata.tables import Range, Scale
+from flagdata.recipes.typed_tables import Range, Scale
 from measure.cloth import Uncertain, draws
-from measure.drape.simulation import ANISOTROPY, BENDING_LENGTH, CLOTH, CURVATURE, SHEAR
-from sim.drape import DISC, PEDESTAL
+from measure.drape.drape_simulation import ANISOTROPY, BENDING_LENGTH, CLOTH, CURVATURE, SHEAR
+from sim.run.cusick_drape import DISC, PEDESTAL
 
 COEFFICIENT, LOBE = 0, 1
 NUMERICS = (0.01, 0.004)

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
+from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from measure.estimate.answer import LEAST_INFORMATION, SHORT, information
     from measure.estimate.combine import CARD_KEY, OWN, UNKNOWN, Dependence, combined, of_model
-    from measure.estimate.gusts import SERIES_KEY, Gusts, Pair, SeriesErrors, errors_of_model
-    from measure.estimate.joint import DRAWS, FilmAnswer
-    from measure.estimate.material import weight_of
-    from measure.estimate.measuring import Measurement, measure
-    from measure.estimate.options import Options
-    from measure.estimate.page import Context, Section
-    from measure.estimate.pictures import steps
-    from measure.estimate.series import Beside, beside
+    from measure.estimate.film_answer import LEAST_INFORMATION, SHORT, information
+    from measure.estimate.film_measuring import Measurement, measure
+    from measure.estimate.film_posterior import DRAWS, FilmAnswer
+    from measure.estimate.gusty_series import SERIES_KEY, Gusts, Pair, SeriesErrors, errors_of_model
+    from measure.estimate.measurement_page import Context, Section
+    from measure.estimate.measurement_pictures import steps
+    from measure.estimate.measuring_options import Options
+    from measure.estimate.named_cloth import weight_of
+    from measure.estimate.wind_by_window import Beside, beside
 
 __getattr__ = lazy_exports(__name__, __file__)

@@ -34,12 +34,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from flagdata.errors import InputError
-from measure.estimate.cards import card_entry
+from measure.estimate.card_entries import card_entry
 
 if TYPE_CHECKING:
-    from models.estimator import Estimator
+    from models.trained.estimator import Estimator
 
 OWN = frozenset({"wind_speed"})
 """Targets of which each window has its own; all others are one cloth's."""

@@ -12,15 +12,15 @@ import numpy as np
 import pyarrow.compute as pc
 import torch
 
-from flagdata.arrays import Float32Array, UInt8Array
+from flagdata.core.arrays import Float32Array, UInt8Array
+from flagdata.core.rng import stream
+from flagdata.core.schema import Kind
 from flagdata.lake import Lake
 from flagdata.record import Record
-from flagdata.rng import stream
-from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS
-from models.estimator import Estimator
-from models.frontend import FrontEnd
-from models.training.conditioned import FitFilm
+from models.maps.frontend import FrontEnd
+from models.trained.estimator import Estimator
+from models.training.conditioned_clips import FitFilm
 from models.training.timed_film import LEAST_RATE
 
 COMPARED = 48

@@ -11,15 +11,15 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+from flagdata.core.stated import Stated
 from flagdata.errors import UsageError
-from flagdata.stated import Stated
-from measure.estimate.measuring import Measurement
+from measure.estimate.film_measuring import Measurement
+from measure.film.film_source import Subject
 from measure.film.similarity import LOGARITHMS, POWERS
-from measure.film.source import Subject
-from measure.refine.command import Clip, run
+from measure.refine.refine_command import Clip, run
 from measure.refine.refinement import Interval, Refinement
-from models.estimator import Estimator
-from models.targets import ASPECT, Cloth
+from models.networks.targets import ASPECT, Cloth
+from models.trained.estimator import Estimator
 
 
 def refined(

@@ -33,12 +33,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.findings import Finding
+from flagdata.core.shell import command_line
 from flagdata.errors import RefusedError, UnknownNameError, UsageError
-from flagdata.findings import Finding
-from flagdata.shell import command_line
 from measure.gate.reasons import REASONS
-from models.targets import ASPECT, Cloth, Target
+from models.networks.targets import ASPECT, Cloth, Target
 
 
 @dataclass(frozen=True, kw_only=True)

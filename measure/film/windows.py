@@ -1,8 +1,8 @@
 """A film cut into windows of the network's length, once for each size of flag that is considered.
 
 A window starts on a frame. Where no frame is near an instant of the network, its picture is interpolated between the
-two frames about it (`models.conditioning.instants`); frames that repeat the one before are left out first. A window in
-which frames are missing is left out. Where a film's coding left no noise, some is given back
+two frames about it (`models.conditioning.frame_interpolation`); frames that repeat the one before are left out first. A
+window in which frames are missing is left out. Where a film's coding left no noise, some is given back
 (`models.conditioning.grain`).
 """
 
@@ -14,16 +14,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flagdata.arrays import UInt8Array
+from flagdata.core.arrays import UInt8Array
+from flagdata.core.findings import Finding
 from flagdata.errors import InputError, UsageError
-from flagdata.film import Film
-from flagdata.findings import Finding
-from measure.film.conditioned import ConditionedFilm
+from flagdata.ingest.films.film import Film
+from measure.film.conditioned_film import ConditionedFilm
 from measure.film.similarity import spacing
+from models.conditioning.frame_interpolation import Interpolator, TimedFrame, at_instants
 from models.conditioning.grain import grained
-from models.conditioning.instants import Interpolator, TimedFrame, at_instants
 from models.conditioning.repeats import Distinct
-from models.estimator import Estimator
+from models.trained.estimator import Estimator
 
 _BEYOND = 0.05
 """Share of the time between two frames by which an instant may lie beyond the film's last: stamps are rounded to

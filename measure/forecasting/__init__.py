@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
+from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from measure.forecasting.alignment import aligned
-    from measure.forecasting.calibration import PRIOR, THETA, Calibration
+    from measure.forecasting.calibrated_parameters import PRIOR, THETA, Calibration
     from measure.forecasting.model import Model, errors_of
     from measure.forecasting.observer import Forecaster
     from measure.forecasting.regressors import (

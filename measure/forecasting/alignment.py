@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from flagdata.errors import InputError
 from measure.observe.trajectory import Experiment, Specimen, Trajectory
 

@@ -10,13 +10,13 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from measure.forecasting.calibration import THETA, Calibration
+from measure.forecasting.calibrated_parameters import THETA, Calibration
 from measure.forecasting.observer import WIDEST, Forecaster
 from measure.forecasting.regressors import EffectColumn
 from measure.forecasting.segments import Segments
+from sim.cloth.state import State
+from sim.cloth.system import System
 from sim.effects import Effect, apply
-from sim.state import State
-from sim.system import System
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -23,20 +23,20 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from flagdata.arrays import BoolArray, FloatArray, IntArray
+from flagdata.core.arrays import BoolArray, FloatArray, IntArray
 from flagdata.errors import UsageError
-from measure.forecasting.calibration import THETA, Calibration
+from measure.forecasting.calibrated_parameters import THETA, Calibration
 from measure.forecasting.regressors import DOUBLE, Column, StepColumn, WrittenColumn
 from measure.forecasting.segments import Segments
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import Specimen
-from sim.anchors import AnchorTracks
-from sim.handles import Handles
+from sim.cloth.anchors import AnchorTracks
+from sim.cloth.handles import Handles
+from sim.cloth.scene import Scene, assemble
+from sim.cloth.state import State
+from sim.cloth.system import InapplicableError, System
 from sim.integrate.joint_batch import JointBatch
 from sim.integrate.split import SplitEuler
-from sim.scene import Scene, assemble
-from sim.state import State
-from sim.system import InapplicableError, System
 from sim.wind.sampled import Beyond, Even, SampledWind
 
 WIDEST = 400

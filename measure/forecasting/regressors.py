@@ -15,17 +15,17 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from flagdata.errors import UsageError
-from measure.forecasting.calibration import THETA
-from sim.cloth import Cloth
+from measure.forecasting.calibrated_parameters import THETA
+from sim.cloth.cloth_batch import Cloth
+from sim.cloth.state import State
+from sim.cloth.system import System
 from sim.effects import EFFECTS, Effect, apply
+from sim.effects.cloth_geometry import left_of
 from sim.effects.effect import ForceEffect
-from sim.effects.geometry import left_of
 from sim.effects.gusts import Gusts
 from sim.effects.parameter import Parameter
-from sim.state import State
-from sim.system import System
 
 
 class Column(ABC):

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from flagdata.arrays import BoolArray, FloatArray, IntArray
+from flagdata.core.arrays import BoolArray, FloatArray, IntArray
 from flagdata.errors import InputError
 from measure.observe.trajectory import Trajectory, WindTrack
 

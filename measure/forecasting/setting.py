@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flagdata.arrays import FloatArray, IntArray
+from flagdata.core.arrays import FloatArray, IntArray
 from measure.forecasting.alignment import aligned
-from measure.forecasting.calibration import PRIOR_WITHOUT_MASS, Calibration, prior
+from measure.forecasting.calibrated_parameters import PRIOR_WITHOUT_MASS, Calibration, prior
 from measure.forecasting.observer import Forecaster
 from measure.forecasting.segments import Segments
 from measure.observe.trajectory import Experiment

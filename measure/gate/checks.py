@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flagdata.arrays import Float32Array, FloatArray, UInt8Array
-from measure.gate import motion
+from flagdata.core.arrays import Float32Array, FloatArray, UInt8Array
+from measure.gate import clip_motion
 from measure.gate.clip_statistics import SIDE, ClipStatistics
 
 _TILE = 28
@@ -184,43 +184,58 @@ CHECKS: dict[str, Check] = {
     "contrast": Check(measure=contrast, what="contrast [gray levels]", low="too-dark", resolution=0.03, logarithm=True),
     "noise": Check(measure=noise, what="noise over contrast", high="too-dark", resolution=0.05, logarithm=True),
     "area": Check(
-        measure=motion.area, what="share of the picture that moves", low="no-motion", resolution=0.05, logarithm=True
+        measure=clip_motion.area,
+        what="share of the picture that moves",
+        low="no-motion",
+        resolution=0.05,
+        logarithm=True,
     ),
     "energy": Check(
-        measure=motion.energy, what="power of motion over contrast", low="no-motion", resolution=0.05, logarithm=True
+        measure=clip_motion.energy,
+        what="power of motion over contrast",
+        low="no-motion",
+        resolution=0.05,
+        logarithm=True,
     ),
     "strength": Check(
-        measure=motion.strength, what="strongest motion over noise", low="no-motion", resolution=0.05, logarithm=True
+        measure=clip_motion.strength,
+        what="strongest motion over noise",
+        low="no-motion",
+        resolution=0.05,
+        logarithm=True,
     ),
     "at-edge": Check(
-        measure=motion.at_edge, what="motion at the picture's edge over motion inside", high="cut-off", resolution=0.05
+        measure=clip_motion.at_edge,
+        what="motion at the picture's edge over motion inside",
+        high="cut-off",
+        resolution=0.05,
     ),
     "around": Check(
-        measure=motion.around, what="share of the picture's rim that moves", high="moving-camera", resolution=0.05
+        measure=clip_motion.around, what="share of the picture's rim that moves", high="moving-camera", resolution=0.05
     ),
     "off-centre": Check(
-        measure=motion.off_centre, what="distance of the motion from the middle", high="cut-off", resolution=0.02
+        measure=clip_motion.off_centre, what="distance of the motion from the middle", high="cut-off", resolution=0.02
     ),
     "width": Check(
-        measure=motion.width, what="width of what moves [sides]", high="scale", low="scale", resolution=0.03
+        measure=clip_motion.width, what="width of what moves [sides]", high="scale", low="scale", resolution=0.03
     ),
     "height": Check(
-        measure=motion.height, what="height of what moves [sides]", high="scale", low="scale", resolution=0.03
+        measure=clip_motion.height, what="height of what moves [sides]", high="scale", low="scale", resolution=0.03
     ),
     "second-region": Check(
-        measure=motion.second_region,
+        measure=clip_motion.second_region,
         what="motion of a second region over the first's",
         high="several-flags",
         resolution=0.05,
     ),
     "scatter": Check(
-        measure=motion.scatter,
+        measure=clip_motion.scatter,
         what="share of the motion apart from its largest region",
         high="unlike-cloth",
         resolution=0.03,
     ),
     "edges-moving": Check(
-        measure=motion.edges_moving, what="share of edges that move", high="moving-camera", resolution=0.03
+        measure=clip_motion.edges_moving, what="share of edges that move", high="moving-camera", resolution=0.03
     ),
     "shift": Check(
         measure=shift,

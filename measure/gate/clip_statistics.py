@@ -10,7 +10,7 @@ import torch
 from scipy import ndimage
 from torch.nn import functional
 
-from flagdata.arrays import BoolArray, Float32Array, UInt8Array
+from flagdata.core.arrays import BoolArray, Float32Array, UInt8Array
 from flagdata.errors import InputError
 
 SIDE = 112

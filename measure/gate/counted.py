@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
-from flagdata.findings import Finding, Severity
+from flagdata.core.findings import Finding, Severity
 from measure.gate.reasons import REASONS
 from measure.gate.watch import FilmWatch
 from models.conditioning import Conditioning, Follower

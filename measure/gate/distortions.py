@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from flagdata.arrays import Float32Array, FloatArray, UInt8Array
+from flagdata.core.arrays import Float32Array, FloatArray, UInt8Array
 from measure.gate.clip_statistics import SIDE, ClipStatistics
 
 Film = UInt8Array

@@ -14,13 +14,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from flagdata.errors import InputError
 from measure.gate.checks import CHECKS
 from measure.gate.distortions import DISTORTIONS
-from measure.gate.features import MOVES
+from measure.gate.gate_features import MOVES
 from measure.gate.tail_probability import ExponentialTails
-from models.outliers import conformal_p, shrunk_covariance, whitening
+from models.trained.outliers import conformal_p, shrunk_covariance, whitening
 
 _SIDED = tuple(
     (name, column, sign, kind)

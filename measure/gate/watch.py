@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.arrays import BoolArray, Float32Array, UInt8Array
-from models.conditioning import noise
+from flagdata.core.arrays import BoolArray, Float32Array, UInt8Array
+from models.conditioning import camera_noise
 
 SIDE = 240
 """Longer side [px] of the small copies."""
@@ -91,7 +91,7 @@ class FilmWatch:
         if len(self.times) % _SAMPLED == 1 and len(self._sample) < _KEPT:
             self._sample.append(small)
             self._bright.append(float(np.quantile(picture[::4, ::4], 0.99)))
-            self._noise.append(noise.deviation_in(picture))
+            self._noise.append(camera_noise.deviation_in(picture))
 
     def _change(self, small: Float32Array) -> None:
         """Add up how much the picture changes, in itself and averaged."""

@@ -14,20 +14,20 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.arrays import FloatArray, UInt8Array
+from flagdata.core.arrays import FloatArray, UInt8Array
 from flagdata.errors import InputError
 from measure.gate.checks import CHECKS
+from measure.gate.clip_motion import LEAST_AREA
 from measure.gate.clip_statistics import LEAST_DEVIATION, ClipStatistics
 from measure.gate.counted import COUNTED
 from measure.gate.distortions import DISTORTIONS
-from measure.gate.features import features_of
 from measure.gate.gate import SCORES, Gate
-from measure.gate.motion import LEAST_AREA
+from measure.gate.gate_features import features_of
+from measure.gate.gate_verdict import Reason
 from measure.gate.reasons import REASONS
 from measure.gate.tail_probability import level
-from measure.gate.verdict import Reason
-from models.estimator import Estimator
-from models.outliers import Familiarity
+from models.trained.estimator import Estimator
+from models.trained.outliers import Familiarity
 
 FALSE_ALARM = 0.05
 """Share of clips like the simulated ones that may be refused."""
@@ -70,7 +70,7 @@ class WindowGate(Protocol):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FamiliarityGate:
-    """The distance of a window's summary to those of the training clips; see `models.outliers`."""
+    """The distance of a window's summary to those of the training clips; see `models.trained.outliers`."""
 
     cloud: Familiarity
 

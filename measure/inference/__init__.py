@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
+from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from measure.inference.evidence import CoefficientFit, Evidence, best_gain, gains
     from measure.inference.growth import power
     from measure.inference.random_effect import NullModel, Nulls
+    from measure.inference.segment_evidence import CoefficientFit, Evidence, best_gain, gains
     from measure.inference.whitened_misfit import WhitenedMisfit
 
 __getattr__ = lazy_exports(__name__, __file__)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
-from measure.inference.evidence import Chosen, Evidence, left_together
+from flagdata.core.arrays import FloatArray
+from measure.inference.segment_evidence import Chosen, Evidence, left_together
 
 
 @dataclass(frozen=True, kw_only=True)

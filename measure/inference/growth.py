@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 
 
 def power(sizes: FloatArray, damping: FloatArray) -> float:

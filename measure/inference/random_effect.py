@@ -17,11 +17,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.arrays import FloatArray, IntArray
-from measure.forecasting.calibration import DAMPING, PRIOR, Calibration
+from flagdata.core.arrays import FloatArray, IntArray
+from measure.forecasting.calibrated_parameters import DAMPING, PRIOR, Calibration
 from measure.forecasting.setting import Design
 from measure.inference.growth import power
-from measure.probes.rows import StatisticRows
+from measure.probes.segment_rows import StatisticRows
 from measure.probes.statistics import Statistics
 
 _SHIFTS = 16

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field, replace
 
 from torch import Tensor
 
-from flagdata.arrays import FloatArray
-from measure.forecasting.calibration import Calibration
-from measure.inference.evidence import Evidence
+from flagdata.core.arrays import FloatArray
+from measure.forecasting.calibrated_parameters import Calibration
 from measure.inference.random_effect import NullModel
+from measure.inference.segment_evidence import Evidence
 from measure.probes.statistics import Projection, Statistics
 
 

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
+from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from measure.loop.corrective_field import Mode
+    from measure.loop.effect_selection import GUST_COLUMN, LibraryJudgement, estimate, finalists, judge
     from measure.loop.run import LoopOptions, LoopOutcome, solve
-    from measure.loop.selection import GUST_COLUMN, LibraryJudgement, estimate, finalists, judge
     from measure.loop.set_up import HOIST
     from measure.loop.validation import folds, paired, total_error
 

@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 
 from torch import Tensor
 
-from measure.forecasting.calibration import THETA
+from measure.forecasting.calibrated_parameters import THETA
 from measure.forecasting.regressors import FieldColumn, fields
 from measure.forecasting.setting import Setting
-from measure.inference.evidence import Evidence
+from measure.inference.segment_evidence import Evidence
 from measure.inference.whitened_misfit import WhitenedMisfit
 
 

@@ -7,15 +7,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flagdata.arrays import BoolArray, FloatArray
+from flagdata.core.arrays import BoolArray, FloatArray
 from flagdata.errors import ErrorKind, FlagdataError
-from measure.forecasting.calibration import PRIOR, THETA, Calibration
+from measure.forecasting.calibrated_parameters import PRIOR, THETA, Calibration
 from measure.forecasting.model import Model, errors_of, linearised
 from measure.forecasting.observer import Forecaster
 from measure.forecasting.regressors import DOUBLE, Column, EffectColumn
 from measure.forecasting.segments import Segments
-from measure.inference.evidence import Evidence
 from measure.inference.random_effect import NullModel
+from measure.inference.segment_evidence import Evidence
 from measure.inference.whitened_misfit import WhitenedMisfit
 from measure.probes.statistics import Statistics, reduced
 

@@ -22,21 +22,21 @@ import numpy as np
 from torch import Tensor
 
 from flagdata.answer import Bound, Span
-from flagdata.arrays import BoolArray, FloatArray
-from measure.ends import of_profile
-from measure.forecasting.calibration import Calibration
+from flagdata.core.arrays import BoolArray, FloatArray
+from measure.forecasting.calibrated_parameters import Calibration
 from measure.forecasting.model import Model, errors_of
 from measure.forecasting.observer import Forecaster
 from measure.forecasting.regressors import EffectColumn, columns, names
 from measure.forecasting.segments import Segments
-from measure.inference.evidence import Evidence, left_together
+from measure.inference.segment_evidence import Evidence, left_together
 from measure.inference.whitened_misfit import WhitenedMisfit
 from measure.loop.gauss_newton import FitDivergedError, Refined, refine
 from measure.loop.validation import LeftOut, left_out
+from measure.nulls.null_simulation import FreeRunDivergedError
 from measure.nulls.reference import Reference
-from measure.nulls.simulation import FreeRunDivergedError
+from measure.posterior_ends import of_profile
 from measure.verdict.criteria import CRITERIA
-from measure.verdict.record import Estimate
+from measure.verdict.verdict_record import Estimate
 from sim.effects.parameter import Parameter
 
 COUNT = 16

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import welch
 
-from flagdata.arrays import BoolArray, FloatArray, IntArray
+from flagdata.core.arrays import BoolArray, FloatArray, IntArray
 from measure.forecasting.segments import Segments
 from measure.loop.validation import Predictions
 from measure.observe.trajectory import Experiment
-from measure.verdict.record import Residual
+from measure.verdict.verdict_record import Residual
 
 _SHOWN = 50
 """Frames in motion: two seconds at 25 a second."""

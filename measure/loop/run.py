@@ -22,22 +22,19 @@ from functools import cached_property
 import numpy as np
 import torch
 
-from flagdata.arrays import FloatArray, IntArray
+from flagdata.core.arrays import FloatArray, IntArray
+from flagdata.core.provenance import code_version
+from flagdata.core.rng import child_seed
 from flagdata.errors import InputError, UsageError
-from flagdata.provenance import code_version
-from flagdata.rng import child_seed
-from measure.forecasting.calibration import THETA, Calibration
+from measure.forecasting.calibrated_parameters import THETA, Calibration
 from measure.forecasting.model import Model
 from measure.forecasting.regressors import EffectColumn, columns, names
 from measure.forecasting.setting import Setting, Stage
 from measure.forecasting.strengths import WHERE, Suspicion
-from measure.inference.evidence import CoefficientFit, Evidence
+from measure.inference.segment_evidence import CoefficientFit, Evidence
 from measure.inference.whitened_misfit import WhitenedMisfit
 from measure.loop.corrective_field import Mode, corrective_field
-from measure.loop.gauss_newton import Refined, cut
-from measure.loop.refit import Fits, Refit, refit
-from measure.loop.residuals import residuals
-from measure.loop.selection import (
+from measure.loop.effect_selection import (
     GUST_COLUMN,
     LibraryJudgement,
     Weighed,
@@ -47,23 +44,35 @@ from measure.loop.selection import (
     strength,
     withdrawn,
 )
+from measure.loop.gauss_newton import Refined, cut
+from measure.loop.refit import Fits, Refit, refit
+from measure.loop.residuals import residuals
 from measure.loop.set_up import SetUp
 from measure.loop.validation import LeftOut, Predictions, Trial, compare, folds, numerical_floor, predict
 from measure.nulls import bank as banks
-from measure.nulls import plan
+from measure.nulls import null_plan
 from measure.nulls.conformal import kinds_needed
 from measure.nulls.free_run import settled_off
+from measure.nulls.null_simulation import NullBatch
 from measure.nulls.reference import NullBank, Reference
-from measure.nulls.simulation import NullBatch
 from measure.observe.checks.attachment import hoist_stands_still
 from measure.observe.trajectory import Experiment
-from measure.probes.course import Variation
 from measure.probes.lines import SpectralLine
 from measure.probes.statistics import Projection, Statistics, projected
+from measure.probes.wind_course import Variation
 from measure.probes.wind_log import lags
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.decided import NOT_REJECTED
-from measure.verdict.record import Candidate, Comparison, Conclusion, Estimate, NullTest, Parameter, Power, Verdict
+from measure.verdict.verdict_record import (
+    Candidate,
+    Comparison,
+    Conclusion,
+    Estimate,
+    NullTest,
+    Parameter,
+    Power,
+    Verdict,
+)
 
 
 def parameters(
@@ -129,7 +138,7 @@ _LOOKS = 4
 
 
 @dataclass(frozen=True, kw_only=True)
-class LoopOptions(plan.NullOptions):
+class LoopOptions(null_plan.NullOptions):
     """How to close the loop: by which nulls, at which level of the global test.
 
     Attributes:
@@ -141,7 +150,7 @@ class LoopOptions(plan.NullOptions):
         UsageError: values that make no sense, or a level that so many nulls cannot test.
     """
 
-    most_nulls: int = 2 * plan.FEWEST_NULLS
+    most_nulls: int = 2 * null_plan.FEWEST_NULLS
     suspected: Suspicion | None = None
 
     def __post_init__(self) -> None:
@@ -203,7 +212,7 @@ def solve(experiment: Experiment, options: LoopOptions, *, stage: Stage | None =
     nominal, suspected = setting, _suspected(measured, options.suspected)
 
     def tested(nulls: int) -> tuple[Setting, Fits, NullBank, Reference]:
-        bank = plan.bank_for(nominal, options, nulls=nulls, stage=report)
+        bank = null_plan.bank_for(nominal, options, nulls=nulls, stage=report)
         reference = bank.reference(
             len(nominal.segments), noise=nominal.design.noise, seed=options.seed, prior=nominal.prior
         )
@@ -214,7 +223,7 @@ def solve(experiment: Experiment, options: LoopOptions, *, stage: Stage | None =
         reference = reference.at(fitted.calibration)
         return fitted, fits, bank, reference if suspected is None else reference.along(*suspected)
 
-    nulls = plan.first_round(options)
+    nulls = null_plan.first_round(options)
     setting, fits, bank, reference = tested(nulls)
     evidence = fits.whitened.evidence(fits.whitened.statistics)
     while (wanted := _nulls_wanted(options, nulls, reference, evidence)) is not None:
@@ -240,7 +249,9 @@ def _nulls_wanted(options: LoopOptions, nulls: int, reference: Reference, eviden
     if options.bank is not None:
         return None
     statistic = reference.tested(evidence, names())
-    return plan.more_nulls(nulls, options.nulls, options.most_nulls, reference.test, statistic, level=options.level)
+    return null_plan.more_nulls(
+        nulls, options.nulls, options.most_nulls, reference.test, statistic, level=options.level
+    )
 
 
 def _suspected(measured: Statistics, suspected: Suspicion | None) -> tuple[int, int] | None:

@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass
 
 from measure.forecasting.regressors import TURNED, names
-from measure.inference.evidence import Evidence
+from measure.inference.segment_evidence import Evidence
 from measure.nulls.reference import Reference
 from measure.verdict.criteria import CRITERIA
-from measure.verdict.record import Estimate
+from measure.verdict.verdict_record import Estimate
 
 HOIST = "full-hoist.stiffness"
 

@@ -13,8 +13,8 @@ import numpy as np
 import torch
 from scipy.stats import t as student
 
-from flagdata.arrays import BoolArray, FloatArray, IntArray
-from flagdata.rng import child_seed
+from flagdata.core.arrays import BoolArray, FloatArray, IntArray
+from flagdata.core.rng import child_seed
 from measure.forecasting.model import Model, errors_of
 from measure.forecasting.observer import Forecaster
 from measure.forecasting.segments import Segments
@@ -22,10 +22,10 @@ from measure.forecasting.setting import Setting
 from measure.inference.whitened_misfit import WhitenedMisfit
 from measure.loop.gauss_newton import Refined, finished
 from measure.nulls import tracks, winds
-from measure.nulls.simulation import NullBatch
-from measure.observe.anchors import as_seen
+from measure.nulls.null_simulation import NullBatch
+from measure.observe.attachment_anchors import as_seen
 from measure.verdict.criteria import CRITERIA
-from measure.verdict.record import Comparison, Estimate
+from measure.verdict.verdict_record import Comparison, Estimate
 
 _DURATION = 4.5  # s: two segments of each recording
 _ENOUGH = 3

@@ -15,27 +15,27 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.arrays import FloatArray, read_arrays
-from flagdata.console import say_beside_bars
+from flagdata.core.arrays import FloatArray, read_arrays
+from flagdata.core.console import say_beside_bars
+from flagdata.core.files.outputs import rewrite
+from flagdata.core.numbered import bounded
+from flagdata.core.provenance import code_version
+from flagdata.core.rng import child_seed, stream
 from flagdata.errors import CorruptError, NotFoundError, UsageError
-from flagdata.numbered import bounded
-from flagdata.outputs import rewrite
-from flagdata.provenance import code_version
-from flagdata.rng import child_seed, stream
-from flagdata.tables import SEED_LIMIT
-from measure.forecasting.calibration import Calibration
+from flagdata.recipes.typed_tables import SEED_LIMIT
+from measure.forecasting.calibrated_parameters import Calibration
 from measure.forecasting.observer import Forecaster
 from measure.forecasting.regressors import Column, columns, names
 from measure.forecasting.segments import Segments
 from measure.inference.random_effect import Nulls
 from measure.nulls import stiffness
 from measure.nulls.free_run import mistaken, settled_off
+from measure.nulls.null_simulation import NullBatch
 from measure.nulls.reference import NullBank
-from measure.nulls.simulation import NullBatch
-from measure.observe.anchors import as_seen
+from measure.observe.attachment_anchors import as_seen
 from measure.observe.trajectory import Specimen, Trajectory
-from measure.probes.course import Course
 from measure.probes.statistics import Statistics, statistics
+from measure.probes.wind_course import Course
 from sim.integrate.split import SplitEuler
 from sim.workers import connected
 

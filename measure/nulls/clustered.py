@@ -25,7 +25,7 @@ import numpy as np
 from scipy.special import ndtri
 from scipy.stats import rankdata, t
 
-from flagdata.arrays import FloatArray, IntArray
+from flagdata.core.arrays import FloatArray, IntArray
 from measure.nulls.conformal import MOST_KINDS
 from measure.shares import clopper_pearson
 

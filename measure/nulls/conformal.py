@@ -21,7 +21,7 @@ from functools import cached_property
 
 import numpy as np
 
-from flagdata.arrays import FloatArray, IntArray
+from flagdata.core.arrays import FloatArray, IntArray
 from measure.shares import clopper_pearson
 
 MOST_KINDS = 1000

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from measure.forecasting.strengths import on_markers
-from measure.inference.evidence import Evidence
+from measure.inference.segment_evidence import Evidence
 
 APPEARS = 0.25
 """Share of a shift that the fit's mesh expects of an effect which appears in recordings of other meshes: the median of

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
-from flagdata.rng import child_seed, stream
-from measure.forecasting.calibration import Calibration
-from measure.nulls.simulation import NullBatch
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import child_seed, stream
+from measure.forecasting.calibrated_parameters import Calibration
+from measure.nulls.null_simulation import NullBatch
 from measure.observe.trajectory import Trajectory
 from measure.probes.settled import settled
 from measure.verdict.criteria import CRITERIA

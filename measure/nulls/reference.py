@@ -9,21 +9,21 @@ from functools import cached_property
 
 import numpy as np
 
-from flagdata.arrays import FloatArray, IntArray
+from flagdata.core.arrays import FloatArray, IntArray
+from flagdata.core.rng import stream
 from flagdata.errors import InputError, UsageError
-from flagdata.rng import stream
-from measure.forecasting.calibration import DAMPING, PRIOR, THETA, Calibration
+from measure.forecasting.calibrated_parameters import DAMPING, PRIOR, THETA, Calibration
 from measure.forecasting.regressors import TURNED
 from measure.forecasting.setting import Design
-from measure.inference.evidence import Evidence, best_gain
 from measure.inference.fluctuation import fluctuation
 from measure.inference.growth import power
 from measure.inference.random_effect import NullModel, Nulls
+from measure.inference.segment_evidence import Evidence, best_gain
 from measure.nulls.conformal import GroupedConformal, kinds_needed
 from measure.nulls.directions import APPEARS, NOTHING, Move, directed, moves, pulled, shares_of, standardised
 from measure.nulls.tails import as_normal, freedom
 from measure.probes.lines import Lines, SpectralLine, strongest
-from measure.probes.rows import StatisticRows
+from measure.probes.segment_rows import StatisticRows
 from measure.verdict.criteria import CRITERIA
 
 _GROUPS = 400

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sim.material import Material
+from sim.cloth.material import Material
 
 _STRETCHING = (0.5, 2.0)
 _APART = 1.7

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 
 _NORMAL = 1e6
 """Degrees of freedom from which a tail is the normal's."""

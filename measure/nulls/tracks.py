@@ -14,9 +14,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.linalg import solveh_banded
 
-from flagdata.arrays import FloatArray
-from flagdata.rng import stream
-from measure.nulls.simulation import CARRIED, SETTLE
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import stream
+from measure.nulls.null_simulation import CARRIED, SETTLE
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import AttachmentTrack, Trajectory
 

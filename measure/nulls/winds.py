@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flagdata.rng import stream
-from measure.nulls.simulation import SETTLE
+from flagdata.core.rng import stream
+from measure.nulls.null_simulation import SETTLE
 from measure.observe.trajectory import Trajectory, WindTrack
 
 _STEADY = 1e-3

@@ -9,18 +9,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
-from flagdata.registry import Registry
-from measure.observables.cloth import ClothWindow, View, seen_from
-from measure.observables.film import FilmWindow
+from flagdata.packages.lazy import lazy_exports
+from flagdata.recipes.registry import Registry
+from measure.observables.film_window import FilmWindow
 from measure.observables.observable import Observable, UnseenError, WindowReading
 from measure.observables.silhouettes import Silhouettes
+from measure.observables.tracked_cloth import ClothWindow, View, seen_from
 
 if TYPE_CHECKING:
-    from measure.observables.cloth import ClothWindow, View, edges_of, seen_from
-    from measure.observables.film import FilmWindow
+    from measure.observables.film_window import FilmWindow
     from measure.observables.observable import WINDOW, Observable
-    from measure.observables.table import table_of
+    from measure.observables.observables_table import table_of
+    from measure.observables.tracked_cloth import ClothWindow, View, edges_of, seen_from
     from measure.observables.watching import watched
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
-from measure.observables.cloth import ClothWindow
-from measure.observables.film import FilmWindow
-from measure.observables.unseen import EDGE_ON, NO_SILHOUETTE, UnseenError
+from flagdata.core.arrays import FloatArray
+from measure.observables.film_window import FilmWindow
+from measure.observables.not_shown import EDGE_ON, NO_SILHOUETTE, UnseenError
+from measure.observables.tracked_cloth import ClothWindow
 
 Window = FilmWindow | ClothWindow
 """Both have `times`, `free_edge`, `middle`, `silhouettes`, `length` and `height`."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from measure.observables.chord import Window, chord
-from measure.observables.motion import spectrum
+from measure.observables.not_shown import NO_MOTION, UnseenError
 from measure.observables.observable import Observable
-from measure.observables.unseen import NO_MOTION, UnseenError
+from measure.observables.place_courses import spectrum
 
 _STILL = 0.004
 """Root mean square motion of the free edge, in flag lengths, below which there is no spectrum but of noise. Lower reads

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from measure.observables.chord import Window, chord
+from measure.observables.not_shown import NO_SILHOUETTE, UnseenError
 from measure.observables.observable import Observable
-from measure.observables.unseen import NO_SILHOUETTE, UnseenError
 
 _BETWEEN = 0.45
 """Share of the hoist's height above and below its middle in which the cloth's edge is looked at: at the ends it is

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from measure.observables.chord import Window
-from measure.observables.motion import speed
 from measure.observables.observable import Observable
+from measure.observables.place_courses import speed
 
 
 def middle_speed(window: Window) -> float:

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, TypeVar
 
-from measure.observables.cloth import ClothWindow
-from measure.observables.film import FilmWindow
-from measure.observables.unseen import UnseenError
+from measure.observables.film_window import FilmWindow
+from measure.observables.not_shown import UnseenError
+from measure.observables.tracked_cloth import ClothWindow
 
 __all__ = ["Observable", "UnseenError", "WindowReading"]
 

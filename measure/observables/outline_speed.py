@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from measure.observables.chord import Window
-from measure.observables.motion import RATE
+from measure.observables.not_shown import FEW_FRAMES, UnseenError
 from measure.observables.observable import Observable
+from measure.observables.place_courses import RATE
 from measure.observables.silhouettes import BESIDE
-from measure.observables.unseen import FEW_FRAMES, UnseenError
 
 
 def outline_speed(window: Window) -> float:

@@ -8,7 +8,7 @@ from functools import cached_property
 import cv2
 import numpy as np
 
-from flagdata.arrays import BoolArray, FloatArray
+from flagdata.core.arrays import BoolArray, FloatArray
 from flagdata.errors import InputError
 
 _TAIL = 0.06

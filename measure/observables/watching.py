@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flagdata.arrays import FloatArray, UInt8Array
+from flagdata.core.arrays import FloatArray, UInt8Array
 from flagdata.errors import RefusedError
-from measure.film.conditioned import ConditionedFilm
+from measure.film.conditioned_film import ConditionedFilm
 from measure.film.similarity import FlagSize
-from measure.observables.film import FilmWindow
+from measure.observables.film_window import FilmWindow
 from measure.observables.observable import WINDOW
 from models.conditioning.outline import Outliner
 from models.conditioning.stills import halved

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from measure.observables.chord import Window, chord
-from measure.observables.motion import HIGHEST, LOWEST, RATE, even, transformed
-from measure.observables.unseen import EDGE_ON, NO_WAVE, UnseenError
+from measure.observables.not_shown import EDGE_ON, NO_WAVE, UnseenError
+from measure.observables.place_courses import HIGHEST, LOWEST, RATE, even, transformed
 
 _SECTIONS = np.linspace(0.35, 0.85, 6)
 """Of the mean chord, where the middle line is followed."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
+from flagdata.packages.lazy import lazy_exports
 from measure.observe.experiment import Observed, observe
 from measure.observe.gaps import fill
 from measure.observe.observation import Known, Observation, Up, from_arrays
@@ -13,14 +13,14 @@ from measure.observe.setup import Hold, Setup, sheet
 from measure.observe.trajectory import Experiment, Specimen, Trajectory, WindTrack
 
 if TYPE_CHECKING:
-    from measure.observe.anchors import as_seen, carried
+    from measure.observe.attachment_anchors import as_seen, carried
     from measure.observe.checks.attachment import hoist_stands_still
-    from measure.observe.cloth import model_mesh
+    from measure.observe.cloth_mesh import model_mesh
     from measure.observe.experiment import hold, observe
+    from measure.observe.experiment_recipe import load, parse, read
     from measure.observe.interpolation import onto
-    from measure.observe.meshes import from_folder, from_sequence, sample
+    from measure.observe.mesh_observations import from_folder, from_sequence, sample
     from measure.observe.observation import Known, Observation, Up, from_arrays
-    from measure.observe.recipe import load, parse, read
     from measure.observe.setup import Hold, Setup, sheet
     from measure.observe.trajectory import (
         AREA_WEIGHT_UNCERTAINTY,
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
         Trajectory,
         WindTrack,
     )
-    from measure.observe.wind import LogPlacement, from_log
+    from measure.observe.wind_tracks import LogPlacement, from_log
 
 
 __all__ = [

@@ -10,19 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.findings import Finding
 from flagdata.errors import InputError
-from flagdata.findings import Finding
-from flagdata.ingest.meshes.store import scene_wind
+from flagdata.ingest.meshes.mesh_artifacts import scene_wind
 from flagdata.lake import Artifact
-from flagdata.retired_names import present_names
+from flagdata.recipes.retired_names import present_names
 from measure.observe.observation import Known
 from measure.observe.trajectory import WindTrack
-from sim import handles
-from sim.air import AIR_FORCES, AirForce, QuadraticNormal
 from sim.arcsim import STAGES
-from sim.handles import ARCSIM_STIFFNESS
-from sim.material import BENDING_SHAPE, MATERIALS, STRETCHING_SHAPE, Material, named
+from sim.cloth import handles
+from sim.cloth.air import AIR_FORCES, AirForce, QuadraticNormal
+from sim.cloth.handles import ARCSIM_STIFFNESS
+from sim.cloth.material import BENDING_SHAPE, MATERIALS, STRETCHING_SHAPE, Material, named
 
 
 def of_arcsim(scene: Mapping[str, Any], rest: FloatArray, *, where: str) -> tuple[Known, tuple[Finding, ...]]:

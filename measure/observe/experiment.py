@@ -24,23 +24,23 @@ import numpy as np
 from scipy.spatial import KDTree
 from scipy.stats import chi2
 
-from flagdata.arrays import FloatArray, IntArray
+from flagdata.core.arrays import FloatArray, IntArray
+from flagdata.core.findings import Finding
 from flagdata.errors import InputError
-from flagdata.findings import Finding
-from measure.observe import cloth
-from measure.observe.anchors import anchors_of, carried
-from measure.observe.checks import attachment, frames, inertia, shape, surroundings
+from measure.observe import cloth_mesh
+from measure.observe.attachment_anchors import anchors_of, carried
+from measure.observe.checks import attachment, cloth_lengths, frames, inertia_check, surroundings
 from measure.observe.common import at_same_points, at_same_rate
 from measure.observe.gaps import fill_positions
 from measure.observe.observation import Known, Observation
 from measure.observe.setup import Hold, Setup
 from measure.observe.trajectory import Experiment, Specimen, Trajectory
-from sim import handles
-from sim.air import QuadraticNormal
-from sim.handles import ARCSIM_STIFFNESS
-from sim.material import Material
-from sim.mesh import Mesh
-from sim.scene import GRAVITY
+from sim.cloth import handles
+from sim.cloth.air import QuadraticNormal
+from sim.cloth.handles import ARCSIM_STIFFNESS
+from sim.cloth.material import Material
+from sim.cloth.mesh import Mesh
+from sim.cloth.scene import GRAVITY
 
 _TIME_ORDERS = (2, 4, 6, 8, 10, 12)
 _DEGREES = (0, 1, 2, 3, 4)  # of the polynomial in (u, v); 0 stands for the marker itself
@@ -169,8 +169,8 @@ def hold(mesh: Mesh, pins: Hold | FloatArray) -> tuple[Mesh, tuple[int, ...]]:
     if isinstance(pins, Hold):
         return mesh, tuple(int(vertex) for vertex in _NAMED[pins](mesh.rest))
     rest, tolerance = mesh.rest.copy(), _NEAR * float(np.ptp(mesh.rest, axis=0).max())
-    corners = cloth.outline(mesh.rest, mesh.faces, where="model mesh")
-    sharp = corners[cloth.sharp_corners(corners)]
+    corners = cloth_mesh.outline(mesh.rest, mesh.faces, where="model mesh")
+    sharp = corners[cloth_mesh.sharp_corners(corners)]
     fixed = (np.hypot(*(rest[:, None] - sharp).transpose(2, 0, 1)) <= tolerance).any(axis=1)
     edge = np.zeros(len(rest), dtype=bool)
     edge[mesh.boundary] = True
@@ -180,8 +180,8 @@ def hold(mesh: Mesh, pins: Hold | FloatArray) -> tuple[Mesh, tuple[int, ...]]:
         away = np.hypot(*(rest - pin).T)
         vertex = int(away.argmin())
         if away[vertex] > tolerance:
-            at_edge = cloth.distance_to(corners, pin) <= tolerance
-            if not at_edge and not cloth.inside(corners, pin[None])[0]:
+            at_edge = cloth_mesh.distance_to(corners, pin) <= tolerance
+            if not at_edge and not cloth_mesh.inside(corners, pin[None])[0]:
                 raise InputError(
                     "it is not on the cloth", where=where, fix="give pins in the coordinates of the markers, in metres"
                 )
@@ -216,7 +216,7 @@ def observe(observations: Sequence[Observation], setup: Setup | None = None) -> 
         raise InputError("there are no recordings", where="experiment", fix="give at least one")
     corners, findings = _outline(observations, setup)
     low = corners.min(axis=0)
-    mesh = cloth.model_mesh(corners - low, vertices=setup.vertices)
+    mesh = cloth_mesh.model_mesh(corners - low, vertices=setup.vertices)
     prepared = [_prepared(observation, corners) for observation in observations]
     at_rate, resampled = at_same_rate([_trajectory(observation, low) for observation in prepared])
     recordings, moved = at_same_points(at_rate, mesh.rest)
@@ -264,16 +264,16 @@ def _prepared(observation: Observation, corners: FloatArray) -> Observation:
     if not np.isfinite(observation.positions).all(axis=2).any():
         raise InputError("no marker was tracked in any frame", where=where, fix="check the columns of the positions")
     observation = frames.even(observation)
-    edges = shape.Edges.between(observation.markers, where=where)
+    edges = cloth_lengths.Edges.between(observation.markers, where=where)
     observation = frames.without_stuck_markers(observation)
     sigma = _noise(observation)
-    scaled = shape.check_scale(observation, edges, sigma)
-    observation = frames.without_repeats(shape.without_strays(observation, edges, sigma), sigma)
+    scaled = cloth_lengths.check_scale(observation, edges, sigma)
+    observation = frames.without_repeats(cloth_lengths.without_strays(observation, edges, sigma), sigma)
     period = float(observation.times[1] - observation.times[0])
     filled = fill_positions(observation.positions, observation.markers, period=period, where=where)
     begin = float(observation.times[filled.frames.start])
     markers = observation.markers[filled.markers]
-    if len(markers) < shape.FEWEST:
+    if len(markers) < cloth_lengths.FEWEST:
         raise InputError(
             f"{len(markers)} of {len(observation.markers)} markers are left", where=where, fix="track more of them"
         )
@@ -294,7 +294,7 @@ def _prepared(observation: Observation, corners: FloatArray) -> Observation:
             *observation.findings,
             *scaled,
             *filled.findings,
-            *shape.check_cover(markers, corners, where=where),
+            *cloth_lengths.check_cover(markers, corners, where=where),
             *frames.lost_frames(filled.positions, where=where),
         ),
     )
@@ -332,7 +332,7 @@ def _checked(experiment: Experiment) -> tuple[Finding, ...]:
         surroundings.check_accelerations(recording, specimen)
         findings += surroundings.check_strength(recording, specimen)
         if specimen.mass_known and not experiment.carried:
-            findings += inertia.check_inertia(recording, specimen)
+            findings += inertia_check.check_inertia(recording, specimen)
     if not experiment.carried:
         attachment.check_places(experiment.recordings, specimen)
     return tuple(findings)
@@ -355,7 +355,7 @@ def _outline(observations: Sequence[Observation], setup: Setup) -> tuple[FloatAr
         corners = outline
     else:
         markers = np.concatenate([observation.markers for observation in observations])
-        edge = cloth.hull(markers, where="cloth")
+        edge = cloth_mesh.hull(markers, where="cloth")
         size = np.ptp(edge, axis=0)
         finding = Finding.of(
             "cloth-assumed-to-end-at-markers",
@@ -365,7 +365,7 @@ def _outline(observations: Sequence[Observation], setup: Setup) -> tuple[FloatAr
             fix="give its width and height, or its rest mesh",
         )
         return edge, (finding,)
-    return (corners if cloth.area(corners) > 0 else corners[::-1]), ()
+    return (corners if cloth_mesh.area(corners) > 0 else corners[::-1]), ()
 
 
 def _trajectory(observation: Observation, low: FloatArray) -> Trajectory:

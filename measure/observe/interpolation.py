@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.interpolate import RBFInterpolator
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from flagdata.errors import InputError
 
 _COINCIDENT = 1e-6

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
+from flagdata.core.schema import Kind
 from flagdata.errors import InputError
 from flagdata.ingest.markers import MarkerOptions, read_table
 from flagdata.lake import Artifact, Lake
-from flagdata.lake.meshes import MarkerSequence, read_markers
-from flagdata.schema import Kind
+from flagdata.lake.mesh_sequences import MarkerSequence, read_markers
 from flagdata.timebase import NANOSECONDS
 from measure.observe.observation import Observation
 

@@ -8,13 +8,13 @@ from enum import StrEnum
 
 import numpy as np
 
-from flagdata.arrays import BoolArray, FloatArray, IntArray
+from flagdata.core.arrays import BoolArray, FloatArray, IntArray
+from flagdata.core.findings import Finding
 from flagdata.errors import InputError
-from flagdata.findings import Finding
-from measure.observe.cloth import outline
+from measure.observe.cloth_mesh import outline
 from measure.observe.trajectory import WindTrack
-from sim.air import AirForce
-from sim.material import Material
+from sim.cloth.air import AirForce
+from sim.cloth.material import Material
 
 
 class Up(StrEnum):

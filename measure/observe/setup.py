@@ -8,13 +8,13 @@ from enum import StrEnum
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.stated import Stated
 from flagdata.errors import InputError, UsageError
-from flagdata.stated import Stated
-from measure.observe.cloth import VERTICES
+from measure.observe.cloth_mesh import VERTICES
 from measure.observe.trajectory import AREA_WEIGHT_UNCERTAINTY
-from sim.air import AirForce
-from sim.material import Material
+from sim.cloth.air import AirForce
+from sim.cloth.material import Material
 
 
 class Hold(StrEnum):

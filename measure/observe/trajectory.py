@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.arrays import AnyArray, BoolArray, FloatArray
+from flagdata.core.arrays import AnyArray, BoolArray, FloatArray
 from flagdata.errors import InputError
-from sim.air import AirForce, QuadraticNormal
-from sim.handles import ARCSIM_STIFFNESS
-from sim.material import Material
-from sim.mesh import Mesh
-from sim.scene import GRAVITY
+from sim.cloth.air import AirForce, QuadraticNormal
+from sim.cloth.handles import ARCSIM_STIFFNESS
+from sim.cloth.material import Material
+from sim.cloth.mesh import Mesh
+from sim.cloth.scene import GRAVITY
 
 GAIN = 0.03
 """Share: calibrated cups and sonics are good to 1 to 3 % (IEC 61400-12-1, annex I, classes them so)."""

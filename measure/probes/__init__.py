@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
+from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from measure.probes.course import ALONG, LEFT, Course, Variation
     from measure.probes.lines import REDUCED, Lines, SpectralLine, strongest
-    from measure.probes.rows import StatisticRows
+    from measure.probes.segment_rows import StatisticRows
     from measure.probes.statistics import Projection, Statistics, error_scale, projected, reduced
+    from measure.probes.wind_course import ALONG, LEFT, Course, Variation
     from measure.probes.wind_log import by_recording, lags
 
 __getattr__ = lazy_exports(__name__, __file__)

@@ -15,7 +15,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from flagdata.arrays import FloatArray, IntArray
+from flagdata.core.arrays import FloatArray, IntArray
 from measure.forecasting.regressors import cosine
 
 REDUCED: FloatArray = np.geomspace(1.0, 4.0, 70)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 
 NAMES = ("droop", "extension", "speed", "amplitude", "hoist amplitude")
 """Droop: angle below the horizontal of the line from the middle of the hoist to the middle of the free edge, the mean

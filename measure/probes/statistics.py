@@ -29,16 +29,16 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from flagdata.arrays import BoolArray, FloatArray, IntArray
-from measure.forecasting.calibration import Calibration
+from flagdata.core.arrays import BoolArray, FloatArray, IntArray
+from measure.forecasting.calibrated_parameters import Calibration
 from measure.forecasting.observer import Forecaster
 from measure.forecasting.regressors import Column, winds
 from measure.forecasting.segments import Segments
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import Specimen
-from measure.probes.course import Course, Gauge
 from measure.probes.lines import Spectrum
-from measure.probes.rows import StatisticRows
+from measure.probes.segment_rows import StatisticRows
+from measure.probes.wind_course import Course, Gauge
 from measure.probes.wind_log import sensitivities
 
 

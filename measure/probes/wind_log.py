@@ -18,12 +18,12 @@ from dataclasses import replace
 import numpy as np
 from torch import Tensor
 
-from flagdata.arrays import FloatArray, IntArray
-from measure.forecasting.calibration import Calibration
+from flagdata.core.arrays import FloatArray, IntArray
+from measure.forecasting.calibrated_parameters import Calibration
 from measure.forecasting.observer import Forecaster
 from measure.forecasting.segments import Segments
 from measure.observe.trajectory import WindTrack
-from measure.probes.course import ALONG, Course
+from measure.probes.wind_course import ALONG, Course
 
 NUISANCES, DIRECTION = 3, 1
 """How many there are for each recording, and the place of the direction among them."""

@@ -10,7 +10,7 @@ from torch import Tensor
 from flagdata.errors import UnknownNameError
 from measure.forecasting.regressors import EffectColumn, library
 from sim.effects import Effect
-from sim.effects.files import load
+from sim.effects.effect_files import load
 from sim.effects.parameter import Parameter
 
 
@@ -36,7 +36,7 @@ def from_file(spec: str) -> tuple[FileColumn, ...]:
     """Lists the strengths of the effect that `FILE.py:Class` names, with steps of half their expected range.
 
     Raises:
-        FlagdataError: as `sim.effects.files.load`.
+        FlagdataError: as `sim.effects.effect_files.load`.
     """
     effect = load(spec)
     described = effect.parameters()

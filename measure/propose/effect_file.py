@@ -10,8 +10,8 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from flagdata.core.files.outputs import check_files, write_files
 from flagdata.errors import ConflictError, UsageError
-from flagdata.outputs import check_files, write_files
 from measure.propose.outcome import ProposalOutcome, TermStrength
 from measure.propose.terms import MASS, Term, TermColumn
 
@@ -33,7 +33,7 @@ class EffectFile:
 
     @property
     def spec(self) -> str:
-        """As `sim.effects.files.load` takes it."""
+        """As `sim.effects.effect_files.load` takes it."""
         return f"{self.path}:{self.class_name}"
 
 

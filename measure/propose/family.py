@@ -12,10 +12,10 @@ from functools import cached_property
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
-from measure.forecasting.calibration import THETA
-from measure.inference.evidence import Evidence
+from flagdata.core.arrays import FloatArray
+from measure.forecasting.calibrated_parameters import THETA
 from measure.inference.random_effect import Nulls
+from measure.inference.segment_evidence import Evidence
 from measure.nulls.reference import left_out_groups
 from measure.probes.statistics import Statistics
 from measure.propose.projected import evidence

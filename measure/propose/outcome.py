@@ -7,7 +7,7 @@ from enum import StrEnum
 from typing import Any
 
 from measure.propose.search import Step
-from measure.verdict.record import Estimate
+from measure.verdict.verdict_record import Estimate
 
 
 class Decision(StrEnum):

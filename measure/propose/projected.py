@@ -23,18 +23,18 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from flagdata.arrays import FloatArray, IntArray
-from measure.forecasting.calibration import THETA, Calibration
+from flagdata.core.arrays import FloatArray, IntArray
+from measure.forecasting.calibrated_parameters import THETA, Calibration
 from measure.forecasting.model import Model, linearised
 from measure.forecasting.observer import WIDEST, Forecaster
 from measure.forecasting.regressors import Column
 from measure.forecasting.segments import Segments
-from measure.inference.evidence import Evidence
 from measure.inference.random_effect import NullModel
+from measure.inference.segment_evidence import Evidence
 from measure.inference.whitened_misfit import WhitenedMisfit
 from measure.probes.statistics import Projection, Statistics, error_scale, reduced
 from measure.propose.terms import MASS, TermColumn
-from sim.cloth import Cloth
+from sim.cloth.cloth_batch import Cloth
 from sim.effects.effect import ClothEffect, Effect
 from sim.effects.field import FieldEffect, Flat, Seen, heavier
 

@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from flagdata.documents import read_json
+from flagdata.core.files.outputs import check_rewrite, rewrite
 from flagdata.errors import CorruptError
-from flagdata.outputs import check_rewrite, rewrite
+from flagdata.recipes.documents import read_json
 from measure.propose.outcome import ProposalOutcome
 
 SCHEMA = "flagdata.proposals/1"

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from measure.forecasting.calibration import THETA
-from measure.inference.evidence import Evidence, gains
+from measure.forecasting.calibrated_parameters import THETA
+from measure.inference.segment_evidence import Evidence, gains
 from measure.loop.validation import total_error
 from measure.propose.family import Family
 

@@ -13,10 +13,10 @@ from typing import Annotated
 
 from torch import Tensor
 
+from flagdata.core.numbered import bounded
 from flagdata.errors import UsageError
-from flagdata.numbered import bounded
 from measure.forecasting.regressors import EffectColumn
-from sim.cloth import Cloth
+from sim.cloth.cloth_batch import Cloth
 from sim.effects import Effect
 from sim.effects.effect import ClothEffect
 from sim.effects.field import FieldEffect, Flat, Seen, heavier

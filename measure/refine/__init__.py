@@ -10,18 +10,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
+from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from measure.refine.command import Clip, run
     from measure.refine.evaluator import Evaluator, fingerprint
     from measure.refine.metamodel import Metamodel
     from measure.refine.procedure import Settings, refine, squared
+    from measure.refine.refine_command import Clip, run
     from measure.refine.refinement import Interval, Refinement, Round
     from measure.refine.simulator import FilmRequest, Simulator
     from measure.refine.space import AREA_WEIGHT_COLUMN, QUANTITIES, WIND_COLUMN, Space
     from measure.refine.target import Target
+    from measure.refine.target_view import DrawnView, FilmCamera, FixedView
     from measure.refine.trace import Trace
-    from measure.refine.view import DrawnView, FilmCamera, FixedView
 
 __getattr__ = lazy_exports(__name__, __file__)

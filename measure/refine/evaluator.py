@@ -15,14 +15,14 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from flagdata.arrays import FloatArray, UInt8Array, read_arrays
-from flagdata.checksums import is_sealed, sealed
+from flagdata.core.arrays import FloatArray, UInt8Array, read_arrays
+from flagdata.core.files.checksums import is_sealed, sealed
+from flagdata.core.files.outputs import rewrite
+from flagdata.core.provenance import canonical, digest
+from flagdata.core.rng import child_seed
 from flagdata.errors import CorruptError
-from flagdata.outputs import rewrite
-from flagdata.provenance import canonical, digest
-from flagdata.rng import child_seed
 from measure.refine.simulator import FilmRequest, Simulator
-from models.estimator import Estimator
+from models.trained.estimator import Estimator
 
 STAGES = ("simulate", "render", "embed")
 _DECIMALS = 12  # of a point: enough for any optimiser, and none of the last bits of another machine's

@@ -4,7 +4,7 @@
 2. Each is simulated in replicates and filmed by the target's view; the covariance of the replicates makes the distance,
    and their distance to each other the noise floor.
 3. A linear model of the network's estimates of wind and area weight over the parameters is the likelihood
-   (`measure.refine.metamodel`); it weighs draws of the prior (`measure.refine.posterior`).
+   (`measure.refine.metamodel`); it weighs draws of the prior (`measure.refine.refined_posterior`).
 4. Further θ are draws of that posterior, widened, until the budget is spent, or the nearest θ has reached the floor and
    the wind's interval has settled.
 
@@ -27,23 +27,23 @@ from pathlib import Path
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.findings import Finding, Severity
+from flagdata.core.rng import child_seed, stream
 from flagdata.errors import InputError
-from flagdata.findings import Finding, Severity
-from flagdata.rng import child_seed, stream
-from measure.ends import PILED, WITHIN, limits_of
-from measure.refine import start
+from measure.posterior_ends import PILED, WITHIN, limits_of
+from measure.refine import refinement_start
 from measure.refine.evaluator import STAGES, Evaluated, Evaluator, fingerprint
 from measure.refine.metamodel import Metamodel, least
-from measure.refine.posterior import REGRESSORS, Posterior, bending_table, posterior, regressors
+from measure.refine.refined_posterior import REGRESSORS, Posterior, bending_table, posterior, regressors
 from measure.refine.refinement import Interval, Refinement, Round, intervals_of
 from measure.refine.simulator import Simulator
 from measure.refine.space import DIMENSION, WIND_COLUMN, Space
 from measure.refine.target import Target, knows_view
 from measure.refine.trace import Trace
-from models.estimator import Estimator
-from models.outliers import shrunk_covariance
-from sim.run.recipe import Recipe
+from models.trained.estimator import Estimator
+from models.trained.outliers import shrunk_covariance
+from sim.run.simulation_recipe import Recipe
 
 
 def squared(embedding: FloatArray, target: FloatArray) -> FloatArray:
@@ -162,7 +162,7 @@ class Settings:
     @property
     def fewest(self) -> int:
         """Evaluations of the first round: enough for an interval even if replicates were all alike."""
-        return (least(REGRESSORS + 1, len(start.SUMMARISED)) + 2) * self.replicates
+        return (least(REGRESSORS + 1, len(refinement_start.SUMMARISED)) + 2) * self.replicates
 
 
 def refine(
@@ -191,7 +191,7 @@ def refine(
             a recipe without ranges, a space of another box, or too many simulations that failed.
     """
     chosen, several = settings or Settings(), tuple([targets] if isinstance(targets, Target) else targets)
-    start.require(estimator)
+    refinement_start.require(estimator)
     if not several:
         raise InputError("there is no clip to measure", fix="give at least one target")
     model = fingerprint(estimator)
@@ -226,10 +226,10 @@ class _Run:
     def whole(self) -> Refinement:
         begun = time.perf_counter()
         embedded = [e.embed(t.clip[None])[0] for e, t in zip(self.evaluators, self.targets, strict=True)]
-        observed = [start.summaries(self.estimator, row[None])[0] for row in embedded]
+        observed = [refinement_start.summaries(self.estimator, row[None])[0] for row in embedded]
         seed, aspect = child_seed(self.settings.seed, "amortised"), self.evaluators[0].simulator.aspect
         estimates = [
-            start.amortised(self.estimator, target.clip, self.space, aspect=aspect, seed=seed, draws=400)
+            refinement_start.amortised(self.estimator, target.clip, self.space, aspect=aspect, seed=seed, draws=400)
             for target in self.targets
         ]
         points: list[FloatArray] = []  # (clip, θ, 17) of each round
@@ -290,11 +290,11 @@ class _Run:
         """Draws points (clip, θ, 17): draws of the amortised posteriors, widened; the cloth of each clip's in turn."""
         count = self.settings.fewest // self.settings.replicates
         rng = stream(self.settings.seed, OWN, "first")
-        wide = [start.widened(draws, self.settings.widening, self.space) for draws in estimates]
+        wide = [refinement_start.widened(draws, self.settings.widening, self.space) for draws in estimates]
         chosen = np.stack([draws[rng.choice(len(draws), count, replace=False)] for draws in wide])
         turn = np.arange(count) % len(estimates)
         shared = chosen[turn, np.arange(count)]
-        base = start.completed(self.space, shared, seed=self.settings.seed)
+        base = refinement_start.completed(self.space, shared, seed=self.settings.seed)
         return self._with_winds(base, chosen[:, :, 0])
 
     def _next(self, current: Posterior, done: int, number: int) -> FloatArray:
@@ -326,7 +326,7 @@ class _Run:
             rows = np.concatenate([g.embedding for g in group])
             number_of_point = np.repeat(np.arange(len(group)), [len(g.embedding) for g in group])
             finite = np.isfinite(rows).all(axis=1)
-            summaries = start.summaries(self.estimator, rows[finite])
+            summaries = refinement_start.summaries(self.estimator, rows[finite])
             predictors = regressors(self.space.reported(points[clip]), self.space)[number_of_point[finite]]
             models.append(Metamodel.fit(predictors, summaries, number_of_point[finite]))
         return posterior(self.space, models, observed, seed=child_seed(self.settings.seed, OWN, "posterior", number))

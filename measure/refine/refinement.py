@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from flagdata.answer import Span
-from flagdata.arrays import FloatArray
-from flagdata.findings import Finding
-from flagdata.tables import Range
-from measure.ends import span
+from flagdata.core.arrays import FloatArray
+from flagdata.core.findings import Finding
+from flagdata.recipes.typed_tables import Range
+from measure.posterior_ends import span
 from measure.refine.evaluator import Evaluator
-from measure.refine.posterior import Posterior
+from measure.refine.refined_posterior import Posterior
 from measure.refine.space import QUANTITIES
 from measure.refine.target import Target
 from measure.refine.trace import Trace
@@ -35,7 +35,7 @@ class Interval:
         name: of `QUANTITIES`; of clips after the first, the wind's has the clip's number behind it.
         unit: SI.
         median: of the posterior; None where its draws pile up at an end of the range beyond which there may be more.
-        span: the central interval, or a bound on one side (`measure.ends`).
+        span: the central interval, or a bound on one side (`measure.posterior_ends`).
         prior_share: width of the central interval over that of the prior's of the same level: near 1 where the clip
             does not constrain it.
     """

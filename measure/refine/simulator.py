@@ -19,23 +19,23 @@ from functools import cached_property
 import numpy as np
 import torch
 
-from flagdata.arrays import UInt8Array
+from flagdata.core.arrays import UInt8Array
+from flagdata.core.provenance import canonical, digest
+from flagdata.core.rng import child_seed, stream
 from flagdata.errors import InputError
-from flagdata.provenance import canonical, digest
-from flagdata.rng import child_seed, stream
-from flagdata.tables import Range
+from flagdata.recipes.typed_tables import Range
 from measure.refine.space import AREA_WEIGHT_COLUMN, WIND_COLUMN, Space
-from measure.refine.view import View
+from measure.refine.target_view import View
 from models.conditioning.conditioning import VERSION
-from models.training.conditioned import FitFilm
+from models.training.conditioned_clips import FitFilm
 from sim.assets import Assets
-from sim.material import BENDING_SHAPE
+from sim.cloth.material import BENDING_SHAPE
+from sim.cloth.scene import roughened
 from sim.render import RENDERERS, Meshes
 from sim.render.renderer import Renderer
-from sim.run.batch import Stepper, run
+from sim.run.member_batch import Stepper, run
 from sim.run.members import Crew, Member
-from sim.run.recipe import Recipe
-from sim.scene import roughened
+from sim.run.simulation_recipe import Recipe
 
 START_NOISE = 1e-3
 """Standard deviation of the free vertices' start about the flat cloth [m]."""

@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.provenance import canonical, digest
 from flagdata.errors import InputError
-from flagdata.provenance import canonical, digest
-from flagdata.tables import Range, Scale, plain
-from sim.material import BENDING_SHAPE, Material
-from sim.run.recipe import Recipe, Shape
+from flagdata.recipes.typed_tables import Range, Scale, plain
+from sim.cloth.material import BENDING_SHAPE, Material
+from sim.run.simulation_recipe import Recipe, Shape
 
 BENDING = BENDING_SHAPE[0] * BENDING_SHAPE[1]
 AREA_WEIGHT_COLUMN, WIND_COLUMN = BENDING, BENDING + 1

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.arrays import UInt8Array
+from flagdata.core.arrays import UInt8Array
 from flagdata.errors import InputError
 from flagdata.lake import Artifact
-from flagdata.retired_names import present_names
+from flagdata.recipes.retired_names import present_names
 from measure.refine.space import BENDING, QUANTITIES, Space
-from measure.refine.view import FixedView, View, of_parameters
+from measure.refine.target_view import FixedView, View, of_parameters
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

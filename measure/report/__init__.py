@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
+from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from measure.report.document import as_document, from_document
     from measure.report.lead_sentences import lead
     from measure.report.report_page import page
-    from measure.report.statement import by_draw, with_sentences
+    from measure.report.verdict_statement import by_draw, with_sentences
 
 __getattr__ = lazy_exports(__name__, __file__)

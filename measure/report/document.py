@@ -21,7 +21,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from flagdata.errors import InputError
-from measure.verdict.record import Verdict
+from measure.verdict.verdict_record import Verdict
 
 SCHEMA = "flagdata.verdict/1"
 _SCALARS = {bool: "true or false", int: "a whole number", str: "a text"}

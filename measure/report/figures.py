@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from measure.report.chart import Chart, Linear, Logarithmic
 from measure.verdict.quantity import display, number
-from measure.verdict.record import NullTest, Residual
+from measure.verdict.verdict_record import NullTest, Residual
 
 _LEFT, _RIGHT, _TOP = 62.0, 628.0, 34.0
 _BINS = 24

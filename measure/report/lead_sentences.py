@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from measure.loop.selection import heterogeneous
-from measure.report.sentences import (
+from measure.loop.effect_selection import heterogeneous
+from measure.report.verdict_sentences import (
     candidate_title,
     contradicted,
     erring_text,
@@ -19,7 +19,7 @@ from measure.report.sentences import (
 )
 from measure.verdict.decided import erring
 from measure.verdict.quantity import known, number, probability, with_level
-from measure.verdict.record import Candidate, Conclusion, NullTest, Verdict
+from measure.verdict.verdict_record import Candidate, Conclusion, NullTest, Verdict
 
 _EVIDENCE = ((0.001, "very strong"), (0.01, "strong"), (0.05, "moderate"), (0.1, "weak"))
 """Largest p → the word for the evidence (Muff, Nilsen, O'Hara and Nater, Trends in Ecology & Evolution 37, 2022)."""

@@ -16,13 +16,13 @@ from markupsafe import Markup, escape
 
 from flagdata.pages.glossary import GLOSSARY
 from flagdata.pages.render import render
-from measure.report import cloth, figures, motion, rows, sentences
+from measure.report import error_maps, figures, moving_cloth, row_charts, verdict_sentences
 from measure.report.chart import Linear, drawing
 from measure.report.lead_sentences import lead
-from measure.report.sentences import readable
+from measure.report.verdict_sentences import readable
 from measure.verdict import quantity
 from measure.verdict.quantity import known, number
-from measure.verdict.record import Comparison, Conclusion, Estimate, Residual, Verdict
+from measure.verdict.verdict_record import Comparison, Conclusion, Estimate, Residual, Verdict
 
 _WIDTH, _LEFT, _RIGHT = 640.0, 190.0, 70.0
 _ROW, _BAR = 46.0, 12.0
@@ -118,35 +118,35 @@ class ResidualView:
 
 def page(verdict: Verdict) -> str:
     """Renders the report of `verdict`, HTML."""
-    errors = rows.errors_scale(verdict.comparisons)
-    gains = rows.gain_scale(verdict.ranking)
-    named_candidates = sentences.named_candidates(verdict)
-    motions = [m for m in map(motion.motion, verdict.residuals) if m is not None]
+    errors = row_charts.errors_scale(verdict.comparisons)
+    gains = row_charts.gain_scale(verdict.ranking)
+    named_candidates = verdict_sentences.named_candidates(verdict)
+    motions = [m for m in map(moving_cloth.motion, verdict.residuals) if m is not None]
     values = {
         "verdict": verdict,
         "tone": TONES[verdict.conclusion],
         **opening(verdict),
-        "test_sentence": sentences.test_sentence(verdict),
-        "remark": sentences.test_remark(verdict.test),
+        "test_sentence": verdict_sentences.test_sentence(verdict),
+        "remark": verdict_sentences.test_remark(verdict.test),
         "named": named_candidates,
-        "rejected": sentences.rejected(verdict),
-        "control_summary": sentences.control_summary(verdict),
+        "rejected": verdict_sentences.rejected(verdict),
+        "control_summary": verdict_sentences.control_summary(verdict),
         "has_control": any(quantity.known(c.control) for c in verdict.comparisons),
         "has_shift": any(quantity.known(p.after) for p in verdict.parameters),
         "residual_after": any(r.in_time_after for r in verdict.residuals),
-        "level": sentences.common_level(e for c in verdict.comparisons for e in (c.before, c.after, c.floor)),
-        "ranking_level": sentences.common_level(c.strength for c in verdict.ranking),
+        "level": verdict_sentences.common_level(e for c in verdict.comparisons for e in (c.before, c.after, c.floor)),
+        "ranking_level": verdict_sentences.common_level(c.strength for c in verdict.ranking),
         "lengths": _lengths(verdict),
-        "errors_row": lambda comparison: rows.errors_row(comparison, errors),
-        "gain_row": lambda c: rows.gain_row(c, gains, "after" if c in named_candidates else "single"),
-        "title": lambda c: sentences.candidate_title(verdict, c),
-        "strength_row": rows.strength_row,
+        "errors_row": lambda comparison: row_charts.errors_row(comparison, errors),
+        "gain_row": lambda c: row_charts.gain_row(c, gains, "after" if c in named_candidates else "single"),
+        "title": lambda c: verdict_sentences.candidate_title(verdict, c),
+        "strength_row": row_charts.strength_row,
         "null": figures.null_distribution(verdict.test),
         "some_unseen": any(r.held_out for r in verdict.residuals),
         "windless": [r.recording for r in verdict.residuals if not math.isfinite(r.speed)],
         "against_wind": figures.against_wind(verdict.residuals),
-        **_residuals(verdict.residuals, sentences.after_label(verdict)),
-        **_motions(motions, sentences.after_label(verdict)),
+        **_residuals(verdict.residuals, verdict_sentences.after_label(verdict)),
+        **_motions(motions, verdict_sentences.after_label(verdict)),
         "provenance": list(_flattened(verdict.provenance)),
     }
     return render("measure.report", "page.html.j2", values, filters=FILTERS)
@@ -155,7 +155,7 @@ def page(verdict: Verdict) -> str:
 def opening(verdict: Verdict) -> dict[str, Any]:
     """Returns what the top of a page of markers or films shows: sentence, chart and what speaks against them."""
     first = lead(verdict)
-    after = sentences.after_label(verdict)
+    after = verdict_sentences.after_label(verdict)
     return {
         "lead": first,
         "rest": verdict.words.removeprefix(first).strip(),
@@ -163,12 +163,12 @@ def opening(verdict: Verdict) -> dict[str, Any]:
         "after_label": after,
         "has_after": any(quantity.known(c.after) for c in verdict.comparisons),
         "against": [
-            *sentences.error_warnings(verdict),
-            *sentences.control_warnings(verdict),
-            *sentences.reduction_warnings(verdict),
+            *verdict_sentences.error_warnings(verdict),
+            *verdict_sentences.control_warnings(verdict),
+            *verdict_sentences.reduction_warnings(verdict),
             *(text for _, text in verdict.findings),
         ],
-        "power": sentences.power_mean(verdict),
+        "power": verdict_sentences.power_mean(verdict),
         "glossary": GLOSSARY,
     }
 
@@ -180,35 +180,35 @@ def _lengths(verdict: Verdict) -> quantity.Display:
 
 
 def _residuals(residuals: tuple[Residual, ...], after_label: str) -> dict[str, Any]:
-    size, mean = cloth.size_shade(residuals), cloth.mean_shade(residuals)
+    size, mean = error_maps.size_shade(residuals), error_maps.mean_shade(residuals)
     return {
         "residuals": [
             ResidualView(
                 residual=r,
-                sizes=cloth.size_maps(r, size, after_label),
-                means=cloth.mean_maps(r, mean),
+                sizes=error_maps.size_maps(r, size, after_label),
+                means=error_maps.mean_maps(r, mean),
                 time=figures.in_time(r),
                 spectrum=figures.in_frequency(r),
             )
             for r in residuals
         ],
-        "size_bar": cloth.colour_bar(size, "root mean square error"),
-        "mean_bar": cloth.colour_bar(mean, "mean error"),
+        "size_bar": error_maps.colour_bar(size, "root mean square error"),
+        "mean_bar": error_maps.colour_bar(mean, "mean error"),
     }
 
 
-def _motions(motions: list[motion.MotionClip], after_label: str) -> dict[str, Any]:
+def _motions(motions: list[moving_cloth.MotionClip], after_label: str) -> dict[str, Any]:
     """Returns the player's data, unseen recordings first."""
     ordered = sorted(motions, key=lambda m: not m.held_out)
-    stills = [motion.still(m, after_label) for m in ordered]
+    stills = [moving_cloth.still(m, after_label) for m in ordered]
     data = {
-        "view": motion.VIEW,
+        "view": moving_cloth.VIEW,
         "list": [{**m.as_dict(), "still": str(still)} for m, still in zip(ordered, stills, strict=True)],
     }
     return {
         "motions": ordered,
         "still": stills[0] if stills else "",
-        "factors": motion.FACTORS,
+        "factors": moving_cloth.FACTORS,
         "motion_data": htmlsafe_json_dumps(data, allow_nan=False, separators=(",", ":")),
     }
 
@@ -246,7 +246,7 @@ def _full(estimate: Estimate) -> Markup:
 
 def _parameter(estimate: Estimate) -> Markup:
     """Writes the parameter, unless the data leave it open."""
-    text = sentences.parameter_text(estimate)
+    text = verdict_sentences.parameter_text(estimate)
     return _full(estimate) if text == quantity.with_level(estimate) else _data(estimate.value, text)
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
+from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from measure.verdict.criteria import CRITERIA
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
         with_error,
         with_level,
     )
-    from measure.verdict.record import (
+    from measure.verdict.verdict_record import (
         Candidate,
         Comparison,
         Conclusion,

@@ -11,9 +11,9 @@ from typing import Any
 
 from scipy.stats import norm
 
+from flagdata.core.provenance import recipe_hash
 from flagdata.errors import UsageError
-from flagdata.provenance import recipe_hash
-from flagdata.retired_names import hashed_names
+from flagdata.recipes.retired_names import hashed_names
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.quantity import known, number
-from measure.verdict.record import Comparison, Conclusion, Verdict
+from measure.verdict.verdict_record import Comparison, Conclusion, Verdict
 
 NOT_REJECTED = (Conclusion.UNTESTED, Conclusion.SUFFICIENT, Conclusion.UNDECIDED)
 """Conclusions that state nothing to be missing."""

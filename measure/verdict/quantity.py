@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from measure.verdict.record import Estimate
+from measure.verdict.verdict_record import Estimate
 
 MINUS = "\N{MINUS SIGN}"
 NONE = "\N{EM DASH}"

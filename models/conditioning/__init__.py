@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
+from flagdata.packages.lazy import lazy_exports
 from models.conditioning.conditioning import Conditioned, Conditioning, Follower, conditioned, conditioning_of
 
 if TYPE_CHECKING:
     from models.conditioning.conditioning import VERSION, Conditioning, Follower, conditioned, conditioning_of
+    from models.conditioning.frame_interpolation import Interpolator, TimedFrame
     from models.conditioning.grain import grained
-    from models.conditioning.instants import Interpolator, TimedFrame
     from models.conditioning.mask_network import MaskNetwork, inputs_of
     from models.conditioning.outline import Outliner
     from models.conditioning.repeats import Distinct

@@ -9,10 +9,10 @@ from functools import cached_property
 import cv2
 import numpy as np
 
-from flagdata.arrays import BoolArray, Float32Array, FloatArray, UInt8Array
+from flagdata.core.arrays import BoolArray, Float32Array, FloatArray, UInt8Array
 from flagdata.errors import InputError, UsageError
-from models.conditioning import framing, noise
-from models.conditioning.camera import STILL, WORK, Camera, Transform, by_edges, camera_of, path
+from models.conditioning import camera_noise, framing
+from models.conditioning.camera_motion import STILL, WORK, Camera, Transform, by_edges, camera_of, path
 from models.conditioning.framing import Square
 from models.conditioning.outline import FEWEST, Hoist, hoist_of
 from models.conditioning.regions import Region, regions_of
@@ -420,8 +420,8 @@ def _noise(stack: UInt8Array, weight: Float32Array) -> float:
     if not frozen.any():
         return _ROUNDING
     change = np.diff(stack.astype(np.float32), axis=0)
-    rough = np.stack([noise.rough(picture)[frozen] for picture in change])
-    return max(noise.deviation(rough) / np.sqrt(2), _ROUNDING)
+    rough = np.stack([camera_noise.rough(picture)[frozen] for picture in change])
+    return max(camera_noise.deviation(rough) / np.sqrt(2), _ROUNDING)
 
 
 def _shown(square: Square, size: int, *, width: int, height: int) -> BoolArray:

@@ -1,7 +1,8 @@
 """The square of the picture that is judged: about all places that the cloth visits, resampled once.
 
-A still camera's square is averaged down as an ingested film's is (`flagdata.ingest.camera.geometry`). A moving one's is
-drawn by one warp that registers, crops and scales; where it shrinks, on a finer grid that is then averaged. Beyond the
+A still camera's square is averaged down as an ingested film's is (`flagdata.ingest.camera.picture_geometry`). A moving
+one's is drawn by one warp that registers, crops and scales; where it shrinks, on a finer grid that is then averaged.
+Beyond the
 picture its border is repeated: a square is padded, never cut.
 """
 
@@ -14,8 +15,8 @@ import cv2
 import numpy as np
 from PIL import Image
 
-from flagdata.arrays import UInt8Array
-from models.conditioning.camera import Transform
+from flagdata.core.arrays import UInt8Array
+from models.conditioning.camera_motion import Transform
 
 FILL = 0.62
 """Longer side of the places that the cloth visits, in sides of the square: the middle of what training films show."""

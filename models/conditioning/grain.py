@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flagdata.arrays import UInt8Array
-from flagdata.rng import stream
+from flagdata.core.arrays import UInt8Array
+from flagdata.core.rng import stream
 
 STILL = 0.5
 """Share of a clip's places that never change above which noise is given back: films of the training's cameras have 0.01

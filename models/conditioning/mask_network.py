@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
-from flagdata.arrays import BoolArray
+from flagdata.core.arrays import BoolArray
 from flagdata.errors import CorruptError
 from models.conditioning.stills import Stills
-from models.storage import WEIGHTS, check_model, read_card, read_tensors
+from models.trained.model_folder import WEIGHTS, check_model, read_card, read_tensors
 
 FOLDER = Path(__file__).parent / "cloth_mask"
 """The network that comes with the package: card, weights and checksums."""

@@ -17,7 +17,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from flagdata.arrays import BoolArray, FloatArray, UInt8Array
+from flagdata.core.arrays import BoolArray, FloatArray, UInt8Array
 from models.conditioning.mask_network import MaskNetwork, inputs_of, shipped
 from models.conditioning.stills import SAMPLE, Stills
 

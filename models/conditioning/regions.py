@@ -13,7 +13,7 @@ from typing import Literal
 import cv2
 import numpy as np
 
-from flagdata.arrays import BoolArray, Float32Array, FloatArray, UInt8Array
+from flagdata.core.arrays import BoolArray, Float32Array, FloatArray, UInt8Array
 
 Side = Literal["left", "right", "top"]
 _COARSE = 120

@@ -12,8 +12,8 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from flagdata.arrays import UInt8Array
-from models.conditioning.instants import TimedFrame
+from flagdata.core.arrays import UInt8Array
+from models.conditioning.frame_interpolation import TimedFrame
 
 SHARE = 0.15
 """Chosen on six real films: of those whose frames all differ none is below 0.2, and of one with 15 pictures in 60

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from flagdata.arrays import BoolArray, Float32Array, IntArray, UInt8Array
+from flagdata.core.arrays import BoolArray, Float32Array, IntArray, UInt8Array
 
 _PICTURES = 24
 """Pictures at most that are looked at."""

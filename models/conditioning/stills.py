@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.arrays import UInt8Array
+from flagdata.core.arrays import UInt8Array
 
 HALVED = 2
 """By how much pictures are averaged down before cloth is sought in them."""

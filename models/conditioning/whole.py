@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from flagdata.arrays import BoolArray, FloatArray, UInt8Array
-from models.conditioning.camera import STILL, Transform
+from flagdata.core.arrays import BoolArray, FloatArray, UInt8Array
+from models.conditioning.camera_motion import STILL, Transform
 from models.conditioning.regions import nearby
 
 SIDES = ("left", "upper", "right", "lower")

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
+from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from models.evaluation.bootstrap import Resamples, estimate
-    from models.evaluation.calibration import LEVELS, coverage, rank_histogram, tarp
     from models.evaluation.linear import bouman
     from models.evaluation.predictions import Predictions
+    from models.evaluation.predictive_calibration import LEVELS, coverage, rank_histogram, tarp
     from models.evaluation.scores import SCORES
 
 __getattr__ = lazy_exports(__name__, __file__)

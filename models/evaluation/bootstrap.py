@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.arrays import FloatArray, IntArray
+from flagdata.core.arrays import FloatArray, IntArray
 from flagdata.errors import InputError
 
 LEVEL = 0.90

@@ -7,10 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
-from flagdata.rng import stream
-from models.crops import Cropping
-from models.estimator import Estimator
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import stream
 from models.evaluation import triplets
 from models.evaluation.bootstrap import Resamples, estimate
 from models.evaluation.curves import FramesPoint
@@ -18,8 +16,10 @@ from models.evaluation.evaluation import Read
 from models.evaluation.linear import bouman
 from models.evaluation.predict import embedded
 from models.evaluation.predictions import Predictions
-from models.frontend import FrontEnd
-from models.targets import truth
+from models.maps.crops import Cropping
+from models.maps.frontend import FrontEnd
+from models.networks.targets import truth
+from models.trained.estimator import Estimator
 from models.training.inputs import Prepared
 
 Films = Callable[[FrontEnd, Cropping], Prepared]

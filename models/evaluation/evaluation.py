@@ -8,15 +8,23 @@ from typing import Any
 
 import numpy as np
 
-from flagdata import rng
+from flagdata.core import rng
+from flagdata.core.findings import Finding, Severity
 from flagdata.errors import UnknownNameError
-from flagdata.findings import Finding, Severity
-from models.evaluation import paper, table, triplets
+from models.evaluation import paper, score_table, triplets
 from models.evaluation.bootstrap import DRAWS, Resamples
-from models.evaluation.calibration import CURVE, LEVELS, Coverage, RankHistogram, coverage, rank_histogram, tarp
 from models.evaluation.curves import FramesPoint, LearningPoint
 from models.evaluation.linear import Readout
 from models.evaluation.predictions import WIND, Predictions
+from models.evaluation.predictive_calibration import (
+    CURVE,
+    LEVELS,
+    Coverage,
+    RankHistogram,
+    coverage,
+    rank_histogram,
+    tarp,
+)
 from models.evaluation.scores import BinError, error_against
 from models.evaluation.tsne import TsneLayout, layout
 
@@ -84,10 +92,10 @@ class Evaluation:
     seed: int
     clips: int
     groups: int
-    rows: tuple[table.Row, ...]
-    targets: tuple[table.TargetRow, ...]
+    rows: tuple[score_table.Row, ...]
+    targets: tuple[score_table.TargetRow, ...]
     reference: str | None
-    differences: tuple[table.Difference, ...]
+    differences: tuple[score_table.Difference, ...]
     wind_errors: tuple[WindError, ...]
     calibrations: tuple[CalibrationCurve, ...]
     expected: tuple[Expected, ...]
@@ -134,7 +142,7 @@ def evaluate(
         UnknownNameError: a label that no model has.
         UsageError: t-SNE without scikit-learn.
     """
-    models = table.models(predictions)
+    models = score_table.models(predictions)
     for label in (reference, tsne_of):
         if label is not None and label not in models:
             raise UnknownNameError.of("model", label, models)
@@ -149,8 +157,8 @@ def evaluate(
     if resamples.groups < 20:
         text = f"intervals rest on {resamples.groups} sequences; below 20 a percentile interval is too narrow"
         findings.append(_warning("few-sequences", text))
-    runs = {label: [table.metric_values(run, resamples, chosen) for run in of] for label, of in models.items()}
-    values = {label: table.mean_values(of) for label, of in runs.items()}
+    runs = {label: [score_table.metric_values(run, resamples, chosen) for run in of] for label, of in models.items()}
+    values = {label: score_table.mean_values(of) for label, of in runs.items()}
     with_wind = {label: of for label, of in models.items() if WIND in of[0].targets}
     with_samples = {label: of for label, of in models.items() if of[0].samples is not None}
     varied = {label: of for label, of in with_samples.items() if (np.ptp(of[0].truth, axis=0) > 0).all()}
@@ -166,12 +174,12 @@ def evaluate(
         seed=seed,
         clips=len(group),
         groups=resamples.groups,
-        rows=tuple(row for label, of in models.items() for row in table.rows(of, runs[label], resamples)),
-        targets=tuple(row for of in models.values() for row in table.target_rows(of, resamples)),
+        rows=tuple(row for label, of in models.items() for row in score_table.rows(of, runs[label], resamples)),
+        targets=tuple(row for of in models.values() for row in score_table.target_rows(of, resamples)),
         reference=reference,
         differences=()
         if reference is None
-        else table.differences(values, reference, clips=len(group), groups=resamples.groups, metrics=_COMPARED),
+        else score_table.differences(values, reference, clips=len(group), groups=resamples.groups, metrics=_COMPARED),
         wind_errors=tuple(
             WindError(label=label, bins=error_against(of, WIND, resamples)) for label, of in with_wind.items()
         ),

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.arrays import FloatArray, IntArray
+from flagdata.core.arrays import FloatArray, IntArray
+from flagdata.core.findings import Finding
 from flagdata.errors import InputError
-from flagdata.findings import Finding
 from models.evaluation.bootstrap import Resamples, ScoreEstimate, estimate
 from models.evaluation.scores import SCORES
 

@@ -9,18 +9,18 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from flagdata.arrays import FloatArray, UInt8Array
+from flagdata.core.arrays import FloatArray, UInt8Array
+from flagdata.core.rng import child_seed
+from flagdata.core.stated import Stated
+from flagdata.core.workload import one_thread
 from flagdata.dataset.pairs import Pairs
 from flagdata.errors import InputError
-from flagdata.rng import child_seed
-from flagdata.stated import Stated
-from flagdata.workload import one_thread
-from models.estimator import Estimator
 from models.evaluation.predictions import Predictions
-from models.frontend import FrontEnd
-from models.learner import Learner, Loss
-from models.restriction import Known
-from models.targets import Scaling, stated
+from models.maps.frontend import FrontEnd
+from models.networks.learner import Learner, Loss
+from models.networks.targets import Scaling, stated
+from models.trained.estimator import Estimator
+from models.trained.restriction import Known
 from models.training.inputs import Prepared, clip_as_taken
 
 DRAWS = 200

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.arrays import Float32Array, FloatArray, IntArray
+from flagdata.core.arrays import Float32Array, FloatArray, IntArray
 from flagdata.errors import InputError, UnknownNameError
 
 WIND = "wind_speed"

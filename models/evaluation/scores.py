@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from flagdata.errors import InputError
 from models.evaluation.bootstrap import Resamples, ScoreEstimate, estimate, ratio
 from models.evaluation.predictions import Predictions

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata import rng
-from flagdata.arrays import FloatArray, IntArray
+from flagdata.core import rng
+from flagdata.core.arrays import FloatArray, IntArray
 from flagdata.errors import InputError
 from models.evaluation.bootstrap import Resamples
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flagdata import rng
-from flagdata.arrays import FloatArray
+from flagdata.core import rng
+from flagdata.core.arrays import FloatArray
 from flagdata.errors import InputError, UsageError
 from models.evaluation.predictions import WIND, Predictions
 

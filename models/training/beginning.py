@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from flagdata.arrays import IntArray
+from flagdata.core.arrays import IntArray
 from flagdata.dataset.pairs import Pairs
 from flagdata.errors import InputError
 from flagdata.lake import Lake
-from models.learner import Loss
-from models.targets import Scaling
-from models.training.conditioned import SIZE
+from models.networks.learner import Loss
+from models.networks.targets import Scaling
+from models.training.conditioned_clips import SIZE
 from models.training.inputs import complete_truth, simulations
-from models.training.recipe import TrainingRecipe
 from models.training.stated_films import StatedFilms
 from models.training.steps import check_batch
+from models.training.training_recipe import TrainingRecipe
 
 _MULTIPLE = 8  # of the sizes that every front end takes [px]
 

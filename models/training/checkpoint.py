@@ -18,13 +18,13 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from flagdata.checksums import SUMS, check_sums, files_of, write_sums
-from flagdata.durable import flush_file
+from flagdata.core.files.checksums import SUMS, check_sums, files_of, write_sums
+from flagdata.core.files.durable import flush_file
+from flagdata.core.files.file_locks import LOCK
+from flagdata.core.numbered import bounded
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, RefusedError
-from flagdata.locks import LOCK
-from flagdata.numbered import bounded
-from models.learner import Learner
-from models.storage import CARD, WEIGHTS, read_card, read_tensors, write_card, write_tensors
+from models.networks.learner import Learner
+from models.trained.model_folder import CARD, WEIGHTS, read_card, read_tensors, write_card, write_tensors
 from models.training.progress import LossCourse
 
 _LOG = logging.getLogger("flagdata")

@@ -26,22 +26,22 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from flagdata.arrays import AnyArray, BoolArray, FloatArray, IntArray, UInt8Array
-from flagdata.checksums import is_sealed, sealed
+from flagdata.core.arrays import AnyArray, BoolArray, FloatArray, IntArray, UInt8Array
+from flagdata.core.files.checksums import is_sealed, sealed
+from flagdata.core.files.file_locks import alone_in
+from flagdata.core.files.outputs import rewrite
+from flagdata.core.provenance import canonical, digest
+from flagdata.core.rng import stream
+from flagdata.core.workload import one_thread
 from flagdata.dataset.pairs import Pairs
 from flagdata.errors import CorruptError, FlagdataError, InputError
-from flagdata.locks import alone_in
-from flagdata.outputs import rewrite
-from flagdata.provenance import canonical, digest
-from flagdata.rng import stream
 from flagdata.timebase import NANOSECONDS
-from flagdata.workload import one_thread
-from models import targets
 from models.conditioning.conditioning import VERSION
-from models.crops import Cropping
-from models.frontend import FrontEnd, standardised
+from models.maps.crops import Cropping
+from models.maps.frontend import FrontEnd, standardised
+from models.networks import targets
 from models.training.augment import Augment
-from models.training.conditioned import FitFilm
+from models.training.conditioned_clips import FitFilm
 from models.training.timed_film import TimedFilm, has_rate
 
 _LOG = logging.getLogger("flagdata")
@@ -126,7 +126,7 @@ class Prepared:
         return replace(self, maps=maps)
 
     def truth(self, names: Sequence[str]) -> FloatArray:
-        """Returns (n, target), as `models.targets.truth`.
+        """Returns (n, target), as `models.networks.targets.truth`.
 
         Raises:
             InputError: a target that an entry does not state.
@@ -139,7 +139,7 @@ class Prepared:
 
 
 def complete_truth(parameters: Mapping[str, FloatArray], names: Sequence[str]) -> FloatArray:
-    """Returns (n, target), as `models.targets.truth`, where every entry states all of them.
+    """Returns (n, target), as `models.networks.targets.truth`, where every entry states all of them.
 
     Raises:
         InputError: one that does not.

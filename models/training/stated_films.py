@@ -8,13 +8,13 @@ from typing import Self
 
 import numpy as np
 
-from flagdata.arrays import BoolArray, FloatArray, IntArray
+from flagdata.core.arrays import BoolArray, FloatArray, IntArray
 from flagdata.dataset.pairs import Pairs
 from flagdata.errors import InputError
 from flagdata.lake import Lake
 from flagdata.timebase import NANOSECONDS
-from models.crops import Cropping
-from models.frontend import FrontEnd
+from models.maps.crops import Cropping
+from models.maps.frontend import FrontEnd
 from models.training.timed_film import LEAST_RATE, frame_rate, gives_clip, has_rate
 
 LEAST_FRAMES = 4

@@ -25,16 +25,16 @@ from torch import Tensor, nn
 from torch import distributed as ranks
 from torch.nn.parallel import DistributedDataParallel
 
-from flagdata.arrays import IntArray
+from flagdata.core.arrays import IntArray
+from flagdata.core.provenance import array_hash
+from flagdata.core.rng import stream, torch_draws
 from flagdata.errors import CorruptError, ErrorKind, FlagdataError, RefusedError, UsageError
-from flagdata.provenance import array_hash
-from flagdata.rng import stream, torch_draws
-from models.learner import Learner, Loss
+from models.networks.learner import Learner, Loss
 from models.training import checkpoint
 from models.training.checkpoint import Standing
 from models.training.inputs import Prepared
 from models.training.progress import Epoch, LossCourse
-from models.training.recipe import LEAST_BATCH, OptimiserSpec, Precision, Schedule, TrainingRecipe
+from models.training.training_recipe import LEAST_BATCH, OptimiserSpec, Precision, Schedule, TrainingRecipe
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

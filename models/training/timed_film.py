@@ -7,9 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from flagdata.arrays import AnyArray, BoolArray, FloatArray, IntArray, UInt8Array
+from flagdata.core.arrays import AnyArray, BoolArray, FloatArray, IntArray, UInt8Array
 from flagdata.errors import InputError
-from models.conditioning.instants import Interpolator, TimedFrame, at_instants
+from models.conditioning.frame_interpolation import Interpolator, TimedFrame, at_instants
 
 LEAST_RATE = 0.8
 """Least frame rate of a film, in those of the network: most of its pictures must have been taken."""

@@ -12,15 +12,15 @@ import math
 from pathlib import Path
 from typing import Any
 
+from flagdata.core.files.outputs import write_files
 from flagdata.errors import InputError
 from flagdata.ingest.meshes import Obj, obj_text
-from flagdata.outputs import write_files
-from sim.air import QuadraticNormal
-from sim.arcsim.reading import SIMULATED, STAGES, ArcsimScene
-from sim.material import Material
-from sim.scene import Scene
-from sim.sizing import Remeshing
-from sim.tables import Evaluation
+from sim.arcsim.arcsim_reading import SIMULATED, STAGES, ArcsimScene
+from sim.cloth.air import QuadraticNormal
+from sim.cloth.material import Material
+from sim.cloth.scene import Scene
+from sim.cloth.sizing import Remeshing
+from sim.cloth.stiffness_tables import Evaluation
 
 
 def write_scene(file: ArcsimScene, folder: Path, *, name: str = "scene") -> Path:

@@ -14,9 +14,9 @@ from typing import Protocol
 
 import numpy as np
 
-from flagdata.arrays import UInt8Array
+from flagdata.core.arrays import UInt8Array
 from flagdata.errors import InputError
-from flagdata.registry import Registry
+from flagdata.recipes.registry import Registry
 from sim.assets.photos import Photos
 
 PHOTO = "photo"
@@ -43,10 +43,10 @@ TEXTURES = Registry(
     {
         "flag": "sim.assets.flags:NATIONAL",
         "banner": "sim.assets.banners:BANNER",
-        "weave": "sim.assets.cloths:WEAVE",
-        "stripes": "sim.assets.cloths:STRIPES",
-        "checks": "sim.assets.cloths:CHECKS",
-        "print": "sim.assets.cloths:PRINT",
+        "weave": "sim.assets.cloth_textures:WEAVE",
+        "stripes": "sim.assets.cloth_textures:STRIPES",
+        "checks": "sim.assets.cloth_textures:CHECKS",
+        "print": "sim.assets.cloth_textures:PRINT",
     },
 )
 BACKGROUNDS = Registry(

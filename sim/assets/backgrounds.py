@@ -10,10 +10,10 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from sim.assets.colour import Hue, hue
-from sim.assets.noise import Picture, Plane, defocused, fractal, over, ridge, smoothstep
 from sim.assets.seeded import Seeded
+from sim.assets.smooth_fields import Picture, Plane, defocused, fractal, over, ridge, smoothstep
 
 _ROWS, _COLUMNS = 400, 512  # px
 _HEIGHT: Plane = np.linspace(1.0, 0.0, _ROWS)[:, None] * np.ones((1, _COLUMNS))  # 1 at the upper edge

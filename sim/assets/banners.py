@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from sim.assets.colour import hue
 from sim.assets.flags import ROWS, FlagSheet
 from sim.assets.seeded import Seeded

@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 
 Band: TypeAlias = tuple[float, float]
 Hue: TypeAlias = tuple[Band, Band, Band]

@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from flagdata.arrays import BoolArray, Float32Array, UInt8Array
+from flagdata.core.arrays import BoolArray, Float32Array, UInt8Array
 from flagdata.errors import UnknownNameError
 from sim.assets.colour import decoded, encoded, of_hex
 

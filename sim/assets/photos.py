@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageOps, UnidentifiedImageError
 
-from flagdata.arrays import UInt8Array
+from flagdata.core.arrays import UInt8Array
 from flagdata.errors import InputError, UnknownNameError
 
 _SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".bmp")

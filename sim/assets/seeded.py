@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flagdata.arrays import FloatArray, UInt8Array
+from flagdata.core.arrays import FloatArray, UInt8Array
+from flagdata.core.numbered import bounded
+from flagdata.core.rng import stream
 from flagdata.errors import InputError
-from flagdata.numbered import bounded
-from flagdata.rng import stream
-from flagdata.tables import SEED_LIMIT
+from flagdata.recipes.typed_tables import SEED_LIMIT
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,9 +17,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from flagdata.caches import user_cache
+from flagdata.core.files.caches import user_cache
+from flagdata.core.shell import command_line
 from flagdata.errors import ErrorKind, FlagdataError, NotFoundError
-from flagdata.shell import command_line
 
 SETTING = "FLAGDATA_BLENDER"
 SERIES = "4.5"
@@ -165,7 +165,7 @@ def create(folder: Path, *, python: str | None = None, say: Callable[[str], None
         BlenderError: a step failed, or the module cannot be imported.
     """
     target = interpreter(folder)
-    from flagdata.outputs import check_folder, rewrite
+    from flagdata.core.files.outputs import check_folder, rewrite
 
     if not _is_own(folder):
         check_folder(folder)

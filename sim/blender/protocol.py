@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.arrays import AnyArray
+from flagdata.core.arrays import AnyArray
 from flagdata.errors import CorruptError
 
 PROTOCOL_VERSION = 1

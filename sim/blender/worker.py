@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.arrays import AnyArray, Float32Array, UInt8Array
+from flagdata.core.arrays import AnyArray, Float32Array, UInt8Array
 from sim.blender.protocol import Message, decode, encode
 
 _SENSOR = 36.0  # mm, of the camera model; only its ratio to the lens matters

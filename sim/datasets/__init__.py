@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
+from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from sim.datasets.anemometer import logged, velocities
+    from sim.datasets.camera_picture import coded, settings
     from sim.datasets.cast import Cast, Roll, casts
-    from sim.datasets.films import EPOCH, PlannedFilm, Sequences
-    from sim.datasets.picture import coded, settings
-    from sim.datasets.reading import DATASETS, load, parse
-    from sim.datasets.recipe import AnemometerSpec, CameraSpec, DatasetRecipe, Truth, with_counts
+    from sim.datasets.dataset_films import EPOCH, PlannedFilm, Sequences
+    from sim.datasets.dataset_recipe import AnemometerSpec, CameraSpec, DatasetRecipe, Truth, with_counts
+    from sim.datasets.dataset_toml import DATASETS, load, parse
 
 __getattr__ = lazy_exports(__name__, __file__)

@@ -9,18 +9,18 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from flagdata.arrays import FloatArray
-from flagdata.rng import stream
-from flagdata.schema import SampleFlag
-from flagdata.signals import Sensor, WindSeries
-from flagdata.tables import Quantity, Range
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import stream
+from flagdata.core.schema import SampleFlag
+from flagdata.recipes.typed_tables import Quantity, Range
+from flagdata.record.signals import Sensor, WindSeries
 from flagdata.timebase import NANOSECONDS
-from sim.datasets.reading import changing
-from sim.datasets.recipe import AnemometerSpec
+from sim.cloth.system import System
+from sim.datasets.dataset_recipe import AnemometerSpec
+from sim.datasets.dataset_toml import changing
 from sim.effects import SENSOR_EFFECTS
 from sim.effects.sensor import AnemometerEffect
 from sim.run.members import Crew, Member
-from sim.system import System
 
 _FINE = 10.0
 """Rate [Hz] at which the air is sampled and an instrument's response computed; of a faster one twice its own."""

@@ -1,7 +1,7 @@
 """Building a data set: sequences first, then their films, each commit a batch of them.
 
-Workers put what they make into the lake's store (`sim.datasets.jobs`); this process alone commits. What is in the lake
-is known by its identity, so that a build that was killed goes on where its last commit was, and ends with the same
+Workers put what they make into the lake's store (`sim.datasets.build_jobs`); this process alone commits. What is in the
+lake is known by its identity, so that a build that was killed goes on where its last commit was, and ends with the same
 artifacts and objects as an unbroken one.
 """
 
@@ -15,16 +15,16 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from flagdata.documents import column_json
+from flagdata.core.provenance import canonical
+from flagdata.core.schema import Kind
 from flagdata.errors import ConflictError, RefusedError
 from flagdata.lake import Artifact, Lake
-from flagdata.provenance import canonical
-from flagdata.schema import Kind
-from sim.datasets import jobs
+from flagdata.recipes.documents import column_json
+from sim.datasets import build_jobs
+from sim.datasets.build_jobs import PutFilm, PutSequences
 from sim.datasets.cast import IN_PLACE_OF, Cast, Roll, casts, recall_failures
-from sim.datasets.films import PlannedFilm, Sequences
-from sim.datasets.jobs import PutFilm, PutSequences
-from sim.datasets.recipe import DatasetRecipe
+from sim.datasets.dataset_films import PlannedFilm, Sequences
+from sim.datasets.dataset_recipe import DatasetRecipe
 from sim.datasets.shard import Shard
 from sim.run.publish import Deposited, commit, whole
 from sim.workers import Job, Workers
@@ -191,7 +191,7 @@ class Build:
                 indices = [index for index in pending if roll.crew.base(index) == base]
                 for first in range(0, len(indices), simulation.batch):
                     members = indices[first : first + simulation.batch]
-                    yield jobs.put_sequences, (self._address, simulation, base, members, self.device)
+                    yield build_jobs.put_sequences, (self._address, simulation, base, members, self.device)
 
     # Films
 
@@ -264,7 +264,7 @@ class Build:
         rows = self.lake.rows("kind = 'meshes'", at=self.branch, columns=["artifact", "object"]).to_pylist()
         objects = {row["artifact"]: row["object"] for row in rows}
         for film in films:
-            yield jobs.put_film, (self._address, self.recipe, film, objects[film.sequence], self.device)
+            yield build_jobs.put_film, (self._address, self.recipe, film, objects[film.sequence], self.device)
 
     @property
     def _address(self) -> str:

@@ -12,20 +12,20 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from flagdata.arrays import UInt8Array
-from flagdata.documents import column_json
+from flagdata.core.arrays import UInt8Array
+from flagdata.core.files.outputs import check_file, rewrite, write_file
+from flagdata.core.numbered import by_numbers
+from flagdata.core.provenance import canonical, code_version
+from flagdata.core.rng import stream
+from flagdata.core.schema import Kind
 from flagdata.lake import Lake
-from flagdata.numbered import by_numbers
-from flagdata.outputs import check_file, rewrite, write_file
-from flagdata.pages.pictures import still
+from flagdata.pages.page_pictures import still
 from flagdata.pages.render import render
-from flagdata.provenance import canonical, code_version
+from flagdata.recipes.documents import column_json
 from flagdata.record import Record
-from flagdata.rng import stream
-from flagdata.schema import Kind
 from flagdata.storage import Place
 from sim.datasets.cast import casts
-from sim.datasets.recipe import DatasetRecipe
+from sim.datasets.dataset_recipe import DatasetRecipe
 
 _COMMAND = "build"
 _SHOWN = 24  # pictures of the contact sheet

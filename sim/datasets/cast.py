@@ -6,16 +6,16 @@ import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from flagdata.documents import column_json
+from flagdata.core.rng import child_seed, stream
 from flagdata.errors import RefusedError
 from flagdata.lake import Lake
-from flagdata.rng import child_seed, stream
-from flagdata.tables import Range
-from sim.datasets.recipe import DatasetRecipe, GroupSpec, SessionSpec, Side
+from flagdata.recipes.documents import column_json
+from flagdata.recipes.typed_tables import Range
+from sim.datasets.dataset_recipe import DatasetRecipe, GroupSpec, SessionSpec, Side
 from sim.run.members import Crew
 from sim.run.publish import member_artifact
-from sim.run.recipe import MaterialSpec
-from sim.run.recipe import Recipe as Simulation
+from sim.run.simulation_recipe import MaterialSpec
+from sim.run.simulation_recipe import Recipe as Simulation
 
 IN_PLACE_OF = "in_place_of"
 """Entry in the report of a sequence that others failed before: index → why, of the members whose place it takes."""

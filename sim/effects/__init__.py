@@ -7,19 +7,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
-from flagdata.registry import Registry
+from flagdata.packages.lazy import lazy_exports
+from flagdata.recipes.registry import Registry
 from sim.effects.effect import Effect, apply
 from sim.effects.parameter import Parameter, Role
 
 if TYPE_CHECKING:
     from sim.effects.added_mass import AddedMass
     from sim.effects.anemometer_lag import AnemometerLag
+    from sim.effects.cloth_geometry import horizontal, left_of, norm, origin
     from sim.effects.effect import ClothEffect, Effect, FlowEffect, ForceEffect, WindEffect, apply
+    from sim.effects.effect_files import load
     from sim.effects.field import FieldEffect, Flat, Seen, heavier
-    from sim.effects.files import load
     from sim.effects.finite_span_loading import FiniteSpanLoading
-    from sim.effects.geometry import horizontal, left_of, norm, origin
     from sim.effects.gusts import Gusts
     from sim.effects.hem_mass import HemMass
     from sim.effects.internal_damping import InternalDamping
@@ -73,7 +73,7 @@ EFFECTS = Registry(
     accepts=lambda entry: isinstance(entry, type) and issubclass(entry, Effect),
 )
 """On the cloth: kinds of `sim.effects.effect`; also those of installed packages, from the entry points
-`flagdata.effects`. Of files, see `sim.effects.files`."""
+`flagdata.effects`. Of files, see `sim.effects.effect_files`."""
 
 SENSOR_EFFECTS = Registry(
     "sensor effect",

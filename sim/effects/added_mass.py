@@ -7,12 +7,12 @@ from typing import Annotated, TypeAlias
 
 from torch import Tensor
 
-from sim.cloth import Cloth
+from sim.cloth.cloth_batch import Cloth
+from sim.cloth.inertia import mean_normal_rates, mean_normals, rest_areas
+from sim.cloth.state import State
+from sim.cloth.system import System
 from sim.effects.effect import ForceEffect
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
-from sim.inertia import mean_normal_rates, mean_normals, rest_areas
-from sim.state import State
-from sim.system import System
 
 MassPerArea: TypeAlias = Annotated[
     Value,
@@ -31,7 +31,7 @@ class AddedMass(ForceEffect):
     """Still-air inertia: per area −m_a V̇ n, with V = v·n the velocity along the normal n and V̇ = n·a + ṅ·v.
 
     Its power is that of the air's kinetic energy ½ m_a V², so that none is made or lost when the cloth turns. The first
-    term is mass (see `sim.inertia`), the second a force.
+    term is mass (see `sim.cloth.inertia`), the second a force.
 
     Attributes:
         mass: m_a, per area of cloth.

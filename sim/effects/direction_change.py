@@ -9,8 +9,8 @@ from typing import Annotated
 import torch
 from torch import Tensor
 
+from sim.effects.cloth_geometry import horizontal, left_of
 from sim.effects.effect import WindEffect
-from sim.effects.geometry import horizontal, left_of
 from sim.effects.parameter import Value, shape, strength
 
 

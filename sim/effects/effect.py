@@ -14,13 +14,13 @@ import torch
 from torch import Tensor
 
 from flagdata.errors import UsageError
-from sim.air import AirForce, QuadraticNormal, face_wind
-from sim.cloth import Cloth
-from sim.effects.geometry import origin
+from sim.cloth.air import AirForce, QuadraticNormal, face_wind
+from sim.cloth.cloth_batch import Cloth
+from sim.cloth.state import State
+from sim.cloth.system import System
+from sim.effects.cloth_geometry import origin
 from sim.effects.parameter import Parametrised
-from sim.kernel.given import Given
-from sim.state import State
-from sim.system import System
+from sim.kernel.effect_code import Given
 from sim.wind import Wind
 
 

@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from sim.cloth import Cloth
+from sim.cloth.cloth_batch import Cloth
+from sim.cloth.inertia import mean_normals, rest_areas
+from sim.cloth.state import State
+from sim.cloth.system import System
+from sim.effects.cloth_geometry import horizontal, left_of, norm, origin
 from sim.effects.effect import Effect
-from sim.effects.geometry import horizontal, left_of, norm, origin
-from sim.inertia import mean_normals, rest_areas
-from sim.state import State
-from sim.system import System
 
 _LOCAL = 0.1
 """Radius of what is local, as a share of the geometric mean of the cloth's width and height."""
@@ -117,7 +117,7 @@ class Flat:
 @dataclass(frozen=True, kw_only=True)
 class Seen(Flat):
     """What the vertices see. Fields are (vertex, 3, batch), or broadcast to it. Normals are the mean normals of
-    `sim.inertia`.
+    `sim.cloth.inertia`.
 
     Attributes:
         position: (vertex, 3, batch) [m].

@@ -19,12 +19,13 @@ height, each multiplied by m(k)/m(k₀) for its own k, and put together again:
 
     −m(k₀) √e F[√e R] n
 
-V and the slip are continued to the hoist and the fly from within before they are differentiated (`sim.ends`).
+V and the slip are continued to the hoist and the fly from within before they are differentiated
+(`sim.cloth.cloth_ends`).
 
 F is symmetric and the same at all times, so that the Coriolis term does no work within the sheet and the centrifugal
 one is the gradient of an energy, as without it. The first term, the acceleration's, is a mass m(k₀) e of each vertex
-(see `sim.inertia`), of the wave of twice the cloth's length, k₀ = π/L; that of shorter waves is too large, as they are
-carried too slowly.
+(see `sim.cloth.inertia`), of the wave of twice the cloth's length, k₀ = π/L; that of shorter waves is too large, as
+they are carried too slowly.
 """
 
 from __future__ import annotations
@@ -36,17 +37,17 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from flagdata.arrays import FloatArray
-from sim.cloth import Cloth
+from flagdata.core.arrays import FloatArray
+from sim.cloth.cloth_batch import Cloth
+from sim.cloth.inertia import mean_normals, rest_areas
+from sim.cloth.mesh import Mesh
+from sim.cloth.state import State
+from sim.cloth.system import InapplicableError, System
 from sim.effects.effect import ForceEffect
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
 from sim.effects.quantities import AIR_DENSITY, AirDensity
 from sim.effects.reactive_loading import momentum_rates
-from sim.inertia import mean_normals, rest_areas
-from sim.kernel.given import Given
-from sim.mesh import Mesh
-from sim.state import State
-from sim.system import InapplicableError, System
+from sim.kernel.effect_code import Given
 
 _ALONG, _ACROSS = 10, 4
 """Modes along the cloth and over its height, at most; as in the C++."""

@@ -9,12 +9,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from sim.cloth import Cloth
+from sim.cloth.cloth_batch import Cloth
+from sim.cloth.handles import Handles, full_hoist
+from sim.cloth.state import State
+from sim.cloth.system import InapplicableError, Springs, System
 from sim.effects.effect import Effect
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
-from sim.handles import Handles, full_hoist
-from sim.state import State
-from sim.system import InapplicableError, Springs, System
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,11 +9,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from sim.effects.cloth_geometry import disturbed
 from sim.effects.effect import WindEffect
-from sim.effects.geometry import disturbed
 from sim.effects.parameter import NOT_NEGATIVE, Value, shape, strength
 from sim.wind import sampled
-from sim.wind.spectral import VonKarman
+from sim.wind.spectral_wind import VonKarman
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import torch
 
-from sim.cloth import Cloth
+from sim.cloth.cloth_batch import Cloth
+from sim.effects.cloth_geometry import hem_lengths
 from sim.effects.effect import ClothEffect
-from sim.effects.geometry import hem_lengths
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
 
 

@@ -9,9 +9,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from sim.cloth import Cloth
+from sim.cloth.cloth_batch import Cloth
+from sim.effects.cloth_geometry import edge_distances
 from sim.effects.effect import ClothEffect
-from sim.effects.geometry import edge_distances
 from sim.effects.parameter import NOT_NEGATIVE, Value, shape, strength
 
 

@@ -8,14 +8,14 @@ from typing import Annotated
 import torch
 from torch import Tensor
 
-from sim import bending
-from sim.cloth import Cloth, gather_sum
+from sim.cloth import bending
+from sim.cloth.cloth_batch import Cloth, gather_sum
+from sim.cloth.state import State
+from sim.cloth.stiffness_tables import CURVATURE_SPACING
+from sim.cloth.system import System
 from sim.effects.effect import Effect
 from sim.effects.parameter import NOT_NEGATIVE, Value, shape, strength
-from sim.kernel.given import Given
-from sim.state import State
-from sim.system import System
-from sim.tables import CURVATURE_SPACING
+from sim.kernel.effect_code import Given
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Annotated
 
-from sim.cloth import Cloth
+from sim.cloth.cloth_batch import Cloth
 from sim.effects.effect import ClothEffect
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
 

@@ -10,9 +10,9 @@ import torch
 from numpy.typing import ArrayLike
 from torch import Tensor
 
-from flagdata.signals import WindSeries
+from flagdata.record.signals import WindSeries
+from sim.effects.cloth_geometry import disturbed
 from sim.effects.effect import WindEffect
-from sim.effects.geometry import disturbed
 from sim.effects.parameter import Value, strength
 from sim.wind import sampled
 

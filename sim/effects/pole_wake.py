@@ -8,8 +8,8 @@ from typing import Annotated
 import torch
 from torch import Tensor
 
+from sim.effects.cloth_geometry import horizontal, left_of, norm
 from sim.effects.effect import FlowEffect
-from sim.effects.geometry import horizontal, left_of, norm
 from sim.effects.parameter import NOT_NEGATIVE, Value, shape, strength
 
 

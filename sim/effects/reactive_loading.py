@@ -15,11 +15,11 @@ along the sheet, and the load −m_a (D V) n,
 
     D V = n·a + ṅ·(v − u) + s·∇_s V + ½ V ∇_s·s                             (u taken as slow: u̇ is left out)
 
-For v = η_t e_z, n = e_z − η_x e_x, u = U e_x and small slopes the last term is of third order, and the others are
-η_tt + U η_xt + U ∂x(η_t + U η_x): the equation above. The last makes it Lighthill's large-amplitude theory (Proc. R.
-Soc. B 179:125, 1971) as Candelier, Boyer and Leroyer put it (J. Fluid Mech. 668:196, 2011) for a sheet that does not
-stretch, ½ V ∇_s·s = −½ κ V². With it the balance of energy closes: in air at rest, what the sheet gives is the change
-of ½ m_a V² over the sheet, and ½ m_a V² s shed across its edge. The first term is the integrator's (see `sim.inertia`),
+For v = η_t e_z, n = e_z − η_x e_x, u = U e_x and small slopes the last term is of third order, and the others are η_tt
++ U η_xt + U ∂x(η_t + U η_x): the equation above. The last makes it Lighthill's large-amplitude theory (Proc. R. Soc. B
+179:125, 1971) as Candelier, Boyer and Leroyer put it (J. Fluid Mech. 668:196, 2011) for a sheet that does not stretch,
+½ V ∇_s·s = −½ κ V². With it the balance of energy closes: in air at rest, what the sheet gives is the change of ½ m_a
+V² over the sheet, and ½ m_a V² s shed across its edge. The first term is the integrator's (see `sim.cloth.inertia`),
 the others are a force. At the ends of the cloth the means over faces are those of half a cell further in, which keeps
 that balance exactly and is a half of η_xx; continuing them, as `sim.effects.finite_span_loading` does, costs runs here,
 where nothing else bounds short waves (decision 052).
@@ -31,13 +31,13 @@ from dataclasses import dataclass, replace
 
 from torch import Tensor
 
-from sim.cloth import Cloth
+from sim.cloth.cloth_batch import Cloth
+from sim.cloth.cloth_ends import Ends
+from sim.cloth.inertia import mean_normal_rates, mean_normals, rest_areas
+from sim.cloth.state import State
+from sim.cloth.system import System
 from sim.effects.added_mass import AddedMass, MassPerArea
 from sim.effects.effect import ForceEffect
-from sim.ends import Ends
-from sim.inertia import mean_normal_rates, mean_normals, rest_areas
-from sim.state import State
-from sim.system import System
 
 
 @dataclass(frozen=True, kw_only=True)

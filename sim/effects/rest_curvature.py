@@ -8,13 +8,13 @@ from typing import Annotated
 import torch
 from torch import Tensor
 
-from sim import bending
-from sim.cloth import Cloth, gather_sum
+from sim.cloth import bending
+from sim.cloth.cloth_batch import Cloth, gather_sum
+from sim.cloth.state import State
+from sim.cloth.system import System
 from sim.effects.effect import Effect
 from sim.effects.parameter import Value, strength
-from sim.kernel.given import Given
-from sim.state import State
-from sim.system import System
+from sim.kernel.effect_code import Given
 
 
 @dataclass(frozen=True, kw_only=True)

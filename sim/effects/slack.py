@@ -9,13 +9,13 @@ import torch
 from torch import Tensor
 
 from flagdata.errors import UsageError
-from sim.cloth import Cloth
+from sim.cloth.cloth_batch import Cloth
+from sim.cloth.handles import Handles
+from sim.cloth.state import State
+from sim.cloth.system import Springs, System
+from sim.effects.cloth_geometry import norm
 from sim.effects.effect import Effect
-from sim.effects.geometry import norm
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
-from sim.handles import Handles
-from sim.state import State
-from sim.system import Springs, System
 
 # Shorter cords count as this long [m], so that the gradient at none is finite.
 _SHORTEST = 1e-6

@@ -7,8 +7,8 @@ from typing import Annotated
 
 from torch import Tensor
 
-from sim.air import face_wind
-from sim.cloth import Cloth
+from sim.cloth.air import face_wind
+from sim.cloth.cloth_batch import Cloth
 from sim.effects.effect import ForceEffect
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
 

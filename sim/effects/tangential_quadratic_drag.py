@@ -7,10 +7,10 @@ from typing import Annotated
 
 from torch import Tensor
 
-from sim.air import face_wind
-from sim.cloth import Cloth
+from sim.cloth.air import face_wind
+from sim.cloth.cloth_batch import Cloth
+from sim.effects.cloth_geometry import norm
 from sim.effects.effect import ForceEffect
-from sim.effects.geometry import norm
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
 from sim.effects.quantities import AIR_DENSITY, AirDensity
 

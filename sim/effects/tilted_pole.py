@@ -10,11 +10,11 @@ import torch
 from torch import Tensor
 
 from flagdata.errors import UsageError
+from sim.cloth.state import State
+from sim.cloth.system import InapplicableError, System
+from sim.effects.cloth_geometry import horizontal, left_of, norm
 from sim.effects.effect import Effect
-from sim.effects.geometry import horizontal, left_of, norm
 from sim.effects.parameter import Value, strength
-from sim.state import State
-from sim.system import InapplicableError, System
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,8 +8,8 @@ from typing import Annotated
 import torch
 from torch import Tensor
 
+from sim.effects.cloth_geometry import horizontal, norm
 from sim.effects.effect import WindEffect
-from sim.effects.geometry import horizontal, norm
 from sim.effects.parameter import Value, strength
 
 _QUARTER = 1.5707963267948966

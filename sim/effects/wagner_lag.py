@@ -28,14 +28,14 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from sim.air import FaceWind, face_wind
-from sim.cloth import Cloth
+from sim.cloth.air import FaceWind, face_wind
+from sim.cloth.cloth_batch import Cloth
+from sim.cloth.state import State
+from sim.cloth.system import System
+from sim.effects.cloth_geometry import norm
 from sim.effects.effect import Effect, pressing
-from sim.effects.geometry import norm
 from sim.effects.parameter import Value, strength
-from sim.kernel.given import Given
-from sim.state import State
-from sim.system import System
+from sim.kernel.effect_code import Given
 
 JONES = ((0.165, 0.0455), (0.335, 0.3))
 """Amplitude and rate [1/half chord] of each lag, as in the C++."""

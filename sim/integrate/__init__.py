@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
-from flagdata.lazy import lazy_exports
-from flagdata.registry import Registry
-from sim.state import State
-from sim.system import System
+from flagdata.packages.lazy import lazy_exports
+from flagdata.recipes.registry import Registry
+from sim.cloth.state import State
+from sim.cloth.system import System
 
 if TYPE_CHECKING:
     from sim.integrate.backend import Backend

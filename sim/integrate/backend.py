@@ -8,10 +8,10 @@ import torch
 from torch import Tensor
 
 from flagdata.errors import UsageError
+from sim.cloth.state import State
+from sim.cloth.system import Drive, System
 from sim.kernel.fused import Kernel
-from sim.kernel_warp.batch import WarpKernel
-from sim.state import State
-from sim.system import Drive, System
+from sim.kernel_warp.warp_batch import WarpKernel
 
 
 class Backend(StrEnum):

@@ -21,13 +21,13 @@ import torch
 from torch import Tensor
 
 from flagdata.errors import UsageError
-from sim import bending, contact, membrane
-from sim.cloth import gather_sum
-from sim.inertia import mean_normals
+from sim.cloth import bending, contact, membrane
+from sim.cloth.cloth_batch import gather_sum
+from sim.cloth.inertia import mean_normals
+from sim.cloth.state import State
+from sim.cloth.system import Drive, System
 from sim.integrate.backend import Backend, kernel_for
 from sim.kernel.fused import Kernel
-from sim.state import State
-from sim.system import Drive, System
 
 
 class AirShape(StrEnum):

@@ -14,9 +14,9 @@ import torch
 from torch import Tensor
 
 from flagdata.errors import UsageError
-from sim.cloth import Cloth
-from sim.state import State
-from sim.system import AnchorMotion, Springs, System, Tie
+from sim.cloth.cloth_batch import Cloth
+from sim.cloth.state import State
+from sim.cloth.system import AnchorMotion, Springs, System, Tie
 from sim.wind import Wind
 
 

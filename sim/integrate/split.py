@@ -5,9 +5,9 @@ A step of h is
     v ← v + h M⁻¹ F_extra(x, v),   a backward Euler step of the base model,
 
 Lie's splitting, of first order in h as the base step is. Air that moves with the cloth takes its share of the step's
-change of velocity (see `sim.inertia`); springs beside the handles act implicitly, vertex by vertex. What loosens the
-handles is part of the base model's solve, since no impulse can take back what they pull. The base step is the compiled
-kernel's, so that an effect costs one evaluation a step, not one an iteration of the solver.
+change of velocity (see `sim.cloth.inertia`); springs beside the handles act implicitly, vertex by vertex. What loosens
+the handles is part of the base model's solve, since no impulse can take back what they pull. The base step is the
+compiled kernel's, so that an effect costs one evaluation a step, not one an iteration of the solver.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from itertools import accumulate
 import torch
 from torch import Tensor
 
-from sim.inertia import effective, mean_normals
+from sim.cloth.inertia import effective, mean_normals
+from sim.cloth.state import State
+from sim.cloth.system import Drive, System
 from sim.integrate.backend import extra_force, kernel_for
 from sim.integrate.implicit import AirShape, BackwardEuler
 from sim.integrate.joint_batch import JointBatch
 from sim.kernel.fused import Kernel
-from sim.state import State
-from sim.system import Drive, System
 
 
 @dataclass(frozen=True, kw_only=True)

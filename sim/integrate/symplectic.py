@@ -25,11 +25,11 @@ import torch
 from torch import Tensor
 
 from flagdata.errors import UsageError
+from sim.cloth.state import State
+from sim.cloth.system import Drive, System
 from sim.integrate.backend import Backend, extra_force, kernel_for, warp_kernel_for
 from sim.integrate.stability import outer_limit, stable_step
 from sim.kernel.fused import Kernel
-from sim.state import State
-from sim.system import Drive, System
 
 SAFETY = 0.7
 """Share of the linear stability limit that is used: large deformation stiffens faces beyond the estimate. Higher takes

@@ -1,7 +1,7 @@
 // What acts beside the base model: the loops around the functions of effects (effect.hpp), for one block.
 //
 // All of it is added to the forces of the base model in passes of its own, so that those are the same to the last bit
-// whether effects act or not. sim/system.py is the definition (`System.extra_force`).
+// whether effects act or not. sim/cloth/system.py is the definition (`System.extra_force`).
 
 #pragma once
 
@@ -173,7 +173,7 @@ class Acting {
     if (!sheets_) turn(x, nullptr);
   }
 
-  // Of a force on cloth and air, what gives the cloth's own mass its acceleration (sim/inertia.py).
+  // Of a force on cloth and air, what gives the cloth's own mass its acceleration (sim/cloth/inertia.py).
   void share_with_air(const T* x, T* f) {
     orient(x);
     const T *mass = p.mass + b * p.vertices * L, *added = p.added_mass + b * p.vertices * L;

@@ -12,10 +12,10 @@ import torch
 from torch import Tensor
 
 from flagdata.errors import UsageError
-from sim.cloth import Cloth
+from sim.cloth.cloth_batch import Cloth
+from sim.cloth.system import System
 from sim.compiler import of_effect
-from sim.kernel.given import Compilable, Given, header
-from sim.system import System
+from sim.kernel.effect_code import Compilable, Given, header
 
 
 class Kind(IntEnum):

@@ -1,6 +1,6 @@
 // The base model on a CPU: membrane, bending, gravity, quadratic-normal air, handle springs, contact, limits, leapfrog.
 //
-// The torch source (sim/membrane.py, bending.py, air.py, system.py, integrate/symplectic.py) is the definition; this file
+// The torch source (sim/cloth: membrane.py, bending.py, air.py, system.py; sim/integrate/symplectic.py) is the definition; this file
 // repeats it for speed and is tested against it. One block holds L members of the batch side by side, in vector
 // registers; every lane does the same operations in the same order, so a member's result does not depend on the others.
 

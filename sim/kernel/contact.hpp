@@ -1,4 +1,4 @@
-// Self-contact for one block: what sim/contact.py defines, with a search that looks only at what is near.
+// Self-contact for one block: what sim/cloth/contact.py defines, with a search that looks only at what is near.
 //
 // Every lane has its own candidates, in two nested lists (Verlet's). The far list holds all pairs of a vertex and a
 // face that touch before any vertex has gone further than its far allowance from where it was; it is made by a search

@@ -35,7 +35,7 @@ struct Hinge {
   Real<V> elapsed;     // since then [s]: what is remembered is to be brought up to date where this is not 0
 };
 
-// Vertices at the hoist and the fly, and what fields are continued to them from (sim/ends.py). Field by field as in fused.py.
+// Vertices at the hoist and the fly, and what fields are continued to them from (sim/cloth/cloth_ends.py). Field by field as in fused.py.
 template <typename T>
 struct Ends {
   int64_t count, width;

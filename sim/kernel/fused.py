@@ -13,14 +13,14 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from flagdata.arrays import FloatArray, IntArray
-from sim.cloth import Cloth
+from flagdata.core.arrays import FloatArray, IntArray
+from sim.cloth.cloth_batch import Cloth
+from sim.cloth.contact import Contact, layers
+from sim.cloth.limits import chebyshev_weights
+from sim.cloth.stiffness_tables import Evaluation
+from sim.cloth.system import Drive, System
 from sim.compiler import library
-from sim.contact import Contact, layers
 from sim.kernel.acting import Acting, ActingEntry, acting
-from sim.limits import chebyshev_weights
-from sim.system import Drive, System
-from sim.tables import Evaluation
 
 _POINTERS = (
     "face",

@@ -1,4 +1,5 @@
-// Fields on the faces and hinges of a mesh in one pass, as sim/air.py, cloth.py, inertia.py and bending.py define them.
+// Fields on the faces and hinges of a mesh in one pass, as air.py, cloth_batch.py, inertia.py and bending.py
+// of sim/cloth define them.
 //
 // Members are innermost: L of them are taken at a time, and those left over beside empty lanes. Every member has the same
 // operations in the same order, so that what it gets does not depend on the others.

@@ -1,11 +1,11 @@
 """The base model's steps on a graphics processor, one flag a thread block, all steps of a call in one launch.
 
-The torch source (sim/membrane.py, bending.py, air.py, system.py, integrate/symplectic.py) is the definition, as it is
-of the C++ kernel. Positions, velocities and everything that threads hand to each other are tiles in shared memory;
-device memory is read for what does not change, and for the state before the first step. Warp has no shared arrays: a
-thread writes its element of a tile by `tile_scatter_masked`, which all threads of the block call and which ends with a
-barrier, and reads any element by `tile_extract`. There are no atomics; sums at the vertices are gathered in the order
-of `sim.cloth.incidence`.
+The torch source (sim/cloth: membrane.py, bending.py, air.py, system.py; sim/integrate/symplectic.py) is the definition,
+as it is of the C++ kernel. Positions, velocities and everything that threads hand to each other are tiles in shared
+memory; device memory is read for what does not change, and for the state before the first step. Warp has no shared
+arrays: a thread writes its element of a tile by `tile_scatter_masked`, which all threads of the block call and which
+ends with a barrier, and reads any element by `tile_extract`. There are no atomics; sums at the vertices are gathered in
+the order of `sim.cloth.cloth_batch.incidence`.
 
 A step has four passes over threads:
 
@@ -15,7 +15,7 @@ A step has four passes over threads:
 4. vertices: sum of these, springs, kick and drift.
 
 A fold's gradient at the opposite corner is n/h and at the edge's ends −(1 − w) n/h and −w n/h for each of its faces
-(see `sim.bending`), so that a face needs of a hinge only its moment.
+(see `sim.cloth.bending`), so that a face needs of a hinge only its moment.
 """
 
 # The kernel's body is Warp's language, of which its stubs type a part.
@@ -40,7 +40,7 @@ thread."""
 OPTIONS = {"fast_math": True}
 """Of the compiler: divisions and roots are right to two or three units of the last place."""
 
-_MIN_ALTITUDE = wp.constant(1e-3)  # see sim.bending
+_MIN_ALTITUDE = wp.constant(1e-3)  # see sim.cloth.bending
 _TINY = wp.constant(1e-30)
 
 
@@ -56,7 +56,7 @@ class Sheet:
         area: (face,) at rest [m²].
         end: (hinge,) vertices i and j.
         side: (hinge,) 4 · face + the corner opposite, of the face on the left and of that on the right of i→j.
-        column, shape: (hinge,) see `sim.cloth.Cloth`.
+        column, shape: (hinge,) see `sim.cloth.cloth_batch.Cloth`.
         row: (hinge,) place among the bending rows, 0 to 2.
         around: (k, vertex) corner · faces + face, of the faces at each vertex.
         vertex: (vertex,) how many these are, and which handle holds it, counted from 1; 0 for none.
@@ -110,7 +110,7 @@ class Members:
 
 @wp.struct
 class Motion:
-    """Wind and handles between two times, linear between them; see `sim.system.Drive`.
+    """Wind and handles between two times, linear between them; see `sim.cloth.system.Drive`.
 
     Attributes:
         wind: (2, 3, batch) [m/s].

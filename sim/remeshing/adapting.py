@@ -5,8 +5,8 @@ the mesh is made Delaunay in the metric around each; then vertices are merged in
 longer than `SHORT` and no triangle a sliver. The metric is that of the cloth before; the middle of an edge has the mean
 of its ends'.
 
-A split keeps the momentum ρ Σ a v̄ (v̄ the mean of a face's corners, a its rest area), since a velocity that is linear on
-the face is linear on its halves. A flip and a collapse change it by ρ times the difference of Σ a v̄ over the faces
+A split keeps the momentum ρ Σ a v̄ (v̄ the mean of a face's corners, a its rest area), since a velocity that is linear
+on the face is linear on its halves. A flip and a collapse change it by ρ times the difference of Σ a v̄ over the faces
 concerned, which is zero where the velocity is linear in the material over all of them. For a flip of i–j into k–l on a
 parallelogram of area a that is (ρ a/6) (v_k + v_l − vᵢ − vⱼ).
 """
@@ -21,15 +21,15 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from flagdata.arrays import FloatArray, IntArray
+from flagdata.core.arrays import FloatArray, IntArray
 from flagdata.errors import UsageError
-from sim.cloth import Cloth
+from sim.cloth.cloth_batch import Cloth
+from sim.cloth.mesh import Mesh
+from sim.cloth.sizing import Remeshing, vertex_metrics
+from sim.cloth.state import State
+from sim.cloth.system import System
 from sim.effects.effect import ForceEffect
-from sim.mesh import Mesh
 from sim.remeshing.triangles import Triangles
-from sim.sizing import Remeshing, vertex_metrics
-from sim.state import State
-from sim.system import System
 
 SHORT = 0.8
 """Length in the metric that a collapse may make an edge: below 1, so that it is not split again at once."""

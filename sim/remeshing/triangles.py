@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from flagdata.arrays import FloatArray, IntArray
-from sim.mesh import Mesh
+from flagdata.core.arrays import FloatArray, IntArray
+from sim.cloth.mesh import Mesh
 
 LEAST_QUALITY = 0.1
 """Of a triangle that a flip or a collapse makes: 12 √3 times its area over its perimeter squared; 1 has equal sides."""

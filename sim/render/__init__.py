@@ -9,20 +9,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
-from flagdata.registry import Registry
-from sim.render.meshes import Meshes
+from flagdata.packages.lazy import lazy_exports
+from flagdata.recipes.registry import Registry
 from sim.render.parameters import RenderParameters
+from sim.render.rendered_meshes import Meshes
 from sim.render.renderer import Renderer
 
 if TYPE_CHECKING:
-    from sim.render.camera import Camera
     from sim.render.cycles import Cycles, Workbench
     from sim.render.develop import plate, to_bytes, to_linear
-    from sim.render.meshes import Meshes
     from sim.render.parameters import RenderParameters
-    from sim.render.prior import RenderPrior, named
+    from sim.render.pinhole_camera import Camera
     from sim.render.raster import Raster
+    from sim.render.render_prior import RenderPrior, named
+    from sim.render.rendered_meshes import Meshes
     from sim.render.renderer import Renderer
     from sim.render.staging import stage
 

@@ -17,14 +17,14 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from flagdata.arrays import Float32Array
+from flagdata.core.arrays import Float32Array
 from sim.assets import Assets
 from sim.blender.process import WorkerProcess
 from sim.blender.protocol import Message
-from sim.render.camera import Camera
 from sim.render.develop import develop, plate
-from sim.render.meshes import Meshes
 from sim.render.parameters import RenderParameters
+from sim.render.pinhole_camera import Camera
+from sim.render.rendered_meshes import Meshes
 from sim.render.shutter import moved
 from sim.render.staging import POLE_ALBEDO, Stage, stage
 

@@ -10,8 +10,8 @@ import torch
 from PIL import Image
 from torch import Tensor
 
-from flagdata.arrays import Float32Array, UInt8Array
-from flagdata.schema import FRAME_SIZE
+from flagdata.core.arrays import Float32Array, UInt8Array
+from flagdata.core.schema import FRAME_SIZE
 from sim.assets.colour import decoded
 from sim.render.parameters import RenderParameters
 

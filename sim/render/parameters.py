@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Annotated, Any, get_type_hints
 
+from flagdata.core.schema import FRAME_SIZE
 from flagdata.errors import InputError
-from flagdata.schema import FRAME_SIZE
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,16 +11,16 @@ from torch import Tensor
 from sim.assets import Assets
 from sim.render import raster_kernel, raster_torch
 from sim.render.develop import develop, plate
-from sim.render.geometry import Geometry, check_in_front
-from sim.render.light import Light
-from sim.render.meshes import Meshes
 from sim.render.parameters import RenderParameters
+from sim.render.pixel_view import RasterView
 from sim.render.raster_kernel import library
+from sim.render.rendered_meshes import Meshes
 from sim.render.sampling import Samples
+from sim.render.scene_geometry import Geometry, check_in_front
+from sim.render.scene_light import Light
 from sim.render.shutter import VertexMotion
 from sim.render.staging import Stage, stage
 from sim.render.texture import Pyramid
-from sim.render.view import RasterView
 
 _TOGETHER = 32  # frames; bounds the memory
 

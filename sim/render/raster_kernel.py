@@ -9,12 +9,12 @@ import torch
 from torch import Tensor
 
 from sim.compiler import compiled
-from sim.render.geometry import Geometry
-from sim.render.light import Light
+from sim.render.pixel_view import RasterView
+from sim.render.scene_geometry import Geometry
+from sim.render.scene_light import Light
 from sim.render.shadow import SIZE, basis
 from sim.render.staging import POLE_ALBEDO
 from sim.render.texture import Pyramid
-from sim.render.view import RasterView
 
 _COUNTS = ("frames", "width", "height", "vertices", "pole_start", "levels", "suns", "map")
 _POINTERS = (

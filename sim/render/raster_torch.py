@@ -8,12 +8,12 @@ import torch
 from torch import Tensor
 
 from sim.render.coverage import GRID, Triangles, fragments
-from sim.render.geometry import NEAR, Geometry
-from sim.render.light import Light
+from sim.render.pixel_view import RasterView
+from sim.render.scene_geometry import NEAR, Geometry
+from sim.render.scene_light import Light
 from sim.render.shadow import ShadowMaps
 from sim.render.staging import POLE_ALBEDO
 from sim.render.texture import Pyramid
-from sim.render.view import RasterView
 
 _BITS = 32
 _LAST = (1 << 31) - 1

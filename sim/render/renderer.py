@@ -6,8 +6,8 @@ from typing import Protocol
 
 from torch import Tensor
 
-from sim.render.meshes import Meshes
 from sim.render.parameters import RenderParameters
+from sim.render.rendered_meshes import Meshes
 
 
 class Renderer(Protocol):

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
-from flagdata.rng import stream
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import stream
 from sim.render.parameters import RenderParameters
 
 SUNS = 2

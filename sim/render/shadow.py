@@ -10,8 +10,8 @@ import torch
 from torch import Tensor
 
 from sim.render.coverage import Triangles, fragments
-from sim.render.geometry import Geometry
-from sim.render.light import Direction
+from sim.render.scene_geometry import Geometry
+from sim.render.scene_light import Direction
 
 SIZE = 256
 """Texels of a map along each side; the frame's cloth just fits in."""

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from flagdata.errors import InputError
-from sim.render.meshes import Frame, Meshes
+from sim.render.rendered_meshes import Frame, Meshes
 
 _INWARD = 1e-5  # share by which a material point on the very edge is moved towards the middle
 

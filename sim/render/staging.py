@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from sim.render.camera import Camera
-from sim.render.meshes import Meshes
 from sim.render.parameters import RenderParameters
+from sim.render.pinhole_camera import Camera
+from sim.render.rendered_meshes import Meshes
 
 POLE_ALBEDO = (0.45, 0.45, 0.47)  # linear sRGB: weathered aluminium, painted grey
 _POLE_SIDES = 12

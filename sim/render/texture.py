@@ -8,7 +8,7 @@ from functools import cached_property
 import torch
 from torch import Tensor
 
-from flagdata.arrays import UInt8Array
+from flagdata.core.arrays import UInt8Array
 from sim.render.develop import to_linear
 
 

@@ -1,24 +1,24 @@
 """From a recipe to mesh sequences in a lake: members are drawn, run in batches, diagnosed and published.
 
-A recipe is a TOML file (see `sim.run.reading`), one of `catalogs/scenes` by name, or an ArcSim scene file.
+A recipe is a TOML file (see `sim.run.simulation_toml`), one of `catalogs/scenes` by name, or an ArcSim scene file.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
+from flagdata.packages.lazy import lazy_exports
 from sim.run.publish import Progress, RunReport, simulate
-from sim.run.reading import load
-from sim.run.recipe import Recipe
+from sim.run.simulation_recipe import Recipe
+from sim.run.simulation_toml import load
 
 if TYPE_CHECKING:
-    from sim.run.arrays import recipe_of
-    from sim.run.batch import CRUMPLED, BatchOutcome, Stepper, principal_strains, run
+    from sim.run.member_batch import CRUMPLED, BatchOutcome, Stepper, principal_strains, run
     from sim.run.members import Crew
     from sim.run.publish import member_artifact, simulate
-    from sim.run.reading import of_content, parse
-    from sim.run.recipe import IntegratorSpec, MaterialSpec, Recipe, Shape
+    from sim.run.simulate_call import recipe_of
+    from sim.run.simulation_recipe import IntegratorSpec, MaterialSpec, Recipe, Shape
+    from sim.run.simulation_toml import of_content, parse
 
 
 __all__ = ["Progress", "Recipe", "RunReport", "load", "simulate"]

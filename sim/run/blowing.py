@@ -10,12 +10,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from flagdata.arrays import FloatArray
+from flagdata.answer.film_series import Wind
+from flagdata.core.arrays import FloatArray
+from flagdata.core.provenance import canonical, digest
 from flagdata.errors import InputError, UsageError
-from flagdata.provenance import canonical, digest
-from flagdata.series import Wind
-from flagdata.signals import WindSeries
-from flagdata.tables import Angle, value
+from flagdata.recipes.typed_tables import Angle, value
+from flagdata.record.signals import WindSeries
 from sim.wind.sampled import Beyond, SampledWind, about_mean, usable
 
 Logs: TypeAlias = Callable[[str], tuple[str, WindSeries]]

@@ -11,20 +11,20 @@ from typing import TypeAlias
 import numpy as np
 import torch
 
-from flagdata.arrays import FloatArray
-from flagdata.retired_names import hashed_key
-from flagdata.rng import child_seed, stream
-from flagdata.tables import Quantity, Range, ends
-from sim import handles as held
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import child_seed, stream
+from flagdata.recipes.retired_names import hashed_key
+from flagdata.recipes.typed_tables import Quantity, Range, ends
+from sim.cloth import handles as held
+from sim.cloth.handles import Handles
+from sim.cloth.material import BENDING_SHAPE, Material
+from sim.cloth.mesh import Mesh, grid
+from sim.cloth.scene import Scene, assemble, roughened, upright
+from sim.cloth.state import State
+from sim.cloth.system import System
 from sim.effects import EFFECTS, Effect, apply
 from sim.effects.gusts import Gusts
-from sim.handles import Handles
-from sim.material import BENDING_SHAPE, Material
-from sim.mesh import Mesh, grid
-from sim.run.recipe import Attachment, EffectSpec, MaterialSpec, Recipe, SceneSpec, Shape
-from sim.scene import Scene, assemble, roughened, upright
-from sim.state import State
-from sim.system import System
+from sim.run.simulation_recipe import Attachment, EffectSpec, MaterialSpec, Recipe, SceneSpec, Shape
 
 Parameter: TypeAlias = float | str | tuple[float, ...]
 _GUST_RATE = 10.0  # Hz; the run is linear between samples

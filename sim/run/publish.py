@@ -14,18 +14,18 @@ from typing import Any, TypeAlias
 
 import torch
 
+from flagdata.core.provenance import canonical
+from flagdata.core.schema import Kind
+from flagdata.core.workload import one_thread
 from flagdata.errors import UsageError
 from flagdata.lake import Artifact, CommitResult, Lake
 from flagdata.lake.deposit import Deposit, deposit
-from flagdata.lake.meshes import write_meshes
+from flagdata.lake.mesh_sequences import write_meshes
 from flagdata.lake.remaking import Remade, unsound
-from flagdata.provenance import canonical
-from flagdata.schema import Kind
-from flagdata.workload import one_thread
 from sim.compiler import library
-from sim.run.batch import BatchOutcome, Stepper, run
+from sim.run.member_batch import BatchOutcome, Stepper, run
 from sim.run.members import Crew
-from sim.run.recipe import Recipe
+from sim.run.simulation_recipe import Recipe
 
 Deposited: TypeAlias = tuple[Artifact, Deposit]
 """A row that is not committed yet, and its object in the store."""

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Protocol
 
 from torch import Tensor
 
-from flagdata.lazy import lazy_exports
-from flagdata.registry import Registry
+from flagdata.packages.lazy import lazy_exports
+from flagdata.recipes.registry import Registry
 
 if TYPE_CHECKING:
     from sim.wind.sampled import Beyond, Even, SampledWind
-    from sim.wind.spectral import VonKarman
+    from sim.wind.spectral_wind import VonKarman
     from sim.wind.uniform import UniformWind
 
 

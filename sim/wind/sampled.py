@@ -17,10 +17,10 @@ import torch
 from numpy.typing import ArrayLike, NDArray
 from torch import Tensor
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.schema import UNUSABLE
 from flagdata.errors import InputError, UsageError
-from flagdata.schema import UNUSABLE
-from flagdata.signals import WindSeries
+from flagdata.record.signals import WindSeries
 from flagdata.timebase import NANOSECONDS
 
 _LONGEST_GAP = 5.0

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
+from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from sim.workers.connect import connected

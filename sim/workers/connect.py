@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 
-from flagdata.extras import explained
+from flagdata.core.extras import explained
 from sim.workers.jobs import Workers
 from sim.workers.local import processes
 

@@ -13,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
+from flagdata.core.schema import Kind, SampleFlag
 from flagdata.lake import Artifact, Lake, MeshSequence, write_meshes
 from flagdata.record import RecordWriter
-from flagdata.schema import Kind, SampleFlag
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 
 START = 1_777_636_800_000_000_000  # 2026-05-01T12:00:00Z
 PERIOD = 40_000_000

@@ -12,8 +12,9 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
+from flagdata.core.findings import Severity
+from flagdata.core.schema import CATALOG, FORMAT_VERSION, Kind, catalog_schema
 from flagdata.errors import ConflictError
-from flagdata.findings import Severity
 from flagdata.lake import (
     Artifact,
     Lake,
@@ -26,7 +27,6 @@ from flagdata.lake import (
     verify_catalog,
 )
 from flagdata.record import Record
-from flagdata.schema import CATALOG, FORMAT_VERSION, Kind, catalog_schema
 from tests.flagdata.lake.conftest import put_older_ref
 
 ARCHIVES = sorted(Path(__file__).parent.glob("lake_v*.tar.xz"))

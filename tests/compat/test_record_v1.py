@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.clock import ClockModel
+from flagdata.core.clock_model import ClockModel
 from flagdata.record import Coding, Record, salvage
-from flagdata.signals import Sensor
+from flagdata.record.signals import Sensor
 
 RECORD = Path(__file__).with_name("record-v1.mcap")
 START = 1_767_225_600_000_000_000  # 2026-01-01T00:00:00Z

@@ -10,8 +10,8 @@ import pytest
 
 from docs.generate_cli import commands
 from flagdata import cli
-from flagdata.console import say
-from flagdata.options import REST, LongCommand
+from flagdata.core.console import say
+from flagdata.verbs.verb_options import REST, LongCommand
 from tests.program import invoke
 
 LONG = 14
@@ -109,7 +109,7 @@ def test_names_whose_library_is_not_installed_are_left_out_with_the_extra_that_b
             return {"one": "it"}
         raise ModuleNotFoundError("No module named 'torch'", name="torch")
 
-    monkeypatch.setattr("flagdata.commands.catalog.titles", absent)
+    monkeypatch.setattr("flagdata.commands.catalog_names.titles", absent)
     ended = invoke("catalog")
     assert ended.code == 0
     assert ended.out.count("  one") == 3

@@ -1,4 +1,5 @@
-"""A command in a text for people is written by `flagdata.shell`, which quotes its words. The test reads the source."""
+"""A command in a text for people is written by `flagdata.core.shell`, which quotes its words. The test reads the
+source."""
 
 from __future__ import annotations
 

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from flagdata.lazy import exported, exports
-from flagdata.verb_package import VerbPackage
+from flagdata.packages.lazy import exported, exports
+from flagdata.packages.verb_package import VerbPackage
 from tests.contract.imports import ROOT, modules, statements, tree
 from tests.contract.test_import_circles import PRODUCT, name_of
 from tests.contract.test_part_circles import part
@@ -73,7 +73,7 @@ def test_a_name_loads_its_own_module_and_no_other(tmp_path: Path) -> None:
     package.mkdir(parents=True)
     (tmp_path / "house" / "__init__.py").write_text("")
     (package / "__init__.py").write_text(
-        "from typing import TYPE_CHECKING\nfrom flagdata.lazy import lazy_exports\n"
+        "from typing import TYPE_CHECKING\nfrom flagdata.packages.lazy import lazy_exports\n"
         "if TYPE_CHECKING:\n    from house.room.chair import Chair, legs\n    from house.room.table import top\n"
         "__getattr__ = lazy_exports(__name__, __file__)\n"
     )

@@ -17,17 +17,17 @@ import pytest
 import torch
 from torch import Tensor
 
+from flagdata.core.rng import stream
 from flagdata.errors import InputError, UsageError
-from flagdata.rng import stream
-from sim import scene
+from sim.cloth import scene
+from sim.cloth.handles import Handles
+from sim.cloth.material import named
+from sim.cloth.mesh import Mesh, grid
+from sim.cloth.scene import Scene, assemble
+from sim.cloth.state import State
+from sim.cloth.system import System
 from sim.effects import EFFECTS, Effect
-from sim.handles import Handles
 from sim.integrate import Backend, BackwardEuler, Symplectic, advance
-from sim.material import named
-from sim.mesh import Mesh, grid
-from sim.scene import Scene, assemble
-from sim.state import State
-from sim.system import System
 from tests.contract.strengths import nulled, nulls
 
 NAMES = list(EFFECTS)

@@ -13,17 +13,17 @@ from typing import Any
 import pytest
 import torch
 
+from flagdata.core.rng import stream
 from flagdata.errors import UsageError
-from flagdata.rng import stream
-from sim import scene
-from sim.air import AIR_FORCES, Stokes
+from sim.cloth import scene
+from sim.cloth.air import AIR_FORCES, Stokes
+from sim.cloth.material import named
+from sim.cloth.scene import assemble
+from sim.cloth.state import State
+from sim.cloth.system import System
 from sim.effects import EFFECTS, FieldEffect, Seen, load
 from sim.integrate import Backend, BackwardEuler, JointBatch, SplitEuler, advance
 from sim.kernel import Kernel
-from sim.material import named
-from sim.scene import assemble
-from sim.state import State
-from sim.system import System
 from tests.contract.strengths import nulls
 from tests.contract.test_effects import START, drawn, flag, with_effect
 
@@ -212,7 +212,7 @@ def test_batches_of_all_effects_split_jointly_in_one_call_as_torch_splits_each(
 OWN = '''
 from dataclasses import dataclass
 from typing import Annotated
-from sim.air import face_wind
+from sim.cloth.air import face_wind
 from sim.effects.effect import ForceEffect
 from sim.effects.parameter import Value, strength
 

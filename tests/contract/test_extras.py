@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from flagdata.extras import EXTRAS
+from flagdata.core.extras import EXTRAS
 
 ROOT = Path(__file__).resolve().parents[2]
 LOG = "time,wind_speed (m/s)\n2026-05-01T12:00:00+02:00,5.1\n2026-05-01T12:00:01+02:00,5.3\n"

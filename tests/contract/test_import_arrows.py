@@ -85,7 +85,7 @@ def test_a_measurement_loads_neither_torchs_compiler_nor_what_only_other_command
     code = (
         "import sys\nfrom measure.anemometer import network\n"
         "from measure.commands import measure, measurement_artifact\n"
-        "from measure.estimate import measuring, series\n"
+        "from measure.estimate import film_measuring as measuring, wind_by_window as series\n"
         "network(None, lake=None, at=None)\n"
         f"print('LOADED', sorted(set({heavy!r}) & set(sys.modules)))"
     )

@@ -9,7 +9,7 @@ import ast
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
 
-from flagdata.lazy import exported
+from flagdata.packages.lazy import exported
 from tests.contract.imports import ROOT, imported_names, modules, tree
 
 PRODUCT = ("flagdata", "sim", "models", "measure")

@@ -23,7 +23,7 @@ SUSPECT = re.compile(
 )
 """What is in each module that has anything to do with SQL; parsing the others takes a second."""
 NAMES_ALONE = {
-    "flagdata/catalog_sql.py": "names of the schema's columns",
+    "flagdata/lake/catalog_sql.py": "names of the schema's columns",
     "flagdata/ingest/anemometer/documents/sqlite.py": "names of another file's tables, quoted",
 }
 """Modules that make SQL out of names, which cannot be parameters."""

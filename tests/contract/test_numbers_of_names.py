@@ -1,7 +1,7 @@
-"""Numbers of names are read by `flagdata.numbered`, and no parsed number is a length. The test reads the source.
+"""Numbers of names are read by `flagdata.core.numbered`, and no parsed number is a length. The test reads the source.
 
-A name of a file may state any number. `int` of a part of a name is an offence outside `flagdata.numbered`, and so is a
-`range`, an array or a list as long as a number that the same function read from a text by `int`.
+A name of a file may state any number. `int` of a part of a name is an offence outside `flagdata.core.numbered`, and so
+is a `range`, an array or a list as long as a number that the same function read from a text by `int`.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ import pytest
 from tests.contract.imports import ROOT, modules, tree
 
 PRODUCT = ("flagdata", "sim", "models", "measure")
-READER = "flagdata/numbered.py"
+READER = "flagdata/core/numbered.py"
 BOUNDED = {
     "flagdata/timebase.py": "hours and minutes of two digits, by the pattern of a zone",
-    "flagdata/scheduling.py": "threads of this process, as the kernel numbers them",
+    "flagdata/core/scheduling.py": "threads of this process, as the kernel numbers them",
     "flagdata/ingest/camera/picture_names.py": "hours, minutes, seconds and nanoseconds, by the pattern of a clock",
 }
 """Modules that read numbers of names by `int`, with what bounds these."""

@@ -29,15 +29,15 @@ from torch.utils.data import DataLoader
 
 import flagdata
 from docs.generate_cli import commands
-from flagdata.arrays import UInt8Array
+from flagdata.core.arrays import UInt8Array
+from flagdata.core.schema import Kind
 from flagdata.dataset import DecodedCache, HashedSplit, clip_rows, collate
-from flagdata.dataset.lineage import origins_of
+from flagdata.dataset.clip_lineage import origins_of
 from flagdata.dataset.sides import clips_of
 from flagdata.export import FORMATS
 from flagdata.lake import Artifact, Lake
 from flagdata.record import Record, RecordWriter
-from flagdata.schema import Kind
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 from models.training import DataSpec, inputs, load, sides_of
 from tests.contract.imports import ROOT, modules, tree
 from tests.contract.test_public_arguments import public_calls
@@ -342,10 +342,10 @@ CALLERS = {
     "flagdata/api/lakes.py": ("pairs",),
     "flagdata/dataset/tagged.py": ("the note of a tag, of all clips",),
     "flagdata/dataset/resolve.py": ("Source.pairs", "Source.sides"),
-    "flagdata/export/plan.py": ("flagdata export",),
-    "measure/demo/page.py": ("the one recording of the demo, of which no side is asked for",),
-    "models/evaluation/command.py": ("flagdata evaluate",),
-    "models/training/command.py": ("sides_of",),
+    "flagdata/export/export_plan.py": ("flagdata export",),
+    "measure/demo/recording_page.py": ("the one recording of the demo, of which no side is asked for",),
+    "models/evaluation/evaluate_command.py": ("flagdata evaluate",),
+    "models/training/train_command.py": ("sides_of",),
     "tests/studies/gate.py": ("FilmsOf",),
     "tests/studies/masks/command.py": ("batches",),
     "tests/studies/shipping.py": ("sides_of",),

@@ -1,4 +1,5 @@
-"""What a user names goes through `flagdata.outputs`: of the other modules, those listed alone write or remove files.
+"""What a user names goes through `flagdata.core.files.outputs`: of the other modules, those listed alone write or
+remove files.
 
 The test reads the source. A module that needs to write something else is added here, with the reason why what it writes
 is never a user's.
@@ -12,34 +13,34 @@ from pathlib import Path
 
 from tests.contract.imports import ROOT, modules, tree
 
-SHARED = {"flagdata/outputs.py", "flagdata/manifest.py"}
+SHARED = {"flagdata/core/files/outputs.py", "flagdata/core/files/manifest.py"}
 LAKE = "writes inside a lake or its staging, under names of its own"
-INSIDE = "writes into a scratch folder that the caller made with flagdata.outputs"
+INSIDE = "writes into a scratch folder that the caller made with flagdata.core.files.outputs"
 SCRATCH = "writes into a temporary folder of its own"
 ALLOWED = {
-    "flagdata/durable.py": LAKE,
+    "flagdata/core/files/durable.py": LAKE,
     "flagdata/lake/leases.py": LAKE,
     "flagdata/lake/lake.py": LAKE,
-    "flagdata/lake/log.py": LAKE,
-    "flagdata/lake/meshes.py": LAKE,
+    "flagdata/lake/delta_log.py": LAKE,
+    "flagdata/lake/mesh_sequences.py": LAKE,
     "flagdata/lake/objects.py": LAKE,
     "flagdata/lake/refs.py": LAKE,
     "flagdata/lake/catalog.py": LAKE,
-    "flagdata/lake/probing.py": "tries what a disk can do, by files of its own in staging",
+    "flagdata/lake/place_probing.py": "tries what a disk can do, by files of its own in staging",
     "flagdata/lake/rowfiles.py": "writes into memory",
-    "flagdata/lake/locks.py": LAKE,
+    "flagdata/lake/lake_locks.py": LAKE,
     "flagdata/storage/path.py": "writes, removes and renames what its callers name, as pathlib does for folders",
-    "flagdata/object_cache.py": "a cache of a lake's objects by their hash",
-    "sim/datasets/card.py": LAKE + "; a path that the user gives goes through flagdata.outputs",
+    "flagdata/core/files/object_cache.py": "a cache of a lake's objects by their hash",
+    "sim/datasets/card.py": LAKE + "; a path that the user gives goes through flagdata.core.files.outputs",
     "flagdata/lake/deposit.py": LAKE,
     "flagdata/lake/restoring.py": LAKE,
-    "measure/closing/artifacts.py": LAKE,
+    "measure/closing/verdict_artifacts.py": LAKE,
     "measure/commands/measurement_artifact.py": LAKE + "; or into a scratch folder (--zarr)",
-    "models/training/command.py": LAKE,
-    "sim/datasets/jobs.py": LAKE,
-    "flagdata/checksums.py": "states the checksums inside a folder that its caller made",
-    "flagdata/locks.py": "the lock in a run folder or a cache",
-    "flagdata/record/output.py": "writes a record into staging or to a scratch path, and only where nothing is",
+    "models/training/train_command.py": LAKE,
+    "sim/datasets/build_jobs.py": LAKE,
+    "flagdata/core/files/checksums.py": "states the checksums inside a folder that its caller made",
+    "flagdata/core/files/file_locks.py": "the lock in a run folder or a cache",
+    "flagdata/record/record_file.py": "writes a record into staging or to a scratch path, and only where nothing is",
     "flagdata/record/salvage.py": "removes the record that it has itself just made",
     "flagdata/commands/ingest_sources.py": "removes the crop picture that it has itself just written",
     "flagdata/export/csv_text.py": INSIDE,
@@ -52,26 +53,26 @@ ALLOWED = {
     "flagdata/export/zarr_groups.py": INSIDE,
     "flagdata/export/wind_csv.py": INSIDE,
     "flagdata/ingest/meshes/folder.py": INSIDE,
-    "measure/observables/table.py": INSIDE,
+    "measure/observables/observables_table.py": INSIDE,
     "flagdata/commands/query.py": INSIDE,
-    "measure/camera.py": INSIDE,
-    "measure/demo/command.py": INSIDE,
+    "measure/simulated_camera.py": INSIDE,
+    "measure/demo/demo_command.py": INSIDE,
     "measure/demo/logger.py": INSIDE,
-    "measure/demo/recording.py": INSIDE,
-    "measure/demo/page.py": INSIDE,
+    "measure/demo/demo_recording.py": INSIDE,
+    "measure/demo/recording_page.py": INSIDE,
     "measure/demo/tracked.py": INSIDE,
     "sim/blender/worker.py": SCRATCH,
-    "sim/datasets/record.py": SCRATCH,
-    "sim/datasets/plan.py": SCRATCH,
-    "flagdata/installed_names.py": "the building of a wheel, in the folder that it builds in",
+    "sim/datasets/film_record.py": SCRATCH,
+    "sim/datasets/build_plan.py": SCRATCH,
+    "flagdata/packages/installed_names.py": "the building of a wheel, in the folder that it builds in",
     "flagdata/dataset/cache.py": "a cache: files named by 64 hex digits and its own two, whichever folder it is in",
     "measure/nulls/bank.py": "makes the folder of a bank that `challenge bank` has claimed; batches by put_if_absent",
-    "measure/cloth/artifact.py": LAKE,
-    "measure/anemometer/storage.py": LAKE,
+    "measure/cloth/calibration_artifact.py": LAKE,
+    "measure/anemometer/reading_model_folder.py": LAKE,
     "measure/cloth/design.py": "a cache: files named by 32 hex digits, by put_if_absent, whichever folder it is in",
     "sim/compiler.py": "flagdata's own cache folder",
     "models/training/checkpoint.py": "the run folder of a training",
-    "models/storage.py": "writes into folders that its callers make: staging, a run folder, shipped models",
+    "models/trained/model_folder.py": "writes into folders that its callers make: staging, a run folder, shipped models",
 }
 
 ALWAYS = {

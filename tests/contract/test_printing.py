@@ -1,4 +1,4 @@
-"""What a terminal is given goes through `flagdata.console`, which escapes it. The test reads the source."""
+"""What a terminal is given goes through `flagdata.core.console`, which escapes it. The test reads the source."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import ast
 
 from tests.contract.imports import PACKAGES, ROOT, modules, tree
 
-PRINTER = "flagdata/console.py"
+PRINTER = "flagdata/core/console.py"
 ALLOWED = {
-    "measure/closing/command_line.py": "bars of stages, whose names are escaped",
+    "measure/closing/null_options.py": "bars of stages, whose names are escaped",
 }
 CLICK = {"echo", "secho", "echo_via_pager", "prompt", "confirm", "style"}
 STREAMS = {"stdout", "stderr", "__stdout__", "__stderr__"}

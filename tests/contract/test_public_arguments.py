@@ -19,11 +19,11 @@ import torch
 
 import flagdata
 import flagdata.dataset
-from flagdata.arguments import checked, plain, real, whole
+from flagdata.core.arguments import checked, plain, real, whole
+from flagdata.core.rng import stream
 from flagdata.dataset import PairLoader, Sample
 from flagdata.dataset.loader import Batchable
 from flagdata.errors import UsageError
-from flagdata.rng import stream
 
 _WHOLE = re.compile(r"(?:int(?: \| None)?|tuple\[int(?:, int)*\](?: \| None)?)")
 _MADE_INSIDE = {"Pairs.__init__"}

@@ -10,8 +10,8 @@ import pytest
 import torch
 from torch import Tensor
 
+from flagdata.core.rng import stream
 from flagdata.errors import InputError
-from flagdata.rng import stream
 from sim.effects import SENSOR_EFFECTS, AnemometerEffect, Parametrised, Sampling
 from sim.effects.sensor import CameraEffect, ClockEffect
 from tests.contract.strengths import nulled

@@ -6,8 +6,8 @@ import re
 from dataclasses import fields
 
 from sim.datasets import AnemometerSpec, CameraSpec
-from sim.datasets.reading import SIDES, _DatasetTables, _Render, _Scene, _SessionsSide
-from sim.datasets.recipe import GroupSpec, SessionSpec
+from sim.datasets.dataset_recipe import GroupSpec, SessionSpec
+from sim.datasets.dataset_toml import SIDES, _DatasetTables, _Render, _Scene, _SessionsSide
 from tests.docs.pages import DOCS
 
 TABLES = {

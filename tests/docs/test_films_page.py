@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from measure.cloth import OBSERVED
-from measure.cloth import recording as observed
+from measure.cloth import observed_recording as observed
 from measure.observables import OBSERVABLES, Observable
 from tests.studies.validation.power import reference_table, table
 

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flagdata.core.schema import Kind
 from flagdata.ingest import write_folder
 from flagdata.lake import Lake, MeshSequence
-from flagdata.schema import Kind
 from measure.demo import TrackedRecipe, make_tracks
 from measure.nulls import NullBatch
 from measure.nulls.bank import build
@@ -24,7 +24,7 @@ from measure.observe import Experiment, load
 from measure.propose import Decision, ProposalOutcome
 from measure.propose.proposal_log import entries
 from measure.verdict import Conclusion, Estimate, Parameter, Verdict
-from sim.mesh import grid
+from sim.cloth.mesh import grid
 from tests.docs.pages import Shell, blocks, commands
 from tests.measure.observe.flags import HEIGHT, WIDTH, flutter
 from tests.measure.report.verdicts import Size, verdict
@@ -156,7 +156,7 @@ def test_every_command_of_proposing_runs(folder: Path, tmp_path: Path, monkeypat
         calls.append((tried, given))
         return nothing_taken()
 
-    monkeypatch.setattr("measure.propose.propose.propose", instead)
+    monkeypatch.setattr("measure.propose.term_search.propose", instead)
     monkeypatch.chdir(tmp_path)
     shutil.copy(folder / "tracks.csv", tmp_path)
     for name in ("flag.toml", "other.toml"):

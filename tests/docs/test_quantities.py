@@ -13,46 +13,46 @@ import pytest
 import flagdata
 from docs import generate_cli
 from docs.generate_glossary import QUANTITIES
-from flagdata.retired_names import KEYS, NAMES
-from flagdata.schema import CATALOG
+from flagdata.core.schema import CATALOG
+from flagdata.recipes.retired_names import KEYS, NAMES
 
 ROOT = Path(flagdata.__file__).parent.parent
 PRODUCT = ("flagdata", "sim", "models", "measure")
-RECIPES = ("sim/run/reading.py", "measure/observe/recipe.py")
+RECIPES = ("sim/run/simulation_toml.py", "measure/observe/experiment_recipe.py")
 """Modules whose dataclasses and tables are the keys of recipes."""
 RETIRED = {*NAMES, *KEYS, "density_uncertainty", "density-uncertainty"}
 OF_THE_AIR = {
-    "measure/observe/checks/inertia.py",
+    "measure/observe/checks/inertia_check.py",
     "measure/observe/checks/surroundings.py",
     "measure/observe/describing.py",
-    "measure/observe/recipe.py",
-    "measure/report/statement.py",
-    "sim/air.py",
-    "sim/drape.py",
-    "sim/run/reading.py",
-    *(f"sim/{part}/{name}.py" for part, name in (("kernel", "fused"), ("kernel_warp", "batch"))),
+    "measure/observe/experiment_recipe.py",
+    "measure/report/verdict_statement.py",
+    "sim/cloth/air.py",
+    "sim/run/cusick_drape.py",
+    "sim/run/simulation_toml.py",
+    *(f"sim/{part}/{name}.py" for part, name in (("kernel", "fused"), ("kernel_warp", "warp_batch"))),
     "sim/kernel_warp/leapfrog.py",
 }
 """Modules in which a density is the air's, beside those of effects."""
-OF_ARCSIM = {"sim/arcsim/reading.py", "sim/arcsim/writing.py"}
+OF_ARCSIM = {"sim/arcsim/arcsim_reading.py", "sim/arcsim/writing.py"}
 """Modules in which `density` is a key of another program's files."""
 OF_STATISTICS = {
-    "measure/cloth/evidence.py",
-    "measure/cloth/posterior.py",
+    "measure/cloth/model_evidence.py",
+    "measure/cloth/cloth_posterior.py",
     "measure/loop/residuals.py",
-    "models/restriction.py",
-    "sim/membrane.py",  # of energy
-    "sim/wind/spectral.py",
+    "models/trained/restriction.py",
+    "sim/cloth/membrane.py",  # of energy
+    "sim/wind/spectral_wind.py",
 }
 """Modules in which a density is that of a probability, a spectrum or an energy."""
 OF_THE_LAST_VERSION = {
-    "flagdata/retired_names.py",
-    "flagdata/api/measuring.py",
-    "measure/closing/arrays.py",
-    "measure/cloth/command_line.py",
+    "flagdata/recipes/retired_names.py",
+    "flagdata/api/measuring_verbs.py",
+    "measure/closing/close_loop_call.py",
+    "measure/cloth/film_options.py",
     "measure/commands/close_loop.py",
-    "measure/nulls/plan.py",  # a hash
-    "measure/observe/recipe.py",
+    "measure/nulls/null_plan.py",  # a hash
+    "measure/observe/experiment_recipe.py",
     "measure/observe/trajectory.py",  # a hash
 }
 """Modules that read names of the last version, or hash under them."""

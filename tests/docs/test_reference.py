@@ -11,8 +11,8 @@ import pytest
 import flagdata
 from docs import generate_cli, generate_effects, generate_glossary
 from flagdata.ingest import FileLayout, QualityRules
-from flagdata.ingest.anemometer.recipe import MATCH, ChannelLayout, CheckLayout, Recipe, TimeLayout
-from flagdata.signals import Sensor
+from flagdata.ingest.anemometer.sensor_recipe import MATCH, ChannelLayout, CheckLayout, Recipe, TimeLayout
+from flagdata.record.signals import Sensor
 from sim.effects import EFFECTS, SENSOR_EFFECTS
 from tests.docs.calls import lines, undocumented
 from tests.docs.pages import DOCS

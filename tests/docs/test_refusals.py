@@ -35,7 +35,7 @@ VERBS = {
         "measure/estimate",
     ),
     "align": ("flagdata/align", "flagdata/commands/align.py"),
-    "ingest": ("flagdata/ingest", "flagdata/commands/ingest_options.py", "flagdata/commands/confirm.py"),
+    "ingest": ("flagdata/ingest", "flagdata/commands/ingest_options.py", "flagdata/commands/confirm_recipe.py"),
     "close-loop": (
         "measure/closing",
         "measure/commands/close_loop",

@@ -8,7 +8,7 @@ import re
 import pytest
 
 from measure.report import by_draw, from_document, lead
-from measure.report.words import words
+from measure.report.verdict_words import words
 from measure.verdict import Verdict
 from tests.docs.pages import DOCS
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import av
 import numpy as np
 
-from flagdata.arrays import FloatArray
-from flagdata.rng import stream
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import stream
 from flagdata.timebase import NANOSECONDS, from_datetime
 from measure.demo import BEFORE, CUP, START
 from measure.demo.logger import write_log

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flagdata.arrays import Float32Array, FloatArray, UInt8Array
+from flagdata.core.arrays import Float32Array, FloatArray, UInt8Array
 from flagdata.errors import InputError
 
 

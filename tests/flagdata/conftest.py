@@ -13,7 +13,7 @@ import av
 import numpy as np
 import pytest
 
-from flagdata.commands.confirm import OnCommandLine
+from flagdata.commands.confirm_recipe import OnCommandLine
 from flagdata.lake import Lake
 from tests.confirming import CONFIRMED
 

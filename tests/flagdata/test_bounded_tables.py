@@ -14,11 +14,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from flagdata import arrays, parquet
-from flagdata.arrays import read_arrays
+from flagdata.core import arrays
+from flagdata.core.arrays import read_arrays
+from flagdata.core.files import bounded_parquet
+from flagdata.core.files.bounded_parquet import read_parquet
 from flagdata.errors import CorruptError, FlagdataError, LimitError
 from flagdata.lake import Lake
-from flagdata.parquet import read_parquet
 from measure.nulls import bank
 from tests.compat.make_lake import fill
 
@@ -53,8 +54,8 @@ def test_a_table_that_states_more_rows_than_can_be_held_is_refused_before_it_is_
 def test_a_long_text_that_many_rows_name_is_refused_when_its_rows_are_too_many(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(parquet, "_BATCH", 16)
-    monkeypatch.setattr(parquet, "HELD", MEMORY)
+    monkeypatch.setattr(bounded_parquet, "_BATCH", 16)
+    monkeypatch.setattr(bounded_parquet, "HELD", MEMORY)
     with pytest.raises(LimitError, match="take more than"):
         read_parquet(_one_long_text(tmp_path / "a.parquet"))
 

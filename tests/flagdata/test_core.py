@@ -16,10 +16,10 @@ import pyarrow as pa
 import pytest
 
 import flagdata
-from flagdata import provenance, rng, schema, units
+from flagdata.core import provenance, rng, schema, units
+from flagdata.core.findings import Finding, Severity, quality_flags
 from flagdata.errors import ErrorKind, FlagdataError, RefusedError, UnknownNameError
-from flagdata.findings import Finding, Severity, quality_flags
-from flagdata.registry import Registry
+from flagdata.recipes.registry import Registry
 from tests.contract.imports import modules, tree
 from tests.program import invoke
 

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from flagdata.errors import CorruptError, FlagdataError, InputError, LimitError
 from flagdata.ingest import MarkerOptions, is_marker_table, read_obj, read_table
-from flagdata.ingest.markers import table as marker_table
+from flagdata.ingest.markers import marker_table
 from flagdata.lake import (
     Lake,
     MarkerSequence,
@@ -31,7 +31,7 @@ from flagdata.lake import (
     write_meshes,
 )
 from flagdata.record import Record, RecordWriter, salvage
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 from tests.damage import QUICK, changed, damaged, damages, paths, wild
 
 START = 1_767_225_600_000_000_000

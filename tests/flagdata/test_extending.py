@@ -19,9 +19,9 @@ from flagdata import extend
 from flagdata.errors import InputError
 from flagdata.ingest import FORMATS
 from flagdata.lake import Lake
-from flagdata.registry import PlugInError, Registry
-from models.learner import Loss, build
-from models.registry import NETWORKS
+from flagdata.recipes.registry import PlugInError, Registry
+from models.networks.learner import Loss, build
+from models.networks.networks_by_name import NETWORKS
 from sim.datasets import DATASETS
 from sim.effects import EFFECTS
 from sim.render import RENDERERS

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from flagdata.cli import NAMES
-from flagdata.commands.catalog import titles
+from flagdata.commands.catalog_names import titles
 from flagdata.ingest import FORMATS, sniff
-from flagdata.registry import PlugInError, Registry
+from flagdata.recipes.registry import PlugInError, Registry
 from sim.effects import EFFECTS
 from tests.program import invoke
 

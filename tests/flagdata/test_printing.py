@@ -20,11 +20,11 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from flagdata import console
 from flagdata.cli import VERBS, root
+from flagdata.core import console
+from flagdata.core.printable import printable, printable_lines
+from flagdata.core.schema import CATALOG, catalog_schema
 from flagdata.lake import Lake
-from flagdata.printable import printable, printable_lines
-from flagdata.schema import CATALOG, catalog_schema
 from tests.program import invoke
 
 EVIL = "\x1b]0;pwned\x07\x1b[2J\x7f\x9b2J\u202eexe.\u2066\u2028\n      9  cdeadbeef  forged line\r\b"

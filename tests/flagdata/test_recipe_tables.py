@@ -13,7 +13,18 @@ import pytest
 from msgspec import Meta
 
 from flagdata.errors import InputError, LimitError, UnknownNameError
-from flagdata.tables import Angle, AngleQuantity, Count, Named, NotNegative, Positive, Quantity, Range, Spelled, read
+from flagdata.recipes.typed_tables import (
+    Angle,
+    AngleQuantity,
+    Count,
+    Named,
+    NotNegative,
+    Positive,
+    Quantity,
+    Range,
+    Spelled,
+    read,
+)
 
 
 class Kind(StrEnum):

@@ -10,10 +10,10 @@ import torch
 
 from measure.forecasting import Calibration, Forecaster, Segments
 from measure.observe import Specimen, Trajectory, WindTrack
-from sim import handles
+from sim.cloth import handles
+from sim.cloth.material import named
+from sim.cloth.mesh import grid
 from sim.integrate import SplitEuler
-from sim.material import named
-from sim.mesh import grid
 
 RATE = 25.0
 

@@ -16,9 +16,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flagdata.documents import NESTING_LIMIT
 from flagdata.errors import CorruptError, FlagdataError, InputError, LimitError
-from flagdata.recipes import parsed
+from flagdata.recipes.documents import NESTING_LIMIT
+from flagdata.recipes.shelves import parsed
 from measure.nulls import bank
 from sim.arcsim import read_material, read_scene
 from tests.damage import QUICK, as_toml, changed, damaged, damages, paths, wild

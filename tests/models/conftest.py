@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.arrays import UInt8Array
+from flagdata.core.arrays import UInt8Array
+from flagdata.core.schema import Kind
 from flagdata.dataset import clip_rows
 from flagdata.lake import Artifact, Lake
 from flagdata.record import Record, RecordWriter
-from flagdata.schema import Kind
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 
 PERIOD = 40_000_000
 START = 1_577_836_800_000_000_000

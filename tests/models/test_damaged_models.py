@@ -15,11 +15,11 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flagdata.checksums import write_sums
+from flagdata.core.files.checksums import write_sums
 from flagdata.errors import CorruptError, InputError, LimitError
-from models import estimator
-from models.estimator import CLOUD
-from models.storage import CARD, read_tensors, write_tensors
+from models.trained import estimator
+from models.trained.estimator import CLOUD
+from models.trained.model_folder import CARD, read_tensors, write_tensors
 from models.training import TrainingRecipe, checkpoint, parse
 from tests.damage import QUICK, changed, paths, wild
 from tests.refusals import unrefused

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from flagdata.errors import InputError
-from models.learner import Learner, Loss, contrastive_loss
+from models.networks.learner import Learner, Loss, contrastive_loss
 
 SEEDS = torch.tensor([1, 1, 2, 3])
 

@@ -12,11 +12,11 @@ import torch
 from torch import nn
 
 from flagdata.errors import InputError
-from models.baselines import Cardona, ResNetOfFrames, Yang, evenly_spaced
-from models.blocks import BasicBlock, ResNet18
-from models.network import INPUTS, Network
-from models.registry import NETWORKS
-from models.sdn import SpectralNetwork
+from models.networks.baselines import Cardona, ResNetOfFrames, Yang, evenly_spaced
+from models.networks.blocks import BasicBlock, ResNet18
+from models.networks.network import INPUTS, Network
+from models.networks.networks_by_name import NETWORKS
+from models.networks.sdn import SpectralNetwork
 from tests.refusals import unrefused
 
 SMALL: dict[str, dict[str, Any]] = {

@@ -142,7 +142,7 @@ CASES = [
         ("query --json", OR, "query --csv", OR, "query --arrow a.arrow"),
     ),
     Case(
-        "flagdata/cells.py",
+        "flagdata/lake/catalog_cells.py",
         "cast it in the SQL, or write it by --arrow",
         "query --csv --sql 'select interval 3 days as x'",
         (

@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 
 from flagdata.align import methods
+from flagdata.core.schema import Kind
 from flagdata.dataset import HashedSplit
 from flagdata.dataset.splits import Origin
 from flagdata.ingest import CameraIngest, CameraOptions, Labels, ingest_camera
 from flagdata.lake import Artifact, Lake, selection
-from flagdata.schema import Kind
 from tests.remedies.cases import Case, heal
 from tests.remedies.user import User
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from tests.flagdata.lake.test_healing import cut, flip, lose
 
+from flagdata.core.schema import Kind
 from flagdata.lake import Artifact, Catalog, Lake, Objects, clone, expire, transfer
-from flagdata.schema import Kind
 from tests.flagdata.lake.conftest import overwrite, put_older_ref
 from tests.flagdata.lake.test_transfer import no_bar
 from tests.flagdata.lake.test_unfinished import stopped
@@ -45,7 +45,7 @@ def keep_measurement(lake: Lake) -> Artifact:
 def test_a_film_whose_object_is_lost_is_put_back_by_its_file_or_by_a_clone(user: User) -> None:
     user.succeeds("clone", "lake", "copy.lake")
     lose(the_lake(user), object_of(the_lake(user), "first"))
-    user.meets("flagdata/durable.py", "flagdata heal FROM, a c", "doctor")
+    user.meets("flagdata/core/files/durable.py", "flagdata heal FROM, a c", "doctor")
     user.follows("heal", "copy.lake")
     user.succeeds("doctor", shows="(?m)^healthy")
     cut(the_lake(user), object_of(the_lake(user), "first"))
@@ -59,7 +59,7 @@ def test_a_measurement_whose_object_is_lost_comes_back_by_a_clone_or_is_withdraw
     keep_measurement(the_lake(user))
     user.succeeds("clone", "lake", "copy.lake")
     lose(the_lake(user), object_of(the_lake(user), "wave"))
-    user.meets("flagdata/durable.py", "flagdata heal FROM, a c", "doctor")
+    user.meets("flagdata/core/files/durable.py", "flagdata heal FROM, a c", "doctor")
     user.follows("heal", "copy.lake")
     user.succeeds("doctor", shows="(?m)^healthy")
     lose(the_lake(user), object_of(the_lake(user), "wave"))
@@ -86,7 +86,7 @@ def test_a_file_of_the_lake_that_is_damaged_is_taken_from_an_older_clone(user: U
     log = user.folder / "lake" / "catalog" / "_delta_log"
     for path in (user.folder / "lake" / "lake.json", log / f"{1:020d}.json", log / f"{0:020d}.json"):
         overwrite(path, b"")
-        user.meets("flagdata/durable.py", "flagdata heal FROM, a c", "ls")
+        user.meets("flagdata/core/files/durable.py", "flagdata heal FROM, a c", "ls")
         user.follows("heal", "older.lake", shows="1 item taken, .*; nothing still damaged")
         user.succeeds("doctor", shows="(?m)^healthy")
 
@@ -95,7 +95,7 @@ def test_a_damaged_ref_of_an_earlier_version_is_taken_from_a_clone(user: User) -
     path = put_older_ref(the_lake(user), "tags", "v9")
     user.succeeds("clone", "lake", "copy.lake")
     overwrite(path, b"{")
-    user.meets("flagdata/durable.py", "flagdata heal FROM, a c", "doctor")
+    user.meets("flagdata/core/files/durable.py", "flagdata heal FROM, a c", "doctor")
     user.follows("heal", "copy.lake", shows="ref .*v9.json: had changed")
     user.succeeds("ls", "--at", "v9", shows="camera +first")
     user.succeeds("doctor", shows="(?m)^healthy")
@@ -106,7 +106,7 @@ def test_an_erasure_is_refused_until_a_damaged_ref_is_healed(user: User) -> None
     user.succeeds("clone", "lake", "copy.lake")
     overwrite(path, b"{")
     erase = ("withdraw", "first", "--everywhere", "-m", "asked")
-    user.meets("flagdata/durable.py", "flagdata heal FROM, a c", *erase)
+    user.meets("flagdata/core/files/durable.py", "flagdata heal FROM, a c", *erase)
     user.follows("heal", "copy.lake")
     user.succeeds(*erase)
     user.succeeds("doctor", shows="(?m)^healthy")

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.arrays import UInt8Array
+from flagdata.core.arrays import UInt8Array
+from flagdata.core.schema import Kind
 from flagdata.dataset import clip_rows
 from flagdata.lake import Artifact, Lake
 from flagdata.record import Record
-from flagdata.schema import Kind
 from tests.measure.estimate.conftest import TARGETS, pictures, write_video, written
 from tests.remedies.user import User
 

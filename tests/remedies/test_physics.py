@@ -89,7 +89,7 @@ CASES = [
         code=1,
     ),
     Case(
-        "sim/blender/command.py",
+        "sim/blender/blender_setup.py",
         "leave out --folder and --python",
         "blender-setup --check --folder x --python y",
         ("blender-setup --check",),

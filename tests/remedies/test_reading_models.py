@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flagdata.core.schema import Kind
 from flagdata.lake import Artifact, Lake
 from flagdata.record import RecordWriter
-from flagdata.schema import Kind
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 from flagdata.timebase import NANOSECONDS
-from measure.anemometer import calibration, measuring
+from measure.anemometer import anemometer_measuring, reading_calibration
 from tests.measure.anemometer.made import Place, features, gusts, place
 from tests.remedies.user import User
 
@@ -24,7 +24,7 @@ READ = "the answer combines"
 def shown(patch: pytest.MonkeyPatch, *, seed: int, where: Place | None = None) -> None:
     """Let a film show the gusts of a seed, seen from a place."""
     own = features(gusts(float(SECONDS), seed=seed), seed=seed, where=where)
-    for module in (calibration, measuring):
+    for module in (reading_calibration, anemometer_measuring):
         patch.setattr(module, "features_of", lambda *_, **__: own)
 
 

@@ -10,8 +10,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from flagdata.core.schema import Kind
 from flagdata.lake import Artifact, Lake
-from flagdata.schema import Kind
 from tests.flagdata.lake.conftest import overwrite
 from tests.remedies.cases import Case, meet
 from tests.remedies.user import User
@@ -92,7 +92,7 @@ CHANGES = [
     (Case("export/source.py", "names the rows that are damaged", EXPORT), Kind.CLIP, "frame_count", 9000),
     (Case("export/obj.py", "run flagdata doctor", EXPORT.replace("mcap", "obj")), Kind.MESHES, "object", None),
     (
-        Case("flagdata/documents.py", "run flagdata doctor", EXPORT.replace("mcap", "webdataset")),
+        Case("flagdata/recipes/documents.py", "run flagdata doctor", EXPORT.replace("mcap", "webdataset")),
         Kind.CLIP,
         "parameters",
         "{",

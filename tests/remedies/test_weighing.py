@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from flagdata.timebase import NANOSECONDS
 from measure.cloth import Design
-from measure.cloth import calibration as calibrate
+from measure.cloth import cloth_calibration as calibrate
 from tests.measure.cloth.calibration.conftest import cheap as cheap
 from tests.measure.cloth.calibration.conftest import known, readings
 from tests.remedies.cases import Case, heal

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from flagdata.core.findings import Finding
 from flagdata.errors import FlagdataError
-from flagdata.findings import Finding
 from tests.program import Ended, invoke
 from tests.remedies.templates import OPTION, Remedy, relative, remedies, verbs
 

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 import torch
 
-from sim.air import AirForce, QuadraticNormal
-from sim.cloth import Cloth
-from sim.handles import Handles
-from sim.material import Material, isotropic
-from sim.mesh import Mesh, grid
-from sim.scene import upright
-from sim.state import State
-from sim.system import System
-from sim.tables import Evaluation
+from sim.cloth.air import AirForce, QuadraticNormal
+from sim.cloth.cloth_batch import Cloth
+from sim.cloth.handles import Handles
+from sim.cloth.material import Material, isotropic
+from sim.cloth.mesh import Mesh, grid
+from sim.cloth.scene import upright
+from sim.cloth.state import State
+from sim.cloth.stiffness_tables import Evaluation
+from sim.cloth.system import System
 from sim.wind import UniformWind
 from tests.clusters import Cluster
 

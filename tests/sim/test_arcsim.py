@@ -15,21 +15,21 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from flagdata.errors import ConflictError, InputError, NotFoundError, UnknownNameError
 from flagdata.ingest import read_folder
 from flagdata.lake import Mesh as MeshFrame
-from sim.air import QuadraticNormal, Stokes
 from sim.arcsim import STAGES, SWEEPS, ArcsimScene, read_material, read_scene, write_scene
-from sim.contact import Contact
-from sim.handles import Handles
+from sim.cloth.air import QuadraticNormal, Stokes
+from sim.cloth.contact import Contact
+from sim.cloth.handles import Handles
+from sim.cloth.limits import StrainLimits
+from sim.cloth.material import named
+from sim.cloth.mesh import Mesh
+from sim.cloth.scene import Scene, assemble, flag
+from sim.cloth.sizing import Remeshing
+from sim.cloth.stiffness_tables import Evaluation
 from sim.integrate import AirShape, BackwardEuler
-from sim.limits import StrainLimits
-from sim.material import named
-from sim.mesh import Mesh
-from sim.scene import Scene, assemble, flag
-from sim.sizing import Remeshing
-from sim.tables import Evaluation
 from tests.refusals import unrefused
 
 MATERIAL = {"density": 0.284, "stretching": [[50, 1, 60, 40]] * 6, "bending": [[1e-5] * 5] * 3}

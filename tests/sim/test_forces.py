@@ -10,11 +10,11 @@ import torch
 from scipy.spatial.transform import Rotation
 
 from flagdata.errors import InputError
-from sim import bending, membrane
-from sim.air import QuadraticNormal, Stokes
-from sim.material import Material, named
-from sim.mesh import Mesh
-from sim.tables import Evaluation
+from sim.cloth import bending, membrane
+from sim.cloth.air import QuadraticNormal, Stokes
+from sim.cloth.material import Material, named
+from sim.cloth.mesh import Mesh
+from sim.cloth.stiffness_tables import Evaluation
 from tests.refusals import unrefused
 from tests.sim.conftest import PLAIN, make_system
 
@@ -189,7 +189,7 @@ def test_linearised_stiffness_is_the_derivative_of_the_force_at_small_strain(dis
         (bending, bending.LinearisedBending, system.cloth.hinge_slots),
     ):
         at = kind.at(system.cloth, state.position)
-        from sim.cloth import gather_sum
+        from sim.cloth.cloth_batch import gather_sum
 
         product = gather_sum(at.corner_products(field), slots)
         forward = part.force(system.cloth, state.position + step * field, state.velocity)

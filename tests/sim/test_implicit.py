@@ -10,14 +10,14 @@ import pytest
 import torch
 
 from flagdata.errors import UsageError
-from sim import membrane
-from sim.air import QuadraticNormal
-from sim.handles import Handles
+from sim.cloth import membrane
+from sim.cloth.air import QuadraticNormal
+from sim.cloth.handles import Handles
+from sim.cloth.material import isotropic, named
+from sim.cloth.mesh import grid
+from sim.cloth.state import State
 from sim.integrate import AirShape, Backend, BackwardEuler, Symplectic
 from sim.integrate.implicit import conjugate_gradients
-from sim.material import isotropic, named
-from sim.mesh import grid
-from sim.state import State
 from tests.refusals import unrefused
 from tests.sim.conftest import make_system
 

@@ -12,13 +12,13 @@ import torch
 
 from flagdata.errors import UsageError
 from sim import compiler as build
-from sim.air import QuadraticNormal, Stokes
-from sim.handles import Handles
+from sim.cloth.air import QuadraticNormal, Stokes
+from sim.cloth.handles import Handles
+from sim.cloth.material import named
+from sim.cloth.state import State
+from sim.cloth.stiffness_tables import Evaluation
 from sim.integrate import Backend, BackwardEuler, Symplectic, advance
 from sim.kernel import Kernel
-from sim.material import named
-from sim.state import State
-from sim.tables import Evaluation
 from tests.sim.conftest import PLAIN, make_system
 
 

@@ -12,18 +12,18 @@ import pytest
 import torch
 
 from flagdata.errors import UsageError
-from sim.air import QuadraticNormal, Stokes
-from sim.contact import Contact
-from sim.handles import Handles
+from sim.cloth.air import QuadraticNormal, Stokes
+from sim.cloth.contact import Contact
+from sim.cloth.handles import Handles
+from sim.cloth.limits import StrainLimits
+from sim.cloth.material import named
+from sim.cloth.mesh import grid
+from sim.cloth.scene import assemble, flag
+from sim.cloth.state import State
+from sim.cloth.stiffness_tables import Evaluation
 from sim.integrate import Backend, BackwardEuler, Symplectic, advance
-from sim.kernel_warp import batch
-from sim.limits import StrainLimits
-from sim.material import named
-from sim.mesh import grid
+from sim.kernel_warp import warp_batch
 from sim.run import Recipe, parse
-from sim.scene import assemble, flag
-from sim.state import State
-from sim.tables import Evaluation
 from tests.sim.conftest import PLAIN, make_system
 
 wp = pytest.importorskip("warp", reason="warp-lang is not installed: pip install 'flagdata[gpu]'")
@@ -145,10 +145,10 @@ def test_implicit_steps_float64_and_gradients_are_refused(flapping, distorted) -
 
 def test_a_mesh_that_does_not_fit_is_refused(flapping, monkeypatch) -> None:
     # 651 vertices, 1,200 faces and 1,750 hinges take 68,528 bytes as compiled for the H200, which has 232,448.
-    batch._check_room(grid(width=1.5, height=1.0, columns=30, rows=20), 68_528)
+    warp_batch._check_room(grid(width=1.5, height=1.0, columns=30, rows=20), 68_528)
     with pytest.raises(UsageError, match="bytes of shared memory"):
-        batch._check_room(grid(width=1.5, height=1.0, columns=60, rows=40), 232_448)
-    monkeypatch.setattr(batch, "FACES_LIMIT", 47)
+        warp_batch._check_room(grid(width=1.5, height=1.0, columns=60, rows=40), 232_448)
+    monkeypatch.setattr(warp_batch, "FACES_LIMIT", 47)
     with pytest.raises(UsageError, match="the mesh has 48 faces"):
         advance(flapping[0], flapping[1], 0.002, steps=2, backend=Backend.WARP)
 
@@ -156,7 +156,7 @@ def test_a_mesh_that_does_not_fit_is_refused(flapping, monkeypatch) -> None:
 def test_a_device_that_is_not_there_and_warp_that_is_not_installed_are_errors(flapping, monkeypatch) -> None:
     system, start = flapping
     with pytest.raises(UsageError, match="no device 'cuda:7'"):
-        batch._code(torch.device("cuda", 7))
+        warp_batch._code(torch.device("cuda", 7))
     monkeypatch.setitem(sys.modules, "warp", None)
     monkeypatch.delitem(sys.modules, "sim.kernel_warp.leapfrog", raising=False)
     with pytest.raises(UsageError, match=r"pip install 'flagdata\[gpu\]'"):

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 import torch
 
+from flagdata.core.rng import stream
 from flagdata.errors import UsageError
-from flagdata.rng import stream
-from sim.air import NO_AIR, Stokes
+from sim.cloth.air import NO_AIR, Stokes
+from sim.cloth.handles import Handles
+from sim.cloth.material import named
+from sim.cloth.mesh import grid
+from sim.cloth.scene import assemble, flag
 from sim.effects import EFFECTS, Lift, TangentialLinearDrag, apply
-from sim.handles import Handles
 from sim.integrate import Backend, Symplectic, advance
-from sim.material import named
-from sim.mesh import grid
-from sim.scene import assemble, flag
 from tests.sim.conftest import PLAIN, make_system
 
 STEP = 4e-4

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import torch
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from sim.cloth.material import named
+from sim.cloth.scene import Scene, assemble, flag
 from sim.integrate import AirShape, BackwardEuler, Symplectic
-from sim.material import named
-from sim.scene import Scene, assemble, flag
 from tests.verification.motion import EdgeMotion, edge_motion
 
 pytestmark = pytest.mark.reference

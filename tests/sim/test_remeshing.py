@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 import torch
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from flagdata.errors import InputError, UsageError
-from sim.batch import Batch, Divergence
-from sim.contact import Contact
+from sim.cloth.contact import Contact
+from sim.cloth.limits import StrainLimits, correction, least_correction, stretches
+from sim.cloth.material import named
+from sim.cloth.mesh import Mesh, grid
+from sim.cloth.scene import Scene, assemble, flag
+from sim.cloth.sizing import Remeshing, bounded, face_metrics, larger, vertex_metrics
 from sim.effects import EFFECTS, apply
 from sim.integrate import BackwardEuler
-from sim.limits import StrainLimits, correction, least_correction, stretches
-from sim.material import named
-from sim.mesh import Mesh, grid
 from sim.remeshing.adapting import Adapted, adapted
 from sim.remeshing.triangles import Triangles
-from sim.scene import Scene, assemble, flag
-from sim.sizing import Remeshing, bounded, face_metrics, larger, vertex_metrics
+from sim.run.simulation_loop import Batch, Divergence
 from tests.sim.conftest import make_system
 
 NOTHING = Remeshing(refine_angle=1e6, refine_compression=1e6, refine_velocity=1e6, size_min=0.01, size_max=0.3)

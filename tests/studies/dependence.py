@@ -25,14 +25,14 @@ import click
 import numpy as np
 import torch
 
-from flagdata.arrays import FloatArray
-from flagdata.console import LocalPath, progress, say
+from flagdata.core.arrays import FloatArray
+from flagdata.core.console import LocalPath, progress, say
+from flagdata.core.rng import child_seed, stream
 from flagdata.errors import InputError
-from flagdata.rng import child_seed, stream
 from measure.estimate import CARD_KEY, OWN, Dependence
-from models.estimator import SHIPPED, Estimator
-from models.storage import CARD, card_bytes, read_card, renew
-from models.targets import truth
+from models.networks.targets import truth
+from models.trained.estimator import SHIPPED, Estimator
+from models.trained.model_folder import CARD, card_bytes, read_card, renew
 
 if TYPE_CHECKING:
     from tests.studies.long_films import LongFilm
@@ -187,7 +187,7 @@ def card_entry(found: Errors, *, seed: int = 0) -> dict[str, Any]:
 @click.option("--out", type=LocalPath(), default=SHIPPED, help="Folder of the models that are shipped.")
 def main(name: str, films: int, windows: int, seed: int, out: Path) -> None:
     """Measure how alike windows of one film are to the shipped model NAME, and write it into its card."""
-    from models.estimator import load
+    from models.trained.estimator import load
     from tests.studies.long_films import simulated
 
     model = load(out / name)

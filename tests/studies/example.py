@@ -13,15 +13,15 @@ from pathlib import Path
 import click
 import numpy as np
 
-from flagdata.console import LocalPath, say
-from flagdata.outputs import fresh_folder
-from flagdata.rng import child_seed
+from flagdata.core.console import LocalPath, say
+from flagdata.core.files.outputs import fresh_folder
+from flagdata.core.rng import child_seed
 from flagdata.timebase import NANOSECONDS, from_datetime
-from measure.camera import write_film
 from measure.demo import CUP
+from measure.simulated_camera import write_film
 from sim.assets import Assets
 from sim.datasets import logged, velocities
-from sim.render import prior
+from sim.render import render_prior
 from sim.run import Crew, Stepper, recipe_of, run
 
 SEED = 54
@@ -65,7 +65,7 @@ def make(folder: Path, *, seed: int) -> None:
     (outcome,) = run(crew, Stepper.of(crew, member.base), [member], size=1)
     assert outcome.sequence is not None, outcome.failure
     zeta = (
-        prior.named("outdoor")
+        render_prior.named("outdoor")
         .with_quantities({"width": 400, "height": 300, "raster_samples": 4}, source="the example")
         .draw(child_seed(seed, "example", "look"), Assets())
     )

@@ -15,19 +15,19 @@ import click
 import numpy as np
 import torch
 
-from flagdata.arrays import FloatArray
-from flagdata.console import LocalPath, progress, say
+from flagdata.core.arrays import FloatArray
+from flagdata.core.console import LocalPath, progress, say
+from flagdata.core.rng import stream
+from flagdata.core.schema import Kind
 from flagdata.dataset import HashedSplit
 from flagdata.dataset.sides import divide, selected
 from flagdata.errors import InputError
 from flagdata.lake.matching import matching
-from flagdata.rng import stream
-from flagdata.schema import Kind
 from flagdata.timebase import NANOSECONDS
 from measure.gate import DISTORTIONS, Gate
 from measure.gate.distortions import Film
-from measure.gate.features import Features, features_of
-from models.estimator import DEFAULT, SHIPPED, Estimator, load
+from measure.gate.gate_features import Features, features_of
+from models.trained.estimator import DEFAULT, SHIPPED, Estimator, load
 from models.training import DataSpec, FitFilm
 
 PLAIN, DISTORTED = 360, 30

@@ -11,17 +11,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flagdata.arrays import FloatArray, UInt8Array
+from flagdata.core.arrays import FloatArray, UInt8Array
+from flagdata.core.rng import child_seed
 from flagdata.errors import InputError
+from flagdata.recipes.typed_tables import Range
 from flagdata.record import decode
-from flagdata.rng import child_seed
-from flagdata.tables import Range
-from models.estimator import Estimator
+from models.trained.estimator import Estimator
 from models.training import DataSpec, FitFilm
 from sim.assets import Assets
-from sim.datasets import EPOCH, Cast, DatasetRecipe, PlannedFilm, jobs, load, picture, velocities
+from sim.datasets import EPOCH, Cast, DatasetRecipe, PlannedFilm, build_jobs, camera_picture, load, velocities
 from sim.datasets.cast import of_group
-from sim.datasets.record import parameters_of
+from sim.datasets.film_record import parameters_of
 from sim.run import Crew, Recipe, recipe_of
 from sim.run.members import Member
 
@@ -150,7 +150,7 @@ def _batch(
     recipe: DatasetRecipe, cast: Cast, base: int, indices: Sequence[int], model: Estimator, windows: int
 ) -> Iterator[LongFilm]:
     assets, simulation = Assets(photos=recipe.photos), cast.simulation
-    for outcome in jobs.simulate(simulation, base, indices, "cpu").outcomes:
+    for outcome in build_jobs.simulate(simulation, base, indices, "cpu").outcomes:
         if outcome.sequence is None:
             continue
         member = outcome.member
@@ -167,9 +167,9 @@ def _batch(
             begin=EPOCH,
             filming={},
         )
-        zeta, drawn = recipe.prior.draw(seed, assets), picture.settings(recipe.camera, seed=seed)
-        seen = jobs.shot(recipe, job, outcome.sequence, zeta, assets, device="cpu").numpy()
-        film = np.stack(decode(picture.coded(seen, drawn, recipe.camera, seed=seed), where=job.name))
+        zeta, drawn = recipe.prior.draw(seed, assets), camera_picture.settings(recipe.camera, seed=seed)
+        seen = build_jobs.shot(recipe, job, outcome.sequence, zeta, assets, device="cpu").numpy()
+        film = np.stack(decode(camera_picture.coded(seen, drawn, recipe.camera, seed=seed), where=job.name))
         if model.cropping.conditioned:
             film = FitFilm.of(film, np.arange(len(film)) / simulation.time.rate).frames
         yield LongFilm(

@@ -1,7 +1,7 @@
-"""How a model errs in the windows of a gusty film: what its card states for `measure.estimate.gusts`.
+"""How a model errs in the windows of a gusty film: what its card states for `measure.estimate.gusty_series`.
 
-Each window's error is d, m_w of `measure.estimate.gusts` less the logarithm of the true mean wind of the window, and s
-is s_w. Over films of 10 windows, and the 9 that share halves with two:
+Each window's error is d, m_w of `measure.estimate.gusty_series` less the logarithm of the true mean wind of the window,
+and s is s_w. Over films of 10 windows, and the 9 that share halves with two:
 
 - *own*: σ_e² is the mean of (d_v − d_w)²/(s_v² + s_w²) over pairs of windows of a film that begin two lengths apart or
   more. What is common to a film drops out of the difference.
@@ -27,17 +27,17 @@ import click
 import numpy as np
 import torch
 
-from flagdata.arrays import FloatArray, UInt8Array
-from flagdata.console import LocalPath, progress, say
+from flagdata.core.arrays import FloatArray, UInt8Array
+from flagdata.core.console import LocalPath, progress, say
+from flagdata.core.rng import child_seed, stream
+from flagdata.core.stated import Stated
 from flagdata.errors import InputError
-from flagdata.rng import child_seed, stream
-from flagdata.stated import Stated
 from measure.estimate import DRAWS, SERIES_KEY, FilmAnswer, Options, Pair, SeriesErrors
-from measure.estimate.gusts import error_correlation, log_moments
+from measure.estimate.gusty_series import error_correlation, log_moments
 from measure.film import FlagSize, sizes
 from measure.film.similarity import trained_on
-from models.estimator import SHIPPED, Estimator
-from models.storage import CARD, card_bytes, read_card, renew
+from models.trained.estimator import SHIPPED, Estimator
+from models.trained.model_folder import CARD, card_bytes, read_card, renew
 from tests.studies.long_films import LongFilm
 from tests.studies.validation.wind_series_films import made
 
@@ -213,7 +213,7 @@ def card_entry(films: Sequence[LongFilm], model: Estimator, *, seed: int) -> dic
 @click.option("--out", type=LocalPath(), default=SHIPPED, help="Folder of the models that are shipped.")
 def main(name: str, films: int, seed: int, kept: Path, out: Path) -> None:
     """Measure how the shipped model NAME errs in windows of gusty films, and write it into its card."""
-    from models.estimator import load
+    from models.trained.estimator import load
 
     torch.set_num_threads(1)
     model = load(out / name)

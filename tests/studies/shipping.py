@@ -19,16 +19,16 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from flagdata.checksums import write_sums
-from flagdata.console import LocalPath, progress, say
-from flagdata.documents import column_json
+from flagdata.core.console import LocalPath, progress, say
+from flagdata.core.files.checksums import write_sums
+from flagdata.core.files.outputs import check_folder, fresh_folder
+from flagdata.core.schema import Kind
 from flagdata.errors import UsageError
-from flagdata.outputs import check_folder, fresh_folder
-from flagdata.schema import Kind
-from models.estimator import CLOUD, SHIPPED, Estimator, load
+from flagdata.recipes.documents import column_json
 from models.evaluation.predict import embedded
-from models.outliers import Familiarity
-from models.storage import WEIGHTS, write_card, write_tensors
+from models.trained.estimator import CLOUD, SHIPPED, Estimator, load
+from models.trained.model_folder import WEIGHTS, write_card, write_tensors
+from models.trained.outliers import Familiarity
 from models.training import Prepared
 
 LEVELS = (0.5, 0.8, 0.9)

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flagdata.rng import stream
+from flagdata.core.rng import stream
 from measure.estimate import CARD_KEY, of_model
-from models import estimator
+from models.trained import estimator
 from tests.studies.dependence import Errors, card_entry, errors_of
 
 

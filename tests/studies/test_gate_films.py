@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from flagdata.core.schema import Kind
 from flagdata.errors import InputError, RefusedError
 from flagdata.lake import Artifact, Lake
-from flagdata.schema import Kind
-from models import estimator
+from models.trained import estimator
 from models.training import DataSpec
 from tests.models.conftest import fill
 from tests.studies.gate import FilmsOf, rate_of

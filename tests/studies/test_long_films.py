@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from models import estimator
-from models.estimator import Estimator
-from models.targets import truth
+from models.networks.targets import truth
+from models.trained import estimator
+from models.trained.estimator import Estimator
 from sim.datasets import load
 from tests.studies.dependence import columns_of, errors
 from tests.studies.long_films import LongFilm, _casts, _shares, gusty, simulated

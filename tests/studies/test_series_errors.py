@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flagdata.core.rng import stream
 from flagdata.errors import InputError
-from flagdata.rng import stream
 from tests.studies.long_films import LongFilm
 from tests.studies.series_errors import FilmErrors, half_steps, series_errors, size_of, spread
 

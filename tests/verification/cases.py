@@ -18,14 +18,14 @@ from scipy.optimize import brentq
 from scipy.signal import welch
 from scipy.special import j0, jn_zeros
 
-from flagdata.arrays import FloatArray
-from sim.air import QuadraticNormal
-from sim.handles import Handles
+from flagdata.core.arrays import FloatArray
+from sim.cloth.air import QuadraticNormal
+from sim.cloth.handles import Handles
+from sim.cloth.material import isotropic, named
+from sim.cloth.mesh import grid
+from sim.cloth.scene import assemble, flag
+from sim.cloth.state import State
 from sim.integrate import Symplectic, advance, stable_step
-from sim.material import isotropic, named
-from sim.mesh import grid
-from sim.scene import assemble, flag
-from sim.state import State
 from tests.verification.motion import edge_motion
 from tests.verification.systems import build, settle
 

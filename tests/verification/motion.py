@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from flagdata.errors import UsageError
 
 

@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from flagdata.arrays import FloatArray
-from sim.air import AirForce, QuadraticNormal
-from sim.cloth import Cloth
-from sim.handles import Handles
+from flagdata.core.arrays import FloatArray
+from sim.cloth.air import AirForce, QuadraticNormal
+from sim.cloth.cloth_batch import Cloth
+from sim.cloth.handles import Handles
+from sim.cloth.material import Material
+from sim.cloth.mesh import Mesh
+from sim.cloth.scene import upright
+from sim.cloth.state import State
+from sim.cloth.system import System
 from sim.integrate import advance, stable_step
-from sim.material import Material
-from sim.mesh import Mesh
-from sim.scene import upright
-from sim.state import State
-from sim.system import System
 from sim.wind import UniformWind
 
 

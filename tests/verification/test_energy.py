@@ -7,9 +7,9 @@ import math
 import numpy as np
 import torch
 
+from sim.cloth.material import named
+from sim.cloth.state import State
 from sim.integrate import BackwardEuler, advance
-from sim.material import named
-from sim.state import State
 from tests.verification.cases import KICKED_MESH, energy_drift, kicked
 from tests.verification.systems import build
 

@@ -6,17 +6,17 @@ from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
-from flagdata.addresses import local_path
+from flagdata.core.files.addresses import local_path
+from flagdata.core.files.regular_files import is_beside
 from flagdata.errors import FlagdataError, NotFoundError
-from flagdata.files import is_beside
 from flagdata.ingest.anemometer import untimed
 from flagdata.ingest.anemometer.containers import json_lines
 from flagdata.ingest.anemometer.draft.drafting import Draft
-from flagdata.ingest.anemometer.formats.registry import FORMATS, SIGNATURES, Format
-from flagdata.ingest.anemometer.options import Limits, WindOptions
+from flagdata.ingest.anemometer.formats.log_formats import FORMATS, SIGNATURES, Format
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, NAMED, SURE, Guess, GuessKind, Head
 from flagdata.ingest.anemometer.table.delimited import Delimited, drafted
-from flagdata.ingest.anemometer.text.source import TextFile, first_bytes, is_workbook, open_text, signature
+from flagdata.ingest.anemometer.text.text_file import TextFile, first_bytes, is_workbook, open_text, signature
+from flagdata.ingest.anemometer.wind_options import Limits, WindOptions
 from flagdata.ingest.meshes import others
 
 _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp"}

@@ -14,16 +14,16 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
+from flagdata.core.findings import Finding, Severity
+from flagdata.core.shell import command_line
 from flagdata.errors import TimeError, UsageError
-from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.draft.shape import TableShape, shape_of
-from flagdata.ingest.anemometer.formats.registry import FORMATS, Format
+from flagdata.ingest.anemometer.draft.table_shape import TableShape, shape_of
+from flagdata.ingest.anemometer.formats.log_formats import FORMATS, Format
 from flagdata.ingest.anemometer.formats.serial_lines import NOTHING, split_stamp
-from flagdata.ingest.anemometer.instants.stamps import ENGLISH, HOUR, NEXT_DAY
+from flagdata.ingest.anemometer.instants.stamp_text import ENGLISH, HOUR, NEXT_DAY
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, SURE, Head
-from flagdata.ingest.anemometer.text.rows import cells_of_lines
-from flagdata.ingest.anemometer.text.source import RATE_GIVEN, TableText, TextFile
-from flagdata.shell import command_line
+from flagdata.ingest.anemometer.text.cut_lines import cells_of_lines
+from flagdata.ingest.anemometer.text.text_file import RATE_GIVEN, TableText, TextFile
 from flagdata.timebase import NANOSECONDS, iso
 
 _NUMBER = re.compile(r"\s*[-+]?(\d+([.,]\d*)?|[.,]\d+)\s*")

@@ -22,12 +22,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from flagdata.lazy import lazy_exports
+from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from flagdata.ingest.camera.motion import CropProposal
-    from flagdata.ingest.camera.options import CameraOptions, Crop, CropBox, Limits, parse_crop
-    from flagdata.ingest.camera.probing import CameraProbe, probe
+    from flagdata.ingest.camera.camera_options import CameraOptions, Crop, CropBox, Limits, parse_crop
+    from flagdata.ingest.camera.camera_probing import CameraProbe, probe
+    from flagdata.ingest.camera.motion_crop import CropProposal
     from flagdata.ingest.camera.stream import CameraStream, open_camera, propose_crop
 
 __all__ = [

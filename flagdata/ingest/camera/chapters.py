@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
+from flagdata.core.findings import Finding
+from flagdata.core.numbered import bounded
 from flagdata.errors import FlagdataError
-from flagdata.findings import Finding
-from flagdata.ingest.camera.container import open_container
-from flagdata.ingest.camera.options import Limits
-from flagdata.numbered import bounded
+from flagdata.ingest.camera.camera_options import Limits
+from flagdata.ingest.camera.video_container import open_container
 
 _NEW = re.compile(r"(?P<head>G[HXLS])(?P<chapter>[0-9]{2})(?P<file>\d{4}\.\w+)", re.IGNORECASE)
 _OLD = re.compile(r"(?P<head>GP)(?P<chapter>[0-9]{2})(?P<file>\d{4}\.\w+)", re.IGNORECASE)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from flagdata.findings import Finding
+from flagdata.core.findings import Finding
 
 
 @dataclass

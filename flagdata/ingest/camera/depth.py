@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flagdata.findings import Finding
+from flagdata.core.findings import Finding
 
 _DEPTHS = (10, 12, 14, 16)
 """Bits of gray of the cameras that store it in 16."""

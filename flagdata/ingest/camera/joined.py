@@ -15,17 +15,17 @@ from pathlib import Path
 
 import numpy as np
 
+from flagdata.core.files.regular_files import is_folder, is_mcap
+from flagdata.core.findings import Finding
+from flagdata.core.numbered import by_numbers
+from flagdata.core.shell import command_line
 from flagdata.errors import FlagdataError, InputError, TimeError, UsageError
-from flagdata.files import is_folder, is_mcap
-from flagdata.findings import Finding
+from flagdata.ingest.camera.camera_options import CameraOptions
 from flagdata.ingest.camera.chapters import place_by_name
-from flagdata.ingest.camera.options import CameraOptions
-from flagdata.ingest.camera.source import Picture, SourceFacts
-from flagdata.ingest.camera.stamps import Timing
-from flagdata.ingest.camera.video import VideoSource
+from flagdata.ingest.camera.frame_stamps import Timing
+from flagdata.ingest.camera.picture_source import Picture, SourceFacts
+from flagdata.ingest.camera.video_file import VideoSource
 from flagdata.ingest.mcap.bags import to_join
-from flagdata.numbered import by_numbers
-from flagdata.shell import command_line
 from flagdata.timebase import NANOSECONDS, parse
 
 _ROUNDED = 2.5

@@ -20,9 +20,9 @@ from itertools import accumulate, pairwise
 from pathlib import PurePath
 from statistics import median
 
+from flagdata.core.findings import Finding
+from flagdata.core.numbered import Ordinal, bounded
 from flagdata.errors import InputError
-from flagdata.findings import Finding
-from flagdata.numbered import Ordinal, bounded
 from flagdata.timebase import NANOSECONDS
 
 _FRACTION = 3  # digits from which on a number behind the seconds is a fraction of one

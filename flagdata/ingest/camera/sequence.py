@@ -15,17 +15,17 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from flagdata.core.files.regular_files import is_beside
+from flagdata.core.findings import Finding
 from flagdata.errors import InputError, LimitError, TimeError
-from flagdata.files import is_beside
-from flagdata.findings import Finding
 from flagdata.ingest.camera import depth
+from flagdata.ingest.camera.camera_options import CameraOptions, Limits, exact
 from flagdata.ingest.camera.damage import resized, undecoded
-from flagdata.ingest.camera.geometry import Orientation
+from flagdata.ingest.camera.frame_stamps import survey
 from flagdata.ingest.camera.luma import BROKEN, DEEP, Luma, luma_of_image
-from flagdata.ingest.camera.options import CameraOptions, Limits, exact
+from flagdata.ingest.camera.picture_geometry import Orientation
 from flagdata.ingest.camera.picture_names import ordered
-from flagdata.ingest.camera.source import Picture, SourceFacts
-from flagdata.ingest.camera.stamps import survey
+from flagdata.ingest.camera.picture_source import Picture, SourceFacts
 
 PICTURES = {
     ".png": "PNG",

@@ -8,25 +8,25 @@ from fractions import Fraction
 from pathlib import Path
 from types import TracebackType
 
-from flagdata.addresses import local_path
-from flagdata.arrays import UInt8Array
+from flagdata.core.arrays import UInt8Array
+from flagdata.core.files.addresses import local_path
+from flagdata.core.files.regular_files import is_folder, is_lerobot
+from flagdata.core.findings import Finding, Severity
+from flagdata.core.shell import command_line
 from flagdata.errors import LimitError, RefusedError, UsageError
-from flagdata.files import is_folder, is_lerobot
-from flagdata.findings import Finding, Severity
+from flagdata.ingest.camera.camera_options import CameraOptions, CropBox, exact
 from flagdata.ingest.camera.chapters import chapter_of
-from flagdata.ingest.camera.geometry import Geometry, settle_crop, upright_size
+from flagdata.ingest.camera.frame_stamps import StampRepair, nanoseconds
 from flagdata.ingest.camera.grid import EveryFrame, GridReport, Pick, Resampler, Sampler
 from flagdata.ingest.camera.joined import JoinedSource, check_films
-from flagdata.ingest.camera.motion import CropProposal, cut_off, propose
-from flagdata.ingest.camera.options import CameraOptions, CropBox, exact
+from flagdata.ingest.camera.motion_crop import CropProposal, cut_off, propose
+from flagdata.ingest.camera.picture_geometry import Geometry, settle_crop, upright_size
+from flagdata.ingest.camera.picture_source import Picture, PictureSource
+from flagdata.ingest.camera.recording_start import find_start
 from flagdata.ingest.camera.sequence import SequenceSource
-from flagdata.ingest.camera.source import Picture, PictureSource
-from flagdata.ingest.camera.stamps import StampRepair, nanoseconds
-from flagdata.ingest.camera.start import find_start
-from flagdata.ingest.camera.video import VideoSource
+from flagdata.ingest.camera.video_file import VideoSource
 from flagdata.ingest.mcap.bags import is_bag
-from flagdata.shell import command_line
-from flagdata.signals import CameraInfo, Frame
+from flagdata.record.signals import CameraInfo, Frame
 from flagdata.timebase import NANOSECONDS
 
 _EXPOSURE_SLACK = 0.01
@@ -370,7 +370,7 @@ def open_source(path: Path, options: CameraOptions) -> PictureSource:
         check_films((path, *options.chapters))
         return JoinedSource((path, *options.chapters), options)
     if is_lerobot(path):
-        from flagdata.ingest.camera.lerobot import EpisodeSource
+        from flagdata.ingest.camera.lerobot_camera import EpisodeSource
 
         _no_stream(path, options)
         return EpisodeSource(path, options)
@@ -379,7 +379,7 @@ def open_source(path: Path, options: CameraOptions) -> PictureSource:
             "an episode was given, but this is no LeRobot data set", where=str(path), fix="leave out --episode"
         )
     if is_bag(path):
-        from flagdata.ingest.mcap.pictures import TopicSource
+        from flagdata.ingest.mcap.mcap_pictures import TopicSource
 
         _no_stream(path, options)
         return TopicSource(path, options)

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import zstandard
 
+from flagdata.core.files.regular_files import MCAP, is_beside, is_folder, is_mcap, open_regular
+from flagdata.core.numbered import by_numbers
+from flagdata.core.shell import command_line
 from flagdata.errors import InputError
-from flagdata.files import MCAP, is_beside, is_folder, is_mcap, open_regular
-from flagdata.numbered import by_numbers
-from flagdata.shell import command_line
 
 _DESCRIPTION = "metadata.yaml"
 _NAMED = "rosbag2_bagfile_information"

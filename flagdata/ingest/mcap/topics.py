@@ -24,15 +24,15 @@ from mcap.records import Channel, Schema
 from mcap_protobuf.decoder import DecoderFactory
 from numpy.typing import NDArray
 
-from flagdata.arrays import IntArray
-from flagdata.documents import from_stored_json
+from flagdata.core.arrays import IntArray
+from flagdata.core.findings import Finding
+from flagdata.core.shell import command_line
 from flagdata.errors import CorruptError, FlagdataError, InputError, LimitError, UnknownNameError
-from flagdata.findings import Finding
 from flagdata.ingest.mcap import cdr
 from flagdata.ingest.mcap.bags import is_described, parts_of
-from flagdata.ingest.mcap.instants import Stamp, checked, clock_findings, few_without_date, order_of, stamp_of
-from flagdata.ingest.mcap.layout import Layout, Message, Messages, layout_of
-from flagdata.shell import command_line
+from flagdata.ingest.mcap.mcap_layout import Layout, Message, Messages, layout_of
+from flagdata.ingest.mcap.message_instants import Stamp, checked, clock_findings, few_without_date, order_of, stamp_of
+from flagdata.recipes.documents import from_stored_json
 from flagdata.timebase import NANOSECONDS
 
 STILL, MOVING, RAW = "compressed images", "compressed video", "plain pixels"

@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.arrays import IntArray
-from flagdata.documents import SIZE_LIMIT, from_json
+from flagdata.core.arrays import IntArray
+from flagdata.core.files.regular_files import check_input, is_beside
+from flagdata.core.numbered import Ordinal, gap
 from flagdata.errors import InputError, LimitError, NotFoundError
-from flagdata.files import check_input, is_beside
-from flagdata.ingest.meshes.obj import Obj, obj_text, read_obj
 from flagdata.ingest.meshes.others import FIX
-from flagdata.lake.meshes import MeshSequence, RaggedMeshSequence
-from flagdata.numbered import Ordinal, gap
+from flagdata.ingest.meshes.wavefront import Obj, obj_text, read_obj
+from flagdata.lake.mesh_sequences import MeshSequence, RaggedMeshSequence
+from flagdata.recipes.documents import SIZE_LIMIT, from_json
 from flagdata.timebase import NANOSECONDS
 
 FRAME_LIMIT = 100_000
@@ -237,7 +237,7 @@ def write_folder(path: Path, sequence: MeshSequence | RaggedMeshSequence, *, sce
         ConflictError: there is something at `path` already.
         InputError: frames that are not evenly spaced by the scene's frame_time.
     """
-    from flagdata.outputs import check_folder, fresh_folder
+    from flagdata.core.files.outputs import check_folder, fresh_folder
 
     check_folder(path)
     frame_time = scene.get("frame_time")

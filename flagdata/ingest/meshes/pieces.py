@@ -14,9 +14,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
-from flagdata.arrays import IntArray
-from flagdata.findings import Finding
-from flagdata.lake.meshes import Mesh, MeshSequence, RaggedMeshSequence
+from flagdata.core.arrays import IntArray
+from flagdata.core.findings import Finding
+from flagdata.lake.mesh_sequences import Mesh, MeshSequence, RaggedMeshSequence
 
 _NEXT = 1e-2
 """Distance of two vertices at one place, in edge lengths; exporters keep four digits or more."""

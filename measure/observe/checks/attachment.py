@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flagdata.arrays import BoolArray, FloatArray
+from flagdata.core.arrays import BoolArray, FloatArray
+from flagdata.core.findings import Finding
 from flagdata.errors import InputError
-from flagdata.findings import Finding
-from measure.observe import cloth
+from measure.observe import cloth_mesh
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import Experiment, Specimen, Trajectory
 
@@ -40,8 +40,8 @@ def check_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]
     u, v = seats[worst]
     motion = f"the cloth moves by {1e3 * moved[worst]:.3g} mm at the pin (u, v) = ({u:.3g}, {v:.3g}) m"
     still = _still_points(recording)
-    reach = cloth.hull(recording.markers, where=where)
-    away = 0.0 if cloth.inside(reach, seats[worst][None])[0] else cloth.distance_to(reach, seats[worst])
+    reach = cloth_mesh.hull(recording.markers, where=where)
+    away = 0.0 if cloth_mesh.inside(reach, seats[worst][None])[0] else cloth_mesh.distance_to(reach, seats[worst])
     covered = away <= _SEEN * size
     if not covered and moved[worst] <= usual:
         return (

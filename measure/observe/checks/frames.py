@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import KDTree
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.findings import Finding
 from flagdata.errors import InputError
-from flagdata.findings import Finding
 from measure.observe.gaps import LONGEST, frames_of
 from measure.observe.observation import Observation
 from measure.observe.trajectory import marker_at

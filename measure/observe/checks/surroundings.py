@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.findings import Finding
 from flagdata.errors import InputError
-from flagdata.findings import Finding
 from measure.observe.checks.attachment import centre_of_pins
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
 

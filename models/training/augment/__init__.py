@@ -2,7 +2,7 @@
 
 Most of it happens to the film as it was taken, before it is conditioned: conditioning removes some of it, and the
 network learns to live with what is left. The rest is what conditioning leaves, on clips
-(`models.training.augment.motion`).
+(`models.training.augment.residual_motion`).
 """
 
 from models.training.augment.augment import DISTURBANCES, Augment, Strength

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.arrays import Float32Array, FloatArray, UInt8Array
+from flagdata.core.arrays import Float32Array, FloatArray, UInt8Array
+from flagdata.core.rng import stream
 from flagdata.errors import InputError, UnknownNameError
-from flagdata.registry import Registry
-from flagdata.rng import stream
+from flagdata.recipes.registry import Registry
 
 Film = UInt8Array
 """(n, height, width) gray."""
@@ -21,11 +21,11 @@ BEFORE = Registry(
     {
         "tree": "models.training.augment.rim:TREE",
         "second-flag": "models.training.augment.rim:SECOND_FLAG",
-        "shake": "models.training.augment.motion:SHAKE",
-        "blur": "models.training.augment.light:BLUR",
-        "gamma": "models.training.augment.light:GAMMA",
-        "dusk": "models.training.augment.light:DUSK",
-        "noise": "models.training.augment.light:NOISE",
+        "shake": "models.training.augment.residual_motion:SHAKE",
+        "blur": "models.training.augment.light_and_lens:BLUR",
+        "gamma": "models.training.augment.light_and_lens:GAMMA",
+        "dusk": "models.training.augment.light_and_lens:DUSK",
+        "noise": "models.training.augment.light_and_lens:NOISE",
         "coding": "models.training.augment.coding:CODING",
     },
 )
@@ -33,8 +33,8 @@ BEFORE = Registry(
 AFTER = Registry(
     "disturbance",
     {
-        "left-over-shake": "models.training.augment.motion:LEFT_OVER_SHAKE",
-        "pole-sway": "models.training.augment.motion:POLE_SWAY",
+        "left-over-shake": "models.training.augment.residual_motion:LEFT_OVER_SHAKE",
+        "pole-sway": "models.training.augment.residual_motion:POLE_SWAY",
     },
 )
 """Of conditioned clips."""

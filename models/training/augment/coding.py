@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flagdata.record.video import VideoEncoder, decode
+from flagdata.record.video_archive import VideoEncoder, decode
 from models.training.augment.augment import Disturbance, Drawn, Film
 
 _PRESET = "superfast"

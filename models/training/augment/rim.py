@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from flagdata.arrays import Float32Array
+from flagdata.core.arrays import Float32Array
 from models.training.augment.augment import Disturbance, Drawn, Film
 
 _SLOWEST, _FASTEST = 0.3, 2.5

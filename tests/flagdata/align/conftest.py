@@ -12,8 +12,8 @@ import pytest
 from scipy.signal import lfilter
 
 from flagdata.align import MotionSeries
-from flagdata.rng import stream
-from flagdata.signals import Sensor, WindAverage, WindSeries
+from flagdata.core.rng import stream
+from flagdata.record.signals import Sensor, WindAverage, WindSeries
 from flagdata.timebase import from_datetime
 
 SECOND = 1_000_000_000

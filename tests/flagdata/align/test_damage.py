@@ -12,13 +12,13 @@ import pytest
 
 from flagdata.align import ClockOptions, Method, Pair, make_recording
 from flagdata.align.methods import declared
-from flagdata.checksums import content_hash
+from flagdata.core.files.checksums import content_hash
+from flagdata.core.rng import stream
+from flagdata.core.schema import TOPIC_IMAGE, TOPIC_WIND, Kind
 from flagdata.errors import CorruptError, FlagdataError
 from flagdata.lake import Artifact, Lake
 from flagdata.record import Record, RecordWriter, open_bytes, read_messages, read_summary
-from flagdata.rng import stream
-from flagdata.schema import TOPIC_IMAGE, TOPIC_WIND, Kind
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 
 SECOND = 1_000_000_000
 START = 1_780_000_000 * SECOND

@@ -9,7 +9,7 @@ import pytest
 
 from flagdata.align import given
 from flagdata.align.declared import by_stamps, stamp_sigma, stamp_step
-from flagdata.clock import ClockModel, Segment
+from flagdata.core.clock_model import ClockModel, Segment
 from flagdata.errors import InputError, UsageError
 from tests.refusals import unrefused
 

@@ -9,9 +9,9 @@ import pytest
 
 from flagdata.align import LagEstimate, LagSearch, MotionSeries, clock_line, estimate_offset
 from flagdata.align.drift import ClockLine
+from flagdata.core.rng import stream
 from flagdata.errors import InputError
-from flagdata.rng import stream
-from flagdata.signals import WindAverage
+from flagdata.record.signals import WindAverage
 from tests.flagdata.align.conftest import scene
 
 SECOND = 1_000_000_000

@@ -11,11 +11,11 @@ import pytest
 from scipy.stats import binom
 
 from flagdata.align import LagEstimate, LagSearch, MotionSeries, estimate_offset
+from flagdata.core.rng import stream
 from flagdata.errors import InputError
 from flagdata.ingest import WindOptions, read_log
 from flagdata.ingest.anemometer import average
-from flagdata.rng import stream
-from flagdata.signals import WindAverage
+from flagdata.record.signals import WindAverage
 from tests.flagdata.align.conftest import gusts_alone, scene
 
 SECOND = 1_000_000_000

@@ -13,13 +13,13 @@ from click.testing import CliRunner
 from flagdata.align import LagSearch, LogClock, log_clock
 from flagdata.align.logs import gain_of
 from flagdata.cli import root
-from flagdata.clock import ClockModel
+from flagdata.core.clock_model import ClockModel
+from flagdata.core.rng import stream
+from flagdata.core.schema import Kind
 from flagdata.errors import RefusedError, UsageError
 from flagdata.lake import Artifact, Lake
 from flagdata.record import Record, RecordWriter
-from flagdata.rng import stream
-from flagdata.schema import Kind
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 
 SECOND = 1_000_000_000
 START = 1_780_000_000 * SECOND

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from flagdata.align import host_clock, pair_clocks
+from flagdata.core.rng import stream
 from flagdata.errors import InputError
-from flagdata.rng import stream
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 from tests.refusals import unrefused
 
 SECOND = 1_000_000_000

@@ -10,9 +10,9 @@ from PIL import Image
 
 from flagdata.align import LagSearch, MotionSeries, check, clock_line, draw, estimate_offset
 from flagdata.align.methods import Evidence
+from flagdata.core.rng import stream
 from flagdata.errors import ConflictError, InputError
-from flagdata.rng import stream
-from flagdata.signals import WindAverage
+from flagdata.record.signals import WindAverage
 from tests.flagdata.align.conftest import scene
 from tests.refusals import unrefused
 

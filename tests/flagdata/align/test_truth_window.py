@@ -13,13 +13,13 @@ from click.testing import CliRunner
 from flagdata.align import by_spans
 from flagdata.align.apart import by_offset
 from flagdata.cli import root
+from flagdata.core.schema import Kind
 from flagdata.dataset import Source, Tolerance
 from flagdata.errors import InputError, UsageError
 from flagdata.lake import Artifact, Lake
-from flagdata.option_types import DURATION
 from flagdata.record import RecordWriter
-from flagdata.schema import Kind
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
+from flagdata.verbs.option_types import DURATION
 
 SECOND = 1_000_000_000
 START = 1_780_000_000 * SECOND

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from flagdata.align import wind_bins
+from flagdata.core.rng import stream
 from flagdata.errors import InputError
-from flagdata.rng import stream
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 
 SECOND = 1_000_000_000
 START = 1_780_000_000 * SECOND

@@ -10,9 +10,9 @@ import pytest
 
 import flagdata
 from flagdata.errors import InputError, LimitError, UnknownNameError, UsageError
-from flagdata.film_array import Frames
+from flagdata.ingest.films.film_array import Frames
 from flagdata.lake import Lake
-from flagdata.verb_package import VerbPackage
+from flagdata.packages.verb_package import VerbPackage
 
 NS = 1_000_000_000
 SMALL = {"width": 0.9, "height": 0.6, "columns": 6}
@@ -41,7 +41,7 @@ def test_a_log_and_a_film_are_read_from_their_files(video: Path, wind_log: Path)
 
 
 def test_more_frames_than_an_array_may_hold_are_refused(video: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("flagdata.film_array.LARGEST", 10_000)
+    monkeypatch.setattr("flagdata.ingest.films.film_array.LARGEST", 10_000)
     with pytest.raises(LimitError, match="give an end of"):
         flagdata.frames(video)
 
@@ -58,7 +58,7 @@ def test_frames_of_an_array_are_a_film(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def flags() -> flagdata.simulated.Simulated:
+def flags() -> flagdata.answer.simulated.Simulated:
     return flagdata.simulate(
         scene=SMALL, wind={"speed": {"low": 3.0, "high": 7.0}}, time=SHORT, count=3, batch=2, seed=5
     )

@@ -8,8 +8,8 @@ from pathlib import Path
 import polars as pl
 import pytest
 
+from flagdata.core.schema import Kind
 from flagdata.lake import Artifact, Lake
-from flagdata.schema import Kind
 from tests.program import Run, invoke
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flagdata.ingest.store import CROP_PICTURE
+from flagdata.ingest.source_artifacts import CROP_PICTURE
 from flagdata.lake import Lake
 from flagdata.record import Record
 from tests.program import invoke

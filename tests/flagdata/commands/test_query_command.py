@@ -10,8 +10,8 @@ from pathlib import Path
 import pyarrow as pa
 import pytest
 
+from flagdata.core.schema import CATALOG, Kind
 from flagdata.lake import Artifact, Lake
-from flagdata.schema import CATALOG, Kind
 from tests.program import Run, invoke
 
 NOON = 1_777_636_800_000_000_000  # 2026-05-01T12:00:00Z

@@ -11,13 +11,13 @@ import time
 import pyarrow as pa
 import pytest
 
-from flagdata.bounded import Child, End, EndedError
-from flagdata.catalog_sql import PART
 from flagdata.commands.query import as_document
 from flagdata.commands.query import query as command
+from flagdata.core.files.bounded import Child, End, EndedError
+from flagdata.core.schema import catalog_schema
 from flagdata.errors import FlagdataError, LimitError, UsageError
 from flagdata.lake import Request, Selection, selection
-from flagdata.schema import catalog_schema
+from flagdata.lake.catalog_sql import PART
 from tests.refusals import unrefused
 
 EMPTY = catalog_schema().empty_table()
@@ -70,11 +70,11 @@ MOST = 400_000_000
 
 READ_LARGE = """
 import json, resource, sys
-from flagdata import sql_process
-from flagdata.bounded import Child, End, EndedError
+from flagdata.lake import sql_process
+from flagdata.core.files.bounded import Child, End, EndedError
 from flagdata.errors import FlagdataError, LimitError, UsageError
 from flagdata.lake import Request, Selection, selection
-from flagdata.schema import catalog_schema
+from flagdata.core.schema import catalog_schema
 sql_process.MEMORY = selection.MEMORY = int(sys.argv[1])
 for name, sql in json.load(sys.stdin).items():
     largest = 0

@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flagdata.commands.query import VIEWS
+from flagdata.core.schema import CATALOG, Kind, catalog_schema
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.lake import Request, Selection, Slice, View, select, selection
 from flagdata.lake.selection import COLUMNS
-from flagdata.schema import CATALOG, Kind, catalog_schema
 from tests.refusals import unrefused
 
 NOON = 1_777_636_800_000_000_000  # 2026-05-01T12:00:00Z: date -u -d @1777636800

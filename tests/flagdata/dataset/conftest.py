@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from flagdata.clock import ClockModel
+from flagdata.core.clock_model import ClockModel
+from flagdata.core.schema import Kind
 from flagdata.dataset import clip_rows
 from flagdata.lake import Artifact, Lake
 from flagdata.record import Record, RecordWriter
-from flagdata.schema import Kind
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 
 NS = 1_000_000_000
 PERIOD = NS // 25

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flagdata.clock import ClockModel
+from flagdata.core.clock_model import ClockModel
+from flagdata.core.schema import Kind
 from flagdata.dataset import clip_rows
 from flagdata.dataset.clips import runs
 from flagdata.errors import InputError, UsageError
 from flagdata.lake import Artifact
 from flagdata.record import Record, RecordWriter
-from flagdata.schema import Kind
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 from tests.flagdata.dataset.conftest import write_record
 
 NS = 1_000_000_000

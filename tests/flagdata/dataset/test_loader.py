@@ -13,12 +13,12 @@ import pytest
 import torch
 
 import flagdata
+from flagdata.core.rng import stream
+from flagdata.core.schema import TOPIC_IMAGE
 from flagdata.dataset import DecodedCache, collate
 from flagdata.errors import CorruptError, RefusedError, UsageError
 from flagdata.lake import Lake
 from flagdata.record import open_bytes, read_messages, read_summary
-from flagdata.rng import stream
-from flagdata.schema import TOPIC_IMAGE
 from tests.flagdata.dataset.conftest import add_recording
 
 

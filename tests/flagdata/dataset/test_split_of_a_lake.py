@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import flagdata
+from flagdata.core.schema import Kind
 from flagdata.dataset import HashedSplit
 from flagdata.errors import RefusedError
 from flagdata.lake import Artifact, Lake
-from flagdata.schema import Kind
 from tests.flagdata.dataset.conftest import write_record
 
 NS = 1_000_000_000

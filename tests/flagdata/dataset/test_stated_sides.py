@@ -8,11 +8,11 @@ from typing import Any
 import pyarrow as pa
 import pytest
 
+from flagdata.core.schema import Kind, catalog_schema
 from flagdata.dataset import ExplicitSplit, HashedSplit
 from flagdata.dataset.sides import Division, clips_of, divide, selected, stated_sides
 from flagdata.errors import RefusedError, UnknownNameError
 from flagdata.lake import Artifact
-from flagdata.schema import Kind, catalog_schema
 
 COUNTS = {"train": 3, "validation": 2, "test": 2}
 

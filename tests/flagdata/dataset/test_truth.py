@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from flagdata.core.schema import SampleFlag
 from flagdata.dataset import TruthSeries
 from flagdata.errors import InputError, UsageError
-from flagdata.schema import SampleFlag
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 
 NS = 1_000_000_000
 START = 1_777_636_800 * NS  # 2026-05-01T12:00:00Z

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flagdata.arrays import FloatArray, IntArray, UInt8Array
+from flagdata.core.arrays import FloatArray, IntArray, UInt8Array
+from flagdata.core.schema import Kind
 from flagdata.lake import Artifact, Lake
 from flagdata.record import RecordWriter
-from flagdata.schema import Kind
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 
 NOON = 1_777_636_800_000_000_000  # 2026-05-01T12:00:00Z
 SECOND = 1_000_000_000

@@ -10,12 +10,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from flagdata.core.schema import Kind, SampleFlag
 from flagdata.errors import InputError, UsageError
 from flagdata.export import Export, export
 from flagdata.lake import Artifact, Lake
 from flagdata.record import RecordWriter
-from flagdata.schema import Kind, SampleFlag
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 
 NOON = 1_777_636_800_000_000_000  # 2026-05-01T12:00:00Z
 

@@ -17,12 +17,12 @@ import polars as pl
 import pyarrow as pa
 import pytest
 
+from flagdata.core.files.outputs import fresh_folder
+from flagdata.core.schema import Kind, catalog_schema
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UsageError
 from flagdata.export import FORMATS, Export, export
-from flagdata.export.source import ExportRows
+from flagdata.export.export_source import ExportRows
 from flagdata.lake import Artifact, Lake, doctor
-from flagdata.outputs import fresh_folder
-from flagdata.schema import Kind, catalog_schema
 
 CLIPS = "kind = 'clip'"
 FILMED_FORMATS = [name for name in FORMATS if Kind.CLIP in Export(format=name).exporter().kinds]

@@ -12,11 +12,11 @@ import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
+from flagdata.core.schema import Kind
 from flagdata.dataset import TruthSeries
 from flagdata.export import Export, export
 from flagdata.lake import Artifact, Lake
 from flagdata.record import Coding, Record, RecordWriter
-from flagdata.schema import Kind
 
 
 @pytest.fixture(scope="module")

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flagdata.core.provenance import canonical
+from flagdata.core.schema import Kind
 from flagdata.errors import UsageError
 from flagdata.export import Export, export
 from flagdata.ingest import read_folder
 from flagdata.lake import Artifact, Lake, MeshSequence, RaggedMeshSequence, write_meshes
-from flagdata.provenance import canonical
-from flagdata.schema import Kind
 
 FACES = np.array([[0, 1, 2]], dtype=np.int32)
 REST = np.array([[0, 0], [1, 0], [0, 1]], dtype=np.float32)

@@ -7,12 +7,12 @@ from pathlib import Path
 import polars as pl
 import pytest
 
+from flagdata.core.schema import Kind
 from flagdata.dataset import HashedSplit
 from flagdata.dataset.sides import clips_of, divide
 from flagdata.errors import NotFoundError, UnknownNameError, UsageError
 from flagdata.export import Export, export
 from flagdata.lake import Artifact, Lake
-from flagdata.schema import Kind
 
 DAY = 86_400_000_000_000
 MAY = 1_777_593_600_000_000_000  # 2026-05-01T00:00:00Z

@@ -12,7 +12,7 @@ from textwrap import indent
 import numpy as np
 import pytest
 
-from flagdata.commands import confirm as commands
+from flagdata.commands import confirm_recipe as commands
 from flagdata.errors import ConflictError
 from flagdata.ingest import (
     Accepting,
@@ -23,11 +23,11 @@ from flagdata.ingest import (
     WindOptions,
     ingest_wind,
     read_log,
-    store,
+    source_artifacts,
 )
 from flagdata.lake import Lake
 from flagdata.record import Record
-from flagdata.signals import WindLog
+from flagdata.record.signals import WindLog
 from measure.observe import LogPlacement, from_log
 from tests.confirming import CONFIRMED
 from tests.program import Run, invoke
@@ -222,7 +222,9 @@ def test_two_drafts_that_differ_are_two_artifacts_and_the_second_names_the_first
     lake: Lake, table: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     right = read_log(table, ZONED.wind)
-    monkeypatch.setattr(store, "read_log", lambda path, options: _understood(right, factor=3.6, drafted="as m/s"))
+    monkeypatch.setattr(
+        source_artifacts, "read_log", lambda path, options: _understood(right, factor=3.6, drafted="as m/s")
+    )
     wrong = ingest_wind(lake, table, ZONED, confirm=CONFIRMED)
     monkeypatch.undo()
     mended = ingest_wind(lake, table, ZONED, confirm=CONFIRMED)
@@ -251,7 +253,7 @@ def test_a_log_that_an_older_version_read_alike_is_in_the_lake_already(lake: Lak
     again = ingest_wind(lake, table, options)
     assert (again.created, again.artifact.id) == (False, older)
     with pytest.raises(ConflictError):
-        ingest_wind(lake, table, options, labels=store.Labels(session="other"))
+        ingest_wind(lake, table, options, labels=source_artifacts.Labels(session="other"))
 
 
 def test_an_artifact_of_an_older_draft_is_reported_and_a_confirmed_one_is_made_beside_it(

@@ -11,9 +11,9 @@ import pytest
 from click.testing import CliRunner
 
 from flagdata.cli import root
+from flagdata.core.findings import Severity
 from flagdata.errors import CorruptError, InputError
 from flagdata.export import Export, export
-from flagdata.findings import Severity
 from flagdata.ingest import CameraOptions, examine, open_camera
 from flagdata.ingest.mcap import topics
 from tests.flagdata.export.conftest import known as known

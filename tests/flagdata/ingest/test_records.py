@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from flagdata.align import Pair, given, make_recording
-from flagdata.align.recording import Alignment
+from flagdata.align.film_recording import Alignment
+from flagdata.core.schema import CATALOG, Kind
 from flagdata.errors import ConflictError, CorruptError
 from flagdata.export import Export, export
 from flagdata.export.mcap import ROWS
 from flagdata.ingest import Labels, classify, ingest_camera, ingest_record, ingest_wind
 from flagdata.lake import Lake
 from flagdata.record import Record
-from flagdata.schema import CATALOG, Kind
 from tests.confirming import CONFIRMED
 
 OWN = {"branch", "created"}

@@ -15,9 +15,9 @@ from pathlib import Path
 
 import pytest
 
-from flagdata.lake import Artifact, Lake, locks
-from flagdata.provenance import recipe_hash
-from flagdata.schema import Kind
+from flagdata.core.provenance import recipe_hash
+from flagdata.core.schema import Kind
+from flagdata.lake import Artifact, Lake, lake_locks
 from flagdata.storage import Place
 
 AGES = "it sets the age of files, which a store gives them itself"
@@ -31,9 +31,9 @@ _ENDS = {"done", "failed", "killed"}
 def dead_owner() -> dict[str, object]:
     """What a process of this machine noted that has ended."""
     with subprocess.Popen(["sleep", "60"]) as process:
-        started = locks._started(process.pid)
+        started = lake_locks._started(process.pid)
         process.kill()
-    return {**locks.owner(), "pid": process.pid, "started": started}
+    return {**lake_locks.owner(), "pid": process.pid, "started": started}
 
 
 def put_text(lake: Lake, text: str, *, branch: str = "main", parents: tuple[str, ...] = ()) -> Artifact:

@@ -21,7 +21,7 @@ from typing import Any
 
 import pytest
 
-from flagdata.lake import locks
+from flagdata.lake import lake_locks
 from flagdata.storage import RemotePath
 from tests.flagdata.lake.conftest import dead_owner
 
@@ -92,7 +92,7 @@ def dying(at: int | None, *, for_good: bool = False) -> Iterator[Steps]:
         for name in _REQUESTS:
             patches.setattr(RemotePath, name, _stepping(steps, getattr(RemotePath, name), name))
         if at is not None:  # in a bucket others tell by it that the process has ended
-            patches.setattr(locks, "owner", _dead_owner)
+            patches.setattr(lake_locks, "owner", _dead_owner)
         yield steps
     if steps.dead:
         gc.collect()  # files that are closed with it, and their locks

@@ -16,9 +16,9 @@ import traceback
 from hashlib import sha256
 from pathlib import Path
 
+from flagdata.core.provenance import code_version
+from flagdata.core.schema import Kind
 from flagdata.lake import Artifact, Lake, Transaction
-from flagdata.provenance import code_version
-from flagdata.schema import Kind
 
 
 def put(tx: Transaction, source: str, *, folder: bool) -> str:

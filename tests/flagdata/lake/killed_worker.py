@@ -14,8 +14,8 @@ from collections.abc import Callable, Mapping
 from datetime import timedelta
 from pathlib import Path
 
+from flagdata.core.provenance import code_version
 from flagdata.lake import Lake, collect, expire
-from flagdata.provenance import code_version
 from tests.flagdata.lake.crashes import dying
 from tests.flagdata.lake.lake_machine import Items
 

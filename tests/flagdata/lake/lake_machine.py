@@ -24,8 +24,9 @@ from hypothesis import HealthCheck, Phase, seed, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 
+from flagdata.core.findings import Severity
+from flagdata.core.schema import Kind
 from flagdata.errors import FlagdataError
-from flagdata.findings import Severity
 from flagdata.lake import (
     Artifact,
     Lake,
@@ -44,7 +45,6 @@ from flagdata.lake import (
     verify,
     verify_catalog,
 )
-from flagdata.schema import Kind
 from flagdata.storage import Place
 from tests.flagdata.lake.conftest import overwrite
 from tests.flagdata.lake.crashes import Killed, dying

@@ -12,13 +12,13 @@ import pytest
 from PIL import Image
 
 from flagdata.commands.looking import _lines
+from flagdata.core.printable import printable
+from flagdata.core.schema import catalog_schema
 from flagdata.lake import Lake
 from flagdata.lake.ancestry import ancestry
 from flagdata.pages import COLOURS, picture
 from flagdata.pages.graph import PAPER, RULE, Box, svg
 from flagdata.pages.graph_png import _ascii, png
-from flagdata.printable import printable
-from flagdata.schema import catalog_schema
 from tests.flagdata.lake.conftest import put_text
 from tests.program import Run, invoke
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.addresses import lake_place
+from flagdata.core.files.addresses import lake_place
 from flagdata.lake import Artifact, Lake
 from flagdata.record import RecordWriter
 from tests.flagdata.lake.conftest import overwrite, put_text

@@ -10,9 +10,9 @@ import pytest
 from click.testing import CliRunner
 
 from flagdata.cli import root
+from flagdata.core.findings import Severity
 from flagdata.errors import ConflictError, NotFoundError
 from flagdata.export import Export, export
-from flagdata.findings import Severity
 from flagdata.lake import Artifact, Lake, collect, doctor, lost, verify, verify_catalog
 from tests.flagdata.lake.conftest import put_text
 

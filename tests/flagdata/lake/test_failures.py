@@ -19,10 +19,10 @@ import pytest
 from deltalake import DeltaTable
 from deltalake.exceptions import TableNotFoundError
 
+from flagdata.core.findings import Severity
+from flagdata.core.schema import Kind
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, InputError, NotFoundError, UsageError
-from flagdata.findings import Severity
 from flagdata.lake import Artifact, Lake, collect, doctor
-from flagdata.schema import Kind
 from tests.flagdata.lake.conftest import LINKS, put_text
 
 NOW = timedelta(0)

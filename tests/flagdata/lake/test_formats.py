@@ -14,13 +14,13 @@ import polars as pl
 import pytest
 from deltalake import DeltaTable
 
-from flagdata.checksums import content_hash
-from flagdata.durable import HEAL
+from flagdata.core.files.checksums import content_hash
+from flagdata.core.files.durable import HEAL
+from flagdata.core.findings import Severity
+from flagdata.core.schema import CATALOG, Kind
 from flagdata.errors import ConflictError, CorruptError, UsageError
-from flagdata.findings import Severity
 from flagdata.lake import Artifact, Lake, Log, collect, doctor, verify_catalog
 from flagdata.lake.attempts import Moved
-from flagdata.schema import CATALOG, Kind
 from flagdata.storage import RemotePath
 from flagdata.storage.connection import settings
 from tests.flagdata.lake.conftest import AGES, put_text

@@ -16,7 +16,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from flagdata.checksums import content_hash
+from flagdata.core.files.checksums import content_hash
+from flagdata.core.provenance import digest
+from flagdata.core.schema import Kind, catalog_schema
 from flagdata.errors import CorruptError, FlagdataError, LimitError, NotFoundError
 from flagdata.lake import (
     Artifact,
@@ -27,15 +29,13 @@ from flagdata.lake import (
     collect,
     doctor,
     is_healthy,
-    locks,
+    lake_locks,
     object_names,
     transfer,
     usage,
     verify,
     verify_catalog,
 )
-from flagdata.provenance import digest
-from flagdata.schema import Kind, catalog_schema
 from flagdata.storage import Place, RemotePath
 from tests.flagdata.lake.conftest import LINKS, overwrite, put_older_ref, put_text
 from tests.flagdata.lake.test_transfer import no_bar
@@ -150,13 +150,13 @@ def test_a_lock_of_a_bucket_that_states_a_long_life_is_void_after_an_hour(
 ) -> None:
     staging = remote_lake.path / "staging"
     assert isinstance(staging, RemotePath)
-    owner = {**locks.owner(), "machine": "another"}
+    owner = {**lake_locks.owner(), "machine": "another"}
     for life in (1e300, "nan", "inf"):
         (staging / "collect").write_bytes(json.dumps({**owner, "life": life}).encode())
         written = (staging / "collect").stat().st_mtime
         for later, counts in ((0.0, True), (3700.0, False)):
             monkeypatch.setattr(RemotePath, "now", lambda self, at=written + later: at)
-            assert (locks.living(staging / "collect", staging) is not None) == counts
+            assert (lake_locks.living(staging / "collect", staging) is not None) == counts
 
 
 def summary(lake: Lake, content: dict[str, Any], first: int, last: int) -> Place:

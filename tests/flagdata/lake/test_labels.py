@@ -12,11 +12,11 @@ from click.testing import CliRunner
 from deltalake import DeltaTable
 
 from flagdata.cli import root
+from flagdata.core.schema import CATALOG
 from flagdata.dataset import Source
 from flagdata.errors import ConflictError, NotFoundError, UnknownNameError, UsageError
 from flagdata.export import Export, export
 from flagdata.lake import Lake, given, select
-from flagdata.schema import CATALOG
 from tests.flagdata.export.conftest import known as known
 from tests.flagdata.lake.conftest import put_text
 

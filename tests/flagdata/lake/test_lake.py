@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from flagdata.core.schema import Kind, catalog_schema
 from flagdata.errors import ConflictError, NotFoundError, UsageError
 from flagdata.lake import Artifact, Lake, doctor, object_names, verify
-from flagdata.schema import Kind, catalog_schema
 from tests.flagdata.lake.conftest import put_text
 
 

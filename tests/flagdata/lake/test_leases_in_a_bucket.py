@@ -13,15 +13,7 @@ from pathlib import Path
 import pytest
 
 from flagdata.errors import ConflictError, FlagdataError
-from flagdata.lake import (
-    Lake,
-    Lease,
-    Transaction,
-    collect,
-    collecting,
-    doctor,
-    locks,
-)
+from flagdata.lake import Lake, Lease, Transaction, collect, collecting, doctor, lake_locks
 from flagdata.lake.leases import leases
 from flagdata.storage import RemotePath
 from tests.flagdata.lake.conftest import dead_owner, put_text
@@ -44,7 +36,7 @@ def test_locks_of_a_process_that_was_killed_hold_nobody_up(remote_lake: Lake) ->
 
 def test_a_lease_of_another_machine_counts_until_it_was_not_renewed_for_its_life(bucket_folder: str) -> None:
     staging = RemotePath.parse(bucket_folder)
-    owner = {**locks.owner(), "machine": "another", "pid": 1, "started": 1}
+    owner = {**lake_locks.owner(), "machine": "another", "pid": 1, "started": 1}
     for life, folder in ((60.0, "0" * 32), (-60.0, "1" * 32)):
         (staging / folder / "lease").write_bytes(json.dumps({**owner, "life": life}).encode() + b"\nmcap/x\n")
     assert [(state.alive, state.objects) for state in leases(staging)] == [
@@ -55,7 +47,7 @@ def test_a_lease_of_another_machine_counts_until_it_was_not_renewed_for_its_life
 
 def test_a_lease_that_names_no_objects_stops_no_collection(remote_lake: Lake) -> None:
     lease = remote_lake.staging / ("0" * 32) / "lease"
-    lease.write_bytes(json.dumps(locks.owner()).encode() + b"\n../../x\n\xff\x1b[2J\nmcap/01")
+    lease.write_bytes(json.dumps(lake_locks.owner()).encode() + b"\n../../x\n\xff\x1b[2J\nmcap/01")
     put_text(remote_lake, "gusts")
     assert [state.alive for state in leases(remote_lake.staging)] == [True]
     assert collect(remote_lake, grace=NOW).objects == ()
@@ -66,7 +58,7 @@ def test_who_was_cut_off_for_long_publishes_nothing(remote_lake: Lake, monkeypat
 
     def slow(transaction: Transaction, path: Path) -> str:
         name = put(transaction, path)
-        monkeypatch.setattr(locks, "LIFE", 0.0)  # has passed since the lease was renewed
+        monkeypatch.setattr(lake_locks, "LIFE", 0.0)  # has passed since the lease was renewed
         return name
 
     monkeypatch.setattr(Transaction, "put", slow)
@@ -79,8 +71,8 @@ def test_who_was_cut_off_for_long_publishes_nothing(remote_lake: Lake, monkeypat
 def test_a_long_wait_for_a_lock_is_reported_once(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(locks, "_SILENT", 0.0)
-    tries = list(itertools.islice(locks._pauses(RemotePath("bucket", "lake/staging")), 4))
+    monkeypatch.setattr(lake_locks, "_SILENT", 0.0)
+    tries = list(itertools.islice(lake_locks._pauses(RemotePath("bucket", "lake/staging")), 4))
     assert len(tries) == 4
     assert caplog.text.count("waiting for another process") == 1
 
@@ -109,7 +101,7 @@ def test_a_lease_that_the_store_refuses_leaves_nothing_on_this_machine(
     def refused(*_: object) -> None:
         raise OSError("no answer")
 
-    monkeypatch.setattr(locks.TimedLocks, "note", refused)
+    monkeypatch.setattr(lake_locks.TimedLocks, "note", refused)
     with pytest.raises(OSError, match="no answer"):
         Lease(remote_lake.staging)
     assert leases(tmp_path / "cache" / "staging") == []
@@ -121,7 +113,7 @@ def test_erasing_stops_where_its_lock_was_lost_on_the_way(remote_lake: Lake, mon
 
     def slow(path: RemotePath) -> None:
         remove(path)
-        monkeypatch.setattr(locks, "LIFE", 0.0)  # has passed since the lock was renewed
+        monkeypatch.setattr(lake_locks, "LIFE", 0.0)  # has passed since the lock was renewed
 
     monkeypatch.setattr(remote_lake.objects, "remove", slow)
     with pytest.raises(ConflictError, match="take this process for dead"):

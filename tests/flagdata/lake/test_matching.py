@@ -5,10 +5,10 @@ from __future__ import annotations
 import pyarrow as pa
 import pytest
 
+from flagdata.core.schema import Kind, catalog_schema
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.lake import Artifact, Lake, Request, Selection
 from flagdata.lake.matching import matching
-from flagdata.schema import Kind, catalog_schema
 
 NAMES = ("plain", "o'brien", "100%", "a_b", "x' or '1' = '1")
 ROWS = [

@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
+from flagdata.core.schema import catalog_schema
 from flagdata.errors import ConflictError
 from flagdata.lake import Lake, columns, doctor, is_healthy, labels_of, select
 from flagdata.lake.lineage import LABELS
-from flagdata.schema import catalog_schema
 from tests.flagdata.lake.conftest import put_text
 from tests.program import invoke
 

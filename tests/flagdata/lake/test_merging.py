@@ -11,13 +11,13 @@ from pathlib import Path
 import pyarrow as pa
 import pytest
 
+from flagdata.core.findings import Severity
+from flagdata.core.schema import Kind
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UsageError
 from flagdata.export import Export, prepare
-from flagdata.findings import Severity
 from flagdata.lake import Artifact, Lake, collect, doctor
 from flagdata.lake.lineage import Removal
 from flagdata.lake.marking import mark
-from flagdata.schema import Kind
 from tests.flagdata.lake.conftest import put_text
 from tests.program import Ended, invoke
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
+from flagdata.core.schema import Kind
 from flagdata.lake import Artifact, Lake, meant
-from flagdata.schema import Kind
 from tests.flagdata.lake.conftest import put_text
 from tests.program import Run, invoke
 

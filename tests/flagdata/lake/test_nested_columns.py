@@ -8,12 +8,12 @@ from typing import Any, cast
 import pyarrow as pa
 import pytest
 
+from flagdata.core.schema import Kind, catalog_schema
 from flagdata.dataset import COLUMNS, PairTable
 from flagdata.errors import CorruptError, InputError
-from flagdata.export.source import Entry
+from flagdata.export.export_source import Entry
 from flagdata.lake import Artifact, Lake, doctor, with_data_sets
 from flagdata.record import Record
-from flagdata.schema import Kind, catalog_schema
 from tests.program import invoke
 
 DEEP = "[" * 100_000 + "]" * 100_000

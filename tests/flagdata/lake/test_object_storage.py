@@ -17,23 +17,13 @@ from urllib.request import urlopen
 import pytest
 
 import flagdata
-from flagdata import durable, object_cache
-from flagdata.caches import beside
+from flagdata.core.files import durable, object_cache
+from flagdata.core.files.caches import beside
+from flagdata.core.findings import Severity
+from flagdata.core.schema import Kind
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, NotFoundError, RefusedError, UsageError
-from flagdata.findings import Severity
-from flagdata.lake import (
-    Artifact,
-    Lake,
-    collect,
-    doctor,
-    locks,
-    object_names,
-    select,
-    verify,
-    verify_catalog,
-)
+from flagdata.lake import Artifact, Lake, collect, doctor, lake_locks, object_names, select, verify, verify_catalog
 from flagdata.lake.leases import last_written
-from flagdata.schema import Kind
 from flagdata.storage import RemotePath, StoreError, plain
 from tests.flagdata.conftest import write_video
 from tests.flagdata.lake.conftest import dead_owner, put_text
@@ -481,7 +471,7 @@ def test_with_keys_that_only_read_every_command_that_commits_nothing_works_and_a
     put_text(remote_lake, "gusts")
     remote_lake.tag("v1")
     put_text(remote_lake, "more")
-    leftover = json.dumps({**locks.owner(), "machine": "another", "pid": 1}).encode() + b"\n"
+    leftover = json.dumps({**lake_locks.owner(), "machine": "another", "pid": 1}).encode() + b"\n"
     (remote_lake.staging / ("0" * 32) / "lease").write_bytes(leftover)  # of a transaction on another machine
     with read_only(s3_server) as address:
         use_store(address)
@@ -569,7 +559,7 @@ def test_a_lake_whose_making_was_killed_is_made_by_the_same_command(bucket_folde
 
 def test_a_lake_that_a_living_process_is_making_is_left_to_it(bucket_folder: str) -> None:
     place = RemotePath.parse(bucket_folder)
-    (place / "staging" / "made").write_bytes(json.dumps(locks.owner()).encode() + b"\n")
+    (place / "staging" / "made").write_bytes(json.dumps(lake_locks.owner()).encode() + b"\n")
     with pytest.raises(ConflictError, match="another process is making"):
         Lake.create(bucket_folder)
     (place / "lake-of-others").write_bytes(b"1")

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pyarrow as pa
 
+from flagdata.core.schema import Kind, catalog_schema
 from flagdata.lake import Artifact, with_data_sets
-from flagdata.schema import Kind, catalog_schema
 
 
 def catalog(*artifacts: Artifact) -> pa.Table:

@@ -21,7 +21,7 @@ COMMANDS = (["ls"], ["doctor"], ["verify"], ["tag", "v1"], ["log"])
 # One process that imports everything, and a child of it for each command, which may not read what is closed.
 _AS_NOBODY = """
 import json, os, resource, sys, zoneinfo
-import flagdata.commands.lake, flagdata.commands.upkeep, flagdata.dataset.tagged
+import flagdata.commands.lake_versions, flagdata.commands.upkeep, flagdata.dataset.tagged
 import flagdata.ingest.before, flagdata.lake.health, tqdm, xml
 from flagdata.cli import main
 from tests.program import invoke

@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
+from flagdata.core.findings import Severity
 from flagdata.errors import ConflictError
-from flagdata.findings import Severity
 from flagdata.lake import Lake, attempts, collect, doctor, object_names, verify
 from tests.flagdata.lake.conftest import put_text
 

@@ -9,7 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from flagdata import provenance
+from flagdata.core import provenance
+from flagdata.core.files.object_cache import forget
+from flagdata.core.schema import Kind
 from flagdata.errors import FlagdataError
 from flagdata.ingest import (
     IngestResult,
@@ -34,8 +36,6 @@ from flagdata.lake import (
     transfer,
     verify,
 )
-from flagdata.object_cache import forget
-from flagdata.schema import Kind
 from flagdata.storage import Place
 from tests.flagdata.lake.conftest import overwrite, put_text
 from tests.flagdata.lake.test_transfer import no_bar
@@ -209,7 +209,7 @@ def test_a_record_that_is_made_again_by_later_code_has_the_bytes_that_tags_need(
     for one in made:
         lose(lake, str(one.object))
     monkeypatch.setattr(provenance, "code_version", lambda: "9.0.0")
-    for name in ("flagdata.ingest.store", "flagdata.lake.remaking", "flagdata.lake.transaction"):
+    for name in ("flagdata.ingest.source_artifacts", "flagdata.lake.remaking", "flagdata.lake.transaction"):
         monkeypatch.setattr(f"{name}.code_version", lambda: "9.0.0", raising=False)
     again = [ingest_camera(lake, video), ingest_wind(lake, wind_log)]
     assert [one.artifact.object for one in again] == [one.object for one in made]

@@ -25,7 +25,7 @@ from flagdata.lake import (
     verify,
     verify_catalog,
 )
-from flagdata.lake.log import PREVIOUS_HASH
+from flagdata.lake.delta_log import PREVIOUS_HASH
 from flagdata.storage import Place
 from tests.flagdata.lake.conftest import LINKS, overwrite, put_older_ref, put_text
 from tests.flagdata.lake.test_transfer import is_whole, no_bar

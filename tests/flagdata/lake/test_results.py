@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from flagdata.core.schema import Kind
 from flagdata.lake import Artifact, Lake, Placed, Request, Selection, keep, placed, versions
 from flagdata.lake.ancestry import ancestry
-from flagdata.schema import Kind
 from tests.flagdata.lake.conftest import put_text
 from tests.program import Run, invoke
 

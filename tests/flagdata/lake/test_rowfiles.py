@@ -9,10 +9,10 @@ import pyarrow.parquet as pq
 import pytest
 from deltalake import DeltaTable
 
+from flagdata.core.schema import Kind, catalog_schema
 from flagdata.errors import CorruptError
 from flagdata.lake import Artifact, Lake, Scan, select
 from flagdata.lake.rowfiles import ROW_ORDER, RowFiles, in_order
-from flagdata.schema import Kind, catalog_schema
 from tests.flagdata.lake.conftest import overwrite, put_text
 from tests.program import invoke
 

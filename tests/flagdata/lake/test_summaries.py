@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
+from flagdata.core.schema import catalog_schema
 from flagdata.errors import CorruptError
-from flagdata.lake import Lake, Log, catalog, log
-from flagdata.schema import catalog_schema
+from flagdata.lake import Lake, Log, catalog, delta_log
 from tests.flagdata.lake.conftest import overwrite
 
 EVERY = 4
@@ -19,8 +19,8 @@ EVERY = 4
 @pytest.fixture(autouse=True)
 def _often(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(catalog, "_TIDY_EVERY", EVERY)
-    monkeypatch.setattr(log, "_MANY", 3)
-    monkeypatch.setattr(log, "_LARGE", 6 * EVERY)
+    monkeypatch.setattr(delta_log, "_MANY", 3)
+    monkeypatch.setattr(delta_log, "_LARGE", 6 * EVERY)
 
 
 def commit(lake: Lake, versions: int, message: str) -> None:

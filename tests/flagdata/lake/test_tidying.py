@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from flagdata.core.schema import Kind
 from flagdata.lake import Artifact, Lake, Log, catalog, clone, transfer
 from flagdata.lake.rowfiles import RowFiles
-from flagdata.schema import Kind
 from tests.flagdata.lake.conftest import put_text
 from tests.flagdata.lake.test_transfer import no_bar
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from flagdata.core.files.object_cache import forget
 from flagdata.errors import ConflictError, CorruptError
 from flagdata.lake import Lake, clone, collect, doctor, object_names, transfer, verify, verify_catalog
-from flagdata.object_cache import forget
 from tests.flagdata.lake.conftest import overwrite, put_older_ref, put_text
 from tests.program import invoke
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from flagdata.core.findings import Severity
 from flagdata.errors import ConflictError, FlagdataError, NotFoundError
-from flagdata.findings import Severity
 from flagdata.lake import (
     Artifact,
     Catalog,

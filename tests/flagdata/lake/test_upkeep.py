@@ -14,8 +14,9 @@ from pathlib import Path
 
 import pytest
 
+from flagdata.core.findings import Finding, Severity
+from flagdata.core.schema import Kind
 from flagdata.errors import ConflictError, CorruptError, NotFoundError
-from flagdata.findings import Finding, Severity
 from flagdata.lake import (
     Artifact,
     Lake,
@@ -32,7 +33,6 @@ from flagdata.lake import (
     verify_catalog,
 )
 from flagdata.lake.leases import keeping_collectors_out, leases
-from flagdata.schema import Kind
 from flagdata.storage import Place
 from tests.flagdata.lake.conftest import AGES, LINKS, LOCKS, overwrite, put_older_ref, put_text
 

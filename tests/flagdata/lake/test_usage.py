@@ -6,9 +6,9 @@ import shutil
 from datetime import timedelta
 from pathlib import Path
 
+from flagdata.core.schema import Kind
 from flagdata.lake import Artifact, Lake, collect, usage
 from flagdata.lake.collection import CATALOG, OTHER, UNSHOWN, Usage, files_of
-from flagdata.schema import Kind
 from tests.flagdata.lake.conftest import put_text
 from tests.program import Run, invoke
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flagdata.record import Chunking, Coding, RecordWriter
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 
 START = 1_767_225_600_000_000_000  # 2026-01-01T00:00:00Z
 PERIOD = 40_000_000

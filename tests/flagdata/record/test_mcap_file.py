@@ -14,8 +14,8 @@ from mcap.writer import CompressionType, Writer
 from flagdata.errors import ConflictError
 from flagdata.record import Record, RecordWriter, messages, writer
 from flagdata.record.mcap_file import McapFile, MessageBlock
+from flagdata.record.signals import Sensor, WindAverage, WindSeries
 from flagdata.record.writer import packed, pieces_of
-from flagdata.signals import Sensor, WindAverage, WindSeries
 
 START = 1_620_950_400_000_000_000
 CHUNK = 3000

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata import object_cache as cache
-from flagdata import object_ranges as ranges
+from flagdata.core.files import object_cache as cache
+from flagdata.core.files import object_ranges as ranges
+from flagdata.core.schema import Kind
 from flagdata.errors import CorruptError, NotFoundError
 from flagdata.lake import Artifact, Lake, objects
 from flagdata.record import ChecksummedFile, Chunking, Coding, Record
-from flagdata.schema import Kind
 from flagdata.storage import RemotePath
 from tests.flagdata.record.conftest import PERIOD, START
 
@@ -26,7 +26,7 @@ Write = Callable[..., Path]
 def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     """A record of 150 KB has as many blocks as one of 20 MB."""
     monkeypatch.setattr(ranges, "BLOCK", 2048)
-    monkeypatch.setattr("flagdata.record.container._LAST", 4096)
+    monkeypatch.setattr("flagdata.record.mcap_container._LAST", 4096)
 
 
 @pytest.fixture

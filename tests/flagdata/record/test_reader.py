@@ -15,10 +15,10 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 from mcap_protobuf.decoder import DecoderFactory
 
+from flagdata.core.schema import CHANNELS
 from flagdata.errors import CorruptError, FlagdataError, InputError, NotFoundError, UsageError
 from flagdata.record import Chunking, Coding, Record, RecordWriter, messages, reader
-from flagdata.schema import CHANNELS
-from flagdata.signals import WindSeries
+from flagdata.record.signals import WindSeries
 from tests.refusals import unrefused
 
 from .conftest import DEVICE_LAG, EXPOSURE, PERIOD, START

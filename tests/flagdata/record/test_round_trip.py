@@ -11,9 +11,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
+from flagdata.core.schema import CHANNELS
 from flagdata.record import CHECKSUMS, Record, RecordWriter, salvage
-from flagdata.schema import CHANNELS
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 
 _CHANNELS = sorted(name for name, channel in CHANNELS.items() if channel.dims == ("time",))
 _NUMBERS = st.floats(allow_nan=True, allow_infinity=True)

@@ -12,10 +12,10 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
+from flagdata.core.findings import Severity
+from flagdata.core.schema import TOPIC_IMAGE
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, NotFoundError
-from flagdata.findings import Severity
 from flagdata.record import Chunking, Coding, Record, messages, salvage
-from flagdata.schema import TOPIC_IMAGE
 from tests.flagdata.conftest import small_files
 
 

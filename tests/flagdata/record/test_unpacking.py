@@ -17,7 +17,7 @@ from mcap.writer import CompressionType, Writer
 from flagdata.errors import CorruptError, LimitError
 from flagdata.ingest import messages, topics
 from flagdata.record import salvage, unpacked, unpacking
-from flagdata.record.container import MESSAGE_HEAD
+from flagdata.record.mcap_container import MESSAGE_HEAD
 
 BOMB = 96 << 20
 """Bytes that a lying chunk unpacks to."""

@@ -16,10 +16,10 @@ from mcap.reader import make_reader
 from mcap.records import ChunkIndex
 from mcap_protobuf.decoder import DecoderFactory
 
-from flagdata.clock import ClockModel, Segment
+from flagdata.core.clock_model import ClockModel, Segment
 from flagdata.errors import ConflictError, InputError, LimitError, TimeError, UsageError
 from flagdata.record import Chunking, Coding, Record, RecordWriter, writer
-from flagdata.signals import WindSeries
+from flagdata.record.signals import WindSeries
 
 from .conftest import DEVICE_LAG, EXPOSURE, PERIOD, START
 

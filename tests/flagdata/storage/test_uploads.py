@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from flagdata.findings import Severity
+from flagdata.core.findings import Severity
 from flagdata.lake import Lake, Lease, collect, doctor, garbage
 from flagdata.storage import RemotePath, StoreError, Upload, connection
 from flagdata.storage.path import BLOCK

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from flagdata.core.schema import Kind
 from flagdata.lake import Artifact, Lake, keep
-from flagdata.schema import Kind
 from flagdata.view import ServerAnswer, answer
 from tests.flagdata.view.conftest import CURVE, NAME, Shown
 

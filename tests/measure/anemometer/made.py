@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from scipy.signal import lfilter
 
-from flagdata.arrays import FloatArray
-from flagdata.rng import stream
-from flagdata.signals import Sensor
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import stream
+from flagdata.record.signals import Sensor
 from measure.anemometer import Calibrated, Features, Place, Recording, calibrated
 from measure.cloth import Log
 from measure.film import FlagSize, WindowLayout

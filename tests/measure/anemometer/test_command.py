@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
+from flagdata.core.schema import Kind
 from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.lake import Artifact, Lake
 from flagdata.record import RecordWriter
-from flagdata.schema import Kind
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 from flagdata.timebase import NANOSECONDS
-from measure.anemometer import calibration, making, measuring, network
+from measure.anemometer import anemometer_measuring, making, network, reading_calibration
 from measure.commands.calibrate import calibrate
 from measure.commands.measure import measure
 from tests.golden_answers import changes
@@ -55,7 +55,7 @@ def lake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def _shown(patch: pytest.MonkeyPatch, **changes: Any) -> None:
     own = features(gusts(float(_SECONDS), seed=changes["seed"]), **changes)
-    for module in (calibration, measuring):
+    for module in (reading_calibration, anemometer_measuring):
         patch.setattr(module, "features_of", lambda *_, **__: own)
 
 
@@ -95,7 +95,7 @@ def test_a_recording_becomes_a_model_by_which_another_film_is_read(
     assert "another place" in str(refused.exception)
 
     _shown(monkeypatch, seed=1)
-    monkeypatch.setattr("flagdata.provenance.code_version", lambda: "0.1.0+mended")
+    monkeypatch.setattr("flagdata.core.provenance.code_version", lambda: "0.1.0+mended")
     assert "committed as version 2 of 'garden'" in _run(calibrate, *given).stderr
     newest = network("garden", lake=Lake.open(lake), at=None).artifact
     assert newest is not None

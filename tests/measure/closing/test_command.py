@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flagdata.core.findings import Finding, Severity
+from flagdata.core.stated import Stated
 from flagdata.errors import NotFoundError, UsageError
-from flagdata.findings import Finding, Severity
 from flagdata.ingest import MarkerOptions, ingest_markers
 from flagdata.lake import Lake
-from flagdata.stated import Stated
 from measure.closing import SourceOptions
-from measure.closing.sources import read
+from measure.closing.verdict_sources import read
 from measure.commands import CloseLoopCommand
 from measure.commands.close_loop import _setup as setup_of
 from measure.commands.close_loop import with_warnings

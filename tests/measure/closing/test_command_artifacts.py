@@ -12,19 +12,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import sim.run.models
-from flagdata.documents import to_toml
+import sim.run.lake_models
+from flagdata.core.schema import Kind
 from flagdata.errors import CorruptError, InputError
 from flagdata.lake import Artifact, Lake
-from flagdata.schema import Kind
+from flagdata.recipes.documents import to_toml
 from measure.closing import VerdictAnswer, acting, answer_of
-from measure.closing.artifacts import fingerprint, keep, read
-from measure.closing.models import models
+from measure.closing.model_recipes import models
+from measure.closing.verdict_artifacts import fingerprint, keep, read
 from measure.loop import LoopOptions
 from measure.observe import Experiment, Specimen, Trajectory, WindTrack
 from measure.verdict import Conclusion, Estimate, Parameter, Verdict
-from sim.material import named
-from sim.mesh import Mesh
+from sim.cloth.material import named
+from sim.cloth.mesh import Mesh
 from sim.run import Crew, of_content
 from tests.measure.report.verdicts import Size, verdict
 from tests.program import invoke
@@ -151,12 +151,12 @@ def test_newer_code_leaves_its_verdict_and_models_under_the_same_names(
     """As after a mistake was mended, by which the first verdict found no effect."""
     observed = experiment(specimen, source=recorded)
     first = keep(lake, closed(observed, Conclusion.SUFFICIENT))
-    monkeypatch.setattr("flagdata.provenance.code_version", lambda: "0.1.0+mended")
+    monkeypatch.setattr("flagdata.core.provenance.code_version", lambda: "0.1.0+mended")
     second = keep(lake, closed(observed))
     assert (second.place.version, second.measurement != first.measurement) == (2, True)
     assert json.loads(str(lake.artifact("tracks").report))["conclusion"] == Conclusion.EFFECT.value
     assert json.loads(str(lake.artifact(first.measurement).report))["conclusion"] == Conclusion.SUFFICIENT.value
-    assert sim.run.models.load("tracks-base", lake).model == second.models[0]
+    assert sim.run.lake_models.load("tracks-base", lake).model == second.models[0]
     assert lake.artifact("tracks-lift").parents == (second.measurement, recorded)
 
 

@@ -15,9 +15,9 @@ import pytest
 
 from flagdata.errors import FlagdataError
 from measure.demo import Transcript, story
-from measure.demo.cards import Card, Judgement
-from measure.demo.page import Recovered
-from measure.demo.recording import Acting
+from measure.demo.demo_cards import Card, Judgement
+from measure.demo.demo_recording import Acting
+from measure.demo.recording_page import Recovered
 
 
 @pytest.fixture

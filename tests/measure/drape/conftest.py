@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from flagdata.ingest import Obj, write_obj
 from measure.cloth import draws
-from measure.drape import CLOTH, answer
-from sim.drape import DISC, PEDESTAL, disc
+from measure.drape import CLOTH, drape_answer
+from sim.run.cusick_drape import DISC, PEDESTAL, disc
 
 COUNT = 128
 NOISE = 0.005
@@ -54,7 +54,7 @@ def scan(coefficient: float, *, lobe: float = 0.0) -> Obj:
 @pytest.fixture
 def cheap(monkeypatch: pytest.MonkeyPatch) -> None:
     """Simulations by the known function."""
-    monkeypatch.setattr(answer, "simulated", simulated)
+    monkeypatch.setattr(drape_answer, "simulated", simulated)
 
 
 @pytest.fixture

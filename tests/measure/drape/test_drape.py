@@ -11,14 +11,14 @@ import pytest
 from click.testing import CliRunner, Result
 
 import flagdata
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.findings import Finding
+from flagdata.core.stated import Stated
 from flagdata.errors import InputError, RefusedError, UsageError
-from flagdata.findings import Finding
-from flagdata.stated import Stated
 from measure.commands.calibrate import calibrate
 from measure.drape import DrapeBatch, Face, Model, Surface, answered, fitted, material, ratio, rim_of, shape_of
-from sim.drape import disc
-from sim.mesh import Mesh
+from sim.cloth.mesh import Mesh
+from sim.run.cusick_drape import disc
 from tests.golden_answers import changes
 from tests.measure.drape.conftest import COUNT, NOISE, scan, shapes, simulated
 

@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 import torch
 
-from flagdata.arrays import UInt8Array
-from flagdata.checksums import write_sums
-from flagdata.film_array import Frames
-from flagdata.rng import stream, torch_draws
-from models import estimator
-from models.crops import Cropping
-from models.estimator import CLOUD, Estimator
-from models.frontend import FrontEnd
-from models.learner import Learner, Loss
-from models.outliers import Familiarity
-from models.storage import WEIGHTS, renew, tensor_bytes, write_card, write_tensors
-from models.wave import WaveNetwork
+from flagdata.core.arrays import UInt8Array
+from flagdata.core.files.checksums import write_sums
+from flagdata.core.rng import stream, torch_draws
+from flagdata.ingest.films.film_array import Frames
+from models.maps.crops import Cropping
+from models.maps.frontend import FrontEnd
+from models.networks.learner import Learner, Loss
+from models.networks.wave import WaveNetwork
+from models.trained import estimator
+from models.trained.estimator import CLOUD, Estimator
+from models.trained.model_folder import WEIGHTS, renew, tensor_bytes, write_card, write_tensors
+from models.trained.outliers import Familiarity
 
 FRAMES, SIZE, RATE = 12, 24, 25.0
 TARGETS = ("wind_speed", "area_weight", "bending_scale", "anisotropy")

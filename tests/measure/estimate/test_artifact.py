@@ -12,9 +12,9 @@ from measure.commands import read
 from measure.commands.measurement_artifact import artifact, write
 from measure.estimate import beside
 from measure.film import ConditionedFilm, FilmReading, Subject
-from models.estimator import Estimator
+from models.trained.estimator import Estimator
 from tests.measure.estimate.conftest import FRAMES, even
-from tests.measure.estimate.test_measuring import far, measured
+from tests.measure.estimate.test_film_measuring import far, measured
 
 
 def test_a_bound_is_no_wind_of_the_catalog(model: Estimator) -> None:

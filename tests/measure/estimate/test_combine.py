@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import stream
 from flagdata.errors import CorruptError, InputError
-from flagdata.rng import stream
 from measure.estimate import CARD_KEY, UNKNOWN, Dependence, combined, of_model
 from measure.estimate.combine import effective
-from models.estimator import Estimator
+from models.trained.estimator import Estimator
 
 CLOTH = ("area_weight",)
 BOTH = ("wind_speed", "area_weight")

@@ -18,20 +18,20 @@ import torch
 from PIL import Image
 
 import flagdata
-from flagdata.console import progress
+from flagdata.core.console import progress
+from flagdata.core.schema import Kind
+from flagdata.core.stated import Stated
 from flagdata.dataset import clip_rows
 from flagdata.errors import RefusedError, UnknownNameError, UsageError
 from flagdata.lake import Artifact, Lake, clone, objects
 from flagdata.record import Record, RecordWriter
-from flagdata.schema import Kind
-from flagdata.signals import Sensor, WindSeries
-from flagdata.stated import Stated
+from flagdata.record.signals import Sensor, WindSeries
 from flagdata.timebase import NANOSECONDS
 from measure.commands import read
 from measure.estimate import DRAWS, weight_of
 from measure.estimate.nearest import nearest
 from models.conditioning import conditioned
-from models.estimator import DEFAULT, Estimator
+from models.trained.estimator import DEFAULT, Estimator
 from tests.measure.estimate.conftest import FRAMES, RATE, pictures, write_video
 from tests.program import Ended, invoke
 
@@ -252,7 +252,7 @@ def test_a_recording_measured_by_newer_code_is_a_new_version_of_the_measurement(
 ) -> None:
     options = ("--lake", lake, *SIZED, "--model", model_folder, "--anyway")
     first = answer("made-1", *options)
-    monkeypatch.setattr("flagdata.provenance.code_version", lambda: "0.1.0+mended")
+    monkeypatch.setattr("flagdata.core.provenance.code_version", lambda: "0.1.0+mended")
     done = run("made-1", *options)
     assert f"committed as version 2 of 'made-1'; version 1, {str(first['artifact'])[:12]}, is by code " in done.err
     old, new = measurements(lake)
@@ -420,8 +420,8 @@ def test_a_measurement_that_is_committed_is_reported_whatever_becomes_of_its_fil
     lake: Path, model_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each file that the disk refuses is a warning of its own; without a commit it is an error."""
-    monkeypatch.setattr("flagdata.outputs.fresh_folder", refused_by_the_disk)
-    monkeypatch.setattr("flagdata.outputs.write_file", refused_by_the_disk)
+    monkeypatch.setattr("flagdata.core.files.outputs.fresh_folder", refused_by_the_disk)
+    monkeypatch.setattr("flagdata.core.files.outputs.write_file", refused_by_the_disk)
     files = ("--report", tmp_path / "report.html", "--zarr", tmp_path / "series.zarr")
     options = ("made-1", "--lake", lake, *SIZED, "--model", model_folder, "--anyway", *files, "--json")
     done = run(*options)

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flagdata.film_array import Frames
-from flagdata.stated import Stated
+from flagdata.core.stated import Stated
+from flagdata.ingest.films.film_array import Frames
 from measure.commands.measure import _Done, _report
 from measure.commands.measure_film import answered
 from measure.estimate import SERIES_KEY, Measurement, Options, Pair, SeriesErrors, beside, measure
-from models.estimator import Estimator
+from models.trained.estimator import Estimator
 from tests.measure.estimate.conftest import FRAMES, RATE, even
-from tests.measure.estimate.test_measuring import APART, WHOLE, Listed, far
+from tests.measure.estimate.test_film_measuring import APART, WHOLE, Listed, far
 
 ERRORS = SeriesErrors(
     opened=Pair(shared=0.5, own=0.3),

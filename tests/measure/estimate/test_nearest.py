@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flagdata.arrays import UInt8Array
+from flagdata.core.arrays import UInt8Array
 from flagdata.timebase import NANOSECONDS
 from measure.estimate.nearest import _clip
-from models.frontend import FrontEnd
+from models.maps.frontend import FrontEnd
 from tests.models.conditioning.test_conditioning import COUNT, Drawn
 
 FRONT_END = FrontEnd(maps="wave-maps", size=32, frames=30, rate=25.0)

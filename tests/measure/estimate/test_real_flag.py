@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.film import CameraFilm
+from flagdata.ingest.films.film import CameraFilm
 from measure.estimate import UNKNOWN, Options, measure
 from measure.film import ConditionedFilm, FlagSize
 from measure.gate import gate_of
-from models import estimator
+from models.trained import estimator
 
 pytestmark = pytest.mark.reference
 CLIP = "video/dyntex_flag_571c110.avi"  # 352 × 288 px, 25 Hz, 250 frames

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from flagdata.answer import Bound, Span
-from flagdata.stated import parse
+from flagdata.core.stated import parse
 from measure.estimate import Options
 from measure.estimate.refined import _searched, refined, scaled
 from measure.refine import Clip, Interval, Refinement, Round
-from models.targets import Cloth
+from models.networks.targets import Cloth
 
 NOTHING: Any = None
 

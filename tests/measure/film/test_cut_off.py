@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flagdata.arrays import UInt8Array
-from flagdata.film_array import Frames
+from flagdata.core.arrays import UInt8Array
+from flagdata.ingest.films.film_array import Frames
 from measure.film import ConditionedFilm, WindowReader
-from measure.film.conditioned import CutOff
+from measure.film.conditioned_film import CutOff
 from tests.measure.estimate.conftest import RATE
 from tests.models.conditioning.test_conditioning import WIDTH, Drawn
 

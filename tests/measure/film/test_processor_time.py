@@ -14,10 +14,10 @@ import pytest
 import torch
 
 import flagdata
-from flagdata.workload import cores
+from flagdata.core.workload import cores
 from measure.anemometer.making import made
 from measure.cloth import calibrate
-from measure.cloth.sources import Sources
+from measure.cloth.flag_recordings import Sources
 from measure.commands.measure_film import run
 
 MOST = 1.5
@@ -66,10 +66,10 @@ ENTRIES: dict[str, tuple[str, Callable[[], object]]] = {
         "measure.commands.measure_film.gate_beside",
         lambda: run(Mock(), Mock(reading=None), Mock()),
     ),
-    "observe": ("measure.film.source.subjects", lambda: flagdata.observe("flag.mp4", flag_size=(1.5, 1.0))),
-    "calibrate, films": ("measure.cloth.sources.usable", lambda: Sources(opened=(), left_out=()).read(Mock())),
+    "observe": ("measure.film.film_source.subjects", lambda: flagdata.observe("flag.mp4", flag_size=(1.5, 1.0))),
+    "calibrate, films": ("measure.cloth.flag_recordings.usable", lambda: Sources(opened=(), left_out=()).read(Mock())),
     "calibrate, weight": (
-        "measure.cloth.calibration.designs_of",
+        "measure.cloth.cloth_calibration.designs_of",
         lambda: calibrate((), Mock(), folder=Path("unused")),
     ),
     "calibrate, anemometer": (

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 import torch
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import stream
 from flagdata.errors import RefusedError, UsageError
-from flagdata.rng import stream
 from measure.film import FlagSize, scaled_back, sizes
 from measure.film.similarity import SizePrior, spacing
+from sim.cloth.material import Material, named
+from sim.cloth.scene import assemble, flag
 from sim.integrate import Symplectic
-from sim.material import Material, named
-from sim.scene import assemble, flag
 
 CAMEL = named("camel-ponte-roma")
 

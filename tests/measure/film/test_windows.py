@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from flagdata.arrays import FloatArray, UInt8Array
+from flagdata.core.arrays import FloatArray, UInt8Array
+from flagdata.core.findings import Finding
 from flagdata.errors import InputError, UsageError
-from flagdata.findings import Finding
 from measure.film import WindowReader, findings_of
 from measure.film.windows import cut, lay_out
 from models.conditioning import Distinct, Interpolator, TimedFrame

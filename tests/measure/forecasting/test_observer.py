@@ -28,7 +28,7 @@ from measure.forecasting.regressors import MotionColumn
 from measure.observe import Specimen, Trajectory, WindTrack
 from measure.probes import Projection, reduced
 from measure.propose import Term, columns_of
-from sim import handles
+from sim.cloth import handles
 from sim.integrate import JointBatch
 
 NOMINAL = Calibration()

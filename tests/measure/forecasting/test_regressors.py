@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from measure.forecasting import THETA, TURNED, Calibration, FieldColumn, Model, fields, library
 from measure.forecasting.regressors import motions
+from sim.cloth.material import named
+from sim.cloth.scene import assemble, flag
 from sim.effects import EFFECTS, WindEffect
-from sim.material import named
-from sim.scene import assemble, flag
 
 
 def test_every_column_is_a_strength_of_the_library() -> None:

@@ -6,16 +6,16 @@ from __future__ import annotations
 import numpy as np
 import torch
 
-from flagdata.arrays import FloatArray, UInt8Array
+from flagdata.core.arrays import FloatArray, UInt8Array
 from measure.gate import DISTORTIONS, ClipStatistics, Gate
 from measure.gate.checks import CHECKS
-from models.crops import Cropping
-from models.estimator import Estimator
-from models.frontend import FrontEnd
-from models.handmade import FEATURES
-from models.learner import Learner, Loss
-from models.outliers import Familiarity
-from models.registry import NETWORKS
+from models.maps.crops import Cropping
+from models.maps.frontend import FrontEnd
+from models.networks.learner import Learner, Loss
+from models.networks.networks_by_name import NETWORKS
+from models.regression.handmade import FEATURES
+from models.trained.estimator import Estimator
+from models.trained.outliers import Familiarity
 
 SIZE, FRAMES = 112, 30
 DIMENSION = len(CHECKS) + len(FEATURES) + 4 + 3

@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
-from flagdata.arrays import FloatArray, UInt8Array
-from flagdata.findings import Finding
-from flagdata.rng import stream
+from flagdata.core.arrays import FloatArray, UInt8Array
+from flagdata.core.findings import Finding
+from flagdata.core.rng import stream
 from measure.gate import REASONS, FilmWatch
 from measure.gate.counted import reasons
 from models.conditioning import Follower, conditioning_of

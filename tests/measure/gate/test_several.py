@@ -7,10 +7,10 @@ import pytest
 from scipy.signal import lfilter
 from scipy.special import ndtr, ndtri
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import stream
 from flagdata.errors import InputError
-from flagdata.rng import stream
-from measure.gate.verdict import refused_share, refusing, window_rate
+from measure.gate.gate_verdict import refused_share, refusing, window_rate
 
 RATE = 0.05
 RECORDINGS = 40_000

@@ -8,7 +8,7 @@ import pytest
 from flagdata.errors import InputError
 from measure.gate import level
 from measure.gate.tail_probability import BODY, ExponentialTails
-from models.outliers import conformal_p
+from models.trained.outliers import conformal_p
 
 
 def test_one_more_surprise_is_e_times_rarer_in_an_exponential_tail() -> None:

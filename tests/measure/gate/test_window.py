@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.arrays import UInt8Array
-from flagdata.checksums import write_sums
+from flagdata.core.arrays import UInt8Array
+from flagdata.core.files.checksums import write_sums
 from flagdata.errors import CorruptError, InputError, NotFoundError
 from measure.gate import DISTORTIONS, REASONS, CheckedGate, Gate, judge, read, write
-from measure.gate.verdict import verdict
-from models.estimator import Estimator
+from measure.gate.gate_verdict import verdict
+from models.trained.estimator import Estimator
 from tests.measure.gate.made import film, small_model
 from tests.studies.gate import calibrated
 

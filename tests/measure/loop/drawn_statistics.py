@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
-from flagdata.rng import stream
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import stream
 from measure.forecasting import PRIOR, THETA, EffectColumn, columns, names
 from measure.inference import Evidence, NullModel, Nulls
 from measure.loop import GUST_COLUMN, LibraryJudgement, judge

@@ -13,7 +13,7 @@ from flagdata.errors import InputError
 from measure.closing import close_loop
 from measure.forecasting import Calibration, Setting
 from measure.loop import LoopOptions
-from measure.nulls import SETTLE, NullBatch, plan
+from measure.nulls import SETTLE, NullBatch, null_plan
 from measure.nulls import bank as banks
 from measure.observe import (
     AttachmentTrack,
@@ -30,8 +30,8 @@ from measure.observe import (
     sheet,
 )
 from measure.verdict import NOT_REJECTED
+from sim.cloth.material import named
 from sim.effects import EFFECTS, Effect
-from sim.material import named
 from tests.program import invoke
 
 SIZE, RATE, DURATION, NOISE, FAR, VERTICES = 0.4, 25.0, 4.6, 5e-4, 0.12, 36
@@ -105,7 +105,7 @@ def experiment(*effects: Effect, seed: int) -> Experiment:
 def bank(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Nulls of the ways that a recording without effects shows."""
     folder = tmp_path_factory.mktemp("carried")
-    banks.build(folder, plan.batches(Setting.of(experiment(seed=1)), kinds=KINDS, seed=3))
+    banks.build(folder, null_plan.batches(Setting.of(experiment(seed=1)), kinds=KINDS, seed=3))
     return folder
 
 
@@ -136,10 +136,10 @@ def test_a_strong_effect_on_a_carried_cloth_is_found_and_named(bank: Path) -> No
 def test_nulls_of_cloths_held_still_do_not_judge_one_that_is_carried(bank: Path) -> None:
     data = experiment(seed=1)
     setting = Setting.of(data)
-    loaded = plan.load_bank(bank, setting)
+    loaded = null_plan.load_bank(bank, setting)
     still = Setting.of(replace(data, recordings=tuple(replace(own, attachments=None) for own in data.recordings)))
     with pytest.raises(InputError, match="cloths were carried, that of the recordings is held still"):
-        plan.check(loaded, still)
+        null_plan.check(loaded, still)
 
 
 def test_the_ways_of_the_data_shape_their_nulls() -> None:
@@ -149,7 +149,7 @@ def test_the_ways_of_the_data_shape_their_nulls() -> None:
     assert first.attachments is not None
     moved = replace(first, attachments=first.attachments + 1e-3)
     elsewhere = replace(setting, experiment=replace(setting.experiment, recordings=(moved, *others)))
-    assert plan.design_hash(elsewhere) != plan.design_hash(setting)
+    assert null_plan.design_hash(elsewhere) != null_plan.design_hash(setting)
 
 
 def test_close_loop_judges_a_table_of_a_carried_cloth(bank: Path, tmp_path: Path) -> None:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.stats import kstest, uniform
 
-from flagdata.rng import stream
+from flagdata.core.rng import stream
 from measure.loop import estimate
-from measure.loop.selection import heterogeneity
+from measure.loop.effect_selection import heterogeneity
 
 
 def test_of_two_it_is_the_test_of_their_difference() -> None:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flagdata.rng import stream
+from flagdata.core.rng import stream
 from measure.forecasting import THETA, names
 from measure.inference import Evidence, NullModel
 from measure.loop import judge
+from measure.loop.effect_selection import withdrawn
 from measure.loop.refit import Refit
-from measure.loop.selection import withdrawn
 from measure.nulls import Reference
 from measure.verdict import Conclusion
 from tests.measure.loop.drawn_statistics import COUNT, EXPECTED, SEGMENTS, drawn, judged, named, seen

@@ -27,9 +27,9 @@ from measure.nulls import bank as banks
 from measure.observe import Experiment, Specimen, Trajectory
 from measure.probes import projected
 from measure.report import as_document, from_document, lead, page
-from measure.report.words import words
+from measure.report.verdict_words import words
 from measure.verdict import NOT_REJECTED, Conclusion, Verdict, number
-from sim.cloth import Cloth
+from sim.cloth.cloth_batch import Cloth
 from sim.effects import EFFECTS, Effect, ForceEffect, Value, strength
 from sim.workers import Job
 

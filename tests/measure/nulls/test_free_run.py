@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from measure.nulls.free_run import settled_off
 from measure.observe import Trajectory, WindTrack
 

@@ -9,7 +9,7 @@ import pytest
 
 from measure.nulls import StiffnessFactors
 from measure.nulls.stiffness import drawn
-from sim.material import named
+from sim.cloth.material import named
 
 
 def test_without_factors_it_is_the_nominal_material() -> None:

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from measure.nulls import SETTLE, tracks
-from measure.nulls.simulation import CARRIED
+from measure.nulls.null_simulation import CARRIED
 from measure.observe import Trajectory, WindTrack, carried
 
 RATE, SECONDS, FAR, FREQUENCY = 25.0, 8.0, 0.15, 0.7

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flagdata.arrays import FloatArray, IntArray
+from flagdata.core.arrays import FloatArray, IntArray
 from measure.observables import ClothWindow, View, edges_of, seen_from
 
 LENGTH, HEIGHT = 1.5, 1.0

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 import pytest
 
-from flagdata.arrays import BoolArray, FloatArray, IntArray
-from flagdata.rng import stream
+from flagdata.core.arrays import BoolArray, FloatArray, IntArray
+from flagdata.core.rng import stream
 from measure.observables import drawing
 from measure.observables.drawing import STEPS, drawn
 

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from flagdata.arrays import BoolArray, FloatArray, UInt8Array
+from flagdata.core.arrays import BoolArray, FloatArray, UInt8Array
 from measure.observables import OBSERVABLES, ClothWindow, FilmWindow, table_of
 from measure.observables.watching import Watched
 from models.conditioning import HALVED, Outliner, conditioned, halved

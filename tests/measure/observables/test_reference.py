@@ -11,7 +11,7 @@ import math
 import numpy as np
 import pytest
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from measure.observables import OBSERVABLES, View, edges_of, seen_from
 from tests.evidence import REFERENCE
 

@@ -8,9 +8,9 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from flagdata.arrays import UInt8Array
+from flagdata.core.arrays import UInt8Array
+from flagdata.core.findings import Finding
 from flagdata.errors import RefusedError
-from flagdata.findings import Finding
 from measure.commands import observe as command
 from measure.film import ConditionedFilm, FlagSize
 from measure.observables import watched, watching

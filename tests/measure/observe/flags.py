@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from measure.observe import Hold, Known, Observation, Setup, WindTrack, sheet
-from sim.material import named
-from sim.mesh import grid
+from sim.cloth.material import named
+from sim.cloth.mesh import grid
 
 WIDTH, HEIGHT, RATE = 1.2, 0.8, 50.0
 SETUP = Setup(outline=sheet(WIDTH, HEIGHT), material=named("camel-ponte-roma"), pins=Hold.HOIST)

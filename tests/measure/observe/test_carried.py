@@ -12,13 +12,13 @@ import torch
 from flagdata.errors import InputError, UsageError
 from measure.forecasting import Calibration, Forecaster, Segments, aligned, columns
 from measure.observe import Experiment, Hold, Observation, Setup, WindTrack, from_arrays, observe, parse, sheet
-from sim import handles
-from sim.anchors import AnchorTracks
-from sim.handles import Handles
+from sim.cloth import handles
+from sim.cloth.anchors import AnchorTracks
+from sim.cloth.handles import Handles
+from sim.cloth.material import named
+from sim.cloth.mesh import Diagonals, grid
+from sim.cloth.scene import Scene, assemble, upright
 from sim.integrate import BackwardEuler, SplitEuler
-from sim.material import named
-from sim.mesh import Diagonals, grid
-from sim.scene import Scene, assemble, upright
 
 SIZE, RATE, SECONDS = 0.4, 25.0, 4.0
 SETUP = Setup(

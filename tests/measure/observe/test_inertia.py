@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from measure.observe import Hold, Known, Observation, Setup, Specimen, Trajectory, WindTrack, observe, sheet
-from measure.observe.checks.inertia import check_inertia, swing, wind_shown
-from sim.air import QuadraticNormal
-from sim.material import named
-from sim.mesh import grid
+from measure.observe.checks.inertia_check import check_inertia, swing, wind_shown
+from sim.cloth.air import QuadraticNormal
+from sim.cloth.material import named
+from sim.cloth.mesh import grid
 
 WIDTH, HEIGHT, RATE, SPEED, DENSITY, GRAVITY = 1.2, 0.8, 50.0, 5.0, 1.3, 9.81
 CLOTH = named("camel-ponte-roma")

@@ -8,8 +8,8 @@ import pytest
 from flagdata.errors import InputError
 from flagdata.lake import RaggedMeshSequence
 from measure.observe import from_sequence, onto, sample
-from measure.observe.meshes import locate
-from sim.mesh import Mesh, grid
+from measure.observe.mesh_observations import locate
+from sim.cloth.mesh import Mesh, grid
 
 
 @pytest.fixture

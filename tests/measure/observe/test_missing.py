@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flagdata.arrays import BoolArray
+from flagdata.core.arrays import BoolArray
 from flagdata.errors import InputError
 from measure.observe import Known, Observation, Trajectory, observe
 from measure.observe.common import at_same_rate

@@ -13,7 +13,7 @@ from flagdata.errors import InputError
 from flagdata.ingest import read_folder
 from measure.observe import Hold, Observation, Setup, WindTrack, from_arrays, from_folder, observe, sample
 from measure.observe.describing import of_arcsim
-from sim.mesh import grid
+from sim.cloth.mesh import grid
 
 pytestmark = pytest.mark.reference
 

@@ -9,7 +9,7 @@ import pytest
 
 from flagdata.lake import Lake
 from measure.observe import observe
-from measure.observe.meshes import from_artifact
+from measure.observe.mesh_observations import from_artifact
 from sim.run import parse, simulate
 
 RECIPE = """

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import torch
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from measure.probes import REDUCED, Lines, strongest
 from measure.probes.lines import SHAPES, Spectrum
-from sim.mesh import grid
+from sim.cloth.mesh import grid
 
 PERIOD, FRAMES, SEGMENTS = 0.04, 50, 12
 SPEEDS = np.repeat([3.5, 5.0, 7.0], 4)

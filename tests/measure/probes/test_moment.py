@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from flagdata.rng import stream
+from flagdata.core.rng import stream
 from measure.forecasting import Calibration, EffectColumn, Forecaster, Segments
 from measure.observe import Trajectory
 from measure.probes import projected

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from measure.forecasting import THETA, Calibration, Cut, Forecaster, Segments, library
 from measure.forecasting.segments import Segment
 from measure.inference import Evidence, NullModel

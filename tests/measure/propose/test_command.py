@@ -14,8 +14,8 @@ import flagdata
 from flagdata.errors import InputError
 from measure.nulls import NullOptions, of_recordings
 from measure.observe import Experiment
-from measure.observe import recipe as recipes
-from measure.propose import Decision, ProposalOutcome, propose
+from measure.observe import experiment_recipe as recipes
+from measure.propose import Decision, ProposalOutcome, term_search
 from tests.program import invoke
 
 
@@ -26,7 +26,7 @@ def search(pushed: Experiment, monkeypatch: pytest.MonkeyPatch) -> Callable[[Cal
     def replaced(seek: Callable[..., ProposalOutcome]) -> None:
         monkeypatch.setattr(recipes, "load", lambda _: SimpleNamespace(level=0.1, nulls=160))
         monkeypatch.setattr(recipes, "read", lambda *_: SimpleNamespace(experiment=pushed, findings=()))
-        monkeypatch.setattr(propose, "propose", seek)
+        monkeypatch.setattr(term_search, "propose", seek)
 
     return replaced
 

@@ -18,9 +18,9 @@ from measure.propose.candidates import from_file
 from measure.propose.outcome import StrengthCourse, TermStrength
 from measure.propose.terms import TermEffect
 from measure.verdict import Estimate
+from sim.cloth.material import named
+from sim.cloth.scene import assemble, flag
 from sim.effects import apply, load
-from sim.material import named
-from sim.scene import assemble, flag
 
 ROOT = Path(__file__).resolve().parents[3]
 

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 import torch
 
-from flagdata.rng import torch_draws
+from flagdata.core.rng import torch_draws
 from measure.refine import Evaluator, FilmCamera, FixedView, Simulator, fingerprint
-from models.crops import Cropping
-from models.estimator import Estimator
-from models.frontend import FrontEnd
-from models.learner import Learner, Loss
-from models.wave import WaveNetwork
+from models.maps.crops import Cropping
+from models.maps.frontend import FrontEnd
+from models.networks.learner import Learner, Loss
+from models.networks.wave import WaveNetwork
+from models.trained.estimator import Estimator
 from sim.render import RenderParameters
-from sim.run import Recipe, reading
+from sim.run import Recipe, simulation_toml
 
 FRAMES, RATE, SIZE = 8, 25.0, 48
 SCENE = """
@@ -38,7 +38,7 @@ rate = 25.0
 
 @pytest.fixture(scope="session")
 def recipe() -> Recipe:
-    return reading.parse(SCENE, name="coarse", folder=Path(), where="test")
+    return simulation_toml.parse(SCENE, name="coarse", folder=Path(), where="test")
 
 
 @pytest.fixture(scope="session")

@@ -10,9 +10,9 @@ import pytest
 
 from flagdata.errors import CorruptError
 from measure.refine import DrawnView, Evaluator, FilmCamera, FixedView, Simulator, fingerprint
-from measure.refine.view import of_parameters
+from measure.refine.target_view import of_parameters
 from models.conditioning import VERSION
-from models.estimator import Estimator
+from models.trained.estimator import Estimator
 from sim.assets import Assets
 from sim.render import named
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from flagdata.core.rng import child_seed
 from flagdata.errors import InputError
-from flagdata.rng import child_seed
 from measure.estimate.refined import scaled
 from measure.refine import (
     QUANTITIES,
@@ -25,8 +25,8 @@ from measure.refine import (
     Target,
     refine,
 )
-from measure.refine.section import section
-from models.estimator import Estimator
+from measure.refine.refinement_section import section
+from models.trained.estimator import Estimator
 from sim.run import Recipe
 
 SETTINGS = Settings(budget=36, batch=8, seed=4)
@@ -118,7 +118,7 @@ def test_pictures_of_a_flag_four_times_as_large_have_twice_the_winds(
 ) -> None:
     """Wind goes with the root of the size at one Froude number: points, axis and captions alike, as the intervals."""
     drawn: list[Figure] = []
-    monkeypatch.setattr("measure.refine.section.figure_url", lambda figure, dpi: drawn.append(figure) or "")
+    monkeypatch.setattr("measure.refine.refinement_section.figure_url", lambda figure, dpi: drawn.append(figure) or "")
     larger = scaled(whole, 4.0)
     captions = [
         np.array(re.findall(r"step \d+: ([\d.]+) m/s", section(one, in_motion=False))).astype(float)

@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from flagdata.answer import Bound
-from flagdata.rng import stream
-from flagdata.tables import Range
-from measure.ends import limits_of
+from flagdata.core.rng import stream
+from flagdata.recipes.typed_tables import Range
+from measure.posterior_ends import limits_of
 from measure.refine import Interval, Round
 from measure.refine.procedure import _settled
 from measure.refine.refinement import intervals_of

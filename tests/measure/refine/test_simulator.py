@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flagdata.arrays import UInt8Array
+from flagdata.core.arrays import UInt8Array
 from flagdata.errors import InputError
-from flagdata.tables import Range, Scale
+from flagdata.recipes.typed_tables import Range, Scale
 from measure.refine import FilmCamera, FilmRequest, FixedView, Simulator
 from measure.refine.simulator import SimulatedScene
 from models.conditioning import conditioned

@@ -7,7 +7,7 @@ import pytest
 
 from flagdata.errors import InputError
 from measure.refine import QUANTITIES, Space
-from sim.material import named
+from sim.cloth.material import named
 from sim.run import Recipe, load
 
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from measure.report import lead, page, sentences
-from measure.report.sentences import error_warnings, heading, power_text
-from measure.report.words import words
+from measure.report import lead, page, verdict_sentences
+from measure.report.verdict_sentences import error_warnings, heading, power_text
+from measure.report.verdict_words import words
 from measure.verdict import NOT_REJECTED, Conclusion, Power, Verdict, erring, undecided
 from tests.measure.report.verdicts import about, verdict
 
@@ -109,13 +109,13 @@ def test_the_power_is_stated_for_each_effect_and_on_average() -> None:
 def test_a_suspicion_is_reported_as_stated_beforehand_and_flags_are_counted_as_what_they_are() -> None:
     whole = verdict(Conclusion.SUFFICIENT)
     counted = replace(whole.test, effective=152.0, correlation=0.01, tail=0.34, kinds=20, suspected="lift+")
-    said = sentences.test_sentence(replace(whole, test=counted))
+    said = verdict_sentences.test_sentence(replace(whole, test=counted))
     assert "along lift+ alone, suspected before the recordings were looked at," in said
     assert "(1 + 152 × the share of null flags that deviate as much) / (1 + 152)" in said
     assert "correlated by 0.010" in said
     assert "it would be 0.34" in said
     assert counted.least == 1 / 153
-    assert "suspected" not in sentences.test_sentence(whole)
+    assert "suspected" not in verdict_sentences.test_sentence(whole)
 
 
 def test_the_power_stands_before_the_verdicts_sentence_and_in_a_table() -> None:

@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 import pytest
 
-from flagdata.arrays import BoolArray, FloatArray, UInt8Array
+from flagdata.core.arrays import BoolArray, FloatArray, UInt8Array
+from flagdata.core.rng import stream
 from flagdata.errors import InputError, UsageError
-from flagdata.rng import stream
 from models.conditioning import Conditioned, conditioned
 
 HEIGHT, WIDTH, COUNT, RATE = 180, 240, 40, 25.0

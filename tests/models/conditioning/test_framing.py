@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flagdata.rng import stream
+from flagdata.core.rng import stream
 from models.conditioning.framing import Square, cut
 
 

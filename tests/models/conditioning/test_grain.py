@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flagdata.arrays import UInt8Array
+from flagdata.core.arrays import UInt8Array
 from models.conditioning import grained
 from models.conditioning.grain import DEVIATION, STILL
 

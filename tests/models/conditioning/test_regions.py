@@ -5,8 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from flagdata.arrays import Float32Array, FloatArray, UInt8Array
-from flagdata.rng import stream
+from flagdata.core.arrays import Float32Array, FloatArray, UInt8Array
+from flagdata.core.rng import stream
 from models.conditioning.regions import regions_of
 
 HEIGHT, WIDTH = 120, 200

@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from flagdata.arrays import BoolArray, UInt8Array
-from flagdata.rng import stream
+from flagdata.core.arrays import BoolArray, UInt8Array
+from flagdata.core.rng import stream
 from models.conditioning.standing import Box, Standing
 
 SIDE, COUNT = 200, 24

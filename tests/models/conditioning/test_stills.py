@@ -51,8 +51,8 @@ def test_black_bars_count_for_nothing() -> None:
 
 
 def test_weights_that_do_not_fit_are_refused(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from flagdata.checksums import write_sums
-    from models.storage import WEIGHTS, write_card, write_tensors
+    from flagdata.core.files.checksums import write_sums
+    from models.trained.model_folder import WEIGHTS, write_card, write_tensors
 
     write_card(tmp_path, {"name": "other"})
     write_tensors(tmp_path / WEIGHTS, {"weight": torch.zeros(3)})

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from models import estimator
 from models.evaluation.predict import judged_targets
+from models.trained import estimator
 
 STATED = {"wind_speed": np.array([2.0, 3.0]), "area_weight": np.array([0.1, 0.2])}
 SIZED = {"width": np.array([1.5, 1.5]), "height": np.array([1.0, np.nan])}

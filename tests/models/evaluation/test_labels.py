@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
-from models.evaluation.command import labelled
+from models.evaluation.evaluate_command import labelled
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from flagdata.arrays import Float32Array
+from flagdata.core.arrays import Float32Array
 from flagdata.errors import InputError, UnknownNameError
 from models.training import Augment
 from models.training.augment import DISTURBANCES, Strength

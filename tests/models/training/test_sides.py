@@ -10,12 +10,12 @@ from pathlib import Path
 import pyarrow as pa
 import pytest
 
+from flagdata.core.schema import Kind, catalog_schema
 from flagdata.dataset import HashedSplit
 from flagdata.dataset.sides import clips_of, divide
 from flagdata.errors import InputError, NotFoundError, RefusedError, UnknownNameError
 from flagdata.lake import Artifact, Lake
-from flagdata.schema import Kind, catalog_schema
-from models.evaluation.command import refuse_learned
+from models.evaluation.evaluate_command import refuse_learned
 from models.training import DataSpec, parse
 from tests.refusals import unrefused
 

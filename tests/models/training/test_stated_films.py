@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from models.crops import Cropping
-from models.frontend import FrontEnd
+from models.maps.crops import Cropping
+from models.maps.frontend import FrontEnd
 from models.training.stated_films import StatedFilms
 
 FRONT_END = FrontEnd(maps="wave-maps", size=24, frames=30, rate=25.0)

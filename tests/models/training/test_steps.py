@@ -17,14 +17,14 @@ import pytest
 import torch
 
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, InputError, RefusedError, UsageError
-from models.crops import Cropping
-from models.estimator import Estimator
 from models.evaluation.predict import predict
-from models.frontend import FrontEnd
-from models.learner import Learner, Loss, contrastive_loss
+from models.maps.crops import Cropping
+from models.maps.frontend import FrontEnd
+from models.networks.learner import Learner, Loss, contrastive_loss
+from models.trained.estimator import Estimator
 from models.training import Augment, DataSpec, Prepared, TrainingRecipe, checkpoint
-from models.training.recipe import LossSpec, NetworkSpec, OptimiserSpec, Precision, Schedule
 from models.training.steps import Batches, Trained, Training, TrainingDivergedError, learning_rate, validation_batches
+from models.training.training_recipe import LossSpec, NetworkSpec, OptimiserSpec, Precision, Schedule
 
 SIZE = 24
 FRONT_END = FrontEnd(maps="wave-maps", size=SIZE)
@@ -370,13 +370,13 @@ import torch
 from torch import distributed as ranks
 sys.path.insert(0, {here!r})
 from test_steps import Loss, Learner, recipe, training, small_learner
-from models.training.recipe import TrainingRecipe
+from models.training.training_recipe import TrainingRecipe
 torch.set_num_threads(1)
 rank, folder = int(sys.argv[1]), Path(sys.argv[2])
 ranks.init_process_group("gloo", init_method=f"file://{{folder}}/meet", rank=rank, world_size=2)
 TrainingRecipe.learner = small_learner
 done = training(folder / "run-2", recipe(Loss.REGRESSION, epochs=2), checkpoint_seconds=1e9).complete()
-ranks.barrier()  # as `models.training.command` has it: no rank leaves while another still talks to it
+ranks.barrier()  # as `models.training.train_command` has it: no rank leaves while another still talks to it
 if rank == 0:
     state = {{name: value.double().tolist() for name, value in done.learner.state_dict().items()}}
     (folder / "weights.json").write_text(json.dumps(state))

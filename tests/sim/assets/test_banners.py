@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from flagdata.rng import stream
+from flagdata.core.rng import stream
 from sim.assets import Assets
 from sim.assets.banners import LAYOUTS, drawn, painted
 

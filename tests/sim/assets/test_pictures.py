@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from flagdata.core.rng import stream
 from flagdata.errors import InputError, UnknownNameError
-from flagdata.rng import stream
 from sim.assets import BACKGROUNDS, TEXTURES, Assets
-from sim.assets.noise import fractal
+from sim.assets.smooth_fields import fractal
 from tests.refusals import unrefused
 
 SEEDED = [kind for kind in TEXTURES if kind != "flag"]

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 
 from flagdata.errors import ConflictError, NotFoundError
 from sim.blender import environment, launch
-from sim.blender.command import blender_setup
+from sim.blender.blender_setup import blender_setup
 from sim.blender.environment import BlenderError
 
 ROOT = Path(__file__).resolve().parents[3]

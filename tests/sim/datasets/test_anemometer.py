@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flagdata.schema import SampleFlag
+from flagdata.core.schema import SampleFlag
 from sim.datasets import AnemometerSpec, DatasetRecipe, Truth, anemometer, casts
 from sim.run import Crew
 

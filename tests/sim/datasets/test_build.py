@@ -22,8 +22,8 @@ from flagdata.lake import Lake, doctor, object_names, verify
 from flagdata.record import Record
 from sim.datasets import DatasetRecipe
 from sim.datasets.build import Build, BuildReport
-from sim.datasets.jobs import PutSequences
-from sim.datasets.plan import length
+from sim.datasets.build_jobs import PutSequences
+from sim.datasets.build_plan import length
 from sim.datasets.shard import Shard
 from sim.workers import Job, Scheduled
 from tests.clusters import Cluster

@@ -8,11 +8,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from flagdata.core.rng import stream
+from flagdata.core.workload import one_thread
 from flagdata.lake import MeshSequence
 from flagdata.record import Record
-from flagdata.rng import stream
-from flagdata.workload import one_thread
-from sim.datasets import DatasetRecipe, Roll, Sequences, casts, jobs
+from sim.datasets import DatasetRecipe, Roll, Sequences, build_jobs, casts
 from tests.sim.datasets.leakage import FEATURES, Surroundings, accuracies, dealt_anew, features_of
 
 SEQUENCES, FILMS = 40, 80
@@ -43,14 +43,14 @@ def films(make: Callable[..., DatasetRecipe], tmp_path_factory: pytest.TempPathF
     roll = Roll(cast=cast)
     sequences: dict[int, MeshSequence] = {}
     for first in range(0, SEQUENCES, 2):
-        for outcome in jobs.simulate(cast.simulation, 0, [first, first + 1], "cpu").outcomes:
+        for outcome in build_jobs.simulate(cast.simulation, 0, [first, first + 1], "cpu").outcomes:
             assert outcome.sequence is not None
             sequences[outcome.member.index] = outcome.sequence
     members = tuple((cast, index, roll.id(index)) for index in range(SEQUENCES))
     features, owners, parameters = [], [], []
     path = tmp_path_factory.mktemp("films") / "film.mcap"
     for place, film in enumerate(Sequences(recipe=recipe, side="train", members=members).films()):
-        done = jobs.film(recipe, film, sequences[film.index], "cpu")
+        done = build_jobs.film(recipe, film, sequences[film.index], "cpu")
         path.write_bytes(done.data)
         record = Record.open(path)
         features.append(features_of(film.name, record, order=place, size=len(done.data)))

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import torch
 
+from sim.cloth.mesh import Mesh, grid
+from sim.cloth.system import System
 from sim.effects import Effect, apply
-from sim.mesh import Mesh, grid
-from sim.system import System
 
 
 @pytest.fixture

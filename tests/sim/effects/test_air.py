@@ -10,14 +10,14 @@ import pytest
 import torch
 
 from flagdata.errors import UsageError
-from sim.air import QuadraticNormal, Stokes
+from sim.cloth.air import QuadraticNormal, Stokes
+from sim.cloth.handles import Handles
+from sim.cloth.inertia import mean_normal_rates, mean_normals
+from sim.cloth.material import isotropic, named
+from sim.cloth.mesh import grid
+from sim.cloth.scene import Scene, assemble
 from sim.effects import EFFECTS, AddedMass, Lift, Permeability, Porosity, PowerLawDrag, TangentialLinearDrag, apply
-from sim.handles import Handles
-from sim.inertia import mean_normal_rates, mean_normals
 from sim.integrate import advance
-from sim.material import isotropic, named
-from sim.mesh import grid
-from sim.scene import Scene, assemble
 from tests.sim.conftest import PLAIN, make_system
 
 AirDensityChange = EFFECTS["air-density"]

@@ -9,11 +9,11 @@ import pytest
 import torch
 
 from flagdata.errors import UsageError
-from sim.air import QuadraticNormal
+from sim.cloth.air import QuadraticNormal
+from sim.cloth.handles import Handles, corners
+from sim.cloth.mesh import grid
 from sim.effects import EFFECTS, Slack, apply
-from sim.handles import Handles, corners
 from sim.integrate import BackwardEuler, JointBatch, SplitEuler, advance
-from sim.mesh import grid
 from tests.sim.conftest import PLAIN, make_system
 
 FullHoist = EFFECTS["full-hoist"]

@@ -10,13 +10,13 @@ import pytest
 import torch
 
 from flagdata.errors import UsageError
-from sim import bending
-from sim.air import QuadraticNormal
+from sim.cloth import bending
+from sim.cloth.air import QuadraticNormal
+from sim.cloth.handles import Handles
+from sim.cloth.material import isotropic
+from sim.cloth.mesh import Mesh, grid
 from sim.effects import EFFECTS, HemMass, InternalDamping, apply
-from sim.handles import Handles
 from sim.integrate import advance, stable_step
-from sim.material import isotropic
-from sim.mesh import Mesh, grid
 from tests.sim.conftest import PLAIN, make_system
 
 HemStiffness = EFFECTS["hem-stiffness"]

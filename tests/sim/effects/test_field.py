@@ -9,9 +9,9 @@ import pytest
 import torch
 from torch import Tensor
 
+from sim.cloth.material import named
+from sim.cloth.scene import assemble, flag
 from sim.effects import Flat, Seen, heavier
-from sim.material import named
-from sim.scene import assemble, flag
 
 SHAPES = ("everywhere", "hoist", "fly", "upper", "lower", "upper_fly", "lower_fly")
 FIELDS = (

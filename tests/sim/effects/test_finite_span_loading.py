@@ -9,14 +9,14 @@ import pytest
 import torch
 from scipy.special import k0, k1
 
-from flagdata.arrays import FloatArray
-from sim.cloth import Cloth
+from flagdata.core.arrays import FloatArray
+from sim.cloth.cloth_batch import Cloth
+from sim.cloth.material import named
+from sim.cloth.mesh import grid
+from sim.cloth.scene import assemble, flag
+from sim.cloth.system import InapplicableError
 from sim.effects import FiniteSpanLoading, apply
 from sim.effects.finite_span_loading import cosines, profile_over_height, relative_masses, strip_mass
-from sim.material import named
-from sim.mesh import grid
-from sim.scene import assemble, flag
-from sim.system import InapplicableError
 
 
 def potential_flow(wavenumber: float, *, panels: int = 80) -> tuple[float, FloatArray, FloatArray]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 import torch
 
+from flagdata.core.rng import stream
 from flagdata.errors import InputError, UnknownNameError, UsageError
-from flagdata.rng import stream
 from sim.effects import EFFECTS, Porosity, Shear, apply
 from tests.sim.conftest import PLAIN, make_system
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import torch
 
+from sim.cloth.mesh import grid
 from sim.effects import ReactiveLoading
-from sim.mesh import grid
 from tests.sim.conftest import PLAIN, make_system
 
 U, K, OMEGA, AMPLITUDE, MASS = 6.0, 9.0, 100.0, 1e-4, 0.4

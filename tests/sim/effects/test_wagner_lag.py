@@ -10,13 +10,13 @@ import torch
 from scipy.special import hankel2
 
 from flagdata.errors import UsageError
-from sim import scene
-from sim.air import Stokes, face_wind
+from sim.cloth import scene
+from sim.cloth.air import Stokes, face_wind
+from sim.cloth.material import named
+from sim.cloth.scene import assemble
 from sim.effects import apply
 from sim.effects.wagner_lag import HeldBack, WagnerLag
 from sim.integrate import Symplectic
-from sim.material import named
-from sim.scene import assemble
 from tests.sim.conftest import PLAIN, make_system
 
 SPEED = 6.0

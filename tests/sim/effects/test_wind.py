@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import torch
 
+from flagdata.core.rng import stream
+from flagdata.core.schema import SampleFlag
 from flagdata.errors import InputError, UsageError
-from flagdata.rng import stream
-from flagdata.schema import SampleFlag
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 from sim.effects import EFFECTS, Gusts, Shear, VerticalWind
 from tests.refusals import unrefused
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from flagdata.arrays import UInt8Array
+from flagdata.core.arrays import UInt8Array
 from sim.render import Raster, RenderParameters
 from tests.sim.render.pieces import BLACK, WHITE, Given, plain
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import torch
 
-from flagdata.arrays import FloatArray, IntArray, UInt8Array
+from flagdata.core.arrays import FloatArray, IntArray, UInt8Array
 from sim.assets import Assets
 from sim.render import Meshes
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError, UnknownNameError, UsageError
-from flagdata.tables import Range
+from flagdata.recipes.typed_tables import Range
 from sim.assets import BACKGROUNDS, TEXTURES, Assets
 from sim.render import RenderParameters
-from sim.render import prior as priors
+from sim.render import render_prior as priors
 from tests.refusals import unrefused
 
 DRAWS = 150

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import flagdata
+from flagdata.core.schema import Kind
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.lake import Artifact, Lake, MeshSequence, read_meshes
 from flagdata.record import RecordWriter
-from flagdata.schema import Kind
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 from sim.run import Recipe, of_content
 from tests.program import Ended, Run, invoke
 from tests.refusals import unrefused
@@ -78,7 +78,7 @@ def expected(first: float, toward: float) -> np.ndarray:
 
 def test_a_log_from_python_blows_about_its_mean_from_the_instant_that_is_named() -> None:
     series = log()
-    wind = flagdata.series.Wind(
+    wind = flagdata.answer.film_series.Wind(
         name="cup",
         time=np.arange(40) / 2,
         start=int(series.time[0]),

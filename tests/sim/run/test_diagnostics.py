@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import torch
 
-from sim.air import NO_AIR
+from sim.cloth.air import NO_AIR
+from sim.cloth.material import Material, isotropic, named
+from sim.cloth.scene import assemble, flag
 from sim.integrate import Symplectic, advance
-from sim.material import Material, isotropic, named
 from sim.run import CRUMPLED, Crew, Stepper, parse, run
-from sim.run.batch import Monitor
-from sim.scene import assemble, flag
+from sim.run.member_batch import Monitor
 
 PONTE_ROMA = replace(named("camel-ponte-roma"), damping=0.0)
 CONSTANT = isotropic(

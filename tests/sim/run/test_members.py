@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import torch
 
+from sim.cloth.material import named
+from sim.cloth.scene import upright
 from sim.effects import EFFECTS
-from sim.material import named
 from sim.run import Crew, parse
-from sim.scene import upright
 from tests.sim.run.conftest import make_recipe, small
 
 CAMEL = named("camel-ponte-roma")

@@ -134,7 +134,7 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path: Path) -> None:
 
 
 def test_what_fails_is_reported_and_not_stored(lake: Lake) -> None:
-    # With a hundredth of the declared damping a sheet crumples where there is wind (`sim.run.batch.CRUMPLED`).
+    # With a hundredth of the declared damping a sheet crumples where there is wind (`sim.run.member_batch.CRUMPLED`).
     recipe = make_recipe(material='damping = { low = 1e-9, high = 1e-3, scale = "log" }')
     recipe = replace(recipe, count=8, time=replace(recipe.time, settle=2.4))
     report = simulate(lake, recipe)

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 import flagdata
+from flagdata.answer.simulated import Simulated
 from flagdata.errors import LimitError, UnknownNameError, UsageError
 from flagdata.ingest import read_folder
 from flagdata.lake import Lake, RaggedMeshSequence, read_meshes
-from flagdata.simulated import Simulated
 from measure.observe import from_sequence
-from sim.limits import StrainLimits
+from sim.cloth.limits import StrainLimits
+from sim.cloth.sizing import Remeshing
 from sim.render import Meshes
 from sim.run import Crew, Recipe, load, parse, simulate
-from sim.sizing import Remeshing
 
 TEXT = """
 seed = 1

@@ -31,9 +31,9 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from deltalake import DeltaTable, write_deltalake
 
+from flagdata.core.rng import stream
+from flagdata.core.schema import Kind, catalog_schema
 from flagdata.lake import Artifact, Lake
-from flagdata.rng import stream
-from flagdata.schema import Kind, catalog_schema
 from flagdata.view import Media, Site, answer
 
 ROWS = int(os.environ.get("FLAGDATA_BENCH_ROWS", "1_000_000"))
@@ -94,7 +94,7 @@ print(json.dumps(found))
 """
 _WHOLE = {
     "ls": """
-from flagdata.commands.artifacts import ls
+from flagdata.commands.list_artifacts import ls
 lap()
 with redirect_stdout(StringIO()):
     ls.command.main(["--lake", sys.argv[1]], standalone_mode=False)""",

@@ -17,15 +17,15 @@ from typing import Any
 
 import torch
 
-from flagdata.rng import stream
-from sim.air import Stokes
-from sim.contact import Contact
+from flagdata.core.rng import stream
+from sim.cloth.air import Stokes
+from sim.cloth.contact import Contact
+from sim.cloth.material import named
+from sim.cloth.scene import assemble, flag
+from sim.cloth.state import State
+from sim.cloth.system import System
 from sim.effects import EFFECTS, apply
 from sim.integrate import BackwardEuler, SplitEuler, Symplectic, advance
-from sim.material import named
-from sim.scene import assemble, flag
-from sim.state import State
-from sim.system import System
 
 BATCH = 16
 STEPS = 60

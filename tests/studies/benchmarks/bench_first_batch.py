@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from flagdata.core.rng import stream
+from flagdata.core.schema import CLIP_FRAMES
 from flagdata.lake import Lake
-from flagdata.rng import stream
-from flagdata.schema import CLIP_FRAMES
 from tests.s3 import BUCKET, SECRETS, moto
 from tests.studies.benchmarks.bench_pairs import make_recording
 

@@ -18,10 +18,10 @@ import pyarrow as pa
 import zarr
 from deltalake import write_deltalake
 
-from flagdata.checksums import size_of
+from flagdata.core.files.checksums import size_of
+from flagdata.core.rng import stream
+from flagdata.core.schema import CATALOG, CLIP_FRAMES, Kind, catalog_schema
 from flagdata.lake import Artifact, Lake, MeshSequence, read_meshes, write_meshes
-from flagdata.rng import stream
-from flagdata.schema import CATALOG, CLIP_FRAMES, Kind, catalog_schema
 
 ROWS = 10_000
 COMMITS = 64  # two rounds of tidying

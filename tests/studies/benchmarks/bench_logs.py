@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
+from flagdata.core.rng import stream
 from flagdata.lake import Lake
 from flagdata.record import Record
-from flagdata.rng import stream
 
 ROWS = {"day": 1_700_000, "small": 2_000}
 _HEADER = (
@@ -30,7 +30,7 @@ _HEADER = (
 )
 _WAYS = {
     "columns": "",
-    "rows": "from flagdata.ingest.anemometer.text.rows import RowReader; RowReader.blocks = RowReader.rows; ",
+    "rows": "from flagdata.ingest.anemometer.text.cut_lines import RowReader; RowReader.blocks = RowReader.rows; ",
 }
 _PEAK = """
 import atexit, sys

@@ -19,9 +19,9 @@ from typing import Any
 import av
 import numpy as np
 
-from flagdata.arrays import UInt8Array
-from flagdata.film import Film
-from flagdata.rng import child_seed
+from flagdata.core.arrays import UInt8Array
+from flagdata.core.rng import child_seed
+from flagdata.ingest.films.film import Film
 from measure.anemometer import Network, gate_beside, network
 from measure.estimate import Options, measure, of_model
 from measure.film import FilmReading, FlagSize, subjects

@@ -16,9 +16,9 @@ import torch
 from scipy import ndimage
 from torch.nn import functional
 
-from models import estimator
-from models.frontend import FrontEnd, Maps, standardised
-from models.spectral import SpectralDecomposition
+from models.maps.frontend import FrontEnd, Maps, standardised
+from models.maps.spectral_layer import SpectralDecomposition
+from models.trained import estimator
 from models.training import load
 
 _RUNS = 31

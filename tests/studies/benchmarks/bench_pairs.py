@@ -22,12 +22,12 @@ import webdataset
 from scipy.ndimage import gaussian_filter
 
 import flagdata
+from flagdata.core.rng import stream
+from flagdata.core.schema import CLIP_FRAMES, FRAME_RATE, FRAME_SIZE, Kind
 from flagdata.dataset import DecodedCache, Pairs, clip_rows
 from flagdata.lake import Artifact, Lake
 from flagdata.record import Record, RecordWriter
-from flagdata.rng import stream
-from flagdata.schema import CLIP_FRAMES, FRAME_RATE, FRAME_SIZE, Kind
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 from flagdata.timebase import NANOSECONDS
 
 START = 1_777_636_800 * NANOSECONDS  # 2026-05-01T12:00:00Z

@@ -19,11 +19,11 @@ from pathlib import Path
 from typing import Any
 
 import flagdata
+from flagdata.core.schema import CLIP_FRAMES
 from flagdata.errors import FlagdataError
 from flagdata.export import Export, export
 from flagdata.lake import Lake
 from flagdata.record import Record
-from flagdata.schema import CLIP_FRAMES
 from tests.s3 import BUCKET, SECRETS, moto
 from tests.studies.benchmarks.bench_pairs import make_recording, make_shards
 from tests.studies.validation.environments import DATASETS, LANCE, LEROBOT, Environment

@@ -16,10 +16,10 @@ import simplejpeg
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from flagdata.arrays import UInt8Array
+from flagdata.core.arrays import UInt8Array
+from flagdata.core.rng import stream
+from flagdata.core.schema import CLIP_FRAMES, FRAME_SIZE, TOPIC_IMAGE
 from flagdata.record import Coding, Record, RecordWriter
-from flagdata.rng import stream
-from flagdata.schema import CLIP_FRAMES, FRAME_SIZE, TOPIC_IMAGE
 
 FRAMES = {Coding.JPEG: 12_000, Coding.H264: 1_500}
 CLIPS = 60

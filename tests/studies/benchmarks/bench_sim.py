@@ -19,14 +19,14 @@ from typing import Any
 import numpy as np
 import torch
 
-from sim.contact import Contact
+from sim.cloth.contact import Contact
+from sim.cloth.limits import StrainLimits
+from sim.cloth.material import named
+from sim.cloth.scene import assemble, flag
+from sim.cloth.state import State
+from sim.cloth.system import System
 from sim.integrate import Backend, BackwardEuler, Symplectic, advance, stable_step
 from sim.kernel import Kernel
-from sim.limits import StrainLimits
-from sim.material import named
-from sim.scene import assemble, flag
-from sim.state import State
-from sim.system import System
 from tests.evidence import REFERENCE
 
 FRAME = 0.04

@@ -21,12 +21,12 @@ from typing import Any
 import numpy as np
 import torch
 
+from sim.cloth.material import named
+from sim.cloth.scene import assemble, flag
+from sim.cloth.state import State
+from sim.cloth.system import System
 from sim.compiler import compiler
 from sim.integrate import Backend, advance, stable_step
-from sim.material import named
-from sim.scene import assemble, flag
-from sim.state import State
-from sim.system import System
 
 BATCH = 16
 STEPS = 60
@@ -165,8 +165,8 @@ _MEASURE = """
 import json, sys
 import torch
 from sim.integrate.symplectic import Symplectic, Backend
-from sim.material import named
-from sim.scene import assemble, flag
+from sim.cloth.material import named
+from sim.cloth.scene import assemble, flag
 columns, batch = int(sys.argv[1]), int(sys.argv[2])
 torch.set_num_threads(1)
 def peak():

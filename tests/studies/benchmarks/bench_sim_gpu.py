@@ -18,14 +18,14 @@ from typing import Any
 
 import torch
 
-from models.frontend import FrontEnd
-from models.learner import Loss, build
+from models.maps.frontend import FrontEnd
+from models.networks.learner import Loss, build
+from sim.cloth.material import named
+from sim.cloth.scene import assemble, flag
+from sim.cloth.state import State
+from sim.cloth.system import System
 from sim.integrate import Backend, Symplectic, advance
 from sim.kernel_warp import leapfrog
-from sim.material import named
-from sim.scene import assemble, flag
-from sim.state import State
-from sim.system import System
 
 FRAME = 0.04
 FLAGS = (256, 1024, 4096, 16384, 65536)

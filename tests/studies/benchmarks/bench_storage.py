@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.arrays import UInt8Array
+from flagdata.core.arrays import UInt8Array
+from flagdata.core.rng import stream
+from flagdata.core.schema import CLIP_FRAMES
 from flagdata.lake.objects import RemoteObjects
 from flagdata.record import Record, RecordWriter
-from flagdata.rng import stream
-from flagdata.schema import CLIP_FRAMES
 from flagdata.storage import RemotePath
 from tests.s3 import BUCKET, SECRETS, moto
 

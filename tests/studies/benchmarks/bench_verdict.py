@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from flagdata.rng import child_seed
+from flagdata.core.rng import child_seed
 from measure.forecasting import Setting
 from measure.loop import LoopOptions, solve
 from measure.nulls import bank as banks

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from flagdata.core.provenance import canonical, digest
 from flagdata.errors import CorruptError
-from flagdata.provenance import canonical, digest
 from tests.studies.challenge.recipe import Kind
 
 

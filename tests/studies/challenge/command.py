@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flagdata.console import LakePlace, LocalPath, document, echo, echo_lines, progress, say
+from flagdata.core.console import LakePlace, LocalPath, document, echo, echo_lines, progress, say
 from flagdata.errors import UsageError
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def challenge() -> None:
 @json_option
 def make(folder: Path, recipe: str, seed: int, count: int, workers: int, as_json: bool) -> None:
     """Draw keys, simulate, and write sealed data sets into a new folder; one that was stopped goes on."""
-    from flagdata.workload import announced
+    from flagdata.core.workload import announced
     from tests.studies.challenge.make import make as make_challenge
     from tests.studies.challenge.make import workload
     from tests.studies.challenge.recipe import load
@@ -110,7 +110,7 @@ def bank(
     """Simulate nulls that all sets of a recipe share, by what participants know; a build that was stopped goes on."""
     from flagdata.lake import Lake
     from measure.nulls import bank as banks
-    from measure.nulls.workload import of_batches
+    from measure.nulls.null_workload import of_batches
     from tests.studies.challenge.nulls import claim, nulls_of
 
     lake = None if lake_path is None else Lake.open(lake_path)
@@ -144,9 +144,9 @@ def bank(
 @json_option
 def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path | None, as_json: bool) -> None:
     """Judge the sets that have no verdict yet, and file the verdicts with their hashes."""
-    from flagdata.caches import user_cache
+    from flagdata.core.files.caches import user_cache
     from measure.cloth import announced
-    from measure.cloth.command import workload
+    from measure.cloth.close_films import workload
     from measure.loop import LoopOptions
     from measure.nulls import of_recordings
     from tests.studies.challenge.filing import filed

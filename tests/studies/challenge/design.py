@@ -10,8 +10,8 @@ from typing import TypeVar
 
 import numpy as np
 
+from flagdata.core.rng import stream
 from flagdata.errors import UsageError
-from flagdata.rng import stream
 from sim.effects import ClothEffect
 from tests.studies.challenge.answer_key import Acting, AnswerKey
 from tests.studies.challenge.classes import class_of

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from flagdata.documents import read_json
+from flagdata.core.files.outputs import rewrite
+from flagdata.core.provenance import file_hash
 from flagdata.errors import ConflictError, CorruptError, RefusedError
-from flagdata.outputs import rewrite
-from flagdata.provenance import file_hash
+from flagdata.recipes.documents import read_json
 from measure.verdict import Verdict
 from tests.studies.challenge.folder import ChallengeFolder, write_json
 

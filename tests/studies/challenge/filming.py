@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 import torch
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import child_seed, stream
 from flagdata.lake import MeshSequence
-from flagdata.rng import child_seed, stream
 from flagdata.timebase import NANOSECONDS
-from measure.camera import write_film
+from measure.simulated_camera import write_film
 from sim.assets import Assets
 from sim.effects import AnemometerLag
-from sim.render import prior
+from sim.render import render_prior
 from tests.studies.challenge.answer_key import AnswerKey
 from tests.studies.challenge.films import SCHEMA
 from tests.studies.challenge.meshes import mesh_of
@@ -68,7 +68,8 @@ def films_of(
             "exposure_bias": -0.3,
         }
         look = replace(
-            prior.named("outdoor").with_quantities(quantities, source="the challenge"), backgrounds=filming.backgrounds
+            render_prior.named("outdoor").with_quantities(quantities, source="the challenge"),
+            backgrounds=filming.backgrounds,
         )
         zeta = look.draw(child_seed(seed, name, "look", index), Assets())
         write_film(

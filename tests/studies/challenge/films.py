@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.documents import read_json
+from flagdata.core.findings import Finding
 from flagdata.errors import InputError, NotFoundError
-from flagdata.findings import Finding
+from flagdata.recipes.documents import read_json
 from measure.cloth import AZIMUTH, ELEVATION, Flag, Log, Normal, Observed, Uncertain
 
 SCHEMA = "flagdata.challenge-films/1"
@@ -52,7 +52,7 @@ class Filmed:
         Raises:
             FlagdataError: in none of the films a flag is found.
         """
-        from flagdata.film import CameraFilm
+        from flagdata.ingest.films.film import CameraFilm
         from measure.cloth import Part, usable
         from measure.film import ConditionedFilm, FlagSize
 

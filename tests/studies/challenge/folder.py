@@ -20,16 +20,16 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.arrays import Float32Array, FloatArray
-from flagdata.documents import read_json
+from flagdata.core.arrays import Float32Array, FloatArray
+from flagdata.core.files.outputs import rewrite
+from flagdata.core.provenance import canonical, digest, file_hash
 from flagdata.errors import CorruptError, InputError, NotFoundError, UnknownNameError
-from flagdata.outputs import rewrite
-from flagdata.provenance import canonical, digest, file_hash
-from flagdata.recipes import is_name
+from flagdata.recipes.documents import read_json
+from flagdata.recipes.shelves import is_name
 from measure.observe import Experiment, Specimen, Trajectory, WindTrack, as_seen
-from sim.handles import corners
-from sim.material import named
-from sim.mesh import grid
+from sim.cloth.handles import corners
+from sim.cloth.material import named
+from sim.cloth.mesh import grid
 from tests.studies.challenge.films import Filmed, read_films
 
 _EPOCH = 1_600_000_000  # of every file of a set: the time of writing would show which sets were simulated together

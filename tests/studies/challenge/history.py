@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from flagdata.core.files.outputs import check_rewrite, rewrite
 from flagdata.errors import ConflictError, CorruptError
-from flagdata.outputs import check_rewrite, rewrite
 
 KEYS = ("challenge", "title", "code_version", "criteria", "sets")
 """Columns before the shares: the folder's name, its title, the grader's code, hashes of the verdicts' criteria divided

@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.arrays import Float32Array, FloatArray
-from flagdata.documents import read_json
+from flagdata.core.arrays import Float32Array, FloatArray
+from flagdata.core.files.outputs import check_folder, fresh_folder
+from flagdata.core.provenance import code_version, recipe_hash
+from flagdata.core.rng import stream
 from flagdata.errors import FlagdataError
-from flagdata.outputs import check_folder, fresh_folder
-from flagdata.provenance import code_version, recipe_hash
-from flagdata.rng import stream
-from sim.handles import ARCSIM_STIFFNESS
-from sim.scene import GRAVITY
+from flagdata.recipes.documents import read_json
+from sim.cloth.handles import ARCSIM_STIFFNESS
+from sim.cloth.scene import GRAVITY
 from sim.workers import single_threaded
 from tests.studies.challenge import folder as files
 from tests.studies.challenge.answer_key import AnswerKey, seal

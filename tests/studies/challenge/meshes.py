@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from flagdata.arrays import FloatArray
-from sim.mesh import Mesh, grid
+from flagdata.core.arrays import FloatArray
+from sim.cloth.mesh import Mesh, grid
 from tests.studies.challenge.recipe import ChallengeRecipe, Diagonals, Numerics
 
 
 def mesh_of(numerics: Numerics, *, width: float, height: float) -> Mesh:
-    """A grid of columns × rows cells, vertices in the order of `sim.mesh.grid`."""
+    """A grid of columns × rows cells, vertices in the order of `sim.cloth.mesh.grid`."""
     mesh = grid(width=width, height=height, columns=numerics.columns, rows=numerics.rows)
     if numerics.diagonals is Diagonals.ALTERNATE:
         return mesh

@@ -9,20 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.documents import read_json
+from flagdata.core.files.outputs import check_folder
+from flagdata.core.provenance import code_version, recipe_hash
+from flagdata.core.rng import child_seed, stream
 from flagdata.errors import ConflictError, InputError, UsageError
 from flagdata.lake import Lake
-from flagdata.outputs import check_folder
-from flagdata.provenance import code_version, recipe_hash
-from flagdata.rng import child_seed, stream
+from flagdata.recipes.documents import read_json
 from measure.forecasting import Cut, Setting
-from measure.nulls import NullBatch, plan
+from measure.nulls import NullBatch, null_plan
 from measure.nulls import bank as banks
 from measure.observe import Specimen
-from measure.observe import recipe as recipes
-from sim import handles
-from sim.material import named
-from sim.mesh import grid
+from measure.observe import experiment_recipe as recipes
+from sim.cloth import handles
+from sim.cloth.material import named
+from sim.cloth.mesh import grid
 from tests.studies.challenge.folder import HEIGHT, MODEL_COLUMNS, MODEL_ROWS, write_json
 from tests.studies.challenge.meshes import layout
 from tests.studies.challenge.recipe import ChallengeRecipe, load
@@ -108,8 +108,8 @@ def nulls_of(recipe: str, *, seed: int, kinds: int, lake: Lake | None) -> tuple[
         return Origin(title=loaded.title, recipe=recipe_hash(_content(loaded))), made
     experiment = recipes.load(path)
     setting = Setting.of(recipes.read(experiment, lake).experiment)
-    origin = Origin(title=experiment.title, recipe=plan.design_hash(setting))
-    return origin, plan.batches(setting, kinds=kinds, seed=seed)
+    origin = Origin(title=experiment.title, recipe=null_plan.design_hash(setting))
+    return origin, null_plan.batches(setting, kinds=kinds, seed=seed)
 
 
 def _content(recipe: ChallengeRecipe) -> dict[str, Any]:

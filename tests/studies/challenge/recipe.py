@@ -14,7 +14,7 @@ All values are SI. A *range* is `{ low = …, high = …, scale = "linear" | "lo
                       distance; azimuth-sigma, elevation-sigma, distance-sigma (a share): their standard uncertainty,
                       by which the true place differs; height: of the flag's middle above the ground;
                       weight-sigma: standard error of the stated area weight (a share), 0 where none is stated;
-                      backgrounds: kinds that are behind the flag, see `sim.render.prior`
+                      backgrounds: kinds that are behind the flag, see `sim.render.render_prior`
     [numerics.NAME]   columns, rows, diagonals, integrator, step, thickness: of contact, none where it is 0; damping
     [effects.NAME]    parameter, range, negative: share of the sets with the other sign; an effect of the library;
                       values: magnitudes in place of a range; sets of this effect alone have them in turn
@@ -32,12 +32,12 @@ from typing import Annotated, Any, TypeAlias
 
 from msgspec import Meta
 
-from flagdata import tables
 from flagdata.errors import InputError, LimitError
-from flagdata.recipes import Shelf, parsed
-from flagdata.registry import Registry
-from flagdata.tables import POSITIVE, WHOLE_LIMIT, Count, Named, NotNegative, Positive, Range
-from sim import material
+from flagdata.recipes import typed_tables
+from flagdata.recipes.registry import Registry
+from flagdata.recipes.shelves import Shelf, parsed
+from flagdata.recipes.typed_tables import POSITIVE, WHOLE_LIMIT, Count, Named, NotNegative, Positive, Range
+from sim.cloth import material
 
 
 class _Beside(Shelf):
@@ -238,15 +238,15 @@ def parse(text: str, *, where: str) -> ChallengeRecipe:
     from sim.effects import EFFECTS
     from tests.studies.challenge.outside import OUTSIDE
 
-    form = tables.read(_Form, parsed(text, where=where), where=where)
+    form = typed_tables.read(_Form, parsed(text, where=where), where=where)
     flag, log, films, inside = form.flag, form.log, form.films, f"{where} [recordings]"
     for name in flag.materials:
         material.named(name, where=f"{where} [flag]")
     if films is None:
-        run = marked = tables.read(_MarkerRecordings, form.recordings, where=inside)
+        run = marked = typed_tables.read(_MarkerRecordings, form.recordings, where=inside)
         rates, noises = tuple(_whole("rates", rate, where=inside) for rate in marked.rates), marked.noises
     else:
-        run = tables.read(_Recordings, form.recordings, where=inside)
+        run = typed_tables.read(_Recordings, form.recordings, where=inside)
         rates, noises = (films.rate,), (0.0,)
     for name, numerics in form.numerics.items():
         _check(numerics, where=f"{where} [numerics] [{name}]")
@@ -369,7 +369,7 @@ def _strengths(effects: Mapping[str, Mapping[str, Any]], known: Registry, *, whe
         }
         inside = f"{where} [{name}]"
         usual = {"parameter": strengths[0], "range": _NOMINAL, "negative": 0.0}
-        made = Strengths(**{**usual, **tables.entries(types, content, where=inside)})
+        made = Strengths(**{**usual, **typed_tables.entries(types, content, where=inside)})
         if any(value <= 0 for value in made.values):
             raise InputError(
                 "values has magnitudes that are not above 0", where=inside, fix="say by negative which sets differ"

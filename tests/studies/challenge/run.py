@@ -12,8 +12,8 @@ from multiprocessing import get_context
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Protocol
 
+from flagdata.core.rng import child_seed
 from flagdata.errors import FlagdataError
-from flagdata.rng import child_seed
 from measure.verdict import Verdict
 from sim.workers import single_threaded
 from tests.studies.challenge.filing import Filing, file, filed, verdict_json

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flagdata.markdown import plain, table
-from flagdata.outputs import check_files, write_files
-from flagdata.pages.pictures import png
-from flagdata.provenance import code_version
+from flagdata.answer.markdown import plain, table
+from flagdata.core.files.outputs import check_files, write_files
+from flagdata.core.provenance import code_version
+from flagdata.pages.page_pictures import png
 from tests.studies.challenge.classes import class_of
 from tests.studies.challenge.rates import Power
 from tests.studies.challenge.recipe import Kind

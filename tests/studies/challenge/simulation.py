@@ -10,18 +10,18 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from flagdata.arrays import Float32Array, FloatArray
+from flagdata.core.arrays import Float32Array, FloatArray
+from flagdata.core.rng import stream
 from flagdata.errors import FlagdataError, UsageError
-from flagdata.rng import stream
-from sim.batch import Batch, DivergedError, Divergence
-from sim.contact import Contact
+from sim.cloth.contact import Contact
+from sim.cloth.handles import Handles, corners
+from sim.cloth.material import Material, named
+from sim.cloth.scene import Scene, assemble, roughened
+from sim.cloth.state import State
+from sim.cloth.system import System
 from sim.effects import Effect, Gusts, apply
-from sim.handles import Handles, corners
 from sim.integrate import BackwardEuler, Integrator, Symplectic
-from sim.material import Material, named
-from sim.scene import Scene, assemble, roughened
-from sim.state import State
-from sim.system import System
+from sim.run.simulation_loop import Batch, DivergedError, Divergence
 from sim.wind import Beyond, Even, SampledWind, VonKarman
 from tests.studies.challenge.answer_key import Acting, AnswerKey
 from tests.studies.challenge.meshes import mesh_of

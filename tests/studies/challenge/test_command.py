@@ -10,8 +10,8 @@ import pytest
 import torch
 from click.testing import CliRunner
 
-from flagdata import outputs
 from flagdata.cli import main
+from flagdata.core.files import outputs
 from measure.verdict import Conclusion
 from tests.studies.__main__ import studies
 from tests.studies.challenge import cases, history

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from flagdata.errors import CorruptError, InputError, RefusedError, UnknownNameError
-from flagdata.film import CameraFilm
+from flagdata.ingest.films.film import CameraFilm
 from measure.cloth import AZIMUTH, ELEVATION, Flag, Part
 from measure.film import FlagSize
 from measure.verdict import Conclusion

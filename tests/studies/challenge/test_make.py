@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flagdata.core.provenance import file_hash
+from flagdata.core.rng import stream
 from flagdata.errors import ConflictError, CorruptError, InputError, UnknownNameError
-from flagdata.provenance import file_hash
-from flagdata.rng import stream
 from tests.studies.challenge import cases
 from tests.studies.challenge import make as making
 from tests.studies.challenge.answer_key import AnswerKey, opened, seal

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from flagdata.core.provenance import recipe_hash
 from flagdata.errors import ConflictError, InputError, UsageError
-from flagdata.provenance import recipe_hash
 from measure.forecasting import Cut
 from measure.nulls import NullBatch
 from measure.nulls import bank as banks

@@ -11,15 +11,15 @@ import pytest
 import torch
 from torch import Tensor
 
-from flagdata.rng import stream
+from flagdata.core.rng import stream
+from sim.cloth.handles import Handles
+from sim.cloth.material import named
+from sim.cloth.mesh import grid
+from sim.cloth.scene import Scene, assemble, upright
+from sim.cloth.state import State
+from sim.cloth.system import System
 from sim.effects import EFFECTS, Effect, apply
-from sim.handles import Handles
 from sim.integrate import Backend, advance
-from sim.material import named
-from sim.mesh import grid
-from sim.scene import Scene, assemble, upright
-from sim.state import State
-from sim.system import System
 from tests.studies.challenge.outside import OUTSIDE, button, places, seam, tether, vent, whirl
 from tests.studies.challenge.outside.attraction import Attraction
 from tests.studies.challenge.outside.balloon import DRAG, NET, Balloon

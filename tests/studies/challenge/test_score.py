@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flagdata.core.rng import stream
 from flagdata.errors import InputError
-from flagdata.rng import stream
 from measure.shares import Share
 from measure.verdict import Candidate, Conclusion, Estimate, Verdict
 from sim.effects import EFFECTS

@@ -31,7 +31,7 @@ from http.client import HTTPConnection
 from pathlib import Path
 from typing import Any
 
-from flagdata.findings import Severity
+from flagdata.core.findings import Severity
 from flagdata.lake import Lake, collect, doctor, object_names, verify
 from flagdata.lake.objects import SUMS
 from flagdata.storage import RemotePath, connection

@@ -29,10 +29,10 @@ from typing import Any
 
 import numpy as np
 
+from flagdata.core.findings import Finding, Severity
 from flagdata.errors import FlagdataError
-from flagdata.findings import Finding, Severity
 from flagdata.lake import Lake, collect, doctor, object_names, read_refs, verify, verify_catalog
-from flagdata.lake.layout import STORES
+from flagdata.lake.lake_layout import STORES
 from tests.evidence import circumstances
 from tests.program import Ended, invoke
 from tests.studies.failing import disk

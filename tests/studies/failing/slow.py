@@ -16,23 +16,23 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.schema import Kind
 from flagdata.examples import example
 from flagdata.lake import Artifact, Lake
-from flagdata.schema import Kind
 from measure.closing import close_loop
 from measure.forecasting import Calibration, Setting
 from measure.loop import LoopOptions
-from measure.nulls import NullBatch, plan
+from measure.nulls import NullBatch, null_plan
 from measure.nulls import bank as banks
 from measure.observe import Specimen
-from measure.observe import recipe as recipes
+from measure.observe import experiment_recipe as recipes
 from measure.propose import dictionary
-from measure.propose.propose import propose
-from sim import handles
+from measure.propose.term_search import propose
+from sim.cloth import handles
+from sim.cloth.material import named
+from sim.cloth.mesh import grid
 from sim.effects import EFFECTS
-from sim.material import named
-from sim.mesh import grid
 from tests.small import DATA_SET, SIMULATION, TRAINING
 from tests.studies.failing.scenes import Scene, artifacts, files, rows
 from tests.studies.failing.trial import Command
@@ -95,12 +95,12 @@ def loop_scene(folder: Path) -> Scene:
     text = EXPERIMENT.format(width=WIDTH, height=HEIGHT) + "".join(parts)
     (folder / "tracks.toml").write_text(text)
     experiment = recipes.read(recipes.load(folder / "tracks.toml")).experiment
-    banks.build(folder / "bank", plan.batches(Setting.of(experiment), kinds=KINDS, seed=0), workers=2)
+    banks.build(folder / "bank", null_plan.batches(Setting.of(experiment), kinds=KINDS, seed=0), workers=2)
     kept = folder.with_name(f"{folder.name}.kept")
     kept.mkdir()
     verdict = close_loop(experiment, LoopOptions(bank=folder / "bank", level=LEVEL))
     (kept / "verdict").write_bytes(pickle.dumps(verdict))
-    options = plan.NullOptions(bank=folder / "bank", level=LEVEL)
+    options = null_plan.NullOptions(bank=folder / "bank", level=LEVEL)
     (kept / "outcome").write_bytes(pickle.dumps(propose(experiment, dictionary(), options=options)))
     return Scene(folder=folder, ids={"kept": str(kept)})
 
@@ -180,7 +180,7 @@ def kept_verdict(kept: str) -> None:
 
 def kept_outcome(kept: str) -> None:
     """Proposing gives the outcome that was kept, once the bank is read."""
-    import measure.propose.propose
+    import measure.propose.term_search
 
     outcome = _kept(f"{kept}/outcome")
 
@@ -188,12 +188,12 @@ def kept_outcome(kept: str) -> None:
         banks.load(options.bank, words="kept")
         return outcome
 
-    measure.propose.propose.propose = proposed
+    measure.propose.term_search.propose = proposed
 
 
 def kept_jobs(kept: str) -> None:
     """What jobs of a build compute is kept by the jobs' arguments; they put it into the lake as they do."""
-    from sim.datasets import jobs
+    from sim.datasets import build_jobs
 
     def keeping(function: Callable[..., Any]) -> Callable[..., Any]:
         def done(*arguments: Any) -> Any:
@@ -204,7 +204,7 @@ def kept_jobs(kept: str) -> None:
 
         return done
 
-    jobs.simulate, jobs.film = keeping(jobs.simulate), keeping(jobs.film)
+    build_jobs.simulate, build_jobs.film = keeping(build_jobs.simulate), keeping(build_jobs.film)
 
 
 def kept_windows(kept: str) -> None:
@@ -224,14 +224,14 @@ def kept_windows(kept: str) -> None:
 
 def known_flags(kept: str) -> None:
     """Simulated flags are a known function of their cloth, and few walkers weigh it."""
-    import measure.cloth.calibration
-    import measure.cloth.posterior
+    import measure.cloth.cloth_calibration
+    import measure.cloth.cloth_posterior
     from tests.measure.cloth.calibration.conftest import known
 
     del kept
-    measure.cloth.calibration.simulated = known
-    measure.cloth.posterior.WALKERS, measure.cloth.posterior.STEPS = 96, 300
-    measure.cloth.posterior.CHECK = (32, 120)
+    measure.cloth.cloth_calibration.simulated = known
+    measure.cloth.cloth_posterior.WALKERS, measure.cloth.cloth_posterior.STEPS = 96, 300
+    measure.cloth.cloth_posterior.CHECK = (32, 120)
 
 
 def _name(arguments: Sequence[object]) -> str:

@@ -11,9 +11,9 @@ from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
-from flagdata.findings import Finding, Severity
+from flagdata.core.findings import Finding, Severity
 from flagdata.lake import Lake, doctor, object_names, read_refs, verify, verify_catalog
-from flagdata.lake.layout import STAGING, STORES
+from flagdata.lake.lake_layout import STAGING, STORES
 from tests.studies.failing.groups import PUBLISHING, kinds
 from tests.studies.failing.injector import Done, Fault, Injector
 

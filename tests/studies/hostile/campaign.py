@@ -28,7 +28,7 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 
 from flagdata.cli import root
-from flagdata.console import foreseen
+from flagdata.core.console import foreseen
 from flagdata.errors import FlagdataError, UnforeseenError
 
 SECONDS = 60.0

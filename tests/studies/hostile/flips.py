@@ -23,12 +23,12 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.console import foreseen
+from flagdata.core.console import foreseen
+from flagdata.core.files.object_cache import block_of, keep_blocks
+from flagdata.core.schema import Kind
 from flagdata.dataset import DecodedCache
 from flagdata.errors import UnforeseenError
 from flagdata.lake import Artifact, Lake, catalog, expire
-from flagdata.object_cache import block_of, keep_blocks
-from flagdata.schema import Kind
 from measure.cloth import design
 from measure.nulls import bank
 from measure.refine import evaluator

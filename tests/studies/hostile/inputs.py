@@ -15,8 +15,8 @@ import pyarrow as pa
 import pyarrow.parquet
 from hypothesis import strategies as st
 
+from flagdata.core.provenance import file_hash
 from flagdata.lake import Lake
-from flagdata.provenance import file_hash
 from tests.compat.make_lake import write_record
 from tests.damage import damaged, damages, edited, edits
 from tests.studies.challenge.filing import Filing, file, note_opening, read

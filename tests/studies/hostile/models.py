@@ -14,15 +14,15 @@ import torch
 import torch._dynamo  # which the first step of an optimiser loads
 from hypothesis import strategies as st
 
-from flagdata.checksums import write_sums
+from flagdata.core.files.checksums import write_sums
 from measure.nulls import bank
-from models import estimator
-from models.crops import Cropping
-from models.estimator import CLOUD
-from models.frontend import FrontEnd
-from models.learner import Learner, Loss, build
-from models.outliers import Familiarity
-from models.storage import CARD, WEIGHTS, write_card, write_tensors
+from models.maps.crops import Cropping
+from models.maps.frontend import FrontEnd
+from models.networks.learner import Learner, Loss, build
+from models.trained import estimator
+from models.trained.estimator import CLOUD
+from models.trained.model_folder import CARD, WEIGHTS, write_card, write_tensors
+from models.trained.outliers import Familiarity
 from models.training import checkpoint
 from models.training.progress import LossCourse
 from tests.damage import damaged, damages, edited, edits

@@ -10,14 +10,14 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from flagdata.ingest.anemometer.recipe import parse as parse_sensor
-from flagdata.recipes import parsed
+from flagdata.ingest.anemometer.sensor_recipe import parse as parse_sensor
+from flagdata.recipes.shelves import parsed
 from measure.observe import load as load_experiment
 from models.training import parse as parse_training
 from sim.arcsim import read_material, read_scene
+from sim.cloth.material import Material
 from sim.datasets import parse as parse_dataset
-from sim.material import Material
-from sim.render.prior import read as read_prior
+from sim.render.render_prior import read as read_prior
 from sim.run import Crew, Stepper
 from sim.run import parse as parse_scene
 from tests.damage import as_toml, damaged, damages, edited, edits

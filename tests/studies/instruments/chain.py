@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import torch
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from flagdata.errors import InputError
 from sim.effects import SENSOR_EFFECTS, AnemometerEffect, Parameter
 

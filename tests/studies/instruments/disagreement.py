@@ -26,10 +26,10 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
-from flagdata.arrays import BoolArray, FloatArray, IntArray
+from flagdata.core.arrays import BoolArray, FloatArray, IntArray
+from flagdata.core.rng import stream
+from flagdata.core.stated import Stated
 from flagdata.errors import InputError
-from flagdata.rng import stream
-from flagdata.stated import Stated
 from tests.studies.instruments.chain import Chain, about
 
 _FEWEST = 12

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flagdata.clock import NINETY
+from flagdata.core.clock_model import NINETY
+from flagdata.core.rng import stream
+from flagdata.core.stated import parse
 from flagdata.errors import InputError
-from flagdata.rng import stream
-from flagdata.stated import parse
 from sim.effects import SENSOR_EFFECTS, AnemometerEffect
 from tests.studies.instruments.chain import ORDER, Chain, about
 from tests.studies.instruments.disagreement import Disagreement, Law, Readings, Rows, fit, jackknife, without

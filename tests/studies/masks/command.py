@@ -9,13 +9,13 @@ from typing import Any
 import click
 import torch
 
-from flagdata.checksums import write_sums
-from flagdata.console import LocalPath, say
+from flagdata.core.console import LocalPath, say
+from flagdata.core.files.checksums import write_sums
+from flagdata.core.files.outputs import check_folder, fresh_folder
+from flagdata.core.provenance import code_version, recipe_hash
 from flagdata.lake import Lake
-from flagdata.outputs import check_folder, fresh_folder
-from flagdata.provenance import code_version, recipe_hash
 from models.conditioning.mask_network import FOLDER
-from models.storage import WEIGHTS, write_card, write_tensors
+from models.trained.model_folder import WEIGHTS, write_card, write_tensors
 from tests.studies.masks.examples import batches, make, read
 from tests.studies.masks.training import Scores, train
 

@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.core.files.outputs import rewrite
+from flagdata.core.rng import child_seed, stream
+from flagdata.core.schema import Kind
 from flagdata.errors import NotFoundError
 from flagdata.lake import Lake, MeshSequence, read_meshes
-from flagdata.outputs import rewrite
-from flagdata.rng import child_seed, stream
-from flagdata.schema import Kind
 from models.conditioning import Stills
 from sim.assets import Assets
 from sim.workers import single_threaded

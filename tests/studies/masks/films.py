@@ -17,15 +17,15 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from flagdata.arrays import Float32Array, FloatArray, UInt8Array
+from flagdata.core.arrays import Float32Array, FloatArray, UInt8Array
+from flagdata.core.rng import child_seed, stream
 from flagdata.lake import MeshSequence
 from flagdata.record import decode
-from flagdata.rng import child_seed, stream
 from models.conditioning import HALVED, Conditioning, Stills, conditioned, framing, halved
-from models.conditioning.camera import STILL
+from models.conditioning.camera_motion import STILL
 from sim.assets import Assets
 from sim.datasets import coded, load, settings
-from sim.render import Meshes, Raster, RenderParameters, prior, stage
+from sim.render import Meshes, Raster, RenderParameters, render_prior, stage
 
 _CAMERA = "outdoor"
 """Data set whose cameras' noise and coding films get."""
@@ -94,7 +94,7 @@ def example(runs: Sequence[MeshSequence], *, seed: int, assets: Assets) -> Examp
 
 
 def _look(rng: np.random.Generator, seed: int, assets: Assets) -> RenderParameters:
-    look = prior.named("outdoor").draw(seed, assets)
+    look = render_prior.named("outdoor").draw(seed, assets)
     width, height = ((640, 360), (480, 480), (480, 360))[int(rng.integers(3))]
     bare = {"pole_radius": 0.0} if rng.random() < _BARE else {}
     return replace(look, width=width, height=height, raster_samples=4, **bare)

@@ -11,8 +11,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from flagdata.arrays import FloatArray
-from flagdata.rng import stream
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import stream
 from models.conditioning import MaskNetwork, inputs_of
 from tests.studies.masks.films import Example
 

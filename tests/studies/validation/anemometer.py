@@ -21,12 +21,12 @@ from typing import Any
 import numpy as np
 import torch
 
-from flagdata.arrays import FloatArray
-from flagdata.findings import Finding
+from flagdata.core.arrays import FloatArray
+from flagdata.core.findings import Finding
 from flagdata.lake import Lake
 from measure.anemometer import Features, Network, Recording, calibrated, network
-from measure.anemometer.features import features_of
-from measure.anemometer.measuring import measured_from
+from measure.anemometer.anemometer_measuring import measured_from
+from measure.anemometer.window_features import features_of
 from measure.cloth import Log
 from measure.estimate import Measurement, Options, beside
 from measure.film import FilmReading, FlagSize, Subject, subjects

@@ -19,14 +19,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from flagdata.core.rng import child_seed
+from flagdata.core.schema import Kind
 from flagdata.lake import Lake, MeshSequence, read_meshes
+from flagdata.recipes.typed_tables import Range
 from flagdata.record import Record
-from flagdata.rng import child_seed
-from flagdata.schema import Kind
-from flagdata.tables import Range
 from flagdata.timebase import NANOSECONDS
 from sim.assets import Assets
-from sim.datasets import EPOCH, Cast, DatasetRecipe, PlannedFilm, Roll, Sequences, casts, jobs, load
+from sim.datasets import EPOCH, Cast, DatasetRecipe, PlannedFilm, Roll, Sequences, build_jobs, casts, load
 from sim.render import RenderPrior
 from sim.run import Crew, MaterialSpec
 from sim.run import Recipe as Simulation
@@ -162,7 +162,7 @@ def make(folder: Path, seed: int, *, first: float = 600.0) -> Lake:
         identity, sequence = sequences[simulation.name]
         film = replace(shot.film, sequence=identity)
         shown = replace(sequence, time=sequence.time[: shot.frames], positions=sequence.positions[: shot.frames])
-        done = jobs.film(shot.recipe, film, shown, "cpu")
+        done = build_jobs.film(shot.recipe, film, shown, "cpu")
         with lake.transaction(f"film {name}") as transaction:
             staged = transaction.staging(".mcap")
             staged.write_bytes(done.data)
@@ -187,7 +187,7 @@ def _sequence(lake: Lake, simulation: Simulation, shot: Shot) -> tuple[str, Mesh
     identity = roll.id(shot.film.index)
     rows = lake.rows({"artifact": identity}, columns=["object"]).to_pylist()
     if not rows:
-        done = jobs.simulate(simulation, 0, [shot.film.index], "cpu")
+        done = build_jobs.simulate(simulation, 0, [shot.film.index], "cpu")
         publish(lake, simulation, done.outcomes, step=done.step, branch="main")
         rows = lake.rows({"artifact": identity}, columns=["object"]).to_pylist()
     sequence = read_meshes(lake.whole_object(rows[0]["object"]))

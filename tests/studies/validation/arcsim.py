@@ -15,10 +15,10 @@ import torch
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from flagdata.arrays import FloatArray, IntArray
-from flagdata.rng import stream
+from flagdata.core.arrays import FloatArray, IntArray
+from flagdata.core.rng import stream
+from sim.cloth.scene import assemble, flag
 from sim.integrate import AirShape, BackwardEuler, Integrator, Symplectic
-from sim.scene import assemble, flag
 from tests.evidence import ABSENT, REFERENCE
 from tests.studies.validation.flags_runs import CAMEL, one_core
 from tests.verification.motion import edge_motion

@@ -41,11 +41,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from flagdata.align import pair_clocks
-from flagdata.arrays import BoolArray, FloatArray, IntArray
-from flagdata.clock import NINETY
-from flagdata.pages.pictures import png
-from flagdata.rng import stream
-from flagdata.stated import Stated
+from flagdata.core.arrays import BoolArray, FloatArray, IntArray
+from flagdata.core.clock_model import NINETY
+from flagdata.core.rng import stream
+from flagdata.core.stated import Stated
+from flagdata.pages.page_pictures import png
 from flagdata.timebase import NANOSECONDS, parse
 from models.evaluation import Resamples, estimate
 from models.evaluation.bootstrap import ratio

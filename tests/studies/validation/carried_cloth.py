@@ -17,17 +17,17 @@ import numpy as np
 import torch
 from scipy.interpolate import CubicSpline
 
-from flagdata.arrays import FloatArray
-from flagdata.rng import child_seed
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import child_seed
 from measure.closing import close_loop
 from measure.forecasting import Calibration, Setting
 from measure.loop import LoopOptions
-from measure.nulls import NullBatch, plan, tracks
+from measure.nulls import NullBatch, null_plan, tracks
 from measure.nulls import bank as banks
 from measure.observe import Experiment, Hold, Observation, Setup, WindTrack, from_arrays, observe, sheet
 from measure.verdict import Verdict
+from sim.cloth.material import named
 from sim.effects import EFFECTS, Effect
-from sim.material import named
 from tests.evidence import ABSENT, REFERENCE
 from tests.studies.validation.robot_cloth import MATERIAL
 from tests.studies.validation.robot_cloth.model import Cloth
@@ -176,8 +176,8 @@ def _row(verdict: Verdict) -> dict[str, Any]:
 def _bank(experiment: Experiment, seed: int) -> LoopOptions:
     """By `KINDS` kinds of nulls of an experiment's own ways."""
     setting = Setting.of(experiment)
-    plan.simulated(setting, nulls=KINDS * banks.WINDS, seed=seed, workers=2, stage=lambda *_: None)
-    return LoopOptions(seed=seed, bank=plan.kept_in(setting, seed=seed))
+    null_plan.simulated(setting, nulls=KINDS * banks.WINDS, seed=seed, workers=2, stage=lambda *_: None)
+    return LoopOptions(seed=seed, bank=null_plan.kept_in(setting, seed=seed))
 
 
 def _places(cloth: Cloth) -> FloatArray:

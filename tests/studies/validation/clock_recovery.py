@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from flagdata.align import LagEstimate, LagSearch, estimate_offset, motion_energy, wind_bins
+from flagdata.core.rng import stream
 from flagdata.ingest import WindOptions, read_log
-from flagdata.rng import stream
 from flagdata.timebase import NANOSECONDS, from_datetime
 from measure.demo import SENSOR, START
 from measure.demo.logger import ZONE

@@ -22,12 +22,12 @@ from typing import Any
 import numpy as np
 
 import flagdata
+from flagdata.core.rng import stream
+from flagdata.core.schema import CATALOG, Kind
 from flagdata.dataset import Tolerance
 from flagdata.errors import FlagdataError
 from flagdata.lake import Lake, doctor, object_names, verify
 from flagdata.record import Record
-from flagdata.rng import stream
-from flagdata.schema import CATALOG, Kind
 from sim.datasets import DatasetRecipe, load
 from tests.sim.datasets.leakage import FEATURES, Surroundings, accuracies, dealt_anew, features_of
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import ttest_1samp
 
-from flagdata.caches import user_cache
+from flagdata.core.files.caches import user_cache
 from measure.drape import (
     BENDING_LENGTH,
     CURVATURE,
@@ -30,8 +30,8 @@ from measure.drape import (
     simulated,
     together,
 )
-from sim.mesh import Mesh
-from sim.scene import GRAVITY
+from sim.cloth.mesh import Mesh
+from sim.cloth.scene import GRAVITY
 from tests.evidence import ABSENT, REFERENCE
 from tests.studies.validation.drapes_picture import bank, cantilevers, draw
 

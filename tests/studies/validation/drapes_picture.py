@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from measure.cloth import TABLES
 from measure.drape import DrapeBatch, Surface, mesh
-from sim.material import named
-from sim.scene import GRAVITY
+from sim.cloth.material import named
+from sim.cloth.scene import GRAVITY
 from tests.evidence import REFERENCE
 
 LENGTHS = (0.012, 0.016, 0.020, 0.025)

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 import torch
 
+from flagdata.core.stated import Stated
 from flagdata.errors import FlagdataError, NotFoundError
-from flagdata.stated import Stated
 from measure.anemometer import Network, gate_beside, network
 from measure.estimate import Measurement, Options, measure, of_model
 from measure.film import FilmReading, FlagSize, subjects

@@ -14,15 +14,15 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from flagdata.arrays import BoolArray, FloatArray
-from flagdata.rng import stream
-from sim.contact import Contact
+from flagdata.core.arrays import BoolArray, FloatArray
+from flagdata.core.rng import stream
+from sim.cloth.contact import Contact
+from sim.cloth.material import named
+from sim.cloth.scene import Scene, assemble, flag
+from sim.cloth.state import State
+from sim.cloth.system import System
 from sim.integrate import BackwardEuler, Integrator, Symplectic
-from sim.material import named
 from sim.run import principal_strains
-from sim.scene import Scene, assemble, flag
-from sim.state import State
-from sim.system import System
 from tests.verification.motion import edge_motion
 
 RATE = 50.0

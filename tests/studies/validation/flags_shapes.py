@@ -12,8 +12,8 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from flagdata.arrays import FloatArray, IntArray
-from sim.scene import flag
+from flagdata.core.arrays import FloatArray, IntArray
+from sim.cloth.scene import flag
 from tests.studies.validation.flags_runs import CAMEL, RATE, Ensemble
 
 SHOWN = (2.0, 4.0, 6.0, 8.0, 10.0)

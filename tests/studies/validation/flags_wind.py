@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.signal import welch
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from sim.cloth.scene import GRAVITY
 from sim.run import CRUMPLED
-from sim.scene import GRAVITY
 from tests.studies.validation.arcsim import ReferenceMotion
 from tests.studies.validation.flags_runs import CAMEL, ENERGY_EVERY, RATE, REPLICATES, SETTLED, Ensemble
 

@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from tests.evidence import ABSENT, REFERENCE
 from tests.verification.flutter.beam import Strip, leading, onset, pipe_onset
 

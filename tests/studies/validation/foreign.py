@@ -22,8 +22,8 @@ from typing import Any
 
 import torch
 
+from flagdata.core.rng import child_seed
 from flagdata.errors import InputError, NotFoundError
-from flagdata.rng import child_seed
 from measure.closing import close_loop
 from measure.forecasting import Segments
 from measure.loop import LoopOptions

@@ -17,19 +17,19 @@ import torch
 from PIL import Image, ImageDraw
 from scipy import ndimage
 
-from flagdata.arrays import FloatArray, UInt8Array
+from flagdata.core.arrays import FloatArray, UInt8Array
+from flagdata.core.rng import child_seed, stream
 from flagdata.lake import MeshSequence
 from flagdata.record import VideoEncoder, decode
-from flagdata.rng import child_seed, stream
 from flagdata.timebase import NANOSECONDS
 from sim.assets import Assets
-from sim.handles import Handles
+from sim.cloth.handles import Handles
+from sim.cloth.material import named as material
+from sim.cloth.mesh import grid
+from sim.cloth.scene import Scene, assemble, upright
 from sim.integrate import BackwardEuler
-from sim.material import named as material
-from sim.mesh import grid
 from sim.render import Meshes, Raster, plate, to_bytes
 from sim.render import named as prior
-from sim.scene import Scene, assemble, upright
 
 Films: TypeAlias = Sequence[UInt8Array]
 SIZE, FRAMES, RATE = 300, 30, 25.0

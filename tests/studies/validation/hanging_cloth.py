@@ -20,11 +20,11 @@ import numpy as np
 import torch
 
 import flagdata
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import stream
+from flagdata.core.schema import Kind
 from flagdata.dataset import Pairs
-from flagdata.rng import stream
-from flagdata.schema import Kind
-from models import estimator
+from models.trained import estimator
 from models.training import DataSpec
 
 PAPER = ((0.17, 0.22), (0.24, 0.29), (0.39, 0.45))

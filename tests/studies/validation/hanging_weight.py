@@ -17,16 +17,16 @@ from typing import Any
 import numpy as np
 import torch
 
-from flagdata.arrays import FloatArray
-from flagdata.film_array import Frames
-from flagdata.rng import child_seed, stream
-from flagdata.stated import Stated
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import child_seed, stream
+from flagdata.core.stated import Stated
+from flagdata.ingest.films.film_array import Frames
 from measure.anemometer import gate_beside, network
 from measure.estimate import DRAWS, FilmAnswer, Measurement, Options, measure, of_model
-from measure.estimate.joint import WEIGHT, WIND
+from measure.estimate.film_posterior import WEIGHT, WIND
 from measure.film import FlagSize
-from models.estimator import Estimator
-from models.restriction import Known
+from models.trained.estimator import Estimator
+from models.trained.restriction import Known
 from tests.studies.long_films import LongFilm, simulated
 
 FILMS = 40

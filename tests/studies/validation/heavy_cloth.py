@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from flagdata.stated import Stated
+from flagdata.core.stated import Stated
 from tests.studies.validation.ten_looks import Cloth, graded
 
 HEAVY = Cloth(

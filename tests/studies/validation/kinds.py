@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import torch
 
-from flagdata.arrays import UInt8Array
-from flagdata.film_array import Frames
-from flagdata.rng import child_seed
+from flagdata.core.arrays import UInt8Array
+from flagdata.core.rng import child_seed
+from flagdata.ingest.films.film_array import Frames
 from measure.film import ConditionedFilm
 from measure.gate import REASONS
 from tests.studies.validation.kinds_films import (

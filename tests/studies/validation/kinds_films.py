@@ -14,12 +14,12 @@ import cv2
 import numpy as np
 import torch
 
-from flagdata.arrays import BoolArray, FloatArray, UInt8Array
+from flagdata.core.arrays import BoolArray, FloatArray, UInt8Array
+from flagdata.core.rng import child_seed, stream
 from flagdata.lake import MeshSequence
-from flagdata.rng import child_seed, stream
 from sim.assets import Assets
-from sim.datasets.picture import noisy
-from sim.render import Meshes, Raster, RenderParameters, prior, stage
+from sim.datasets.camera_picture import noisy
+from sim.render import Meshes, Raster, RenderParameters, render_prior, stage
 from sim.run import Crew, Stepper, recipe_of, run
 
 RATE, COUNT = 25.0, 150
@@ -97,7 +97,7 @@ def flights(seed: int, count: int) -> list[Flight]:
 
 def look(seed: int) -> RenderParameters:
     """Draws camera, light, texture and background."""
-    zeta = prior.named("outdoor").draw(child_seed(seed, "look"), Assets())
+    zeta = render_prior.named("outdoor").draw(child_seed(seed, "look"), Assets())
     rng = stream(seed, "kinds", "camera")
     return replace(
         zeta,
@@ -149,7 +149,7 @@ def pair(first: Flight, second: Flight, seed: int) -> Shot:
     columns, rows = np.flatnonzero(alone.any(axis=(0, 1))), np.flatnonzero(alone.any(axis=(0, 2)))
     across = float(rng.choice([-1, 1]) * rng.uniform(*_APART)) * len(columns) / WIDTH
     down = float(rng.uniform(-_LOWER, _LOWER)) * len(rows) / WIDTH
-    other = prior.named("outdoor").draw(child_seed(seed, "second"), Assets())
+    other = render_prior.named("outdoor").draw(child_seed(seed, "second"), Assets())
     back = shot(first, replace(zeta, frame_offset_x=-across / 2), seed)
     front = shot(
         second,

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from flagdata.provenance import code_version
+from flagdata.core.provenance import code_version
 
 _ROOT = Path(__file__).resolve().parents[3]
 TESTS = ("tests/flagdata/lake", "tests/flagdata/record/test_ranges.py")

@@ -23,8 +23,8 @@ import click
 import openpyxl
 
 from flagdata.cli import main as run_flagdata
-from flagdata.commands import confirm
-from flagdata.console import say
+from flagdata.commands import confirm_recipe
+from flagdata.core.console import say
 from flagdata.lake import Lake
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "results" / "wind-log-transcripts.md"
@@ -202,7 +202,7 @@ def transcript(trial: Trial, options: str, typed: Sequence[str] | None) -> str:
         contextlib.redirect_stdout(out),
         contextlib.redirect_stderr(out),
         patch.object(click, "prompt", prompt),
-        patch.object(confirm, "at_terminal", lambda: typed is not None),
+        patch.object(confirm_recipe, "at_terminal", lambda: typed is not None),
     ):
         try:
             run_flagdata(arguments)

@@ -31,8 +31,8 @@ import numpy as np
 import flagdata.ingest.anemometer as package
 from flagdata.errors import FlagdataError
 from flagdata.ingest import WindOptions
-from flagdata.ingest.anemometer import log as module
-from flagdata.ingest.anemometer.options import Limits
+from flagdata.ingest.anemometer import anemometer_log as module
+from flagdata.ingest.anemometer.wind_options import Limits
 
 _FOLDER = "FLAGDATA_LOGS_ORACLE"
 _LARGEST = 6_000_000

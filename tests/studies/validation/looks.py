@@ -34,13 +34,13 @@ from typing import Any
 import numpy as np
 from torch import Tensor
 
-from flagdata.arrays import FloatArray
-from flagdata.rng import child_seed, stream
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import child_seed, stream
 from measure.cloth import CLOTH, COLUMNS, NUISANCES, OBSERVED, Flag, FlagBatch, draws
-from measure.cloth.prior import FABRIC
+from measure.cloth.flag_prior import FABRIC
 from measure.observables import OBSERVABLES
 from sim.assets import Assets
-from sim.mesh import Mesh
+from sim.cloth.mesh import Mesh
 from sim.render import Cycles, Meshes, Raster, RenderParameters
 from tests.studies.validation.looks_films import RATE, Filmed, Place, edges_of, filmed, look
 from tests.studies.validation.looks_refilmed import Look, refilmed

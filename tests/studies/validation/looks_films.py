@@ -10,17 +10,17 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from flagdata.arrays import FloatArray, UInt8Array
+from flagdata.core.arrays import FloatArray, UInt8Array
 from flagdata.errors import FlagdataError
-from flagdata.film_array import Frames
+from flagdata.ingest.films.film_array import Frames
 from flagdata.record import decode
 from measure.cloth import OBSERVED, Flag
 from measure.film import ConditionedFilm, FlagSize
 from measure.observables import OBSERVABLES, ClothWindow, FilmWindow, edges_of, watched
 from sim.assets import Assets
+from sim.cloth.mesh import Mesh
 from sim.datasets import coded, load, settings
-from sim.mesh import Mesh
-from sim.render import Meshes, RenderParameters, prior, stage
+from sim.render import Meshes, RenderParameters, render_prior, stage
 
 RATE = 25.0
 """Frames a second [Hz]."""
@@ -96,7 +96,7 @@ class Filmed:
 
 def look(seed: int, *, light: int) -> RenderParameters:
     """A look that is drawn: all of one seed, but for the sun and the sky, which are of another."""
-    own, other = (prior.named("outdoor").draw(one, Assets()) for one in (seed, light))
+    own, other = (render_prior.named("outdoor").draw(one, Assets()) for one in (seed, light))
     shown = {
         name: getattr(other, name)
         for name in ("sun_height", "sun_radius", "sun_azimuth", "sun_strength", "sun_softness", "sky_strength")

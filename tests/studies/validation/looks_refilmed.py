@@ -11,13 +11,13 @@ import cv2
 import numpy as np
 import torch
 
-from flagdata.arrays import BoolArray, FloatArray, UInt8Array
-from flagdata.rng import stream
+from flagdata.core.arrays import BoolArray, FloatArray, UInt8Array
+from flagdata.core.rng import stream
 from measure.cloth import Flag
 from measure.observables import FilmWindow, edges_of
 from models.conditioning import HALVED
 from sim.assets import Assets
-from sim.mesh import Mesh
+from sim.cloth.mesh import Mesh
 from sim.render import Raster, RenderParameters, to_linear
 from tests.studies.validation.looks_films import Filmed, Place, meshes_of, places, read
 

@@ -26,8 +26,8 @@ from typing import Any
 import numpy as np
 import torch
 
-from flagdata.arrays import BoolArray, FloatArray
-from flagdata.rng import child_seed, stream
+from flagdata.core.arrays import BoolArray, FloatArray
+from flagdata.core.rng import child_seed, stream
 from measure.cloth import (
     TOGETHER,
     Design,
@@ -55,7 +55,7 @@ from measure.cloth import (
     weighable,
 )
 from measure.cloth.design import Weighable
-from measure.cloth.evidence import Weighing, weigh
+from measure.cloth.model_evidence import Weighing, weigh
 from sim.effects import AnemometerLag
 from sim.wind import VonKarman
 

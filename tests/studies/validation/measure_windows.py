@@ -18,15 +18,15 @@ from typing import Any
 import numpy as np
 import torch
 
-from flagdata.arrays import BoolArray, FloatArray
-from flagdata.console import progress
-from flagdata.rng import child_seed, stream
+from flagdata.core.arrays import BoolArray, FloatArray
+from flagdata.core.console import progress
+from flagdata.core.rng import child_seed, stream
 from measure.estimate import OWN, combined, of_model
-from models import estimator
-from models.estimator import Estimator
 from models.evaluation import LEVELS, Predictions, Resamples, coverage, rank_histogram, tarp
-from models.evaluation.calibration import Coverage
 from models.evaluation.predictions import WIND
+from models.evaluation.predictive_calibration import Coverage
+from models.trained import estimator
+from models.trained.estimator import Estimator
 from tests.studies.dependence import Posteriors, posteriors
 from tests.studies.long_films import LongFilm, simulated
 

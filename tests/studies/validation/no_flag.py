@@ -17,16 +17,16 @@ import cv2
 import numpy as np
 import torch
 
-from flagdata.arrays import UInt8Array
+from flagdata.core.arrays import UInt8Array
+from flagdata.core.rng import stream
 from flagdata.errors import RefusedError
-from flagdata.film_array import Frames
-from flagdata.rng import stream
+from flagdata.ingest.films.film_array import Frames
 from measure.anemometer import Network, gate_beside, network
 from measure.estimate import Options, measure, of_model
 from measure.film import ConditionedFilm, FlagSize
 from measure.gate import WindowGate
 from sim.assets import Assets
-from sim.datasets.picture import noisy
+from sim.datasets.camera_picture import noisy
 from tests.drawn import no_flag
 from tests.studies.validation.films import kind_of
 

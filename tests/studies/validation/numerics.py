@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from measure.cloth import (
     OBSERVED,
     Design,

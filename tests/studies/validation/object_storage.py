@@ -30,12 +30,12 @@ from http.server import BaseHTTPRequestHandler
 from pathlib import Path
 from typing import Any, ClassVar
 
+from flagdata.core.files.object_ranges import ObjectRanges
+from flagdata.core.findings import Severity
+from flagdata.core.provenance import code_version
+from flagdata.core.schema import Kind
 from flagdata.errors import RefusedError
-from flagdata.findings import Severity
 from flagdata.lake import Artifact, Lake, collect, doctor, object_names, verify
-from flagdata.object_ranges import ObjectRanges
-from flagdata.provenance import code_version
-from flagdata.schema import Kind
 from flagdata.storage import RemotePath
 from tests.s3 import BUCKET, SECRETS, moto, serving
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from flagdata.errors import FlagdataError
 from measure.film import FilmReading, FlagSize, subjects
 from measure.observables import OBSERVABLES, ClothWindow, Observable, edges_of, watched

@@ -21,7 +21,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from measure.observables import OBSERVABLES, WINDOW, Observable, View, edges_of, seen_from
 from sim.effects import EFFECTS, Parameter, Role
 from sim.run import Crew, Stepper, parse

@@ -13,7 +13,7 @@ from typing import Any
 import av
 import numpy as np
 
-from models import estimator
+from models.trained import estimator
 from tests.evidence import ABSENT, REFERENCE
 
 _CLIP = "video/dyntex_flag_571c110.avi"

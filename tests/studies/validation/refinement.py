@@ -26,10 +26,10 @@ from typing import Any
 import numpy as np
 import torch
 
-from flagdata.arrays import FloatArray
-from flagdata.console import progress
+from flagdata.core.arrays import FloatArray
+from flagdata.core.console import progress
+from flagdata.core.rng import child_seed, stream
 from flagdata.dataset import Source
-from flagdata.rng import child_seed, stream
 from measure.refine import (
     DENSITY,
     WIND,
@@ -41,16 +41,16 @@ from measure.refine import (
     Target,
     Trace,
     refine,
+    refinement_start,
     squared,
-    start,
 )
-from measure.refine.command import RENDERS, scenes_of, space_of
 from measure.refine.evaluator import STAGES
+from measure.refine.refine_command import RENDERS, scenes_of, space_of
 from measure.refine.space import DIMENSION
 from measure.refine.target import as_stated, of_recording
-from models import estimator as models
-from models.estimator import Estimator
-from models.evaluation.handmade import TARGETS, Fitted, fitted
+from models.evaluation.feature_baselines import TARGETS, Fitted, fitted
+from models.trained import estimator as models
+from models.trained.estimator import Estimator
 from models.training import DataSpec, FitFilm
 from sim.assets import Assets
 from sim.render import named
@@ -235,7 +235,7 @@ def _peer(method: str, evaluator: Evaluator, target: Target, *, budget: int, see
 
 def _regression(target: Target, estimator: Estimator, space: Space, seed: int) -> Score:
     begun = time.perf_counter()
-    draws = start.amortised(estimator, target.clip, space, aspect=1.5, seed=seed, draws=models.DRAWS)
+    draws = refinement_start.amortised(estimator, target.clip, space, aspect=1.5, seed=seed, draws=models.DRAWS)
     seconds = time.perf_counter() - begun
     low, middle, high = np.quantile(draws, [(1 - LEVEL) / 2, 0.5, (1 + LEVEL) / 2], axis=0)
     wind, density = target.truth["wind_speed"], target.truth["area_weight"]

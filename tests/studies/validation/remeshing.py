@@ -19,13 +19,13 @@ import torch
 from matplotlib.figure import Figure
 from matplotlib.tri import LinearTriInterpolator, Triangulation
 
-from flagdata.arrays import FloatArray, IntArray
+from flagdata.core.arrays import FloatArray, IntArray
 from flagdata.ingest import read_folder
 from sim.arcsim import SWEEPS, read_scene
-from sim.batch import Batch, Divergence
+from sim.cloth.scene import Scene, assemble, flag
 from sim.integrate import AirShape, BackwardEuler
 from sim.remeshing import remeshed
-from sim.scene import Scene, assemble, flag
+from sim.run.simulation_loop import Batch, Divergence
 from tests.evidence import ABSENT, REFERENCE
 
 RATE = 25.0

@@ -16,7 +16,7 @@ import numpy as np
 import torch
 from PIL import Image
 
-from flagdata.arrays import BoolArray, FloatArray
+from flagdata.core.arrays import BoolArray, FloatArray
 from flagdata.lake import MeshSequence
 from sim.assets import Assets
 from sim.render import Cycles, Meshes, Raster, Renderer, RenderParameters, Workbench, named, plate, stage, to_bytes

@@ -29,9 +29,9 @@ import numpy as np
 import torch
 from scipy.signal import lfilter
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import child_seed, stream
 from flagdata.errors import InputError
-from flagdata.rng import child_seed, stream
 from measure.cloth import TABLES
 from measure.forecasting import Setting
 from measure.loop import LoopOptions, solve
@@ -40,8 +40,8 @@ from measure.nulls import bank as banks
 from measure.observe import Experiment, Hold, Observation, Setup, Specimen, WindTrack, from_arrays, observe, sheet
 from measure.shares import Share
 from measure.verdict import CRITERIA, Estimate
-from sim.material import named
-from sim.mesh import grid
+from sim.cloth.material import named
+from sim.cloth.mesh import grid
 from sim.wind import VonKarman
 from tests.studies.validation.flags_runs import CAMEL
 

@@ -22,15 +22,15 @@ from typing import Any
 import numpy as np
 import torch
 
-from flagdata.arrays import UInt8Array
+from flagdata.core.arrays import UInt8Array
+from flagdata.core.rng import child_seed
+from flagdata.core.stated import Stated
 from flagdata.lake import MeshSequence, RaggedMeshSequence
-from flagdata.rng import child_seed
-from flagdata.stated import Stated
 from measure.anemometer import Network, gate_beside, network
-from measure.camera import write_film
 from measure.estimate import Options
 from measure.film import FlagSize
 from measure.gate import WindowGate
+from measure.simulated_camera import write_film
 from sim.assets import Assets
 from sim.assets.flags import ROWS, FlagSheet
 from sim.render import RenderParameters

@@ -11,11 +11,11 @@ import torch
 
 from measure.observe import parse
 from measure.verdict import Conclusion
-from sim.cloth import Cloth
+from sim.cloth.cloth_batch import Cloth
+from sim.cloth.material import named
+from sim.cloth.membrane import energy as stretching
+from sim.cloth.mesh import grid
 from sim.effects import HemMass
-from sim.material import named
-from sim.membrane import energy as stretching
-from sim.mesh import grid
 from tests.studies.validation import foreign
 from tests.studies.validation.mujoco import experiments
 from tests.studies.validation.mujoco.experiments import DAMPINGS, NOMINAL, NOTHING, SPREAD, UNDECLARED, Truth, draw

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flagdata.rng import stream
+from flagdata.core.rng import stream
 from measure.cloth import OBSERVED, Flag
 from measure.observables import edges_of
 from sim.render import RenderParameters

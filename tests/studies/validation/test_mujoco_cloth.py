@@ -15,12 +15,12 @@ import torch
 from scipy.integrate import quad, solve_ivp
 from scipy.special import j0
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from flagdata.errors import NotFoundError
-from sim.cloth import Cloth
+from sim.cloth.cloth_batch import Cloth
+from sim.cloth.material import named
+from sim.cloth.mesh import grid
 from sim.effects import FiniteSpanLoading
-from sim.material import named
-from sim.mesh import grid
 from tests.studies.validation.environments import MUJOCO, UnusableError
 from tests.studies.validation.mujoco.cloth import Air, Flight, Integrator, Method, Sheet, Wind, fly
 

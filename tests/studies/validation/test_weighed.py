@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flagdata.arrays import FloatArray, IntArray
-from measure.cloth import OBSERVED, Design, posterior
+from flagdata.core.arrays import FloatArray, IntArray
+from measure.cloth import OBSERVED, Design, cloth_posterior
 from measure.observables import WINDOW
 from tests.measure.cloth.calibration.conftest import readings
 from tests.studies.validation import weighed
@@ -39,8 +39,8 @@ def test_flags_are_weighed_and_their_sheet_is_written(tmp_path: Path, monkeypatc
     monkeypatch.setattr(weighed, "film", lambda truth, at: _geometry(truth, at))
     monkeypatch.setattr(weighed, "finer", _finer)
     monkeypatch.setattr(weighed, "TRUTHS", 2)
-    monkeypatch.setattr(posterior, "WALKERS", 64)
-    monkeypatch.setattr(posterior, "CHECK", (32, 60))
+    monkeypatch.setattr(cloth_posterior, "WALKERS", 64)
+    monkeypatch.setattr(cloth_posterior, "CHECK", (32, 60))
     own = weighed.design()
     sheet = weighed.run(seed=1, out=tmp_path)
     given = [row for row in sheet["geometry"]["flags"] if row["value"] is not None]

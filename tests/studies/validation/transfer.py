@@ -18,18 +18,18 @@ from typing import Any
 import numpy as np
 import torch
 
-from flagdata.arrays import AnyArray, UInt8Array
+from flagdata.core.arrays import AnyArray, UInt8Array
+from flagdata.core.rng import child_seed, stream
+from flagdata.core.stated import Stated
 from flagdata.lake import MeshSequence
+from flagdata.recipes.typed_tables import Range
 from flagdata.record import Record
-from flagdata.rng import child_seed, stream
-from flagdata.stated import Stated
-from flagdata.tables import Range
 from measure.refine import DrawnView
-from models import estimator
-from models.restriction import Known
+from models.trained import estimator
+from models.trained.restriction import Known
 from sim.assets import Assets
-from sim.datasets import DatasetRecipe, PlannedFilm, Sequences, casts, jobs, load
-from sim.datasets.recipe import Side
+from sim.datasets import DatasetRecipe, PlannedFilm, Sequences, build_jobs, casts, load
+from sim.datasets.dataset_recipe import Side
 from sim.render import Meshes, Raster
 from sim.run import IntegratorSpec
 from tests.evidence import ABSENT, REFERENCE
@@ -132,7 +132,7 @@ def filmed(recipe: DatasetRecipe, *, folder: Path | None = None) -> Iterator[tup
     sequences: dict[int, MeshSequence] = {}
     for first in range(0, len(indices), cast.simulation.batch):
         part = indices[first : first + cast.simulation.batch]
-        for outcome in jobs.simulate(cast.simulation, 0, part, "cpu").outcomes:
+        for outcome in build_jobs.simulate(cast.simulation, 0, part, "cpu").outcomes:
             if outcome.sequence is not None:
                 sequences[outcome.member.index] = outcome.sequence
     members = tuple((cast, index, f"{index:032x}") for index in sequences)
@@ -152,7 +152,7 @@ def filmed(recipe: DatasetRecipe, *, folder: Path | None = None) -> Iterator[tup
 
 
 def _frames(recipe: DatasetRecipe, film: PlannedFilm, sequence: MeshSequence) -> tuple[UInt8Array, dict[str, Any]]:
-    done = jobs.film(recipe, film, sequence, "cpu")
+    done = build_jobs.film(recipe, film, sequence, "cpu")
     with tempfile.NamedTemporaryFile(suffix=".mcap") as kept:
         kept.write(done.data)
         kept.flush()

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 from scipy.special import jn_zeros
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from tests.studies.validation.flags_runs import one_core
 from tests.studies.validation.verification_tables import check, draw_tables
 from tests.verification.cases import (

@@ -10,8 +10,8 @@ import numpy as np
 import torch
 from matplotlib.figure import Figure
 
-from flagdata.arrays import FloatArray
-from sim.tables import (
+from flagdata.core.arrays import FloatArray
+from sim.cloth.stiffness_tables import (
     CURVATURE_SPACING,
     GRIDS,
     Evaluation,

@@ -41,8 +41,8 @@ from typing import Any
 import numpy as np
 import torch
 
-from flagdata.arrays import FloatArray, IntArray
-from flagdata.rng import stream
+from flagdata.core.arrays import FloatArray, IntArray
+from flagdata.core.rng import stream
 from measure.cloth import (
     MEASURED,
     OBSERVED,
@@ -57,17 +57,17 @@ from measure.cloth import (
     Uncertain,
     simulated,
 )
-from measure.cloth.calibration import answered
-from measure.cloth.simulation import BATCH, windows
+from measure.cloth.cloth_calibration import answered
+from measure.cloth.flag_simulation import BATCH, windows
 from measure.observables import View
-from sim import handles
-from sim.batch import Batch, Divergence, after
+from sim.cloth import handles
+from sim.cloth.handles import Handles
+from sim.cloth.material import named
+from sim.cloth.mesh import Diagonals, Mesh, grid
+from sim.cloth.scene import Scene, assemble
 from sim.effects import AnemometerLag
-from sim.handles import Handles
 from sim.integrate import BackwardEuler, Symplectic
-from sim.material import named
-from sim.mesh import Diagonals, Mesh, grid
-from sim.scene import Scene, assemble
+from sim.run.simulation_loop import Batch, Divergence, after
 from sim.wind import Beyond, Even, SampledWind, VonKarman
 from tests.studies.validation import environments
 from tests.studies.validation.mujoco.cloth import Air, Method, Sheet, Wind, fly

@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 import torch
 
-from flagdata.arrays import FloatArray
-from flagdata.rng import stream
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import stream
 from measure.cloth import (
     MEASURED,
     OBSERVED,
@@ -39,9 +39,9 @@ from measure.cloth import (
     weighed,
     with_errors,
 )
-from sim.batch import Batch, Divergence, after
+from sim.cloth.scene import assemble
 from sim.integrate import BackwardEuler
-from sim.scene import assemble
+from sim.run.simulation_loop import Batch, Divergence, after
 from sim.wind import Beyond, Even, SampledWind, VonKarman
 from tests.studies.validation import loop_on_films as loop
 from tests.studies.validation import weighed as large

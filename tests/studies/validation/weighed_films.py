@@ -12,14 +12,14 @@ import av
 import numpy as np
 import torch
 
-from flagdata.arrays import FloatArray, UInt8Array
-from flagdata.rng import stream
+from flagdata.core.arrays import FloatArray, UInt8Array
+from flagdata.core.rng import stream
 from measure.cloth import OBSERVED
 from measure.film import FilmReading, FlagSize, subjects
 from measure.observables import OBSERVABLES, watched
 from sim.assets import Assets
-from sim.mesh import Mesh
-from sim.render import Meshes, Raster, RenderParameters, prior
+from sim.cloth.mesh import Mesh
+from sim.render import Meshes, Raster, RenderParameters, render_prior
 
 RATE, SECONDS = 25.0, 120.0  # Hz, s
 SIGMA = np.array([OBSERVABLES[name].sigma for name in OBSERVED])
@@ -54,7 +54,7 @@ def filmed(truth: Mapping[str, Any], positions: FloatArray, mesh: Mesh, at: Path
 def pictures(truth: Mapping[str, Any], positions: FloatArray, mesh: Mesh) -> UInt8Array:
     """(frame, height, width, 3) of a look that is drawn, from the truth's place."""
     assets = Assets()
-    zeta = placed(prior.named("flags").draw(truth["seed"], assets), truth, positions, mesh)
+    zeta = placed(render_prior.named("flags").draw(truth["seed"], assets), truth, positions, mesh)
     count, vertices = positions.shape[:2]
     faces = torch.tensor(mesh.faces, dtype=torch.int64)
     size = mesh.rest.max(axis=0)

@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 import torch
 
-from flagdata.arrays import BoolArray, FloatArray
-from flagdata.console import progress
-from flagdata.film_array import Frames
-from flagdata.rng import child_seed
-from flagdata.stated import Stated
+from flagdata.core.arrays import BoolArray, FloatArray
+from flagdata.core.console import progress
+from flagdata.core.rng import child_seed
+from flagdata.core.stated import Stated
+from flagdata.ingest.films.film_array import Frames
 from measure.anemometer import Network, gate_beside, network
 from measure.estimate import SERIES_KEY, Measurement, Options, measure, of_model
 from tests.studies.long_films import LongFilm

@@ -9,8 +9,8 @@ from __future__ import annotations
 import pickle
 from pathlib import Path
 
-from flagdata.console import progress
-from models.estimator import Estimator
+from flagdata.core.console import progress
+from models.trained.estimator import Estimator
 from tests.studies.long_films import LongFilm, gusty
 
 DATASET = "outdoor-damped"

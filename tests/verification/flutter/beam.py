@@ -25,7 +25,7 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 
 TERMS = 14
 _NO_FLUID = 1e-12

@@ -15,15 +15,15 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from sim.cloth.handles import Handles
+from sim.cloth.material import isotropic
+from sim.cloth.mesh import grid
+from sim.cloth.scene import Scene, assemble
+from sim.cloth.state import State
+from sim.cloth.system import System
 from sim.effects import Effect, ReactiveLoading, TangentialLinearDrag, apply
-from sim.handles import Handles
 from sim.integrate import Integrator, Symplectic
-from sim.material import isotropic
-from sim.mesh import grid
-from sim.scene import Scene, assemble
-from sim.state import State
-from sim.system import System
 from tests.verification.flutter.beam import Onset, Strip
 
 # In-plane stiffness [N/m]: stiff enough that nothing stretches, soft enough that steps are long.

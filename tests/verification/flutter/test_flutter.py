@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from tests.verification.flutter.beam import Onset, Strip, eigenvalues, leading, onset
 from tests.verification.flutter.strip import crossing, growth, sweep
 

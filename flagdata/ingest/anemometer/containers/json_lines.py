@@ -6,9 +6,9 @@ import csv
 import io
 import json
 
+from flagdata.core.findings import Finding, Severity
 from flagdata.errors import InputError
-from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.text.source import TableText, TextFile
+from flagdata.ingest.anemometer.text.text_file import TableText, TextFile
 
 _NAMES = 2000
 

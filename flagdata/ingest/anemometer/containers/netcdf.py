@@ -20,14 +20,14 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.arrays import AnyArray, IntArray
+from flagdata.core.arrays import AnyArray, IntArray
+from flagdata.core.findings import Finding
+from flagdata.core.units import UNITS, spelled
 from flagdata.errors import InputError, LimitError, TimeError
-from flagdata.findings import Finding
-from flagdata.ingest.anemometer.instants.stamps import DAY, HOUR, snapped
-from flagdata.ingest.anemometer.options import Limits
-from flagdata.ingest.anemometer.text.source import TableText
+from flagdata.ingest.anemometer.instants.stamp_text import DAY, HOUR, snapped
+from flagdata.ingest.anemometer.text.text_file import TableText
+from flagdata.ingest.anemometer.wind_options import Limits
 from flagdata.timebase import NANOSECONDS, from_datetime, iso
-from flagdata.units import UNITS, spelled
 
 _UNITS = {
     "nanosecond": 1,

@@ -2,7 +2,7 @@
 
 Dates and times become ISO 8601; formulas give the values that Excel stored; empty rows stay, so that line numbers are
 the sheet's row numbers. Needs the library python-calamine (the extra `flagdata[excel]`), which works in a process of
-its own, see `flagdata.workbook`.
+its own, see `flagdata.ingest.anemometer.containers.workbook`.
 """
 
 from __future__ import annotations
@@ -11,12 +11,12 @@ import zipfile
 from importlib.util import find_spec
 from pathlib import Path
 
-from flagdata.bounded import Child, End, EndedError
+from flagdata.core.files.bounded import Child, End, EndedError
+from flagdata.core.findings import Finding
 from flagdata.errors import FlagdataError, InputError, LimitError
-from flagdata.findings import Finding
-from flagdata.ingest.anemometer.options import Limits
-from flagdata.ingest.anemometer.text.source import TableText
-from flagdata.workbook import Sheet
+from flagdata.ingest.anemometer.containers.workbook import Sheet
+from flagdata.ingest.anemometer.text.text_file import TableText
+from flagdata.ingest.anemometer.wind_options import Limits
 
 _MEMORY = 900 << 20
 """Memory that reading a workbook may take [B]; a sheet of a million rows and ten columns takes half of it."""
@@ -61,7 +61,7 @@ def open_sheet(path: Path, *, limits: Limits) -> TableText:
 
 
 def _read(where: str, limits: Limits) -> Sheet | None:
-    child = Child("flagdata.workbook:reader", memory=_MEMORY)
+    child = Child("flagdata.ingest.anemometer.containers.workbook:reader", memory=_MEMORY)
     try:
         return child.ask((where, limits.rows), seconds=_SECONDS)
     except EndedError as ended:

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flagdata.findings import Finding
-from flagdata.ingest.anemometer.instants.stamps import DAY
-from flagdata.ingest.anemometer.reading import Reading
-from flagdata.ingest.anemometer.recipe import Recipe
-from flagdata.signals import Series
+from flagdata.core.findings import Finding
+from flagdata.core.units import UNITS, unit
+from flagdata.ingest.anemometer.instants.stamp_text import DAY
+from flagdata.ingest.anemometer.log_reading import Reading
+from flagdata.ingest.anemometer.sensor_recipe import Recipe
+from flagdata.record.signals import Series
 from flagdata.timebase import NANOSECONDS, iso
-from flagdata.units import UNITS, unit
 
 _FASTEST = 75.0
 """m/s; above the strongest gusts of any storm but tornadoes and the record of Barrow Island (113 m/s)."""

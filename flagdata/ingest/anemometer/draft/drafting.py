@@ -14,10 +14,12 @@ from typing import Literal
 
 import numpy as np
 
-from flagdata import compass
-from flagdata.ingest.anemometer.draft.given import GivenColumns, given_columns
+from flagdata.core import compass
+from flagdata.core.units import UNITS, canonical, spelled
+from flagdata.ingest.anemometer.draft.given_columns import GivenColumns, given_columns
+from flagdata.ingest.anemometer.draft.heading_words import GUSTS, MOVING, Meaning, fits, meaning, named_alike
 from flagdata.ingest.anemometer.draft.questions import ZONE, Open
-from flagdata.ingest.anemometer.draft.shape import TableShape, is_missing, is_number, shape_of
+from flagdata.ingest.anemometer.draft.table_shape import TableShape, is_missing, is_number, shape_of
 from flagdata.ingest.anemometer.draft.times import (
     TimeFields,
     counts_of,
@@ -26,13 +28,11 @@ from flagdata.ingest.anemometer.draft.times import (
     of_columns,
     unread_count,
 )
-from flagdata.ingest.anemometer.draft.words import GUSTS, MOVING, Meaning, fits, meaning, named_alike
 from flagdata.ingest.anemometer.instants import dates
-from flagdata.ingest.anemometer.instants.stamps import EPOCH
-from flagdata.ingest.anemometer.options import WindOptions
-from flagdata.ingest.anemometer.recipe import DELIMITERS
-from flagdata.signals import Series
-from flagdata.units import UNITS, canonical, spelled
+from flagdata.ingest.anemometer.instants.stamp_text import EPOCH
+from flagdata.ingest.anemometer.sensor_recipe import DELIMITERS
+from flagdata.ingest.anemometer.wind_options import WindOptions
+from flagdata.record.signals import Series
 
 
 @dataclass(frozen=True, kw_only=True)

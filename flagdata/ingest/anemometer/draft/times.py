@@ -6,11 +6,11 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from flagdata.ingest.anemometer.draft.shape import TableShape, is_number
-from flagdata.ingest.anemometer.draft.words import Meaning, words_of
-from flagdata.ingest.anemometer.instants import stamps
+from flagdata.ingest.anemometer.draft.heading_words import Meaning, words_of
+from flagdata.ingest.anemometer.draft.table_shape import TableShape, is_number
+from flagdata.ingest.anemometer.instants import stamp_text
 from flagdata.ingest.anemometer.instants.dates import is_time_of_day, parse
-from flagdata.ingest.anemometer.instants.stamps import Stamps
+from flagdata.ingest.anemometer.instants.stamp_text import Stamps
 from flagdata.timebase import iso
 
 _CLOCKS = ("%H:%M:%S%f", "%H:%M", "%I:%M:%S%f %p", "%I:%M %p", "%H%M%S", "%H%M", "%H")
@@ -117,12 +117,12 @@ def of_columns(
 def of_another_origin(time: TimeFields, meanings: Sequence[Meaning]) -> bool:
     """Checks whether a count of Unix time stands below a heading that speaks of another origin."""
     words = {word for i in time.columns for word in meanings[i].plain.split()}
-    return time.form in stamps.EPOCH and time.form not in words and bool(words & _OTHER_ORIGINS)
+    return time.form in stamp_text.EPOCH and time.form not in words and bool(words & _OTHER_ORIGINS)
 
 
 def counts_of(text: str) -> str:
     """Writes the date that a number is by each count since an origin that reads it; "" where none does."""
-    read = {form: parse([text], form)[0] for form in (*stamps.EPOCH, *stamps.SERIAL)}
+    read = {form: parse([text], form)[0] for form in (*stamp_text.EPOCH, *stamp_text.SERIAL)}
     dates = [
         f"{iso(int(stamps.ns[0])).removesuffix('Z')} as {form}" for form, stamps in read.items() if stamps.valid[0]
     ]
@@ -135,7 +135,7 @@ def unread_count(shape: TableShape, meanings: Sequence[Meaning]) -> str:
         cell = shape.rows[0][index]
         if meaning.kind not in ("time", "date") or not is_number(cell):
             continue
-        if re.fullmatch(stamps.EXPONENT, cell):
+        if re.fullmatch(stamp_text.EXPONENT, cell):
             return f"; {shape.shown(index)} begins with {cell!r}, which was rounded: export it with all its digits"
         if dates := counts_of(cell):
             return f"; {shape.shown(index)} begins with {cell!r}, which would be {dates}"
@@ -145,7 +145,7 @@ def unread_count(shape: TableShape, meanings: Sequence[Meaning]) -> str:
 def _candidates(texts: Sequence[str], columns: tuple[int, ...]) -> list[str]:
     first = texts[0] if texts else ""
     if _UNITS_OF_A_COUNT.fullmatch(first):
-        return [*stamps.EPOCH, *(form for form in _WHOLE if form != "iso")]
+        return [*stamp_text.EPOCH, *(form for form in _WHOLE if form != "iso")]
     dated = [f"{date} {clock}" for date in _DATES for clock in _CLOCKS]
     dated += _CLOCKS if len(columns) == 1 else ()
     return [*_WHOLE, *dated] if len(columns) > 1 or _CLOCK.search(first) else [*_WHOLE, *dated, *_DATES]
@@ -156,7 +156,7 @@ def _reads_any(texts: Sequence[str], form: str) -> bool:
     if "%" not in form:
         return bool(parse(list(texts), form)[0].valid.any())
     day = "%Y-%m-%d " if is_time_of_day(form) else ""
-    expression = re.compile(stamps.pattern(f"{day}{form}"))
+    expression = re.compile(stamp_text.pattern(f"{day}{form}"))
     return any(expression.fullmatch(f"{'1970-01-01 ' if day else ''}{text.strip()}") for text in texts)
 
 

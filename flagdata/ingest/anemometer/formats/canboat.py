@@ -27,17 +27,17 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from flagdata.core.schema import SampleFlag
+from flagdata.core.shell import command_line
+from flagdata.core.units import UNITS
 from flagdata.errors import InputError
 from flagdata.ingest.anemometer.formats.serial_lines import Defect, Instrument, Sample, read_lines
-from flagdata.ingest.anemometer.options import WindOptions
-from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.log_reading import Reading
 from flagdata.ingest.anemometer.samples.platform import settled
 from flagdata.ingest.anemometer.sniffing import Guess, Head
-from flagdata.ingest.anemometer.text.source import TextFile
-from flagdata.schema import SampleFlag
-from flagdata.shell import command_line
-from flagdata.signals import Sensor
-from flagdata.units import UNITS
+from flagdata.ingest.anemometer.text.text_file import TextFile
+from flagdata.ingest.anemometer.wind_options import WindOptions
+from flagdata.record.signals import Sensor
 
 _CANDUMP = re.compile(
     r"\((?P<stamp>\d{10}\.\d{1,9})\)\s+\S+\s+(?P<id>[0-9A-F]{8})#(?P<bytes>(?:[0-9A-F]{2}){0,8})\s*[RT]?"

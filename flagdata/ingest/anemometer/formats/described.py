@@ -2,7 +2,7 @@
 
 Such a recipe leaves open what differs from one export to the next: where the heading stands, which of several names a
 column has, in which unit it is. The formats of catalogs/sensors/formats are recipes of this kind that recognise their
-files; a user's own is read by `--sensor FILE.toml`. Beside the keys of every recipe (see recipe.py) they have
+files; a user's own is read by `--sensor FILE.toml`. Beside the keys of every recipe (see sensor_recipe.py) they have
 
     described-by        whose description it follows, of a format that was never tested on a real file
     [match]             see recipe.MATCH
@@ -30,25 +30,25 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.documents import to_toml
+from flagdata.core.findings import Finding
+from flagdata.core.schema import CHANNELS
+from flagdata.core.shell import command_line
+from flagdata.core.units import UNITS, spelled, unit
 from flagdata.errors import InputError
-from flagdata.findings import Finding
-from flagdata.ingest.anemometer import recipe as recipes
-from flagdata.ingest.anemometer.formats.headings import Column, Heading, find, fits, stamp_format
-from flagdata.ingest.anemometer.instants.stamps import parse
-from flagdata.ingest.anemometer.options import WindOptions
-from flagdata.ingest.anemometer.reading import Reading, described
-from flagdata.ingest.anemometer.recipe import OpenRecipe, Recipe
+from flagdata.ingest.anemometer import sensor_recipe as recipes
+from flagdata.ingest.anemometer.formats.recipe_headings import Column, Heading, find, fits, stamp_format
+from flagdata.ingest.anemometer.instants.stamp_text import parse
+from flagdata.ingest.anemometer.log_reading import Reading, described
+from flagdata.ingest.anemometer.sensor_recipe import OpenRecipe, Recipe
 from flagdata.ingest.anemometer.sniffing import Guess, Head
+from flagdata.ingest.anemometer.table.log_table import Table, read_table, with_horizontal
 from flagdata.ingest.anemometer.table.rowclock import StatedTime
-from flagdata.ingest.anemometer.table.table import Table, read_table, with_horizontal
-from flagdata.ingest.anemometer.text.rows import RowReader, cells_of_lines
-from flagdata.ingest.anemometer.text.source import TextFile
-from flagdata.recipes import Shelf
-from flagdata.schema import CHANNELS
-from flagdata.shell import command_line
+from flagdata.ingest.anemometer.text.cut_lines import RowReader, cells_of_lines
+from flagdata.ingest.anemometer.text.text_file import TextFile
+from flagdata.ingest.anemometer.wind_options import WindOptions
+from flagdata.recipes.documents import to_toml
+from flagdata.recipes.shelves import Shelf
 from flagdata.timebase import NANOSECONDS
-from flagdata.units import UNITS, spelled, unit
 
 _SHELF = Shelf(folder="sensors/formats", noun="table format")
 _LINES = 5000

@@ -7,17 +7,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from flagdata.arrays import IntArray
+from flagdata.core.arrays import IntArray
+from flagdata.core.findings import Finding
 from flagdata.errors import InputError, UsageError
-from flagdata.findings import Finding
-from flagdata.ingest.anemometer import recipe as recipes
-from flagdata.ingest.anemometer.options import WindOptions
-from flagdata.ingest.anemometer.reading import Reading
-from flagdata.ingest.anemometer.recipe import Recipe
+from flagdata.ingest.anemometer import sensor_recipe as recipes
+from flagdata.ingest.anemometer.log_reading import Reading
+from flagdata.ingest.anemometer.sensor_recipe import Recipe
 from flagdata.ingest.anemometer.sniffing import Guess, Head
+from flagdata.ingest.anemometer.table.log_table import read_table, with_horizontal
 from flagdata.ingest.anemometer.table.rowclock import StatedTime
-from flagdata.ingest.anemometer.table.table import read_table, with_horizontal
-from flagdata.ingest.anemometer.text.source import TextFile
+from flagdata.ingest.anemometer.text.text_file import TextFile
+from flagdata.ingest.anemometer.wind_options import WindOptions
 
 # Possessive quantifiers: a line of 60,000 blanks or digits must not take quadratic time.
 _FIELD = (

@@ -35,8 +35,10 @@ from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from typing import Any
 
+from flagdata.core.schema import SampleFlag
+from flagdata.core.units import UNITS
 from flagdata.errors import UsageError
-from flagdata.ingest.anemometer.formats.sentences import checksum
+from flagdata.ingest.anemometer.formats.nmea_sentences import checksum
 from flagdata.ingest.anemometer.formats.serial_lines import (
     GIVEN_CLOCK,
     LONGEST,
@@ -48,15 +50,13 @@ from flagdata.ingest.anemometer.formats.serial_lines import (
     split_stamp,
     turned,
 )
-from flagdata.ingest.anemometer.options import WindOptions
-from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.log_reading import Reading
 from flagdata.ingest.anemometer.sniffing import Guess, Head
-from flagdata.ingest.anemometer.table.table import with_horizontal
-from flagdata.ingest.anemometer.text.source import TextFile
-from flagdata.recipes import Shelf, parsed
-from flagdata.schema import SampleFlag
-from flagdata.signals import Sensor
-from flagdata.units import UNITS
+from flagdata.ingest.anemometer.table.log_table import with_horizontal
+from flagdata.ingest.anemometer.text.text_file import TextFile
+from flagdata.ingest.anemometer.wind_options import WindOptions
+from flagdata.recipes.shelves import Shelf, parsed
+from flagdata.record.signals import Sensor
 
 _SHELF = Shelf(folder="sensors/serial", noun="serial format")
 _AXES = ("wind_x", "wind_y")

@@ -14,13 +14,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from flagdata.arrays import IntArray
+from flagdata.core.arrays import IntArray
+from flagdata.core.findings import Finding
 from flagdata.errors import TimeError, UsageError
-from flagdata.findings import Finding
-from flagdata.ingest.anemometer.formats.sentences import TimeMark
-from flagdata.ingest.anemometer.instants import clock as clocks
-from flagdata.ingest.anemometer.instants.clock import ClockChoice
-from flagdata.signals import Instants
+from flagdata.ingest.anemometer.formats.nmea_sentences import TimeMark
+from flagdata.ingest.anemometer.instants import log_clock as clocks
+from flagdata.ingest.anemometer.instants.log_clock import ClockChoice
+from flagdata.record.signals import Instants
 from flagdata.timebase import NANOSECONDS
 
 SENTENCE = 82 * 10 * NANOSECONDS // 4800

@@ -24,10 +24,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from flagdata.core.findings import Finding, Severity
+from flagdata.core.schema import SampleFlag
+from flagdata.core.shell import command_line
+from flagdata.core.units import UNITS
 from flagdata.errors import InputError, UsageError
-from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.formats.marks import NO_TIME_FIX, Placed, TimeLine
-from flagdata.ingest.anemometer.formats.sentences import (
+from flagdata.ingest.anemometer.formats.nmea_sentences import (
     SPEED_UNITS,
     ChecksumError,
     Sentence,
@@ -45,17 +48,14 @@ from flagdata.ingest.anemometer.formats.serial_lines import (
     without_comments,
 )
 from flagdata.ingest.anemometer.instants.zones import instants
-from flagdata.ingest.anemometer.options import WindOptions
-from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.log_reading import Reading
 from flagdata.ingest.anemometer.samples import rules
 from flagdata.ingest.anemometer.samples.platform import settled
 from flagdata.ingest.anemometer.sniffing import Guess, Head
-from flagdata.ingest.anemometer.text.source import TextFile
-from flagdata.schema import SampleFlag
-from flagdata.shell import command_line
-from flagdata.signals import Instants, Sensor, Series
+from flagdata.ingest.anemometer.text.text_file import TextFile
+from flagdata.ingest.anemometer.wind_options import WindOptions
+from flagdata.record.signals import Instants, Sensor, Series
 from flagdata.timebase import NANOSECONDS
-from flagdata.units import UNITS
 
 _OTHERS = {"VWR": "apparent_wind", "VWT": "theoretical_wind", "MDA": "wind"}
 """Older sentences → the wind they hold."""

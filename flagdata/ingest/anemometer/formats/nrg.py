@@ -9,12 +9,12 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from flagdata.core.numbered import bounded
 from flagdata.ingest.anemometer.formats.described import Described
-from flagdata.ingest.anemometer.formats.headings import Column, Heading
-from flagdata.ingest.anemometer.options import WindOptions
-from flagdata.ingest.anemometer.reading import Reading
-from flagdata.ingest.anemometer.text.source import TextFile
-from flagdata.numbered import bounded
+from flagdata.ingest.anemometer.formats.recipe_headings import Column, Heading
+from flagdata.ingest.anemometer.log_reading import Reading
+from flagdata.ingest.anemometer.text.text_file import TextFile
+from flagdata.ingest.anemometer.wind_options import WindOptions
 
 _CHANNELS = 99_999
 _NAME = re.compile(r"Ch(?P<channel>\d+)_(?:.*_)?(?P<statistic>Avg|Samples)_(?P<unit>[^_]*|deg_[CF])", re.IGNORECASE)

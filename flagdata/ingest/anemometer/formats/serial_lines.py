@@ -19,19 +19,19 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.arrays import BoolArray, FloatArray, IntArray
+from flagdata.core.arrays import BoolArray, FloatArray, IntArray
+from flagdata.core.findings import Finding, Severity
+from flagdata.core.schema import CHANNELS, SampleFlag
 from flagdata.errors import InputError, TimeError, UsageError
-from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.formats.sentences import tag_time
-from flagdata.ingest.anemometer.instants.stamps import ABBREVIATED, ENGLISH, Stamps
-from flagdata.ingest.anemometer.instants.stamps import parse as parse_stamps
+from flagdata.ingest.anemometer.formats.nmea_sentences import tag_time
+from flagdata.ingest.anemometer.instants.stamp_text import ABBREVIATED, ENGLISH, Stamps
+from flagdata.ingest.anemometer.instants.stamp_text import parse as parse_stamps
 from flagdata.ingest.anemometer.instants.zones import instants
-from flagdata.ingest.anemometer.reading import Reading, described
+from flagdata.ingest.anemometer.log_reading import Reading, described
 from flagdata.ingest.anemometer.samples import rules
 from flagdata.ingest.anemometer.sniffing import Head
-from flagdata.ingest.anemometer.text.source import TextFile
-from flagdata.schema import CHANNELS, SampleFlag
-from flagdata.signals import Sensor
+from flagdata.ingest.anemometer.text.text_file import TextFile
+from flagdata.record.signals import Sensor
 
 _CLOCK = r"(?P<time>\d{2}:\d{2}:\d{2}(?:\.\d{1,9})?)"
 _RAW = r"[\"\])]?[\s,;>|]+(?P<raw>\S.*)"

@@ -15,16 +15,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from flagdata.arrays import BoolArray, FloatArray, IntArray
+from flagdata.core.arrays import BoolArray, FloatArray, IntArray
+from flagdata.core.findings import Finding, Severity
+from flagdata.core.schema import SampleFlag
 from flagdata.errors import InputError
-from flagdata.findings import Finding, Severity
 from flagdata.ingest.anemometer.formats.described import Described
-from flagdata.ingest.anemometer.options import WindOptions
-from flagdata.ingest.anemometer.reading import Reading
+from flagdata.ingest.anemometer.log_reading import Reading
 from flagdata.ingest.anemometer.sniffing import NAMED, Guess, Head
-from flagdata.ingest.anemometer.text.source import TextFile
-from flagdata.schema import SampleFlag
-from flagdata.signals import Instants
+from flagdata.ingest.anemometer.text.text_file import TextFile
+from flagdata.ingest.anemometer.wind_options import WindOptions
+from flagdata.record.signals import Instants
 from flagdata.timebase import NANOSECONDS
 
 _DIAGNOSTIC = re.compile(r"diag(_csat|_sonic|nostic)?(_\d+)?|csat_?diag|diag_word", re.IGNORECASE)

@@ -15,12 +15,12 @@ from typing import Literal
 import numpy as np
 import pyarrow as pa
 
-from flagdata.arrays import IntArray
+from flagdata.core.arrays import IntArray
+from flagdata.core.findings import Finding
+from flagdata.core.shell import command_line
 from flagdata.errors import TimeError
-from flagdata.findings import Finding
-from flagdata.ingest.anemometer.instants import stamps
-from flagdata.ingest.anemometer.instants.stamps import DAY, HOUR, NEXT_DAY, Stamps
-from flagdata.shell import command_line
+from flagdata.ingest.anemometer.instants import stamp_text
+from flagdata.ingest.anemometer.instants.stamp_text import DAY, HOUR, NEXT_DAY, Stamps
 from flagdata.timebase import NANOSECONDS, iso
 
 Order = Literal["ymd", "dmy", "mdy"]
@@ -39,7 +39,7 @@ def _letters(form: str) -> set[str]:
 
 def is_elapsed(form: str) -> bool:
     """Checks whether a format counts from a start that the file does not state."""
-    return form in stamps.ELAPSED
+    return form in stamp_text.ELAPSED
 
 
 def is_time_of_day(form: str) -> bool:
@@ -70,14 +70,14 @@ def check(form: str) -> None:
     Raises:
         UsageError: see `stamps.pattern`.
     """
-    if form not in stamps.NAMED:
-        stamps.pattern(_with_date(form)[0])
+    if form not in stamp_text.NAMED:
+        stamp_text.pattern(_with_date(form)[0])
 
 
 def parse(texts: Sequence[str] | pa.StringArray, form: str) -> tuple[Stamps, int]:
     """Parses stamps as `stamps.parse_mixed` does: times of day as of 1970-01-01, dates without a year as of 2000."""
     dated_form, before = _with_date(form)
-    return stamps.parse_mixed(texts, dated_form, before=before)
+    return stamp_text.parse_mixed(texts, dated_form, before=before)
 
 
 def date_form(texts: Sequence[str], *, given_order: Order | None, where: str) -> tuple[str, Order, str]:

@@ -17,13 +17,13 @@ from datetime import UTC, datetime, timedelta, tzinfo
 
 import numpy as np
 
-from flagdata.arrays import BoolArray, IntArray
+from flagdata.core.arrays import BoolArray, IntArray
+from flagdata.core.findings import Finding
+from flagdata.core.shell import command_line
 from flagdata.errors import FlagdataError, TimeError, ZoneMissingError
-from flagdata.findings import Finding
-from flagdata.ingest.anemometer.instants.clock import usual
-from flagdata.ingest.anemometer.instants.stamps import HOUR
-from flagdata.shell import command_line
-from flagdata.signals import Instants
+from flagdata.ingest.anemometer.instants.log_clock import usual
+from flagdata.ingest.anemometer.instants.stamp_text import HOUR
+from flagdata.record.signals import Instants
 from flagdata.timebase import NANOSECONDS, zone
 
 LINES = 100

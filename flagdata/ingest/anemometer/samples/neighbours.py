@@ -12,11 +12,11 @@ import math
 
 import numpy as np
 
-from flagdata.arrays import FloatArray, IntArray
-from flagdata.averaging import average
-from flagdata.findings import Finding
-from flagdata.ingest.anemometer.instants.clock import span
-from flagdata.signals import WindSeries
+from flagdata.core.arrays import FloatArray, IntArray
+from flagdata.core.findings import Finding
+from flagdata.ingest.anemometer.instants.log_clock import span
+from flagdata.record.averaging import average
+from flagdata.record.signals import WindSeries
 from flagdata.timebase import NANOSECONDS
 
 STEP = 1800

@@ -25,16 +25,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flagdata.arrays import BoolArray, IntArray
+from flagdata.core.arrays import BoolArray, IntArray
+from flagdata.core.findings import Finding, Severity
+from flagdata.core.schema import SampleFlag
+from flagdata.core.shell import command_line
 from flagdata.errors import TimeError
-from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.instants import clock
-from flagdata.ingest.anemometer.instants.clock import JITTER, ClockChoice, Jump
-from flagdata.ingest.anemometer.instants.stamps import DAY
-from flagdata.ingest.anemometer.reading import Reading
-from flagdata.ingest.anemometer.text.source import RATE_GIVEN
-from flagdata.schema import SampleFlag
-from flagdata.shell import command_line
+from flagdata.ingest.anemometer.instants import log_clock
+from flagdata.ingest.anemometer.instants.log_clock import JITTER, ClockChoice, Jump
+from flagdata.ingest.anemometer.instants.stamp_text import DAY
+from flagdata.ingest.anemometer.log_reading import Reading
+from flagdata.ingest.anemometer.text.text_file import RATE_GIVEN
 from flagdata.timebase import NANOSECONDS, iso
 
 _FEW, _SHARE = 10, 4
@@ -67,7 +67,7 @@ def in_order(reading: Reading, *, where: str, choice: ClockChoice | None = None)
         TimeError: time runs back in a way that no rule explains, or rows share a stamp for too long.
     """
     reading = _without_empty(reading)
-    sorting = clock.sorted_as_given(reading.time, reading.line, choice)
+    sorting = log_clock.sorted_as_given(reading.time, reading.line, choice)
     if sorting is not None:
         reading = reading.with_findings((sorting[1],)).take(sorting[0])
     reading = _on_one_clock(_without_copies(reading), where, None if choice == "sort" else choice)
@@ -118,7 +118,7 @@ def _without_copies(reading: Reading) -> Reading:
     if not (copied or (shared.all() and not differ.any())):
         # Coarse stamps make equal rows too: isolated pairs alone are the same row written twice, and not those beside
         # which a fast logger left out a step: there the second is a sample that came late.
-        period = clock.usual(time)
+        period = log_clock.usual(time)
         wide = np.concatenate(([False], (steps > 1.5 * period) & (period < _FAST), [False, False]))
         twice &= ~(wide[:-2] | wide[2:]) & (int(shared.sum()) <= max(1.0, _ISOLATED * len(shared)))
     message = "{n} rows repeat the row before in stamp and in all values that are read: copies"
@@ -143,20 +143,20 @@ def _on_one_clock(reading: Reading, where: str, choice: ClockChoice | None) -> R
     time, n = reading.time, len(reading.time)
     lag = np.maximum.accumulate(time) - time
     if not np.any(lag > JITTER):
-        return _continued(reading, clock.set_back_a_little(time, choice), choice)
+        return _continued(reading, log_clock.set_back_a_little(time, choice), choice)
     few = max(min(_FEW, n // _SHARE), n // 1000)
-    scattered = int((np.diff(time) < -JITTER).sum()) > max(few, clock.MOST)
-    wild = np.zeros(n, dtype=bool) if scattered else clock.excursions(time, most=few)
-    jumps = () if scattered else clock.set_back(time[~wild])
-    scattered |= len(jumps) > clock.MOST
+    scattered = int((np.diff(time) < -JITTER).sum()) > max(few, log_clock.MOST)
+    wild = np.zeros(n, dtype=bool) if scattered else log_clock.excursions(time, most=few)
+    jumps = () if scattered else log_clock.set_back(time[~wild])
+    scattered |= len(jumps) > log_clock.MOST
     was_set = choice is not None or all(_believable(time[~wild], jump) for jump in jumps)
     if scattered or not was_set or int(wild.sum()) > max(few, n // _SHARE):
         wild = np.ones(n, dtype=bool)
-        wild[clock.longest_rise(time)] = False
+        wild[log_clock.longest_rise(time)] = False
         if int(wild.sum()) > few:
             raise _runs_back(reading, where, settable=choice is None and not scattered)
         jumps = ()
-    elif jumps and choice is None and clock.disordered(time[~wild]):
+    elif jumps and choice is None and log_clock.disordered(time[~wild]):
         raise _runs_back(reading, where, settable=True)
     first = iso(int(time[np.argmax(wild)]))
     message = f"{{n}} rows with stamps far from their neighbours' ({first})"
@@ -167,7 +167,7 @@ def _on_one_clock(reading: Reading, where: str, choice: ClockChoice | None) -> R
         message,
         severity=Severity.ERROR,
         value=worst,
-        fix=clock.SORT if reading.stamped else None,
+        fix=log_clock.SORT if reading.stamped else None,
     )
     return _continued(settled, jumps, choice)
 
@@ -185,10 +185,10 @@ def _runs_back(reading: Reading, where: str, *, settable: bool) -> TimeError:
     reached = np.maximum.accumulate(time)
     falls = np.flatnonzero(np.diff(time) < 0) + 1
     at = int(falls[np.argmax((reached - time)[falls])])
-    out = len(time) - len(clock.longest_rise(time))
+    out = len(time) - len(log_clock.longest_rise(time))
     places = f"in {len(falls)} places, the farthest " if len(falls) > 1 else ""
-    ways = [clock.SORT] if reading.stamped else []
-    ways += [f"if one log's clock was set anew, {clock.CHOICES}"] if settable else []
+    ways = [log_clock.SORT] if reading.stamped else []
+    ways += [f"if one log's clock was set anew, {log_clock.CHOICES}"] if settable else []
     ways += ["if files were joined, split the file there and ingest the parts by themselves", _STATIONS]
     return TimeError(
         f"time runs backwards {places}by {(reached - time)[at] / NANOSECONDS:.1f} s, from {iso(int(reached[at]))} to "
@@ -200,18 +200,20 @@ def _runs_back(reading: Reading, where: str, *, settable: bool) -> TimeError:
 
 def _continued(reading: Reading, jumps: tuple[Jump, ...], choice: ClockChoice | None) -> Reading:
     """Puts the rows on one clock: set back by `jumps`, or set on as `clock.set_on` finds."""
-    on = clock.set_on(reading.time, returns=jumps)
+    on = log_clock.set_on(reading.time, returns=jumps)
     if choice is None:
         undone = {-jump.size for jump in jumps}
         doubtful = tuple(jump for jump in on if jump.size not in undone)
-        reading = reading.with_findings(clock.report(reading.time, doubtful, reading.line, choice, stamps_stay=True))
+        reading = reading.with_findings(
+            log_clock.report(reading.time, doubtful, reading.line, choice, stamps_stay=True)
+        )
         on = tuple(jump for jump in on if jump.size in undone)
     all_jumps = tuple(sorted((*jumps, *on), key=lambda jump: jump.row))
     if not all_jumps:
         return reading
-    time, shifted = clock.continued(reading.time, all_jumps, choice)
+    time, shifted = log_clock.continued(reading.time, all_jumps, choice)
     flags = np.where(shifted, reading.flags | SampleFlag.TIME_UNSURE, reading.flags)
-    findings = clock.report(reading.time, all_jumps, reading.line, choice, sortable=reading.stamped)
+    findings = log_clock.report(reading.time, all_jumps, reading.line, choice, sortable=reading.stamped)
     return replace(reading, time=time).with_findings(findings, flags=flags)
 
 

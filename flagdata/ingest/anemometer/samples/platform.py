@@ -15,13 +15,13 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.findings import Finding, Severity
+from flagdata.core.units import UNITS
 from flagdata.errors import InputError, UsageError
-from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.options import WindOptions
-from flagdata.ingest.anemometer.reading import Reading
-from flagdata.signals import Series
-from flagdata.units import UNITS
+from flagdata.ingest.anemometer.log_reading import Reading
+from flagdata.ingest.anemometer.wind_options import WindOptions
+from flagdata.record.signals import Series
 
 Platform: TypeAlias = Literal["fixed", "moving", "corrected"]
 MOVING = 0.5

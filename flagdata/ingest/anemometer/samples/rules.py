@@ -12,12 +12,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from flagdata.arrays import BoolArray, FloatArray, IntArray
+from flagdata.core.arrays import BoolArray, FloatArray, IntArray
+from flagdata.core.findings import Finding, Severity
+from flagdata.core.schema import CHANNELS, UNUSABLE, SampleFlag
 from flagdata.errors import InputError
-from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading, streams
+from flagdata.ingest.anemometer.log_reading import WIND_CHANNELS, Reading, streams
 from flagdata.ingest.anemometer.samples.zero import resolution
-from flagdata.schema import CHANNELS, UNUSABLE, SampleFlag
 from flagdata.timebase import NANOSECONDS, iso
 
 SPEEDS = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed", "wind_speed_estimate")

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flagdata.arrays import BoolArray, FloatArray, IntArray
+from flagdata.core.arrays import BoolArray, FloatArray, IntArray
+from flagdata.core.findings import Finding, Severity
+from flagdata.core.schema import SampleFlag
+from flagdata.core.shell import command_line
 from flagdata.errors import RefusedError, UsageError
-from flagdata.findings import Finding, Severity
-from flagdata.ingest.anemometer.options import ZeroOffset
-from flagdata.ingest.anemometer.reading import Reading
-from flagdata.schema import SampleFlag
-from flagdata.shell import command_line
+from flagdata.ingest.anemometer.log_reading import Reading
+from flagdata.ingest.anemometer.wind_options import ZeroOffset
 from flagdata.timebase import NANOSECONDS
 
 _WINDOW = 2.0

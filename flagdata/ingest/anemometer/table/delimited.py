@@ -7,23 +7,23 @@ from dataclasses import replace
 
 import numpy as np
 
+from flagdata.core.findings import Finding
 from flagdata.errors import InputError, UnknownNameError, UsageError
-from flagdata.findings import Finding
-from flagdata.ingest.anemometer import recipe as recipes
+from flagdata.ingest.anemometer import sensor_recipe as recipes
 from flagdata.ingest.anemometer.draft.doubts import KEYS, doubts
 from flagdata.ingest.anemometer.draft.drafting import Draft, draft
+from flagdata.ingest.anemometer.draft.heading_words import meaning
 from flagdata.ingest.anemometer.draft.questions import Open, OpenFactsError
-from flagdata.ingest.anemometer.draft.words import meaning
 from flagdata.ingest.anemometer.formats.described import column_findings, complete
-from flagdata.ingest.anemometer.options import WindOptions
-from flagdata.ingest.anemometer.reading import WIND_CHANNELS, Reading
-from flagdata.ingest.anemometer.recipe import OpenRecipe, Recipe
+from flagdata.ingest.anemometer.log_reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.samples import platform
+from flagdata.ingest.anemometer.sensor_recipe import OpenRecipe, Recipe
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, Head
+from flagdata.ingest.anemometer.table.log_table import read_table, with_horizontal
 from flagdata.ingest.anemometer.table.rowclock import StatedTime
-from flagdata.ingest.anemometer.table.table import read_table, with_horizontal
-from flagdata.ingest.anemometer.text.rows import RowReader
-from flagdata.ingest.anemometer.text.source import TextFile
+from flagdata.ingest.anemometer.text.cut_lines import RowReader
+from flagdata.ingest.anemometer.text.text_file import TextFile
+from flagdata.ingest.anemometer.wind_options import WindOptions
 
 _ASKED = frozenset({"unit", "date_order", "wind", "columns", "missing", "expect"})
 """Options that complete a draft; a recipe says these things itself."""

@@ -10,15 +10,15 @@ from typing import TypeAlias
 import numpy as np
 import pyarrow as pa
 
-from flagdata.arrays import BoolArray, IntArray
+from flagdata.core.arrays import BoolArray, IntArray
+from flagdata.core.findings import Finding
 from flagdata.errors import UsageError
-from flagdata.findings import Finding
-from flagdata.ingest.anemometer.instants import clock, dates, stamps, zones
-from flagdata.ingest.anemometer.instants.clock import ClockChoice
-from flagdata.ingest.anemometer.instants.stamps import Stamps
-from flagdata.ingest.anemometer.text.cells import Growing
+from flagdata.ingest.anemometer.instants import dates, log_clock, stamp_text, zones
+from flagdata.ingest.anemometer.instants.log_clock import ClockChoice
+from flagdata.ingest.anemometer.instants.stamp_text import Stamps
 from flagdata.ingest.anemometer.text.columns import Columns
-from flagdata.signals import Instants
+from flagdata.ingest.anemometer.text.text_cells import Growing
+from flagdata.record.signals import Instants
 
 NEWEST_FIRST = 0.9
 """Share of rows older than the row before them from which a log is a list with the newest row on top."""
@@ -103,7 +103,7 @@ class RowClock:
         if dates.is_elapsed(self.form) or dates.needs_date(self.form):
             # such stamps have no day of their own: it follows from the rows' order, so they are not sorted
             return order, findings
-        sorting = clock.sorted_as_given(wall[order], line[order], choice)
+        sorting = log_clock.sorted_as_given(wall[order], line[order], choice)
         if sorting is None:
             return order, findings
         return np.arange(len(wall))[order][sorting[0]], (*findings, sorting[1])
@@ -116,7 +116,7 @@ class RowClock:
         self.ns, self.utc = Growing(np.int64), Growing(np.bool_)
         if dates.is_elapsed(self.form):
             return dates.since_start(wall, self.form, start=stamp_options.start, line=line, where=where)
-        if self.form not in stamps.NAMED and "%p" not in self.form and not utc.any():
+        if self.form not in stamp_text.NAMED and "%p" not in self.form and not utc.any():
             dates.refuse_twelve(wall, line=line, where=where)
         findings: tuple[Finding, ...] = ()
         if dates.needs_date(self.form):

@@ -17,8 +17,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from flagdata.arrays import BoolArray, IntArray, UInt8Array
-from flagdata.buffers import owned
+from flagdata.core.arrays import BoolArray, IntArray, UInt8Array
+from flagdata.core.files.buffers import owned
 
 _LF, _CR, _QUOTE = 10, 13, 34
 

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flagdata.core.schema import CHANNELS, SampleFlag
 from flagdata.errors import FlagdataError
 from flagdata.ingest import OpenFactsError, Reading, WindOptions, read_log
-from flagdata.schema import CHANNELS, SampleFlag
-from flagdata.signals import Sensor, WindLog
+from flagdata.record.signals import Sensor, WindLog
 from flagdata.timebase import iso
 
 SECOND = 1_000_000_000

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flagdata.core.findings import Finding, Severity
+from flagdata.core.rng import stream
+from flagdata.core.schema import SampleFlag
 from flagdata.errors import TimeError, UsageError
-from flagdata.findings import Finding, Severity
 from flagdata.ingest import ClockChoice, Reading, WindOptions, gaps, read_log
 from flagdata.ingest.anemometer.samples.order import in_order
-from flagdata.rng import stream
-from flagdata.schema import SampleFlag
-from flagdata.signals import WindLog
+from flagdata.record.signals import WindLog
 from tests.flagdata.ingest.anemometer.cases import sentence
 from tests.flagdata.ingest.anemometer.conftest import made, read
 

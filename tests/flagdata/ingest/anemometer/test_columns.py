@@ -9,11 +9,11 @@ import pytest
 
 from flagdata.errors import InputError
 from flagdata.ingest import FileLayout, WindOptions, open_text, read_log
-from flagdata.ingest.anemometer.instants.stamps import PLAIN_FORMS, parse
-from flagdata.ingest.anemometer.options import Limits
+from flagdata.ingest.anemometer.instants.stamp_text import PLAIN_FORMS, parse
 from flagdata.ingest.anemometer.text.columns import Columns
-from flagdata.ingest.anemometer.text.rows import RowReader
-from flagdata.ingest.anemometer.text.source import TextFile
+from flagdata.ingest.anemometer.text.cut_lines import RowReader
+from flagdata.ingest.anemometer.text.text_file import TextFile
+from flagdata.ingest.anemometer.wind_options import Limits
 
 HEADER = b"a,b,c\n"
 LAWS: dict[str, bytes] = {
@@ -181,7 +181,7 @@ def test_a_damaged_toa5_table_is_read_as_row_by_row(tmp_path: Path, monkeypatch:
 @pytest.mark.parametrize("form", PLAIN_FORMS)
 def test_stamps_by_arrow_are_those_of_the_pattern(monkeypatch: pytest.MonkeyPatch, form: str, texts: list[str]) -> None:
     quick = parse(texts, form)
-    monkeypatch.setattr("flagdata.ingest.anemometer.instants.stamps.PLAIN_FORMS", ())
+    monkeypatch.setattr("flagdata.ingest.anemometer.instants.stamp_text.PLAIN_FORMS", ())
     slow = parse(texts, form)
     for name in ("ns", "utc", "valid", "distant"):
         np.testing.assert_array_equal(getattr(quick, name), getattr(slow, name), err_msg=name)

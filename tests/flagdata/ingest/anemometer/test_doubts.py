@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import stream
+from flagdata.core.units import unit
 from flagdata.errors import UnknownNameError
 from flagdata.ingest import OpenFactsError, Reading, WindOptions, read_log
-from flagdata.ingest.anemometer import recipe as recipes
+from flagdata.ingest.anemometer import sensor_recipe as recipes
 from flagdata.ingest.anemometer.draft.doubts import KEYS, doubts
-from flagdata.rng import stream
-from flagdata.signals import Sensor
-from flagdata.units import unit
+from flagdata.record.signals import Sensor
 
 Write = Callable[[str | bytes], Path]
 PLAIN = "time,wind_speed (m/s),wind_direction (deg)\n"

@@ -11,8 +11,8 @@ import pytest
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.ingest import OpenFactsError, WindOptions, draft, read_log
 from flagdata.ingest.anemometer.draft.drafting import Draft
-from flagdata.ingest.anemometer.draft.shape import shape_of
-from flagdata.ingest.anemometer.draft.words import meaning
+from flagdata.ingest.anemometer.draft.heading_words import meaning
+from flagdata.ingest.anemometer.draft.table_shape import shape_of
 
 Write = Callable[[str | bytes], Path]
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from flagdata.bounded import Child, End, EndedError
+from flagdata.core.files.bounded import Child, End, EndedError
 from flagdata.errors import FlagdataError, InputError, LimitError
 from flagdata.ingest import WindOptions, open_text, read_log, sniff
 from flagdata.ingest.anemometer import Limits

@@ -11,8 +11,8 @@ import pytest
 
 from flagdata.errors import InputError, TimeError
 from flagdata.ingest import WindOptions, anemometers
-from flagdata.ingest.anemometer import recipe as recipes
-from flagdata.signals import WindLog
+from flagdata.ingest.anemometer import sensor_recipe as recipes
+from flagdata.record.signals import WindLog
 from flagdata.timebase import iso
 from tests.flagdata.ingest.anemometer.conftest import read, shows
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flagdata.core.schema import SampleFlag
 from flagdata.errors import FlagdataError, InputError, TimeError, UsageError
 from flagdata.ingest.anemometer.formats import canboat
 from flagdata.ingest.anemometer.formats.makers import SerialLines, crc16
 from flagdata.ingest.anemometer.formats.serial_lines import Defect, split_stamp
-from flagdata.schema import SampleFlag
-from flagdata.signals import WindLog
+from flagdata.record.signals import WindLog
 from flagdata.timebase import iso
 from tests.flagdata.ingest.anemometer.cases import sentence
 from tests.flagdata.ingest.anemometer.conftest import read

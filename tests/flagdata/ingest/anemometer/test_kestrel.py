@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flagdata.core.schema import SampleFlag
 from flagdata.errors import InputError
-from flagdata.schema import SampleFlag
 from flagdata.timebase import iso
 from tests.flagdata.ingest.anemometer.conftest import read
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
+from flagdata.core.schema import SampleFlag
 from flagdata.errors import InputError, TimeError, UsageError
-from flagdata.schema import SampleFlag
 from tests.flagdata.ingest.anemometer.cases import case
 from tests.flagdata.ingest.anemometer.conftest import check_refused, check_reported, read
 

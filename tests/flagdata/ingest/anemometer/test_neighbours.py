@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flagdata.core.rng import stream
 from flagdata.ingest import Labels, WindIngest, WindOptions, ingest_wind
 from flagdata.ingest.anemometer.samples.neighbours import hours_off
 from flagdata.lake import Lake
-from flagdata.rng import stream
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 
 S = 1_000_000_000
 T0 = 1_777_636_800 * S

@@ -9,11 +9,11 @@ from operator import xor
 import numpy as np
 import pytest
 
+from flagdata.core.schema import SampleFlag
 from flagdata.errors import InputError, TimeError, UsageError
 from flagdata.ingest import Head, checksum
 from flagdata.ingest.anemometer.formats.nmea import Nmea, StampedNmea
-from flagdata.ingest.anemometer.formats.sentences import ChecksumError, clock, split, tag_time
-from flagdata.schema import SampleFlag
+from flagdata.ingest.anemometer.formats.nmea_sentences import ChecksumError, clock, split, tag_time
 from flagdata.timebase import iso
 from tests.flagdata.ingest.anemometer.cases import sentence
 from tests.flagdata.ingest.anemometer.conftest import read

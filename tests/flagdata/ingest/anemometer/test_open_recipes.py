@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from flagdata.documents import from_toml, to_toml
+from flagdata.core.provenance import digest
 from flagdata.errors import FlagdataError, InputError
 from flagdata.ingest import FORMATS, WindOptions, read_log
 from flagdata.ingest.anemometer.formats import described
-from flagdata.provenance import digest
+from flagdata.recipes.documents import from_toml, to_toml
 
 Write = Callable[..., Path]
 

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flagdata.core.findings import Severity
+from flagdata.core.rng import stream
+from flagdata.core.schema import SampleFlag
 from flagdata.errors import TimeError, UsageError
-from flagdata.findings import Severity
 from flagdata.ingest import ClockChoice, Reading, gaps
-from flagdata.ingest.anemometer.instants.clock import longest_rise
+from flagdata.ingest.anemometer.instants.log_clock import longest_rise
 from flagdata.ingest.anemometer.samples.order import in_order
-from flagdata.rng import stream
-from flagdata.schema import SampleFlag
-from flagdata.signals import WindLog
+from flagdata.record.signals import WindLog
 from tests.flagdata.ingest.anemometer.conftest import made, read
 
 START = 1_777_636_800 * 10**9

@@ -13,11 +13,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from flagdata.core.units import UNITS
 from flagdata.errors import FlagdataError
 from flagdata.ingest import FORMATS, Head, WindOptions, read_log, sniff
 from flagdata.ingest.anemometer import average
-from flagdata.signals import WindLog
-from flagdata.units import UNITS
+from flagdata.record.signals import WindLog
 from tests.flagdata.ingest.anemometer.cases import sentence
 
 QUICK = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])

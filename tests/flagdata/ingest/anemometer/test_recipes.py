@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flagdata.core.schema import CHANNELS, SampleFlag
+from flagdata.core.units import UNITS
 from flagdata.errors import FlagdataError, InputError, UnknownNameError
 from flagdata.ingest import WindOptions, read_log
-from flagdata.ingest.anemometer import recipe as recipes
-from flagdata.schema import CHANNELS, SampleFlag
-from flagdata.signals import WindLog
+from flagdata.ingest.anemometer import sensor_recipe as recipes
+from flagdata.record.signals import WindLog
 from flagdata.timebase import iso
-from flagdata.units import UNITS
 from tests.flagdata.ingest.anemometer.conftest import read
 
 PLAIN = """

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flagdata.core.findings import Finding
+from flagdata.core.schema import UNUSABLE, SampleFlag
 from flagdata.errors import InputError, TimeError
-from flagdata.findings import Finding
 from flagdata.ingest import WindOptions, read_log, sniff
 from flagdata.ingest.anemometer import average
-from flagdata.schema import UNUSABLE, SampleFlag
-from flagdata.signals import WindLog
+from flagdata.record.signals import WindLog
 from flagdata.timebase import iso
 
 pytestmark = pytest.mark.reference

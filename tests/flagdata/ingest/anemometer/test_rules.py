@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from flagdata.core.findings import Severity
+from flagdata.core.rng import stream
+from flagdata.core.schema import SampleFlag
 from flagdata.dataset import TruthSeries
 from flagdata.errors import InputError, UsageError
-from flagdata.findings import Severity
 from flagdata.ingest import QualityRules, Reading
 from flagdata.ingest.anemometer import average
 from flagdata.ingest.anemometer.samples import rules, zero
-from flagdata.rng import stream
-from flagdata.schema import SampleFlag
-from flagdata.signals import Sensor, WindLog, WindSeries
+from flagdata.record.signals import Sensor, WindLog, WindSeries
 from tests.flagdata.ingest.anemometer.conftest import made, read
 
 S = 1_000_000_000

@@ -14,7 +14,7 @@ from flagdata.errors import TimeError, UsageError
 from flagdata.ingest import WindOptions, draft
 from flagdata.ingest.anemometer.instants import dates
 from flagdata.ingest.anemometer.instants.dates import date_form
-from flagdata.ingest.anemometer.instants.stamps import parse
+from flagdata.ingest.anemometer.instants.stamp_text import parse
 from flagdata.ingest.anemometer.instants.zones import to_utc
 from flagdata.timebase import wall_status
 from tests.flagdata.ingest.anemometer.conftest import read

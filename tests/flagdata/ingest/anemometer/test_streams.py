@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flagdata.core.rng import stream
+from flagdata.core.schema import SampleFlag
 from flagdata.errors import InputError
 from flagdata.ingest import Reading, ingest_wind
-from flagdata.ingest.anemometer.reading import streams
+from flagdata.ingest.anemometer.log_reading import streams
 from flagdata.ingest.anemometer.samples import rules
 from flagdata.lake import Lake
-from flagdata.rng import stream
-from flagdata.schema import SampleFlag
-from flagdata.signals import Sensor
+from flagdata.record.signals import Sensor
 from tests.flagdata.ingest.anemometer.cases import sentence
 from tests.flagdata.ingest.anemometer.conftest import read
 

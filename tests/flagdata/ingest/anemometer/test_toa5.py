@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from flagdata.schema import SampleFlag
+from flagdata.core.schema import SampleFlag
 from tests.flagdata.ingest.anemometer.conftest import read
 
 

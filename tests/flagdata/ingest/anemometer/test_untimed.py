@@ -12,7 +12,7 @@ import pytest
 
 from flagdata.errors import FlagdataError, UsageError
 from flagdata.ingest import WindOptions, read_log
-from flagdata.signals import WindLog
+from flagdata.record.signals import WindLog
 from tests.flagdata.ingest.anemometer.conftest import read
 
 Write = Callable[[str], Path]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flagdata.schema import SampleFlag
+from flagdata.core.schema import SampleFlag
 from tests.flagdata.ingest.anemometer.cases import sentence
 from tests.flagdata.ingest.anemometer.conftest import read
 

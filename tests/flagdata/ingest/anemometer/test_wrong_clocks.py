@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from flagdata.signals import WindLog
+from flagdata.record.signals import WindLog
 from tests.flagdata.ingest.anemometer.conftest import read
 
 

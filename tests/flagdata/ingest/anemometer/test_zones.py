@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from flagdata.ingest.anemometer.instants.zones import stated_zone
-from flagdata.signals import WindLog
+from flagdata.record.signals import WindLog
 from tests.flagdata.ingest.anemometer.conftest import read
 
 _NRG = (

@@ -10,7 +10,7 @@ import av
 import numpy as np
 import pytest
 
-from flagdata.arrays import UInt8Array
+from flagdata.core.arrays import UInt8Array
 from flagdata.ingest import CameraOptions
 
 SIDE = 96

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flagdata.findings import Finding
+from flagdata.core.findings import Finding
 from flagdata.ingest import CameraOptions, open_camera
-from flagdata.signals import CameraInfo, Frame
+from flagdata.record.signals import CameraInfo, Frame
 
 MS = 1_000_000
 

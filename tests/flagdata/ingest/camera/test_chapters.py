@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flagdata.core.files.regular_files import MCAP
+from flagdata.core.findings import Severity
 from flagdata.errors import InputError, UsageError
-from flagdata.files import MCAP
-from flagdata.findings import Severity
 from flagdata.ingest import CameraIngest, CameraOptions, ingest_camera, open_camera, probe
 from flagdata.ingest.camera.joined import in_order
 from flagdata.lake import Lake

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 import flagdata
+from flagdata.core.schema import Kind
 from flagdata.dataset import HashedSplit, clip_rows
 from flagdata.dataset.sides import clips_of, divide
 from flagdata.errors import CorruptError
@@ -17,7 +18,6 @@ from flagdata.export import Export, export
 from flagdata.ingest import CameraIngest, CameraOptions, ingest_camera
 from flagdata.lake import Artifact, Lake
 from flagdata.record import Record, RecordWriter
-from flagdata.schema import Kind
 from tests.flagdata.dataset.conftest import picture
 from tests.program import invoke
 

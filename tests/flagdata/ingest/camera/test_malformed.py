@@ -17,13 +17,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from flagdata.core.findings import Finding, Severity
 from flagdata.errors import FlagdataError, InputError, LimitError, NotFoundError
-from flagdata.findings import Finding, Severity
 from flagdata.ingest import CameraOptions, open_camera, probe
 from flagdata.ingest.camera import Limits
 from flagdata.ingest.camera.boxes import top
 from flagdata.ingest.camera.sequence import heads
-from flagdata.signals import Frame
+from flagdata.record.signals import Frame
 from tests.flagdata.ingest.camera.conftest import PLAIN, START, number_of, numbered, write_video
 
 FRAMES = 50

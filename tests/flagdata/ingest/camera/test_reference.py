@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from flagdata.findings import Severity
+from flagdata.core.findings import Severity
 from flagdata.ingest import CameraOptions, open_camera, probe
 
 pytestmark = pytest.mark.reference

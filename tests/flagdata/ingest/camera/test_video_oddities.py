@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from flagdata.core.findings import Severity
 from flagdata.errors import InputError, NotFoundError, TimeError, UsageError
-from flagdata.findings import Severity
 from flagdata.ingest import CameraOptions, CropBox, open_camera, probe
 from tests.flagdata.ingest.camera.conftest import PLAIN, START, number_of, write_video
 from tests.flagdata.ingest.camera.reading import grid_of, read

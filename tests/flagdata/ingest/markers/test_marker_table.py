@@ -9,10 +9,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from flagdata.core.schema import Kind
 from flagdata.errors import CorruptError, InputError, UnknownNameError, UsageError
 from flagdata.ingest import MarkerOptions, ingest_markers, is_marker_table, read_table
 from flagdata.lake import Lake, read_markers
-from flagdata.schema import Kind
 from tests.program import invoke
 from tests.refusals import unrefused
 

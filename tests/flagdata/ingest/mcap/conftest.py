@@ -19,7 +19,7 @@ from mcap.writer import CompressionType, Writer
 from mcap_protobuf.writer import Writer as ProtobufWriter
 from PIL import Image
 
-from flagdata.arrays import UInt8Array
+from flagdata.core.arrays import UInt8Array
 
 NOON = 1_777_636_800_000_000_000  # 2026-05-01T12:00:00Z
 STEP = 40_000_000

@@ -11,7 +11,7 @@ import numpy as np
 from mcap.writer import Writer
 from numpy.typing import NDArray
 
-from flagdata.arrays import UInt8Array
+from flagdata.core.arrays import UInt8Array
 from tests.flagdata.ingest.mcap.conftest import NOON, STEP, encoded
 
 TIME = "=" * 80 + "\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"

@@ -28,7 +28,7 @@ from flagdata.ingest import (
 from flagdata.lake import Lake
 from tests.flagdata.ingest.mcap.conftest import NOON
 from tests.flagdata.ingest.mcap.ros import WIND, bag, channel, film, wind
-from tests.flagdata.ingest.mcap.test_layout import COLUMNS, grays
+from tests.flagdata.ingest.mcap.test_mcap_layout import COLUMNS, grays
 
 NAMED = "rosbag2_bagfile_information:\n  version: 8\n  storage_identifier: mcap\n  relative_file_paths:\n"
 

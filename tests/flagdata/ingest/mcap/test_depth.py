@@ -15,7 +15,7 @@ from flagdata.errors import InputError
 from flagdata.ingest import CameraOptions, open_camera
 from tests.flagdata.ingest.mcap.conftest import NOON, STEP
 from tests.flagdata.ingest.mcap.ros import COMPRESSED, PLAIN, Cdr, bag, channel, gray, plain
-from tests.flagdata.ingest.mcap.test_layout import grays
+from tests.flagdata.ingest.mcap.test_mcap_layout import grays
 
 
 def png(image: NDArray[np.uint16]) -> bytes:

@@ -13,7 +13,7 @@ from flagdata.errors import InputError
 from flagdata.ingest import WindIngest, WindOptions, classify, ingest_wind, read_log
 from flagdata.lake import Lake
 from flagdata.record import RecordWriter
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 from tests.confirming import CONFIRMED
 from tests.flagdata.ingest.mcap.conftest import NOON
 

@@ -26,7 +26,7 @@ from tests.flagdata.ingest.mcap.ros import (
     plain,
     wind,
 )
-from tests.flagdata.ingest.mcap.test_layout import COLUMNS, grays
+from tests.flagdata.ingest.mcap.test_mcap_layout import COLUMNS, grays
 
 SPEED = [3 + 7 * k % 11 / 10 for k in range(60)]
 

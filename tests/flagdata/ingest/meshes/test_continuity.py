@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.arrays import IntArray
+from flagdata.core.arrays import IntArray
 from flagdata.errors import InputError
 from flagdata.ingest import Obj, findings, frame_files, obj_text, read_folder
-from flagdata.ingest.meshes.store import continuity
+from flagdata.ingest.meshes.mesh_artifacts import continuity
 from flagdata.lake import MeshSequence, RaggedMeshSequence
 
 N = 6

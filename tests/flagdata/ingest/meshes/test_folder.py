@@ -12,7 +12,7 @@ import pytest
 from flagdata.errors import ConflictError, InputError, LimitError, NotFoundError
 from flagdata.ingest import findings, frame_files, read_folder, write_folder
 from flagdata.ingest.meshes import folder as folders
-from flagdata.ingest.meshes.store import check_units
+from flagdata.ingest.meshes.mesh_artifacts import check_units
 from flagdata.lake import MeshSequence, RaggedMeshSequence
 from tests.refusals import unrefused
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from flagdata.ingest import findings
-from flagdata.ingest.meshes.store import t_joints
+from flagdata.ingest.meshes.mesh_artifacts import t_joints
 from flagdata.lake import MeshSequence
 
 # A square metre of which the left half is one quad and the right half two, so that vertex 6 lies on the edge 1–2.

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flagdata.core.schema import Kind
 from flagdata.errors import InputError, UsageError
 from flagdata.ingest import MeshIngest, ingest_meshes, read_folder, scene_wind
 from flagdata.lake import Lake, MeshSequence, RaggedMeshSequence, read_meshes
-from flagdata.schema import Kind
 from tests.program import Run, invoke
 
 

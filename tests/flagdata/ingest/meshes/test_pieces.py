@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from flagdata.arrays import Float32Array
+from flagdata.core.arrays import Float32Array
 from flagdata.ingest import MeshIngest, ingest_meshes
 from flagdata.ingest.meshes.pieces import in_pieces, slits, welded
 from flagdata.lake import Lake, MeshSequence, RaggedMeshSequence, read_meshes

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flagdata.arrays import FloatArray, IntArray
+from flagdata.core.arrays import FloatArray, IntArray
 from flagdata.errors import InputError
 from flagdata.ingest import read_obj
-from flagdata.ingest.meshes.obj import ears
+from flagdata.ingest.meshes.wavefront import ears
 
 ELL = [(0.0, 0.0), (0.2, 0.0), (0.2, 0.1), (0.1, 0.1), (0.1, 0.2), (0.0, 0.2)]
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.arrays import FloatArray
-from flagdata.rng import child_seed, stream
-from measure.cloth import MEASURED, OBSERVED, Design, posterior
-from measure.cloth import calibration as calibrate
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import child_seed, stream
+from measure.cloth import MEASURED, OBSERVED, Design, cloth_posterior
+from measure.cloth import cloth_calibration as calibrate
 from measure.observables import WINDOW
 
 NOISE = 0.02
@@ -53,7 +53,7 @@ def cheap() -> Iterator[list[Design]]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(calibrate, "simulated", simulated)
         patch.setattr(calibrate, "corrected", lambda *_, **__: MEASURED)
-        patch.setattr(posterior, "WALKERS", 96)
-        patch.setattr(posterior, "STEPS", 300)
-        patch.setattr(posterior, "CHECK", (32, 120))
+        patch.setattr(cloth_posterior, "WALKERS", 96)
+        patch.setattr(cloth_posterior, "STEPS", 300)
+        patch.setattr(cloth_posterior, "CHECK", (32, 120))
         yield asked

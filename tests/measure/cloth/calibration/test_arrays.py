@@ -10,7 +10,7 @@ import pytest
 
 import flagdata
 from flagdata.errors import InputError, UnknownNameError, UsageError
-from measure.cloth import OBSERVED, arrays, of_table
+from measure.cloth import OBSERVED, calibrate_call, of_table
 from measure.film import FlagSize
 from tests.measure.cloth.calibration.conftest import readings
 
@@ -31,7 +31,7 @@ def test_arrays_are_the_table_of_the_same_numbers(tmp_path: Path) -> None:
     path = tmp_path / "t.csv"
     path.write_text("\n".join([",".join(names), *rows]) + "\n")
     (expected,) = of_table(path, FlagSize(length=1.5, height=1.0))
-    (found,) = arrays.of_arrays(COLUMNS, name="recording 1")
+    (found,) = calibrate_call.of_arrays(COLUMNS, name="recording 1")
     np.testing.assert_allclose(found.readings, expected.readings)
     np.testing.assert_allclose(found.sigma, expected.sigma)
     np.testing.assert_allclose(found.log.times, expected.log.times, atol=1e-9)

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from flagdata.answer import Bound
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.stated import parse
 from flagdata.errors import InputError, RefusedError
-from flagdata.stated import parse
-from flagdata.tables import Range
+from flagdata.recipes.typed_tables import Range
 from measure.cloth import (
     CLOTH,
     OBSERVED,
@@ -31,8 +31,8 @@ from measure.cloth import (
     designs_of,
     draws,
 )
-from measure.cloth import calibration as module
-from measure.cloth import recording as observed
+from measure.cloth import cloth_calibration as module
+from measure.cloth import observed_recording as observed
 from measure.cloth.calibration_page import calibration_page as written
 from tests.measure.cloth.calibration.conftest import readings
 from tests.studies.validation.looks import share, vtk

@@ -13,11 +13,11 @@ import pytest
 from click.testing import CliRunner, Result
 from pyarrow import csv
 
+from flagdata.core.schema import Kind
 from flagdata.errors import InputError, RefusedError
 from flagdata.lake import Artifact, Lake
 from flagdata.record import RecordWriter
-from flagdata.schema import Kind
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 from flagdata.timebase import NANOSECONDS
 from measure.cloth import of_table
 from measure.commands.calibrate import calibrate

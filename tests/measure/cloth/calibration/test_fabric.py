@@ -9,8 +9,8 @@ import pytest
 
 from flagdata.errors import UnknownNameError
 from measure.cloth import TABLES, CalibrationOptions, Design, Flag, Log, Observed, designs_of, nulls
-from measure.cloth.prior import CLASSES, fabric
-from sim.material import named
+from measure.cloth.flag_prior import CLASSES, fabric
+from sim.cloth.material import named
 
 FLAG = Flag(length=1.5, height=1.0)
 

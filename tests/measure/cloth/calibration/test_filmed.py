@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flagdata.api.measuring import OfFlag
+from flagdata.api.measuring_verbs import OfFlag
+from flagdata.core.findings import Finding, Severity
 from flagdata.errors import InputError, RefusedError
-from flagdata.findings import Finding, Severity
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 from measure.cloth import OBSERVED, sources_of
-from measure.cloth import sources as filmed
+from measure.cloth import flag_recordings as filmed
 from measure.film import FlagSize
 from measure.observables import WindowReading
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flagdata.rng import stream
+from flagdata.core.rng import stream
 from measure.cloth import FLAGS, MEASURED, OBSERVED, Design, Finer, Flag, Log
 from measure.cloth.numerics import FINE, LASTING
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import stream
 from flagdata.errors import InputError
-from flagdata.rng import stream
 from measure.cloth import (
     AZIMUTH,
     ELEVATION,
@@ -19,8 +19,8 @@ from measure.cloth import (
     Log,
     Observed,
     Sight,
+    cloth_posterior,
     designs_of,
-    posterior,
     weighed,
 )
 from measure.cloth.emulator import scatter
@@ -63,7 +63,7 @@ def _sights(seed: int) -> list[Sight]:
 
 def test_what_recordings_have_in_common_does_not_average_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """Recordings that were independent would know the weight to 0.3/√4; what is common leaves √(0.3² + 0.1²/4)."""
-    monkeypatch.setattr(posterior, "CHECK", (64, 200))
+    monkeypatch.setattr(cloth_posterior, "CHECK", (64, 200))
     sights = _sights(1)
     weights, shown = _shown(2)
     inner = (weights > 0.1) & (weights < 0.22)  # the prior's ends do not cut their posteriors

@@ -11,10 +11,10 @@ import pytest
 from click import Command
 from click.testing import CliRunner
 
+from flagdata.core.schema import Kind
 from flagdata.lake import Artifact, Lake
 from flagdata.record import RecordWriter
-from flagdata.schema import Kind
-from flagdata.signals import Sensor, WindSeries
+from flagdata.record.signals import Sensor, WindSeries
 from flagdata.timebase import NANOSECONDS
 from measure.commands.calibrate import calibrate
 from measure.commands.observe import observe

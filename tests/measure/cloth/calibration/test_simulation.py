@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from measure.cloth import OBSERVED, TABLES, Design, Flag, FlagBatch, Log, mean_bending, simulated
-from measure.cloth.simulation import cloth
+from measure.cloth.flag_simulation import cloth
+from sim.cloth.material import named
 from sim.integrate import BackwardEuler, Symplectic
-from sim.material import named
 
 _LOG = Log(times=np.arange(-10.0, 20.0), speed=np.full(30, 5.0), distance=0.0)
 

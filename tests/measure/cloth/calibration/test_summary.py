@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from measure.cloth import Projection
-from measure.cloth.recording import shown
+from measure.cloth.observed_recording import shown
 
 
 def test_a_line_in_the_logarithm_of_the_wind_is_found_exactly_with_windows_missing() -> None:

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from flagdata.align import given
+from flagdata.core.rng import stream
+from flagdata.core.stated import parse
 from flagdata.errors import InputError, UnknownNameError, UsageError
-from flagdata.rng import stream
-from flagdata.signals import Sensor, WindSeries
-from flagdata.stated import parse
+from flagdata.record.signals import Sensor, WindSeries
 from flagdata.timebase import NANOSECONDS
 from measure.cloth import OBSERVED, Observed, constant_wind, of_table
 from measure.cloth.table_clock import declared, estimated
-from measure.cloth.tables import Beside, rows_of
-from measure.cloth.tables import read_table as read
+from measure.cloth.tables_of_observables import Beside, rows_of
+from measure.cloth.tables_of_observables import read_table as read
 from measure.film import FlagSize
 
 SIZE = FlagSize(length=2.0, height=0.5)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import torch
 
+from flagdata.core.rng import stream
 from flagdata.errors import InputError
-from flagdata.rng import stream
 from measure.cloth import Log
-from measure.cloth.wind import WIND_RATE, blown
+from measure.cloth.blown_wind import WIND_RATE, blown
 from sim.effects import AnemometerLag
 from sim.wind import VonKarman
 

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
+from flagdata.core.schema import Kind
 from flagdata.errors import UsageError
 from flagdata.lake import Artifact, Lake
-from flagdata.schema import Kind
 from measure.cloth import OBSERVED, films_among, simulations_of
 from measure.commands.close_loop import close_loop
 from measure.forecasting import strengths

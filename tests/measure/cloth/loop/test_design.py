@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flagdata.rng import stream
+from flagdata.core.rng import stream
 from measure.cloth import TOGETHER, Design, Discretisation, Flag, FlagBatch, Log, lasting, nulls, pairs, weighable
 
 FLAG = Flag(length=1.5, height=1.0)

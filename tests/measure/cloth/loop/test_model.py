@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from flagdata.arrays import FloatArray
-from flagdata.rng import stream
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import stream
 from measure.cloth import AZIMUTH, CLOTH, ELEVATION, NUISANCES, Emulator, Flag, draws, weighable
 from measure.cloth.emulator import regressors
 from measure.cloth.sight import Response, responded

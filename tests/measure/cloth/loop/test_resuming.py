@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from measure.cloth import FlagBatch, close_loop, design, simulations
 from measure.report import as_document
 from tests.measure.cloth.loop.conftest import options, readings, recording

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from scipy.special import ndtri
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.findings import Finding, Severity
 from flagdata.errors import RefusedError, UsageError
-from flagdata.findings import Finding, Severity
 from measure.cloth import FlagBatch, Observed, close_loop, simulations, solve, verdict_of, weighable
-from measure.cloth.evidence import Fit
-from measure.cloth.verdict import strength_of
+from measure.cloth.films_verdict import strength_of
+from measure.cloth.model_evidence import Fit
 from measure.verdict import CRITERIA, Conclusion, Estimate, Verdict, with_level
 from tests.measure.cloth.loop.conftest import ALIKE, EFFECTS, options, recording, simulate_cheaply
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest, chi2, kstest, norm
 
-from flagdata.arrays import FloatArray, IntArray
-from flagdata.rng import stream
+from flagdata.core.arrays import FloatArray, IntArray
+from flagdata.core.rng import stream
 from measure.cloth import Experiments, score
 from measure.cloth.score_test import ALIKE, Directions, Scene, Scored
 

@@ -13,11 +13,11 @@ import pytest
 from PIL import Image
 
 from measure.cloth import LEAST_WINDOWS, RATE, Observed, solve, verdict_of
-from measure.cloth.recording import Excerpt
+from measure.cloth.observed_recording import Excerpt
 from measure.cloth.verdict_page import drawn, side_by_side
 from measure.cloth.verdict_page import verdict_page as page
 from measure.observables import WINDOW, ClothWindow, FilmWindow
-from sim.mesh import grid
+from sim.cloth.mesh import grid
 from tests.measure.cloth.loop.conftest import options, recording
 
 _BLUE = (31, 111, 156)

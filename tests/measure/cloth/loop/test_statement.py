@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from measure.cloth.statement import separating
+from measure.cloth.films_statement import separating
 from measure.verdict import Conclusion
 from tests.measure.report.verdicts import verdict
 

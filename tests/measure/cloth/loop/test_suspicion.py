@@ -9,7 +9,7 @@ import pytest
 
 from flagdata.errors import UnknownNameError, UsageError
 from measure.cloth import Flag, close_loop, solve, verdict_of, weighable
-from measure.cloth.statement import words
+from measure.cloth.films_statement import words
 from measure.cloth.verdict_page import verdict_page as page
 from measure.forecasting import Suspicion
 from measure.verdict import Conclusion

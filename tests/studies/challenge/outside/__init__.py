@@ -6,7 +6,7 @@ holds.
 
 from __future__ import annotations
 
-from flagdata.registry import Registry
+from flagdata.recipes.registry import Registry
 
 OUTSIDE = Registry(
     "effect outside the library",

@@ -8,11 +8,11 @@ from typing import Annotated
 import torch
 from torch import Tensor
 
-from sim.cloth import Cloth
+from sim.cloth.cloth_batch import Cloth
+from sim.cloth.inertia import rest_areas
+from sim.cloth.state import State
+from sim.cloth.system import System
 from sim.effects import NOT_NEGATIVE, Effect, Value, horizontal, norm, origin, shape, strength
-from sim.inertia import rest_areas
-from sim.state import State
-from sim.system import System
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,10 +6,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from flagdata.arrays import IntArray
-from sim.cloth import Cloth
-from sim.effects.geometry import boundary_edges
-from sim.mesh import Mesh
+from flagdata.core.arrays import IntArray
+from sim.cloth.cloth_batch import Cloth
+from sim.cloth.mesh import Mesh
+from sim.effects.cloth_geometry import boundary_edges
 
 _TOLERANCE = 1e-6
 

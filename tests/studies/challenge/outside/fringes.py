@@ -7,11 +7,11 @@ from typing import Annotated
 
 from torch import Tensor
 
-from sim.cloth import Cloth
+from sim.cloth.cloth_batch import Cloth
+from sim.cloth.state import State
+from sim.cloth.system import System
 from sim.effects import AIR_DENSITY, NOT_NEGATIVE, Effect, Value, norm, strength
 from sim.effects.quantities import AirDensity
-from sim.state import State
-from sim.system import System
 from tests.studies.challenge.outside import edges
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
-from sim.mesh import Mesh
+from flagdata.core.arrays import FloatArray
+from sim.cloth.mesh import Mesh
 
 _TOLERANCE = 1e-9
 

@@ -8,10 +8,10 @@ from typing import Annotated
 import torch
 from torch import Tensor
 
-from sim.cloth import Cloth
+from sim.cloth.cloth_batch import Cloth
+from sim.cloth.state import State
+from sim.cloth.system import System
 from sim.effects import NOT_NEGATIVE, Effect, Value, norm, origin, shape, strength
-from sim.state import State
-from sim.system import System
 
 DROP = 1.0
 """Where it is made fast, below the middle of the attachments [m]."""

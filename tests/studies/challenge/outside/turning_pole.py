@@ -7,10 +7,10 @@ from typing import Annotated
 
 from torch import Tensor
 
-from sim.cloth import Cloth
+from sim.cloth.cloth_batch import Cloth
+from sim.cloth.state import State
+from sim.cloth.system import System
 from sim.effects import Effect, Value, horizontal, left_of, origin, strength
-from sim.state import State
-from sim.system import System
 
 
 @dataclass(frozen=True, kw_only=True)

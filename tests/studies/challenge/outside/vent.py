@@ -9,13 +9,13 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from flagdata.arrays import FloatArray
-from sim.air import face_wind
-from sim.cloth import Cloth
+from flagdata.core.arrays import FloatArray
+from sim.cloth.air import face_wind
+from sim.cloth.cloth_batch import Cloth
+from sim.cloth.mesh import Mesh
+from sim.cloth.state import State
+from sim.cloth.system import System
 from sim.effects import Effect, Value, strength
-from sim.mesh import Mesh
-from sim.state import State
-from sim.system import System
 
 LOW, HIGH = (0.4, 0.1), (0.9, 0.75)
 """Corners of the panel: from the hoist as a share of the width, from below as a share of the height."""

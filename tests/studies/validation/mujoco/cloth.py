@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
-from sim.mesh import Mesh
+from flagdata.core.arrays import FloatArray
+from sim.cloth.mesh import Mesh
 from tests.studies.validation.environments import UnusableError
 
 _WORKER = Path(__file__).with_name("worker.py")

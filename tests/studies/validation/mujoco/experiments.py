@@ -16,11 +16,11 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import csv
 
-from flagdata.arrays import FloatArray, IntArray
-from flagdata.rng import stream
-from sim import handles
+from flagdata.core.arrays import FloatArray, IntArray
+from flagdata.core.rng import stream
+from sim.cloth import handles
+from sim.cloth.mesh import Diagonals, grid
 from sim.effects import AIR_DENSITY
-from sim.mesh import Diagonals, grid
 from tests.studies.validation.mujoco.cloth import Air, Integrator, Method, Sheet, Wind, fly
 
 WIDTH, HEIGHT = 1.5, 1.0  # m

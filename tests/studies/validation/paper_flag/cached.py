@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.arrays import AnyArray
-from flagdata.checksums import is_sealed, sealed
-from flagdata.outputs import rewrite
-from flagdata.provenance import file_hash, recipe_hash
+from flagdata.core.arrays import AnyArray
+from flagdata.core.files.checksums import is_sealed, sealed
+from flagdata.core.files.outputs import rewrite
+from flagdata.core.provenance import file_hash, recipe_hash
 
 _LOG = logging.getLogger("flagdata")
 

@@ -19,9 +19,9 @@ from typing import Literal
 
 import numpy as np
 
-from flagdata.arrays import BoolArray, FloatArray, UInt8Array
+from flagdata.core.arrays import BoolArray, FloatArray, UInt8Array
+from flagdata.core.findings import Severity
 from flagdata.errors import InputError, UsageError
-from flagdata.findings import Severity
 from flagdata.ingest import CameraOptions, open_camera
 from flagdata.timebase import NANOSECONDS
 

@@ -16,7 +16,7 @@ from typing import Protocol
 import numpy as np
 from scipy import stats
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from flagdata.errors import UsageError
 from tests.studies.validation.paper_flag.candidates import Load, Shear, loaded
 from tests.studies.validation.paper_flag.sheet import Sheet, leading, onset

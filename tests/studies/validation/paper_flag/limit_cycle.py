@@ -13,15 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from flagdata.errors import InputError
-from sim.air import QuadraticNormal
+from sim.cloth.air import QuadraticNormal
+from sim.cloth.handles import Handles
+from sim.cloth.material import isotropic
+from sim.cloth.mesh import grid
+from sim.cloth.scene import Scene, assemble
 from sim.effects import Effect, apply
-from sim.handles import Handles
 from sim.integrate import Symplectic
-from sim.material import isotropic
-from sim.mesh import grid
-from sim.scene import Scene, assemble
 
 _GRID_RIGIDITY = 5.0
 """A grid with alternating diagonals has a fifth of its table's rigidity (verified on the heavy elastica)."""

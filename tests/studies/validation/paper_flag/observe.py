@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from flagdata.arrays import AnyArray, FloatArray
+from flagdata.core.arrays import AnyArray, FloatArray
+from flagdata.core.provenance import file_hash
+from flagdata.core.rng import stream
 from flagdata.errors import NotFoundError
-from flagdata.provenance import file_hash
-from flagdata.rng import stream
 from tests.studies.validation.paper_flag import edge
 from tests.studies.validation.paper_flag.cached import cached
 from tests.studies.validation.paper_flag.edge import EdgeTrack, Seen, scatter, track_edge

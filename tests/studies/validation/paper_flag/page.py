@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from flagdata.core.provenance import code_version
 from flagdata.pages import figure_url
 from flagdata.pages.render import render
-from flagdata.provenance import code_version
 from tests.studies.validation.paper_flag import plots
 from tests.studies.validation.paper_flag.candidates import Candidate, Shear
 from tests.studies.validation.paper_flag.evidence import NEVER, Kind

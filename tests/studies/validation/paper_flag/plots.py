@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from tests.studies.validation.paper_flag.candidates import Candidate, Shear
 from tests.studies.validation.paper_flag.evidence import Condition, Kind, factor_that_meets
 from tests.studies.validation.paper_flag.limit_cycle import as_columns

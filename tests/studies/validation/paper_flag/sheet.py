@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from flagdata.errors import InputError
 
 MODES = 8

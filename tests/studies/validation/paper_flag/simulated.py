@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flagdata.arrays import AnyArray, FloatArray
+from flagdata.core.arrays import AnyArray, FloatArray
 from flagdata.errors import InputError
 from tests.studies.validation.paper_flag import limit_cycle
 from tests.studies.validation.paper_flag import waves as waves_module

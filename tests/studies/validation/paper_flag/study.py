@@ -19,7 +19,7 @@ from typing import Protocol
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from tests.studies.validation.paper_flag.candidates import Candidate, Load, Shear, effects, tried
 from tests.studies.validation.paper_flag.evidence import (
     Condition,

@@ -9,9 +9,9 @@ import av
 import numpy as np
 import pytest
 
-from flagdata.arrays import FloatArray, UInt8Array
+from flagdata.core.arrays import FloatArray, UInt8Array
+from flagdata.core.rng import stream
 from flagdata.errors import InputError, UsageError
-from flagdata.rng import stream
 from tests.studies.validation.paper_flag.edge import EdgeOptions, EdgeTrack, Seen, line_in, scatter, track_edge
 
 ROWS, COLUMNS = 240, 320

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flagdata.core.rng import stream
 from flagdata.errors import InputError
-from flagdata.rng import stream
 from tests.studies.validation.paper_flag.edge import EdgeTrack, Seen
 from tests.studies.validation.paper_flag.stretch import arc_lengths, stretch
 

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import stream
 from flagdata.errors import InputError
-from flagdata.rng import stream
 from tests.studies.validation.paper_flag.waves import Estimate, waves
 
 RATE = 500.0

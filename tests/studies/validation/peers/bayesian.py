@@ -11,8 +11,8 @@ import warnings
 import numpy as np
 import torch
 
-from flagdata.arrays import FloatArray
-from flagdata.rng import child_seed, stream, torch_draws
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import child_seed, stream, torch_draws
 from tests.studies.validation.peers.gaussian import fitted, signed
 from tests.studies.validation.peers.library import library
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
-from flagdata.rng import child_seed
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import child_seed
 from tests.studies.validation.peers.library import library
 
 _STEP = 0.5  # a quarter of the box, as the library advises

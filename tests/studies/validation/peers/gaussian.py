@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from tests.studies.validation.peers.library import library
 
 _OF = "botorch"

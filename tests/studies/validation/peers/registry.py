@@ -8,8 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
-from flagdata.registry import Registry
+from flagdata.core.arrays import FloatArray
+from flagdata.recipes.registry import Registry
 from measure.refine import Trace
 
 PEERS = Registry(

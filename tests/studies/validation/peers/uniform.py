@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
-from flagdata.rng import stream
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import stream
 
 
 class RandomSearch:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from flagdata.markdown import table
+from flagdata.answer.markdown import table
 from tests.studies.validation.real_flags.published import PUBLISHED
 from tests.studies.validation.real_flags.study import Bench, judged, with_errors
 from tests.studies.validation.real_flags.validate import KEEP

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from flagdata.arrays import FloatArray
-from flagdata.markdown import table
+from flagdata.answer.markdown import table
+from flagdata.core.arrays import FloatArray
 from tests.studies.validation.paper_flag.recipe import Group
 from tests.studies.validation.real_flags.paper import Paper, measured
 from tests.studies.validation.real_flags.published import PUBLISHED, Published, Role, label

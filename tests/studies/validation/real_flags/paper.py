@@ -23,14 +23,14 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from flagdata.arrays import FloatArray
-from sim.air import QuadraticNormal
+from flagdata.core.arrays import FloatArray
+from sim.cloth.air import QuadraticNormal
+from sim.cloth.handles import Handles
+from sim.cloth.material import isotropic
+from sim.cloth.mesh import grid
+from sim.cloth.scene import Scene, assemble
 from sim.effects import FiniteSpanLoading, apply
-from sim.handles import Handles
 from sim.integrate import Symplectic
-from sim.material import isotropic
-from sim.mesh import grid
-from sim.scene import Scene, assemble
 from tests.evidence import REFERENCE
 from tests.studies.validation.flags_runs import one_core
 from tests.studies.validation.paper_flag.cached import cached

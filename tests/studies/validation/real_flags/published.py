@@ -14,7 +14,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from tests.studies.validation.real_flags.runs import AIR, HEIGHT, LENGTH, READINGS, Flag
 
 DENSITIES = (0.284, 0.11)

@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
-from flagdata.rng import stream
-from sim.contact import Contact
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import stream
+from sim.cloth.contact import Contact
+from sim.cloth.material import Material, named
+from sim.cloth.scene import Scene, assemble, flag
 from sim.effects import EFFECTS, apply
 from sim.integrate import Symplectic
-from sim.material import Material, named
-from sim.scene import Scene, assemble, flag
 from tests.studies.validation.flags_runs import one_core
 from tests.studies.validation.real_flags.waves import waves
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from tests.studies.validation.paper_flag.cached import cached
 from tests.studies.validation.real_flags import runs, waves
 from tests.studies.validation.real_flags.published import FLAGS, PUBLISHED, STREAMING, Published, Role

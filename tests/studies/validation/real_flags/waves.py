@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import hilbert
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 
 FROM = 0.3
 """Share of the length from which on the phase is read: nearer to the hoist the wave hardly moves."""

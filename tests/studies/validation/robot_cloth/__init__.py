@@ -14,7 +14,7 @@ from typing import Any
 
 import torch
 
-from sim.material import named
+from sim.cloth.material import named
 from tests.evidence import ABSENT, REFERENCE
 from tests.studies.validation.robot_cloth.attribution import LEAD, Round
 from tests.studies.validation.robot_cloth.calibrate import at_bounds

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import rankdata
 
-from flagdata.arrays import FloatArray
-from flagdata.rng import stream
+from flagdata.core.arrays import FloatArray
+from flagdata.core.rng import stream
 from tests.studies.validation.robot_cloth.calibrate import Fit, calibrated
 from tests.studies.validation.robot_cloth.model import Cloth, predicted
 from tests.studies.validation.robot_cloth.reading import Swing

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from tests.studies.validation.robot_cloth.model import NAMES, Cloth, Parameters, described, predicted
 from tests.studies.validation.robot_cloth.reading import Swing
 from tests.studies.validation.robot_cloth.tracker import (

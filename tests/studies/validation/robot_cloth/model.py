@@ -10,16 +10,16 @@ import numpy as np
 import torch
 from scipy.interpolate import CubicSpline
 
-from flagdata.arrays import FloatArray, IntArray
+from flagdata.core.arrays import FloatArray, IntArray
 from flagdata.errors import UsageError
-from sim import handles
-from sim.anchors import AnchorTracks
+from sim.cloth import handles
+from sim.cloth.anchors import AnchorTracks
+from sim.cloth.handles import Handles
+from sim.cloth.material import Material
+from sim.cloth.mesh import Mesh, grid
+from sim.cloth.scene import Scene, assemble
 from sim.effects import EFFECTS, Effect, Parameter, apply
-from sim.handles import Handles
 from sim.integrate import BackwardEuler, SplitEuler
-from sim.material import Material
-from sim.mesh import Mesh, grid
-from sim.scene import Scene, assemble
 from tests.studies.validation.robot_cloth.reading import Swing
 from tests.studies.validation.robot_cloth.tracker import instants
 

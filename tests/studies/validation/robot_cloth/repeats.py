@@ -13,7 +13,7 @@ from itertools import product
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from tests.studies.validation.robot_cloth.calibrate import Linear, weights
 from tests.studies.validation.robot_cloth.reading import Swing
 

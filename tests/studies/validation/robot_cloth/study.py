@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
-from flagdata.console import progress
-from flagdata.rng import stream
+from flagdata.core.arrays import FloatArray
+from flagdata.core.console import progress
+from flagdata.core.rng import stream
 from measure.shares import Share
-from sim.material import Material
+from sim.cloth.material import Material
 from tests.studies.validation.robot_cloth.attribution import Late, Round, late, left_errors, lower, sought
 from tests.studies.validation.robot_cloth.calibrate import Fit, Linear, at_bounds, calibrated, linear
 from tests.studies.validation.robot_cloth.model import Cloth, Parameters, rigid

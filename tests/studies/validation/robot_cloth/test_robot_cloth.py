@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from flagdata.errors import InputError, NotFoundError, UsageError
-from sim.material import named
+from sim.cloth.material import named
 from tests.studies.validation.robot_cloth.attribution import late, left_errors, lower, sought
 from tests.studies.validation.robot_cloth.calibrate import Fit, calibrated, linear
 from tests.studies.validation.robot_cloth.model import Cloth, Parameters, described, predicted, rigid

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from flagdata.arrays import BoolArray, FloatArray
+from flagdata.core.arrays import BoolArray, FloatArray
 from tests.studies.validation.robot_cloth.reading import Swing
 
 OFFSETS, CAMERA, LATENCY = "node offsets", "camera pose and depth scale", "latency of single frames"

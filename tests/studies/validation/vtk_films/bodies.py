@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from flagdata.arrays import FloatArray
+from flagdata.core.arrays import FloatArray
 from tests.studies.validation.vtk_films.scene import Body, Light, View
 
 _SIDES = 16

@@ -17,8 +17,8 @@ import av
 import cv2
 import numpy as np
 
-from flagdata.arrays import BoolArray, UInt8Array
-from flagdata.rng import stream
+from flagdata.core.arrays import BoolArray, UInt8Array
+from flagdata.core.rng import stream
 from tests.evidence import REFERENCE
 from tests.studies.validation.gate_clips import person
 from tests.studies.validation.vtk_films.bodies import shaking, tree

@@ -15,7 +15,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from flagdata.rng import stream
+from flagdata.core.rng import stream
 from tests.studies.validation.vtk_films.bodies import pole, shaking, sun, tree
 from tests.studies.validation.vtk_films.pictures import BACKGROUNDS, TEXTURES, background, texture
 from tests.studies.validation.vtk_films.runs import OTHER_AIR, UNDISTURBED, Motion

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from flagdata.rng import stream
+from flagdata.core.rng import stream
 from tests.evidence import REFERENCE
 from tests.studies.validation.environments import VTK
 from tests.studies.validation.vtk_films.designs import SEED, Design, designs, scene_of

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flagdata.arrays import FloatArray, UInt8Array
+from flagdata.core.arrays import FloatArray, UInt8Array
 
 _SIDE = 1024
 """Width and height of a background [px]."""

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from flagdata.arrays import FloatArray, IntArray
+from flagdata.core.arrays import FloatArray, IntArray
 
 RATE = 25.0
 DENSITY = 0.284

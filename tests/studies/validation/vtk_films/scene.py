@@ -18,7 +18,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.arrays import FloatArray, UInt8Array
+from flagdata.core.arrays import FloatArray, UInt8Array
 from tests.studies.validation.environments import UnusableError
 
 _WORKER = Path(__file__).with_name("worker.py")

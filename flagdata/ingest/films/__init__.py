@@ -1,0 +1,1 @@
+"""Films by what names them, opened, and as arrays."""

@@ -1,0 +1,233 @@
+"""A verdict and its models in the lake, in one commit: what was concluded, from which recordings, by which nulls.
+
+The identity of a verdict is a hash of all that went in (recordings, wind, cloth, options), not of the files it came in.
+A measurement's object is a Zarr folder with the verdict's JSON, its report and the nulls' statistics.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flagdata.core.findings import Finding, quality_flags
+from flagdata.core.provenance import array_hash, canonical, digest, file_hash
+from flagdata.core.schema import Kind
+from flagdata.lake import Artifact, Lake, results
+from flagdata.lake.mesh_sequences import check_format, read_part, store_errors, write_plain
+from flagdata.lake.results import Placed
+from measure.closing.model_recipes import NamedModel, acting
+from measure.loop.run import LoopOptions
+from measure.nulls.bank import files
+from measure.observe import Experiment
+from measure.observe.trajectory import described
+from measure.report.document import as_document, from_document
+from measure.report.report_page import page
+from measure.report.verdict_words import words
+from measure.verdict.verdict_record import Candidate, Verdict
+
+_FORMAT = 1
+_HEAD = "flagdata_measurement"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kept:
+    """The contents of a commit.
+
+    Attributes:
+        measurement: id of the verdict.
+        models: ids of its models.
+        place: of the verdict among its versions.
+    """
+
+    measurement: str
+    models: tuple[str, ...]
+    place: Placed
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class VerdictAnswer:
+    """A loop that was closed, of whatever kind of recordings, as it is written and kept.
+
+    Attributes:
+        name: what the measurement is called.
+        verdict: what came out.
+        models: of the verdict.
+        effects: whose strengths are kept beside the cloth that was fitted.
+        findings: on the recordings.
+        page: the report, HTML.
+        words: the verdict's, for a terminal.
+        recipe: all that went in, JSON values.
+        parents: artifacts that the recordings were read from.
+        seed: of the verdict.
+    """
+
+    name: str
+    verdict: Verdict
+    models: tuple[NamedModel, ...]
+    effects: tuple[Candidate, ...]
+    findings: tuple[Finding, ...]
+    page: str
+    words: str
+    recipe: Mapping[str, Any]
+    parents: tuple[str, ...]
+    seed: int
+
+
+def answer_of(
+    verdict: Verdict,
+    experiment: Experiment,
+    options: LoopOptions,
+    *,
+    name: str,
+    models: tuple[NamedModel, ...],
+    findings: tuple[Finding, ...],
+) -> VerdictAnswer:
+    """Makes the answer of a verdict on recordings of markers.
+
+    Args:
+        name: what the measurement is called.
+        models: of the verdict.
+        findings: on the recordings.
+    """
+    bank = None
+    if options.bank is not None:
+        bank = digest(" ".join(file_hash(path) for path in files(options.bank)))
+    recipe = {
+        "close-loop": 1,
+        "experiment": fingerprint(experiment),
+        "level": options.level,
+        "nulls": None if options.bank is not None else [options.nulls, options.most_nulls],
+        "bank": bank,
+    }
+    if options.suspected is not None:  # results that were kept before keep their identity
+        recipe["suspected"] = options.suspected.words
+    return VerdictAnswer(
+        name=name,
+        verdict=verdict,
+        models=models,
+        effects=acting(verdict),
+        findings=findings,
+        page=page(verdict),
+        words=words(verdict),
+        recipe=recipe,
+        parents=tuple(dict.fromkeys(r.source for r in experiment.recordings if r.source)),
+        seed=options.seed,
+    )
+
+
+def keep(lake: Lake, answer: VerdictAnswer, *, branch: str = "main") -> Kept:
+    """Publishes a verdict and its models in one commit where it is new, see `flagdata.lake.results`.
+
+    Raises:
+        FlagdataError: as `Lake.transaction`.
+    """
+    entry = results.keep(
+        lake,
+        _measurement(answer),
+        lambda staged: write(staged, answer.verdict, page=answer.page),
+        f"close loop: {answer.name}",
+        branch=branch,
+        derived=lambda verdict: [_model(answer, model, verdict) for model in answer.models],
+    )
+    verdict = entry.artifact
+    ids = tuple(_model(answer, model, verdict).id for model in answer.models)
+    models = ids if entry.new else models_of(lake, verdict.id, branch)
+    return Kept(measurement=verdict.id, models=models, place=entry)
+
+
+def models_of(lake: Lake, measurement: str, branch: str) -> tuple[str, ...]:
+    """Ids of the models that a measurement left."""
+    rows = lake.rows("kind = 'model'", at=branch, columns=["artifact", "parents"]).to_pylist()
+    return tuple(row["artifact"] for row in rows if measurement in row["parents"])
+
+
+def write(path: Path, verdict: Verdict, *, page: str) -> None:
+    """Writes a new Zarr folder: `verdict` (UTF-8 JSON), `report` (UTF-8 HTML) and `nulls` (statistic of each)."""
+    import zarr
+
+    group = zarr.open_group(path, mode="w-", zarr_format=3)
+    group.update_attributes(
+        {
+            _HEAD: {"format": _FORMAT},
+            "conclusion": verdict.conclusion.value,
+            "named": list(verdict.named),
+            "words": verdict.words,
+        }
+    )
+    texts = {"verdict": json.dumps(as_document(verdict), allow_nan=False), "report": page}
+    for name, text in texts.items():
+        write_plain(group, name, np.frombuffer(text.encode(), dtype=np.uint8))
+    write_plain(group, "nulls", np.array(verdict.test.null, dtype=np.float64))
+
+
+def read(path: Path) -> tuple[Verdict, str]:
+    """Reads the verdict and the report of a measurement's object.
+
+    Raises:
+        CorruptError: not such a folder, damaged, or of a newer format.
+        LimitError: arrays larger than the limits of `flagdata.lake.mesh_sequences`.
+    """
+    from flagdata.lake.sized_chunks import open_group
+
+    with store_errors(path, "the measurement is damaged", fix="run flagdata verify; close the loop again"):
+        group = open_group(path)
+        check_format(group.attrs.get(_HEAD), _FORMAT, path, noun="verdicts")
+        verdict, report = (
+            read_part(group, name, None, None, where=str(path)).tobytes().decode() for name in ("verdict", "report")
+        )
+        return from_document(json.loads(verdict)), report
+
+
+def fingerprint(experiment: Experiment) -> str:
+    """Hashes an experiment with its uncertainties, SHA-256: cloth, pins, recordings and wind; not of names and
+    files."""
+    content, arrays = described(experiment.specimen)
+    content["recordings"] = [[r.rate, r.noise, *r.wind.uncertainty] for r in experiment.recordings]
+    for recording in experiment.recordings:
+        arrays += [recording.markers, recording.positions, recording.wind.times, recording.wind.velocity]
+        arrays += [] if recording.seen is None else [recording.seen]
+    return array_hash(content, arrays)
+
+
+def _measurement(answer: VerdictAnswer) -> Artifact:
+    verdict = answer.verdict
+    fitted = {p.name: (p.after or p.before).value for p in verdict.parameters}
+    fitted |= {f"{c.effect}.{c.parameter}": c.strength.value for c in answer.effects if c.strength.bound is None}
+    report = {
+        "schema": "flagdata.close-loop-report/1",
+        "conclusion": verdict.conclusion.value,
+        "named": list(verdict.named),
+        "words": verdict.words,
+        "p_value": verdict.test.p_value.value,
+        "separating": verdict.separating,
+        "findings": [finding.as_dict() for finding in answer.findings],
+    }
+    return Artifact(
+        kind=Kind.MEASUREMENT,
+        name=answer.name,
+        parents=answer.parents,
+        recipe=dict(answer.recipe),
+        seed=answer.seed,
+        parameters=canonical(fitted),
+        quality=quality_flags(answer.findings),
+        report=json.dumps(report, allow_nan=False, ensure_ascii=False),
+    )
+
+
+def _model(answer: VerdictAnswer, model: NamedModel, measurement: Artifact) -> Artifact:
+    effects: Sequence[str] = list(model.content.get("effects", {}))
+    report = {"schema": "flagdata.model-report/1", "words": answer.verdict.words, "findings": []}
+    return Artifact(
+        kind=Kind.MODEL,
+        name=model.name,
+        parents=(measurement.id, *answer.parents),
+        seed=answer.seed,
+        recipe={**measurement.recipe, "effects": effects},
+        parameters=canonical(model.content),
+        report=json.dumps(report, allow_nan=False, ensure_ascii=False),
+    )

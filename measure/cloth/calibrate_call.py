@@ -1,0 +1,165 @@
+"""Calibration from Python: `flagdata.calibrate`, with recordings as arrays, tables or names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from flagdata.answer.calibrated import Calibrated
+from flagdata.api.measuring_verbs import Calibrating, OfFlag
+from flagdata.core.files.caches import user_cache
+from flagdata.core.provenance import array_hash
+from flagdata.core.stated import Stated
+from flagdata.dataset.lake_source import lake_of
+from flagdata.errors import InputError, UnknownNameError, UsageError
+from flagdata.lake import Lake
+from flagdata.verbs.shared_options import ATTACHMENTS
+from measure.cloth.cloth_calibration import Calibration, calibrate
+from measure.cloth.design import FAR, CalibrationOptions
+from measure.cloth.flag_prior import AZIMUTH, ELEVATION, Uncertain, fabric, stated_angle
+from measure.cloth.flag_recordings import Opened, Sources, opened
+from measure.cloth.flag_simulation import Flag
+from measure.cloth.observed_recording import Observed, cut
+from measure.cloth.tables_of_observables import TIME, Columns, known_columns, of_columns
+from measure.film.film_source import FilmReading
+from measure.film.similarity import FlagSize
+
+Arrays = Mapping[str, ArrayLike]
+Number = float | tuple[float, float] | str | Stated
+
+
+def options_of(chosen: OfFlag, size: FlagSize, *, simulations: int, level: float, seed: int) -> CalibrationOptions:
+    """Returns how a flag of such a size is calibrated.
+
+    Args:
+        simulations: for each recording.
+        level: of the intervals.
+        seed: of all draws.
+
+    Raises:
+        UsageError, UnknownNameError: angles or a material that no flag has.
+    """
+
+    def angle(name: str, value: Number | None, usual: Uncertain) -> Uncertain:
+        return usual if value is None else stated_angle(usual, Stated.of(value), where=f"--{name}")
+
+    return CalibrationOptions(
+        flag=Flag(length=size.length, height=size.height, attachment=_attachment(chosen.attachment)),
+        azimuth=angle("azimuth", chosen.azimuth_deg, AZIMUTH),
+        elevation=angle("elevation", chosen.elevation_deg, ELEVATION),
+        distance=FAR if chosen.distance is None else chosen.distance,
+        simulations=simulations,
+        level=level,
+        seed=seed,
+        material=None if chosen.material is None else fabric(chosen.material, where="--material"),
+    )
+
+
+def folder_of(chosen: OfFlag) -> Path:
+    """Returns the folder in which simulations are kept."""
+    return user_cache() / "calibrate" if chosen.cache is None else Path(chosen.cache)
+
+
+def sources_of(
+    recordings: Sequence[Arrays | Path | str], chosen: OfFlag, size: FlagSize, lake: Lake | None, *, at: str
+) -> Sources:
+    """Opens recordings: tables that are given as arrays, paths of tables, and recordings of a lake.
+
+    Raises:
+        FlagdataError: see `Sources`.
+    """
+    first, last = chosen.start or 0.0, chosen.end
+    offset = None if chosen.clock_offset is None else Stated.of(chosen.clock_offset)
+    reading = FilmReading.of(chosen, size)
+
+    def name(numbered: tuple[int, Arrays | Path | str]) -> str:
+        number, source = numbered
+        return f"recording {number}" if isinstance(source, Mapping) else str(source)
+
+    def opening(numbered: tuple[int, Arrays | Path | str]) -> Opened:
+        _, source = numbered
+        if isinstance(source, Mapping):
+            rows = of_arrays(source, name=name(numbered))
+            cuts = tuple(cut(row, first, last) if row.place is None else row for row in rows)
+            return Opened(name=name(numbered), parent=None, rows=cuts)
+        part = {"first": first, "last": last, "log": chosen.log, "offset": offset}
+        return opened(str(source), size, reading, lake=lake, at=at, **part)
+
+    return Sources.of(list(enumerate(recordings, start=1)), opening, name=name)
+
+
+def calibrated(chosen: Calibrating) -> Calibrated:
+    """Calibrates a flag from Python; see `flagdata.calibrate`.
+
+    Raises:
+        FlagdataError: see `flagdata.calibrate`.
+    """
+    several = chosen.recordings
+    several = [several] if isinstance(several, Mapping | Path | str) else list(several)
+    if not several:
+        raise InputError("no recordings are given", where="recordings", fix="give at least one")
+    if chosen.flag_size is None:
+        raise UsageError(
+            "the flag's size is missing", where="flag_size", fix="give length and height in metres, as in (1.5, 1.0)"
+        )
+    size = FlagSize.of(chosen.flag_size)
+    drawn = {"simulations": chosen.simulations, "level": chosen.level, "seed": chosen.seed}
+    options = options_of(chosen, size, **drawn)
+    gathered = sources_of(several, chosen, size, lake_of(chosen.lake), at=chosen.at or "main").read(size)
+    calibration = calibrate(
+        gathered.recordings,
+        options,
+        folder=folder_of(chosen),
+        workers=chosen.workers,
+        left_out=gathered.left_out,
+    )
+    return _answer(calibration)
+
+
+def of_arrays(columns: Arrays, *, name: str) -> tuple[Observed, ...]:
+    """Returns the recordings of a table that is given as arrays, in the units of the table of observables.
+
+    Raises:
+        InputError: a column that is not known, columns of different lengths, or as
+            `measure.cloth.tables_of_observables.of_table`.
+    """
+    values = {key.replace("_", "-"): np.asarray(column, dtype=np.float64) for key, column in columns.items()}
+    lengths = {column.shape for column in values.values()}
+    if len(lengths) != 1 or len(next(iter(lengths), ())) != 1:
+        raise InputError(f"columns of shapes {sorted(lengths)}", where=name, fix="give (n,) for each, of one n")
+    known_columns(tuple(values), where=name)
+    if TIME in values:
+        values[TIME] = values[TIME] - values[TIME][0]
+    rows = next(iter(lengths))[0]
+    table = Columns(where=name, values=values, lines=tuple(range(1, rows + 1)))
+    names = sorted(values)
+    identity = array_hash({"columns": names}, [values[key] for key in names])
+    return of_columns(table, name=name, identity=identity, wind_log=None)
+
+
+def _answer(calibration: Calibration) -> Calibrated:
+    quantities = {quantity.name: quantity for quantity in calibration.cloth}
+    return Calibrated(
+        sentence=calibration.sentence,
+        level=calibration.options.level,
+        quantities=quantities,
+        draws={name: calibration.draws.cloth[name] for name in quantities},
+        withheld=calibration.withheld,
+        stated=calibration.stated,
+        findings=calibration.findings,
+        document=calibration.as_dict(),
+    )
+
+
+def _attachment(name: str | None) -> str:
+    """Returns how a filmed flag is held, by both corners of its hoist unless it is stated.
+
+    Raises:
+        UnknownNameError: films have no such attachment.
+    """
+    if name not in (None, *ATTACHMENTS):
+        raise UnknownNameError.of("attachment", name, ATTACHMENTS, where="--attachment")
+    return name or ATTACHMENTS[0]

@@ -1,0 +1,506 @@
+"""From recordings of one flag to its cloth: simulated, emulated, weighed, and checked on simulations left out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flagdata.answer import Bound, Quantity
+from flagdata.core.arrays import BoolArray, FloatArray, IntArray
+from flagdata.core.findings import Finding, Severity
+from flagdata.core.rng import child_seed, stream
+from flagdata.core.workload import one_thread
+from measure.cloth.cloth_posterior import Posterior, Sight, posterior, weighed
+from measure.cloth.design import CalibrationOptions, designs_of, simulated
+from measure.cloth.emulator import TAKEN_APART, Emulator, informative
+from measure.cloth.flag_prior import CLOTH, NUISANCES, Uncertain
+from measure.cloth.flag_simulation import OBSERVED
+from measure.cloth.numerics import Correction, corrected, with_errors
+from measure.cloth.observed_recording import (
+    LEAST_IN_ALL,
+    LEFT_OUT,
+    Observed,
+    check_in_all,
+    constant_wind,
+    shown,
+    usable,
+)
+from measure.observables.observable import WINDOW
+from measure.posterior_ends import PILED, WITHIN, span
+
+ANSWER = 5
+"""Raised when the same recordings and options get another answer."""
+DETERMINED = 0.8
+"""Share of the prior's spread, in ranks, below which a posterior is an answer: above it, it is the prior. Higher gives
+a value where the film says little; lower withholds more of them."""
+_FOLDS = 8
+_CHECKED = 48
+"""Simulations left out that are weighed to check the intervals. More make the check of the intervals surer, and slower
+in proportion."""
+_UNLIKE = 0.01
+"""Tail probability of a recording's summary among those that the answer predicts below which the weight is withheld: of
+recordings that are as the model has them one in a hundred. Higher withholds more weights of flags that are as the model
+has them."""
+_LOOK = (
+    "look at the readings with flagdata observe --picture, check --flag-size, --attachment, --azimuth, --elevation and "
+    "--distance; flagdata close-loop looks for what is missing"
+)
+_APART = 2.0
+"""σ from which on a summary is named as what is unlike."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """What the same procedure says of simulations that it was not fitted to.
+
+    Attributes:
+        count: of them.
+        contained: of them, those whose area weight lies in its interval.
+        error: median error of its value, as a share.
+    """
+
+    count: int
+    contained: int
+    error: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Returns JSON values."""
+        return {"count": self.count, "held": self.contained, "median_error": self.error}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fitted:
+    """A recording with what simulations of the answer look like.
+
+    Attributes:
+        observed: the recording.
+        low, middle, high: (window, observable) of simulated flags of the posterior at the level, by the emulator.
+        used: (observable,) those whose mean or slope the answer rests on.
+        misfit: tail probability of its summary among those that the answer predicts.
+        deviations: (2·observable,) summaries less those that the answer predicts, in their standard deviations.
+        failed: simulations that diverged or hardly show the flag.
+    """
+
+    observed: Observed
+    low: FloatArray
+    middle: FloatArray
+    high: FloatArray
+    used: BoolArray
+    misfit: float
+    deviations: FloatArray
+    failed: int
+
+    @property
+    def unlike(self) -> str | None:
+        """Returns what no simulated flag shows, in words; None where some look like it."""
+        if self.misfit >= _UNLIKE:
+            return None
+        names = [*OBSERVED, *(f"the change of {name} with the wind" for name in OBSERVED)]
+        order = np.argsort(-np.abs(np.nan_to_num(self.deviations)))
+        distant = [
+            (names[column], float(self.deviations[column]))
+            for column in order.tolist()
+            if abs(self.deviations[column]) > _APART
+        ]
+        if not distant:
+            return "its observables together"
+        return ", ".join(f"{name} {abs(z):.1f} σ too {'large' if z > 0 else 'small'}" for name, z in distant[:4])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Calibration:
+    """The answer.
+
+    Attributes:
+        options: how it was calibrated.
+        draws: of the posterior.
+        cloth: area weight, bending and damping.
+        places: for each recording gain, azimuth and elevation.
+        recordings: in order.
+        check: on simulations left out.
+        findings: what a reader has to know.
+    """
+
+    options: CalibrationOptions
+    draws: Posterior
+    cloth: tuple[Quantity, ...]
+    places: tuple[tuple[Quantity, ...], ...]
+    recordings: tuple[Fitted, ...]
+    check: Check
+    findings: tuple[Finding, ...] = field(default_factory=tuple)
+
+    @property
+    def weight(self) -> Quantity:
+        """Returns the area weight."""
+        return self.cloth[0]
+
+    @property
+    def withheld(self) -> str | None:
+        """Returns why no value is given, where no simulated flag looks like a recording."""
+        return next(
+            (
+                f"{recording.observed.name}: {recording.unlike}"
+                for recording in self.recordings
+                if recording.unlike is not None
+            ),
+            None,
+        )
+
+    @property
+    def stated(self) -> str | None:
+        """Returns the area weight as `flagdata measure --area-weight` takes it; None where it is not determined or a
+        bound."""
+        weight = self.weight
+        if weight.value is None or weight.sigma is None:
+            return None
+        return f"{weight.value:.4g}±{weight.sigma:.2g}"
+
+    @property
+    def weighs(self) -> bool:
+        """Returns whether anything is given of the area weight: a value or a bound."""
+        return self.withheld is None and self.weight.constrained
+
+    @property
+    def sentence(self) -> str:
+        """Returns the answer in words."""
+        weight = self.weight
+        level = f"{self.options.level * 100:.3g} %"
+        windows = sum(len(recording.observed.readings) for recording in self.recordings)
+        if self.withheld is not None:
+            return f"area weight: withheld, since no simulated flag looks like {self.withheld}"
+        if weight.is_bound:
+            low, high = CLOTH[0].ends or weight.interval
+            bound = f"{weight.span.phrase(3, ' kg/m²')}, {weight.span.percent}"
+            return f"area weight {bound}, n = {windows} windows (assumed: {low:.3f} to {high:.3f} kg/m²)"
+        if weight.value is None:
+            low, high = weight.assumed or weight.interval
+            return f"area weight: not determined by {windows} windows (assumed: {low:.3f} to {high:.3f} kg/m²)"
+        low, high = weight.interval
+        return f"area weight {weight.value:.3f} kg/m² [{low:.3f}, {high:.3f}] {level}, n = {windows} windows"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Returns JSON values."""
+        return {
+            "sentence": self.sentence,
+            "cloth": {q.name: q.as_dict() for q in self.cloth},
+            "recordings": [
+                {
+                    "name": recording.observed.name,
+                    "source": recording.observed.source,
+                    "windows": len(recording.observed.readings),
+                    "wind_speed": float(recording.observed.speed.mean()),
+                    "misfit": recording.misfit,
+                    "failed": recording.failed,
+                    "observables": [name for name, used in zip(OBSERVED, recording.used, strict=True) if used],
+                    "place": {q.name: q.as_dict() for q in view},
+                }
+                for recording, view in zip(self.recordings, self.places, strict=True)
+            ],
+            "area_weight_stated": self.stated,
+            "withheld": self.withheld,
+            "close_loop": None if self.stated is None else {"area-weight": self.stated},
+            "check": self.check.as_dict(),
+            "options": self.options.recipe(),
+            "level": self.options.level,
+            "findings": [finding.as_dict() for finding in self.findings],
+        }
+
+
+@one_thread()
+def calibrate(
+    recordings: Sequence[Observed],
+    options: CalibrationOptions,
+    *,
+    folder: Path,
+    workers: int = 1,
+    left_out: Sequence[Finding] = (),
+    advance: Callable[[int], object] | None = None,
+) -> Calibration:
+    """Weighs the cloth of one flag.
+
+    Args:
+        recordings: of it, each cut to what is to be used.
+        left_out: a warning for each recording of it that cannot be used.
+        folder: where simulations are kept.
+        workers: processes that simulate.
+        advance: called with the number of flags that were simulated or found.
+
+    Raises:
+        InputError: see `Observed` and `designs_of`.
+        RefusedError: see `answered`.
+    """
+    simulations: list[tuple[Observed, Mapping[str, FloatArray], FloatArray, Correction]] = []
+    for recording, design in zip(recordings, designs_of(recordings, options), strict=True):
+        readings = simulated(design, folder=folder, workers=workers, advance=advance)
+        correction = corrected(design, readings, folder=folder, workers=workers, advance=advance)
+        simulations.append((recording, design.values(), readings, correction))
+    return answered(simulations, options, left_out=left_out)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Simulated:
+    """A recording with its simulations.
+
+    Attributes:
+        values: name → (simulation,).
+        summaries: (simulation, summary) with what numerics and pixels may add to them.
+        used: (summary,) those that are weighed by.
+    """
+
+    observed: Observed
+    values: Mapping[str, FloatArray]
+    summaries: FloatArray
+    used: BoolArray
+
+    def rows(self, which: IntArray) -> _Simulated:
+        """Returns it with some of the simulations."""
+        values = {name: drawn[which] for name, drawn in self.values.items()}
+        return replace(self, values=values, summaries=self.summaries[which])
+
+    def sight(self, options: CalibrationOptions) -> Sight:
+        """Returns it with an emulator fitted to the simulations.
+
+        Raises:
+            RefusedError: see `Emulator.fit`.
+        """
+        recording = self.observed
+        return Sight(
+            emulator=Emulator.fit(self.values, self.summaries, self.used, name=recording.name),
+            azimuth=options.azimuth,
+            elevation=options.elevation,
+            place=recording.place,
+        )
+
+
+def answered(
+    simulations: Sequence[tuple[Observed, Mapping[str, FloatArray], FloatArray, Correction]],
+    options: CalibrationOptions,
+    *,
+    left_out: Sequence[Finding] = (),
+) -> Calibration:
+    """Returns the answer from recordings, each with its simulations' values, name → (simulation,), their readings
+    (simulation, window, observable), and how far these lie from those of a finer mesh. Those whose simulations do not
+    show what they show are left out.
+
+    Args:
+        left_out: a warning for each recording that is not among them.
+
+    Raises:
+        RefusedError: simulations show nothing of any recording, see `informative` and `Emulator.fit`.
+        InputError: too little is left.
+    """
+
+    def seen(simulation: tuple[Observed, Mapping[str, FloatArray], FloatArray, Correction]) -> tuple[_Simulated, Sight]:
+        observed, values, readings, correction = simulation
+        summaries = with_errors(observed, readings, correction, seed=options.seed)
+        visible = np.tile(shown(observed.readings), 2 if observed.projection.changes else 1)
+        used = informative(values, summaries, visible, name=observed.name)
+        simulated = _Simulated(observed=observed, values=values, summaries=summaries, used=used)
+        return simulated, simulated.sight(options)
+
+    fitted, unshown = usable(simulations, seen, name=lambda simulation: simulation[0].name)
+    left_out = (*left_out, *unshown)
+    check_in_all([simulation.observed for simulation, _ in fitted], left_out=left_out)
+    calibration = _answered(fitted, options, left_out=left_out)
+    return _without_unlike(calibration, fitted, options, left_out=left_out)
+
+
+def _without_unlike(
+    calibration: Calibration,
+    models: Sequence[tuple[_Simulated, Sight]],
+    options: CalibrationOptions,
+    *,
+    left_out: Sequence[Finding],
+) -> Calibration:
+    """Returns the answer of those recordings that simulated flags look like, if there are such; otherwise the answer
+    as it is, which then is withheld with the reason."""
+    unlike = [recording for recording in calibration.recordings if recording.unlike is not None]
+    like = [pair for pair, recording in zip(models, calibration.recordings, strict=True) if recording.unlike is None]
+    if not unlike or sum(pair.observed.duration for pair, _ in like) < LEAST_IN_ALL * WINDOW - 1e-9:
+        return calibration
+    warned = [Finding(kind=LEFT_OUT, severity=Severity.WARNING, what=_unlike(fitted), fix=_LOOK) for fitted in unlike]
+    again = _answered(like, options, left_out=(*left_out, *warned))
+    return calibration if again.withheld is not None else again
+
+
+def _answered(
+    models: Sequence[tuple[_Simulated, Sight]], options: CalibrationOptions, *, left_out: Sequence[Finding]
+) -> Calibration:
+    """Returns the answer from recordings whose simulations show what they show."""
+    simulations, sights = [simulation for simulation, _ in models], [sight for _, sight in models]
+    draws = posterior(sights, [simulation.observed.summary for simulation in simulations], seed=options.seed)
+    fitted = tuple(
+        _fitted(simulation, sight, draws, number, options)
+        for number, (simulation, sight) in enumerate(zip(simulations, sights, strict=True))
+    )
+    calibration = Calibration(
+        options=options,
+        draws=draws,
+        recordings=fitted,
+        check=checked(simulations, options),
+        cloth=tuple(quantity(q, draws.cloth[q.name], options.level) for q in CLOTH),
+        places=tuple(
+            tuple(quantity(q, view[q.name], options.level) for q in _placed(options)) for view in draws.places
+        ),
+    )
+    findings = (*left_out, *_findings(calibration))
+    if calibration.withheld is not None:
+        assumed = np.linspace(0.0, 1.0, 1001)
+        calibration = replace(calibration, cloth=tuple(quantity(q, q.at(assumed), options.level) for q in CLOTH))
+    return replace(calibration, findings=findings)
+
+
+def quantity(about: Uncertain, draws: FloatArray, level: float) -> Quantity:
+    """Returns what draws of the posterior say of a quantity."""
+    assumed = about.at(np.array([(1 - level) / 2, (1 + level) / 2])).tolist()
+    shares = np.linspace(0.0, 1.0, 1001)
+    ranks = np.interp(draws, about.at(shares), shares)
+    determined = float(ranks.std()) < DETERMINED / math.sqrt(12)
+    # What is not determined has the prior's interval, which has no end where draws pile up.
+    places = ranks if determined and about.ends is not None else None
+    interval = span(draws, places, level=level, limits=about.limits, assumed=about.ends or about.limits)
+    return Quantity(
+        name=about.name,
+        unit=about.unit,
+        value=float(np.median(draws)) if determined and interval.estimated else None,
+        sigma=float(draws.std()) if interval.estimated else None,
+        span=interval,
+        assumed=(assumed[0], assumed[1]),
+        constrained=determined and interval.bound is not Bound.NOTHING,
+    )
+
+
+def checked(recordings: Sequence[_Simulated], options: CalibrationOptions) -> Check:
+    """Weighs simulations of all recordings together, an eighth at a time, by emulators fitted to the others; of the
+    first recording alone where the others are of other cloths."""
+    weights = [simulation.values[CLOTH[0].name] for simulation in recordings]
+    recordings = [
+        simulation for simulation, drawn in zip(recordings, weights, strict=True) if np.array_equal(drawn, weights[0])
+    ]
+    complete = np.flatnonzero(
+        np.all([np.isfinite(simulation.summaries[:, simulation.used]).all(axis=1) for simulation in recordings], axis=0)
+    )
+    rng = stream(options.seed, "calibrate", "check")
+    chosen = rng.permutation(complete)[:_CHECKED]
+    errors: list[float] = []
+    contained = 0
+    for fold in range(min(_FOLDS, len(chosen))):
+        fold_members = chosen[fold::_FOLDS]
+        rest = np.setdiff1d(np.arange(len(weights[0])), fold_members)
+        sights = [simulation.rows(rest).sight(options) for simulation in recordings]
+        seed = child_seed(options.seed, "check", fold)
+        summaries = [simulation.summaries[fold_members] for simulation in recordings]
+        weight = weighed(sights, summaries, seed=seed)[CLOTH[0].name]
+        truth = weights[0][fold_members]
+        low, middle, high = np.quantile(weight, [(1 - options.level) / 2, 0.5, (1 + options.level) / 2], axis=1)
+        contained += int(((low <= truth) & (truth <= high)).sum())
+        errors.extend(np.abs(middle / truth - 1).tolist())
+    return Check(count=len(errors), contained=contained, error=float(np.median(errors)) if errors else math.nan)
+
+
+def _placed(options: CalibrationOptions) -> tuple[Uncertain, ...]:
+    return (*(q for q in NUISANCES if q.name == "gain"), options.azimuth, options.elevation)
+
+
+def _fitted(
+    simulated_recording: _Simulated, sight: Sight, posterior_draws: Posterior, index: int, options: CalibrationOptions
+) -> Fitted:
+    """Returns what the emulator says that flags of the posterior show."""
+    recording, summaries = simulated_recording.observed, simulated_recording.summaries
+    values = {**posterior_draws.cloth, **posterior_draws.places[index]}
+    predicted = sight.emulator.draw(values, seed=options.seed)
+    used = sight.emulator.used
+    count = len(OBSERVED)
+    # What depends on nothing that is regressed on is that of simulations at random.
+    rows = stream(options.seed, "calibrate", "rows").integers(len(summaries), size=len(predicted))
+    # Replicates of the summary as the answer predicts it.
+    replicates = np.where(np.isfinite(summaries), summaries, np.nanmean(summaries, axis=0))[rows]
+    replicates[:, used] = predicted
+    windows = recording.projection.at(replicates.reshape(len(predicted), -1, count))
+    low, middle, high = np.quantile(windows, [(1 - options.level) / 2, 0.5, (1 + options.level) / 2], axis=0)
+    compared = np.isfinite(recording.summary) & np.isfinite(replicates).all(axis=0)
+    # The recording's distance among those of the replicates is the misfit.
+    centre, inverse = replicates[:, compared].mean(axis=0), np.linalg.pinv(np.cov(replicates[:, compared].T))
+    offsets = np.concatenate([replicates[:, compared], recording.summary[None, compared]]) - centre
+    *distances, distance_observed = ((offsets @ inverse) * offsets).sum(axis=1).tolist()
+    distance = np.array(distances)
+    spread = replicates.std(axis=0)
+    deviations = np.where(
+        compared & (spread > 0),
+        (recording.summary - replicates.mean(axis=0)) / np.where(spread > 0, spread, 1.0),
+        np.nan,
+    )
+    return Fitted(
+        observed=recording,
+        low=low,
+        middle=middle,
+        high=high,
+        used=np.asarray(used.reshape(-1, count).any(axis=0)),
+        misfit=float((1 + (distance >= distance_observed).sum()) / (1 + len(distance))),
+        deviations=deviations,
+        failed=int((~np.isfinite(summaries[:, used]).all(axis=1)).sum()),
+    )
+
+
+def _findings(calibration: Calibration) -> tuple[Finding, ...]:
+    findings = list(constant_wind([recording.observed for recording in calibration.recordings]))
+    for fitted in calibration.recordings:
+        findings.extend(fitted.observed.findings)
+        if fitted.unlike is not None:
+            text = f"{_unlike(fitted)}. The weight is withheld"
+            findings.append(Finding.of("unlike-simulations", text, fix=_LOOK))
+        if fitted.failed > 0.1 * calibration.options.simulations:
+            count = calibration.options.simulations
+            text = f"{fitted.failed} of {count} simulations of {fitted.observed.name} were left out"
+            findings.append(Finding.of("failed-simulations", text))
+    if not calibration.draws.together:
+        findings.append(TAKEN_APART)
+    check, level = calibration.check, calibration.options.level
+    if check.contained < check.count * level - 2.6 * math.sqrt(check.count * level * (1 - level)):
+        text = (
+            f"of {check.count} simulations left out, the intervals of {check.contained} contain the area weight, where "
+            f"{check.count * level:.0f} are expected: they are too narrow"
+        )
+        fix = "give more simulations with --simulations"
+        findings.append(Finding.of("narrow-intervals", text, fix=fix))
+    findings.extend(_leaning(calibration))
+    undetermined = [q.name.replace("_", " ") for q in calibration.cloth if not q.constrained]
+    if undetermined:
+        text = f"{', '.join(undetermined)}: the posterior is the prior's, so that no value is given"
+        findings.append(Finding.of("not-determined", text))
+    return tuple(findings)
+
+
+def _unlike(recording: Fitted) -> str:
+    """Returns what is unlike about a recording, and what may be the cause."""
+    return (
+        f"no simulated flag looks like {recording.observed.name} (p = {recording.misfit:.1g}): {recording.unlike}. "
+        "The cloth may not be "
+        "separated from what is behind it, or its size, attachment or place be another than stated, or something may "
+        "act on it that the model lacks"
+    )
+
+
+def _leaning(calibration: Calibration) -> list[Finding]:
+    """Quantities of which only a bound is known."""
+    findings = []
+    for quantity, about in zip(calibration.cloth, CLOTH, strict=True):
+        if not quantity.is_bound or about.ends is None:
+            continue
+        most = quantity.bound is Bound.MOST
+        end = f"{about.ends[0 if most else 1]:.3g} {quantity.unit}"
+        text = (
+            f"{quantity.name.replace('_', ' ')}: {PILED:.0%} of the posterior or more lie within {WITHIN:.0%} of the "
+            f"end of what is assumed, {end}; {'less' if most else 'more'} would look the same, so that only a bound is "
+            "given"
+        )
+        fix = "check the flag's size and where the camera stood" + (
+            ", or weigh a piece of the cloth on a scale" if quantity is calibration.weight else ""
+        )
+        findings.append(Finding.of("leans-on-prior", text, fix=fix))
+    return findings

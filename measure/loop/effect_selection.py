@@ -1,0 +1,561 @@
+"""Which effect it is: models of the library compared by what they predict on recordings they were not fitted to.
+
+Detection is by the calibrated statistic. Attribution is one rule. Models whose held-out scores do not differ
+significantly from the best are the confidence set (after Hansen, Lunde and Nason, Econometrica 79:453, 2011), and of
+these the ones that pass their own predictive test are the verdict. The base model and forces that are none of the
+library compete like any other.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from flagdata.core.arrays import FloatArray, IntArray
+from measure.forecasting.calibrated_parameters import THETA
+from measure.forecasting.regressors import TURNED, EffectColumn, columns, names
+from measure.inference.fluctuation import fluctuation, fluctuation_gains
+from measure.inference.segment_evidence import Evidence, gains
+from measure.loop.refit import Refit
+from measure.loop.set_up import HOIST, SetUp, beyond_tolerance, turned
+from measure.loop.validation import total_error
+from measure.nulls.directions import Move
+from measure.nulls.reference import GUSTS, Reference
+from measure.probes.lines import SpectralLine
+from measure.probes.wind_course import ALONG, Variation
+from measure.verdict.criteria import CRITERIA
+from measure.verdict.decided import undecided
+from measure.verdict.quantity import number
+from measure.verdict.verdict_record import Candidate, Conclusion, Estimate
+from sim.effects import EFFECTS
+
+GUST_COLUMN = -1
+"""Stands for gusts, which are no column: only their size can be found, not their course."""
+_FIRST = len(THETA)
+
+
+def equivalent(effect: str, strength: Estimate) -> tuple[str, ...]:
+    """Effects that no recording of this kind can distinguish from a weighed one: holes in the cloth scale the dynamic
+    pressure as the air's density does, but only lower it."""
+    return ("porosity",) if effect == "air-density" and strength.value < 0 else ()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Weighed:
+    """A candidate with what the decision needs.
+
+    Attributes:
+        column: place among the evidence's columns.
+        candidate: as reported.
+        error: standard error of the strength.
+        gains: (segment,) held-out gain.
+        recording: (segment,) of each.
+        admissible: whether the model exists: its strength is one that the effect may have, its cloth stays one, and a
+            wind that fluctuates does it as turbulence does.
+        unlike: why such a model does not exist, beside its strength: how the wind's course differs from that of
+            turbulence, or that a log's direction is within its tolerance; empty where it does.
+        measured: the strength where it is found apart from the other columns; None where it is fitted beside them.
+    """
+
+    column: int
+    candidate: Candidate
+    error: float
+    gains: FloatArray
+    recording: IntArray
+    admissible: bool
+    unlike: str = ""
+    measured: Estimate | None = None
+
+    def passes(self, level: float) -> bool:
+        """Returns whether the model passes its predictive test: what it leaves is what nulls leave, and its strength is
+        the same in all recordings."""
+        return self.candidate.leftover > level and not heterogeneous(self.candidate, level)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LibraryJudgement:
+    """What was decided.
+
+    Attributes:
+        conclusion: see `Conclusion`.
+        named: columns of the effects named.
+        ranking: candidates, best first, each with the reason why it was not named.
+        confident: columns of the models of the library in the confidence set, best first; empty where the base model or
+            none of the library is as good as they are.
+        statistic, p_value: of the global test.
+        line: of the errors' spectra that the first of the ranking leaves, where it alone would reject the model.
+        course: how the wind varies, by the errors that the first leaves, where that alone would and it is not
+            turbulence.
+        direction: by how much the wind is turned from where its logs have it, counter-clockwise [rad]; None in still
+            air.
+        departed: columns of what the recordings show of the set-up against what was declared.
+        power: of each effect that is tested for, at its expected strength.
+        open: why the base model is neither rejected nor said to suffice, sentences; empty where it is.
+    """
+
+    conclusion: Conclusion
+    named: tuple[int, ...]
+    ranking: tuple[Weighed, ...]
+    confident: tuple[int, ...]
+    statistic: float
+    p_value: float
+    line: SpectralLine | None = None
+    course: Variation | None = None
+    direction: Estimate | None = None
+    departed: tuple[int, ...] = ()
+    power: tuple[tuple[Move, float], ...] = ()
+    open: tuple[str, ...] = ()
+
+
+def judge(
+    evidence: Evidence,
+    reference: Reference,
+    *,
+    level: float,
+    refits: Mapping[int, Refit | None] | None = None,
+    set_up: SetUp | None = None,
+) -> LibraryJudgement:
+    """Weighs the library against the evidence of all recordings.
+
+    Args:
+        level: of the global test.
+        refits: of columns whose models were refitted, which count in place of the linear evidence; None for a cloth
+            that diverged.
+        set_up: what recordings may show of it; what they show leads the verdict, whatever the test says.
+    """
+    refitted = refits or {}
+    statistics = reference.statistics(evidence, names())
+    statistic = reference.tested(evidence, names())
+    p_value, power = reference.test.p(statistic), reference.power(level)
+    effects = [(i + _FIRST, c) for i, c in enumerate(columns()) if isinstance(c, EffectColumn)]
+    # Nothing is known along an effect that the cloth cannot have as it is held.
+    effects = [(i, c) for i, c in effects if evidence.curvature[:, i, i].sum() > 0]
+    held_out = gains(evidence, [[i] for i, _ in effects])
+    candidates = [
+        _weigh(
+            evidence,
+            reference,
+            column,
+            effect,
+            linear,
+            statistics,
+            refitted.get(column),
+            lost=refitted.get(column, 0) is None,
+        )
+        for (column, effect), linear in zip(effects, held_out, strict=True)
+    ]
+    direction, declared = turned(evidence, reference), set_up or SetUp()
+    beyond = beyond_tolerance(direction, declared.tolerance)
+    if direction is not None:
+        turned_column = names().index(TURNED)
+        candidates = [_within(w, direction, declared.tolerance) if w.column == turned_column else w for w in candidates]
+    ranking = _ranked([*candidates, _gusts(evidence, reference, float(statistics[len(names())]))])
+    departing = {
+        names().index(name)
+        for name, declared_otherwise in ((TURNED, beyond), (HOIST, declared.attached))
+        if declared_otherwise
+    }
+    departed = [w for w in ranking if w.column in departing]
+    confident = _confidence_set(ranking, evidence)
+    first = refitted.get((departed or ranking)[0].column)
+    remaining = evidence if first is None else first.evidence
+
+    def judgement(
+        conclusion: Conclusion, accepted: Sequence[Weighed], why: str = "", reasons: tuple[str, ...] = ()
+    ) -> LibraryJudgement:
+        taken = {w.column for w in accepted}
+        reasoned = [
+            replace(w, candidate=replace(w.candidate, why_not=_reason(ranking[0], w, why) * (w.column not in taken)))
+            for w in ranking
+        ]
+        return LibraryJudgement(
+            conclusion=conclusion,
+            named=tuple(w.column for w in accepted),
+            ranking=tuple(reasoned),
+            confident=tuple(w.column for w in confident),
+            statistic=statistic,
+            p_value=p_value,
+            line=_swinging(remaining, reference, level),
+            course=_blown(remaining, reference, level),
+            direction=direction,
+            departed=tuple(w.column for w in departed),
+            power=power,
+            open=reasons,
+        )
+
+    if not reference.test.tests(level):
+        return judgement(Conclusion.UNTESTED, (), "there are too few kinds of numerics to test the base model")
+    if departed:
+        rest = "the recordings show that the set-up is another than the declared one, and nothing else is needed"
+        columns_shown = [w.column for w in departed]
+        if len(departed) == 1 and first is not None:
+            explained = first.leftover > level
+        else:
+            explained = reference.p_left_by(remaining, names(), columns_shown) > level
+        if explained:
+            return judgement(Conclusion.EFFECT, departed, rest)
+        second = _second(remaining, reference, departed[0], ranking, level) if len(departed) == 1 else None
+        if second is not None:
+            return judgement(Conclusion.EFFECT, (*departed, second))
+        return judgement(Conclusion.PARTLY, departed)
+    if p_value > level:
+        why, shares = "the base model is not rejected", [share for _, share in power]
+        reasons = undecided(p_value, level=level, departure=_departure(evidence, reference), power=shares)
+        return judgement(Conclusion.UNDECIDED if reasons else Conclusion.SUFFICIENT, (), why, reasons)
+    if reference.suspected is not None and not confident:
+        confident = [w for w in ranking if w.column == reference.suspected[0] and w.admissible]
+    passing = [w for w in confident if w.passes(level)]
+    if passing:
+        return judgement(Conclusion.EFFECT if len(passing) == 1 else Conclusion.ONE_OF, passing)
+    second = _second(remaining, reference, confident[0], ranking, level) if confident else None
+    if second is not None:
+        return judgement(Conclusion.EFFECT, (confident[0], second))
+    pulsating = _pulsating(remaining, reference, ranking, level)
+    if pulsating is not None and (pulsating.candidate.leftover > level or not confident):
+        ranking = [pulsating if w.column == GUST_COLUMN else w for w in ranking]
+        return judgement(Conclusion.EFFECT if pulsating.candidate.leftover > level else Conclusion.PARTLY, [pulsating])
+    return judgement(Conclusion.PARTLY, confident[:1]) if confident else judgement(Conclusion.OUTSIDE, ())
+
+
+def _departure(evidence: Evidence, reference: Reference) -> float:
+    """Computes the root mean square departure of what recordings settle at from the base model run freely, in nulls'
+    scatters; 0 where it is not looked at."""
+    settles = reference.settles(evidence)
+    return 0.0 if settles is None else float(np.sqrt(np.square(settles).mean()))
+
+
+def _within(turned_wind: Weighed, direction: Estimate, tolerance: float) -> Weighed:
+    """Describes the turned wind as it was measured; no effect where the log's tolerance allows for it."""
+    inside = tolerance > 0 and not beyond_tolerance(direction, tolerance)
+    low, high, allowed = (number(math.degrees(v), digits=2) for v in (direction.low, direction.high, tolerance))
+    unlike = f"the wind is turned by {low}° to {high}° from its log, which {allowed}° of tolerance allow for"
+    return replace(
+        turned_wind,
+        measured=direction,
+        admissible=turned_wind.admissible and not inside,
+        unlike=unlike if inside else "",
+        candidate=replace(turned_wind.candidate, strength=direction),
+    )
+
+
+def withdrawn(judgement: LibraryJudgement) -> LibraryJudgement:
+    """Withdraws the effects that were named: with those that were, or of several that may act with the first, errors on
+    unseen recordings are larger than without."""
+    worse = "errors on unseen recordings are larger than without"
+    tried = judgement.named if judgement.conclusion is Conclusion.EFFECT else judgement.named[:1]
+    why = dict.fromkeys(tried, f"with it, {worse}")
+    why |= {c: f"with the first of those that may act, {worse}" for c in judgement.named if c not in why}
+    ranking = tuple(
+        replace(w, candidate=replace(w.candidate, why_not=why[w.column])) if w.column in why else w
+        for w in judgement.ranking
+    )
+    return replace(judgement, conclusion=Conclusion.OUTSIDE, named=(), ranking=ranking)
+
+
+def _confidence_set(ranking: Sequence[Weighed], evidence: Evidence) -> list[Weighed]:
+    """Selects models of the library whose held-out scores do not differ significantly from the best, best first; none
+    where the base model, which gains nothing, is among them, or where a force that is none of the library leads them
+    all."""
+    able = [w for w in ranking if w.admissible]
+    forces = gains(evidence, [[i + _FIRST] for i, c in enumerate(columns()) if not isinstance(c, EffectColumn)])
+    scores = [*(w.gains for w in able), *forces]
+    best = max(scores, key=lambda scores_of_model: scores_of_model.sum())
+    if not _leads(best, np.zeros_like(best), evidence.recording):
+        return []
+    return [w for w in able if not _leads(best, w.gains, evidence.recording) and _leads(w.gains, 0 * best, w.recording)]
+
+
+def _leads(first: FloatArray, second: FloatArray, recording: IntArray) -> bool:
+    """Returns whether held-out scores (segment,) are better by more than `Criteria.lead` standard errors of the
+    difference."""
+    return bool((first - second).sum() > CRITERIA.lead * total_error(first - second, recording))
+
+
+def _swinging(evidence: Evidence, reference: Reference, level: float) -> SpectralLine | None:
+    """Finds the line of the spectra of what is left, where it alone would reject a model."""
+    line = reference.line(evidence)
+    return line if line is not None and reference.conformal.p(line.far) <= level else None
+
+
+def _varying(evidence: Evidence) -> Variation | None:
+    """Estimates from the errors how the wind varies. None where its course is not asked for."""
+    return None if evidence.course is None else evidence.course.variation(evidence.recording)
+
+
+def _blown(evidence: Evidence, reference: Reference, level: float) -> Variation | None:
+    """Estimates how the wind varies by the remaining errors, where that alone would reject a model and is not
+    turbulence."""
+    swing, variation = reference.swing(evidence), _varying(evidence)
+    if swing is None or variation is None or variation.turbulent:
+        return None
+    return variation if reference.conformal.p(swing) <= level else None
+
+
+def _pulsating(evidence: Evidence, reference: Reference, ranking: Sequence[Weighed], level: float) -> Weighed | None:
+    """Finds gusts by the course of a wind that varies along itself alone, where that alone would reject a model:
+    what varies within segments is not found by how the pressure differs between them. None where the wind does not
+    vary so."""
+    variation = _blown(evidence, reference, level)
+    if variation is None or not variation.alone:
+        return None
+    (gusts,) = (w for w in ranking if w.column == GUST_COLUMN)
+    intensities = [_intensity(evidence.select(evidence.recording == index)) for index in np.unique(evidence.recording)]
+    error = float(np.std(intensities, ddof=1) / math.sqrt(len(intensities))) if len(intensities) > 1 else 0.0
+    intensity = estimate(_intensity(evidence), error, gusts.candidate.strength.unit)
+    return replace(
+        gusts, admissible=True, unlike="", measured=intensity, candidate=replace(gusts.candidate, strength=intensity)
+    )
+
+
+def _intensity(evidence: Evidence) -> float:
+    """Computes the standard deviation of the wind along itself, as a share of its mean, by its course."""
+    variation = _varying(evidence)
+    return 0.0 if variation is None else math.sqrt(max(float(variation.total[ALONG]), 0.0))
+
+
+def heterogeneity(strengths: Sequence[Estimate]) -> float | None:
+    """Computes the p-value of one strength in all recordings, by Cochran's Q (Biometrics 10:101, 1954); None of fewer
+    than two.
+
+    A strength is that of a law in the wind: a wind that rises by so many metres a second, fitted as one that rises by
+    an angle, has a larger angle in lighter winds.
+
+    Args:
+        strengths: of each recording alone, with normal intervals.
+    """
+    if len(strengths) < 2:
+        return None
+    values = np.array([s.value for s in strengths])
+    errors = np.array([(s.high - s.low) / 2 / norm.ppf(0.5 + s.level / 2) for s in strengths])
+    weights = errors**-2.0
+    common = (weights * values).sum() / weights.sum()
+    return float(chi2.sf((weights * (values - common) ** 2).sum(), len(strengths) - 1))
+
+
+def heterogeneous(candidate: Candidate, level: float) -> bool:
+    """Returns whether its strength is another in every recording: another law in the wind would be a better one."""
+    return candidate.heterogeneity is not None and candidate.heterogeneity <= level
+
+
+def finalists(judgement: LibraryJudgement) -> tuple[int, ...]:
+    """Columns that are refitted: the confidence set, the first by held-out gains, and the largest statistics."""
+    able = [w for w in judgement.ranking if w.admissible and w.column != GUST_COLUMN]
+    strongest = sorted(able, key=lambda w: -abs(w.candidate.z))
+    first = (*able[: CRITERIA.refitted], *strongest[: CRITERIA.refitted])
+    chosen = dict.fromkeys([*judgement.departed, *(w.column for w in first), *judgement.confident])
+    return tuple(column for column in chosen if column != GUST_COLUMN)
+
+
+def _second(
+    evidence: Evidence, reference: Reference, first: Weighed, ranking: Sequence[Weighed], level: float
+) -> Weighed | None:
+    """Finds an effect with which the first passes its predictive test, and predicts better than alone. Beside gusts,
+    the pressure is free in every segment.
+
+    Args:
+        evidence: of what the first leaves, if it was refitted.
+    """
+    pressure = names().index(GUSTS)
+    fitted = [first.column]
+    if first.column == GUST_COLUMN:
+        evidence, reference, fitted = evidence.freed(pressure), reference.beside(), []
+    skipped = {GUST_COLUMN, first.column, *([] if fitted else [pressure])}
+    candidates = [w for w in ranking if w.column not in skipped]
+    pairs = gains(evidence, [fitted, *([*fitted, w.column] for w in candidates)])
+    for index in np.argsort(-pairs[1:].sum(axis=1)):
+        second, pair = candidates[index], [*fitted, candidates[index].column]
+        if not _leads(pairs[1 + index], pairs[0], evidence.recording):
+            return None
+        value, _ = evidence.fit(pair).of(second.column)
+        described = EFFECTS[second.candidate.effect].parameters()[second.candidate.parameter]
+        constant = all(_homogeneous_beside(evidence, pair, w, level) for w in (first, second) if w.column in pair)
+        if (
+            described.admits(described.null + value)
+            and constant
+            and reference.p_left_by(evidence, names(), pair) > level
+        ):
+            return second
+    return None
+
+
+def _homogeneous_beside(evidence: Evidence, chosen: Sequence[int], candidate: Weighed, level: float) -> bool:
+    """Returns whether a strength is the same in all recordings, where some columns are fitted to each."""
+    p = heterogeneity(
+        _strengths_by_recording(
+            evidence, chosen, candidate.column, about=0.0, larger=_larger(evidence, candidate), unit="1"
+        )
+    )
+    return p is None or p > level
+
+
+def _larger(evidence: Evidence, candidate: Weighed) -> float:
+    """Computes by how much a strength's standard error is larger than Σ says when it is fitted alone."""
+    return candidate.error / evidence.fit([candidate.column]).of(candidate.column)[1]
+
+
+def _strengths_by_recording(
+    evidence: Evidence, chosen: Sequence[int], column: int, *, about: float, larger: float, unit: str
+) -> tuple[Estimate, ...]:
+    """Estimates the strength of a column in each recording alone, where some columns are fitted to it.
+
+    Args:
+        about: the strength in the model that the evidence is of.
+        larger: by how much its standard errors are larger than Σ says.
+    """
+    strengths: list[Estimate] = []
+    for index in np.unique(evidence.recording):
+        value, claimed = evidence.select(evidence.recording == index).fit(chosen).of(column)
+        strengths.append(estimate(about + value, larger * claimed, unit))
+    return tuple(strengths)
+
+
+def _weigh(
+    evidence: Evidence,
+    reference: Reference,
+    column: int,
+    effect: EffectColumn,
+    linear: FloatArray,
+    statistics: FloatArray,
+    refitted: Refit | None,
+    *,
+    lost: bool,
+) -> Weighed:
+    fit = evidence.fit([column])
+    value, _ = fit.of(column)
+    # The standard error is that which makes the nulls' mean squared z 1.
+    statistic = float(statistics[column])
+    error = abs(value) / math.sqrt(max(statistic, 1e-12))
+    z = value / error if error > 0 else 0.0
+    gained, leftover = linear, refitted.leftover if refitted else reference.p_left_by(evidence, names(), [column])
+    remaining, null = evidence, effect.described.null
+    if refitted is not None:
+        gained, value, remaining = refitted.gains, refitted.coefficient, refitted.evidence
+    about = null + (value if refitted else 0.0)
+    larger = error / fit.of(column)[1]
+    bounded = None if refitted is None or refitted.profile is None else refitted.profile.estimate(larger=larger)
+    # Where all strengths beyond a bound do the same, slopes at one of them say nothing of those of single recordings.
+    by_recording = (
+        ()
+        if bounded is not None
+        else _strengths_by_recording(remaining, [column], column, about=about, larger=larger, unit=effect.unit)
+    )
+    return Weighed(
+        column=column,
+        error=error,
+        gains=gained,
+        recording=evidence.recording,
+        admissible=effect.described.admits(null + value) and not lost,
+        candidate=Candidate(
+            effect=effect.effect,
+            parameter=effect.parameter,
+            null=null,
+            strength=bounded or strength(null, value, error, effect.unit),
+            z=z,
+            p_value=reference.p_alone(statistic, column),
+            p_family=reference.p_family(statistic, column),
+            gain=float(gained.sum()),
+            gain_error=total_error(gained, evidence.recording),
+            behind=0.0,
+            leftover=leftover,
+            by_recording=by_recording,
+            heterogeneity=heterogeneity(by_recording),
+        ),
+    )
+
+
+def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighed:
+    """Weighs gusts, whose course is unknown: a pressure that fluctuates from segment to segment, by twice their
+    intensity."""
+    pressure = names().index(GUSTS)
+    gusts, gained = fluctuation(evidence, pressure), fluctuation_gains(evidence, pressure)
+    described = EFFECTS["gusts"].parameters()["intensity"]
+    variation = _varying(evidence)
+    unlike = "" if variation is None or variation.turbulent or variation.alone else variation.words
+    by_recording = []
+    for index in np.unique(evidence.recording):
+        in_recording = fluctuation(evidence.select(evidence.recording == index), pressure)
+        by_recording.append(estimate(in_recording.deviation / 2, in_recording.error / 2, described.unit))
+    return Weighed(
+        column=GUST_COLUMN,
+        gains=gained,
+        recording=evidence.recording,
+        error=gusts.error / 2,
+        admissible=bool(gusts.deviation > CRITERIA.reach * gusts.error) and not unlike,
+        unlike=unlike,
+        candidate=Candidate(
+            effect="gusts",
+            parameter="intensity",
+            null=described.null,
+            strength=strength(described.null, gusts.deviation / 2, gusts.error / 2, described.unit),
+            z=math.sqrt(statistic),
+            p_value=reference.p_alone(statistic, len(names())),
+            p_family=reference.p_family(statistic, len(names())),
+            gain=float(gained.sum()),
+            gain_error=total_error(gained, evidence.recording),
+            behind=0.0,
+            leftover=reference.beside().p_left_by(evidence.freed(pressure), names(), ()),
+            by_recording=tuple(by_recording),
+        ),
+    )
+
+
+def strength(null: float, coefficient: float, error: float, unit: str) -> Estimate:
+    """Estimates the strength of an effect, by its coefficient beyond null and the standard error that nulls leave.
+
+    What the fit's mesh and a mistold cloth do to an effect is a factor, so that more of the interval lies beyond the
+    strength than between it and the null.
+    """
+    factor, reach = CRITERIA.reach * CRITERIA.strength_factor, CRITERIA.reach * error
+    inward = math.hypot(coefficient * (1 - math.exp(-factor)), reach)
+    outward = math.hypot(coefficient * (math.exp(factor) - 1), reach)
+    low, high = (outward, inward) if coefficient < 0 else (inward, outward)
+    value = null + coefficient
+    return Estimate(value=value, low=value - low, high=value + high, unit=unit, level=CRITERIA.interval)
+
+
+def estimate(value: float, error: float, unit: str) -> Estimate:
+    """Computes a normal interval at the level of all intervals."""
+    return Estimate(
+        value=value,
+        low=value - CRITERIA.reach * error,
+        high=value + CRITERIA.reach * error,
+        unit=unit,
+        level=CRITERIA.interval,
+    )
+
+
+def _ranked(candidates: Sequence[Weighed]) -> list[Weighed]:
+    """Ranks candidates by held-out gain, those first that are admissible."""
+    ordered = sorted(candidates, key=lambda w: (-w.admissible, -w.gains.sum()))
+    return [replace(w, candidate=replace(w.candidate, behind=_behind(ordered[0], w))) for w in ordered]
+
+
+def _behind(best: Weighed, compared: Weighed) -> float:
+    """Computes standard errors of the paired difference."""
+    if compared is best:
+        return 0.0
+    difference = best.gains - compared.gains
+    error = total_error(difference, best.recording)
+    return float(difference.sum() / error) if error > 0 else 0.0
+
+
+def _reason(best: Weighed, candidate: Weighed, why: str) -> str:
+    if why:
+        return why
+    if not candidate.admissible and candidate.unlike:
+        return candidate.unlike
+    if not candidate.admissible and candidate.column == GUST_COLUMN:
+        return "their intensity is not significantly above zero"
+    if not candidate.admissible:
+        strength = candidate.candidate.strength
+        unit = "" if strength.unit == "1" else f" {strength.unit}"
+        return f"the fitted value is unphysical: {number(strength.value)}{unit}"
+    if not _leads(candidate.gains, 0 * candidate.gains, candidate.recording):
+        return "it predicts unseen recordings no better than the base model"
+    if _leads(best.gains, candidate.gains, candidate.recording):
+        return f"{_behind(best, candidate):.1f} standard errors behind {best.candidate.effect} on unseen recordings"
+    return "the errors that remain are larger than those of nulls, or a force outside the library predicts better"

@@ -1,0 +1,220 @@
+"""Mesh sequences as observations: the vertices of a mesh that keeps its topology, else fixed points of the cloth.
+
+Material points of a moving mesh whose topology may change: where they are in each frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flagdata.core.arrays import Float32Array, FloatArray, IntArray
+from flagdata.core.findings import Finding
+from flagdata.core.schema import Kind
+from flagdata.core.units import unit as length_unit
+from flagdata.errors import InputError
+from flagdata.ingest.meshes import read_folder
+from flagdata.lake import Artifact, Lake
+from flagdata.lake.mesh_sequences import MeshSequence, RaggedMeshSequence, read_meshes
+from flagdata.timebase import NANOSECONDS
+from measure.observe.cloth_mesh import VERTICES, model_mesh, outline
+from measure.observe.describing import of_arcsim, of_simulation
+from measure.observe.observation import Known, Observation
+
+_PAIRS = 1_000_000  # of points and faces that are compared at a time
+_SLACK = 1e-3  # barycentric: how far beyond its face, as a share of it, a point still counts as on the cloth
+
+
+@dataclass(frozen=True, kw_only=True)
+class Location:
+    """Points on a triangulated cloth.
+
+    Attributes:
+        corners: (point, 3) vertices of the face that each lies in.
+        weights: (point, 3) barycentric coordinates in it, which sum to 1.
+    """
+
+    corners: IntArray
+    weights: FloatArray
+
+    def of(self, values: FloatArray) -> FloatArray:
+        """Interpolates values (vertex, …) at the points, (point, …), linear in each face."""
+        return np.einsum("pc,pc...->p...", self.weights, values[self.corners])
+
+
+def locate(rest: FloatArray, faces: IntArray, points: FloatArray, *, where: str) -> Location:
+    """Finds the faces in which points of the flat cloth lie, and where in them.
+
+    Args:
+        rest: (vertex, 2) [m].
+        faces: (face, 3), of either orientation; those without area are passed over.
+        points: (point, 2) [m].
+
+    Raises:
+        InputError: a point that no face holds.
+    """
+    a, b, c = (rest[faces[:, i]] for i in range(3))
+    doubled = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    has_area = np.abs(doubled) > 1e-9 * np.abs(doubled).max(initial=0.0)
+    if not has_area.any():
+        raise InputError("no face has an area in the rest shape", where=where, fix="export texture coordinates anew")
+    a, b, c, faces, doubled = a[has_area], b[has_area], c[has_area], faces[has_area], doubled[has_area]
+    containing = np.empty(len(points), dtype=np.int64)
+    weights = np.empty((len(points), 3))
+    step = max(1, _PAIRS // len(faces))
+    for first in range(0, len(points), step):
+        subset = points[first : first + step]
+        second = _cross(subset[:, None] - a, c - a) / doubled
+        third = _cross(b - a, subset[:, None] - a) / doubled
+        inside = np.minimum(np.minimum(second, third), 1 - second - third)
+        best = inside.argmax(axis=1)
+        rows = np.arange(len(subset))
+        worst = float(inside[rows, best].min())
+        if worst < -_SLACK:
+            lost = first + int(inside[rows, best].argmin())
+            u, v = points[lost]
+            raise InputError(
+                f"the point (u, v) = ({u:.4g}, {v:.4g}) m is on no face of the cloth",
+                where=where,
+                fix="give points within the rest shape, in its own coordinates",
+            )
+        containing[first : first + step] = best
+        second, third = second[rows, best], third[rows, best]
+        weights[first : first + step] = np.stack([1 - second - third, second, third], axis=1)
+    return Location(corners=faces[containing], weights=weights)
+
+
+def sample(sequence: MeshSequence | RaggedMeshSequence, points: FloatArray) -> FloatArray:
+    """Interpolates where points of the flat cloth (point, 2) are in each frame, (frame, point, 3) [m], linear in each
+    face.
+
+    Raises:
+        InputError: a point that is not on the cloth in every frame.
+    """
+    positions = np.empty((len(sequence), len(points), 3))
+    last: tuple[Float32Array, NDArray[np.int32]] | None = None
+    location: Location | None = None
+    for index in range(len(sequence)):
+        mesh = sequence.frame(index)
+        same = last is not None and np.array_equal(last[0], mesh.rest) and np.array_equal(last[1], mesh.faces)
+        if location is None or not same:
+            rest, faces = mesh.rest.astype(np.float64), mesh.faces.astype(np.int64)
+            location = locate(rest, faces, points, where=f"frame {index}")
+            last = (mesh.rest, mesh.faces)
+        positions[index] = location.of(mesh.positions.astype(np.float64))
+    return positions
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+MARKERS = 1000
+"""A mesh of more vertices is sampled at fixed points instead: neighbours would say the same twice."""
+_SAME_RATE = 1e-3
+
+
+def from_folder(
+    path: Path, *, name: str | None = None, rate: float | None = None, unit: str = "m", markers: int = VERTICES
+) -> Observation:
+    """Reads an ArcSim output folder, or any folder of OBJ meshes with texture coordinates in metres.
+
+    Args:
+        name: what reports call it; the folder's if None.
+        rate: frames a second [Hz]; None for that of conf.json.
+        unit: of the positions.
+        markers: about how many points are followed where the mesh itself cannot be.
+
+    Raises:
+        FlagdataError: as `read_folder` and `from_sequence`.
+    """
+    sequence = read_folder(path, rate=rate, metre=float(length_unit(unit, where=str(path)).to_si(1.0)))
+    observation = from_sequence(sequence, name=name or path.name, markers=markers)
+    scene = sequence.attributes.get("scene")
+    frame_time = scene.get("frame_time") if isinstance(scene, Mapping) else None
+    if rate is None or not isinstance(frame_time, int | float) or abs(rate * frame_time - 1) < _SAME_RATE:
+        return observation
+    finding = Finding.of(
+        "rate-not-as-described",
+        f"frames are taken at {rate:.6g} Hz, conf.json says {1 / frame_time:.6g} Hz",
+        where=f"recording {observation.name!r}",
+        value=1 / frame_time,
+        fix="leave the rate out, if conf.json is right",
+    )
+    return replace(observation, findings=(*observation.findings, finding))
+
+
+def from_artifact(lake: Lake, artifact: Artifact, *, name: str | None = None, markers: int = VERTICES) -> Observation:
+    """Reads a mesh sequence of a lake.
+
+    Raises:
+        InputError: an artifact of another kind, or without an object.
+        FlagdataError: as `from_sequence` and `read_meshes`.
+    """
+    if artifact.kind is not Kind.MESHES or artifact.object is None:
+        raise InputError(
+            f"the artifact is a {artifact.kind.value}, not a mesh sequence",
+            where=f"artifact {artifact.id}",
+            fix="name a mesh sequence; flagdata ls lists them",
+        )
+    sequence = read_meshes(lake.whole_object(artifact.object))  # damage must not be measured
+    observation = from_sequence(sequence, name=name or artifact.name, markers=markers)
+    first = sequence.frame(0).rest.astype(np.float64)
+    description = observation.known if observation.known.pins is not None else of_simulation(artifact, first)
+    return replace(observation, source=artifact.id, known=description)
+
+
+def from_sequence(sequence: MeshSequence | RaggedMeshSequence, *, name: str, markers: int = VERTICES) -> Observation:
+    """Makes an observation of a moving mesh; one that is remeshed, or has more than `MARKERS` vertices, is followed at
+    fixed points of the cloth.
+
+    The points are those of a model mesh over the first frame's outline, found in each frame through the rest
+    coordinates and linear within its faces.
+
+    Raises:
+        InputError: a cloth with holes, whose outline changes, or a scene that cannot be read.
+    """
+    where = f"recording {name!r}"
+    first = sequence.frame(0)
+    rest, faces = first.rest.astype(np.float64), first.faces.astype(np.int64)
+    corners = outline(rest, faces, where=where)
+    description, findings = _described(sequence.attributes, rest, where)
+    fixed = isinstance(sequence, MeshSequence)
+    if isinstance(sequence, MeshSequence) and len(rest) <= MARKERS:
+        used = np.unique(faces)  # vertices that no face uses are no part of the cloth
+        seats, positions = rest[used], sequence.positions[:, used].astype(np.float64)
+    else:
+        mesh = model_mesh(corners, vertices=markers)
+        seats, positions = mesh.rest, sample(sequence, mesh.rest)
+        findings = (*findings, _resampled(len(seats), remeshed=not fixed, where=where))
+    return Observation(
+        name=name,
+        markers=seats,
+        positions=positions,
+        times=(sequence.time - sequence.time[0]) / NANOSECONDS,
+        outline=corners,
+        known=description,
+        findings=findings,
+    )
+
+
+def _described(attributes: Mapping[str, Any], rest: Any, where: str) -> tuple[Known, tuple[Finding, ...]]:
+    scene = attributes.get("scene")
+    if attributes.get("source") != "arcsim" or not isinstance(scene, Mapping):
+        return Known(), ()
+    return of_arcsim(scene, rest, where=f"{where}, conf.json")
+
+
+def _resampled(count: int, *, remeshed: bool, where: str) -> Finding:
+    why = "its topology changes" if remeshed else f"it has more than {MARKERS} vertices"
+    return Finding.of(
+        "mesh-resampled",
+        f"the mesh is followed at {count} fixed points of the cloth, since {why}",
+        where=where,
+        count=count,
+    )

@@ -1,0 +1,1 @@
+"""From a clip's pixels to the maps that networks see."""

@@ -1,0 +1,1 @@
+"""Estimates without a network: hand-made features, ridge regression, boosting."""
