@@ -10,7 +10,7 @@ from griffe import Docstring, Extension, Function, Parameter, ParameterKind, Par
 
 
 class Called(Extension):
-    """Gives a function that `flagdata.verbs.verb_options.called` or `verb` made the parameters and docstring of run
+    """Gives a function that `flagdata.verbs.verb_options.make_call` or `verb` made the parameters and docstring of run
     time."""
 
     def on_function(self, *, func: Function, **_: Any) -> None:

@@ -95,11 +95,11 @@ def meanings(abbreviation: str) -> dict[str, str]:
     """Maps the offsets from UTC ("+02:00") that an abbreviation may mean to a place whose clocks are called so; empty
     for no abbreviation."""
     name = abbreviation.strip().upper()
-    return {**_called().get(name, {}), **_ELSEWHERE.get(name, {})}
+    return {**_names_of_clocks().get(name, {}), **_ELSEWHERE.get(name, {})}
 
 
 @cache
-def _called() -> dict[str, dict[str, str]]:
+def _names_of_clocks() -> dict[str, dict[str, str]]:
     """Maps what clocks of this year are called to their offset and the first place, by the tz database."""
     clocks: dict[str, dict[str, str]] = {}
     middle = datetime.now(UTC).replace(day=15)
@@ -147,7 +147,7 @@ def zone(name: str, *, where: str | None = None) -> tzinfo:
             raise TimeError(f"the offset {text!r} is beyond ±14:00", where=where, fix="give an offset such as +02:00")
         return timezone(sign * offset)
     if text.isalpha() and (clocks := meanings(text)):
-        raise _abbreviated(text, clocks, where)
+        raise _abbreviation_error(text, clocks, where)
     try:
         return ZoneInfo(text)
     except (ZoneInfoNotFoundError, ValueError, OSError):
@@ -160,7 +160,7 @@ def zone(name: str, *, where: str | None = None) -> tzinfo:
         ) from None
 
 
-def _abbreviated(text: str, clocks: Mapping[str, str], where: str | None) -> UnknownNameError:
+def _abbreviation_error(text: str, clocks: Mapping[str, str], where: str | None) -> UnknownNameError:
     """Returns the error for an abbreviation of these clocks, offset → place."""
     meanings_found = " or ".join(f"{offset} (as in {where_used})" for offset, where_used in clocks.items())
     offsets, places = (" or ".join(dict.fromkeys(names)) for names in (clocks, clocks.values()))

@@ -75,7 +75,7 @@ def span(
     """
     low, high = (float(end) for end in np.quantile(draws, [(1 - level) / 2, (1 + level) / 2]))
     bound = None if places is None else bound_of(places)
-    return _ended(low, high, bound, level=level, limits=limits, assumed=assumed)
+    return _span_left(low, high, bound, level=level, limits=limits, assumed=assumed)
 
 
 def of_profile(
@@ -104,7 +104,7 @@ def of_profile(
     low = float(values[0]) if below else _crossing(values, within, first - 1)
     high = float(values[-1]) if above else _crossing(values, within, last)
     bound = Bound.NOTHING if below and above else Bound.MOST if below else Bound.LEAST if above else None
-    return _ended(low, high, bound, level=level, limits=limits, assumed=(float(values[0]), float(values[-1])))
+    return _span_left(low, high, bound, level=level, limits=limits, assumed=(float(values[0]), float(values[-1])))
 
 
 def _crossing(values: NDArray[np.floating], within: NDArray[np.floating], index: int) -> float:
@@ -114,7 +114,7 @@ def _crossing(values: NDArray[np.floating], within: NDArray[np.floating], index:
     return float(values[index] + share * (values[index + 1] - values[index]))
 
 
-def _ended(
+def _span_left(
     low: float,
     high: float,
     bound: Bound | None,

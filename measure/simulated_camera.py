@@ -58,7 +58,9 @@ def write_film(
         video.codec_context.time_base = Fraction(1, rate)
         video.codec_context.thread_count = 1  # the same bytes on every machine
         number = 0
-        for planes in _rendered(sequence, zeta, Assets() if assets is None else assets, seed=seed, workers=workers):
+        for planes in _render_pictures(
+            sequence, zeta, Assets() if assets is None else assets, seed=seed, workers=workers
+        ):
             for picture in planes:
                 frame = VideoFrame.from_ndarray(picture, format="yuv420p")
                 frame.pts = number
@@ -68,7 +70,7 @@ def write_film(
         container.mux(video.encode())
 
 
-def _rendered(
+def _render_pictures(
     sequence: MeshSequence | RaggedMeshSequence, zeta: RenderParameters, assets: Assets, *, seed: int, workers: int
 ) -> Iterator[UInt8Array]:
     """Pictures (n, 1.5 height, width) in YUV 4:2:0 with noise, in order, a chunk at a time."""

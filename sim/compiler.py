@@ -59,10 +59,10 @@ def compiler() -> str | None:
 @functools.cache
 def library() -> ctypes.CDLL | None:
     """Loads the simulator's compiled kernel; None, with one warning, where it cannot be built."""
-    return compiled("sim.kernel", _SOURCES, without="the simulator runs as plain torch, many times slower")
+    return compile_library("sim.kernel", _SOURCES, without="the simulator runs as plain torch, many times slower")
 
 
-def compiled(package: str, sources: tuple[str, ...], *, without: str) -> ctypes.CDLL | None:
+def compile_library(package: str, sources: tuple[str, ...], *, without: str) -> ctypes.CDLL | None:
     """Compiles C++ sources of a package to a library; None, with one warning, where it cannot be built.
 
     Args:
@@ -72,7 +72,7 @@ def compiled(package: str, sources: tuple[str, ...], *, without: str) -> ctypes.
     Raises:
         UsageError: another user could have written the library, or a folder that it lies in.
     """
-    return _loaded({name: (files(package) / name).read_bytes() for name in sources}, without)
+    return _load_library({name: (files(package) / name).read_bytes() for name in sources}, without)
 
 
 @functools.cache
@@ -84,10 +84,12 @@ def of_effect(header: Path) -> ctypes.CDLL | None:
     """
     sources = {"acting.cpp": b'#include "given.hpp"\n', "given.hpp": header.read_bytes()}
     sources |= {name: (files("sim.kernel") / name).read_bytes() for name in _EFFECT}
-    return _loaded(sources, f"{header.name} is left aside and its effect runs as plain torch, several times slower")
+    return _load_library(
+        sources, f"{header.name} is left aside and its effect runs as plain torch, several times slower"
+    )
 
 
-def _loaded(sources: dict[str, bytes], without: str) -> ctypes.CDLL | None:
+def _load_library(sources: dict[str, bytes], without: str) -> ctypes.CDLL | None:
     """Loads the library that the first of the sources, by name, makes with the others."""
     path = compiler()
     if path is None:

@@ -18,7 +18,7 @@ from models.training.training_recipe import TRAININGS
 from sim.assets import Assets
 from sim.datasets import DATASETS
 from sim.datasets import load as load_dataset
-from sim.render import named
+from sim.render import named_prior
 from sim.run.simulation_toml import SCENES
 
 SIDE = 96
@@ -103,7 +103,7 @@ def place(value: float, low: float, high: float) -> float:
 
 
 def test_the_looks_of_the_world_reach_what_those_outdoors_leave_out() -> None:
-    world, outdoor = named("world"), named("outdoor")
+    world, outdoor = named_prior("world"), named_prior("outdoor")
     assert world.textures.count("banner") * 2 == len(world.textures)
     assert set(outdoor.textures) < set(world.textures)
     assert set(outdoor.backgrounds) < set(world.backgrounds)

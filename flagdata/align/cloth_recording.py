@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from flagdata.align.constant import ConstantWind, declared_recording
-from flagdata.align.film_recording import RecordingResult, copy_frames, data_set_of, recorded
+from flagdata.align.film_recording import RecordingResult, copy_frames, data_set_of, recording_result
 from flagdata.align.present import find_made, provenance
 from flagdata.core.findings import Finding, quality_flags
 from flagdata.core.provenance import canonical
@@ -157,4 +157,4 @@ def _without_wind(
         transaction.add(recording)
         for clip in clip_rows(Record.open(lake.record_place(str(recording.object))), recording, window=TRUTH_WINDOW):
             transaction.add(clip)
-    return recorded(transaction, recording)
+    return recording_result(transaction, recording)

@@ -25,7 +25,7 @@ from flagdata.align.film_recording import (
     RecordingResult,
     add_recording,
     make_recording,
-    recorded,
+    recording_result,
     session_of,
 )
 from flagdata.align.present import find_made, provenance
@@ -151,7 +151,7 @@ def declared_recording(
             code=present.code,
             progress=progress,
         )
-    return transaction.result.artifacts[wind_artifact.id], recorded(transaction, recording)
+    return transaction.result.artifacts[wind_artifact.id], recording_result(transaction, recording)
 
 
 def _add_wind(

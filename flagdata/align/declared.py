@@ -30,7 +30,7 @@ def by_stamps(device: str, reference: str, *, start: int, end: int, sigma: float
     Raises:
         UsageError: σ is zero, negative or not finite: nobody can vouch for that.
     """
-    return _declared(device, reference, method="stamps", start=start, end=end, offset=0.0, sigma=sigma)
+    return _declare(device, reference, method="stamps", start=start, end=end, offset=0.0, sigma=sigma)
 
 
 def given(device: str, reference: str, *, start: int, end: int, offset: float, sigma: float) -> ClockModel:
@@ -39,10 +39,10 @@ def given(device: str, reference: str, *, start: int, end: int, offset: float, s
     Raises:
         UsageError: an offset that is not finite, or a σ that is not positive and finite.
     """
-    return _declared(device, reference, method="given", start=start, end=end, offset=offset, sigma=sigma)
+    return _declare(device, reference, method="given", start=start, end=end, offset=offset, sigma=sigma)
 
 
-def _declared(
+def _declare(
     device: str, reference: str, *, method: str, start: int, end: int, offset: float, sigma: float
 ) -> ClockModel:
     if not math.isfinite(offset):

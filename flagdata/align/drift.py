@@ -64,7 +64,7 @@ def clock_line(
     Raises:
         InputError: `overall` was refused.
     """
-    if not overall.accepted:
+    if not overall.is_accepted:
         raise InputError("no drift about an offset that was refused", fix="check accepted first")
     alone = ClockLine(
         origin=overall.at, offset=overall.offset, drift=0.0, sigma_offset=overall.sigma, sigma_drift=QUARTZ
@@ -78,7 +78,7 @@ def clock_line(
     parts = tuple(
         part
         for chunk in _chunks(motion, count)
-        if (part := estimate_offset(chunk, wind, search=search_nearby, generator=generator)).accepted
+        if (part := estimate_offset(chunk, wind, search=search_nearby, generator=generator)).is_accepted
     )
     if len(parts) < FEWEST_PARTS:
         return alone
@@ -102,12 +102,12 @@ def line_through(parts: tuple[LagEstimate, ...], overall: LagEstimate) -> ClockL
     at = np.array([(part.at - overall.at) / NANOSECONDS for part in parts])
     offset = np.array([part.offset for part in parts])
     sigma = np.array([part.sigma_statistical for part in parts])
-    mean, drift, origin, weight, information = _weighted(at, offset, sigma)
+    mean, drift, origin, weight, information = _weighted_offset(at, offset, sigma)
     residual = (offset - mean - drift * (at - origin)) / sigma
     worst = int(np.argmax(np.abs(residual)))
     scatter = math.sqrt(float(residual @ residual) / (len(parts) - 2))
     if scatter > 1:
-        mean, drift, origin, weight, information = _weighted(at, offset, sigma * scatter)
+        mean, drift, origin, weight, information = _weighted_offset(at, offset, sigma * scatter)
     common = math.sqrt(max(overall.sigma**2 - overall.sigma_statistical**2, 0.0))
     findings: tuple[Finding, ...] = ()
     if abs(residual[worst]) > _DISAGREEMENT:
@@ -131,7 +131,7 @@ def line_through(parts: tuple[LagEstimate, ...], overall: LagEstimate) -> ClockL
     )
 
 
-def _weighted(at: Series, offset: Series, sigma: Series) -> tuple[float, float, float, float, float]:
+def _weighted_offset(at: Series, offset: Series, sigma: Series) -> tuple[float, float, float, float, float]:
     """Computes the offset at the weighted mean time, drift, that time, and the information (1/σ²) of offset and
     drift."""
     weight = sigma**-2

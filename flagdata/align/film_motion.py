@@ -136,13 +136,13 @@ def _change(before: Float32Array, after: Float32Array, block: int) -> tuple[floa
     still = target - columns[:, 1]
     starts = (_quiet(np.abs(still - np.median(still)), least)[0], np.ones(before.size, dtype=bool))
     residual, sigma, parameters = min(
-        (_fitted(columns, target, keep, least) for keep in starts), key=lambda fit: fit[1]
+        (_fit_blocks(columns, target, keep, least) for keep in starts), key=lambda fit: fit[1]
     )
     change = float(np.mean(np.maximum(residual - 3 * sigma, 0.0)))
     return change, float(parameters[1]), float(math.hypot(parameters[2], parameters[3]))
 
 
-def _fitted(
+def _fit_blocks(
     columns: FloatArray, target: FloatArray, keep: BoolArray, least: float
 ) -> tuple[FloatArray, float, FloatArray]:
     """Computes |residual| and its σ after least squares on the blocks to keep, twice; and the four parameters.

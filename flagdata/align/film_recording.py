@@ -274,7 +274,7 @@ def make_recording(
             code=_present(lake, pair, alignment.recipe, name=name, session=session, branch=branch).code,
             progress=progress,
         )
-    return recorded(transaction, recording)
+    return recording_result(transaction, recording)
 
 
 def add_recording(
@@ -307,7 +307,7 @@ def add_recording(
     return recording
 
 
-def recorded(transaction: Transaction, recording: Artifact) -> RecordingResult:
+def recording_result(transaction: Transaction, recording: Artifact) -> RecordingResult:
     """Returns what a transaction did that has ended and made `recording` and its clips."""
     result = transaction.result
     return RecordingResult(

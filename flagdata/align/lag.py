@@ -152,7 +152,7 @@ class LagEstimate:
     curve: LagCurve
 
     @property
-    def accepted(self) -> bool:
+    def is_accepted(self) -> bool:
         return not any(finding.severity is Severity.ERROR for finding in self.findings)
 
     @property

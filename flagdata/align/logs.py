@@ -137,7 +137,7 @@ def clock_between(
     line = _line(motion, bins.average, overall, search=search_used, generator=generator, progress=progress)
     crooked = [finding.what for finding in line.findings]
     if crooked:
-        raise _refused(names, crooked)
+        raise _refused_error(names, crooked)
     return _model(line, sensor, names=names, confidence=overall.confidence, turned=slow_is_sensor), line, overall
 
 
@@ -201,12 +201,12 @@ def _with_equal_lag(slow: WindSeries, fast: WindSeries) -> tuple[WindSeries, Win
         return slow, fast
     if (lags[1] or 0.0) > 0:
         return slow, fast  # a slow log cannot be passed through a lag between its samples: `lead` allows for both
-    late = _lagged(fast, lags[0]) if lags[0] else fast
+    late = _lag_as_rotor(fast, lags[0]) if lags[0] else fast
     at_once = [replace(series, sensor=replace(series.sensor, distance_constant=0.0)) for series in (slow, late)]
     return at_once[0], at_once[1]
 
 
-def _lagged(series: WindSeries, distance: float) -> WindSeries:
+def _lag_as_rotor(series: WindSeries, distance: float) -> WindSeries:
     """Filters a log as a rotor of distance constant `distance` [m] would have given it: dy/dt = (u − y) u / ℓ.
 
     After a gap of ten of its lags the rotor is taken to have followed.
@@ -291,7 +291,7 @@ def _overall(
     low, high = int(wind.time[0]) - centre, int(wind.time[-1]) - centre
     low, high = max(low, int(motion.time[0])), min(high, int(motion.time[-1]))
     if high <= low:
-        raise _refused(names, ["by their stamps and the centre of the search the logs do not overlap"])
+        raise _refused_error(names, ["by their stamps and the centre of the search the logs do not overlap"])
     count = max(1, int((high - low) / NANOSECONDS / WHOLE))
     edges = np.linspace(low, high + 1, count + 1).astype(np.int64)
     spread = []
@@ -303,11 +303,11 @@ def _overall(
     reasons: list[str] = []
     for hour in np.argsort(spread)[::-1][:_TRIES].tolist():
         estimate = _part(motion, wind, int(edges[hour]), int(edges[hour + 1]), search=search, generator=generator)
-        if estimate is not None and estimate.accepted:
+        if estimate is not None and estimate.is_accepted:
             return estimate
         if estimate is not None and not reasons:
             reasons = list(estimate.reasons)
-    raise _refused(names, reasons or ["the logs have no hour in common"])
+    raise _refused_error(names, reasons or ["the logs have no hour in common"])
 
 
 def _line(
@@ -332,7 +332,7 @@ def _line(
     parts: list[LagEstimate] = []
     for index in chosen:
         part = _part(motion, wind, int(edges[index]), int(edges[index + 1]), search=search_nearby, generator=generator)
-        if part is not None and part.accepted:
+        if part is not None and part.is_accepted:
             parts.append(part)
         if progress:
             progress(1)
@@ -365,7 +365,7 @@ def _model(
     )
 
 
-def _refused(names: tuple[str, str], reasons: list[str]) -> RefusedError:
+def _refused_error(names: tuple[str, str], reasons: list[str]) -> RefusedError:
     return RefusedError(
         f"no offset can be estimated: {'; '.join(reasons)}",
         where=f"{names[0]} and {names[1]}",

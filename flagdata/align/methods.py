@@ -152,7 +152,7 @@ class Outcome:
     evidence: Evidence | None = None
 
 
-def declared(pair: Pair, options: ClockOptions, *, recipe: Mapping[str, Any]) -> Outcome:
+def declared_clock(pair: Pair, options: ClockOptions, *, recipe: Mapping[str, Any]) -> Outcome:
     """Builds a clock model by stamps or by a given offset. The stamps' own resolution is added to a σ by stamps.
 
     Raises:
@@ -210,7 +210,7 @@ def evidence(pair: Pair, options: ClockOptions, *, progress: Progress | None = N
     generator = stream(0, "align", pair.camera.id, pair.wind.id)
     estimate = estimate_offset(motion, bins.average, search=search, generator=generator)
     line = None
-    if estimate.accepted:
+    if estimate.is_accepted:
         line = clock_line(motion, bins.average, estimate, search=search, generator=generator)
     return Evidence(motion=motion, wind=bins.average, estimate=estimate, line=line, response=search.response)
 
@@ -228,7 +228,7 @@ def _check_lengths(pair: Pair, wind: WindAverage, search: LagSearch) -> None:
         )
 
 
-def estimated(pair: Pair, evidence: Evidence, *, recipe: Mapping[str, Any]) -> Outcome:
+def estimated_clock(pair: Pair, evidence: Evidence, *, recipe: Mapping[str, Any]) -> Outcome:
     """Builds the clock model of an estimate that may be used.
 
     Raises:

@@ -81,7 +81,7 @@ def _draw_series(axes: Axes, evidence: Evidence) -> None:
     origin = int(wind.time[0]) // NANOSECONDS * NANOSECONDS
     wind_time = (wind.time - origin) / NANOSECONDS - wind.period / 2
     shift = offset - evidence.response if math.isfinite(offset) else 0.0
-    middles, energy = _binned((motion.time - origin) / NANOSECONDS + shift, motion.energy, wind.period)
+    middles, energy = _bin_values((motion.time - origin) / NANOSECONDS + shift, motion.energy, wind.period)
     if len(middles):
         in_view = (wind_time >= middles[0] - _MARGIN) & (wind_time <= middles[-1] + _MARGIN)
         x, y = _broken(wind_time[in_view], normal_scores(wind.speed[in_view]), wind.period)
@@ -133,7 +133,7 @@ def _draw_parts(axes: Axes, line: ClockLine) -> None:
     axes.set_title(f"drift {1e6 * line.drift:+.0f} ± {1e6 * line.sigma_drift:.0f} ppm", loc="left", fontsize=9)
 
 
-def _binned(time: Series, values: Series, period: float) -> tuple[Series, Series]:
+def _bin_values(time: Series, values: Series, period: float) -> tuple[Series, Series]:
     """Middles [s] and means of bins of `period` [s]; bins without a value are left out."""
     finite = np.isfinite(values)
     index = np.floor(time[finite] / period).astype(np.int64)

@@ -144,7 +144,7 @@ def fit(bins: LagBins, *, overlap: float) -> Fit | None:
     Returns:
         `None` where no trial offset covers `overlap` [s], or the motion rises with the wind at none.
     """
-    smooth = np.stack([_smoothed(bins.wind, width) for width in _WIDTHS], axis=1)  # (n, widths)
+    smooth = np.stack([_smooth_samples(bins.wind, width) for width in _WIDTHS], axis=1)  # (n, widths)
     motion_filter = filters = autoregression(bins.motion, stride=STEPS)
     best, highest = -1, -math.inf
     for column in smooth.T:
@@ -187,7 +187,7 @@ def _response(smooth: FloatArray, motion: Series, filters: Series) -> Series:
     return weights
 
 
-def _smoothed(samples: Series, width: float) -> Series:
+def _smooth_samples(samples: Series, width: float) -> Series:
     """Averages what is there over a Gaussian of standard deviation `width` [bins]; NaN stays NaN."""
     reach = math.ceil(3 * width)
     kernel = np.exp(-0.5 * np.square(np.arange(-reach, reach + 1) / width))

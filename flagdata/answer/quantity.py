@@ -41,9 +41,9 @@ class Span:
             digits: behind the point.
             unit: of a single end, with the space before it.
         """
-        return self.worded(lambda value: f"{value:.{digits}f}", unit)
+        return self.word(lambda value: f"{value:.{digits}f}", unit)
 
-    def worded(self, number: Callable[[float], str], unit: str = "") -> str:
+    def word(self, number: Callable[[float], str], unit: str = "") -> str:
         """Phrases the same with ends as `number` writes them."""
         if self.bound is Bound.LEAST:
             return f"at least {number(self.low)}{unit}"
@@ -130,7 +130,7 @@ class Quantity:
             stated = low if low == high else f"{low} to {high}"
             return f"{stated}{self.suffix}, as given" if self.given else self._open(f"{stated}{self.suffix}")
         if self.is_bound:
-            return f"{self.span.worded(lambda end: f'{end:.4g}', self.suffix)}, {self.span.percent}"
+            return f"{self.span.word(lambda end: f'{end:.4g}', self.suffix)}, {self.span.percent}"
         if self.value is None:
             return self._open("nothing" if self.assumed is None else "{:.4g} to {:.4g}".format(*self.assumed))
         return f"{self.value:.4g} [{self.span.low:.4g}, {self.span.high:.4g}]{self.suffix}"

@@ -43,7 +43,7 @@ class Simulated:
         return iter(self.members)
 
     @property
-    def _fixed(self) -> list[MeshSequence]:
+    def _sequences(self) -> list[MeshSequence]:
         """The members, where each has one mesh.
 
         Raises:
@@ -61,7 +61,7 @@ class Simulated:
     @property
     def positions(self) -> Float32Array:
         """(member, frame, vertex, 3) [m], z up."""
-        return np.stack([member.positions for member in self._fixed])
+        return np.stack([member.positions for member in self._sequences])
 
     @property
     def time(self) -> FloatArray:
@@ -72,12 +72,12 @@ class Simulated:
     @property
     def rest(self) -> Float32Array:
         """(vertex, 2) material coordinates [m]."""
-        return self._fixed[0].rest
+        return self._sequences[0].rest
 
     @property
     def faces(self) -> NDArray[np.int32]:
         """(face, 3) vertices of each, counter-clockwise seen from the front."""
-        return self._fixed[0].faces
+        return self._sequences[0].faces
 
     def _rows(self) -> dict[str, str]:
         first = self.members[0]

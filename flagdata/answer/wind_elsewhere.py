@@ -77,7 +77,7 @@ class WindComparison:
         }
 
 
-def compared(wind: FloatArray, stated: Stated, *, is_bound: bool, level: float, seed: int) -> WindComparison:
+def compare_winds(wind: FloatArray, stated: Stated, *, is_bound: bool, level: float, seed: int) -> WindComparison:
     """Compares a posterior of the wind with a statement of it.
 
     The statement is normal about its value, or uniform over its range, and independent of the film.

@@ -17,7 +17,7 @@ from flagdata.core.parts import call
 from flagdata.errors import UsageError
 from flagdata.verbs.option_types import LISTED, POSITIVE
 from flagdata.verbs.shared_options import LAKE, AtVersion, OnLake
-from flagdata.verbs.verb_options import argument, called, option, options
+from flagdata.verbs.verb_options import argument, make_call, option, options
 
 if TYPE_CHECKING:
     from flagdata.dataset.lake_source import AnyLake
@@ -46,7 +46,7 @@ class Querying(AtVersion, OnLake):
     )
 
 
-@called(Querying)
+@make_call(Querying)
 def query(chosen: Querying) -> Rows:
     """Rows of a lake's catalog, as `flagdata query` selects them.
 
@@ -63,10 +63,10 @@ def query(chosen: Querying) -> Rows:
         NotFoundError: no such lake, or no such version.
         LimitError: it takes longer, or gives more, than it may.
     """
-    from flagdata.dataset.lake_source import opened
+    from flagdata.dataset.lake_source import open_source
 
     own = {"sql": chosen.sql, "columns": chosen.columns, "order": chosen.order, "limit": chosen.limit}
-    return opened(chosen.lake).query(chosen.where, at=chosen.at, **own)
+    return open_source(chosen.lake).query(chosen.where, at=chosen.at, **own)
 
 
 @options
@@ -90,7 +90,7 @@ class Naming(AtVersion, OnLake):
                 raise UsageError(f"--{key} cannot be given {what}", fix="leave it out, or see --help")
 
 
-@called(Naming)
+@make_call(Naming)
 def tag(chosen: Naming) -> tuple[Ref, ...]:
     """Names a version of a lake for good, as `flagdata tag` does; without a name, lists the tags.
 
@@ -112,10 +112,10 @@ def tag(chosen: Naming) -> tuple[Ref, ...]:
     from flagdata.dataset.tagged import tag
 
     lake = chosen.opened()
-    return _named(chosen, lake.refs.tags, put=partial(tag, lake), delete=lake.delete_tag)
+    return _names_of_kind(chosen, lake.refs.tags, put=partial(tag, lake), delete=lake.delete_tag)
 
 
-@called(Naming)
+@make_call(Naming)
 def branch(chosen: Naming) -> tuple[Ref, ...]:
     """Begins a line of work in a lake, as `flagdata branch` does; without a name, lists the branches.
 
@@ -133,10 +133,10 @@ def branch(chosen: Naming) -> tuple[Ref, ...]:
         UsageError: options that contradict each other.
     """
     lake = chosen.opened()
-    return _named(chosen, lake.refs.branches, put=lake.branch, delete=lake.delete_branch)
+    return _names_of_kind(chosen, lake.refs.branches, put=lake.branch, delete=lake.delete_branch)
 
 
-def _named(
+def _names_of_kind(
     chosen: Naming, listed: Callable[[], Mapping[str, Ref]], *, put: Callable[..., Ref], delete: Callable[..., object]
 ) -> tuple[Ref, ...]:
     """Lists the names of a kind, or puts or deletes one."""
@@ -179,7 +179,7 @@ class Exporting(AtVersion, OnLake):
             raise UsageError("--salt needs --split", fix="name the side by --split, or leave out --salt")
 
 
-@called(Exporting)
+@make_call(Exporting)
 def export(chosen: Exporting) -> Mapping[str, Any]:
     """Writes a selection of a lake for other programs, as `flagdata export` does.
 
@@ -197,4 +197,4 @@ def export(chosen: Exporting) -> Mapping[str, Any]:
         NotFoundError: no such lake or version, or nothing matches.
         UsageError: a form that is not known, or options that are not of it.
     """
-    return call("flagdata.commands.export:exported", chosen)
+    return call("flagdata.commands.export:export_selection", chosen)

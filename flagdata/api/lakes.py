@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from flagdata.core.arguments import checked
-from flagdata.dataset.lake_source import AnyLake, Source, opened
+from flagdata.core.arguments import check_arguments
+from flagdata.dataset.lake_source import AnyLake, Source, open_source
 from flagdata.storage import Place
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from flagdata.dataset.tolerance import Tolerance
 
 
-@checked
+@check_arguments
 def open(path: Place | str) -> Source:  # noqa: A001  read as flagdata.open
     """The lake in the folder `path`, or at `s3://bucket/prefix`.
 
@@ -38,7 +38,7 @@ def open(path: Place | str) -> Source:  # noqa: A001  read as flagdata.open
     return Source.open(path)
 
 
-@checked
+@check_arguments
 def pairs(
     lake: AnyLake,
     where: str | Mapping[str, Any] | None = None,
@@ -69,6 +69,6 @@ def pairs(
         UnknownNameError: no such column or side.
         UsageError: a filter that is not SQL, or a window that is no length of time.
     """
-    return opened(lake).pairs(
+    return open_source(lake).pairs(
         where, at=at, split=split, split_by=split_by, window=window, tolerance=tolerance, seed=seed, cache=cache
     )

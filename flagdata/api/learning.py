@@ -18,7 +18,7 @@ from flagdata.core.files.caches import beside
 from flagdata.core.parts import attribute
 from flagdata.verbs.option_types import POSITIVE, STATED
 from flagdata.verbs.shared_options import AtVersion, Computed, OnBranch, OnLake, Shared
-from flagdata.verbs.verb_options import argument, called, option, options
+from flagdata.verbs.verb_options import argument, make_call, option, options
 
 if TYPE_CHECKING:
     from flagdata.core.stated import Stated
@@ -54,7 +54,7 @@ class Building(Computed, OnBranch, OnLake):
     )
 
 
-@called(Building)
+@make_call(Building)
 def build(chosen: Building) -> Mapping[str, Any]:
     """Builds a data set in a lake, as `flagdata build` does: its sequences, films, ground truth and card.
 
@@ -111,7 +111,7 @@ class Training(OfInputs, Computed, OnBranch):
     )
 
 
-@called(Training)
+@make_call(Training)
 def train(chosen: Training) -> Mapping[str, Any]:
     """Trains a network on the clips of a lake and commits it as an artifact, as `flagdata train` does.
 
@@ -179,7 +179,7 @@ class Evaluating(OfInputs, Shared):
     seed: int = option("Seed of the draws and of the bootstrap.", default=0, type=click.IntRange(min=0))
 
 
-@called(Evaluating)
+@make_call(Evaluating)
 def evaluate(chosen: Evaluating) -> Mapping[str, Any]:
     """Judges trained networks on one side of a data set and writes the table, as `flagdata evaluate` does.
 

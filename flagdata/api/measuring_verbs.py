@@ -29,7 +29,7 @@ from flagdata.verbs.shared_options import (
     OfCloth,
     OfFilm,
 )
-from flagdata.verbs.verb_options import argument, called, option, options
+from flagdata.verbs.verb_options import argument, make_call, option, options
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -108,7 +108,7 @@ class Measuring(OfFilm, Drawn, BesideLake):
     )
 
 
-@called(Measuring)
+@make_call(Measuring)
 def measure(chosen: Measuring) -> Measured:
     """Wind and area weight of a film of a flag, as `flagdata measure` gives them; nothing is written.
 
@@ -128,7 +128,7 @@ def measure(chosen: Measuring) -> Measured:
             at and there is nothing to return.
         InputError: a file that is no film, or a film that is too short.
     """
-    return call("measure.commands.measure_film:measured", chosen)
+    return call("measure.commands.measure_film:measure_one", chosen)
 
 
 @options
@@ -146,7 +146,7 @@ class Observing(OfFilm, BesideLake):
     window: float = option("Length of a window [s].", default=2.5, section=FILM, type=DURATION, metavar="TIME")
 
 
-@called(Observing)
+@make_call(Observing)
 def observe(chosen: Observing) -> Rows:
     """Droop, extension, speeds and frequencies of a filmed flag, window by window, as `flagdata observe` reads them.
 
@@ -164,7 +164,7 @@ def observe(chosen: Observing) -> Rows:
         RefusedError: the film has no whole window, or no window shows the cloth.
         UsageError: options that contradict each other, or values that no flag has.
     """
-    return call("measure.commands.observe:observed", chosen)
+    return call("measure.commands.observe:observe_film", chosen)
 
 
 @options
@@ -228,7 +228,7 @@ class Calibrating(OfFlag, Drawn, BesideLake):
     workers: int = option("Number of processes that simulate.", default=1, section=HOW, type=POSITIVE)
 
 
-@called(Calibrating)
+@make_call(Calibrating)
 def calibrate(chosen: Calibrating) -> Calibrated:
     """The cloth of a flag from its motion and the wind beside it, as `flagdata calibrate` weighs it.
 
@@ -250,8 +250,8 @@ def calibrate(chosen: Calibrating) -> Calibrated:
         UsageError: options that do not fit.
     """
     if chosen.area_weight is not None:
-        return call("measure.drape.drape_answer:calibrated", chosen)
-    return call("measure.cloth.calibrate_call:calibrated", chosen)
+        return call("measure.drape.drape_answer:calibrate_drapes", chosen)
+    return call("measure.cloth.calibrate_call:calibrate_arrays", chosen)
 
 
 @options
@@ -296,7 +296,7 @@ class Closing:
     workers: int = option("Number of processes that simulate.", default=1)
 
 
-@called(Closing)
+@make_call(Closing)
 def close_loop(chosen: Closing) -> Closed:
     """What the model of a tracked cloth lacks, as `flagdata close-loop` finds it.
 
@@ -315,7 +315,7 @@ def close_loop(chosen: Closing) -> Closed:
     """
     if (chosen.rest is None) != (chosen.rate is None):
         raise UsageError("rest= and rate= must be given together", where="recordings", fix="give both")
-    return call("measure.closing.close_loop_call:closed", chosen)
+    return call("measure.closing.close_loop_call:close_on_arrays", chosen)
 
 
 @options
@@ -336,7 +336,7 @@ class Proposing(ByNulls, NamedLake):
     )
 
 
-@called(Proposing)
+@make_call(Proposing)
 def propose(chosen: Proposing) -> Mapping[str, Any]:
     """An effect that the library lacks, sought in a part of the recordings and tested on the rest.
 

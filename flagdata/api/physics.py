@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from flagdata.core.parts import call
 from flagdata.verbs.option_types import POSITIVE
 from flagdata.verbs.shared_options import Computed
-from flagdata.verbs.verb_options import argument, called, option, options
+from flagdata.verbs.verb_options import argument, make_call, option, options
 
 if TYPE_CHECKING:
     from flagdata.answer.simulated import Simulated
@@ -63,7 +63,7 @@ class Simulating(Members, Computed):
     )
 
 
-@called(Simulating)
+@make_call(Simulating)
 def simulate(chosen: Simulating) -> Simulated:
     """Cloth in the wind as arrays; nothing is written. `flagdata simulate` keeps the same members in a lake.
 
@@ -82,7 +82,7 @@ def simulate(chosen: Simulating) -> Simulated:
     given = {name: value for name in names if (value := getattr(chosen, name)) is not None}
     source = str(chosen.recipe) if isinstance(chosen.recipe, Path) else chosen.recipe
     workers = chosen.processes if chosen.workers is None else chosen.workers
-    return call("sim.run.simulate_call:simulated", source, given, device=chosen.device, workers=workers)
+    return call("sim.run.simulate_call:simulate_members", source, given, device=chosen.device, workers=workers)
 
 
 @options
@@ -110,7 +110,7 @@ class Rendering:
     photos: Path | str | None = option("Folder of photographs as backgrounds.", default=None)
 
 
-@called(Rendering)
+@make_call(Rendering)
 def render(chosen: Rendering) -> Frames:
     """A moving mesh as a camera sees it, in colour.
 
@@ -126,7 +126,7 @@ def render(chosen: Rendering) -> Frames:
     """
     size = {"width": chosen.width, "height": chosen.height}
     return call(
-        "sim.render.render_call:rendered",
+        "sim.render.render_call:render_film",
         chosen.sequence,
         look=chosen.look,
         parameters={**size, **(chosen.parameters or {})},

@@ -15,7 +15,7 @@ from flagdata.core.console import LocalPath
 from flagdata.core.parts import call
 from flagdata.verbs.option_types import DURATION
 from flagdata.verbs.shared_options import RECORDING, NamedRecording, OnBranch, OnLake, Rehearsed
-from flagdata.verbs.verb_options import argument, called, option, options
+from flagdata.verbs.verb_options import argument, make_call, option, options
 
 if TYPE_CHECKING:
     from flagdata.align.methods import ClockOptions
@@ -116,7 +116,7 @@ class Aligning(ByClock):
     second: str = argument("A wind of the lake by its name or id.", "WIND|SENSOR")
 
 
-@called(Aligning)
+@make_call(Aligning)
 def align(chosen: Aligning) -> Mapping[str, Any]:
     """Puts a camera and an anemometer of a lake, or two anemometers, on one clock, as `flagdata align` does.
 
@@ -136,7 +136,7 @@ def align(chosen: Aligning) -> Mapping[str, Any]:
         UnknownNameError: no such camera or wind.
         UsageError: options that contradict each other.
     """
-    return call("flagdata.commands.align:aligned", chosen).content
+    return call("flagdata.commands.align:align_pair", chosen).content
 
 
 @options
@@ -146,7 +146,7 @@ class Realigning(ByClock):
     recording: str = argument("A recording of the lake by its name or id.", "RECORDING")
 
 
-@called(Realigning)
+@make_call(Realigning)
 def realign(chosen: Realigning) -> Mapping[str, Any]:
     """Writes a recording anew with another clock model, from the same artifacts, as `flagdata realign` does.
 
@@ -163,7 +163,7 @@ def realign(chosen: Realigning) -> Mapping[str, Any]:
         UnknownNameError: no such recording.
         UsageError: options that contradict each other.
     """
-    return call("flagdata.commands.align:realigned", chosen).content
+    return call("flagdata.commands.align:realign_recording", chosen).content
 
 
 SOURCE, CAMERA, ANEMOMETER = "What the source is", "Camera", "Anemometer"
@@ -393,7 +393,7 @@ class Ingesting(FromCamera, FromAnemometer):
     )
 
 
-@called(Ingesting)
+@make_call(Ingesting)
 def ingest(chosen: Ingesting) -> tuple[IngestResult, ...]:
     """Brings camera files, anemometer logs, mesh sequences and marker tables into a lake, as `flagdata ingest` does.
 
@@ -414,4 +414,4 @@ def ingest(chosen: Ingesting) -> tuple[IngestResult, ...]:
         UsageError: an option that means nothing for any of the sources.
         ZoneMissingError: wall-clock stamps whose zone nobody gave.
     """
-    return call("flagdata.commands.ingest_sources:ingested", chosen)
+    return call("flagdata.commands.ingest_sources:ingest_from_python", chosen)

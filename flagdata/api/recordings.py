@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 
 from flagdata.answer.film_series import Motion, Wind
-from flagdata.core.arguments import checked
+from flagdata.core.arguments import check_arguments
 from flagdata.core.arrays import UInt8Array
 from flagdata.core.files.addresses import local_path
 from flagdata.core.findings import Finding
 from flagdata.core.schema import Kind
-from flagdata.dataset.lake_source import AnyLake, opened
+from flagdata.dataset.lake_source import AnyLake, open_source
 from flagdata.errors import InputError, NotFoundError
 from flagdata.examples import example_of
 from flagdata.ingest.films.film import Film
-from flagdata.ingest.films.film_array import Frames, collected
-from flagdata.ingest.films.named_films import film_at, named
+from flagdata.ingest.films.film_array import Frames, collect_frames
+from flagdata.ingest.films.named_films import film_at, find_artifact
 from flagdata.lake import Lake
 from flagdata.lake.mesh_sequences import MeshSequence, RaggedMeshSequence, read_meshes
 from flagdata.record.signals import WindSeries
@@ -28,7 +28,7 @@ _BLOWN = (Kind.RECORDING, Kind.WIND)
 """Kinds of artifacts that have a wind."""
 
 
-@checked
+@check_arguments
 def wind(
     source: Path | str,
     *,
@@ -62,7 +62,7 @@ def wind(
     """
     from flagdata.core.provenance import file_hash
     from flagdata.ingest.anemometer import WindOptions, read_log
-    from flagdata.ingest.anemometer.log_confirmation import Accepting, confirmed
+    from flagdata.ingest.anemometer.log_confirmation import Accepting, confirm_readings
     from flagdata.record import Record
 
     example = example_of(source)
@@ -70,17 +70,17 @@ def wind(
     if path.exists():
         options = WindOptions(recipe=None if sensor is None else str(sensor), zone=zone)
         log = read_log(path, options)
-        confirmed(path, file_hash(path), [(log, options)], Accepting(accept=accept))
+        confirm_readings(path, file_hash(path), [(log, options)], Accepting(accept=accept))
         return _wind(log.series, name=path.name, findings=log.findings)
     held = _lake(source, lake)
-    artifact = named(held, str(source), at, kinds=_BLOWN, noun="file, recording or log of the lake")
+    artifact = find_artifact(held, str(source), at, kinds=_BLOWN, noun="file, recording or log of the lake")
     series = None if artifact.object is None else Record.open(held.record_place(artifact.object)).wind()
     if series is None:
         raise InputError(f"the {artifact.kind} holds no wind", where=artifact.name, fix="name a recording or a log")
     return _wind(series, name=artifact.name)
 
 
-@checked
+@check_arguments
 def frames(
     source: Path | str,
     *,
@@ -112,10 +112,10 @@ def frames(
         LimitError: more than 4 GiB of frames.
     """
     film = _film(source, lake=lake, at=at, true_fps=true_fps, sequence_fps=sequence_fps)
-    return collected(film, first=start, last=end)
+    return collect_frames(film, first=start, last=end)
 
 
-@checked
+@check_arguments
 def motion(
     source: Path | str | Frames,
     *,
@@ -145,17 +145,17 @@ def motion(
 
     film = source if isinstance(source, Frames) else _film(source, lake=lake, at=at)
 
-    def timed() -> Iterator[tuple[int, UInt8Array]]:
+    def timed_pictures() -> Iterator[tuple[int, UInt8Array]]:
         for time, image in film.frames(start, film.duration if end is None else end):
             yield round(time * NANOSECONDS), image
 
-    found = motion_energy(timed())
+    found = motion_energy(timed_pictures())
     return Motion(
         name=film.name, time=found.time / NANOSECONDS, start=film.start, energy=found.energy, findings=found.findings
     )
 
 
-@checked
+@check_arguments
 def meshes(
     source: Path | str, *, lake: AnyLake | None = None, at: str | None = None, rate: float | None = None
 ) -> MeshSequence | RaggedMeshSequence:
@@ -183,7 +183,7 @@ def meshes(
 
         return read_folder(path, rate=rate)
     held = _lake(source, lake)
-    artifact = named(held, str(source), at, kinds=(Kind.MESHES,), noun="mesh sequence of the lake")
+    artifact = find_artifact(held, str(source), at, kinds=(Kind.MESHES,), noun="mesh sequence of the lake")
     return read_meshes(held.whole_object(str(artifact.object)))
 
 
@@ -195,7 +195,7 @@ def _film(
     true_fps: float | None = None,
     sequence_fps: float | None = None,
 ) -> Film:
-    held = None if lake is None else opened(lake).lake
+    held = None if lake is None else open_source(lake).lake
     film, _ = film_at(source, lake=held, at=at, true_fps=true_fps, sequence_fps=sequence_fps)
     return film
 
@@ -205,7 +205,7 @@ def _lake(source: Path | str, lake: AnyLake | None) -> Lake:
         raise NotFoundError(
             f"there is no file {str(source)!r}, and no lake was named", fix="correct the path, or give lake="
         )
-    return opened(lake).lake
+    return open_source(lake).lake
 
 
 def _wind(series: WindSeries, *, name: str, findings: tuple[Finding, ...] = ()) -> Wind:

@@ -76,7 +76,7 @@ def align(chosen: AlignCommand) -> None:
     Of two wind artifacts, REFERENCE and SENSOR, the second is written anew on the first one's clock; offset, drift and
     gain are reported. An estimate that is not certain is refused (exit 3) and nothing is committed.
     """
-    aligned(chosen, plot=chosen.plot).shown(as_json=chosen.as_json)
+    align_pair(chosen, plot=chosen.plot).shown(as_json=chosen.as_json)
 
 
 @command(RealignCommand)
@@ -86,14 +86,14 @@ def realign(chosen: RealignCommand) -> None:
     The window of the ground truth stays what it was unless --window says otherwise. The old recording and its clips
     stay until `flagdata withdraw` takes them off the branch; tags keep them.
     """
-    report = realigned(chosen, plot=chosen.plot)
+    report = realign_recording(chosen, plot=chosen.plot)
     report.shown(as_json=chosen.as_json)
     if not chosen.dry_run:
         old = f"the recording {report.superseded[:SHORT]} it supersedes is still on {chosen.branch}"
         say(f"{old}; flagdata withdraw takes it off")
 
 
-def realigned(chosen: Realigning, *, plot: Path | None = None) -> Report:
+def realign_recording(chosen: Realigning, *, plot: Path | None = None) -> Report:
     """Writes a recording anew.
 
     Args:
@@ -104,7 +104,7 @@ def realigned(chosen: Realigning, *, plot: Path | None = None) -> Report:
     """
     from flagdata.align.film_recording import Pair, parents_of, truth_recipe, truth_window
 
-    lake, clock = _opened(chosen, plot)
+    lake, clock = _open_lake(chosen, plot)
     old, parents = parents_of(lake, chosen.recording, at=chosen.branch)
     pair = Pair.of(lake, *parents, at=chosen.branch)
     window = truth_window(old.recipe) if chosen.window is None else chosen.window
@@ -114,7 +114,7 @@ def realigned(chosen: Realigning, *, plot: Path | None = None) -> Report:
     return replace(report, superseded=old.id)
 
 
-def aligned(chosen: Aligning, *, plot: Path | None = None) -> Report:
+def align_pair(chosen: Aligning, *, plot: Path | None = None) -> Report:
     """Puts two artifacts on one clock.
 
     Args:
@@ -126,7 +126,7 @@ def aligned(chosen: Aligning, *, plot: Path | None = None) -> Report:
     from flagdata.align.film_recording import Pair, truth_recipe
     from flagdata.core.schema import TRUTH_WINDOW, Kind
 
-    lake, clock = _opened(chosen, plot)
+    lake, clock = _open_lake(chosen, plot)
     devices = (Kind.CAMERA, Kind.WIND)
     kinds = {lake.artifact(one, at=chosen.branch, kinds=devices).kind for one in (chosen.first, chosen.second)}
     if kinds == {Kind.WIND}:
@@ -143,7 +143,7 @@ def aligned(chosen: Aligning, *, plot: Path | None = None) -> Report:
     return _of_film(chosen, lake, pair, clock, recipe=recipe, plot=plot, name=chosen.name, session=chosen.session)
 
 
-def _opened(chosen: ByClock, plot: Path | None) -> tuple[Lake, ClockOptions]:
+def _open_lake(chosen: ByClock, plot: Path | None) -> tuple[Lake, ClockOptions]:
     """Opens the lake, which can be written unless nothing is to be; with how to come by the clock model."""
     clock = chosen.clock()
     _check_plot(plot, clock)
@@ -305,10 +305,10 @@ def _warn_of_clocks(pair: Pair, options: ClockOptions) -> None:
 
 
 def _outcome(pair: Pair, options: ClockOptions, *, recipe: dict[str, Any], plot: Path | None) -> Outcome:
-    from flagdata.align.methods import Method, declared, estimated, evidence
+    from flagdata.align.methods import Method, declared_clock, estimated_clock, evidence
 
     if options.by is not Method.ESTIMATE:
-        return declared(pair, options, recipe=recipe)
+        return declared_clock(pair, options, recipe=recipe)
     with progress(pair.camera_record.frame_count, label="motion", unit="frame") as advance:
         found = evidence(pair, options, progress=advance)
     if plot is not None:
@@ -316,7 +316,7 @@ def _outcome(pair: Pair, options: ClockOptions, *, recipe: dict[str, Any], plot:
 
         draw(found, plot, title=f"{pair.camera.name} and {pair.wind.name}")
         say(f"plot: {plot}")
-    return estimated(pair, found, recipe=recipe)
+    return estimated_clock(pair, found, recipe=recipe)
 
 
 def _report(made: RecordingResult | None, outcome: Outcome | None) -> Report:

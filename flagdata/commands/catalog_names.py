@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 
 from flagdata.core.console import echo, echo_lines, say, table
-from flagdata.core.extras import explained
+from flagdata.core.extras import explaining_missing
 from flagdata.core.parts import attribute
 from flagdata.core.shell import command_line
 from flagdata.errors import MissingExtraError, UnknownNameError, UsageError
@@ -52,7 +52,7 @@ def catalog(chosen: Named) -> Iterator[Result]:
     found: dict[str, Mapping[str, str]] = {}
     for name, (target, _) in kinds.items():
         try:
-            with explained():
+            with explaining_missing():
                 found[name] = titles(target)
         except MissingExtraError as error:
             if kind is not None:

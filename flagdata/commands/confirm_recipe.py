@@ -118,7 +118,7 @@ def _answer(question: Open) -> tuple[str, object]:
         text: str = ask(asked)
         try:
             if question.key == "expect":
-                return _expected(question, text)
+                return _answers_to_check(question, text)
             return question.key, checks.get(question.key, str)(text)
         except RefusedError:
             raise
@@ -126,7 +126,7 @@ def _answer(question: Open) -> tuple[str, object]:
             say(f"{error.what}; {error.fix}")
 
 
-def _expected(question: Open, text: str) -> tuple[str, object]:
+def _answers_to_check(question: Open, text: str) -> tuple[str, object]:
     """The answers to a check: "yes" where the numbers are right, a number that means no value, or a recipe."""
     if text.lower() == "yes":
         return "expect", question.example

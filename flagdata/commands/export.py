@@ -31,7 +31,7 @@ def export(chosen: ExportCommand) -> None:
       flagdata export csv --where "kind = 'wind'" --to winds
       flagdata export obj --where "kind = 'meshes' and wind > 5" --to meshes
     """
-    manifest = exported(chosen)
+    manifest = export_selection(chosen)
     if chosen.as_json:
         document("export-result", {"folder": str(chosen.to), "manifest": manifest})
         return
@@ -45,14 +45,14 @@ def export(chosen: ExportCommand) -> None:
     echo(chosen.to)
 
 
-def exported(chosen: Exporting) -> Mapping[str, Any]:
+def export_selection(chosen: Exporting) -> Mapping[str, Any]:
     """Writes a selection; returns the manifest of its folder.
 
     Raises:
         FlagdataError: see `flagdata.export`.
     """
     from flagdata.core.files.outputs import check_folder
-    from flagdata.dataset.lake_source import opened
+    from flagdata.dataset.lake_source import open_source
     from flagdata.export import Export, prepare
 
     target = Path(chosen.to)
@@ -66,7 +66,7 @@ def exported(chosen: Exporting) -> Mapping[str, Any]:
         salt=chosen.salt,
         options={name: value for name, value in given.items() if value is not None},
     )
-    prepared = prepare(opened(chosen.lake).lake, request)
+    prepared = prepare(open_source(chosen.lake).lake, request)
     with progress(len(prepared), label=f"export {chosen.format}", unit="artifact") as advance:
         return prepared.write(target, advance=advance).manifest
 

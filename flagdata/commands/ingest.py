@@ -15,7 +15,16 @@ from flagdata.commands.ingest_options import SNIFF, IngestRequest
 from flagdata.commands.ingest_sources import ingest_sources, sniff_sources
 from flagdata.core.console import LocalPath
 from flagdata.errors import UsageError
-from flagdata.verbs.verb_options import AsJson, LongCommand, argument, command, described, option, options, typed
+from flagdata.verbs.verb_options import (
+    AsJson,
+    LongCommand,
+    argument,
+    command,
+    described_fields,
+    option,
+    options,
+    typed_names,
+)
 
 
 @options
@@ -148,8 +157,8 @@ def ingest(chosen: IngestCommand) -> None:
     if not chosen.sniff:
         _ingest(chosen)
         return
-    for name in sorted(typed(chosen) - {*SNIFF, "as_json", "lake"}):
-        spelled = described(type(chosen))[name][1].spelled(name)
+    for name in sorted(typed_names(chosen) - {*SNIFF, "as_json", "lake"}):
+        spelled = described_fields(type(chosen))[name][1].spelling_of(name)
         raise UsageError(f"{spelled} means nothing to --sniff", fix="leave it out")
     given = IngestRequest.of(chosen, confirm=on_command_line(chosen.accept, as_json=chosen.as_json))
     sniff_sources(given, as_json=chosen.as_json)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from flagdata.api.recording_verbs import Clocked, FromAnemometer, FromCamera, FromFrames, Recorded, Scaled
 from flagdata.errors import TimeError, UsageError
 from flagdata.verbs.option_types import written_seconds
-from flagdata.verbs.verb_options import described, typed
+from flagdata.verbs.verb_options import described_fields, typed_names
 
 if TYPE_CHECKING:
     from datetime import tzinfo
@@ -289,8 +289,8 @@ def check_applies(kinds: Sequence[str | None], given: IngestRequest) -> None:
     from flagdata.timebase import names_zone
 
     chosen = given.chosen
-    names, rows = typed(chosen), described(type(chosen))
-    ignored = {kind: names - _OF_ALL - described(form).keys() for kind, (_, form) in KINDS.items()}
+    names, rows = typed_names(chosen), described_fields(type(chosen))
+    ignored = {kind: names - _OF_ALL - described_fields(form).keys() for kind, (_, form) in KINDS.items()}
     called = {kind: name for kind, (name, _) in KINDS.items()}
     if isinstance(chosen, FromCamera) and chosen.start is not None and names_zone(chosen.start):
         called["camera"] += " whose --start names its zone"
@@ -303,7 +303,7 @@ def check_applies(kinds: Sequence[str | None], given: IngestRequest) -> None:
     _check_unit(kinds, chosen.unit if isinstance(chosen, Scaled) else None)
     for name in sorted(names):
         foreign = [kind is not None and name in ignored.get(kind, ()) for kind in kinds]
-        spelled = rows[name][1].spelled(name)
+        spelled = rows[name][1].spelling_of(name)
         if all(foreign):
             whose = " or ".join(sorted({called[kind] for kind in kinds if kind is not None}))
             raise UsageError(f"{spelled} means nothing for {whose}", fix="leave it out")

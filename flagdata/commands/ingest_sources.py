@@ -196,16 +196,16 @@ def ingest_sources(lake: Lake, given: IngestRequest, *, as_json: bool) -> None:
     _exit_on(failures, given.sources)
 
 
-def ingested(chosen: Ingesting) -> tuple[IngestResult, ...]:
+def ingest_from_python(chosen: Ingesting) -> tuple[IngestResult, ...]:
     """Brings sources into a lake from Python; see `flagdata.ingest`.
 
     Raises:
         FlagdataError: see `flagdata.ingest`.
     """
-    from flagdata.dataset.lake_source import opened
+    from flagdata.dataset.lake_source import open_source
     from flagdata.ingest.anemometer.log_confirmation import Accepting
 
-    lake = opened(chosen.lake).lake
+    lake = open_source(chosen.lake).lake
     lake.check_writable()
     kinds, given = _kinds(IngestRequest.of(chosen, confirm=Accepting(accept=chosen.accept)))
     results: list[IngestResult] = []
@@ -243,7 +243,7 @@ def _kinds(given: IngestRequest) -> tuple[list[Guess | FlagdataError], IngestReq
             )
         return kind
 
-    kinds = _recognised(given.sources, kind_of)
+    kinds = _recognise_sources(given.sources, kind_of)
     chapters = given.camera.camera.chapters
     if chapters:
         _check_joined((*given.sources, *chapters), kind_of)
@@ -282,8 +282,8 @@ def sniff_sources(given: IngestRequest, *, as_json: bool) -> None:
     from flagdata.ingest.classification import guesses
 
     topic, encoding = given.wind.wind.topic, given.wind.wind.encoding
-    ranked = _recognised(
-        given.sources, lambda source: _completed(source, guesses(source, topic=topic, encoding=encoding), given)
+    ranked = _recognise_sources(
+        given.sources, lambda source: _complete_guesses(source, guesses(source, topic=topic, encoding=encoding), given)
     )
     check_applies([None if isinstance(one, FlagdataError) else one[0].kind for one in ranked], given)
     entries, failures = _each(
@@ -294,17 +294,17 @@ def sniff_sources(given: IngestRequest, *, as_json: bool) -> None:
     _exit_on(failures, given.sources)
 
 
-def _completed(source: Path, ranked: tuple[Guess, ...], given: IngestRequest) -> tuple[Guess, ...]:
+def _complete_guesses(source: Path, ranked: tuple[Guess, ...], given: IngestRequest) -> tuple[Guess, ...]:
     """The guesses, a draft among them completed by the options beside --sniff."""
-    from flagdata.ingest.anemometer import completed
+    from flagdata.ingest.anemometer import complete_guess
 
     wind = given.wind.wind
     if wind.columns is not None and ranked[0].kind in ("anemometer", "other"):
-        return (completed(source, wind) or ranked[0], *ranked[1:])
+        return (complete_guess(source, wind) or ranked[0], *ranked[1:])
     said = wind.unit is not None or wind.wind is not None or wind.date_order is not None
     if not said or ranked[0].format != "delimited" or ranked[0].recipe is not None:
         return ranked
-    return (completed(source, wind) or ranked[0], *ranked[1:])
+    return (complete_guess(source, wind) or ranked[0], *ranked[1:])
 
 
 def _look(source: Path, ranked: Sequence[Guess], given: IngestRequest) -> dict[str, Any]:
@@ -342,7 +342,9 @@ def _guess(guess: Guess) -> dict[str, Any]:
     }
 
 
-def _recognised(sources: Sequence[Path], recognise: Callable[[Path], Recognised]) -> list[Recognised | FlagdataError]:
+def _recognise_sources(
+    sources: Sequence[Path], recognise: Callable[[Path], Recognised]
+) -> list[Recognised | FlagdataError]:
     """What each source is, or why it is not recognised."""
 
     def of(source: Path) -> Recognised | FlagdataError:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from flagdata.core.console import echo
-from flagdata.core.printable import counted
+from flagdata.core.printable import count_of
 from flagdata.errors import UsageError
 from flagdata.verbs.shared_options import OnBranch, OnLake, Reasoned
 from flagdata.verbs.verb_options import Result, argument, options, verb
@@ -40,4 +40,4 @@ def label(chosen: Labelling) -> Iterator[Result]:
     reason = chosen.message or f"label {', '.join(values)}"
     version, labelled = lake.label(named, values, reason, branch=chosen.branch)
     yield Result("label", {"version": version, "artifacts": sorted(labelled), "labels": values})
-    echo(f"version {version}: {counted(len(labelled), 'artifact')} labelled")
+    echo(f"version {version}: {count_of(len(labelled), 'artifact')} labelled")

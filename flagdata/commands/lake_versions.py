@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 from flagdata.api.lake_verbs import Naming
 from flagdata.commands.list_artifacts import relative
 from flagdata.core.console import document, echo, say, table
-from flagdata.core.printable import SHORT, counted
+from flagdata.core.printable import SHORT, count_of
 from flagdata.errors import UsageError
 from flagdata.verbs.option_types import POSITIVE
 from flagdata.verbs.shared_options import OnBranch, OnLake, Reasoned
-from flagdata.verbs.verb_options import AsJson, Result, argument, command, option, options, typed, verb
+from flagdata.verbs.verb_options import AsJson, Result, argument, command, option, options, typed_names, verb
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
@@ -36,7 +36,7 @@ def init(chosen: Making) -> Iterator[Result]:
     from flagdata.core.schema import FORMAT_VERSION
     from flagdata.lake import Lake
 
-    if chosen.folder is not None and "lake" in typed(chosen):
+    if chosen.folder is not None and "lake" in typed_names(chosen):
         raise UsageError("two folders are given for one lake", fix="give FOLDER or --lake, not both")
     lake = Lake.create(str(chosen.lake) if chosen.folder is None else chosen.folder)
     yield Result("init", {"lake": str(lake.path), "format_version": FORMAT_VERSION})
@@ -172,7 +172,7 @@ def diff(chosen: Comparing) -> Iterator[Result]:
             echo(f"{sign} {row['kind']:<11} {row['artifact'][:SHORT]} {row['name']}")
         for name in objects:
             echo(f"{sign} object      {name}")
-    say(f"{counted(len(added), 'row')} added, {len(removed)} removed")
+    say(f"{count_of(len(added), 'row')} added, {len(removed)} removed")
 
 
 @options
@@ -196,7 +196,7 @@ def withdraw(chosen: Withdrawing) -> Iterator[Result]:
     """
     lake, branch = chosen.opened(), chosen.branch
     if chosen.everywhere:
-        if "branch" in typed(chosen):
+        if "branch" in typed_names(chosen):
             raise UsageError(
                 "--everywhere cannot be combined with --branch", fix="leave out --branch: every branch is meant"
             )
@@ -209,7 +209,7 @@ def withdraw(chosen: Withdrawing) -> Iterator[Result]:
     yield Result("withdraw", {"version": done.version, "withdrawn": sorted(named), **along})
     parts = [f"{len(named)} withdrawn from {branch}"]
     if done.clips:
-        parts.append(f"{counted(len(done.clips), 'clip')} went along")
+        parts.append(f"{count_of(len(done.clips), 'clip')} went along")
     if made:
         parts.append(f"{len(made)} made from them")
     echo(f"version {done.version}: {', '.join(parts)}")
@@ -227,7 +227,7 @@ def _erasing(lake: Lake, chosen: Withdrawing) -> Iterator[Result]:
         say(f"its bytes stay: {name}: {why}")
     say(f"not reached from here: {'; '.join(BEYOND)}")
     tags = f"; listed without data by {', '.join(done.tags)}" if done.tags else ""
-    what = f"{counted(len(done.artifacts), 'artifact')} erased, {counted(len(done.objects), 'object')} deleted"
+    what = f"{count_of(len(done.artifacts), 'artifact')} erased, {count_of(len(done.objects), 'object')} deleted"
     echo(f"version {done.version}: {what}{tags}")
 
 

@@ -9,7 +9,7 @@ from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
 from flagdata.core.console import echo, say, table
-from flagdata.core.printable import SHORT, counted, size_text
+from flagdata.core.printable import SHORT, count_of, size_text
 from flagdata.verbs.shared_options import AtVersion, InFull, OnLake
 from flagdata.verbs.verb_options import Result, argument, option, options, verb
 
@@ -35,7 +35,7 @@ def ls(chosen: Listing) -> Iterator[Result]:
     from flagdata.core.schema import Kind
     from flagdata.errors import UnknownNameError
     from flagdata.lake.matching import matching
-    from flagdata.lake.naming import superseded
+    from flagdata.lake.naming import superseded_rows
     from flagdata.lake.removal import lost
 
     kind, at = chosen.kind, chosen.at
@@ -45,7 +45,7 @@ def ls(chosen: Listing) -> Iterator[Result]:
     found = lake.rows(None if kind is None else {"kind": kind}, at=at, columns=["name", "object"])
     rows = lake.rows("kind <> 'clip'" if kind is None else {"kind": kind}, at=at).to_pylist()
     gone = lost(lake, found)
-    older = superseded(row for row in rows if row["kind"] in (Kind.MEASUREMENT, Kind.MODEL))
+    older = superseded_rows(row for row in rows if row["kind"] in (Kind.MEASUREMENT, Kind.MODEL))
     clips = found.num_rows - len(rows)
     listed = [
         {
@@ -60,8 +60,8 @@ def ls(chosen: Listing) -> Iterator[Result]:
     if rows:
         lines = [_line(row, lost=row["object"] in gone, superseded=row["artifact"] in older) for row in rows]
         table(header, lines)
-    more = f" and {counted(clips, 'clip')} (--kind clip lists them)" if clips else ""
-    say(f"{counted(len(rows), 'artifact')}{more}" if found.num_rows else "no artifacts")
+    more = f" and {count_of(clips, 'clip')} (--kind clip lists them)" if clips else ""
+    say(f"{count_of(len(rows), 'artifact')}{more}" if found.num_rows else "no artifacts")
     for name, why in gone.items():
         names = sorted(matching(found, {"object": name})["name"].unique().to_pylist())
         say(f"without data: {', '.join(names)}: {why.what}")
@@ -81,7 +81,7 @@ def show(chosen: Showing) -> Iterator[Result]:
     ARTIFACT is an id or its beginning, a name, the file it came from, or NAME@TAG. Of a verdict or a measurement its
     sentence comes first, of a network its card.
     """
-    from flagdata.ingest.before import unconfirmed
+    from flagdata.ingest.before import unconfirmed_findings
     from flagdata.lake.catalog_cells import said
     from flagdata.lake.label_columns import PREFIX
     from flagdata.lake.lineage import labels_of
@@ -99,7 +99,7 @@ def show(chosen: Showing) -> Iterator[Result]:
     parents = [relative(other) for other in others if other["artifact"] in row["parents"]]
     children = [relative(other) for other in others if row["artifact"] in other["parents"]]
     path = lake.objects.path(row["object"]) if row["object"] else None
-    doubts = unconfirmed([found])
+    doubts = unconfirmed_findings([found])
     stated = [
         {"version": number, "artifact": one.id, "code_version": one.code_version}
         for number, one in enumerate(versions(lake, found, at=at), start=1)
@@ -135,7 +135,7 @@ def show(chosen: Showing) -> Iterator[Result]:
             echo(f"{label:<15} {one['artifact'][:SHORT]} {one['kind']} {one['name']}")
         if len(relatives) > _MOST and not whole:
             kinds = Counter(one["kind"] for one in relatives[_MOST:])
-            more = ", ".join(counted(count, kind) for kind, count in sorted(kinds.items()))
+            more = ", ".join(count_of(count, kind) for kind, count in sorted(kinds.items()))
             echo(f"{label:<15} … and {more} more (--all lists them)")
     for finding in (*(row["report"] or {}).get("findings", []), *(finding.as_dict() for finding in doubts)):
         echo(f"{finding.get('severity', 'note'):<15} {finding.get('kind')}: {finding.get('what')}")

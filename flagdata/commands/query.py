@@ -101,12 +101,12 @@ def query(chosen: QueryCommand) -> None:
         return
     sql_process()  # starts while the lake is read
     from flagdata.core.files.outputs import check_file
-    from flagdata.dataset.lake_source import opened
+    from flagdata.dataset.lake_source import open_source
     from flagdata.lake.selection import Request, Selection
 
     if chosen.arrow is not None:
         check_file(chosen.arrow)
-    lake = opened(chosen.lake).lake
+    lake = open_source(chosen.lake).lake
     view = lake.view(chosen.at)
     version = view[0].version
     request = Request(

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from flagdata.core.console import echo, progress, say, say_finding
-from flagdata.core.printable import counted, size_text
+from flagdata.core.printable import count_of, size_text
 from flagdata.verbs.shared_options import OnLake
 from flagdata.verbs.verb_options import Result, argument, options, verb
 
@@ -96,6 +96,6 @@ def _reporting(tag: str, address: str, done: Transfer) -> Iterator[Result]:
         say_finding(finding)
     for taken in done.healed:
         say(f"{taken.kind} {taken.name}: {taken.why}")
-    refs = f", {counted(len(done.refs), 'ref')} ({', '.join(done.refs)})" if done.refs else ""
-    say(f"{counted(done.versions, 'version')}, {counted(len(done.objects), 'object')}, {size_text(done.size)}{refs}")
+    refs = f", {count_of(len(done.refs), 'ref')} ({', '.join(done.refs)})" if done.refs else ""
+    say(f"{count_of(done.versions, 'version')}, {count_of(len(done.objects), 'object')}, {size_text(done.size)}{refs}")
     echo(f"{address} is at version {done.head}")

@@ -10,7 +10,7 @@ from flagdata.core.console import LocalPath, echo, progress, say, table
 from flagdata.core.files.addresses import local_path
 from flagdata.core.files.regular_files import check_input
 from flagdata.core.findings import Finding, Severity
-from flagdata.core.printable import counted, size_text
+from flagdata.core.printable import count_of, size_text
 from flagdata.errors import UsageError
 from flagdata.timebase import iso
 from flagdata.verbs.option_types import DURATION, POSITIVE
@@ -30,18 +30,18 @@ class Verifying(OnLake):
 @verb(Verifying, example='flagdata.verify(lake="field.lake")["healthy"]')
 def verify(chosen: Verifying) -> Iterator[Result]:
     """Re-hash the catalog's files and every object; exits with 3 when one is missing or has changed."""
-    from flagdata.lake.health import object_names, read_refs, sampled, verify_catalog
+    from flagdata.lake.health import object_names, read_refs, sample_names, verify_catalog
     from flagdata.lake.health import verify as verified
 
     lake = chosen.opened()
     refs = read_refs(lake)
     findings = verify_catalog(lake, refs)
     names = object_names(lake, refs)
-    drawn = names if chosen.sample is None else sampled(names, chosen.sample)
+    drawn = names if chosen.sample is None else sample_names(names, chosen.sample)
     with progress(len(drawn), label="verify", unit="object") as advance:
         findings += verified(lake, drawn, refs, advance=advance)
     hashed = len(drawn) - sum(finding.kind == "object-missing" for finding in findings)
-    yield from _concluding("verify", findings, f"{hashed} of {counted(len(names), 'object')} re-hashed")
+    yield from _concluding("verify", findings, f"{hashed} of {count_of(len(names), 'object')} re-hashed")
 
 
 @options
@@ -67,7 +67,7 @@ def doctor(chosen: Examining) -> Iterator[Result]:
         yield from _examining(local_path(chosen.source))
         return
     from flagdata.core.schema import Kind
-    from flagdata.ingest.before import unconfirmed
+    from flagdata.ingest.before import unconfirmed_findings
     from flagdata.lake import Artifact
     from flagdata.lake.health import catalog_files, read_refs
     from flagdata.lake.health import doctor as examined
@@ -77,7 +77,7 @@ def doctor(chosen: Examining) -> Iterator[Result]:
     findings = examined(lake, grace=timedelta(seconds=chosen.grace))
     if all(f.severity is not Severity.ERROR for f in findings):  # else rows may not be readable
         winds = lake.rows({"kind": Kind.WIND}).to_pylist()
-        findings += unconfirmed(Artifact.from_row(row) for row in winds)
+        findings += unconfirmed_findings(Artifact.from_row(row) for row in winds)
     checked = "structure checked, contents not (flagdata verify)"
     if chosen.deep:
         findings += tuple(f for f in catalog_files(lake) if f.kind not in {found.kind for found in findings})
@@ -86,7 +86,7 @@ def doctor(chosen: Examining) -> Iterator[Result]:
             known = {(f.kind, f.where) for f in findings}
             found = verified(lake, names, read_refs(lake), advance=advance)
             findings += tuple(f for f in found if (f.kind, f.where) not in known)
-        checked = f"structure checked, {counted(len(names), 'object')} re-hashed"
+        checked = f"structure checked, {count_of(len(names), 'object')} re-hashed"
     yield from _concluding("doctor", findings, checked)
 
 
@@ -111,7 +111,7 @@ def _examining(source: Path) -> Iterator[Result]:
         for one in found.streams
     ]
     table(header, rows)
-    _print_health(found.findings, f"{found.format}: {counted(len(rows), 'stream')} examined")
+    _print_health(found.findings, f"{found.format}: {count_of(len(rows), 'stream')} examined")
 
 
 @options
@@ -146,7 +146,7 @@ def heal(chosen: Healing) -> Iterator[Result]:
         echo(f"{taken.kind} {taken.name}: {taken.why}")
     _print(done.left)
     size = size_text(sum(taken.size for taken in done.taken))
-    say(f"{counted(len(done.taken), 'item')} taken, {size}; {len(done.left) or 'nothing'} still damaged")
+    say(f"{count_of(len(done.taken), 'item')} taken, {size}; {len(done.left) or 'nothing'} still damaged")
 
 
 @options
@@ -174,10 +174,10 @@ def gc(chosen: Collecting) -> Iterator[Result]:
     for name in (*found.objects, *map(str, found.leftovers), *map(str, found.uploads)):
         echo(name)
     verb = "would be deleted" if dry_run else "deleted"
-    what = f"{counted(len(found.objects), 'object')} and {counted(len(found.leftovers), 'leftover')}"
+    what = f"{count_of(len(found.objects), 'object')} and {count_of(len(found.leftovers), 'leftover')}"
     say(f"{what}, {size_text(found.size)}, {verb}")
     if found.uploads:
-        say(f"{counted(len(found.uploads), 'unfinished upload')} {'would be aborted' if dry_run else 'aborted'}")
+        say(f"{count_of(len(found.uploads), 'unfinished upload')} {'would be aborted' if dry_run else 'aborted'}")
     if found.unlisted is not None:
         say(f"the store does not say which uploads are unfinished: {found.unlisted.strerror}", mark="note")
 
@@ -217,7 +217,7 @@ def expire(chosen: Expiring) -> Iterator[Result]:
         say("no version is that old")
         return
     by = "would expire" if found.version is None else f"expired by version {found.version}"
-    gone = f"{counted(len(found.objects), 'object')}, {size_text(found.size)}"
+    gone = f"{count_of(len(found.objects), 'object')}, {size_text(found.size)}"
     say(f"versions up to {found.up_to} {by}: {gone}, {'would go' if dry_run else 'deleted'}")
 
 

@@ -1,7 +1,7 @@
 """Arguments of public calls: numbers and paths of other libraries become Python's own, or are refused in a sentence.
 
 NumPy's `int64(3)`, torch's `tensor(3)` and pandas' values compare equal to 3, and yet hash, print and serialise as
-something else: a seed of that kind gave another order. `checked` reads the annotations of a call, so that every
+something else: a seed of that kind gave another order. `check_arguments` reads the annotations of a call, so that every
 parameter that says `int` takes every whole number, and means the same by it.
 """
 
@@ -39,7 +39,7 @@ def whole(value: object, name: str) -> int:
     Raises:
         UsageError: a truth value, a text, a number with a point, a length of time, or several numbers.
     """
-    with _refused(value, name, "whole number", "give one such as 3, without a point or quotes"):
+    with _refusing(value, name, "whole number", "give one such as 3, without a point or quotes"):
         return operator.index(value)  # type: ignore[arg-type]
 
 
@@ -49,7 +49,7 @@ def real(value: object, name: str) -> float:
     Raises:
         UsageError: a truth value, a text, a time, or several numbers.
     """
-    with _refused(value, name, "number", "give one such as 2.5, without quotes"):
+    with _refusing(value, name, "number", "give one such as 2.5, without quotes"):
         number = plain(value)
         if isinstance(number, str | bytes):
             raise TypeError
@@ -57,7 +57,7 @@ def real(value: object, name: str) -> float:
 
 
 @contextmanager
-def _refused(value: object, name: str, noun: str, fix: str) -> Iterator[None]:
+def _refusing(value: object, name: str, noun: str, fix: str) -> Iterator[None]:
     """Refuse a truth value, a time, and what raises in it."""
     try:
         if isinstance(value, bool) or _NO_NUMBER.search(str(getattr(value, "dtype", ""))):
@@ -83,7 +83,7 @@ def plain(value: Any) -> Any:
     return value.item() if short is None else float(str(short(value.item())))
 
 
-def checked(call: Callable[P, R]) -> Callable[P, R]:
+def check_arguments(call: Callable[P, R]) -> Callable[P, R]:
     """Wraps a public call so that its arguments are made plain, each by its annotation.
 
     `int` and `float` take the numbers of other libraries, `tuple[int, int]` as many of them, `Path` whatever names a

@@ -37,7 +37,7 @@ _JOINED = {
 """How Spanish and Portuguese begin the names of points between."""
 
 
-def _spelled(words: Sequence[str]) -> dict[str, float]:
+def _spell_points(words: Sequence[str]) -> dict[str, float]:
     """Spells every point in the words for north, east, south and west, joined by nothing, a blank or a hyphen."""
     of = dict(zip("NESW", words, strict=True))
     points: dict[str, float] = {}
@@ -108,7 +108,7 @@ _FAR_EAST = {
     for spelled in {point, point[:-2] + point[-2:][::-1]}
 }
 _NAMES: dict[str, float] = (
-    {name: degrees for words in _WORDS.values() for name, degrees in _spelled(words).items()}
+    {name: degrees for words in _WORDS.values() for name, degrees in _spell_points(words).items()}
     | _iberian()
     | _russian()
     | _blowing()

@@ -97,7 +97,7 @@ def say(text: str, *, mark: str | None = None) -> None:
         mark: "note", "warning" or "error" before it, or "flagdata" before the error that ends a command: in colour on a
             terminal, unless the environment variable NO_COLOR is set.
     """
-    message = _indented(text)
+    message = _indent_lines(text)
     if mark is not None:
         coloured = mark in _COLOURS and not os.environ.get("NO_COLOR")
         message = f"{click.style(f'{mark}:', fg=_COLOURS[mark], bold=True) if coloured else f'{mark}:'} {message}"
@@ -113,10 +113,10 @@ def say_beside_bars(text: str) -> None:
     """Writes a text for people while a bar of `progress` is shown."""
     from tqdm import tqdm  # loads slowly
 
-    tqdm.write(_indented(text), file=sys.stderr)
+    tqdm.write(_indent_lines(text), file=sys.stderr)
 
 
-def _indented(text: str) -> str:
+def _indent_lines(text: str) -> str:
     return printable_lines(text).replace("\n", "\n  ")
 
 

@@ -58,7 +58,7 @@ def _is_installed(module: str) -> bool:
 
 
 @contextmanager
-def explained() -> Iterator[None]:
+def explaining_missing() -> Iterator[None]:
     """Turns the missing of a module that an extra brings into an error that names the extra.
 
     Raises:

@@ -1,8 +1,8 @@
 """Numbers that names, headings and texts state, which may be of any size.
 
-`bounded` reads one up to a bound. An `Ordinal` has no bound: it sorts, and is shown, and it is no length. It has no
-`__index__`, so that neither `range` nor an array nor a list takes it for one. What is missing between ordinals is the
-difference of neighbours, see `gap`; nothing is counted up to one.
+`read_bounded` reads one up to a bound. An `Ordinal` has no bound: it sorts, and is shown, and it is no length. It has
+no `__index__`, so that neither `range` nor an array nor a list takes it for one. What is missing between ordinals is
+the difference of neighbours, see `gap`; nothing is counted up to one.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _DIGITS = 4000
 """Most digits of an ordinal: Python converts no more. A file's name has 255 at most."""
 
 
-def bounded(digits: str, *, most: int) -> int | None:
+def read_bounded(digits: str, *, most: int) -> int | None:
     """Reads a number of decimal digits of any script; None of anything else, and of a number above `most`."""
     significant = digits.lstrip("0")
     if not digits.isdecimal() or len(significant) > len(str(most)):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from flagdata.core.extras import explained
+from flagdata.core.extras import explaining_missing
 
 
 def attribute(reference: str) -> Any:
@@ -15,7 +15,7 @@ def attribute(reference: str) -> Any:
         MissingExtraError: it needs a package that is not installed.
     """
     module, _, name = reference.partition(":")
-    with explained():
+    with explaining_missing():
         return getattr(import_module(module), name)
 
 
@@ -26,5 +26,5 @@ def call(reference: str, *arguments: Any, **options: Any) -> Any:
         MissingExtraError: it needs a package that is not installed.
     """
     module, _, name = reference.partition(":")
-    with explained():
+    with explaining_missing():
         return getattr(import_module(module), name)(*arguments, **options)

@@ -18,7 +18,7 @@ def printable_lines(text: str) -> str:
     return "\n".join(map(printable, text.split("\n")))
 
 
-def counted(count: int, noun: str) -> str:
+def count_of(count: int, noun: str) -> str:
     """Writes "1 object", "2 objects": for nouns that take an s."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 

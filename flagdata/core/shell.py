@@ -19,10 +19,10 @@ def command_line(*words: object) -> str:
     Args:
         words: a program's name and its arguments, or options with their values.
     """
-    return " ".join(map(_quoted, words))
+    return " ".join(map(_quote_word, words))
 
 
-def _quoted(word: object) -> str:
+def _quote_word(word: object) -> str:
     text = str(word)
     if isinstance(word, PurePath) and text.startswith("-"):
         text = f"./{text}"

@@ -332,13 +332,13 @@ def canonical(text: str, *, where: str | None = None) -> str:
     Raises:
         UnknownNameError: with the nearest known spelling.
     """
-    name = spelled(text) or _factored(text)
+    name = name_of_unit(text) or _factored_unit(text)
     if name is None:
         raise UnknownNameError.of("unit", text, [*UNITS, *SPELLINGS], where=where)
     return name
 
 
-def spelled(text: str) -> str | None:
+def name_of_unit(text: str) -> str | None:
     """Returns the table's own name of the unit that a file spells as `text`; `None` where it spells none."""
     stripped = text.strip()
     if stripped in UNITS:
@@ -347,16 +347,16 @@ def spelled(text: str) -> str | None:
     unit_name = key if key in UNITS else SPELLINGS.get(key)
     if unit_name is not None:
         return unit_name
-    name = _factored(stripped)
+    name = _factored_unit(stripped)
     unit_name = name is not None and name.partition(" ")[0] in _TENTHS and UNITS[name].si in ("m/s", "rad")
     return name if unit_name else None
 
 
-def _factored(text: str) -> str | None:
+def _factored_unit(text: str) -> str | None:
     """Returns the name of a unit with a factor before it, as "0.765 m/s" of what one turn of a cup is; `None` for no
     such."""
     match = _FACTOR.fullmatch(text.strip().replace(",", "."))
-    name = None if match is None else spelled(match["unit"])
+    name = None if match is None else name_of_unit(match["unit"])
     if match is None or name is None or UNITS[name].offset or " " in name or float(match["factor"]) == 0:
         return None
     return f"{float(match['factor']):g} {name}"

@@ -13,7 +13,7 @@ _MOUNT = Path("/sys/fs/cgroup")
 _OF_PROCESSORS = {"", "cpu"}  # the one hierarchy of cgroup 2, and that of cgroup 1 which limits processors
 
 
-def announced(what: str, seconds: float, *, workers: int = 1, kept: str | None = None) -> str:
+def announce_work(what: str, seconds: float, *, workers: int = 1, kept: str | None = None) -> str:
     """Announces what is to be done, and for about how long.
 
     Args:

@@ -20,7 +20,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from flagdata.core.arguments import checked
+from flagdata.core.arguments import check_arguments
 from flagdata.core.arrays import UInt8Array
 from flagdata.core.files.addresses import local_path
 from flagdata.core.files.regular_files import is_beside
@@ -59,7 +59,7 @@ class DecodedCache:
         UsageError: no room for anything, a folder inside a lake, or one that holds other files.
     """
 
-    @checked
+    @check_arguments
     def __init__(self, path: Path | str, *, limit: int) -> None:
         self.path = local_path(path).absolute()
         self.limit = limit
@@ -87,7 +87,7 @@ class DecodedCache:
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_verified": set()}
 
-    @checked
+    @check_arguments
     def frames(self, object_name: str, first: int, count: int, *, decode: Callable[[], UInt8Array]) -> UInt8Array:
         """Frames (count, height, width) of an object, from the cache or else by `decode`, which fills it."""
         name = hashlib.sha256(f"{object_name}\n{first}\n{count}".encode()).hexdigest() + _SUFFIX
@@ -134,7 +134,7 @@ class DecodedCache:
         if size > self.limit:
             return
         try:
-            with self._locked() as tally:
+            with self._hold_lock() as tally:
                 self._take_room(tally, size)
                 written = self.path / _WRITING
                 with written.open("wb") as stream:
@@ -178,7 +178,7 @@ class DecodedCache:
         return entries
 
     @contextlib.contextmanager
-    def _locked(self) -> Iterator[BinaryIO]:
+    def _hold_lock(self) -> Iterator[BinaryIO]:
         """Lets one writer work at a time, across processes; the lock dies with its holder. Yields the tally, at its
         start."""
         with (self.path / _TALLY).open("a+b") as tally:

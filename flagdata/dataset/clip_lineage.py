@@ -59,7 +59,7 @@ def _ancestors(artifact: str, parents: Mapping[str, list[str]]) -> set[str]:
     return ancestors
 
 
-def superseded(catalog: pa.Table, recordings: set[str]) -> dict[str, str]:
+def superseded_recordings(catalog: pa.Table, recordings: set[str]) -> dict[str, str]:
     """Recordings that another of `recordings` replaces → that one, a later alignment of the same camera and wind."""
     rows = catalog.select(["artifact", "parents", "created"]).filter(
         pc.field("artifact").isin(pa.array(sorted(recordings), pa.string()))

@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from flagdata.core import provenance
-from flagdata.core.arguments import checked
+from flagdata.core.arguments import check_arguments
 from flagdata.core.clock_model import ClockModel
 from flagdata.core.schema import CLIP_FRAMES, TRUTH_WINDOW, Kind
 from flagdata.dataset.truth import TruthSeries, WindTruth, over_ground
@@ -49,7 +49,7 @@ def runs(times: Instants, frames: int) -> Iterator[int]:
         yield from range(first, last - frames + 1, frames)
 
 
-@checked
+@check_arguments
 def clip_rows(
     record: Record, recording: Artifact, *, frames: int = CLIP_FRAMES, window: float = TRUTH_WINDOW
 ) -> list[Artifact]:

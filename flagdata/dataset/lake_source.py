@@ -6,8 +6,8 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from flagdata.core.arguments import checked
-from flagdata.core.extras import explained
+from flagdata.core.arguments import check_arguments
+from flagdata.core.extras import explaining_missing
 from flagdata.core.html import table
 from flagdata.lake import Lake
 from flagdata.lake.catalog_rows import Rows
@@ -32,7 +32,7 @@ class Source:
         self.lake = lake
 
     @classmethod
-    @checked
+    @check_arguments
     def open(cls, path: Place | str) -> Source:
         """Opens the lake in the folder `path`, or at `s3://bucket/prefix`.
 
@@ -41,7 +41,7 @@ class Source:
         """
         return cls(Lake.open(path))
 
-    @checked
+    @check_arguments
     def query(
         self,
         where: str | Mapping[str, Any] | None = None,
@@ -57,7 +57,7 @@ class Source:
 
         return Rows(select(self.lake, where, at=at, columns=columns, order=order, sql=sql, limit=limit))
 
-    @checked
+    @check_arguments
     def pairs(
         self,
         where: str | Mapping[str, Any] | None = None,
@@ -95,7 +95,7 @@ class Source:
             UsageError: a filter that is not SQL, a window that is no length of time, clips of several windows where
                 none is named, or a seed that is no whole number.
         """
-        with explained():
+        with explaining_missing():
             from flagdata.dataset.pairs import Pairs
         from flagdata.dataset.resolve import resolve
         from flagdata.dataset.tolerance import Tolerance
@@ -121,7 +121,7 @@ class Source:
             split_by=resolved.split_by,
         )
 
-    @checked
+    @check_arguments
     def sides(
         self,
         where: str | Mapping[str, Any] | None = None,
@@ -163,7 +163,7 @@ AnyLake: TypeAlias = Source | Lake | Place | str
 """A lake that is open, its folder, or its address `s3://bucket/prefix`."""
 
 
-def opened(lake: AnyLake) -> Source:
+def open_source(lake: AnyLake) -> Source:
     """Opens a lake, whatever names it."""
     if isinstance(lake, Source):
         return lake
@@ -172,4 +172,4 @@ def opened(lake: AnyLake) -> Source:
 
 def lake_of(lake: AnyLake | None) -> Lake | None:
     """Opens the lake that a verb was given; None where it was given none."""
-    return None if lake is None else opened(lake).lake
+    return None if lake is None else open_source(lake).lake

@@ -15,7 +15,7 @@ import numpy as np
 import torch
 from torch.utils.data import DataLoader, Dataset
 
-from flagdata.core.arguments import checked, whole
+from flagdata.core.arguments import check_arguments, whole
 from flagdata.core.arrays import IntArray
 from flagdata.core.rng import stream
 from flagdata.dataset.sample import Batch, Sample, collate
@@ -79,7 +79,7 @@ class PairLoader:
         UsageError: sizes that cannot be, an unknown option, or pinned memory where there is no accelerator.
     """
 
-    @checked
+    @check_arguments
     def __init__(
         self,
         pairs: Batchable,
@@ -147,29 +147,29 @@ class PairLoader:
         full_batches, rest = divmod(len(self.pairs), self._batch_size)
         return full_batches + (rest > 0 and self._last == "keep")
 
-    @checked
+    @check_arguments
     def batches(self, epoch: int) -> list[list[int]]:
         """Indices of the pairs in each batch of this share in a whole epoch, in order."""
         return self._from(epoch, 0)
 
     def _from(self, epoch: int, first: int) -> list[list[int]]:
         """Batches of this share in an epoch of which all shares together handed out `first` before."""
-        size, order = self._batch_size, self._ordered(epoch)
+        size, order = self._batch_size, self._order_of_epoch(epoch)
         index, count = self._share
         end = first + (self._total() - first) // count * count
         return [order[k * size : (k + 1) * size].tolist() for k in range(first + index, end, count)]
 
-    def _ordered(self, epoch: int) -> IntArray:
+    def _order_of_epoch(self, epoch: int) -> IntArray:
         n = len(self.pairs)
         if self._order == "stored":
             return np.arange(n)
         return stream(self.pairs.seed, "pairs", "order", epoch).permutation(n)
 
-    @checked
+    @check_arguments
     def order_hash(self, epoch: int) -> str:
         """Computes the SHA-256 of the samples and their order in an epoch, in hexadecimal: equal for any workers and
         shares."""
-        order = self._ordered(epoch).astype("<i8").tobytes()
+        order = self._order_of_epoch(epoch).astype("<i8").tobytes()
         return hashlib.sha256(
             f"{self.pairs.fingerprint} {self._batch_size} {self._last}\n".encode() + order
         ).hexdigest()

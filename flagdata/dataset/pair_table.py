@@ -97,11 +97,11 @@ class PairTable:
             if rows[column].null_count:
                 artifact = rows.filter(rows[column].is_null())["artifact"][0].as_py()
                 raise CorruptError(f"a clip has no {column}", where=f"artifact {artifact}", fix="run flagdata doctor")
-        objects, index = _coded(rows, "object")
+        objects, index = _encode_column(rows, "object")
         ids = rows["artifact"].to_pylist()
         texts = rows["parameters"].to_pylist()
         if labels:
-            texts = [_labelled(text, labels.get(i), artifact=i) for text, i in zip(texts, ids, strict=True)]
+            texts = [_add_labels(text, labels.get(i), artifact=i) for text, i in zip(texts, ids, strict=True)]
         parameters, names = _parameters(texts, ids)
         return cls(
             artifact=_text(rows, "artifact"),
@@ -160,7 +160,7 @@ def _text(rows: pa.Table, column: str) -> NDArray[np.str_]:
     return np.array(rows[column].fill_null("").to_pylist(), dtype=np.str_)
 
 
-def _coded(rows: pa.Table, column: str) -> tuple[NDArray[np.str_], IntArray]:
+def _encode_column(rows: pa.Table, column: str) -> tuple[NDArray[np.str_], IntArray]:
     """Encodes a column: its different texts, sorted, and of each row which it has; as `np.unique`, without sorting
     all."""
     coded = rows[column].combine_chunks().dictionary_encode()
@@ -187,7 +187,7 @@ def _parameters(texts: Sequence[str | None], artifacts: Sequence[str]) -> tuple[
     return out, np.array(names, dtype=np.str_)
 
 
-def _labelled(text: str | None, labels: Mapping[str, Any] | None, *, artifact: str) -> str | None:
+def _add_labels(text: str | None, labels: Mapping[str, Any] | None, *, artifact: str) -> str | None:
     """Adds a clip's labels to its parameters."""
     if not labels:
         return text

@@ -9,7 +9,7 @@ from typing import Any
 
 import torch
 
-from flagdata.core.arguments import checked
+from flagdata.core.arguments import check_arguments
 from flagdata.core.arrays import FloatArray, UInt8Array
 from flagdata.core.html import table
 from flagdata.core.printable import SHORT
@@ -76,7 +76,7 @@ class Pairs(Batchable):
     def __len__(self) -> int:
         return len(self.table)
 
-    @checked
+    @check_arguments
     def __getitem__(self, index: int) -> Sample:
         """Reads the pair at `index`, 0 ≤ index < len.
 
@@ -104,7 +104,7 @@ class Pairs(Batchable):
             end=int(table.end[index]),
         )
 
-    @checked
+    @check_arguments
     def film(self, index: int) -> UInt8Array:
         """Reads all frames of the recording that the pair at `index` is of: (frames, height, width) gray.
 
@@ -117,7 +117,7 @@ class Pairs(Batchable):
         record = self._record(int(self.table.object[index]))
         return record.frames(0, record.frame_count)
 
-    @checked
+    @check_arguments
     def film_times(self, index: int) -> FloatArray:
         """Reads (frames,) instants of the frames of `film`, from the first [s].
 
@@ -148,7 +148,7 @@ class Pairs(Batchable):
         rows = {"version": self.at or "the head of main", "wind": f"{wind.min():.2f} to {wind.max():.2f} m/s"}
         return table(f"{len(self)} pairs, {len(self.refused)} refused", rows | refused)
 
-    @checked
+    @check_arguments
     def loader(
         self,
         batch_size: int,

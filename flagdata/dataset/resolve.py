@@ -13,7 +13,7 @@ import pyarrow.compute as pc
 
 from flagdata.core.arrays import FloatArray
 from flagdata.core.schema import TRUTH_WINDOW
-from flagdata.dataset.clip_lineage import superseded
+from flagdata.dataset.clip_lineage import superseded_recordings
 from flagdata.dataset.clips import TRUTH_SPEED, clip_truth, truth_series
 from flagdata.dataset.pair_table import COLUMNS, PairTable
 from flagdata.dataset.sides import SideSize, SplitBy, clips_of, divide, lineage_of
@@ -85,7 +85,9 @@ def resolve(
         statement = division.as_dict()
     windows = _windows(clips, table)
     table = _with_window(lake, table, windows, _common(windows) if window is None else window)
-    refused = judge(table, tolerance, superseded=superseded(lineage_of(catalog), set(table.recording.tolist())))
+    refused = judge(
+        table, tolerance, superseded=superseded_recordings(lineage_of(catalog), set(table.recording.tolist()))
+    )
     is_usable = np.array([k not in refused for k in range(len(table))], dtype=np.bool_)
     if not is_usable.any():
         first = next(iter(refused.values()))

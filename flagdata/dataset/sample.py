@@ -103,13 +103,13 @@ class Batch:
 
     def to(self, device: torch.device | str) -> Self:
         """Moves the batch's tensors to `device`; copies from pinned memory overlap with computation."""
-        return self._mapped(lambda tensor: tensor.to(device, non_blocking=tensor.is_pinned()))
+        return self._map_arrays(lambda tensor: tensor.to(device, non_blocking=tensor.is_pinned()))
 
     def pin_memory(self) -> Self:
         """Copies the batch to page-locked memory; `DataLoader(pin_memory=True)` calls it."""
-        return self._mapped(torch.Tensor.pin_memory)
+        return self._map_arrays(torch.Tensor.pin_memory)
 
-    def _mapped(self, function: _TensorMap) -> Self:
+    def _map_arrays(self, function: _TensorMap) -> Self:
         return replace(
             self,
             clip=function(self.clip),

@@ -91,7 +91,7 @@ def divide(catalog: Catalog, rows: pa.Table, split_by: SplitBy | None = None, *,
     relatives on two sides.
 
     Args:
-        rows: of the selection: clips, or what `selected` returns.
+        rows: of the selection: clips, or what `select_columns` returns.
         split_by: the split that the user gives; `None` is the one that data sets state, else `hashed`.
         hashed: the hashed split of this version, see `flagdata.dataset.tagged.hashed_split`.
 
@@ -109,25 +109,25 @@ def divide(catalog: Catalog, rows: pa.Table, split_by: SplitBy | None = None, *,
     datasets = _texts(stating, "dataset")
     if stating.num_rows < rows.num_rows:
         raise RefusedError(
-            f"{stating.num_rows} of {rows.num_rows} rows state a side, of {_listed(datasets)}, and the others none",
+            f"{stating.num_rows} of {rows.num_rows} rows state a side, of {_listed_names(datasets)}, and the others none",
             where=f"artifact {rows.filter(~_STATES)['artifact'][0].as_py()}",
             fix="add side is not null to the filter for those of data sets, or side is null for the others",
         )
     if split_by is not None:
         raise RefusedError(
-            f"{_listed(datasets)} {_state(datasets)} the side of each row, and a hashed split is given beside it",
+            f"{_listed_names(datasets)} {_state(datasets)} the side of each row, and a hashed split is given beside it",
             where=f"salt {split_by.salt!r}, fractions {dict(split_by.fractions)}",
             fix="leave out --salt and split_by: the side that a row states is its side",
         )
     origins = _stated_origins(catalog, datasets)
     refuse_leaks(origins, fix="take what they share off all sides but one by flagdata withdraw")
-    return _stated(rows, origins)
+    return _stated_division(rows, origins)
 
 
 def stated_sides(catalog: Catalog, rows: pa.Table) -> Division | None:
     """Describes the sides that rows state, whether or not relatives are on two of them; None where none states one."""
     stating = rows.filter(_STATES & condition({"kind": _DIVIDED}))
-    return _stated(stating, _stated_origins(catalog, _texts(stating, "dataset"))) if stating.num_rows else None
+    return _stated_division(stating, _stated_origins(catalog, _texts(stating, "dataset"))) if stating.num_rows else None
 
 
 def hashed_sides(catalog: Catalog, rows: pa.Table, split_by: HashedSplit) -> Division:
@@ -135,7 +135,7 @@ def hashed_sides(catalog: Catalog, rows: pa.Table, split_by: HashedSplit) -> Div
     return _Hashed.of(catalog, split_by).division(rows)
 
 
-def selected(rows: pa.Table) -> pa.Table:
+def select_columns(rows: pa.Table) -> pa.Table:
     """Returns `COLUMNS` of rows of any kind; a recording is of itself."""
     own = pc.coalesce(rows["recording"], rows["artifact"])  # type: ignore[attr-defined]
     return rows.select(list(COLUMNS)).set_column(COLUMNS.index("recording"), "recording", own)
@@ -203,7 +203,7 @@ def _as_json(values: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _stated(rows: pa.Table, origins: Mapping[str, Sequence[Origin]]) -> Division:
+def _stated_division(rows: pa.Table, origins: Mapping[str, Sequence[Origin]]) -> Division:
     datasets = _texts(rows, "dataset")
     by_side = {side: rows.filter(pc.field("side") == side) for side in origins}
     sizes = _sizes(by_side, [origin for of_side in origins.values() for origin in of_side])
@@ -213,7 +213,7 @@ def _stated(rows: pa.Table, origins: Mapping[str, Sequence[Origin]]) -> Division
         about={"datasets": datasets},
         artifacts=_artifacts(by_side),
         sizes=sizes,
-        grouping=f"{_listed(datasets)} {_state(datasets)} {counts}",
+        grouping=f"{_listed_names(datasets)} {_state(datasets)} {counts}",
     )
 
 
@@ -221,9 +221,9 @@ def _stated_origins(catalog: Catalog, datasets: Sequence[str]) -> dict[str, list
     """Finds the origins of all rows of data sets, by the side that they state."""
     of_sets = condition({"dataset": datasets, "kind": _DIVIDED})
     if isinstance(catalog, Scan):
-        rows = selected(catalog.matching(of_sets).table(COLUMNS))
+        rows = select_columns(catalog.matching(of_sets).table(COLUMNS))
     else:
-        rows = selected(catalog.filter(of_sets))
+        rows = select_columns(catalog.filter(of_sets))
     lineage = lineage_of(catalog)
     return {
         side: origins_of(lineage, rows.filter(pc.field("side") == side))
@@ -263,7 +263,7 @@ class _Hashed:
         grouping = f"the catalog has {count} independent groups"
         if count == 1:
             grouping = (
-                f"all {self.clips.num_rows} clips belong together ({_shared(self.origins)}), and are on the side "
+                f"all {self.clips.num_rows} clips belong together ({_shared_origins(self.origins)}), and are on the side "
                 f"{next(iter(self.sides.values()))!r}"
             )
         return Division(
@@ -317,7 +317,7 @@ def _sizes(by_side: Mapping[str, pa.Table], origins: Sequence[Origin]) -> dict[s
     return sizes
 
 
-def _shared(origins: Sequence[Origin]) -> str:
+def _shared_origins(origins: Sequence[Origin]) -> str:
     """Says what connects recordings, in words."""
     common = set.intersection(*(set(origin.ties) for origin in origins))
     words = ("session", "day", "seed")
@@ -335,7 +335,7 @@ def _texts(rows: pa.Table, column: str) -> list[str]:
     return sorted(set(rows[column].drop_null().to_pylist()))
 
 
-def _listed(datasets: Iterable[str]) -> str:
+def _listed_names(datasets: Iterable[str]) -> str:
     return ", ".join(map(repr, datasets))
 
 

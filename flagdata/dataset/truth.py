@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flagdata.core.arguments import checked
+from flagdata.core.arguments import check_arguments
 from flagdata.core.arrays import BoolArray
 from flagdata.core.schema import TRUTH_WINDOW, UNUSABLE, SampleFlag
 from flagdata.errors import InputError, UsageError
@@ -158,7 +158,7 @@ class TruthSeries:
             sensor=series.sensor,
         )
 
-    @checked
+    @check_arguments
     def before(self, end: int, *, window: float = TRUTH_WINDOW, clock_sigma: float = 0.0) -> WindTruth:
         """Averages over (end - window, end].
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from flagdata.core.arguments import checked
+from flagdata.core.arguments import check_arguments
 from flagdata.core.files.addresses import local_path
 from flagdata.core.html import table
 from flagdata.errors import NotFoundError, UnknownNameError
@@ -72,7 +72,7 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(path.parent.name for path in _HERE.glob(f"*/{_ABOUT}")))
 
 
-@checked
+@check_arguments
 def example(name: str = "flag") -> Example:
     """Returns an example that comes with the package: a film of a simulated flag, the log beside it, and the truth.
 

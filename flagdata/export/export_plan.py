@@ -20,8 +20,8 @@ from flagdata.core.files.manifest import write_manifest
 from flagdata.core.files.outputs import fresh_folder
 from flagdata.core.provenance import code_version, digest, recipe_hash
 from flagdata.core.schema import FORMAT_VERSION, Kind
-from flagdata.dataset.clip_lineage import superseded
-from flagdata.dataset.sides import Division, divide, selected, stated_sides
+from flagdata.dataset.clip_lineage import superseded_recordings
+from flagdata.dataset.sides import Division, divide, select_columns, stated_sides
 from flagdata.dataset.splits import HashedSplit
 from flagdata.dataset.tagged import hashed_split
 from flagdata.errors import NotFoundError, UsageError
@@ -46,7 +46,7 @@ def on_side(
         UsageError: rows of another kind, which are on no side.
     """
     check_kinds(rows, "a split", frozenset({Kind.CLIP, Kind.RECORDING}))
-    division = divide(catalog, selected(rows), HashedSplit(salt=salt) if salt else None, hashed=hashed)
+    division = divide(catalog, select_columns(rows), HashedSplit(salt=salt) if salt else None, hashed=hashed)
     return rows.filter(_is_one_of(set(division.on(split)))), division
 
 
@@ -54,7 +54,7 @@ def current(catalog: pa.Table, rows: pa.Table) -> tuple[pa.Table, dict[str, str]
     """Drops recordings that another among the rows replaces, and the clips of those: two alignments of one camera and
     wind log would hold every picture twice. Also returns: recording left out → the later one."""
     recordings = rows.filter(pc.field("kind") == Kind.RECORDING.value)["artifact"].to_pylist()
-    replaced = superseded(catalog, {*recordings, *rows["recording"].drop_null().to_pylist()})
+    replaced = superseded_recordings(catalog, {*recordings, *rows["recording"].drop_null().to_pylist()})
     if not replaced:
         return rows, {}
     old = set(replaced)
@@ -251,7 +251,7 @@ def prepare(lake: Lake, request: Export) -> Prepared:
     labels = labels_of(catalog)
     for name, values in columns(with_labels(rows, labels)).items():
         rows = rows.append_column(name, values)
-    division = division or stated_sides(catalog, selected(rows))
+    division = division or stated_sides(catalog, select_columns(rows))
     source = ExportRows(
         lake=lake,
         rows=rows,

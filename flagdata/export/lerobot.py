@@ -148,10 +148,10 @@ class _Made:
         file_columns: dict[str, Any] = {}
         pictures = _FeatureSums.empty()
         if film is not None:
-            file_columns = film.episode(self._sized(entry, pictures))
+            file_columns = film.episode(self._pictures_of_entry(entry, pictures))
             where = data.episode(columns, None)
         else:
-            where = data.episode(columns, [_png(image) for image in self._sized(entry, pictures)])
+            where = data.episode(columns, [_png(image) for image in self._pictures_of_entry(entry, pictures)])
         tallies = {name: _FeatureSums.of(columns[name]) for name in _NUMBERS} | {CAMERA: pictures}
         for name, tally in tallies.items():
             self.tallies.setdefault(name, []).append(tally)
@@ -195,7 +195,7 @@ class _Made:
             )
         return farthest
 
-    def _sized(self, entry: Entry, tally: _FeatureSums) -> Iterator[UInt8Array]:
+    def _pictures_of_entry(self, entry: Entry, tally: _FeatureSums) -> Iterator[UInt8Array]:
         """Yields the pictures of an entry one by one, (height, width) uint8, counted.
 
         Raises:

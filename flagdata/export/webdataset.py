@@ -100,7 +100,7 @@ class _Shards:
         Raises:
             LimitError: the sample alone is larger.
         """
-        added = sum(_BLOCK + _padded(len(data)) for _, data in members)
+        added = sum(_BLOCK + _padded_size(len(data)) for _, data in members)
         if _file_size(added) > self._limit:
             raise LimitError(
                 f"a sample of {added:,} bytes is larger than a shard of {self._limit:,}",
@@ -133,7 +133,7 @@ def _member(name: str, size: int) -> tarfile.TarInfo:
     return info
 
 
-def _padded(size: int) -> int:
+def _padded_size(size: int) -> int:
     return -(-size // _BLOCK) * _BLOCK
 
 

@@ -80,7 +80,7 @@ def earlier(
     return None
 
 
-def unconfirmed(artifacts: Iterable[Artifact]) -> tuple[Finding, ...]:
+def unconfirmed_findings(artifacts: Iterable[Artifact]) -> tuple[Finding, ...]:
     """Warns of each artifact of a log that an older version read by a draft of its own, which nobody confirmed."""
     return tuple(
         Finding.of(

@@ -47,7 +47,7 @@ def guesses(path: Path, *, topic: str | None = None, encoding: str | None = None
     candidates = sniff(path, encoding=encoding)
     if candidates[0].kind != "other":
         return candidates
-    video = _pictured(path) if path.is_file() else None
+    video = _first_picture(path) if path.is_file() else None
     if video is None:
         return candidates
     reason = f"FFmpeg reads it as {video.container} with {video.codec} video"
@@ -143,10 +143,12 @@ def _of_mcap(path: Path, topic: str | None) -> tuple[Guess, ...]:
     return (Guess(format="MCAP", score=0.0, reasons=(reason,), kind="other", fix="give a file that has such a topic"),)
 
 
-def _pictured(path: Path) -> Pictured | None:
-    from flagdata.ingest.camera.camera_probing import pictured  # decoders of video, which a wind's log needs none of
+def _first_picture(path: Path) -> Pictured | None:
+    from flagdata.ingest.camera.camera_probing import (
+        first_picture,
+    )  # decoders of video, which a wind's log needs none of
 
     try:
-        return pictured(path)
+        return first_picture(path)
     except FlagdataError:
         return None

@@ -143,7 +143,7 @@ def _artifact(
         return _of_sample(record, row, source), ()
     if row is not None:
         return replace(Artifact.from_row(row), branch="main", created=None, object=None), ()
-    return _of_metadata(record, source), (_unreported(labels),)
+    return _of_metadata(record, source), (_unreported_finding(labels),)
 
 
 def _of_sample(record: Record, row: Mapping[str, Any] | None, source: Source) -> Artifact:
@@ -240,7 +240,7 @@ def _without(absent: list[str]) -> Finding:
     )
 
 
-def _unreported(labels: Labels) -> Finding:
+def _unreported_finding(labels: Labels) -> Finding:
     unknown = [label for label, value in (("name", labels.name), ("session", labels.session)) if value is None]
     fix = "take it off (flagdata withdraw), then ingest the file in the folder that flagdata export wrote"
     return Finding.of(

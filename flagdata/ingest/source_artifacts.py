@@ -21,7 +21,7 @@ from flagdata.core.provenance import digest, recipe_hash
 from flagdata.core.schema import Kind
 from flagdata.errors import ConflictError, FlagdataError, InputError, NothingMeasuredError
 from flagdata.ingest.anemometer import WindOptions, read_log
-from flagdata.ingest.anemometer.log_confirmation import UNASKED, Confirm, confirmed
+from flagdata.ingest.anemometer.log_confirmation import UNASKED, Confirm, confirm_readings
 from flagdata.ingest.anemometer.samples.neighbours import hours_off
 from flagdata.ingest.anemometer.sensor_recipe import SENSORS
 from flagdata.ingest.before import earlier, other_readings
@@ -256,9 +256,9 @@ def ingest_winds(
         for reading_of_log in new
         if reading_of_log.present.artifact is None
     ]
-    how = confirmed(path, source.hash, unseen, confirm) if unseen else None
+    how = confirm_readings(path, source.hash, unseen, confirm) if unseen else None
     with lake.transaction(f"ingest wind {source.name}", branch=branch) as transaction:
-        staged = [_staged(transaction, path, source, reading_of_log, how) for reading_of_log in new]
+        staged = [_stage_log(transaction, path, source, reading_of_log, how) for reading_of_log in new]
         for artifact, _ in staged:
             transaction.add(artifact)
     done = (
@@ -339,7 +339,7 @@ def _present(lake: Lake, kind: Kind, branch: str) -> list[Artifact]:
     return [Artifact.from_row(row) for row in rows]
 
 
-def _staged(
+def _stage_log(
     transaction: Transaction, path: Path, source: Source, reading_of_log: _Read, how: str | None
 ) -> tuple[Artifact, dict[str, Any]]:
     """Writes the record of a log for a transaction, and returns the artifact and its report.

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from flagdata.lake.copying import clone, pull, transfer
     from flagdata.lake.delta_log import Log
     from flagdata.lake.deposit import Deposit
-    from flagdata.lake.health import doctor, is_healthy, object_names, read_refs, sampled, verify, verify_catalog
+    from flagdata.lake.health import doctor, is_healthy, object_names, read_refs, sample_names, verify, verify_catalog
     from flagdata.lake.label_columns import columns
     from flagdata.lake.labels import given
     from flagdata.lake.lake import Lake
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from flagdata.lake.refs import Refs, Slice, View
     from flagdata.lake.removal import expire, last_version, lost
     from flagdata.lake.restoring import heal
-    from flagdata.lake.results import Placed, keep, placed, versions
+    from flagdata.lake.results import Placed, keep, place_result, versions
     from flagdata.lake.rowfiles import Scan, with_data_sets
     from flagdata.lake.selection import Request, Selection, select
     from flagdata.lake.transaction import Transaction

@@ -65,8 +65,8 @@ def ancestry(rows_of_ref: pa.Table, artifact: str) -> Ancestry:
     rows = rows_of_ref.select(_COLUMNS).combine_chunks()
     children = pc.take(rows["artifact"], pc.list_parent_indices(rows["parents"]))  # type: ignore[attr-defined]
     pairs = pa.table({"child": children, "parent": pc.list_flatten(rows["parents"])})  # type: ignore[attr-defined]
-    above = _reached(pairs, artifact, along=("child", "parent"))
-    below = _reached(pairs, artifact, along=("parent", "child"))
+    above = _reached_steps(pairs, artifact, along=("child", "parent"))
+    below = _reached_steps(pairs, artifact, along=("parent", "child"))
     generations = {relative: -steps for relative, steps in _steps(artifact, above).items()}
     generations |= {
         relative: steps for relative, steps in _steps(artifact, below).items() if relative not in generations
@@ -84,7 +84,7 @@ def ancestry(rows_of_ref: pa.Table, artifact: str) -> Ancestry:
     return Ancestry(artifact=artifact, relatives=relatives, edges=tuple(edges))
 
 
-def _reached(pairs: pa.Table, artifact: str, *, along: tuple[str, str]) -> list[tuple[str, str]]:
+def _reached_steps(pairs: pa.Table, artifact: str, *, along: tuple[str, str]) -> list[tuple[str, str]]:
     """Lists (from, to) of all steps that lead away from an artifact, each once."""
     reached, fresh, steps = {artifact}, {artifact}, []
     while fresh:
@@ -146,7 +146,7 @@ def tree(lineage: Ancestry, *, up: bool, most: int | None) -> Iterator[Line]:
 
     def descend(artifacts: Sequence[str], ends: tuple[bool, ...]) -> None:
         next_ones = dict.fromkeys(one for artifact in artifacts for one in nearer.get(artifact, ()))
-        groups = grouped([lineage.relatives[one] for one in next_ones], most=most)
+        groups = group_relatives([lineage.relatives[one] for one in next_ones], most=most)
         last = len(groups) - 1
         waiting.extend(((*ends, position == last), group) for position, group in reversed(list(enumerate(groups))))
 
@@ -161,7 +161,7 @@ def tree(lineage: Ancestry, *, up: bool, most: int | None) -> Iterator[Line]:
             descend(artifacts, ends)
 
 
-def grouped(relatives: Sequence[Relative], *, most: int | None) -> list[tuple[Relative, ...]]:
+def group_relatives(relatives: Sequence[Relative], *, most: int | None) -> list[tuple[Relative, ...]]:
     """Groups relatives one by one, but those of a kind of which there are more than `most` together."""
     kinds: dict[str | None, list[Relative]] = {}
     for relative in relatives:

@@ -74,12 +74,12 @@ def _one_at_a_time(method: Callable[Concatenate[Catalog, P], T]) -> Callable[Con
     """Keeps other threads out of the catalog, and the Delta library out of forked children, where it would hang."""
 
     @wraps(method)
-    def guarded(self: Catalog, *args: P.args, **kwargs: P.kwargs) -> T:
+    def call_alone(self: Catalog, *args: P.args, **kwargs: P.kwargs) -> T:
         _PROCESS.check()
         with self._lock:
             return method(self, *args, **kwargs)
 
-    return guarded
+    return call_alone
 
 
 class Catalog:
@@ -96,7 +96,7 @@ class Catalog:
         self._summaries = Summaries(marks.parent / "history", self._entries)
         self._lock = threading.RLock()
         self._table: DeltaTable | None = None
-        self._files = RowFiles(path, self._noted)
+        self._files = RowFiles(path, self._noted_hashes)
         self._hashes: dict[str, frozenset[str]] = {}
         self._rows: tuple[int, pa.Table] | None = None
         self._listed: dict[int, list[str]] = {}
@@ -124,7 +124,7 @@ class Catalog:
                     commit_properties=_properties(info),
                 )
             except DeltaError as error:
-                raise self._refused(error) from None
+                raise self._refusal_of(error) from None
             entry = (Path(folder) / "_delta_log" / self._entries.path(0).name).read_bytes()
         if not self._entries.adopt(0, entry):
             raise ConflictError("another process is making a lake there", where=str(self.path), fix="open that one")
@@ -286,7 +286,7 @@ class Catalog:
         try:
             self._open(version).create_checkpoint()
         except DeltaError as error:
-            raise self._refused(error) from None
+            raise self._refusal_of(error) from None
         if isinstance(self._log, Path):
             flush_file(self._log / f"{version:020d}{CHECKPOINT}")
             if (hint := self._log / HINT).exists():
@@ -320,7 +320,7 @@ class Catalog:
         Raises:
             CorruptError: a log entry that cannot be read.
         """
-        return self._entries.changed()
+        return self._entries.changed_entries()
 
     @_one_at_a_time
     def history(self, limit: int | None = None) -> list[dict[str, Any]]:
@@ -339,11 +339,11 @@ class Catalog:
             cached = (len(summarised) - 1, [dict(version) for version in reversed(summarised)])
         # Entries never change, so that a process reads each once: in a bucket each is a request.
         unread = range(cached[0] + 1, head + 1)
-        later = map(self._stated, unread, self._entries.entries(unread, head=head))
+        later = map(self._version_entry, unread, self._entries.entries(unread, head=head))
         self._history = (head, [*reversed([*later]), *cached[1]])
         return self._history[1][:limit]
 
-    def _stated(self, version: int, entry: Entry) -> dict[str, Any]:
+    def _version_entry(self, version: int, entry: Entry) -> dict[str, Any]:
         """Returns what the log says of a version."""
         info = {k.removeprefix(_INFO_PREFIX): v for k, v in entry.info.items() if k.startswith(_INFO_PREFIX)}
         message = {key: entry.info.get(key) for key in ("timestamp", "operation")}
@@ -352,7 +352,7 @@ class Catalog:
             raise self._entries.damaged(version)
         return version_facts
 
-    def _noted(self, name: str) -> frozenset[str]:
+    def _noted_hashes(self, name: str) -> frozenset[str]:
         """Returns the SHA-256 of a file as its commit noted it; nothing where it noted none. Of one whose commit is
         known from a summary without names of files, those of all such commits."""
         if name not in self._hashes:
@@ -444,7 +444,7 @@ class Catalog:
                 fix="run flagdata doctor: it lists the refs that cannot be read",
             )
         with self._log_errors(version):
-            table = self._table = self._repeated(lambda: self._at(version))
+            table = self._table = self._repeat_reading(lambda: self._at(version))
         unknown = [f.name for f in table.schema().fields if f.name not in CATALOG]
         if unknown:
             raise newer(f"the catalog has the columns {', '.join(unknown)}", self.path)
@@ -471,7 +471,7 @@ class Catalog:
                 ) from None
             first = str(error).splitlines()[0].removeprefix(_KERNEL)  # without the Delta library's stack
             first = plain(first) if isinstance(self._log, RemotePath) else first
-            blamed = self._blamed(version)
+            blamed = self._first_unreadable(version)
             saving = blamed.name.endswith(CHECKPOINT)
             raise CorruptError(
                 f"{'a checkpoint' if saving else 'an entry'} of the catalog's log cannot be read: {first}",
@@ -479,7 +479,7 @@ class Catalog:
                 fix=f"{_DELETE}; if that does not help, {HEAL}" if saving else HEAL,
             ) from None
 
-    def _blamed(self, version: int) -> Place:
+    def _first_unreadable(self, version: int) -> Place:
         """Finds the entry, or checkpoint, with which the first version begins that the Delta library cannot open."""
         low, high = 0, version
         while low < high:
@@ -503,7 +503,7 @@ class Catalog:
             table = DeltaTable(self.path.as_uri(), version=version, storage_options=self._options())
         return table
 
-    def _repeated(self, reading: Callable[[], T]) -> T:
+    def _repeat_reading(self, reading: Callable[[], T]) -> T:
         """Repeats what the Delta library reads, which does not ask again where an answer of a store breaks off."""
         for _ in range(_BROKEN):
             try:
@@ -516,7 +516,7 @@ class Catalog:
                     raise
         return reading()
 
-    def _refused(self, error: DeltaError) -> OSError:
+    def _refusal_of(self, error: DeltaError) -> OSError:
         """Turns what the Delta library could not write into an error of the system."""
         if isinstance(self.path, RemotePath):
             return refusal(error, bucket=self.path.bucket, where=str(self.path))
@@ -558,7 +558,7 @@ class Catalog:
         except CommitFailedError:
             raise Moved from None
         except DeltaError as error:
-            raise self._refused(error) from None
+            raise self._refusal_of(error) from None
         self._flush_log(version)
 
     def _flush_log(self, version: int) -> None:

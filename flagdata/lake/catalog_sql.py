@@ -158,11 +158,11 @@ class _Answer:
         self.question = question
         self._duckdb = duckdb
         self._connection = duckdb.connect(":memory:", config={**_SEALED, "memory_limit": f"{question.memory}B"})
-        self._connection.register("stored", _stored(question))
+        self._connection.register("stored", _answer_of(question))
         self._connection.execute(f"CREATE VIEW catalog AS SELECT {_view_columns(question.labels)} FROM stored")
         self._connection.execute("SET TimeZone = 'UTC'")
         self._connection.execute("SET lock_configuration = true")
-        self._relation = self._filtered() if question.sql is None else self._sql(question.sql)
+        self._relation = self._filtered_rows() if question.sql is None else self._sql(question.sql)
         self._parts: Iterator[pa.RecordBatch] = iter(())
 
     def _sql(self, sql: str) -> Any:
@@ -176,7 +176,7 @@ class _Answer:
             raise UsageError("the SQL returns no rows to show", where=sql, fix="give a SELECT from catalog")
         return relation
 
-    def _filtered(self) -> Any:
+    def _filtered_rows(self) -> Any:
         relation = self._connection.view("catalog")
         if self.question.where is not None:
             relation = relation.filter(self.question.where)
@@ -212,21 +212,21 @@ class _Answer:
         for block in raw:
             block.validate(full=True)  # a scan may give text that is not UTF-8
             if blocks and (rows + block.num_rows > size or held_bytes + block.nbytes > PART):
-                yield _joined(blocks)
+                yield _join_batches(blocks)
                 blocks, rows, held_bytes = [], 0, 0
             if block.num_rows > size or block.nbytes > PART:
-                yield from self._halved(block, size)
+                yield from self._halve_block(block, size)
                 continue
             blocks.append(block)
             rows, held_bytes = rows + block.num_rows, held_bytes + block.nbytes
         if blocks:
-            yield _joined(blocks)
+            yield _join_batches(blocks)
 
-    def _halved(self, block: pa.RecordBatch, size: int) -> Iterator[pa.RecordBatch]:
+    def _halve_block(self, block: pa.RecordBatch, size: int) -> Iterator[pa.RecordBatch]:
         if block.num_rows > 1 and (block.num_rows > size or block.nbytes > PART):
             half = block.num_rows // 2
-            yield from self._halved(block.slice(0, half), size)
-            yield from self._halved(block.slice(half), size)
+            yield from self._halve_block(block.slice(0, half), size)
+            yield from self._halve_block(block.slice(half), size)
             return
         if block.num_rows == 1 and (block.nbytes > ROW_BYTES or sum(map(_leaves, block.columns)) > ROW_LIMIT):
             raise LimitError(
@@ -237,7 +237,7 @@ class _Answer:
         yield block
 
 
-def _stored(question: Question) -> Any:
+def _answer_of(question: Question) -> Any:
     if isinstance(question.rows, pa.Table):
         return question.rows
     contents, condition = question.rows
@@ -253,7 +253,7 @@ def dataset_of(contents: Sequence[pa.Buffer], condition: pc.Expression | None) -
     return rows if condition is None else rows.filter(condition)
 
 
-def _joined(batches: Sequence[pa.RecordBatch]) -> pa.RecordBatch:
+def _join_batches(batches: Sequence[pa.RecordBatch]) -> pa.RecordBatch:
     return batches[0] if len(batches) == 1 else pa.concat_batches(batches)
 
 

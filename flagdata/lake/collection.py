@@ -28,10 +28,10 @@ from flagdata.core.schema import Kind
 from flagdata.lake.artifact import OBJECT_NAME
 from flagdata.lake.lake import Lake
 from flagdata.lake.lake_layout import STORES, check_own
-from flagdata.lake.leases import LeaseState, last_written, leases, looking, unleased
+from flagdata.lake.leases import LeaseState, last_written, leases, looking, unleased_entries
 from flagdata.lake.marking import Marked, catalog_files, mark
 from flagdata.lake.objects import Objects, bytes_at, path_in_lake
-from flagdata.lake.removal import unfinished
+from flagdata.lake.removal import find_unfinished
 from flagdata.storage import Place, RemotePath, StoreError
 from flagdata.storage.uploads import Upload
 
@@ -100,7 +100,7 @@ def _find(lake: Lake, grace: timedelta) -> Garbage:
     marked = mark(lake, grace=grace)
     # Rows read from a changed file may name other objects than those they need, so files are re-hashed first.
     marked.check(*catalog_files(lake))
-    deletable = unneeded(lake, marked, states, grace=grace)
+    deletable = list_garbage(lake, marked, states, grace=grace)
     try:
         limit = lake.now() - grace.total_seconds()
         abandoned = tuple(upload for upload in left_uploads(lake, states) if upload.begun <= limit)
@@ -126,7 +126,7 @@ def left_uploads(lake: Lake, states: Sequence[LeaseState]) -> tuple[Upload, ...]
     )
 
 
-def unneeded(lake: Lake, marked: Marked, states: Sequence[LeaseState], *, grace: timedelta) -> Garbage:
+def list_garbage(lake: Lake, marked: Marked, states: Sequence[LeaseState], *, grace: timedelta) -> Garbage:
     """Lists what neither a marked row nor a living transaction needs, and what is older than the grace period.
 
     Args:
@@ -136,10 +136,10 @@ def unneeded(lake: Lake, marked: Marked, states: Sequence[LeaseState], *, grace:
     """
     needed = marked.objects.union(*(state.objects for state in states if state.alive))
     limit = lake.now() - grace.total_seconds()
-    given_up = {left.name for left in unfinished(lake, needed)}
+    given_up = {left.name for left in find_unfinished(lake, needed)}
     objects = [o for o in lake.objects if o.name not in needed and (o.modified <= limit or o.name in given_up)]
     leftovers: list[Place] = [state.folder for state in states if state.leased and not state.alive]
-    leftovers += [path for path in unleased(lake.staging) if last_written(path) <= limit]
+    leftovers += [path for path in unleased_entries(lake.staging) if last_written(path) <= limit]
     leftovers += [path for path in lake.unpublished_files() if path.lstat().st_mtime <= limit]
     return Garbage(
         objects=tuple(o.name for o in objects),
@@ -211,7 +211,7 @@ def usage(lake: Lake, *, at: str | None = None, grace: timedelta) -> Usage:
     states = leases(lake.staging)  # before the catalog, as for a collection
     marked = mark(lake, grace=grace)
     marked.check()
-    freed = unneeded(lake, marked, states, grace=grace).size
+    freed = list_garbage(lake, marked, states, grace=grace).size
     sizes: Counter[str] = Counter()
     for key, size in files_of(lake.path):
         sizes[_owner(key)] += size

@@ -2,8 +2,8 @@
 
 Whatever changes a lake states a `Change`, and `commit` publishes it: it works out what each branch concerned shows
 afterwards, refuses what would not hold together, and writes the whole intent into one entry of the log. What then
-remains to be done (bytes to delete) is read from there, see `flagdata.lake.removal.unfinished`, so that a process which
-is killed leaves nothing half done that nobody knows of.
+remains to be done (bytes to delete) is read from there, see `flagdata.lake.removal.find_unfinished`, so that a process
+which is killed leaves nothing half done that nobody knows of.
 
 What is checked of the branch after the commit:
 
@@ -74,9 +74,9 @@ def commit(lake: Store, change: Change, *, base: int) -> int:
         ConflictError: what a branch would show does not hold together.
         NotFoundError: a new row would lack its object, or what it was made from.
     """
-    stored = {branch: _stored(lake, branch, ids, base) for branch, ids in change.leaving.items()}
+    stored = {branch: _rows_of_branch(lake, branch, ids, base) for branch, ids in change.leaving.items()}
     noted = _notes(lake, change, stored, base)
-    for branch in _concerned(change):
+    for branch in _concerned_branches(change):
         _check_rows(lake, change, branch, base)
     if change.branch is not None:
         before, after = _labels_around(lake, change.branch, change, noted, base)
@@ -102,7 +102,7 @@ def labels_after(lake: Store, branch: str, noted: Mapping[str, str], base: int) 
     return Lineage([entry, *lake.catalog.history()], forks).labels(Slice(branch=branch, version=base + 1))
 
 
-def _stored(lake: Store, branch: str, ids: Collection[str], base: int) -> frozenset[str]:
+def _rows_of_branch(lake: Store, branch: str, ids: Collection[str], base: int) -> frozenset[str]:
     """Selects the rows that a branch has itself; the others are of its base, which goes on to have them."""
     return lake.identities((Slice(branch=branch, version=base),)).intersection(ids) if ids else frozenset()
 
@@ -131,7 +131,7 @@ def _notes(lake: Store, change: Change, stored: Mapping[str, frozenset[str]], ba
     return noted | note_made({**older, **change.made})
 
 
-def _concerned(change: Change) -> Iterable[str]:
+def _concerned_branches(change: Change) -> Iterable[str]:
     """Lists the branches that show other rows afterwards, without one that is deleted."""
     branches = {*change.leaving, *([change.branch] if change.branch and change.fresh.num_rows else [])}
     return sorted(branch for branch in branches if change.deleted != ("branches", branch))

@@ -17,7 +17,7 @@ from datetime import timedelta
 
 from flagdata.core.files.durable import confirming, disk_errors
 from flagdata.core.findings import Finding, Severity
-from flagdata.core.printable import counted
+from flagdata.core.printable import count_of
 from flagdata.core.shell import command_line
 from flagdata.errors import ConflictError, CorruptError, FlagdataError
 from flagdata.lake.lake import Lake
@@ -175,7 +175,7 @@ def _unprintable(source: Lake, marked: Marked, *, versions: int) -> Iterator[Fin
     if columns:
         yield Finding.of(
             "control-characters",
-            f"{counted(unprintable.total(), 'text')} of {', '.join(columns)} hold control characters or marks of "
+            f"{count_of(unprintable.total(), 'text')} of {', '.join(columns)} hold control characters or marks of "
             "direction: they came as they are, and are shown escaped",
             count=unprintable.total(),
             where=str(source.path),

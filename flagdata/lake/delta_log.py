@@ -33,7 +33,7 @@ from typing import Any
 
 from flagdata.core.files.durable import HEAL, make_folders, put_if_absent, unreadable
 from flagdata.core.files.regular_files import open_regular
-from flagdata.core.numbered import bounded
+from flagdata.core.numbered import read_bounded
 from flagdata.core.provenance import digest, file_hash
 from flagdata.errors import CorruptError, ErrorKind, FlagdataError
 from flagdata.recipes.documents import from_json
@@ -145,7 +145,7 @@ class Log:
                 files.setdefault(name, info.get(FILE_HASH))
         return files
 
-    def changed(self) -> list[Place]:
+    def changed_entries(self) -> list[Place]:
         """Entries that are not any more what the next entry, or the mark, says they were; of older lakes' none.
 
         Raises:
@@ -210,7 +210,7 @@ class Log:
 
     def _read(self, version: int) -> Entry:
         text = self._text(version)
-        files, info = self._parsed(version, text)
+        files, info = self._parse_entry(version, text)
         return Entry(files=files, info=info, hash=digest(text))
 
     def marked(self, version: int) -> str | None:
@@ -238,7 +238,7 @@ class Log:
         Raises:
             CorruptError: it cannot be read.
         """
-        return self._parsed(version, entry.decode(errors="replace"))[1].get(FILE_HASH)
+        return self._parse_entry(version, entry.decode(errors="replace"))[1].get(FILE_HASH)
 
     def adopt(self, version: int, entry: bytes) -> bool:
         """Put an entry of another lake of the same history; False where there is another one of that version."""
@@ -249,9 +249,9 @@ class Log:
 
     def _content(self, version: int) -> tuple[list[str], dict[str, str]]:
         """Names of the files that an entry adds, and its commit info."""
-        return self._parsed(version, self._text(version))
+        return self._parse_entry(version, self._text(version))
 
-    def _parsed(self, version: int, text: str) -> tuple[list[str], dict[str, str]]:
+    def _parse_entry(self, version: int, text: str) -> tuple[list[str], dict[str, str]]:
         try:
             # Not splitlines: a message may hold one of the other line ends of Unicode.
             actions = [from_json(line) for line in text.split("\n") if line]
@@ -298,14 +298,14 @@ class Log:
     def checkpoints(self) -> list[int]:
         """Versions at which the Delta library finds all that is in the entries before."""
         matches = map(_CHECKPOINT, _sizes_in(self.folder))
-        return [version for match in matches if match and (version := bounded(match[1], most=_NEWEST)) is not None]
+        return [version for match in matches if match and (version := read_bounded(match[1], most=_NEWEST)) is not None]
 
     def present(self) -> dict[int, int | None]:
         """Maps the version of each entry to its size, where a listing states it."""
         sizes = _sizes_in(self.folder)
         for name in sizes.keys() - self._numbers.keys():
             match = _ENTRY(name)
-            version = bounded(match[1], most=_NEWEST) if match else None
+            version = read_bounded(match[1], most=_NEWEST) if match else None
             self._numbers[name] = -1 if version is None else version
         return {version: size for name, size in sizes.items() if (version := self._numbers[name]) >= 0}
 
@@ -314,7 +314,7 @@ class Log:
 
     @staticmethod
     def _marked_by(name: str) -> int | None:
-        return bounded(name, most=_NEWEST) if _MARK(name) else None
+        return read_bounded(name, most=_NEWEST) if _MARK(name) else None
 
     def _gap(self, missing: Sequence[int], present: Mapping[int, object], *, acknowledged: int) -> LogGapError:
         newest = max(present)
@@ -485,7 +485,7 @@ class Summaries:
         does."""
         names: dict[int, list[tuple[int, str]]] = {}
         for name in names_in(self._folder):
-            covered = _covered(name, head)
+            covered = _covered_versions(name, head)
             if covered is not None:
                 names.setdefault(covered[0], []).append((covered[1], name))
         chain: list[Summary] = []
@@ -514,13 +514,13 @@ class Summaries:
                 raise ValueError("its checksum is wrong")
             content = from_json(text)
             versions = content["versions"]
-            covered = _covered(name, _NEWEST)
+            covered = _covered_versions(name, _NEWEST)
             if covered is None or len(versions) != covered[1] + 1 - covered[0]:
                 raise ValueError("it states other versions than its name")
             if not all(map(is_stated, versions, count(covered[0]))):
                 raise ValueError("it states other versions than its name, or none")
             noted = content.get("checkpoints", {})
-            numbers = [version for number in noted if (version := bounded(number, most=_NEWEST)) is not None]
+            numbers = [version for number in noted if (version := read_bounded(number, most=_NEWEST)) is not None]
             checkpoints = dict(zip(numbers, map(str, noted.values()), strict=True))
             return Summary(
                 name=name, before=content["before"], end=content["end"], checkpoints=checkpoints, versions=versions
@@ -537,11 +537,11 @@ class Summaries:
 
 def summaries_in(folder: Place) -> list[str]:
     """Names of the summaries in a folder; what else is there is no part of the lake."""
-    return [name for name in names_in(folder) if _covered(name, _NEWEST) is not None]
+    return [name for name in names_in(folder) if _covered_versions(name, _NEWEST) is not None]
 
 
-def _covered(name: str, head: int) -> tuple[int, int] | None:
+def _covered_versions(name: str, head: int) -> tuple[int, int] | None:
     """Reads the first and the last version of a summary of its file's name; None of others, and of later than
     `head`."""
-    first, last = (bounded(number, most=head) for number in f"{name}-".split("-")[:2])
+    first, last = (read_bounded(number, most=head) for number in f"{name}-".split("-")[:2])
     return None if first is None or last is None else (first, last)

@@ -16,7 +16,7 @@ import pyarrow as pa
 from flagdata.core.files.durable import HEAL, SCRATCH
 from flagdata.core.files.regular_files import is_beside
 from flagdata.core.findings import Finding, Severity
-from flagdata.core.printable import SHORT, counted
+from flagdata.core.printable import SHORT, count_of
 from flagdata.core.schema import FORMAT_VERSION, Kind
 from flagdata.core.shell import command_line
 from flagdata.errors import FlagdataError
@@ -27,12 +27,12 @@ from flagdata.lake.label_columns import clashes, shown_labels
 from flagdata.lake.lake import Lake
 from flagdata.lake.lake_layout import FOLDERS, STORES, foreign_entries
 from flagdata.lake.lake_locks import COLLECT, TURN
-from flagdata.lake.leases import LeaseState, last_written, leases, looking, unleased
+from flagdata.lake.leases import LeaseState, last_written, leases, looking, unleased_entries
 from flagdata.lake.lineage import removals
 from flagdata.lake.marking import Marked, catalog_files, mark
 from flagdata.lake.objects import DAMAGED, StoredObject
 from flagdata.lake.refs import MAIN
-from flagdata.lake.removal import Unfinished, erased_objects, unfinished
+from flagdata.lake.removal import Unfinished, erased_objects, find_unfinished
 from flagdata.lake.removal import left as rows_left
 from flagdata.storage import Place, StoreError
 from flagdata.storage.uploads import Upload
@@ -87,11 +87,11 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
     ):  # in an empty one, a lock would have to be made
         with looking(lake.staging):
             states = leases(lake.staging)
-            unowned = [(path, last_written(path)) for path in unleased(lake.staging)]
+            unowned = [(path, last_written(path)) for path in unleased_entries(lake.staging)]
     # The catalog last: what was put by now is protected by a lease read above, or committed below, or left behind.
     marked = mark(lake, grace=grace)
     limit = lake.now() - grace.total_seconds()
-    findings = [*map(_linked, foreign), *marked.findings, *_rows(lake, marked, foreign)]
+    findings = [*map(_linked_finding, foreign), *marked.findings, *_rows(lake, marked, foreign)]
     if LogGapError.kind in {finding.kind for finding in marked.findings}:
         return tuple(findings)  # what follows would call the files of the missing entries' commits leftovers
     if not marked.findings:
@@ -99,11 +99,11 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
         needed = marked.objects | in_use
         leftovers: dict[str, Unfinished] = {}
         try:
-            leftovers = {left.name: left for left in unfinished(lake, needed)}
+            leftovers = {left.name: left for left in find_unfinished(lake, needed)}
             findings += _gone(lake, marked, {stored_object.name for stored_object in stored})
         except FlagdataError as error:
             findings.append(_log_damaged(error))
-        findings += [_unfinished(lake, left) for left in leftovers.values()]
+        findings += [_unfinished_finding(lake, left) for left in leftovers.values()]
         findings += [
             _orphan(stored_object, limit, grace)
             for stored_object in stored
@@ -112,10 +112,10 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
         findings += _left_uploads(lake, states, limit, grace)
     findings += _label_clashes(lake, marked)
     findings += [*_strays(lake, foreign), *_system_files(lake), *_ref_files(lake)]
-    findings += [_abandoned(state) for state in states if state.leased and not state.alive]
-    findings += [_unleased(path, written, limit, grace) for path, written in unowned]
+    findings += [_abandoned_finding(state) for state in states if state.leased and not state.alive]
+    findings += [_unleased_finding(path, written, limit, grace) for path, written in unowned]
     try:
-        findings += [_unpublished(path, limit, grace) for path in lake.unpublished_files()]
+        findings += [_unpublished_finding(path, limit, grace) for path in lake.unpublished_files()]
     except FlagdataError as error:
         findings.append(_log_damaged(error))
     return tuple(dict.fromkeys(findings))  # an entry that cannot be read stops more than one check
@@ -168,7 +168,7 @@ def read_refs(lake: Lake) -> Marked:
 def verify_catalog(lake: Lake, marked: Marked | None = None) -> tuple[Finding, ...]:
     """Hashes the catalog's files again and reads every ref; reports what is missing, damaged, a link or unchecked."""
     foreign = [path for path in _foreign(lake) if path.parent.name not in STORES]  # objects are `verify`'s
-    findings = (*map(_linked, foreign), *(marked or read_refs(lake)).findings, *catalog_files(lake))
+    findings = (*map(_linked_finding, foreign), *(marked or read_refs(lake)).findings, *catalog_files(lake))
     return tuple(dict.fromkeys(findings))  # an entry that cannot be read stops both
 
 
@@ -179,7 +179,7 @@ def object_names(lake: Lake, marked: Marked | None = None) -> list[str]:
     return sorted(needed | {stored.name for stored in lake.objects})
 
 
-def sampled(names: Sequence[str], count: int) -> list[str]:
+def sample_names(names: Sequence[str], count: int) -> list[str]:
     """Draws `count` of them at random, others each time, so that repeated checks come round to all."""
     return sorted(random.SystemRandom().sample(list(names), min(count, len(names))))
 
@@ -205,7 +205,7 @@ def _is_among(path: Place, foreign: Collection[Path]) -> bool:
     return isinstance(path, Path) and path in foreign
 
 
-def _linked(path: Path) -> Finding:
+def _linked_finding(path: Path) -> Finding:
     return Finding.of(
         "link",
         "a link or special file, or a folder that holds one: its content lies elsewhere, where it may change",
@@ -290,10 +290,14 @@ def _gone(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Finding]:
     Raises:
         CorruptError: what the log notes of it cannot be read.
     """
-    return [*_erased(lake, marked), *_expired(lake, marked, stored), *_collected(lake, marked, stored)]
+    return [
+        *_erased_findings(lake, marked),
+        *_expired_findings(lake, marked, stored),
+        *_collected_findings(lake, marked, stored),
+    ]
 
 
-def _erased(lake: Lake, marked: Marked) -> list[Finding]:
+def _erased_findings(lake: Lake, marked: Marked) -> list[Finding]:
     """Notes each tag or branch that lists rows whose data were erased."""
     gone = {name: why for name, why in erased_objects(lake).items() if name not in marked.objects}
     findings = []
@@ -314,7 +318,7 @@ def _erased(lake: Lake, marked: Marked) -> list[Finding]:
     return findings
 
 
-def _unfinished(lake: Lake, left: Unfinished) -> Finding:
+def _unfinished_finding(lake: Lake, left: Unfinished) -> Finding:
     """Warns of a commit that was cut off before all of its data were gone."""
     where = str(lake.objects.path(left.name))
     rest = f"what {left.name} holds ({left.reason}), and its bytes are still there: "
@@ -333,7 +337,7 @@ def _unfinished(lake: Lake, left: Unfinished) -> Finding:
     )
 
 
-def _expired(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Finding]:
+def _expired_findings(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Finding]:
     """Notes each commit that let versions expire, of which data went."""
     return [
         Finding.of(
@@ -346,14 +350,14 @@ def _expired(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Findin
         )
         for removal in removals(lake.catalog.history())
         for up_to, objects in (removal.expired,)
-        if (gone := objects - _needed(marked) - frozenset(stored))
+        if (gone := objects - _needed_objects(marked) - frozenset(stored))
     ]
 
 
-def _collected(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Finding]:
+def _collected_findings(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Finding]:
     """Notes where gc has deleted what was withdrawn, so that older versions show rows without data."""
     try:
-        gone = lake.catalog.objects() - _needed(marked) - frozenset(stored)
+        gone = lake.catalog.objects() - _needed_objects(marked) - frozenset(stored)
         removed = removals(lake.catalog.history())
         gone -= {name for removal in removed for name in removal.expired[1]}
         last = next((r for r in removed if not gone.isdisjoint(rows_left(lake, r).values())), None) if gone else None
@@ -374,7 +378,7 @@ def _collected(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Find
     ]
 
 
-def _needed(marked: Marked) -> frozenset[str]:
+def _needed_objects(marked: Marked) -> frozenset[str]:
     """Names of the objects that a branch or tag shows."""
     return frozenset(name for table in marked.refs.values() for name in table["object"].drop_null().to_pylist())
 
@@ -476,7 +480,7 @@ def _ref_files(lake: Lake) -> list[Finding]:
         done, fix = "written anew from the log", "none needed"
     except (OSError, FlagdataError):
         done, fix = "the lake can only be read, so that they stay as they are", "none needed: the log says what counts"
-    message = f"{counted(len(stale), 'file')} of tags and branches did not say what the log says: {done}"
+    message = f"{count_of(len(stale), 'file')} of tags and branches did not say what the log says: {done}"
     return [Finding.of("ref-file-stale", message, where=str(stale[0]), count=len(stale), fix=fix)]
 
 
@@ -491,7 +495,7 @@ def _system_files(lake: Lake) -> list[Finding]:
     )
     if not system_files:
         return []
-    message = f"{counted(len(system_files), 'file')} of an operating system, as .DS_Store: passed over"
+    message = f"{count_of(len(system_files), 'file')} of an operating system, as .DS_Store: passed over"
     fix = "none needed; they may be deleted"
     note = Severity.NOTE
     return [
@@ -501,7 +505,7 @@ def _system_files(lake: Lake) -> list[Finding]:
     ]
 
 
-def _abandoned(state: LeaseState) -> Finding:
+def _abandoned_finding(state: LeaseState) -> Finding:
     records = sorted(state.folder.glob("*.mcap"))
     fix = "run flagdata gc"
     if records:
@@ -514,7 +518,7 @@ def _abandoned(state: LeaseState) -> Finding:
     )
 
 
-def _unleased(path: Place, written: float, limit: float, grace: timedelta) -> Finding:
+def _unleased_finding(path: Place, written: float, limit: float, grace: timedelta) -> Finding:
     old = written <= limit
     return Finding(
         kind="staging-unleased",
@@ -527,7 +531,7 @@ def _unleased(path: Place, written: float, limit: float, grace: timedelta) -> Fi
     )
 
 
-def _unpublished(path: Place, limit: float, grace: timedelta) -> Finding:
+def _unpublished_finding(path: Place, limit: float, grace: timedelta) -> Finding:
     old = path.lstat().st_mtime <= limit
     return Finding(
         kind="write-left",

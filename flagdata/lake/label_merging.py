@@ -44,7 +44,7 @@ def merge_labels(
     for artifact in sorted(own.keys() | other.keys()):
         mine, its = own.get(artifact, {}), other.get(artifact, {})
         if artifact in here and artifact in there:
-            values = _merged(artifact, before.get(artifact, {}), mine, its, ours=ours, theirs=theirs)
+            values = _merge_labels(artifact, before.get(artifact, {}), mine, its, ours=ours, theirs=theirs)
         else:
             values = mine if artifact in here else its
         if values:
@@ -63,13 +63,17 @@ def amended_labels(read: Labels, wanted: Labels, shown: Collection[str]) -> dict
     amended: dict[str, dict[str, Value | None]] = {}
     for artifact in sorted((read.keys() | wanted.keys()).intersection(shown)):
         have, want = read.get(artifact, {}), wanted.get(artifact, {})
-        names = [name for name in sorted(have.keys() | want.keys()) if _typed(have.get(name)) != _typed(want.get(name))]
+        names = [
+            name
+            for name in sorted(have.keys() | want.keys())
+            if _typed_value(have.get(name)) != _typed_value(want.get(name))
+        ]
         if names:
             amended[artifact] = {name: want.get(name) for name in names}
     return amended
 
 
-def _merged(
+def _merge_labels(
     artifact: str,
     before: dict[str, Value],
     mine: dict[str, Value],
@@ -81,7 +85,7 @@ def _merged(
     """Merges the labels of one artifact, name by name."""
     values: dict[str, Value] = {}
     for name in sorted(mine.keys() | its.keys()):
-        was, own, other = (_typed(labels.get(name)) for labels in (before, mine, its))
+        was, own, other = (_typed_value(labels.get(name)) for labels in (before, mine, its))
         if own != other and was not in (own, other):
             raise _both_changed(artifact, name, mine.get(name), its.get(name), ours=ours.branch, theirs=theirs.branch)
         value = its.get(name) if own == was else mine.get(name)
@@ -90,7 +94,7 @@ def _merged(
     return values
 
 
-def _typed(value: Value | None) -> tuple[str, Value | None]:
+def _typed_value(value: Value | None) -> tuple[str, Value | None]:
     """Returns a value with its type: true is no 1."""
     return ("" if value is None else kind(value), value)
 

@@ -29,7 +29,7 @@ from flagdata.lake.objects import Objects
 from flagdata.lake.place_probing import probe
 from flagdata.lake.ref_commits import delete_ref, make_ref
 from flagdata.lake.refs import MAIN, Ref
-from flagdata.lake.removal import Erasure, Withdrawal, descendants, erase, explained, withdraw
+from flagdata.lake.removal import Erasure, Withdrawal, descendants, erase, explain_missing, withdraw
 from flagdata.lake.store import Store
 from flagdata.lake.transaction import Transaction
 from flagdata.recipes.documents import from_json
@@ -116,7 +116,7 @@ class Lake(Store):
         """Checks whether this process makes the lake: the one that succeeds in making its staging."""
         if isinstance(self.staging, RemotePath):
             self.check_writable()
-            return TimedLocks(self.staging).claimed(done=self.path / MARKER)
+            return TimedLocks(self.staging).is_claimed(done=self.path / MARKER)
         make_folders(self.path)
         try:
             self.staging.mkdir()
@@ -216,7 +216,7 @@ class Lake(Store):
         try:
             return self.objects.existing(object)
         except NotFoundError as error:
-            raise explained(self, object, error) from None
+            raise explain_missing(self, object, error) from None
 
     def record_place(self, object: str) -> Place:  # noqa: A002 — the catalog's name for it
         """Returns where `flagdata.record.Record.open` reads a record from: of a large one in a bucket the parts that
@@ -228,7 +228,7 @@ class Lake(Store):
         try:
             return self.objects.readable(object)
         except NotFoundError as error:
-            raise explained(self, object, error) from None
+            raise explain_missing(self, object, error) from None
 
     def openers(self, objects: Sequence[str]) -> tuple[Callable[[], Place], ...]:
         """Returns for each record a function that gives its place as `record_place` does, when it is needed; workers
@@ -241,7 +241,7 @@ class Lake(Store):
             return self.objects.openers(objects)
         except NotFoundError as error:
             name = next(name for name in objects if not self.objects.has(name))
-            raise explained(self, name, error) from None
+            raise explain_missing(self, name, error) from None
 
     def whole_object(self, object: str) -> Path:  # noqa: A002 — the catalog's name for it
         """Returns where an object lies, once its bytes have been compared with its name.
@@ -254,7 +254,7 @@ class Lake(Store):
         try:
             return self.objects.whole(object)
         except NotFoundError as error:
-            raise explained(self, object, error) from None
+            raise explain_missing(self, object, error) from None
 
     def resolve(self, at: str | None) -> int:
         """Returns the Delta version a ref stands for (for a tag of a branch, the branch's).

@@ -109,13 +109,13 @@ class KernelLocks:
     @contextmanager
     def sharing(self) -> Iterator[Check]:
         """Shares the lock, see `Locks.sharing`."""
-        with self._locked(fcntl.LOCK_SH):
+        with self._hold_lock(fcntl.LOCK_SH):
             yield _sure
 
     @contextmanager
     def alone(self) -> Iterator[Check]:
         """Takes the lock alone, see `Locks.alone`."""
-        with self._locked(fcntl.LOCK_EX):
+        with self._hold_lock(fcntl.LOCK_EX):
             yield _sure
 
     def note(self) -> FileNote:
@@ -129,13 +129,13 @@ class KernelLocks:
             return file.read().splitlines(), alive
 
     @contextmanager
-    def _locked(self, mode: int) -> Iterator[None]:
+    def _hold_lock(self, mode: int) -> Iterator[None]:
         """Takes the lock behind a turnstile: a process that waits for it holds the turnstile, so that a stream of
         shared holders cannot keep an exclusive one out for ever. Not to be nested."""
         with ExitStack() as stack:
-            with _opened(self.staging / TURN) as turn:
+            with _open_lock(self.staging / TURN) as turn:
                 lock(turn, fcntl.LOCK_EX, where=self.staging)
-                lock(stack.enter_context(_opened(self.staging / COLLECT)), mode, where=self.staging)
+                lock(stack.enter_context(_open_lock(self.staging / COLLECT)), mode, where=self.staging)
             yield
 
 
@@ -185,7 +185,7 @@ def _sure() -> None:
     """Checks nothing: the kernel keeps a lock until it is given up."""
 
 
-def _opened(path: Path) -> IO[str]:
+def _open_lock(path: Path) -> IO[str]:
     with disk_errors("locking the lake", path):
         if not os.path.lexists(path):
             make_folders(path.parent)  # copies of a lake may come without empty folders
@@ -259,7 +259,7 @@ class TimedLocks:
         alive = living(lease, self.staging) is not None
         return lease.read_bytes().decode(errors="replace").splitlines(), alive
 
-    def claimed(self, *, done: Place) -> bool:
+    def is_claimed(self, *, done: Place) -> bool:
         """Returns whether this process makes the lake: nobody did, or who did was killed before `done` was there."""
         text = _line({**owner(), "id": uuid.uuid4().hex})
         if (self.staging / MADE).create(text.encode()):
@@ -341,7 +341,7 @@ class Held:
         if self._e_tag is None:
             self.place.write_bytes(data)
         else:
-            tag = _replaced(self.place, self._e_tag, data)
+            tag = _replace_object(self.place, self._e_tag, data)
             self._lost = tag is None
             self._e_tag = tag or self._e_tag
         self._written = begun
@@ -365,7 +365,7 @@ def owner() -> dict[str, Any]:
         "since": datetime.now(UTC).isoformat(),
         "life": LIFE,
         "machine": _machine(),
-        "started": _started(os.getpid()),
+        "started": _start_of_process(os.getpid()),
     }
 
 
@@ -377,11 +377,11 @@ def _taken(lock: RemotePath, text: str, staging: RemotePath) -> str | None:
             return lock.stat().e_tag
         tag = lock.stat().e_tag
         if living(lock, staging) is None:
-            return _replaced(lock, tag, data)
+            return _replace_object(lock, tag, data)
     return None
 
 
-def _replaced(lock: RemotePath, tag: str | None, data: bytes) -> str | None:
+def _replace_object(lock: RemotePath, tag: str | None, data: bytes) -> str | None:
     """Replaces an object if it has that version, and returns its new one; `None` where it had another one.
 
     A request that is sent again because its first answer was lost finds what itself has put, and counts as done.
@@ -432,7 +432,7 @@ def living(lock: RemotePath, staging: RemotePath) -> dict[str, Any] | None:
         return None
     except (ValueError, KeyError, TypeError):
         content, life, machine, pid, started = {}, LIFE, None, 0, None
-    if machine is not None and machine == _machine() and _started(pid) != started:
+    if machine is not None and machine == _machine() and _start_of_process(pid) != started:
         return None
     with suppress(FileNotFoundError):
         written = RemotePath(lock.bucket, lock.key).stat().st_mtime
@@ -460,7 +460,7 @@ def _machine() -> str | None:
     return None
 
 
-def _started(pid: int) -> int | None:
+def _start_of_process(pid: int) -> int | None:
     """Reads when a process was started, in ticks since this machine was; None if it has ended."""
     try:
         fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()

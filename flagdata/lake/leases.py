@@ -129,7 +129,7 @@ def leases(staging: Place) -> list[LeaseState]:
     return states
 
 
-def unleased(staging: Place) -> list[Place]:
+def unleased_entries(staging: Place) -> list[Place]:
     """Entries of staging without a lease: folders without one, and files, by name."""
     # The shared locks' folder in a bucket is gone with the last of them, which may be between two requests.
     folders = [state.folder for state in leases(staging) if not state.leased]

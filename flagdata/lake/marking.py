@@ -90,7 +90,7 @@ def mark(lake: Store, *, grace: timedelta, first: int | None = None) -> Marked:
         try:
             view = lake.view(name)
             refs[name] = lake.table(view)
-            objects |= _objects(unerased(lake, refs[name], view))
+            objects |= _objects(unerase(lake, refs[name], view))
         except FlagdataError as error:
             findings.append(_unreadable(error, f"ref {name}"))
     try:
@@ -103,7 +103,7 @@ def mark(lake: Store, *, grace: timedelta, first: int | None = None) -> Marked:
     return Marked(refs=refs, objects=frozenset(objects), findings=tuple(findings))
 
 
-def unerased(lake: Store, rows: pa.Table, view: View) -> pa.Table:
+def unerase(lake: Store, rows: pa.Table, view: View) -> pa.Table:
     """Returns the rows that no version after those of a view erased."""
     newest = max(part.version for part in view)
     erased = {a for removal in removals(lake.catalog.history()) if removal.version > newest for a in removal.erased}
@@ -122,19 +122,19 @@ def catalog_files(lake: Store) -> tuple[Finding, ...]:
         changed = lake.catalog.changed_entries()
     except FlagdataError as error:
         return (Finding.of("log-damaged", error.what, where=error.where, fix=error.fix),)
-    findings = [_damaged("log-damaged", "an entry of the catalog's log has changed", path) for path in changed]
+    findings = [_damaged_finding("log-damaged", "an entry of the catalog's log has changed", path) for path in changed]
     for path, noted in sorted(hashes.items(), key=lambda item: str(item[0])):
         try:
             hash_now = file_hash(path)
         except FileNotFoundError:
-            findings.append(_damaged("catalog-file-missing", "a file of the catalog is missing", path))
+            findings.append(_damaged_finding("catalog-file-missing", "a file of the catalog is missing", path))
             continue
         except OSError as error:
             message = f"a file of the catalog cannot be read: {error.strerror}"
-            findings.append(_damaged("catalog-file-unreadable", message, path))
+            findings.append(_damaged_finding("catalog-file-unreadable", message, path))
             continue
         if noted is not None and hash_now != noted:
-            findings.append(_damaged("catalog-file-changed", "a file of the catalog has changed", path))
+            findings.append(_damaged_finding("catalog-file-changed", "a file of the catalog has changed", path))
     unchecked = list(hashes.values()).count(None)
     if unchecked:
         findings.append(
@@ -149,7 +149,7 @@ def catalog_files(lake: Store) -> tuple[Finding, ...]:
     return tuple(findings)
 
 
-def _damaged(kind: str, text: str, path: Place) -> Finding:
+def _damaged_finding(kind: str, text: str, path: Place) -> Finding:
     return Finding(kind=kind, severity=Severity.ERROR, what=text, where=str(path), fix=HEAL)
 
 
@@ -176,13 +176,13 @@ def _withdrawn(lake: Store, *, since: float, first: int | None) -> Iterator[pa.T
         if not recent and (first is None or before < first):
             continue
         if removal.withdrawn:
-            yield _unexpired(lake, lake.catalog.rows(before), (Slice(branch=MAIN, version=before),))
+            yield _rows_with_data(lake, lake.catalog.rows(before), (Slice(branch=MAIN, version=before),))
         for branch in removal.branches - _begun_without(removal):
             if removal.hidden(branch):  # rows of a base, which may have left the table long ago
                 view = lake.lineage().view(Slice(branch=branch, version=before))
-                yield _unexpired(lake, lake.table(view), view)
+                yield _rows_with_data(lake, lake.table(view), view)
         if recent and removal.deleted:
-            yield _unexpired(lake, lake.table(removal.view), removal.view)
+            yield _rows_with_data(lake, lake.table(removal.view), removal.view)
 
 
 def _begun_without(removal: Removal) -> frozenset[str]:
@@ -199,13 +199,13 @@ def _is_recent(lake: Store, removal: Removal, since: float) -> bool:
     )
 
 
-def _unexpired(lake: Store, rows: pa.Table, view: View) -> pa.Table:
+def _rows_with_data(lake: Store, rows: pa.Table, view: View) -> pa.Table:
     """Returns the rows that no version after those of a view erased, and whose data did not go since: with versions
     that expired, or with an erased artifact of the same bytes."""
     newest = max(part.version for part in view)
     later = [removal for removal in removals(lake.catalog.history()) if removal.version > newest]
     gone = {name for removal in later for name in (*removal.expired[1], *removal.erased.values()) if name is not None}
-    rows = unerased(lake, rows, view)
+    rows = unerase(lake, rows, view)
     return rows.filter(~pc.field("object").isin(pa.array(sorted(gone), pa.string()))) if gone else rows
 
 

@@ -79,7 +79,9 @@ def _attempt(lake: Store, branch: str, message: str, into: str) -> MergeResult:
     before = lake.identities(lineage.view(base)) if base is not None else frozenset()
     ids_here, ids_there = _ids(mine), _ids(theirs_rows)
     new = ids_there - before
-    left_out, brought_back = _decided(lake, ours, theirs, new - ids_here, since=-1 if base is None else base.version)
+    left_out, brought_back = _decide_withdrawals(
+        lake, ours, theirs, new - ids_here, since=-1 if base is None else base.version
+    )
     added, withdrawn = new - ids_here - left_out.keys(), (before - ids_there) & ids_here
     fresh = lake.matching(views[branch], {"artifact": sorted(added)})
     _check_objects(lake, fresh)
@@ -98,7 +100,7 @@ def _attempt(lake: Store, branch: str, message: str, into: str) -> MergeResult:
     change = Change(
         message=message,
         branch=into,
-        fresh=_published(fresh, into),
+        fresh=_published_rows(fresh, into),
         held=fresh["object"].drop_null().to_pylist(),
         leaving={into: withdrawn} if withdrawn else {},
         labels=amended_labels(labels_after(lake, into, {**notes, "branch": into}, head), labels, here | added),
@@ -120,7 +122,7 @@ def _ids(table: pa.Table) -> frozenset[str]:
     return frozenset(table["artifact"].to_pylist())
 
 
-def _published(rows: pa.Table, branch: str) -> pa.Table:
+def _published_rows(rows: pa.Table, branch: str) -> pa.Table:
     """Rows as committed on a branch now."""
     changed = {"branch": branch, "created": datetime.now(UTC)}
     for name, value in changed.items():
@@ -130,7 +132,7 @@ def _published(rows: pa.Table, branch: str) -> pa.Table:
     return rows
 
 
-def _decided(
+def _decide_withdrawals(
     lake: Store, ours: Slice, theirs: Slice, candidates: frozenset[str], *, since: int
 ) -> tuple[dict[str, int], dict[str, int]]:
     """Decides on new rows of the branch that ours withdrew after `since`: those that stay withdrawn, since the branch

@@ -85,12 +85,12 @@ class _Moving(ABC):
         return len(self.time)
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({self._described()})"
+        return f"{type(self).__name__}({self._description()})"
 
     def _repr_html_(self) -> str:
-        return table(self._described(), {name: str(value) for name, value in self.attributes.items()})
+        return table(self._description(), {name: str(value) for name, value in self.attributes.items()})
 
-    def _described(self) -> str:
+    def _description(self) -> str:
         seconds = (int(self.time[-1]) - int(self.time[0])) / NANOSECONDS if len(self) else 0.0
         first = self.frame(0)
         return f"{len(self)} frames in {seconds:.2f} s, {len(first.rest)} vertices, {len(first.faces)} faces"

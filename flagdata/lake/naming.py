@@ -48,7 +48,7 @@ def meant(rows: Iterable[Mapping[str, Any]], wanted: str, *, kinds: Collection[K
     matches = [row for row in matches if row["kind"] in kinds] or matches
     matches = [row for row in matches if row["kind"] != Kind.CLIP] or matches
     if len(matches) > 1 and "recipe" in matches[0]:
-        older = superseded(matches)
+        older = superseded_rows(matches)
         matches = [row for row in matches if row["artifact"] not in older]
     parents = {parent for row in matches for parent in row["parents"] or ()}
     return [row for row in matches if row["artifact"] not in parents]
@@ -59,13 +59,13 @@ REVISION = "revision"
 it. The models that a verdict left have that of the verdict."""
 
 
-def revised(recipe: Mapping[str, Any]) -> str | None:
+def first_revised(recipe: Mapping[str, Any]) -> str | None:
     """Returns the id of the first version of what a row revises; `None` where it revises nothing."""
     revision = recipe.get(REVISION)
     return revision.get("of") if isinstance(revision, Mapping) else None
 
 
-def superseded(rows: Iterable[Mapping[str, Any]]) -> set[str]:
+def superseded_rows(rows: Iterable[Mapping[str, Any]]) -> set[str]:
     """Ids of rows that a later one revises: them, their first version, or what they were made from.
 
     Args:
@@ -78,7 +78,7 @@ def superseded(rows: Iterable[Mapping[str, Any]]) -> set[str]:
         artifact, recipe = row["artifact"], row["recipe"]
         of = None
         if recipe and f'"{REVISION}"' in recipe:
-            of = revised(column_json(recipe, "recipe", artifact=artifact))
+            of = first_revised(column_json(recipe, "recipe", artifact=artifact))
         if of is not None:
             first[artifact] = of
             newest[of] = max(newest.get(of, row["created"]), row["created"])

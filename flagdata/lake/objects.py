@@ -21,7 +21,7 @@ from pathlib import Path
 
 from flagdata.core.files.checksums import content_hash, files_of, read_sums, size_of, sums_of
 from flagdata.core.files.durable import HEAL, flush_folder, flush_tree, make_folders
-from flagdata.core.files.object_cache import copy_of, fetched, forget, kept
+from flagdata.core.files.object_cache import copy_of, fetch_copy, forget, kept
 from flagdata.core.files.regular_files import is_beside
 from flagdata.errors import CorruptError, FlagdataError, InputError, NotFoundError
 from flagdata.lake.artifact import OBJECT_NAME
@@ -347,7 +347,7 @@ class RemoteObjects(Objects):
             return copy
         size = self.size(name)
         try:
-            return fetched(name, remote.suffix, size=size, fetch=partial(self._fetch, name), where=str(remote))
+            return fetch_copy(name, remote.suffix, size=size, fetch=partial(self._fetch, name), where=str(remote))
         except CorruptError:
             self.note_damage(name)
             raise
@@ -360,7 +360,7 @@ class RemoteObjects(Objects):
             NotFoundError, CorruptError: see `existing`.
         """
         remote = self.path(name)
-        if self._copied(name):
+        if self._is_copied(name):
             return self.existing(name)
         try:
             status = remote.stat()
@@ -371,7 +371,7 @@ class RemoteObjects(Objects):
 
     def openers(self, names: Sequence[str]) -> tuple[Callable[[], Place], ...]:
         """Returns functions as for a disk; what is needed is fetched once its function was called."""
-        if not all(map(self._copied, names)):
+        if not all(map(self._is_copied, names)):
             stored_names = {stored.name for stored in self}
             for name in names:
                 if name not in stored_names:
@@ -475,7 +475,7 @@ class RemoteObjects(Objects):
     def _flush_stores(self, stores: Collection[str]) -> None:
         """Does nothing: a store answers a deletion when it is done."""
 
-    def _copied(self, name: str) -> bool:
+    def _is_copied(self, name: str) -> bool:
         return copy_of(name, self.path(name).suffix) is not None
 
     def _put_last(self, name: str) -> RemotePath:

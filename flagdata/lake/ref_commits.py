@@ -24,7 +24,7 @@ from flagdata.errors import ConflictError, NotFoundError, UnknownNameError, Usag
 from flagdata.lake.attempts import persist
 from flagdata.lake.commits import Change, commit
 from flagdata.lake.lineage import removals
-from flagdata.lake.marking import unerased
+from flagdata.lake.marking import unerase
 from flagdata.lake.refs import ERASED, MAIN, NOUNS, Ref, View, as_json, check_name
 from flagdata.lake.removal import descendants, lost
 from flagdata.lake.store import Store
@@ -87,9 +87,9 @@ def _check_whole(lake: Store, view: View, head: int) -> frozenset[str]:
     if view in branches:
         return frozenset()
     rows = lake.columns(view, _WITH_DATA)
-    whole = unerased(lake, rows, view)
+    whole = unerase(lake, rows, view)
     on_branches = [lake.columns(each, _WITH_DATA) for each in branches]
-    of_tags = [unerased(lake, lake.columns(tag.view, _WITH_DATA), tag.view) for tag in lake.refs.tags().values()]
+    of_tags = [unerase(lake, lake.columns(tag.view, _WITH_DATA), tag.view) for tag in lake.refs.tags().values()]
     needed = {name for table in (*on_branches, *of_tags) for name in table["object"].to_pylist()}
     for why in lost(lake, whole.filter(~pc.field("object").isin(pa.array(needed, pa.string())))).values():
         raise ConflictError(why.what, where=str(lake.path), fix=_NEWER)

@@ -204,13 +204,13 @@ class Refs:
         Raises:
             CorruptError: a file that cannot be read, or has changed since it was written.
         """
-        found = {key: self._older(key, path) for key, path in self._unstated().items()}
+        found = {key: self._older(key, path) for key, path in self._unstated_files().items()}
         return {key: ref for key, ref in found.items() if ref is not None}
 
     def enterable(self, head: int) -> dict[Key, Ref]:
         """Reads those of them that the log can take: what is damaged, or names a version after `head`, stays a file."""
         found: dict[Key, Ref] = {}
-        for key, path in self._unstated().items():
+        for key, path in self._unstated_files().items():
             with suppress(FlagdataError):
                 ref = self._older(key, path)
                 if ref is not None and max(part.version for part in ref.view) <= head:
@@ -220,14 +220,14 @@ class Refs:
     def damaged(self) -> dict[Key, Place]:
         """Lists those of them that cannot be read, or have changed since they were written, by kind and name."""
         found: dict[Key, Place] = {}
-        for key, path in self._unstated().items():
+        for key, path in self._unstated_files().items():
             try:
                 self._read(path)
             except FlagdataError:
                 found[key] = path
         return found
 
-    def _unstated(self) -> dict[Key, Place]:
+    def _unstated_files(self) -> dict[Key, Place]:
         """Lists the files of refs that the log does not state, by kind and name."""
         files = {(kind, path.stem): path for kind in NOUNS for path in self._files(kind)}
         lives = self.lives() if files else {}
@@ -388,14 +388,14 @@ class Refs:
             ) from None
 
 
-def _stated(ref: Ref) -> dict[str, Any]:
+def _read_statement(ref: Ref) -> dict[str, Any]:
     """Returns what the log and a file state of a ref."""
     stated = {"name": ref.name, "created": ref.created, "view": as_json(ref.view)}
     return {**stated, **({"notes": dict(ref.notes)} if ref.notes else {})}
 
 
 def _from_stated(stated: Mapping[str, Any]) -> Ref:
-    """Reads what `_stated` returned.
+    """Reads what `_read_statement` returned.
 
     Raises:
         ValueError, KeyError, TypeError, AttributeError: it states no ref.
@@ -406,7 +406,7 @@ def _from_stated(stated: Mapping[str, Any]) -> Ref:
 
 def content_of(ref: Ref) -> bytes:
     """Writes what the file of a ref holds."""
-    content = {"schema": "flagdata.ref/1", **_stated(ref)}
+    content = {"schema": "flagdata.ref/1", **_read_statement(ref)}
     content[_HASH] = recipe_hash(content)
     return (json.dumps(content, indent=2) + "\n").encode()
 
@@ -419,7 +419,7 @@ DELETED = "deleted"
 
 def note_made(refs: Mapping[Key, Ref]) -> dict[str, str]:
     """Writes the note of a commit that makes some refs; none where there are none."""
-    made = [{"kind": kind, **_stated(ref)} for (kind, _), ref in refs.items()]
+    made = [{"kind": kind, **_read_statement(ref)} for (kind, _), ref in refs.items()]
     return {MADE: json.dumps(made, ensure_ascii=False)} if made else {}
 
 
@@ -473,7 +473,7 @@ def resolve(
     if _VERSION.fullmatch(at):
         number = at.lstrip("0") or "0"
         if len(number) > len(str(head)) or int(number) > head:  # Python reads no number of thousands of digits
-            raise NotFoundError(f"there is no version {_quoted(at)}", fix=f"the newest is {head}")
+            raise NotFoundError(f"there is no version {_quote_name(at)}", fix=f"the newest is {head}")
         return (Slice(branch=MAIN, version=int(number)),)
     if _COMMIT.fullmatch(at):
         views = commits()
@@ -496,9 +496,9 @@ def resolve(
 
 
 def _not_there(noun: str, at: str, names: Iterable[str]) -> NotFoundError:
-    at = _quoted(at)  # also since names that are alike are sought in time with the square of the length
+    at = _quote_name(at)  # also since names that are alike are sought in time with the square of the length
     return NotFoundError(f"there is no {noun} {at!r}", fix=UnknownNameError.of(noun, at, names).fix)
 
 
-def _quoted(name: str) -> str:
+def _quote_name(name: str) -> str:
     return name if len(name) <= _SHOWN else f"{name[:_SHOWN]}…"

@@ -8,7 +8,7 @@ note, see `flagdata.lake.lineage`. `gc` deletes their data after the grace perio
 *Erased*: off every branch by one commit, the bytes deleted at once, also where a tag or an old version shows them.
 Their rows stay in tags and older versions, which say what was erased and why. Objects that other rows need stay. What a
 lake cannot reach is named: exports, clones, caches. The commit comes first: a process that is killed before it has
-deleted the bytes, or a disk that refuses, leaves an erasure that the log knows, see `unfinished`. The same command
+deleted the bytes, or a disk that refuses, leaves an erasure that the log knows, see `find_unfinished`. The same command
 finishes it, and so does `gc`.
 
 *Expired*: the oldest versions give up the data that only they show, at once. Their rows stay readable, and what a
@@ -232,7 +232,7 @@ class Unfinished:
     reason: str
 
 
-def unfinished(lake: Store, needed: Collection[str]) -> list[Unfinished]:
+def find_unfinished(lake: Store, needed: Collection[str]) -> list[Unfinished]:
     """Finds what commits left to be done: objects that are stored though all artifacts of them were erased, or though
     they went with versions that expired; by name. Nothing else asks the log for that.
 
@@ -403,12 +403,12 @@ def left(lake: Store, removal: Removal) -> dict[str, str | None]:
     branch does or they came again."""
     if not removal.withdrawn:
         return {}
-    before, after = (_stored(lake, version) for version in (removal.version - 1, removal.version))
+    before, after = (_stored_rows(lake, version) for version in (removal.version - 1, removal.version))
     gone = pc.invert(pc.is_in(_keys(before), value_set=_keys(after)))  # type: ignore[attr-defined]
     return {row["artifact"]: row["object"] for row in before.filter(gone).to_pylist()}
 
 
-def _stored(lake: Store, version: int) -> pa.Table:
+def _stored_rows(lake: Store, version: int) -> pa.Table:
     columns = ["artifact", "branch", "object"]
     rows = lake.catalog.scan(version)
     return lake.catalog.rows(version).select(columns) if rows is None else rows.table(columns)
@@ -419,7 +419,7 @@ def _keys(rows: pa.Table) -> pa.ChunkedArray:
     return pc.binary_join_element_wise(rows["artifact"], rows["branch"], "/")  # type: ignore[attr-defined]
 
 
-def explained(lake: Store, name: str, missing: NotFoundError) -> NotFoundError:
+def explain_missing(lake: Store, name: str, missing: NotFoundError) -> NotFoundError:
     """Returns why an object is missing: it was erased, it went with versions that expired, or it was collected after a
     version withdrew it; `missing` where no version did, or where the catalog cannot be asked."""
     reasons = (
@@ -455,5 +455,5 @@ def lost(lake: Store, rows: pa.Table) -> dict[str, NotFoundError]:
     errors: dict[str, NotFoundError] = {}
     for name in sorted(rows["object"].drop_null().unique().to_pylist()):
         if not lake.objects.has(name):
-            errors[name] = explained(lake, name, lake.objects.missing(name))
+            errors[name] = explain_missing(lake, name, lake.objects.missing(name))
     return errors

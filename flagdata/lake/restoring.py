@@ -36,7 +36,7 @@ from flagdata.lake.lake_layout import FOLDERS, check_own
 from flagdata.lake.leases import Lease, collecting
 from flagdata.lake.marking import Marked
 from flagdata.lake.refs import MAIN, Deletion, Ref, content_of
-from flagdata.lake.removal import unfinished
+from flagdata.lake.removal import find_unfinished
 from flagdata.lake.right_entries import are_of_one_history, mending, read_bytes
 from flagdata.recipes.documents import from_json
 from flagdata.storage import Place, RemotePath
@@ -95,7 +95,7 @@ def heal(lake: Lake, source: Lake, *, bars: Bars) -> Healed:
         FlagdataError: what the disk or the store refused; what was taken before stays.
     """
 
-    def changed(lake: Lake, names: Sequence[str]) -> Iterator[str]:
+    def changed_objects(lake: Lake, names: Sequence[str]) -> Iterator[str]:
         with bars(len(names), "compare", "object") as advance:
             for name in names:
                 if lake.objects.is_whole(name):
@@ -104,20 +104,20 @@ def heal(lake: Lake, source: Lake, *, bars: Bars) -> Healed:
                     yield name
                 advance(1)
 
-    return _healed(lake, source, changed, bars=bars)
+    return _heal_lake(lake, source, changed_objects, bars=bars)
 
 
 def heal_noted(lake: Lake, source: Lake, *, bars: Bars) -> Healed:
     """As `heal`, but of the objects those alone that are missing, of another size, or were found damaged before."""
 
-    def noted(lake: Lake, names: Sequence[str]) -> Iterator[str]:
+    def noted_objects(lake: Lake, names: Sequence[str]) -> Iterator[str]:
         sizes = read_refs(lake).sizes
         return (name for name in names if not lake.objects.is_there(name, sizes.get(name)))
 
-    return _healed(lake, source, noted, bars=bars)
+    return _heal_lake(lake, source, noted_objects, bars=bars)
 
 
-def _healed(lake: Lake, source: Lake, unsound: Unsound, *, bars: Bars) -> Healed:
+def _heal_lake(lake: Lake, source: Lake, unsound: Unsound, *, bars: Bars) -> Healed:
     _check_kinship(lake, source)
     with disk_errors("healing", lake.path):
         check_own(lake.path)
@@ -128,22 +128,22 @@ def _healed(lake: Lake, source: Lake, unsound: Unsound, *, bars: Bars) -> Healed
                 check()
                 taken += heal_part(Lake(lake.path), source)
         lake = Lake(lake.path)
-        marked, names = _needed(lake)
+        marked, names = _needed_objects(lake)
         missing = [*unsound(lake, names)]
         came = {taken.name: taken for taken in _objects(lake, source, missing, bars=bars)}
         taken += [*came.values(), *_copies(lake, names)]
     still_missing = [name for name in missing if name not in came]
-    damaged = (*_unmarked(lake), *verify_catalog(lake, marked), *verify(lake, still_missing, marked))
+    damaged = (*_marker_findings(lake), *verify_catalog(lake, marked), *verify(lake, still_missing, marked))
     left = tuple(finding for finding in damaged if finding.severity is Severity.ERROR)
     return Healed(taken=tuple(taken), left=left)
 
 
-def _needed(lake: Lake) -> tuple[Marked, list[str]]:
+def _needed_objects(lake: Lake) -> tuple[Marked, list[str]]:
     """Reads what refs show, and lists the objects that are needed or stored, but for what was erased."""
     marked = read_refs(lake)
     erased: set[str] = set()
     with suppress(FlagdataError):  # of a log that is damaged still, so that no erasure is known
-        erased = {left.name for left in unfinished(lake, marked.objects)}
+        erased = {left.name for left in find_unfinished(lake, marked.objects)}
     return marked, [name for name in object_names(lake, marked) if name not in erased]
 
 
@@ -188,11 +188,11 @@ def _put(path: Place, data: bytes, kind: str) -> Taken:
 
 
 def _marker(lake: Lake, source: Lake) -> Iterator[Taken]:
-    if _unmarked(lake) and not _unmarked(source):
+    if _marker_findings(lake) and not _marker_findings(source):
         yield _put(lake.path / MARKER, (source.path / MARKER).read_bytes(), "marker")
 
 
-def _unmarked(lake: Lake) -> list[Finding]:
+def _marker_findings(lake: Lake) -> list[Finding]:
     """Reports a marker that is missing or cannot be read."""
     try:
         Lake.open(lake.path)
@@ -314,7 +314,7 @@ def _objects(lake: Lake, source: Lake, names: Sequence[str], *, bars: Bars) -> I
     with closing(Lease(lake.staging)) as lease, bars(len(names), "objects", "object") as advance:
         for name in names:
             lease.hold(name)  # an erasure that begins later sees it
-        needed = {*_needed(Lake(lake.path))[1]}
+        needed = {*_needed_objects(Lake(lake.path))[1]}
         for name in names:
             with suppress(NotFoundError, CorruptError):  # of the other lake's
                 found = source.objects.whole(name)

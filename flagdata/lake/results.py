@@ -18,7 +18,7 @@ from flagdata.core.printable import SHORT
 from flagdata.core.schema import Kind
 from flagdata.lake.artifact import Artifact
 from flagdata.lake.lake import Lake
-from flagdata.lake.naming import REVISION, revised
+from flagdata.lake.naming import REVISION, first_revised
 from flagdata.lake.refs import MAIN
 from flagdata.lake.remaking import Remade, present
 from flagdata.lake.store import Store
@@ -65,14 +65,16 @@ def versions(lake: Store, result: Artifact, *, at: str | None = None) -> tuple[A
     """Lists the versions of a measurement that a ref shows, in the order of their commits; none of another kind."""
     if result.kind is not Kind.MEASUREMENT:
         return ()
-    first = revised(result.recipe) or result.id
+    first = first_revised(result.recipe) or result.id
     mentioned = pc.match_substring(pc.field("recipe"), first)  # type: ignore[attr-defined]
     wanted = (pc.field("kind") == result.kind.value) & ((pc.field("artifact") == first) | mentioned)
     rows = sorted(lake.meeting(lake.view(at), wanted).to_pylist(), key=lambda row: row["created"])
-    return tuple(version for version in map(Artifact.from_row, rows) if first in (version.id, revised(version.recipe)))
+    return tuple(
+        version for version in map(Artifact.from_row, rows) if first in (version.id, first_revised(version.recipe))
+    )
 
 
-def placed(lake: Store, result: Artifact, *, branch: str = MAIN) -> Placed:
+def place_result(lake: Store, result: Artifact, *, branch: str = MAIN) -> Placed:
     """Finds where a result goes that this code inferred: it is there already if the same code's is, else it is new.
 
     Args:
@@ -96,7 +98,8 @@ def keep(
     branch: str = MAIN,
     derived: Callable[[Artifact], Iterable[Artifact]] = lambda kept: (),
 ) -> Placed:
-    """Commits a result where it is new (see `placed`), or its object damaged or missing, with what was derived from it.
+    """Commits a result where it is new (see `place_result`), or its object damaged or missing, with what was derived
+    from it.
 
     Args:
         result: its row as a first version, without its object.
@@ -107,7 +110,7 @@ def keep(
         FlagdataError: as `Lake.transaction`.
     """
     with lake.transaction(message, branch=branch) as transaction:
-        placement = placed(lake, result, branch=branch)
+        placement = place_result(lake, result, branch=branch)
         if placement.new or present(lake, placement.artifact).whole is None:
             staged = transaction.staging(".zarr")
             write(staged)
@@ -115,5 +118,5 @@ def keep(
             for row in derived(placement.artifact):
                 transaction.add(row)
     if placement.new and placement.artifact.id not in transaction.result.added:  # another process was faster
-        return placed(lake, result, branch=branch)
+        return place_result(lake, result, branch=branch)
     return replace(placement, healed=transaction.result.healed.get(placement.artifact.id))

@@ -26,7 +26,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from flagdata.core.files.bounded_parquet import check_stated
-from flagdata.core.files.buffers import owned
+from flagdata.core.files.buffers import own_copy
 from flagdata.core.files.durable import HEAL
 from flagdata.core.files.regular_files import open_regular
 from flagdata.core.schema import CATALOG, Kind, catalog_schema
@@ -178,7 +178,7 @@ class RowFiles:
         if name in self._contents:
             return self._contents[name]
         with self._reading(name), open_regular(self._folder / name) as stream:
-            content = owned(stream.read())
+            content = own_copy(stream.read())
             where = str(self._folder / name)
             noted = self._noted(name)
             if noted and hashlib.sha256(content).hexdigest() not in noted:

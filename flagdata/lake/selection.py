@@ -198,7 +198,7 @@ class Selection:
         try:
             if self._left <= 0:
                 raise EndedError(End.LATE)
-            self._process.started()
+            self._process.wait_for_start()
             begun = time.monotonic()
             answer = self._process.ask((verb, self._number, *rest), seconds=self._left)
         except EndedError as ended:

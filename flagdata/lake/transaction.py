@@ -127,12 +127,12 @@ class Transaction:
         with disk_errors("committing", self._lake.catalog.path):
             try:
                 self._result = self._publish()
-                self._result = replace(self._result, healed=self._healed())
+                self._result = replace(self._result, healed=self._heal_rows())
             except (OSError, FlagdataError):
                 if self._result is None:
                     raise
 
-    def _healed(self) -> dict[str, Remade]:
+    def _heal_rows(self) -> dict[str, Remade]:
         objects = {identity: (name, name) for identity, name in self._restored.items()}
         objects |= {identity: (before, str(row.object)) for identity, (before, row) in self._moved.items()}
         remade = {pair: describe_remade(self._lake, before=pair[0], now=pair[1]) for pair in set(objects.values())}

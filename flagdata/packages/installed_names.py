@@ -90,7 +90,7 @@ class _Loader(SourceFileLoader):
 
     def source_to_code(self, data: Any, path: Any, *, _optimize: int = -1) -> Any:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Returns the code of the renamed source."""
-        return compile(renamed(decode_source(data), _ROOT), path, "exec", dont_inherit=True, optimize=_optimize)
+        return compile(rename_packages(decode_source(data), _ROOT), path, "exec", dont_inherit=True, optimize=_optimize)
 
     def path_stats(self, path: Any) -> Any:
         """Refuses to date the source, so that no byte code is read or kept: what is kept has the short names.
@@ -101,7 +101,7 @@ class _Loader(SourceFileLoader):
         raise OSError(path)
 
 
-def renamed(source: str, root: Path) -> str:
+def rename_packages(source: str, root: Path) -> str:
     """Renames the packages in Python source as they are in an installation.
 
     Args:
@@ -152,7 +152,7 @@ class BuildPackages(BuildPy):
         inside = root / "flagdata" / FOLDER
         shutil.rmtree(inside, ignore_errors=True)
         for path in sorted(root.rglob("*.py")):
-            path.write_text(renamed(path.read_text(encoding="utf-8"), root), encoding="utf-8")
+            path.write_text(rename_packages(path.read_text(encoding="utf-8"), root), encoding="utf-8")
         inside.mkdir()
         (inside / "__init__.py").write_text(_ABOUT, encoding="utf-8")
         for name in BESIDE:

@@ -38,12 +38,12 @@ def lazy_exports(package: str, file: str) -> Callable[[str], Any]:
 @cache
 def exports(file: str) -> dict[str, str]:
     """Returns name → module of what the source of a package hands out, read once."""
-    blocks = exported(ast.parse(Path(file).read_text(encoding="utf-8")))
+    blocks = export_blocks(ast.parse(Path(file).read_text(encoding="utf-8")))
     imports = [node for block in blocks for node in block.body if isinstance(node, ast.ImportFrom)]
     return {alias.name: node.module for node in imports if node.module for alias in node.names}
 
 
-def exported(tree: ast.Module) -> list[ast.If]:
+def export_blocks(tree: ast.Module) -> list[ast.If]:
     """Returns the blocks `if TYPE_CHECKING` of a package that calls `lazy_exports`, none of another module."""
     calls = [
         node

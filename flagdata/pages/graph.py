@@ -88,11 +88,11 @@ class GraphLayout:
 def layout(boxes: Sequence[Box], edges: Collection[tuple[str, str]]) -> GraphLayout:
     """Places for boxes and lines; arguments as of `svg`."""
     tall = _FIRST + NEXT * max(len(box.lines) for box in boxes)
-    columns, ways = _placed(boxes, edges, tall)
-    height = max(_stacked(column) for column in columns)
+    columns, ways = _place_boxes(boxes, edges, tall)
+    height = max(_height_of_column(column) for column in columns)
     _order(columns, ways)
     for column in columns:
-        y = _MARGIN + (height - _stacked(column)) / 2
+        y = _MARGIN + (height - _height_of_column(column)) / 2
         for box_place in column:
             box_place.y = y + box_place.height / 2
             y += box_place.height + _GAP_Y
@@ -129,7 +129,7 @@ def svg(boxes: Sequence[Box], edges: Collection[tuple[str, str]], *, title: str)
     return "\n".join(parts) + "\n"
 
 
-def _placed(
+def _place_boxes(
     boxes: Sequence[Box], edges: Collection[tuple[str, str]], tall: int
 ) -> tuple[list[list[Place]], list[tuple[str, ...]]]:
     """Places the boxes of each column, and lists the keys that each line leads through."""
@@ -172,7 +172,7 @@ def _mean(values: Sequence[float]) -> float:
     return sum(values) / len(values)
 
 
-def _stacked(column: Sequence[Place]) -> float:
+def _height_of_column(column: Sequence[Place]) -> float:
     return sum(box_place.height for box_place in column) + _GAP_Y * (len(column) - 1)
 
 

@@ -24,10 +24,14 @@ def png(boxes: Sequence[Box], edges: Collection[tuple[str, str]]) -> bytes:
     pen = ImageDraw.Draw(picture)
     for way in drawn.ways:
         for curve in graph.curves(way):
-            pen.line([_scaled(point) for point in _points(*curve)], fill=graph.RULE, width=3)
+            pen.line([_scale_point(point) for point in _points(*curve)], fill=graph.RULE, width=3)
         for column, passed in way[1:-1]:
             begin = graph.left(column)
-            pen.line([_scaled((begin, passed.y)), _scaled((begin + graph.WIDTH, passed.y))], fill=graph.RULE, width=3)
+            pen.line(
+                [_scale_point((begin, passed.y)), _scale_point((begin + graph.WIDTH, passed.y))],
+                fill=graph.RULE,
+                width=3,
+            )
     for box in boxes:
         _box(pen, box, *drawn.at[box.key])
     content = io.BytesIO()
@@ -38,10 +42,10 @@ def png(boxes: Sequence[Box], edges: Collection[tuple[str, str]]) -> bytes:
 def _box(pen: ImageDraw.ImageDraw, box: Box, column: int, box_place: graph.Place) -> None:
     x, y = graph.left(column), box_place.y - box_place.height / 2
     edge, width = (graph.MARKED, 5) if box.marked else (graph.RULE, 2)
-    corners = [_scaled((x, y)), _scaled((x + graph.WIDTH, y + box_place.height))]
+    corners = [_scale_point((x, y)), _scale_point((x + graph.WIDTH, y + box_place.height))]
     pen.rounded_rectangle(corners, radius=6 * _SCALE, fill=graph.PAPER, outline=edge, width=width)
     colour = graph.COLOURS.get(box.kind or "", graph.QUIET)
-    pen.rectangle([_scaled((x + 5, y + 8)), _scaled((x + 8, y + box_place.height - 8))], fill=colour)
+    pen.rectangle([_scale_point((x + 5, y + 8)), _scale_point((x + 8, y + box_place.height - 8))], fill=colour)
     _write(pen, (x + 14, y + 20), graph.cut(box.title, graph.TITLE_CELLS), size=13, colour=graph.INK)
     for number, text in enumerate(box.lines):
         below = (x + 14, y + 36 + graph.NEXT * number)
@@ -50,7 +54,7 @@ def _box(pen: ImageDraw.ImageDraw, box: Box, column: int, box_place: graph.Place
 
 def _write(pen: ImageDraw.ImageDraw, at: Point, text: str, *, size: int, colour: str) -> None:
     font = ImageFont.load_default(size * _SCALE)
-    pen.text(_scaled(at), _ascii(printable(text)), fill=colour, font=font, anchor="ls")
+    pen.text(_scale_point(at), _ascii(printable(text)), fill=colour, font=font, anchor="ls")
 
 
 def _ascii(text: str) -> str:
@@ -73,5 +77,5 @@ def _points(begin: Point, control_1: Point, control_2: Point, end: Point) -> lis
     return points
 
 
-def _scaled(point: Point) -> Point:
+def _scale_point(point: Point) -> Point:
     return _SCALE * point[0], _SCALE * point[1]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from flagdata.core.printable import SHORT
-from flagdata.lake.ancestry import Ancestry, Relative, grouped
+from flagdata.lake.ancestry import Ancestry, Relative, group_relatives
 from flagdata.pages.graph import Box, svg
 
 MOST = 8
@@ -41,7 +41,7 @@ def graph(
     for relative in ancestry.relatives.values():
         generations.setdefault(relative.generation, []).append(relative)
     for generation, members in generations.items():
-        for group in grouped(members, most=most):
+        for group in group_relatives(members, most=most):
             first = group[0]
             key_of |= {relative_in_group.artifact: first.artifact for relative_in_group in group}
             if len(group) > 1:

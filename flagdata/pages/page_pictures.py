@@ -35,7 +35,7 @@ def figure_url(figure: Figure, *, dpi: float = 110) -> str:
 
 def still(frame: UInt8Array | Image.Image, *, side: int | None = None) -> str:
     """Writes a frame (height, width) as a JPEG in a data URL, at its own size or `side` pixels wide and high."""
-    return _url([_sized(frame, side)], "jpeg", quality=85)
+    return _url([_shrink_picture(frame, side)], "jpeg", quality=85)
 
 
 def moving(clip: Sequence[UInt8Array] | UInt8Array, *, rate: float, side: int) -> str:
@@ -45,10 +45,12 @@ def moving(clip: Sequence[UInt8Array] | UInt8Array, *, rate: float, side: int) -
     square = min(frames.shape[1:3])
     top, left_edge = (frames.shape[1] - square) // 2, (frames.shape[2] - square) // 2
     cut = frames[:, top : top + square, left_edge : left_edge + square]
-    return _url([_sized(frame, side) for frame in cut], "webp", quality=60, duration=round(1000 / rate), loop=0)
+    return _url(
+        [_shrink_picture(frame, side) for frame in cut], "webp", quality=60, duration=round(1000 / rate), loop=0
+    )
 
 
-def _sized(frame: UInt8Array | Image.Image, side: int | None) -> Image.Image:
+def _shrink_picture(frame: UInt8Array | Image.Image, side: int | None) -> Image.Image:
     image = frame if isinstance(frame, Image.Image) else Image.fromarray(frame)
     return image if side is None else image.resize((side, side), Image.Resampling.LANCZOS)
 

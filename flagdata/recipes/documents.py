@@ -97,7 +97,7 @@ def from_json(text: str | bytes) -> Any:
         LimitsError: longer than `SIZE_LIMIT`, or nested deeper than `NESTING_LIMIT`.
         ValueError: not JSON, or a number that is not finite or of thousands of digits.
     """
-    content = _parsed(text)
+    content = _parse_text(text)
     _check(content)
     return content
 
@@ -109,7 +109,7 @@ def from_stored_json(text: str) -> Any:
         LimitsError: longer than `SIZE_LIMIT`, or nested deeper than `NESTING_LIMIT`.
         ValueError: not JSON, or a number of thousands of digits.
     """
-    content = _parsed(text)
+    content = _parse_text(text)
     for _ in _levels(content):
         pass
     return content
@@ -149,7 +149,7 @@ def read_json(path: Path, *, noun: str, fix: str = "restore it from a copy") -> 
     return content
 
 
-def _parsed(text: str | bytes) -> Any:
+def _parse_text(text: str | bytes) -> Any:
     _check_size(text)
     try:
         return json.loads(text)

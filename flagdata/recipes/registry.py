@@ -47,7 +47,7 @@ class Registry(Mapping[str, Any]):
         self._accepts = accepts
         self._found: dict[str, list[EntryPoint]] | None = None
 
-    def _added(self) -> dict[str, list[EntryPoint]]:
+    def _entry_points(self) -> dict[str, list[EntryPoint]]:
         """Lists the entry points of each name."""
         if self._found is None:
             self._found = {}
@@ -56,7 +56,7 @@ class Registry(Mapping[str, Any]):
         return self._found
 
     def __getitem__(self, name: str) -> Any:
-        added = self._added().get(name, [])
+        added = self._entry_points().get(name, [])
         if len(added) + (name in self._own) > 1:
             by = [*(["flagdata"] if name in self._own else []), *map(_package, added)]
             raise PlugInError(
@@ -65,14 +65,14 @@ class Registry(Mapping[str, Any]):
                 fix="rename the entry point of the installed package, or uninstall it",
             )
         if added:
-            return self._loaded(added[0])
+            return self._load_entry(added[0])
         if name not in self._own:
             raise UnknownNameError.of(self._noun, name, self)
-        return _imported(self._own[name])
+        return _import_target(self._own[name])
 
-    def _loaded(self, entry: EntryPoint) -> Any:
+    def _load_entry(self, entry: EntryPoint) -> Any:
         try:
-            entry_value = _imported(entry.value)
+            entry_value = _import_target(entry.value)
             why = (
                 None
                 if self._accepts(entry_value)
@@ -90,7 +90,7 @@ class Registry(Mapping[str, Any]):
 
     def package(self, name: str) -> str | None:
         """Names the installed package that adds a name; `None` for those of the table."""
-        added = self._added().get(name)
+        added = self._entry_points().get(name)
         return _package(added[-1]) if added else None
 
     def usable(self, names: Iterable[str] | None = None) -> Iterator[tuple[str, Any]]:
@@ -102,19 +102,19 @@ class Registry(Mapping[str, Any]):
                 _LOG.warning("warning: left out: %s\n  where: %s\n  fix:   %s", error.what, error.where, error.fix)
 
     def __contains__(self, name: object) -> bool:
-        return name in self._own or name in self._added()
+        return name in self._own or name in self._entry_points()
 
     def __iter__(self) -> Iterator[str]:
-        return iter(dict.fromkeys([*self._own, *self._added()]))
+        return iter(dict.fromkeys([*self._own, *self._entry_points()]))
 
     def __len__(self) -> int:
-        return len(self._own.keys() | self._added().keys())
+        return len(self._own.keys() | self._entry_points().keys())
 
 
 def _package(entry: EntryPoint) -> str:
     return f"package {entry.dist.name}" if entry.dist is not None else "a package"
 
 
-def _imported(target: str) -> Any:
+def _import_target(target: str) -> Any:
     module, _, attribute = target.partition(":")
     return getattr(import_module(module), attribute)

@@ -83,7 +83,7 @@ class Shelf:
 
     def title(self, name: str) -> str:
         """Returns what a recipe is, one line."""
-        table = parsed(self.named(name).text, where=name)
+        table = parse_recipe(self.named(name).text, where=name)
         return str(table.get("title") or table["about"])
 
     def named(self, name: str, *, where: str | None = None) -> Found:
@@ -151,7 +151,7 @@ def is_name(value: object) -> bool:
     return isinstance(value, str) and bool(value.strip()) and value.isprintable() and len(value) <= NAME_LIMIT
 
 
-def parsed(text: str, *, where: str) -> dict[str, Any]:
+def parse_recipe(text: str, *, where: str) -> dict[str, Any]:
     """Parses the tables of a recipe's text.
 
     Raises:

@@ -177,7 +177,7 @@ def entries(types: Mapping[str, Any], content: Any, *, where: str) -> dict[str, 
     Args:
         types: key → type, of all keys that may be there.
     """
-    angles = {key for key, kind in types.items() if _Mark.ANGLE in _stripped(kind)[1]}
+    angles = {key for key, kind in types.items() if _Mark.ANGLE in _strip_annotations(kind)[1]}
     check_keys(content, [*types, *(key + DEGREES for key in angles)], where=where)
     values = {}
     for key, kind in types.items():
@@ -209,7 +209,7 @@ def value(kind: Any, content: Any, *, key: str, where: str) -> Any:
     Raises:
         UnknownNameError, InputError, LimitError: as `read`.
     """
-    bare, notes = _stripped(kind)
+    bare, notes = _strip_annotations(kind)
     origin, inner = get_origin(bare), get_args(bare)
     if bare is Any:
         return content
@@ -220,14 +220,14 @@ def value(kind: Any, content: Any, *, key: str, where: str) -> Any:
     if _Mark.SPELLED in notes and isinstance(content, list | tuple):
         return tuple(str(item).strip() for item in content)
     if origin is tuple and inner[-1] is ... and isinstance(content, list | tuple):
-        item, marks = _stripped(inner[0])
+        item, marks = _strip_annotations(inner[0])
         if _is_table(item):
             return tuple(
                 _table(item, entry, where=f"{where} [[{key}]] {n}") for n, entry in enumerate(content, start=1)
             )
         if isinstance(item, EnumMeta) or any(isinstance(mark, Named) for mark in marks):
             return tuple(value(inner[0], item, key=key, where=where) for item in content)
-    return _converted(bare, notes, content, key=key, where=where)
+    return _convert_value(bare, notes, content, key=key, where=where)
 
 
 def _is_table(bare: Any) -> bool:
@@ -248,26 +248,26 @@ def _quantity(bare: Any, notes: list[Any], content: Any, *, key: str, where: str
     if isinstance(content, Mapping):
         quantity = read(Range, content, where=f"{where} {key}")
     else:
-        number = _converted(float, notes, content, key=key, where=where)
+        number = _convert_value(float, notes, content, key=key, where=where)
         quantity = Range(low=number, high=number) if bare is Range else number
     for end in ends(quantity):
-        _converted(float, notes, end, key=key, where=where)
+        _convert_value(float, notes, end, key=key, where=where)
     return quantity
 
 
 def _in_degrees(kind: Any, content: Mapping[str, Any], *, key: str, where: str) -> Quantity:
     """Reads an angle that is given in degrees [rad]."""
-    bare, notes = _stripped(kind)
+    bare, notes = _strip_annotations(kind)
     spelled = key + DEGREES
     if key in content:
         raise InputError(f"{key} is given twice", where=where, fix=f"keep {key} or {spelled}")
     angle = in_radians(value(bare, content[spelled], key=spelled, where=where))
     for end in ends(angle):
-        _converted(float, notes, end, key=key, where=where)
+        _convert_value(float, notes, end, key=key, where=where)
     return angle
 
 
-def _converted(bare: Any, notes: list[Any], content: Any, *, key: str, where: str) -> Any:
+def _convert_value(bare: Any, notes: list[Any], content: Any, *, key: str, where: str) -> Any:
     """Converts a value to a type with bounds; raises as `read`."""
     bounds = [note for note in notes if isinstance(note, Meta)]
     if bare is int and not bounds:
@@ -300,13 +300,13 @@ def _refusal(bare: Any, bounds: list[Meta], content: Any, *, key: str, where: st
     most = min((bound.le for bound in bounds if bound.le is not None), default=math.inf)
     if bare is int and isinstance(content, int) and content > most:
         return LimitError(f"{key} is {_excerpt(content)}", where=where, fix=f"give at most {most}")
-    return InputError(f"{key} is {_excerpt(content)}", where=where, fix=f"give {_wanted(bare, bounds)}")
+    return InputError(f"{key} is {_excerpt(content)}", where=where, fix=f"give {_wanted_words(bare, bounds)}")
 
 
-def _wanted(bare: Any, bounds: list[Meta]) -> str:
+def _wanted_words(bare: Any, bounds: list[Meta]) -> str:
     """Returns what a value of a type looks like, in words."""
     if get_origin(bare) in (Union, UnionType):
-        return " or ".join(_wanted(*_stripped(kind)) for kind in get_args(bare))
+        return " or ".join(_wanted_words(*_strip_annotations(kind)) for kind in get_args(bare))
     if get_origin(bare) is Literal:
         return " or ".join(f'"{name}"' for name in get_args(bare))
     if get_origin(bare) is tuple:
@@ -321,13 +321,13 @@ def _wanted(bare: Any, bounds: list[Meta]) -> str:
 
 
 def _example(kind: Any) -> str:
-    bare = _stripped(kind)[0]
+    bare = _strip_annotations(kind)[0]
     if get_origin(bare) is tuple:
         return f"[{', '.join('…' if item is ... else _example(item) for item in get_args(bare))}]"
     return _EXAMPLES.get(bare, "{…}")
 
 
-def _stripped(kind: Any) -> tuple[Any, list[Any]]:
+def _strip_annotations(kind: Any) -> tuple[Any, list[Any]]:
     """Splits a type into itself without None, and what `Annotated` says of it."""
     notes: list[Any] = []
     while True:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from flagdata.record.reader import Record
     from flagdata.record.record_bytes import open_bytes
     from flagdata.record.record_checksums import CHECKSUMS, ChecksummedFile
-    from flagdata.record.unpacking import unpacked
+    from flagdata.record.unpacking import unpack_chunk
     from flagdata.record.video_archive import VideoEncoder, decode
     from flagdata.record.writer import Chunking, Coding, RecordWriter
 

@@ -171,7 +171,7 @@ class McapFile:
         self, *, log_time: int, name: str, media_type: str, data: Iterable[bytes], size: int, create_time: int = 0
     ) -> None:
         """Add an attachment of `size` bytes that come in pieces."""
-        fixed = [struct.pack("<QQ", log_time, create_time), *(_prefixed(text) for text in (name, media_type))]
+        fixed = [struct.pack("<QQ", log_time, create_time), *(_prefix_length(text) for text in (name, media_type))]
         head = b"".join(fixed) + struct.pack("<Q", size)
         length = len(head) + size + 4
         offset = self._at
@@ -292,6 +292,6 @@ def _bytes(record: McapRecord) -> bytes:
     return builder.end()
 
 
-def _prefixed(text: str) -> bytes:
+def _prefix_length(text: str) -> bytes:
     data = text.encode()
     return struct.pack("<I", len(data)) + data

@@ -52,7 +52,7 @@ from flagdata.record.metadata import SALVAGE
 from flagdata.record.record_bytes import open_bytes
 from flagdata.record.record_checksums import CHECKSUMS, ChecksummedFile
 from flagdata.record.record_file import Output
-from flagdata.record.unpacking import unpacked
+from flagdata.record.unpacking import unpack_chunk
 from flagdata.record.writer import CHUNK_BYTES, PROFILE, Chunking, library_name
 from flagdata.timebase import iso
 
@@ -343,7 +343,7 @@ class _Pass:
                 self._record(opcode, self._stream.read(length), start)
                 continue
             following = self._next_chunk(start + 1)
-            spared = self._spared(start, self._size if following is None else following)
+            spared = self._spare_messages(start, self._size if following is None else following)
             if opcode == Opcode.CHUNK and spared is None:
                 self._stream.seek(start + RECORD_HEAD)
                 self._partial(start)
@@ -368,7 +368,7 @@ class _Pass:
                     return None
                 try:
                     chunk = parse(Chunk.read, view[at + RECORD_HEAD : end], where=self._where)
-                    records = unpacked(chunk)
+                    records = unpack_chunk(chunk)
                 except FlagdataError:  # anything may follow a byte that only looks like a chunk's first
                     continue
                 if len(records) == chunk.uncompressed_size and zlib.crc32(records) == chunk.uncompressed_crc:
@@ -388,7 +388,7 @@ class _Pass:
         except FlagdataError as error:
             self._copy.find("damaged-record", Severity.ERROR, f"a record left out: {error.what}", where=f"byte {start}")
 
-    def _spared(self, start: int, end: int) -> tuple[int, int] | None:
+    def _spare_messages(self, start: int, end: int) -> tuple[int, int] | None:
         """Copies the messages of damaged bytes of the file that are sound by themselves: how many these are, and how
         many there were; `None` where the record does not state it."""
         messages = self._sound.between(start, end)
@@ -405,7 +405,7 @@ class _Pass:
         chunk = parse(Chunk.read, content, where=self._where)
         end = start + RECORD_HEAD + len(content)
         try:
-            records = unpacked(chunk)
+            records = unpack_chunk(chunk)
         except FlagdataError as error:
             return self._damaged_chunk(start, end, error.what)
         for opcode, record in _whole_records(records):
@@ -513,7 +513,7 @@ class _Pass:
             self._damage("unreadable", start, f"bytes {start} to {end} are damaged", spared)
 
     def _damaged_chunk(self, start: int, end: int, why: str) -> None:
-        spared = self._spared(start, end)
+        spared = self._spare_messages(start, end)
         self._damage("damaged-chunk", start, ("a chunk left out: " if spared is None else "a chunk: ") + why, spared)
 
     def _damage(self, kind: str, start: int, text: str, spared: tuple[int, int] | None = None) -> None:

@@ -22,7 +22,7 @@ _PIECE = 1 << 20
 _FIX = "run `flagdata recover` on the file"
 
 
-def unpacked(chunk: Chunk, *, where: str | None = None) -> memoryview:
+def unpack_chunk(chunk: Chunk, *, where: str | None = None) -> memoryview:
     """Unpacks the records of a chunk.
 
     Raises:
@@ -32,7 +32,7 @@ def unpacked(chunk: Chunk, *, where: str | None = None) -> memoryview:
     """
     if chunk.compression:
         check_stated(chunk.uncompressed_size, where=where)
-        data: bytes | bytearray = _joined(
+        data: bytes | bytearray = _join_pieces(
             _pieces(chunk.compression, chunk.data, where=where), chunk.uncompressed_size, where=where
         )
     else:
@@ -56,7 +56,7 @@ def check_stated(size: int, *, where: str | None = None) -> None:
         )
 
 
-def _joined(pieces: Iterator[bytes], stated_size: int, *, where: str | None) -> bytearray:
+def _join_pieces(pieces: Iterator[bytes], stated_size: int, *, where: str | None) -> bytearray:
     unpacked_bytes = bytearray()
     try:
         for piece in pieces:

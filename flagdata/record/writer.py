@@ -71,14 +71,14 @@ def samples(series: WindSeries, log_time: IntArray, rows: slice) -> Payloads:
     parts.append(_integer("flags", messages.WindSample, series.flags[rows].astype(np.int64)))
     if series.host_time is not None:
         parts.append(_timestamp("host_time", messages.WindSample, series.host_time[rows]))
-    return _joined(parts)
+    return _join_parts(parts)
 
 
 def means(average: WindAverage) -> Payloads:
     """Encodes `WindMean` of each bin."""
     kind = messages.WindMean
     period = np.full(len(average.time), average.period)
-    return _joined(
+    return _join_parts(
         [
             _timestamp("timestamp", kind, average.time),
             *(_double(name, kind, getattr(average, name), presence=False) for name in ("speed", "sigma", "direction")),
@@ -88,7 +88,7 @@ def means(average: WindAverage) -> Payloads:
     )
 
 
-def _joined(parts: Sequence[Payloads]) -> Payloads:
+def _join_parts(parts: Sequence[Payloads]) -> Payloads:
     return Payloads(data=np.hstack([p.data for p in parts]), used=np.hstack([p.used for p in parts]))
 
 
@@ -105,7 +105,7 @@ def _number(name: str, kind: object) -> int:
     return fields[name].number  # pyright: ignore[reportAttributeAccessIssue]
 
 
-def _tagged(tag: list[int], values: Payloads, present: BoolArray) -> Payloads:
+def _tag_values(tag: list[int], values: Payloads, present: BoolArray) -> Payloads:
     """Values (n, w) behind their tag; rows that are not `present` are empty."""
     n = len(present)
     front = np.broadcast_to(np.array(tag, dtype=np.uint8), (n, len(tag)))
@@ -121,26 +121,26 @@ def _double(name: str, kind: object, values: Series, *, presence: bool) -> Paylo
     bits = raw.view("<u8")
     written = np.ones(len(raw), dtype=bool) if presence else bits != 0
     data = raw.view(np.uint8).reshape(-1, 8)
-    return _tagged(_tag(_number(name, kind), _DOUBLE), Payloads(data=data, used=np.ones(data.shape, bool)), written)
+    return _tag_values(_tag(_number(name, kind), _DOUBLE), Payloads(data=data, used=np.ones(data.shape, bool)), written)
 
 
 def _integer(name: str, kind: object, values: IntArray) -> Payloads:
     """Encodes a whole number; 0 is left out."""
-    return _tagged(_tag(_number(name, kind), _VARINT), _varint(values), values != 0)
+    return _tag_values(_tag(_number(name, kind), _VARINT), _varint(values), values != 0)
 
 
 def _timestamp(name: str, kind: object, time: IntArray) -> Payloads:
     """Encodes a google.protobuf.Timestamp."""
     seconds, nanos = np.divmod(time, NANOSECONDS)
-    inner = _joined(
+    inner = _join_parts(
         [
-            _tagged(_tag(1, _VARINT), _varint(seconds), seconds != 0),
-            _tagged(_tag(2, _VARINT), _varint(nanos), nanos != 0),
+            _tag_values(_tag(1, _VARINT), _varint(seconds), seconds != 0),
+            _tag_values(_tag(2, _VARINT), _varint(nanos), nanos != 0),
         ]
     )
     length = inner.used.sum(axis=1, dtype=np.int64)[:, None].astype(np.uint8)
-    body = _joined([Payloads(data=length, used=np.ones(length.shape, bool)), inner])
-    return _tagged(_tag(_number(name, kind), _LENGTH), body, np.ones(len(time), dtype=bool))
+    body = _join_parts([Payloads(data=length, used=np.ones(length.shape, bool)), inner])
+    return _tag_values(_tag(_number(name, kind), _LENGTH), body, np.ones(len(time), dtype=bool))
 
 
 def _varint(values: IntArray) -> Payloads:
@@ -181,7 +181,7 @@ def pieces_of(path: Path, size: int) -> Iterator[bytes]:
         )
 
 
-def packed(data: Iterable[bytes], size: int) -> list[bytes] | None:
+def compress_pieces(data: Iterable[bytes], size: int) -> list[bytes] | None:
     """Compresses `data` of `size` bytes by gzip, in pieces; `None` where that is not smaller."""
     level = 1 if size > QUICK_ABOVE else 9
     coder = zlib.compressobj(level, zlib.DEFLATED, _GZIP)
@@ -390,7 +390,7 @@ class RecordWriter:
     def _attach(
         self, name: str, read: Callable[[], Iterable[bytes]], size: int, *, media_type: str, log_time: int
     ) -> None:
-        gzipped = packed(read(), size) if size > COMPRESS_ATTACHMENTS_ABOVE else None
+        gzipped = compress_pieces(read(), size) if size > COMPRESS_ATTACHMENTS_ABOVE else None
         if gzipped is not None:
             size, name, media_type = sum(map(len, gzipped)), f"{name}.gz", media_type + GZIP_SUFFIX
         data = read() if gzipped is None else gzipped

@@ -140,10 +140,10 @@ def plain(error: BaseException | str) -> str:
     if message := _MESSAGE.search(text):
         status = _STATUS.search(text)
         line = f"{status[1].strip()}: {message[1]}" if status else message[1]
-    return redacted(line)[:_SHOWN]
+    return redact_credentials(line)[:_SHOWN]
 
 
-def redacted(text: str) -> str:
+def redact_credentials(text: str) -> str:
     """Removes from `text` the credentials in use, the user of an address, and anything of the form of an access key."""
     for variable in _ENVIRONMENT:
         if (value := settings().get(variable)) and len(value) > 3:

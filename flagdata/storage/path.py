@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from flagdata.errors import UsageError
 from flagdata.storage import connection
 from flagdata.storage.refusals import DeniedError, StoreError, refusal, store_time
-from flagdata.storage.uploads import Upload, unfinished
+from flagdata.storage.uploads import Upload, list_unfinished
 
 if TYPE_CHECKING:
     from obstore.store import S3Store
@@ -208,11 +208,11 @@ class RemotePath:
         if file.stat().st_size <= BLOCK:
             self._upload(file)
             return
-        before = self._unfinished()
+        before = self._unfinished_uploads()
         try:
             self._upload(file)
         except BaseException:
-            for upload in self._unfinished() - before:
+            for upload in self._unfinished_uploads() - before:
                 with suppress(StoreError):  # what is left is a collection's
                     upload.abort()
             raise
@@ -223,7 +223,7 @@ class RemotePath:
         Raises:
             StoreError: the store did not list them; some cannot.
         """
-        beneath = unfinished(self.bucket, self.key)
+        beneath = list_unfinished(self.bucket, self.key)
         return [
             upload
             for upload in beneath
@@ -238,7 +238,7 @@ class RemotePath:
         """
         return store_time(self.bucket)
 
-    def _unfinished(self) -> set[Upload]:
+    def _unfinished_uploads(self) -> set[Upload]:
         """Lists what `uploads` gives; nothing where the store does not say."""
         with suppress(StoreError):
             return {*self.uploads()}
@@ -309,7 +309,7 @@ class RemotePath:
         broken = 0
         while True:
             try:
-                for meta in self._listed(offset):
+                for meta in self._list_beneath(offset):
                     offset = meta["path"]
                     yield meta["path"].removeprefix(prefix), _status(meta)
                 return
@@ -318,7 +318,7 @@ class RemotePath:
                 if not error.passing or broken == _BROKEN:
                     raise
 
-    def _listed(self, offset: str | None) -> Iterator[Any]:
+    def _list_beneath(self, offset: str | None) -> Iterator[Any]:
         """Yields what is beneath, after a key; a listing that breaks off cannot be gone on with."""
         store = connection.client(self.bucket)
         import obstore

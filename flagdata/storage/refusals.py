@@ -12,7 +12,7 @@ import time
 from dataclasses import dataclass
 
 from flagdata.storage.connection import COLOUR, plain, settings
-from flagdata.storage.requests import SHORTLY, Answer, Unreachable, asked
+from flagdata.storage.requests import SHORTLY, Answer, Unreachable, send_request
 
 _NEEDS = {
     "GET": "s3:GetObject",
@@ -170,11 +170,11 @@ def refusal(error: BaseException, *, bucket: str, where: str) -> StoreError:
     cause = _cause(code, status, text, bucket=bucket, needs=needs)
     passing = False
     if cause is None and status in _UNNAMED:
-        answer = asked(bucket, {"list-type": "2", "max-keys": "1"}, waits=SHORTLY)
+        answer = send_request(bucket, {"list-type": "2", "max-keys": "1"}, waits=SHORTLY)
         if isinstance(answer, Unreachable) and status is None and code is None:
             cause = Cause(what=answer.what, fix=answer.fix)
         elif isinstance(answer, Answer):
-            cause = _answered(answer, bucket=bucket, needs=needs, refused=status)
+            cause = _answered_cause(answer, bucket=bucket, needs=needs, refused=status)
             passing = cause is None and status is None
     if cause is None:
         cause = _of_status(status, needs)
@@ -185,7 +185,7 @@ def refusal(error: BaseException, *, bucket: str, where: str) -> StoreError:
     return error_found
 
 
-def refused(answer: Answer | Unreachable, *, bucket: str, where: str, needs: str) -> StoreError:
+def refusal_of(answer: Answer | Unreachable, *, bucket: str, where: str, needs: str) -> StoreError:
     """Returns the error for an answer that is not what was asked for.
 
     Args:
@@ -204,9 +204,9 @@ def store_time(bucket: str) -> float:
     Raises:
         StoreError: it did not answer, or stated no time.
     """
-    answer = asked(bucket, {"location": ""}, method="HEAD")
+    answer = send_request(bucket, {"location": ""}, method="HEAD")
     if isinstance(answer, Unreachable):
-        raise refused(answer, bucket=bucket, where=f"s3://{bucket}", needs="")
+        raise refusal_of(answer, bucket=bucket, where=f"s3://{bucket}", needs="")
     if answer.date is None:
         raise StoreError(errno.EREMOTEIO, "the store's answers do not state its time (Date)", f"s3://{bucket}")
     return answer.date.timestamp()
@@ -242,23 +242,23 @@ def _cause(code: str | None, status: int | None, text: str, *, bucket: str, need
     if code == "NoSuchBucket":
         return Cause(what=f"there is no bucket {bucket!r}", fix=NoBucketError.fix, kind=NoBucketError)
     if code in _CLOCK:
-        answer = asked(bucket, {"location": ""}, method="HEAD", waits=SHORTLY)
-        return _skewed(_ahead(answer) if isinstance(answer, Answer) else None)
+        answer = send_request(bucket, {"location": ""}, method="HEAD", waits=SHORTLY)
+        return _skewed_cause(_ahead(answer) if isinstance(answer, Answer) else None)
     if code is not None and (action := _ACTION.search(text)):
-        return _denied(action[1])
+        return _denied_cause(action[1])
     if code in ("AccessDenied", "Forbidden") or status == 401:
-        return _denied(needs) if "aws_access_key_id" in settings() else _MISSING
+        return _denied_cause(needs) if "aws_access_key_id" in settings() else _MISSING
     return _BY_CODE.get(code or "")
 
 
-def _answered(answer: Answer, *, bucket: str, needs: str, refused: int | None) -> Cause | None:
+def _answered_cause(answer: Answer, *, bucket: str, needs: str, refused: int | None) -> Cause | None:
     """Finds the cause that the store's answer to another request shows."""
     region = answer.headers.get("x-amz-bucket-region")
     if answer.status != 200 and region is not None and region != settings()["aws_region"]:
         return _abroad(region)
     ahead = _ahead(answer)
     if refused == 403 and ahead is not None and abs(ahead) > _AHEAD:
-        return _skewed(ahead)
+        return _skewed_cause(ahead)
     if answer.status == 301:
         return _abroad(None)
     if answer.status in _BY_STATUS:
@@ -273,7 +273,7 @@ def _answered(answer: Answer, *, bucket: str, needs: str, refused: int | None) -
 
 def _of_status(status: int | None, needs: str) -> Cause:
     if status in (401, 403):
-        return _denied(needs) if "aws_access_key_id" in settings() else _MISSING
+        return _denied_cause(needs) if "aws_access_key_id" in settings() else _MISSING
     if status in _BY_STATUS:
         return _BY_STATUS[status]
     if status is not None and status >= 500:
@@ -292,7 +292,7 @@ def _abroad(region: str | None) -> Cause:
     return Cause(what=f"the bucket is in the region {region}, not in {used}", fix=f"set AWS_REGION={region}{end}")
 
 
-def _skewed(ahead: float | None) -> Cause:
+def _skewed_cause(ahead: float | None) -> Cause:
     if ahead is None or abs(ahead) < _AHEAD:
         message = "this machine's clock differs from the store's"
     else:
@@ -301,7 +301,7 @@ def _skewed(ahead: float | None) -> Cause:
     return Cause(what=message, fix="set this machine's clock (by NTP)", kind=CredentialsError)
 
 
-def _denied(needs: str) -> Cause:
+def _denied_cause(needs: str) -> Cause:
     if needs.startswith("kms:"):
         fix = f"have {needs} permitted on the key that encrypts the bucket"
         return Cause(what="the key service does not permit it", fix=fix, kind=DeniedError)
@@ -310,7 +310,7 @@ def _denied(needs: str) -> Cause:
 
 
 def _region_of(bucket: str) -> str | None:
-    answer = asked(bucket, {"location": ""}, method="HEAD", waits=SHORTLY)
+    answer = send_request(bucket, {"location": ""}, method="HEAD", waits=SHORTLY)
     return answer.headers.get("x-amz-bucket-region") if isinstance(answer, Answer) else None
 
 

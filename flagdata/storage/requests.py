@@ -23,7 +23,7 @@ from typing import IO, Any
 from urllib.error import HTTPError, URLError
 from urllib.parse import quote, urlencode, urlsplit
 
-from flagdata.storage.connection import CONNECT_TIMEOUT, redacted, settings
+from flagdata.storage.connection import CONNECT_TIMEOUT, redact_credentials, settings
 
 _WAITS = (0.1, 0.3, 1.0, 2.0, 4.0)
 """Seconds before a request is sent again that the store, or the way to it, let fail."""
@@ -86,7 +86,7 @@ class _Staying(urllib.request.HTTPRedirectHandler):
         return None
 
 
-def asked(
+def send_request(
     bucket: str, query: Mapping[str, str], *, method: str = "GET", key: str = "", waits: Sequence[float] = _WAITS
 ) -> Answer | Unreachable:
     """Sends a request for a bucket, or for a key of it, and returns the store's answer.
@@ -106,7 +106,7 @@ def asked(
 def _once(bucket: str, query: Mapping[str, str], method: str, key: str) -> Answer | Unreachable:
     url = _address(bucket, key)
     text = urlencode(sorted(query.items()), quote_via=quote, safe="-_.~")
-    headers = signed(method, url, text, settings(), when=datetime.now(UTC))
+    headers = signed_headers(method, url, text, settings(), when=datetime.now(UTC))
     request = urllib.request.Request(urlsplit(url)._replace(query=text).geturl(), method=method, headers=headers)
     try:
         with urllib.request.build_opener(_Staying).open(request, timeout=2 * CONNECT_TIMEOUT) as answer:
@@ -118,7 +118,7 @@ def _once(bucket: str, query: Mapping[str, str], method: str, key: str) -> Answe
         return _unreachable(error.reason if isinstance(error, URLError) else error, url)
 
 
-def signed(
+def signed_headers(
     method: str, url: str, query: str, options: Mapping[str, str], *, when: datetime, service: str = "s3"
 ) -> dict[str, str]:
     """Signs the headers of a request without a body; without access keys those of one that nobody has signed.
@@ -173,7 +173,7 @@ def _unreachable(reason: Any, url: str) -> Unreachable:
     host = parts.hostname or ""
     proxy = urllib.request.getproxies().get(parts.scheme)
     if proxy is not None and not urllib.request.proxy_bypass(host):
-        message = f"there was no answer of {host} through the proxy {redacted(proxy)}: {_one_line(reason)}"
+        message = f"there was no answer of {host} through the proxy {redact_credentials(proxy)}: {_one_line(reason)}"
         variable = f"{parts.scheme.upper()}_PROXY"
         return Unreachable(
             what=message, fix=f"check {variable}, or name {host} in NO_PROXY to reach it without a proxy"
@@ -204,4 +204,4 @@ def _unreachable(reason: Any, url: str) -> Unreachable:
 
 
 def _one_line(reason: object) -> str:
-    return redacted(" ".join(str(reason).split()))[:200]
+    return redact_credentials(" ".join(str(reason).split()))[:200]

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from datetime import datetime
 from xml.etree import ElementTree as ET
 
-from flagdata.storage.refusals import refused
-from flagdata.storage.requests import Answer, asked
+from flagdata.storage.refusals import refusal_of
+from flagdata.storage.requests import Answer, send_request
 
 _PAGES = 1000
 """Most pages of a listing that are read, of 1,000 uploads each."""
@@ -43,27 +43,29 @@ class Upload:
         Raises:
             StoreError: the store did not.
         """
-        answer = asked(self.bucket, {"uploadId": self.identity}, method="DELETE", key=self.key)
+        answer = send_request(self.bucket, {"uploadId": self.identity}, method="DELETE", key=self.key)
         if not isinstance(answer, Answer) or answer.status not in _GONE:
-            raise refused(answer, bucket=self.bucket, where=str(self), needs="s3:AbortMultipartUpload")
+            raise refusal_of(answer, bucket=self.bucket, where=str(self), needs="s3:AbortMultipartUpload")
 
 
-def unfinished(bucket: str, prefix: str) -> list[Upload]:
+def list_unfinished(bucket: str, prefix: str) -> list[Upload]:
     """Lists the unfinished uploads whose keys begin so, by key.
 
     Raises:
         StoreError: the store did not list them; some cannot.
     """
-    return sorted(_listed(bucket, prefix), key=lambda upload: (upload.key, upload.begun))
+    return sorted(_list_uploads(bucket, prefix), key=lambda upload: (upload.key, upload.begun))
 
 
-def _listed(bucket: str, prefix: str) -> Iterator[Upload]:
+def _list_uploads(bucket: str, prefix: str) -> Iterator[Upload]:
     marks: dict[str, str] = {}
     for _ in range(_PAGES):
-        answer = asked(bucket, {"uploads": "", "prefix": prefix, **marks})
+        answer = send_request(bucket, {"uploads": "", "prefix": prefix, **marks})
         page = _page(answer)
         if page is None:
-            raise refused(answer, bucket=bucket, where=f"s3://{bucket}/{prefix}", needs="s3:ListBucketMultipartUploads")
+            raise refusal_of(
+                answer, bucket=bucket, where=f"s3://{bucket}/{prefix}", needs="s3:ListBucketMultipartUploads"
+            )
         for entry in page.findall("{*}Upload"):
             upload = _upload(bucket, entry)
             if upload is not None and upload.key.startswith(prefix):

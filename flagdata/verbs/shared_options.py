@@ -41,9 +41,9 @@ class OnLake:
         Raises:
             NotFoundError: there is none.
         """
-        from flagdata.dataset.lake_source import opened
+        from flagdata.dataset.lake_source import open_source
 
-        return opened(self.lake).lake
+        return open_source(self.lake).lake
 
     def found(self) -> Lake:
         """Finds the lake, also one that cannot be opened, for what heals it.

@@ -91,7 +91,7 @@ class Option:
     now: str = ""
     click: Mapping[str, Any] = field(default_factory=dict)
 
-    def spelled(self, key: str) -> str:
+    def spelling_of(self, key: str) -> str:
         """Returns the name on the command line that errors use, of the option of such a field."""
         return next((name for name in self.names if name.startswith("--")), f"--{key.replace('_', '-')}")
 
@@ -153,7 +153,7 @@ def options(form: C) -> C:
     return dataclass(frozen=True, kw_only=True)(form)
 
 
-def described(form: type) -> dict[str, tuple[Field[Any], Option]]:
+def described_fields(form: type) -> dict[str, tuple[Field[Any], Option]]:
     """Returns field → itself and its option: those of a class before those that it inherits.
 
     What a class states in `HELP`, field → text, stands in place of the help that it inherits.
@@ -161,23 +161,23 @@ def described(form: type) -> dict[str, tuple[Field[Any], Option]]:
     table = {one.name: one for one in fields(form)}
     names = dict.fromkeys(name for base in form.__mro__ for name in vars(base).get("__annotations__", ()))
     texts: dict[str, str] = getattr(form, "HELP", {})
-    return {name: (table[name], _helped(table[name], texts.get(name))) for name in names if name in table}
+    return {name: (table[name], _help_of_option(table[name], texts.get(name))) for name in names if name in table}
 
 
-def _helped(of_option: Field[Any], text: str | None) -> Option:
+def _help_of_option(of_option: Field[Any], text: str | None) -> Option:
     row: Option = of_option.metadata["option"]
     return row if text is None else replace(row, about=text)
 
 
-def typed(chosen: object) -> frozenset[str]:
+def typed_names(chosen: object) -> frozenset[str]:
     """Returns the names of the options that the user gave, at their defaults or not."""
     return vars(chosen).get("_typed", frozenset())
 
 
 def _with_typed(chosen: Any, names: frozenset[str]) -> Any:
-    for key, (_, row) in described(type(chosen)).items():
+    for key, (_, row) in described_fields(type(chosen)).items():
         if row.now and key in names:
-            say(f"{row.spelled(key)} is of the last version: give {row.now}", mark="warning")
+            say(f"{row.spelling_of(key)} is of the last version: give {row.now}", mark="warning")
     vars(chosen)["_typed"] = names
     return chosen
 
@@ -264,7 +264,7 @@ def command(
 
         return cls(
             name=run.__name__.strip("_").replace("_", "-"),
-            params=[_parameter(key, *row) for key, row in described(form).items()],
+            params=[_parameter(key, *row) for key, row in described_fields(form).items()],
             callback=callback,
             help=inspect.getdoc(run),
         )
@@ -310,7 +310,7 @@ def _parameter(key: str, place: Field[Any], row: Option) -> click.Parameter:
         more["multiple"] = True
     elif not required and place.default is not None:
         more = {"show_default": True, **more}
-    names = row.names or (row.spelled(key),)
+    names = row.names or (row.spelling_of(key),)
     default = {} if required else {"default": more.pop("default", place.default)}
     about = f"{row.about.removesuffix('.')}; also {more['envvar']}." if "envvar" in more else row.about
     return SectionedOption(
@@ -318,7 +318,7 @@ def _parameter(key: str, place: Field[Any], row: Option) -> click.Parameter:
     )
 
 
-def called(form: Callable[P, object]) -> Callable[[Callable[[Any], R]], Callable[P, R]]:
+def make_call(form: Callable[P, object]) -> Callable[[Callable[[Any], R]], Callable[P, R]]:
     """Makes the Python call of a verb from the class of its options and the function that runs it.
 
     Values become plain Python's, each by its annotation (`flagdata.core.arguments`). The options are described in the
@@ -327,12 +327,12 @@ def called(form: Callable[P, object]) -> Callable[[Callable[[Any], R]], Callable
     from flagdata.core.arguments import converter  # loads NumPy
 
     build: Any = form
-    rows = described(build)
+    rows = described_fields(build)
     converts = {key: plain for key, (place, _) in rows.items() if (plain := converter(str(place.type))) is not None}
     floats = {key for key, (place, _) in rows.items() if str(place.type).removesuffix(" | None") == "float"}
     signature = inspect.signature(form)
     renamed = {_keyword(old): key for key, (_, row) in rows.items() for old in row.was}
-    spelled = {name: key for key, (_, row) in rows.items() for name in (*row.names, row.spelled(key))}
+    spelled = {name: key for key, (_, row) in rows.items() for name in (*row.names, row.spelling_of(key))}
     ordered = sorted((signature.parameters[key] for key in rows), key=lambda one: one.kind)
 
     def made(run: Callable[[Any], R]) -> Callable[P, R]:
@@ -392,7 +392,7 @@ def verb(
 
     def made(run: Callable[[Any], Iterator[Result]]) -> Callable[P, Mapping[str, Any]]:
         @functools.wraps(run)
-        def printed(chosen: Any) -> None:
+        def print_result(chosen: Any) -> None:
             steps = run(chosen)
             result = next(steps, None)
             if result is None:
@@ -411,13 +411,13 @@ def verb(
                 return next(steps, _NOTHING).content
 
         bases: Any = (form, AsJson)
-        shown = command(options(type(run.__name__, bases, {"__module__": run.__module__})))(printed)
+        shown = command(options(type(run.__name__, bases, {"__module__": run.__module__})))(print_result)
         name = str(shown.name)
         about = (part for part in (inspect.getdoc(run) or "").split("\n\n") if not part.startswith("\b"))
         shows = (f"```python\n{example}\n```", f"Returns:\n    What `flagdata {name} --json` prints.")
         result.__doc__ = "\n\n".join((*about, *shows))
         result.__annotations__ = {"return": "Mapping[str, Any]"}
-        call = called(form)(result)
+        call = make_call(form)(result)
         vars(call).update(command=shown, result=result)
         return call
 

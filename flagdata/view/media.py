@@ -18,7 +18,7 @@ from flagdata.core.arrays import FloatArray
 from flagdata.core.schema import Kind
 from flagdata.errors import CorruptError, NotFoundError, UsageError
 from flagdata.lake import Lake
-from flagdata.lake.removal import explained
+from flagdata.lake.removal import explain_missing
 from flagdata.recipes.documents import from_stored_json
 from flagdata.record import Record
 from flagdata.timebase import NANOSECONDS
@@ -152,7 +152,7 @@ class Media:
         if name is None:
             raise NotFoundError("it has no data of its own", where=row["artifact"], fix="look at its page")
         if self.is_lost(row):
-            raise explained(self._lake, name, self._lake.objects.missing(name))
+            raise explain_missing(self._lake, name, self._lake.objects.missing(name))
 
     def _film(self, row: Mapping[str, Any]) -> FilmStrip | None:
         self._check_there(row)

@@ -228,7 +228,7 @@ def sql(site: Site, text: str | None) -> tuple[str, FlagdataError | None]:
 
 def problem(site: Site, error: FlagdataError, status: int) -> str:
     """Renders the page of an error; it reads nothing of the lake."""
-    return _filled(site, "problem.html.j2", error=error, status=status, refs=[], version=None)
+    return _fill_template(site, "problem.html.j2", error=error, status=status, refs=[], version=None)
 
 
 def style() -> bytes:
@@ -245,10 +245,10 @@ def script() -> bytes:
 def _page(site: Site, template: str, **values: Any) -> str:
     branches, tags = site.lake.refs.branches(), site.lake.refs.tags()
     refs = [*((name, "branch") for name in (MAIN, *branches)), *((name, "tag") for name in tags)]
-    return _filled(site, template, refs=refs, version=site.lake.resolve(site.at), **values)
+    return _fill_template(site, template, refs=refs, version=site.lake.resolve(site.at), **values)
 
 
-def _filled(site: Site, template: str, **values: Any) -> str:
+def _fill_template(site: Site, template: str, **values: Any) -> str:
     common_values = {"site": site, "link": site.link, "lake": str(site.lake.path), "examples": EXAMPLES, "short": SHORT}
     return render("flagdata.view", template, {**common_values, **values}, filters={"printable": printable})
 

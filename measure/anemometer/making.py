@@ -21,7 +21,15 @@ from flagdata.errors import InputError
 from flagdata.lake import Artifact, Lake, results
 from flagdata.lake.results import Placed
 from measure.anemometer.networks import CALIBRATED, network
-from measure.anemometer.reading_calibration import ANSWER, ENOUGH, LEAST, Calibrated, Recording, calibrated, recorded
+from measure.anemometer.reading_calibration import (
+    ANSWER,
+    ENOUGH,
+    LEAST,
+    Calibrated,
+    Recording,
+    calibrate_reading,
+    windows_of_recording,
+)
 from measure.anemometer.reading_model_folder import write
 from measure.anemometer.window_features import VERSION
 from measure.cloth.observed_recording import usable
@@ -131,10 +139,10 @@ def made(
         UsageError, UnknownNameError: nothing of these names.
     """
 
-    def opened(source: str) -> Subject:
+    def open_subject(source: str) -> Subject:
         return subjects(source, query=None, lake=lake, at=at, reading=reading)[0]
 
-    opened_subjects, unopened = usable(sources, opened, name=str)
+    opened_subjects, unopened = usable(sources, open_subject, name=str)
     reader = network(model, lake=lake, at=at)
     seconds = sum(min(subject.film.duration, math.inf if last is None else last) - first for subject in opened_subjects)
     if seconds < LEAST:
@@ -149,10 +157,10 @@ def made(
             advance(count)
 
     def look(subject: Subject) -> Recording:
-        return recorded(subject, reader, size, first=first, last=last, advance=step)
+        return windows_of_recording(subject, reader, size, first=first, last=last, advance=step)
 
     recordings, unread = usable(opened_subjects, look, name=lambda recording: recording.film.name)
-    result = calibrated(recordings, network=reader, size=size, level=level)
+    result = calibrate_reading(recordings, network=reader, size=size, level=level)
     result = replace(result, findings=(*unopened, *unread, *result.findings))
     title = name if name is not None else f"{recordings[0].name}-anemometer"
     if lake is None or branch is None:

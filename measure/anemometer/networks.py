@@ -82,9 +82,9 @@ def network(name: str | None, *, lake: Lake | None, at: str | None) -> Network:
     shipped = {path.name for path in estimator.SHIPPED.iterdir() if (path / CARD).is_file()}
     chosen = name if name is not None else estimator.DEFAULT
     if (local_path(chosen) / CARD).is_file():
-        return _loaded(Path(chosen), None)
+        return _load_network(Path(chosen), None)
     if chosen in shipped:
-        return _loaded(estimator.SHIPPED / chosen, None)
+        return _load_network(estimator.SHIPPED / chosen, None)
     rows = [] if lake is None else _models(lake, at)
     same = meant(rows, chosen)
     if not same or lake is None:
@@ -93,7 +93,11 @@ def network(name: str | None, *, lake: Lake | None, at: str | None) -> Network:
         raise UsageError(f"{len(same)} models are called {chosen!r}", where="--model", fix="give the id of one")
     artifact = lake.artifact(same[0]["artifact"], at=at)
     folder = lake.object_path(str(artifact.object))
-    return _loaded(folder, artifact) if artifact.kind is Kind.NETWORK else _calibrated(folder, artifact, lake, at)
+    return (
+        _load_network(folder, artifact)
+        if artifact.kind is Kind.NETWORK
+        else _calibrated_network(folder, artifact, lake, at)
+    )
 
 
 def _models(lake: Lake, at: str | None) -> list[dict[str, Any]]:
@@ -102,7 +106,7 @@ def _models(lake: Lake, at: str | None) -> list[dict[str, Any]]:
     return [row for row in rows if row["kind"] == Kind.NETWORK or CALIBRATED in json.loads(row["recipe"] or "{}")]
 
 
-def _calibrated(folder: Path, artifact: Artifact, lake: Lake, at: str | None) -> Network:
+def _calibrated_network(folder: Path, artifact: Artifact, lake: Lake, at: str | None) -> Network:
     reading = read_reading_model(folder)
     base = network(reading.network, lake=lake, at=at)
     if base.identity != reading.identity:
@@ -114,7 +118,7 @@ def _calibrated(folder: Path, artifact: Artifact, lake: Lake, at: str | None) ->
     return replace(base, identity=artifact.id, artifact=artifact, reading=reading)
 
 
-def _loaded(folder: Path, artifact: Artifact | None) -> Network:
+def _load_network(folder: Path, artifact: Artifact | None) -> Network:
     return Network(estimator=estimator.load(folder), identity=_identity(folder), artifact=artifact, folder=folder)
 
 

@@ -73,11 +73,11 @@ class Familiar:
     @classmethod
     def of(cls, values: FloatArray, winds: FloatArray, blocks: NDArray[np.int_]) -> Familiar:
         """Fits to windows (n, column), the winds read from them and their blocks of time (n,)."""
-        fit = cls._fitted(values, winds)
+        fit = cls._fit_windows(values, winds)
         distances, noises = np.empty(len(winds)), []
         for block in np.unique(blocks):
             inside = blocks == block
-            white = cls._fitted(values[~inside], winds[~inside])._white(values[inside], winds[inside])
+            white = cls._fit_windows(values[~inside], winds[~inside])._white(values[inside], winds[inside])
             distances[inside] = np.sqrt(np.square(white).mean(axis=1))
             noises.append(len(white) * float(np.square(white.mean(axis=0)).mean()))
         return cls(
@@ -92,7 +92,7 @@ class Familiar:
         )
 
     @classmethod
-    def _fitted(cls, values: FloatArray, winds: FloatArray) -> Familiar:
+    def _fit_windows(cls, values: FloatArray, winds: FloatArray) -> Familiar:
         centre, spread = values.mean(axis=0), values.std(axis=0)
         spread = np.where(spread > 0, spread, 1.0)
         standard = (values - centre) / spread

@@ -18,7 +18,7 @@ from measure.anemometer.intervals import half_width
 from measure.anemometer.networks import Network
 from measure.anemometer.novelty import Familiar
 from measure.anemometer.reading_model import ReadingModel
-from measure.anemometer.regression import BLOCK, Ridge, blocks_of, validated, with_neighbours
+from measure.anemometer.regression import BLOCK, Ridge, blocks_of, validate_penalties, with_neighbours
 from measure.anemometer.window_features import SUMMARY, Features, features_of
 from measure.cloth.blown_wind import STEADY, Log
 from measure.film.film_source import Subject
@@ -139,7 +139,7 @@ class Calibrated:
         }
 
 
-def recorded(
+def windows_of_recording(
     subject: Subject,
     network: Network,
     size: FlagSize,
@@ -180,13 +180,13 @@ def recorded(
         name=film.name,
         identity=subject.artifact.id,
         features=features,
-        log=log.unlagged(),
+        log=log.undo_lag(),
         sensor=wind.sensor,
         findings=findings,
     )
 
 
-def calibrated(recordings: Sequence[Recording], *, network: Network, size: FlagSize, level: float) -> Calibrated:
+def calibrate_reading(recordings: Sequence[Recording], *, network: Network, size: FlagSize, level: float) -> Calibrated:
     """Fits a reading model.
 
     Raises:
@@ -224,7 +224,7 @@ def calibrated(recordings: Sequence[Recording], *, network: Network, size: FlagS
     offset = _best_offset(plain, winds, blocks, clock, is_named)
     logged = winds(offset)
     # Penalty and weights by cross-validation over blocks; its errors become the intervals.
-    checked = validated(rows, logged, blocks, np.tile(is_named, rows.shape[1] // len(names)))
+    checked = validate_penalties(rows, logged, blocks, np.tile(is_named, rows.shape[1] // len(names)))
     spread = float(logged.std())
     if checked.rmse >= spread:
         raise RefusedError(
@@ -253,10 +253,10 @@ def calibrated(recordings: Sequence[Recording], *, network: Network, size: FlagS
         offset=offset,
         clock=clock,
         level=level,
-        uncalibrated=_uncalibrated(recordings, usable, logged),
+        uncalibrated=_uncalibrated_error_of(recordings, usable, logged),
         findings=(
             *(f for recording in recordings for f in recording.findings),
-            *_noticed(recordings, count * step, offset, clock),
+            *_notices(recordings, count * step, offset, clock),
         ),
     )
 
@@ -285,19 +285,19 @@ def _best_offset(
     """Fits the error of the clock [s], by windows without their neighbours, which could make up for it."""
     if clock <= CLOCK:
         return 0.0
-    errors = [validated(plain, winds(share * clock), blocks, is_named).rmse for share in _OFFSETS.tolist()]
+    errors = [validate_penalties(plain, winds(share * clock), blocks, is_named).rmse for share in _OFFSETS.tolist()]
     misfit = len(plain) * np.log(errors) + np.square(_OFFSETS) / 2
     return float(_OFFSETS[misfit.argmin()]) * clock
 
 
-def _uncalibrated(recordings: Sequence[Recording], usable: Sequence[BoolArray], logged: FloatArray) -> float:
+def _uncalibrated_error_of(recordings: Sequence[Recording], usable: Sequence[BoolArray], logged: FloatArray) -> float:
     network_winds = np.concatenate(
         [recording.features.winds[mask] for recording, mask in zip(recordings, usable, strict=True)]
     )
     return float(np.sqrt(np.mean((network_winds - logged) ** 2)))
 
 
-def _noticed(recordings: Sequence[Recording], seconds: float, offset: float, clock: float) -> list[Finding]:
+def _notices(recordings: Sequence[Recording], seconds: float, offset: float, clock: float) -> list[Finding]:
     findings = []
     if seconds < ENOUGH:
         findings.append(

@@ -61,7 +61,7 @@ class Ridge:
         weight."""
         centre, spread = _standard(rows, weights)
         offset = float(winds.mean())
-        coefficients = _solved((rows - centre) / spread, winds - offset, [penalty])[0]
+        coefficients = _solve_ridge((rows - centre) / spread, winds - offset, [penalty])[0]
         return cls(centre=centre, spread=spread, coefficients=coefficients, offset=offset, penalty=penalty)
 
     def __call__(self, rows: FloatArray) -> FloatArray:
@@ -75,7 +75,7 @@ def _standard(rows: FloatArray, weights: FloatArray | float) -> tuple[FloatArray
     return rows.mean(axis=0), np.where(spread > 0, spread, 1.0) / weights
 
 
-def _solved(rows: FloatArray, winds: FloatArray, penalties: Sequence[float]) -> FloatArray:
+def _solve_ridge(rows: FloatArray, winds: FloatArray, penalties: Sequence[float]) -> FloatArray:
     """Solves for the coefficients (penalty, column) of centred rows (n, column) and winds (n,)."""
     left, values, right = np.linalg.svd(rows, full_matrices=False)
     along = left.T @ winds
@@ -120,7 +120,7 @@ class Validated:
     rmse: float
 
 
-def validated(rows: FloatArray, winds: FloatArray, blocks: NDArray[np.int_], is_named: BoolArray) -> Validated:
+def validate_penalties(rows: FloatArray, winds: FloatArray, blocks: NDArray[np.int_], is_named: BoolArray) -> Validated:
     """Leaves each block out in turn, with the windows around it, for each penalty and weight of the named features.
 
     Args:
@@ -129,11 +129,13 @@ def validated(rows: FloatArray, winds: FloatArray, blocks: NDArray[np.int_], is_
         blocks: (n,) of each window; two or more.
         is_named: (column,) which are numbers with a unit, each of which says more than one of a summary.
     """
-    results = [_validated(rows, winds, blocks, np.where(is_named, weight, 1.0)) for weight in WEIGHTS]
+    results = [_validate_penalties(rows, winds, blocks, np.where(is_named, weight, 1.0)) for weight in WEIGHTS]
     return min(results, key=lambda result: result.rmse)
 
 
-def _validated(rows: FloatArray, winds: FloatArray, blocks: NDArray[np.int_], weights: FloatArray) -> Validated:
+def _validate_penalties(
+    rows: FloatArray, winds: FloatArray, blocks: NDArray[np.int_], weights: FloatArray
+) -> Validated:
     predicted = np.empty((len(PENALTIES), len(winds)))
     for block in np.unique(blocks):
         inside = np.flatnonzero(blocks == block)
@@ -141,7 +143,7 @@ def _validated(rows: FloatArray, winds: FloatArray, blocks: NDArray[np.int_], we
         fitted[max(0, inside[0] - _BESIDE) : inside[-1] + _BESIDE + 1] = False
         centre, spread = _standard(rows[fitted], weights)
         offset = winds[fitted].mean()
-        coefficients = _solved((rows[fitted] - centre) / spread, winds[fitted] - offset, PENALTIES)
+        coefficients = _solve_ridge((rows[fitted] - centre) / spread, winds[fitted] - offset, PENALTIES)
         predicted[:, inside] = offset + coefficients @ ((rows[inside] - centre) / spread).T
     errors = np.sqrt(np.square(predicted - winds).mean(axis=1))
     best = int(errors.argmin())

@@ -12,7 +12,7 @@ from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from measure.closing.close import close_loop
-    from measure.closing.joint_verdict import joined
+    from measure.closing.joint_verdict import join_verdicts
     from measure.closing.model_recipes import acting
     from measure.closing.verdict_artifacts import VerdictAnswer, answer_of
     from measure.closing.verdict_sources import SourceOptions

@@ -17,7 +17,7 @@ from flagdata.core.stated import Stated
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.lake.mesh_sequences import MeshSequence
 from measure.closing.close import close_loop
-from measure.closing.verdict_findings import checked, with_warnings
+from measure.closing.verdict_findings import check_findings, with_warnings
 from measure.loop.run import LoopOptions
 from measure.nulls.null_plan import FEWEST_NULLS
 from measure.observe import Hold, Observation, Setup, WindTrack, from_arrays, observe, sheet
@@ -28,12 +28,12 @@ from measure.report.report_page import page
 from measure.report.verdict_words import words
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.verdict_record import Estimate, Verdict
-from sim.cloth.material import MATERIALS, named
+from sim.cloth.material import MATERIALS, named_material
 
 Recordings: TypeAlias = ArrayLike | MeshSequence | Sequence[ArrayLike | MeshSequence]
 
 
-def closed(chosen: Closing) -> Closed:
+def close_on_arrays(chosen: Closing) -> Closed:
     """Closes the loop on arrays; see `flagdata.close_loop`.
 
     Raises:
@@ -45,8 +45,8 @@ def closed(chosen: Closing) -> Closed:
         level=CRITERIA.level if chosen.level is None else chosen.level,
         nulls=FEWEST_NULLS if chosen.nulls is None else chosen.nulls,
     )
-    observed = observe(_tracked(chosen), _setup(chosen))
-    return _answer(with_warnings(close_loop(observed.experiment, options), checked(observed.findings)))
+    observed = observe(_tracked_observations(chosen), _setup(chosen))
+    return _answer(with_warnings(close_loop(observed.experiment, options), check_findings(observed.findings)))
 
 
 def _setup(chosen: Closing) -> Setup:
@@ -56,15 +56,15 @@ def _setup(chosen: Closing) -> Setup:
     if isinstance(attachment, str) and attachment not in names:
         raise UnknownNameError.of("attachment", attachment, names, where="attachment")
     setup = Setup(
-        material=named(chosen.material),
+        material=named_material(chosen.material),
         pins=Hold(attachment) if isinstance(attachment, str) else tuple((float(u), float(v)) for u, v in attachment),
         outline=None if chosen.flag_size is None else sheet(*chosen.flag_size),
     )
     weight = None if chosen.area_weight is None else Stated.of(chosen.area_weight)
-    return setup.weighed(weight, chosen.density_uncertainty)
+    return setup.state_weight(weight, chosen.density_uncertainty)
 
 
-def _tracked(chosen: Closing) -> list[Observation]:
+def _tracked_observations(chosen: Closing) -> list[Observation]:
     """Makes one observation of each recording, with the wind beside it."""
     several, wind = _several(chosen.recordings), chosen.wind
     winds = wind if isinstance(wind, list) else [wind] * len(several)

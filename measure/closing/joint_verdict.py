@@ -86,7 +86,7 @@ class Joint:
         }
 
 
-def joined(markers: Verdict, films: Verdict, *, level: float, nominal: Mapping[str, float]) -> Joint:
+def join_verdicts(markers: Verdict, films: Verdict, *, level: float, nominal: Mapping[str, float]) -> Joint:
     """Joins the verdicts on each kind to one answer.
 
     Args:
@@ -134,7 +134,7 @@ def _strength(effect: str, markers: Verdict, films: Verdict) -> Combined:
         next((candidate for candidate in verdict.ranking if candidate.effect == effect), None)
         for verdict in (markers, films)
     ]
-    return _combined(
+    return _multiply_likelihoods(
         effect,
         *((None if candidate is None else candidate.strength) for candidate in candidates),
         shared=CRITERIA.strength_factor,
@@ -156,7 +156,7 @@ def _cloth(markers: Verdict, films: Verdict, nominal: Mapping[str, float]) -> tu
                 by_markers = _times(by_markers, factor, of_films.unit)
             label = parameter.name.replace("_", " ")
             label = f"{label}, base model" if moment == "before" else f"{label}, with {films.named[0]}"
-            combined.append(_combined(label, by_markers, of_films))
+            combined.append(_multiply_likelihoods(label, by_markers, of_films))
     return tuple(combined)
 
 
@@ -170,7 +170,7 @@ def _times(estimate: Estimate, factor: float, unit: str) -> Estimate:
     )
 
 
-def _combined(
+def _multiply_likelihoods(
     name: str, markers: Estimate | None, films: Estimate | None, *, shared: float = 0.0, null: float = 0.0
 ) -> Combined:
     """Multiplies two likelihoods in the logarithm of the distance from a null value.
@@ -181,7 +181,9 @@ def _combined(
         shared: standard deviation of the logarithm that both have in common.
     """
     usable = [
-        estimate for estimate in (markers, films) if estimate is not None and known(estimate) and _sided(estimate, null)
+        estimate
+        for estimate in (markers, films)
+        if estimate is not None and known(estimate) and _is_one_sided(estimate, null)
     ]
     if len(usable) < 2:
         only = usable[0] if usable else next((estimate for estimate in (films, markers) if known(estimate)), None)
@@ -205,7 +207,7 @@ def _combined(
     )
 
 
-def _sided(estimate: Estimate, null: float) -> bool:
+def _is_one_sided(estimate: Estimate, null: float) -> bool:
     """Returns whether an interval is finite and on one side of the null value."""
     return (
         math.isfinite(estimate.low) and math.isfinite(estimate.high) and (estimate.low > null or estimate.high < null)

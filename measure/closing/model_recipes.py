@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from measure.forecasting.alignment import aligned
+from measure.forecasting.alignment import align_experiment
 from measure.forecasting.regressors import SHAPES
 from measure.observe.trajectory import Experiment, Specimen
 from measure.verdict.verdict_record import Candidate, Conclusion, Verdict
 from sim.cloth import handles
 from sim.cloth.air import AIR_FORCES, AirForce
 from sim.cloth.handles import ARCSIM_STIFFNESS
-from sim.cloth.material import MATERIALS, Material, named
+from sim.cloth.material import MATERIALS, Material, named_material
 from sim.cloth.mesh import grid
 from sim.cloth.scene import upright
 from sim.effects import EFFECTS
@@ -54,7 +54,7 @@ def models(verdict: Verdict, experiment: Experiment, *, name: str, seed: int) ->
     """
     if experiment.carried:
         return ()
-    turned = aligned(experiment)
+    turned = align_experiment(experiment)
     common = _common(turned, seed)
     models_made = [_model(f"{name}-base", verdict, common, turned.specimen, ())]
     if effects := acting(verdict):
@@ -74,12 +74,12 @@ def acting(verdict: Verdict) -> tuple[Candidate, ...]:
     return unrejected if verdict.conclusion is Conclusion.EFFECT else unrejected[:1]
 
 
-def fitted(verdict: Verdict, effects: Sequence[Candidate]) -> dict[str, float]:
+def fitted_parameters(verdict: Verdict, effects: Sequence[Candidate]) -> dict[str, float]:
     """Parameters of the cloth, calibrated with the effects where there are any, by their names."""
     return {p.name: (p.after if effects and p.after is not None else p.before).value for p in verdict.parameters}
 
 
-def acted(effects: Sequence[Candidate]) -> dict[str, dict[str, dict[str, float]]]:
+def acting_effects(effects: Sequence[Candidate]) -> dict[str, dict[str, dict[str, float]]]:
     """Makes the table `effects` of a recipe, with the fitted strengths; nothing where there are none."""
     strengths: dict[str, dict[str, float]] = {}
     for candidate in effects:
@@ -93,14 +93,14 @@ def acted(effects: Sequence[Candidate]) -> dict[str, dict[str, dict[str, float]]
 def _model(
     name: str, verdict: Verdict, common: Mapping[str, Any], specimen: Specimen, effects: Sequence[Candidate]
 ) -> NamedModel:
-    fit = fitted(verdict, effects)
+    fit = fitted_parameters(verdict, effects)
     material = _material(specimen.material)
     material |= {
         "area-weight": specimen.material.area_weight * fit["area_weight"],
         "bending-factor": fit["bending"],
         "damping": fit["damping"],
     }
-    return NamedModel(name=name, content={"title": name, **common, "material": material, **acted(effects)})
+    return NamedModel(name=name, content={"title": name, **common, "material": material, **acting_effects(effects)})
 
 
 def _common(experiment: Experiment, seed: int) -> dict[str, Any]:
@@ -162,7 +162,7 @@ def _mesh(specimen: Specimen) -> dict[str, Any]:
 def _material(nominal: Material) -> dict[str, Any]:
     """Names the material, where the catalog's tables are its; else gives its tables."""
     if nominal.name in MATERIALS.names():
-        catalogued = named(nominal.name)
+        catalogued = named_material(nominal.name)
         if np.array_equal(catalogued.stretching, nominal.stretching) and np.array_equal(
             catalogued.bending, nominal.bending
         ):

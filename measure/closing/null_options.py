@@ -10,7 +10,7 @@ from flagdata.core.findings import Finding
 from flagdata.core.printable import printable
 from flagdata.errors import UsageError
 from flagdata.verbs.shared_options import ByNulls
-from measure.closing.verdict_findings import checked, finding_text
+from measure.closing.verdict_findings import check_findings, finding_text
 
 if TYPE_CHECKING:
     from measure.forecasting.setting import Stage
@@ -38,7 +38,7 @@ def nulls_given(recipe: ExperimentRecipe | None, chosen: ByNulls, *, level: floa
 def refuse(findings: Sequence[Finding]) -> None:
     """Reports what was found, up to an error, which ends it."""
     for finding in findings:
-        checked((finding,))
+        check_findings((finding,))
         say(finding_text(finding), mark=finding.severity.value)
 
 

@@ -24,7 +24,7 @@ from measure.closing.model_recipes import NamedModel, acting
 from measure.loop.run import LoopOptions
 from measure.nulls.bank import files
 from measure.observe import Experiment
-from measure.observe.trajectory import described
+from measure.observe.trajectory import describe_cloth
 from measure.report.document import as_document, from_document
 from measure.report.report_page import page
 from measure.report.verdict_words import words
@@ -186,7 +186,7 @@ def read(path: Path) -> tuple[Verdict, str]:
 def fingerprint(experiment: Experiment) -> str:
     """Hashes an experiment with its uncertainties, SHA-256: cloth, pins, recordings and wind; not of names and
     files."""
-    content, arrays = described(experiment.specimen)
+    content, arrays = describe_cloth(experiment.specimen)
     content["recordings"] = [[r.rate, r.noise, *r.wind.uncertainty] for r in experiment.recordings]
     for recording in experiment.recordings:
         arrays += [recording.markers, recording.positions, recording.wind.times, recording.wind.velocity]

@@ -16,7 +16,7 @@ _DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside", "still-
 """Kinds of findings that look like an effect."""
 
 
-def checked(findings: Sequence[Finding]) -> tuple[Finding, ...]:
+def check_findings(findings: Sequence[Finding]) -> tuple[Finding, ...]:
     """Returns the findings, none of which is an error: what is wrong with the data must not come out as an effect.
 
     Raises:

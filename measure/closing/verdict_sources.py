@@ -17,7 +17,7 @@ from flagdata.ingest.anemometer import WindOptions
 from flagdata.ingest.anemometer.log_confirmation import UNASKED, Confirm
 from flagdata.lake import Lake
 from measure.observe import Observation, Up
-from measure.observe.experiment_recipe import RecordingSource, WindSource, blown, opened
+from measure.observe.experiment_recipe import RecordingSource, WindSource, blown, open_recordings
 from measure.observe.wind_tracks import LogPlacement
 
 Recorded = TypeVar("Recorded", bound="_Recording")
@@ -87,7 +87,7 @@ def _beside(
     observations: list[tuple[Observation, RecordingSource]] = []
     for text in sources:
         source = RecordingSource(source=text, rate=reading.rate, unit=reading.unit, noise=reading.noise)
-        several = opened(source, _HERE, lake)
+        several = open_recordings(source, _HERE, lake)
         observations += [
             (observation, replace(source, take=observation.name if len(several) > 1 else "")) for observation in several
         ]
@@ -117,7 +117,7 @@ def _beside(
     ]
 
 
-def drafted(
+def draft_recordings(
     sources: Sequence[str], winds: Sequence[str], reading: SourceOptions, lake: Lake | None, *, folder: Path
 ) -> dict[str, Any]:
     """Returns what a recipe says of the recordings of some sources, see `measure.observe.experiment_recipe`.
@@ -129,32 +129,37 @@ def drafted(
         FlagdataError: as `read`.
     """
 
-    def placed(text: str) -> str:
+    def place_source(text: str) -> str:
         path = local_path(text)
         return os.path.relpath(path, folder) if path.exists() else text
 
     def blowing(wind: WindSource) -> dict[str, Any]:
         if wind.velocity is not None:
             return {"velocity": list(wind.velocity)}
-        log = {"log": placed(wind.log), "axis": reading.axis, "north": reading.north, "clock_offset": reading.offset}
-        sensor = None if reading.sensor is None else placed(reading.sensor)
+        log = {
+            "log": place_source(wind.log),
+            "axis": reading.axis,
+            "north": reading.north,
+            "clock_offset": reading.offset,
+        }
+        sensor = None if reading.sensor is None else place_source(reading.sensor)
         return log | {"sensor": sensor, "zone": reading.zone, "accept": reading.confirm.accept}
 
     tables = []
     for _, source, wind in _beside(sources, winds, reading, lake):
-        table = {**vars(source), "source": placed(source.source), "wind": None if wind is None else blowing(wind)}
+        table = {**vars(source), "source": place_source(source.source), "wind": None if wind is None else blowing(wind)}
         tables.append(table)
-    return filled({"up": reading.up.value, "recording": tables})
+    return filled_entries({"up": reading.up.value, "recording": tables})
 
 
-def filled(table: Mapping[str, Any]) -> dict[str, Any]:
+def filled_entries(table: Mapping[str, Any]) -> dict[str, Any]:
     """Returns a table of a recipe without what it says nothing of."""
     stated_entries: dict[str, Any] = {}
     for key, value in table.items():
         if isinstance(value, Mapping):
-            value = filled(value)
+            value = filled_entries(value)
         elif isinstance(value, list) and value and isinstance(value[0], Mapping):
-            value = [filled(entry) for entry in value]
+            value = [filled_entries(entry) for entry in value]
         if value not in (None, "", {}, "m"):
             stated_entries[key.replace("_", "-")] = value
     return stated_entries

@@ -11,18 +11,18 @@ if TYPE_CHECKING:
     from measure.cloth.calibrate_call import folder_of, options_of, sources_of
     from measure.cloth.close_films import simulations_of
     from measure.cloth.cloth_calibration import Calibration, calibrate, quantity
-    from measure.cloth.cloth_posterior import weighed
+    from measure.cloth.cloth_posterior import weigh_cloths
     from measure.cloth.design import (
         TOGETHER,
         CalibrationOptions,
         Design,
-        announced,
+        announce_simulations,
         designs_of,
         lasting,
         nulls,
         pairs,
         readings_of,
-        simulated,
+        simulated_values,
         weighable,
     )
     from measure.cloth.emulator import Emulator, informative

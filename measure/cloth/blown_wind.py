@@ -162,7 +162,7 @@ class Log:
         free = [not ((begins < end) & (stops > start)).any() for start, end in zip(starts, ends, strict=True)]
         return np.array(free) & (starts >= self.times[0]) & (ends <= self.times[-1])
 
-    def unlagged(self) -> Log:
+    def undo_lag(self) -> Log:
         """Returns the same with its instrument's lag undone; itself where that is not known."""
         if not self.distance:
             return self

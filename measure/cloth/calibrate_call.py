@@ -20,7 +20,7 @@ from flagdata.verbs.shared_options import ATTACHMENTS
 from measure.cloth.cloth_calibration import Calibration, calibrate
 from measure.cloth.design import FAR, CalibrationOptions
 from measure.cloth.flag_prior import AZIMUTH, ELEVATION, Uncertain, fabric, stated_angle
-from measure.cloth.flag_recordings import Opened, Sources, opened
+from measure.cloth.flag_recordings import Opened, Sources, open_recording
 from measure.cloth.flag_simulation import Flag
 from measure.cloth.observed_recording import Observed, cut
 from measure.cloth.tables_of_observables import TIME, Columns, known_columns, of_columns
@@ -86,12 +86,12 @@ def sources_of(
             cuts = tuple(cut(row, first, last) if row.place is None else row for row in rows)
             return Opened(name=name(numbered), parent=None, rows=cuts)
         part = {"first": first, "last": last, "log": chosen.log, "offset": offset}
-        return opened(str(source), size, reading, lake=lake, at=at, **part)
+        return open_recording(str(source), size, reading, lake=lake, at=at, **part)
 
     return Sources.of(list(enumerate(recordings, start=1)), opening, name=name)
 
 
-def calibrated(chosen: Calibrating) -> Calibrated:
+def calibrate_arrays(chosen: Calibrating) -> Calibrated:
     """Calibrates a flag from Python; see `flagdata.calibrate`.
 
     Raises:

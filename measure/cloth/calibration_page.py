@@ -120,7 +120,7 @@ def shown_quantity(quantity: Quantity) -> dict[str, str]:
     turn = 180 / math.pi if quantity.name in _DEGREES else 1.0
     least, most = quantity.assumed or quantity.interval
     unit = "" if quantity.unit == "1" else quantity.unit
-    interval = quantity.span.worded(lambda value: f"{value * turn:.3g}")
+    interval = quantity.span.word(lambda value: f"{value * turn:.3g}")
     return {
         "name": quantity.name.replace("_", " "),
         "unit": "°" if quantity.name in _DEGREES else unit,

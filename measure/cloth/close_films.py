@@ -11,12 +11,12 @@ from flagdata.core.console import progress, say
 from flagdata.core.stated import Stated
 from flagdata.errors import UsageError
 from flagdata.lake import Lake
-from measure.closing.model_recipes import NamedModel, acted, acting, fitted
+from measure.closing.model_recipes import NamedModel, acting, acting_effects, fitted_parameters
 from measure.closing.null_options import stage_bars
 from measure.closing.verdict_artifacts import VerdictAnswer
 from measure.closing.verdict_sources import distinct
 from measure.cloth.calibrate_call import folder_of, options_of, sources_of
-from measure.cloth.design import PAIRS, TOGETHER, announced, lasting, weighable
+from measure.cloth.design import PAIRS, TOGETHER, announce_simulations, lasting, weighable
 from measure.cloth.film_options import JudgingFilms
 from measure.cloth.films_statement import words
 from measure.cloth.films_verdict import verdict_of
@@ -29,7 +29,7 @@ from measure.film.similarity import FlagSize
 from measure.forecasting.strengths import Suspicion
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.verdict_record import Candidate, Verdict
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 
 ANSWER = 4
 """Raised when the same recordings and options get another answer."""
@@ -96,7 +96,7 @@ def models(verdict: Verdict, outcome: SolvedLoop, *, name: str) -> tuple[NamedMo
 
 
 def _content(verdict: Verdict, outcome: SolvedLoop, title: str, effects: Sequence[Candidate]) -> Mapping[str, Any]:
-    calibration, cloth = outcome.options.calibration, fitted(verdict, effects)
+    calibration, cloth = outcome.options.calibration, fitted_parameters(verdict, effects)
     speeds = [float(recording.speed.mean()) for recording in outcome.recordings]
     fabric = FABRIC if calibration.material is None else calibration.material.tables[0]
     speed: Any = speeds[0] if min(speeds) == max(speeds) else {"low": min(speeds), "high": max(speeds)}
@@ -118,10 +118,10 @@ def _content(verdict: Verdict, outcome: SolvedLoop, title: str, effects: Sequenc
         "material": {
             "name": fabric,
             "area-weight": cloth["area_weight"],
-            "bending-factor": cloth["bending"] / mean_bending(named(fabric)),
+            "bending-factor": cloth["bending"] / mean_bending(named_material(fabric)),
             "damping": max(cloth["damping"] - _STEP, 0.0),
         },
-        **acted(effects),
+        **acting_effects(effects),
     }
 
 
@@ -179,7 +179,11 @@ def close_films(
     with progress(None, label="observe", unit="window") as advance:
         gathered = opened.read(size, advance=advance)
     recordings = distinct(gathered.recordings)
-    say(announced(workload([recording.duration for recording in recordings], options), workers=chosen.processes))
+    say(
+        announce_simulations(
+            workload([recording.duration for recording in recordings], options), workers=chosen.processes
+        )
+    )
     outcome = solve(
         recordings,
         options,

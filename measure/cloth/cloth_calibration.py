@@ -15,12 +15,12 @@ from flagdata.core.arrays import BoolArray, FloatArray, IntArray
 from flagdata.core.findings import Finding, Severity
 from flagdata.core.rng import child_seed, stream
 from flagdata.core.workload import one_thread
-from measure.cloth.cloth_posterior import Posterior, Sight, posterior, weighed
-from measure.cloth.design import CalibrationOptions, designs_of, simulated
+from measure.cloth.cloth_posterior import Posterior, Sight, posterior, weigh_cloths
+from measure.cloth.design import CalibrationOptions, designs_of, simulated_values
 from measure.cloth.emulator import TAKEN_APART, Emulator, informative
 from measure.cloth.flag_prior import CLOTH, NUISANCES, Uncertain
 from measure.cloth.flag_simulation import OBSERVED
-from measure.cloth.numerics import Correction, corrected, with_errors
+from measure.cloth.numerics import Correction, measure_correction, with_errors
 from measure.cloth.observed_recording import (
     LEAST_IN_ALL,
     LEFT_OUT,
@@ -232,14 +232,14 @@ def calibrate(
 
     Raises:
         InputError: see `Observed` and `designs_of`.
-        RefusedError: see `answered`.
+        RefusedError: see `answer_of`.
     """
     simulations: list[tuple[Observed, Mapping[str, FloatArray], FloatArray, Correction]] = []
     for recording, design in zip(recordings, designs_of(recordings, options), strict=True):
-        readings = simulated(design, folder=folder, workers=workers, advance=advance)
-        correction = corrected(design, readings, folder=folder, workers=workers, advance=advance)
+        readings = simulated_values(design, folder=folder, workers=workers, advance=advance)
+        correction = measure_correction(design, readings, folder=folder, workers=workers, advance=advance)
         simulations.append((recording, design.values(), readings, correction))
-    return answered(simulations, options, left_out=left_out)
+    return answer_of(simulations, options, left_out=left_out)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -277,7 +277,7 @@ class _Simulated:
         )
 
 
-def answered(
+def answer_of(
     simulations: Sequence[tuple[Observed, Mapping[str, FloatArray], FloatArray, Correction]],
     options: CalibrationOptions,
     *,
@@ -306,7 +306,7 @@ def answered(
     fitted, unshown = usable(simulations, seen, name=lambda simulation: simulation[0].name)
     left_out = (*left_out, *unshown)
     check_in_all([simulation.observed for simulation, _ in fitted], left_out=left_out)
-    calibration = _answered(fitted, options, left_out=left_out)
+    calibration = _answer_of(fitted, options, left_out=left_out)
     return _without_unlike(calibration, fitted, options, left_out=left_out)
 
 
@@ -324,28 +324,28 @@ def _without_unlike(
     if not unlike or sum(pair.observed.duration for pair, _ in like) < LEAST_IN_ALL * WINDOW - 1e-9:
         return calibration
     warned = [Finding(kind=LEFT_OUT, severity=Severity.WARNING, what=_unlike(fitted), fix=_LOOK) for fitted in unlike]
-    again = _answered(like, options, left_out=(*left_out, *warned))
+    again = _answer_of(like, options, left_out=(*left_out, *warned))
     return calibration if again.withheld is not None else again
 
 
-def _answered(
+def _answer_of(
     models: Sequence[tuple[_Simulated, Sight]], options: CalibrationOptions, *, left_out: Sequence[Finding]
 ) -> Calibration:
     """Returns the answer from recordings whose simulations show what they show."""
     simulations, sights = [simulation for simulation, _ in models], [sight for _, sight in models]
     draws = posterior(sights, [simulation.observed.summary for simulation in simulations], seed=options.seed)
     fitted = tuple(
-        _fitted(simulation, sight, draws, number, options)
+        _fitted_values(simulation, sight, draws, number, options)
         for number, (simulation, sight) in enumerate(zip(simulations, sights, strict=True))
     )
     calibration = Calibration(
         options=options,
         draws=draws,
         recordings=fitted,
-        check=checked(simulations, options),
+        check=check_coverage(simulations, options),
         cloth=tuple(quantity(q, draws.cloth[q.name], options.level) for q in CLOTH),
         places=tuple(
-            tuple(quantity(q, view[q.name], options.level) for q in _placed(options)) for view in draws.places
+            tuple(quantity(q, view[q.name], options.level) for q in _uncertain_places(options)) for view in draws.places
         ),
     )
     findings = (*left_out, *_findings(calibration))
@@ -375,7 +375,7 @@ def quantity(about: Uncertain, draws: FloatArray, level: float) -> Quantity:
     )
 
 
-def checked(recordings: Sequence[_Simulated], options: CalibrationOptions) -> Check:
+def check_coverage(recordings: Sequence[_Simulated], options: CalibrationOptions) -> Check:
     """Weighs simulations of all recordings together, an eighth at a time, by emulators fitted to the others; of the
     first recording alone where the others are of other cloths."""
     weights = [simulation.values[CLOTH[0].name] for simulation in recordings]
@@ -395,7 +395,7 @@ def checked(recordings: Sequence[_Simulated], options: CalibrationOptions) -> Ch
         sights = [simulation.rows(rest).sight(options) for simulation in recordings]
         seed = child_seed(options.seed, "check", fold)
         summaries = [simulation.summaries[fold_members] for simulation in recordings]
-        weight = weighed(sights, summaries, seed=seed)[CLOTH[0].name]
+        weight = weigh_cloths(sights, summaries, seed=seed)[CLOTH[0].name]
         truth = weights[0][fold_members]
         low, middle, high = np.quantile(weight, [(1 - options.level) / 2, 0.5, (1 + options.level) / 2], axis=1)
         contained += int(((low <= truth) & (truth <= high)).sum())
@@ -403,11 +403,11 @@ def checked(recordings: Sequence[_Simulated], options: CalibrationOptions) -> Ch
     return Check(count=len(errors), contained=contained, error=float(np.median(errors)) if errors else math.nan)
 
 
-def _placed(options: CalibrationOptions) -> tuple[Uncertain, ...]:
+def _uncertain_places(options: CalibrationOptions) -> tuple[Uncertain, ...]:
     return (*(q for q in NUISANCES if q.name == "gain"), options.azimuth, options.elevation)
 
 
-def _fitted(
+def _fitted_values(
     simulated_recording: _Simulated, sight: Sight, posterior_draws: Posterior, index: int, options: CalibrationOptions
 ) -> Fitted:
     """Returns what the emulator says that flags of the posterior show."""

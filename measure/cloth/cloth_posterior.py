@@ -112,7 +112,7 @@ def posterior(sights: Sequence[Sight], observed: Sequence[FloatArray], *, seed: 
     return Posterior(cloth=cloth, places=tuple(places), together=base.scatter.together)
 
 
-def weighed(sights: Sequence[Sight], observed: Sequence[FloatArray], *, seed: int) -> Mapping[str, FloatArray]:
+def weigh_cloths(sights: Sequence[Sight], observed: Sequence[FloatArray], *, seed: int) -> Mapping[str, FloatArray]:
     """Draws the cloths of several flags, each by itself, seen from the sights' places: name → (flag, draw).
 
     Args:

@@ -47,7 +47,7 @@ from measure.cloth.flag_simulation import BATCH, LITTLE, Discretisation, Flag, F
 from measure.cloth.observed_recording import Observed, check_in_all
 from measure.forecasting.strengths import Strengths, all_strengths
 from measure.observables.observable import WINDOW
-from sim.workers import connected
+from sim.workers import connect_workers
 
 _HOIST = "full-hoist.stiffness"
 
@@ -235,7 +235,7 @@ def designs_of(recordings: Sequence[Observed], options: CalibrationOptions) -> l
     ]
 
 
-def simulated(
+def simulated_values(
     design: Design, *, folder: Path, workers: int = 1, advance: Callable[[int], object] | None = None
 ) -> FloatArray:
     """Returns (simulation, window, observable) in the order of the design's values; NaN where a flag diverged.
@@ -271,14 +271,14 @@ def readings_of(
     batches: Sequence[Simulatable], *, folder: Path, workers: int = 1, advance: Callable[[int], object] | None = None
 ) -> FloatArray:
     """Returns what batches read, (cloth, …) in order, of flags (flag, place, window, observable); those that the folder
-    lacks are simulated. As `simulated`."""
+    lacks are simulated. As `simulated_values`."""
     paths = [folder / f"{digest(canonical(dict(batch.content())))[:32]}.npz" for batch in batches]
     missing = [number for number, path in enumerate(paths) if not path.exists()]
     if advance is not None and len(missing) < len(batches):
         advance(sum(len(batch.seeds) for number, batch in enumerate(batches) if number not in set(missing)))
     folder.mkdir(parents=True, exist_ok=True)
     if missing:
-        with connected(None, workers=min(workers, len(missing)), say=say_beside_bars) as pool:
+        with connect_workers(None, workers=min(workers, len(missing)), say=say_beside_bars) as pool:
             for count in pool.results((_make, (batches[number], paths[number])) for number in missing):
                 if advance is not None:
                     advance(count)
@@ -420,14 +420,14 @@ _PACE = 25.0
 """Seconds of one flag that one core simulates in a second: 128 flags for two minutes took some ten minutes."""
 
 
-def announced(flag_seconds: float, *, workers: int) -> str:
+def announce_simulations(flag_seconds: float, *, workers: int) -> str:
     """Returns what is to be simulated, and for about how long.
 
     Args:
         flag_seconds: simulated seconds of all flags together.
         workers: processes that share them.
     """
-    return workload.announced(
+    return workload.announce_work(
         f"simulating flags for {flag_seconds / 60:.0f} minutes in all",
         flag_seconds / _PACE,
         workers=workers,

@@ -10,7 +10,7 @@ from flagdata.api.measuring_verbs import LENGTHS, OfFlag
 from flagdata.errors import UsageError
 from flagdata.verbs.option_types import STATED
 from flagdata.verbs.shared_options import FLAG, HOW, TEST, ByNulls
-from flagdata.verbs.verb_options import described, option, options, typed
+from flagdata.verbs.verb_options import described_fields, option, options, typed_names
 
 if TYPE_CHECKING:
     from flagdata.core.stated import Stated
@@ -102,10 +102,10 @@ def refuse_of_others(chosen: JudgingFilms, *, films: bool) -> None:
     Raises:
         UsageError: one of them is on the command line.
     """
-    rows = described(type(chosen))
-    for name in OF_MARKERS if films else described(OfFilms):
-        if name in typed(chosen) and name not in OF_BOTH:
+    rows = described_fields(type(chosen))
+    for name in OF_MARKERS if films else described_fields(OfFilms):
+        if name in typed_names(chosen) and name not in OF_BOTH:
             kind = "films and tables of observables" if films else "markers and meshes"
             other_kind = "markers and meshes" if films else "films and tables of observables"
-            spelled = rows[name][1].spelled(name)
+            spelled = rows[name][1].spelling_of(name)
             raise UsageError(f"the sources are {kind}", where=spelled, fix=f"leave it out: it is about {other_kind}")

@@ -10,8 +10,8 @@ from measure.cloth.observed_recording import Observed, constant_wind
 from measure.observables import OBSERVABLES
 from measure.report import verdict_sentences
 from measure.report.lead_sentences import lead
-from measure.report.verdict_sentences import listed
-from measure.report.verdict_words import item, wrapped
+from measure.report.verdict_sentences import list_names
+from measure.report.verdict_words import item, wrap_lines
 from measure.verdict.decided import NOT_REJECTED
 from measure.verdict.quantity import estimate_text, known, level_text, number, probability, share, with_level
 from measure.verdict.verdict_record import Candidate, Comparison, Conclusion, Verdict
@@ -20,7 +20,7 @@ _MOST = 4
 """Observables that are named."""
 
 
-def stated(
+def state_verdict(
     verdict: Verdict,
     recordings: Sequence[Observed],
     *,
@@ -91,7 +91,7 @@ def assumptions(recordings: Sequence[Observed], *, has_weight: bool, unseen: tup
         )
     if unseen:
         sentences.append(
-            f"even where they are strong, {listed(unseen)} would move what these recordings show by less than two "
+            f"even where they are strong, {list_names(unseen)} would move what these recordings show by less than two "
             "standard errors beyond what another cloth or view does: they are not excluded"
         )
     sentences.append("a wind that is turned from its log looks like another place of the camera, and is not weighed")
@@ -105,7 +105,7 @@ def words(verdict: Verdict) -> str:
     """Writes the verdict, its test, the errors before and after, what else was weighed and what was assumed; lines
     of at most 100 characters, without a final line break."""
     return "\n".join(
-        line for label, text in _items(verdict) for line in (item(label, text) if label else wrapped(text))
+        line for label, text in _items(verdict) for line in (item(label, text) if label else wrap_lines(text))
     )
 
 
@@ -151,7 +151,7 @@ def _items(verdict: Verdict) -> Iterator[tuple[str, str]]:
         moved = f" → {with_level(parameter.after)}" if parameter.after is not None else ""
         yield parameter.name.replace("_", " "), f"{with_level(parameter.before)}{moved}"
     if verdict.conclusion not in NOT_REJECTED:
-        for candidate in verdict_sentences.rejected(verdict)[:_RUNNERS_UP]:
+        for candidate in verdict_sentences.rejected_candidates(verdict)[:_RUNNERS_UP]:
             yield f"not {verdict_sentences.candidate_title(verdict, candidate)}", candidate.why_not
     if verdict.separating:
         yield "would separate", verdict.separating

@@ -18,7 +18,7 @@ from flagdata.core.arrays import FloatArray
 from flagdata.core.findings import Severity
 from flagdata.core.provenance import code_version
 from measure.cloth.design import Weighable
-from measure.cloth.films_statement import stated
+from measure.cloth.films_statement import state_verdict
 from measure.cloth.flag_prior import CLOTH
 from measure.cloth.loop import (
     FilmLoopOptions,
@@ -27,14 +27,14 @@ from measure.cloth.loop import (
 )
 from measure.cloth.model_evidence import (
     Fit,
-    expected,
-    fitted,
+    expected_strength,
+    fit_model,
     hypothesis,
     quantiles,
 )
 from measure.cloth.observed_recording import Observed
 from measure.cloth.simulations import of_recordings
-from measure.cloth.unseen_windows import compared
+from measure.cloth.unseen_windows import compare_models
 from measure.forecasting.setting import Stage
 from measure.posterior_ends import span
 from measure.verdict.criteria import CRITERIA
@@ -79,7 +79,7 @@ def verdict_of(outcome: SolvedLoop) -> Verdict:
     names = tuple(dict.fromkeys(effects[number].column.effect for number in decision.named))
     acting = outcome.best if decision.named else None
     rest = [number for number in np.argsort(-decision.probability) if number not in decision.confident]
-    comparisons = compared(
+    comparisons = compare_models(
         outcome.recordings,
         outcome.halves,
         outcome.sights,
@@ -112,7 +112,7 @@ def verdict_of(outcome: SolvedLoop) -> Verdict:
         for effect, errors in zip(effects, outcome.sensitivity.tolist(), strict=True)
         if errors < SEEN
     ]
-    return stated(
+    return state_verdict(
         verdict,
         outcome.recordings,
         has_weight=options.area_weight is not None,
@@ -150,7 +150,7 @@ def _power(outcome: SolvedLoop) -> tuple[Power, ...]:
         Power(
             effect=effects[number].column.effect,
             parameter=effects[number].column.parameter,
-            strength=expected(outcome.sights, effects[number]),
+            strength=expected_strength(outcome.sights, effects[number]),
             unit=effects[number].column.unit,
             share=float(power[number]),
         )
@@ -258,7 +258,7 @@ def _ranking(outcome: SolvedLoop) -> tuple[Candidate, ...]:
     candidates = []
     for number in np.argsort(-decision.probability).tolist():
         effect = weighing.effects[number]
-        fit = fitted(outcome.sights, experiment, effect, seed=outcome.options.calibration.seed)
+        fit = fit_model(outcome.sights, experiment, effect, seed=outcome.options.calibration.seed)
         candidates.append(
             Candidate(
                 effect=effect.column.effect,

@@ -30,14 +30,14 @@ from measure.cloth.observed_recording import (
     first_part,
     usable,
 )
-from measure.cloth.table_clock import joined
+from measure.cloth.table_clock import join_log
 from measure.cloth.tables_of_observables import column_names, of_table
 from measure.film.conditioned_film import ConditionedFilm
 from measure.film.film_source import FilmReading, Subject, subjects
 from measure.film.similarity import FlagSize
 from measure.observables import OBSERVABLES
 from measure.observables.observable import WINDOW
-from measure.observables.watching import watched
+from measure.observables.watching import watch_film
 
 S = TypeVar("S")
 _TABLES = (".csv", ".parquet")
@@ -100,7 +100,7 @@ class Part:
             RefusedError: no flag is found, or the camera moves and cannot be steadied.
         """
         film, first = self.film, self.first
-        film_windows = watched(film, size, first=first, last=self.end, advance=advance)
+        film_windows = watch_film(film, size, first=first, last=self.end, advance=advance)
         findings = (*self.findings, *film.findings())
         if lost := [
             finding for finding in findings if finding.kind == "camera-lost" and (finding.value or 0.0) > _LOST
@@ -209,7 +209,7 @@ class Sources:
         return Gathered(recordings=recordings, parents=tuple(parents), left_out=left_out)
 
 
-def opened(
+def open_recording(
     source: str,
     size: FlagSize,
     reading: FilmReading,
@@ -270,7 +270,7 @@ def _of_table(
             raise UsageError(
                 "the log is of no lake", where="--log", fix="name the lake that it was ingested into: --lake"
             )
-        log_beside, parent = joined(path, size, lake=lake, log=log, at=at, offset=offset)
+        log_beside, parent = join_log(path, size, lake=lake, log=log, at=at, offset=offset)
     elif offset is not None:
         raise UsageError(
             "an offset needs a log", where="--clock-offset", fix="name the log: --log ARTIFACT --lake LAKE"

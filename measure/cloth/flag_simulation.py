@@ -26,9 +26,9 @@ from measure.observables.observable import WINDOW
 from measure.observables.tracked_cloth import edges_of
 from sim.cloth import handles as held
 from sim.cloth.handles import Handles
-from sim.cloth.material import Material, named
+from sim.cloth.material import Material, named_material
 from sim.cloth.mesh import Diagonals, Mesh, grid
-from sim.cloth.scene import Scene, assemble, roughened
+from sim.cloth.scene import Scene, assemble, roughen_start
 from sim.cloth.state import State
 from sim.cloth.system import System
 from sim.effects import apply
@@ -191,10 +191,10 @@ class FlagBatch:
     @property
     def windows(self) -> int:
         """Windows of the film that are simulated."""
-        return math.floor(self._simulated / WINDOW + 1e-9)
+        return math.floor(self._simulated_seconds / WINDOW + 1e-9)
 
     @property
-    def _simulated(self) -> float:
+    def _simulated_seconds(self) -> float:
         return self.duration if self.until is None else self.until
 
     def content(self) -> Mapping[str, object]:
@@ -252,13 +252,13 @@ class FlagBatch:
 
     def positions(self, mesh: Mesh, *, rate: float = RATE) -> FloatArray:
         """Simulates (frame, vertex, 3, flag) [m] of the film's frames, `rate` a second [Hz]."""
-        system, state, integrator = self._assembled(mesh)
+        system, state, integrator = self._assemble_flags(mesh)
         simulated = simulation_loop.Batch(
             system=system, state=state, integrator=integrator, divergence=simulation_loop.Divergence.KEEP
         )
-        return simulated.positions(simulation_loop.after(SETTLE, self._simulated, rate), rate)
+        return simulated.positions(simulation_loop.after(SETTLE, self._simulated_seconds, rate), rate)
 
-    def _assembled(self, mesh: Mesh) -> tuple[System, State, Integrator]:
+    def _assemble_flags(self, mesh: Mesh) -> tuple[System, State, Integrator]:
         """Flags in their winds at rest, and what simulates them."""
         step = self.step
         system, state = assemble(self._scenes(mesh, damped=step or 0.0))
@@ -277,7 +277,7 @@ class FlagBatch:
             along = mesh.rest[:, 0]
             flat = np.stack([along * math.cos(_AHEAD), along * math.sin(_AHEAD), mesh.rest[:, 1]], axis=1)
             material = self._material(member, damped)
-            start = roughened(flat, handles, stream(seed, "calibrate", "start"), _ROUGH)
+            start = roughen_start(flat, handles, stream(seed, "calibrate", "start"), _ROUGH)
             scenes.append(Scene(mesh=mesh, position=start, material=material, handles=handles))
         return scenes
 
@@ -326,7 +326,7 @@ def cloth(area_weight: float, bending: float, damping: float, *, stretching: flo
         stretching: factor on the fabric's table.
         fabric: a material of the catalog.
     """
-    base = named(fabric)
+    base = named_material(fabric)
     return replace(
         base,
         area_weight=area_weight,

@@ -24,11 +24,11 @@ from measure.cloth.design import CalibrationOptions, Weighable, weighable
 from measure.cloth.emulator import TAKEN_APART
 from measure.cloth.flag_prior import CLOTH
 from measure.cloth.flag_simulation import OBSERVED
-from measure.cloth.model_evidence import Experiments, Fit, Sight, Weighing, fitted, hypothesis, misfits, weigh
+from measure.cloth.model_evidence import Experiments, Fit, Sight, Weighing, fit_model, hypothesis, misfits, weigh
 from measure.cloth.observed_recording import Observed, constant_wind
 from measure.cloth.score_test import Judged, directions, judge, score
-from measure.cloth.simulations import Simulations, gathered, of_base, of_nulls, of_recordings, shown_by
-from measure.cloth.unseen_windows import Halves, halved
+from measure.cloth.simulations import Simulations, of_base, of_nulls, of_recordings, shown_by, simulate_all
+from measure.cloth.unseen_windows import Halves, halve_recordings
 from measure.forecasting.setting import Stage
 from measure.forecasting.strengths import Suspicion
 from measure.verdict.criteria import CRITERIA
@@ -207,18 +207,24 @@ class SolvedLoop:
     @property
     def halves(self) -> tuple[Halves, ...]:
         """Returns the halves of the recordings that have two, which predict each other."""
-        return self._halved[0]
+        return self._halves_of_recordings[0]
 
     @cached_property
-    def _halved(self) -> tuple[tuple[Halves, ...], tuple[Finding, ...]]:
-        return halved(self.recordings, self.simulations)
+    def _halves_of_recordings(self) -> tuple[tuple[Halves, ...], tuple[Finding, ...]]:
+        return halve_recordings(self.recordings, self.simulations)
 
     @property
     def findings(self) -> tuple[Finding, ...]:
         """Returns the findings on the recordings."""
         of_recordings = (finding for recording in self.recordings for finding in recording.findings)
         of_scatter = [] if self.together else [TAKEN_APART]
-        return (*self.left_out, *self._halved[1], *constant_wind(self.recordings), *of_recordings, *of_scatter)
+        return (
+            *self.left_out,
+            *self._halves_of_recordings[1],
+            *constant_wind(self.recordings),
+            *of_recordings,
+            *of_scatter,
+        )
 
 
 def solve(
@@ -234,7 +240,7 @@ def solve(
         raise InputError("no recordings are given", where="close-loop", fix="give one or more")
     effects, seed = options.effects, options.calibration.seed
     # All simulations, read where they were made before.
-    simulations = gathered(
+    simulations = simulate_all(
         recordings, options.calibration, effects, kinds=options.kinds, folder=folder, workers=workers, stage=stage
     )
     # A model of what each recording shows, by its simulations; recordings without one are left out.
@@ -245,7 +251,7 @@ def solve(
     model = of_base(sights, recordings, simulations, options.area_weight, seed=seed)
     experiment = of_recordings(sights, recordings, options.area_weight)
     scored = score(experiment, model, null, kinds, directions(sights, effects, options.suspected), level=options.level)
-    base = fitted(sights, experiment, None, seed=seed)
+    base = fit_model(sights, experiment, None, seed=seed)
     departing = departures(recordings, sights, base)
     weighing = weigh(sights, experiment, effects, seed=seed)
     decision = judge(
@@ -259,7 +265,7 @@ def solve(
     best = None
     if effects:
         first = effects[decision.confident[0]]
-        best = first, fitted(sights, experiment, first, seed=seed)
+        best = first, fit_model(sights, experiment, first, seed=seed)
     return SolvedLoop(
         options=options,
         recordings=recordings,

@@ -172,10 +172,10 @@ class Hypothesis:
             at = np.zeros((len(observed), self.dimension))
             if self.effect is not None:
                 at[:, -1] = begin
-            modes.append(self._climbed(at, observed))
+            modes.append(self._climb(at, observed))
         return modes
 
-    def _climbed(self, at: FloatArray, observed: Experiments) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _climb(self, at: FloatArray, observed: Experiments) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Climbs to a mode (n, d) from a start, the curvature there (n, d, d), and the misfit (n,)."""
         value, damping = self.log_posterior(at, observed), np.full(len(at), 1.0)
         for _ in range(_STEPS):
@@ -279,8 +279,8 @@ def weigh(
     Args:
         effects: those that all sights' models know a response of.
     """
-    base = fitted(sights, observed, None, seed=seed)
-    fits = [fitted(sights, observed, effect, seed=seed) for effect in effects]
+    base = fit_model(sights, observed, None, seed=seed)
+    fits = [fit_model(sights, observed, effect, seed=seed) for effect in effects]
     return Weighing(
         effects=tuple(effects),
         factors=_side_by_side([fit.evidence - base.evidence for fit in fits], len(observed)),
@@ -299,7 +299,7 @@ def _side_by_side(columns: Sequence[FloatArray], count: int) -> FloatArray:
     return np.stack(columns, axis=1) if columns else np.zeros((count, 0))
 
 
-def fitted(
+def fit_model(
     sights: Sequence[Sight],
     observed: Experiments,
     effect: Weighable | None,
@@ -311,6 +311,6 @@ def fitted(
     return hypothesis(sights, effect).fit(observed, rng)
 
 
-def expected(sights: Sequence[Sight], effect: Weighable) -> float:
+def expected_strength(sights: Sequence[Sight], effect: Weighable) -> float:
     """Returns the strength at which these changes are, beyond null."""
     return float(np.mean([sight.responses[effect.name].expected for sight in sights]))

@@ -134,7 +134,7 @@ def with_errors(observed: Observed, readings: FloatArray, correction: Correction
     return (summaries + observed.pixels(len(summaries), seed=seed)).reshape(len(summaries), -1)
 
 
-def corrected(
+def measure_correction(
     design: Design,
     readings: FloatArray,
     *,

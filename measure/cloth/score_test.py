@@ -36,7 +36,7 @@ from measure.cloth.design import Weighable
 from measure.cloth.model_evidence import Experiments, Misfits, Sight, Weighing
 from measure.forecasting.strengths import Suspicion
 from measure.nulls.clustered import ClusteredNulls
-from measure.verdict.decided import undecided
+from measure.verdict.decided import undecided_sentences
 from measure.verdict.verdict_record import Conclusion
 from models.trained.outliers import shrunk_covariance
 
@@ -402,7 +402,7 @@ def judge(
         ]
     )
 
-    def judged(conclusion: Conclusion, indices: tuple[int, ...] = (), reasons: tuple[str, ...] = ()) -> Judged:
+    def conclude(conclusion: Conclusion, indices: tuple[int, ...] = (), reasons: tuple[str, ...] = ()) -> Judged:
         return Judged(
             conclusion=conclusion,
             named=indices,
@@ -414,15 +414,15 @@ def judge(
         )
 
     if not scored.nulls.tests(level):
-        return judged(Conclusion.UNTESTED)
+        return conclude(Conclusion.UNTESTED)
     if scored.p_value > level:
-        reasons = undecided(scored.p_value, level=level, departure=departure, power=scored.tested.tolist())
-        return judged(Conclusion.UNDECIDED if reasons else Conclusion.SUFFICIENT, reasons=reasons)
+        reasons = undecided_sentences(scored.p_value, level=level, departure=departure, power=scored.tested.tolist())
+        return conclude(Conclusion.UNDECIDED if reasons else Conclusion.SUFFICIENT, reasons=reasons)
     if not scored.pointed:
-        return judged(Conclusion.OUTSIDE)
+        return conclude(Conclusion.OUTSIDE)
     if any(leftover[column] > level for column in confident):
-        return judged(Conclusion.EFFECT if len(confident) == 1 else Conclusion.ONE_OF, confident)
+        return conclude(Conclusion.EFFECT if len(confident) == 1 else Conclusion.ONE_OF, confident)
     excess = float(weighing.misfits.base[0] - np.median(nulls.base))
     explained = float(weighing.misfits.base[0] - weighing.misfits.left[0, confident[0]])
     part = explained >= PART * excess
-    return judged(Conclusion.PARTLY, confident[:1]) if part else judged(Conclusion.OUTSIDE)
+    return conclude(Conclusion.PARTLY, confident[:1]) if part else conclude(Conclusion.OUTSIDE)

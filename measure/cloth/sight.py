@@ -130,7 +130,7 @@ def values(scores: FloatArray, sights: Sequence[Sight]) -> tuple[dict[str, Float
     return cloth, [placed[first] for first in owners]
 
 
-def responded(
+def response_of(
     emulator: Emulator,
     effect: Weighable,
     strengths: FloatArray,

@@ -28,7 +28,7 @@ from measure.cloth.flag_simulation import OBSERVED
 from measure.cloth.model_evidence import Experiments, Sight
 from measure.cloth.numerics import Correction, Finer, with_errors
 from measure.cloth.observed_recording import Observed, Projection, check_in_all, shown, usable
-from measure.cloth.sight import first_of, responded
+from measure.cloth.sight import first_of, response_of
 from measure.forecasting.setting import Stage
 
 
@@ -66,7 +66,7 @@ class Simulations:
         )
 
 
-def gathered(
+def simulate_all(
     recordings: Sequence[Observed],
     options: CalibrationOptions,
     effects: Sequence[Weighable],
@@ -215,7 +215,7 @@ def sight(
         with_it = projection.of(readings).reshape(len(readings), -1)
         without = projection.of(base[pair.indices][:, :count]).reshape(len(readings), -1)
         paired = {name: v[pair.indices] for name, v in values.items()}
-        response = responded(emulator, pair.effect, pair.strengths, paired, with_it, without)
+        response = response_of(emulator, pair.effect, pair.strengths, paired, with_it, without)
         if response is not None:
             responses[pair.effect.name] = response
     return Sight(

@@ -40,7 +40,7 @@ _FOLLOWS = (
 """Observables that follow the wind, those that do so most closely first; the droop falls with it."""
 
 
-def joined(
+def join_log(
     path: Path,
     size: FlagSize,
     *,
@@ -76,13 +76,13 @@ def joined(
         raise InputError("the wind artifact holds no samples", where=artifact.id, fix="ingest the log anew")
     names = (artifact.name or artifact.id[:12], path.stem)
     if offset is not None:
-        clock = declared(table, offset, names=names)
+        clock = declared_clock(table, offset, names=names)
     else:
-        clock = estimated(table, series, names=names, seed=artifact.id, progress=progress)
+        clock = estimated_clock(table, series, names=names, seed=artifact.id, progress=progress)
     return Beside(series=series, clock=clock), artifact.id
 
 
-def declared(table: Columns, offset: Stated, *, names: tuple[str, str]) -> ClockModel:
+def declared_clock(table: Columns, offset: Stated, *, names: tuple[str, str]) -> ClockModel:
     """Returns the table's clock on the log's, by an offset that is given.
 
     Args:
@@ -101,7 +101,7 @@ def declared(table: Columns, offset: Stated, *, names: tuple[str, str]) -> Clock
     return given(names[1], names[0], start=int(times[0]), end=int(times[-1]) + 1, offset=offset.low, sigma=offset.sigma)
 
 
-def estimated(
+def estimated_clock(
     table: Columns,
     series: WindSeries,
     *,

@@ -29,7 +29,7 @@ from flagdata.core.files.plain_text import plain_text
 from flagdata.core.files.regular_files import check_input
 from flagdata.core.findings import Finding
 from flagdata.core.provenance import file_hash
-from flagdata.core.units import spelled, unit
+from flagdata.core.units import name_of_unit, unit
 from flagdata.errors import InputError, TimeError
 from flagdata.ingest.named_columns import small_table, small_table_head
 from flagdata.record.signals import Instants, WindSeries
@@ -93,7 +93,11 @@ def read_table(path: Path, size: FlagSize) -> Columns:
     check_input(path, limit=_LIMIT)
     where = str(path)
     headings, rows = _cells(path)
-    wanted = [(column, *_parsed(text)) for column, text in enumerate(headings) if not _named(text).endswith(_REASON)]
+    wanted = [
+        (column, *_parse_heading(text))
+        for column, text in enumerate(headings)
+        if not _name_of_heading(text).endswith(_REASON)
+    ]
     names = [name for _, name, _ in wanted]
     known_columns(names, where=where)
     if twice := sorted({name for name in names if names.count(name) > 1}):
@@ -105,13 +109,13 @@ def read_table(path: Path, size: FlagSize) -> Columns:
         scale = _scale(name, unit_text, size, where=where)
         cells = [row[column].strip() if column < len(row) else "" for _, row in rows]
         if name == TIME:
-            instants = _converted(cells, lines, name, where, partial(_instant, scale=scale))
+            instants = _convert_cells(cells, lines, name, where, partial(_instant, scale=scale))
             if None in instants or not instants:
                 raise InputError("rows without a time", where=where, fix="leave them out, or fill their times in")
             origin = instants[0] or 0
             values[name] = np.array([((instant or 0) - origin) / NANOSECONDS for instant in instants])
         else:
-            numbers = _converted(cells, lines, name, where, float)
+            numbers = _convert_cells(cells, lines, name, where, float)
             values[name] = np.array([math.nan if cell_value is None else cell_value * scale for cell_value in numbers])
     return Columns(where=where, values=values, origin=origin, lines=lines)
 
@@ -136,26 +140,26 @@ def column_names(path: Path) -> set[str]:
         import pyarrow.parquet as pq
 
         try:
-            return {_named(name) for name in pq.read_schema(path).names}
+            return {_name_of_heading(name) for name in pq.read_schema(path).names}
         except pa.ArrowException:
             return set()
     try:
-        return {_named(cell) for cell in small_table_head(path).names}
+        return {_name_of_heading(cell) for cell in small_table_head(path).names}
     except InputError:
         return set()
 
 
-def _named(heading: str) -> str:
+def _name_of_heading(heading: str) -> str:
     """Returns the name in a heading, as the table of observables spells names."""
     match = _HEADING.fullmatch(heading.strip())
     return re.sub(r"[\s_]+", "-", (match["name"] if match else heading).strip().lower())
 
 
-def _parsed(heading: str) -> tuple[str, str | None]:
+def _parse_heading(heading: str) -> tuple[str, str | None]:
     """Name and unit of a heading."""
     match = _HEADING.fullmatch(heading.strip())
     unit_text = None if match is None else match["bracketed"] or match["after"]
-    return _named(heading), unit_text.strip() if unit_text else None
+    return _name_of_heading(heading), unit_text.strip() if unit_text else None
 
 
 def _scale(name: str, stated_unit: str | None, size: FlagSize, *, where: str) -> float:
@@ -176,7 +180,7 @@ def _scale(name: str, stated_unit: str | None, size: FlagSize, *, where: str) ->
         return parsed.scale / (size.length if about.counted_in == "length" else size.height)
     also = "" if about is None or about.measured_in is None else f" or {about.measured_in}"
     raise InputError(
-        f"the unit {spelled(stated_unit) or stated_unit} of {name}, which is in {own_unit}",
+        f"the unit {name_of_unit(stated_unit) or stated_unit} of {name}, which is in {own_unit}",
         where=where,
         fix=f"give {own_unit}{also}",
     )
@@ -199,7 +203,7 @@ def _cells(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
         for field in table.schema:
             unit_text = (field.metadata or {}).get(b"unit", b"").decode()
             headings.append(
-                f"{field.name} [{unit_text}]" if unit_text and _parsed(field.name)[1] is None else field.name
+                f"{field.name} [{unit_text}]" if unit_text and _parse_heading(field.name)[1] is None else field.name
             )
         columns = [["" if cell is None else str(cell) for cell in column.to_pylist()] for column in table.columns]
         rows = enumerate(map(list, zip(*columns, strict=True)), start=2)
@@ -208,7 +212,7 @@ def _cells(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
     return list(table.names), [(line, [table.number(cell) for cell in row]) for line, row in table.rows]
 
 
-def _converted(
+def _convert_cells(
     cells: Sequence[str], lines: Sequence[int], name: str, where: str, convert: Callable[[str], _Value]
 ) -> list[_Value | None]:
     """Converts each cell, `None` where it is blank.

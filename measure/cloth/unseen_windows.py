@@ -20,7 +20,7 @@ from flagdata.core.rng import stream
 from flagdata.errors import RefusedError
 from measure.cloth.design import Weighable
 from measure.cloth.flag_simulation import OBSERVED
-from measure.cloth.model_evidence import Sight, fitted, hypothesis
+from measure.cloth.model_evidence import Sight, fit_model, hypothesis
 from measure.cloth.observed_recording import LEAST_WINDOWS, Observed
 from measure.cloth.simulations import Simulations, of_recordings, part_of, sights_of
 from measure.observables import OBSERVABLES
@@ -71,7 +71,7 @@ class Halves:
     second: tuple[Sight, Observed]
 
 
-def compared(
+def compare_models(
     recordings: Sequence[Observed],
     halves: Sequence[Halves],
     sights: Sequence[Sight],
@@ -84,7 +84,7 @@ def compared(
     """Comparisons for each observable: on other halves, and on recordings left out.
 
     Args:
-        halves: of the recordings that have them, see `halved`.
+        halves: of the recordings that have them, see `halve_recordings`.
         sights: of whole recordings.
         effect: that is named; None for none.
         control: the best wrong effect; None for none.
@@ -98,7 +98,9 @@ def compared(
         predictions = [
             predicted
             for task in tasks
-            for predicted in _predicted(task, effect=effect, control=control, scale_weight=scale_weight, seed=seed)
+            for predicted in _predict_windows(
+                task, effect=effect, control=control, scale_weight=scale_weight, seed=seed
+            )
         ]
         for column, name in enumerate(OBSERVED):
             shown_by = [
@@ -122,7 +124,9 @@ def _other_halves(halves: Sequence[Halves]) -> list[_Task]:
     ]
 
 
-def halved(recordings: Sequence[Observed], simulations: Simulations) -> tuple[tuple[Halves, ...], tuple[Finding, ...]]:
+def halve_recordings(
+    recordings: Sequence[Observed], simulations: Simulations
+) -> tuple[tuple[Halves, ...], tuple[Finding, ...]]:
     """Returns the halves of the recordings that have two, and a warning for each of which one cannot be fitted.
 
     Recordings that are too short have none, nor have rows of a table against wind, whose windows are the same.
@@ -162,7 +166,7 @@ def _left_out(recordings: Sequence[Observed], sights: Sequence[Sight]) -> list[_
     ]
 
 
-def _predicted(
+def _predict_windows(
     task: _Task,
     *,
     effect: Weighable | None,
@@ -176,7 +180,7 @@ def _predicted(
 
     def means(which: Weighable | None) -> list[FloatArray]:
         """Predicts (observable,) of each predicted sight."""
-        fit = fitted(sights, experiment, which, seed=seed)
+        fit = fit_model(sights, experiment, which, seed=seed)
         cloth, places, strength = hypothesis(sights, which).values(fit.scores[0])
         columns = []
         for fitted_number, sight, _ in task.predicted:

@@ -24,7 +24,7 @@ from measure.cloth.design import Weighable
 from measure.cloth.films_statement import level_of
 from measure.cloth.flag_simulation import OBSERVED, RATE, FlagBatch
 from measure.cloth.loop import SolvedLoop
-from measure.cloth.model_evidence import Fit, Sight, fitted, hypothesis
+from measure.cloth.model_evidence import Fit, Sight, fit_model, hypothesis
 from measure.cloth.observed_recording import Observed
 from measure.cloth.simulations import of_recordings
 from measure.observables import View
@@ -100,7 +100,7 @@ def side_by_side(outcome: SolvedLoop, index: int, *, after: str) -> SideBySide |
         models.append((after, outcome.best[0], _AFTER_RGB))
     for label, effect, colour in models:
         model_fitted = hypothesis(sights, effect)
-        fit = fitted(sights, experiment, effect, seed=outcome.options.calibration.seed)
+        fit = fit_model(sights, experiment, effect, seed=outcome.options.calibration.seed)
         cloth, places, strength = model_fitted.values(fit.weights[:1] @ fit.scores[0])
         window, depth = _flown(outcome, index, excerpt.number, {**cloth, **places[place]}, effect, strength)
         drawings.append(_moving(label, drawn(window, depth, film, colour)))

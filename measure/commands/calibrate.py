@@ -17,7 +17,7 @@ from flagdata.core.shell import command_line
 from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.examples import check_without_lake
 from flagdata.verbs.shared_options import FLAG, HOW, WRITTEN, Keeping, Shared
-from flagdata.verbs.verb_options import AsJson, argument, command, described, option, options, typed
+from flagdata.verbs.verb_options import AsJson, argument, command, described_fields, option, options, typed_names
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
@@ -108,12 +108,12 @@ def calibrate(chosen: CalibrateCommand) -> None:
         check_file(chosen.report, command="calibrate")
     if chosen.lake is None:
         check_without_lake(*chosen.recordings)
-    from flagdata.lake.results import placed
+    from flagdata.lake.results import place_result
     from measure.cloth.calibrate_call import folder_of, options_of, sources_of
     from measure.cloth.calibration_artifact import artifact, keep
     from measure.cloth.calibration_page import calibration_page as page
     from measure.cloth.cloth_calibration import calibrate as calibrated
-    from measure.cloth.design import announced
+    from measure.cloth.design import announce_simulations
     from measure.cloth.numerics import FLAGS, effort
     from measure.film.film_source import FilmReading
     from measure.film.similarity import FlagSize
@@ -137,7 +137,7 @@ def calibrate(chosen: CalibrateCommand) -> None:
         gathered = weighable.read(size, advance=advance)
     observed, parents = gathered.recordings, gathered.parents
     work = sum(options.simulations * recording.duration + effort(recording.duration) for recording in observed)
-    say(announced(work, workers=workers))
+    say(announce_simulations(work, workers=workers))
     with progress((options.simulations + FLAGS) * len(observed), label="calibrate", unit="flag") as advance:
         calibration = calibrated(
             observed,
@@ -149,7 +149,7 @@ def calibrate(chosen: CalibrateCommand) -> None:
         )
     wanted = None
     if lake is not None and not chosen.read_only:
-        wanted = placed(lake, artifact(calibration, reading, parents), branch=chosen.branch).artifact.id
+        wanted = place_result(lake, artifact(calibration, reading, parents), branch=chosen.branch).artifact.id
     text = (
         None
         if chosen.report is None
@@ -197,20 +197,20 @@ def _check_only(chosen: CalibrateCommand) -> None:
     """
     ignored = {"weight": {"name", "model"}, "anemometer": _OF_WEIGHT}.get(chosen.only or "", set())
     if chosen.area_weight is not None:
-        ignored = set(described(CalibrateCommand)) - _OF_DRAPES
+        ignored = set(described_fields(CalibrateCommand)) - _OF_DRAPES
     other = "--area-weight" if chosen.area_weight is not None else command_line("--only", chosen.only)
-    for name in sorted(ignored & typed(chosen)):
-        spelled = described(CalibrateCommand)[name][1].spelled(name)
+    for name in sorted(ignored & typed_names(chosen)):
+        spelled = described_fields(CalibrateCommand)[name][1].spelling_of(name)
         raise UsageError(f"{spelled} cannot be combined with {other}", where=spelled, fix=f"leave {spelled} out")
 
 
 def _drapes(chosen: CalibrateCommand) -> None:
     """Finds and reports the cloth of drapes."""
     from measure.cloth.calibration_page import shown_quantity as shown
-    from measure.drape.drape_answer import draped
+    from measure.drape.drape_answer import read_drapes
 
     with progress(chosen.simulations, label="drape", unit="drape") as advance:
-        found = draped(chosen, workers=chosen.processes, advance=advance)
+        found = read_drapes(chosen, workers=chosen.processes, advance=advance)
     if chosen.as_json:
         document("calibrate", {**found.as_dict(), "artifact": None, "anemometer": None})
         return

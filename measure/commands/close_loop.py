@@ -14,7 +14,7 @@ from flagdata.core.console import LocalPath, document, echo, say
 from flagdata.errors import UnknownNameError, UsageError
 from flagdata.verbs.option_types import POSITIVE, STATED
 from flagdata.verbs.shared_options import BOTH_STATED, TEST, WRITTEN, NamedLake, OnBranch
-from flagdata.verbs.verb_options import AsJson, argument, command, option, options, typed
+from flagdata.verbs.verb_options import AsJson, argument, command, option, options, typed_names
 from measure.closing.null_options import nulls_given, refuse, stage_bars
 from measure.closing.verdict_findings import with_warnings
 from measure.cloth.film_options import JudgingFilms, refuse_of_others
@@ -264,14 +264,14 @@ def close_loop(chosen: CloseLoopCommand) -> None:
         answer = of_films(chosen.level) if films else of_markers(chosen.level)[0]
         deliver(answer, delivery)
         return
-    from measure.closing.joint_verdict import joined
+    from measure.closing.joint_verdict import join_verdicts
     from measure.cloth.flag_simulation import mean_bending
     from measure.verdict.criteria import CRITERIA
 
     level_of_both = chosen.level or (None if recipe is None else recipe.level) or CRITERIA.level
     by_films = of_films(level_of_both / 2)
     by_markers, nominal = of_markers(level_of_both / 2)
-    joint = joined(
+    joint = join_verdicts(
         by_markers.verdict,
         by_films.verdict,
         level=level_of_both,
@@ -285,7 +285,7 @@ def _refuse_beside(chosen: CloseLoopCommand, sources: tuple[str, ...], *, films:
     if sources:
         raise UsageError("the recipe names its recordings", where="SOURCE", fix="leave SOURCE or [[recording]] out")
     for name in _OF_SOURCES:
-        if name in typed(chosen) and not (films and name == "clock_offset"):
+        if name in typed_names(chosen) and not (films and name == "clock_offset"):
             spelled = "wind" if name == "winds" else name.replace("_", "-")
             raise UsageError(
                 "the recipe says how its recordings are read", where=f"--{spelled}", fix="write it into the recipe"
@@ -333,7 +333,7 @@ def _draft(chosen: CloseLoopCommand, sources: tuple[str, ...], lake: Lake | None
     """
     from flagdata.core.files.outputs import write_file
     from flagdata.recipes.documents import to_toml
-    from measure.closing.verdict_sources import drafted, filled
+    from measure.closing.verdict_sources import draft_recordings, filled_entries
     from measure.observe import Setup
 
     if chosen.recipe is not None or chosen.draft is None or not sources:
@@ -349,9 +349,9 @@ def _draft(chosen: CloseLoopCommand, sources: tuple[str, ...], lake: Lake | None
         "cloth": dict(zip(("width", "height"), size, strict=False)),
         "material": {"name": chosen.material, "area_weight": _weight(setup, chosen)},
         "attachment": pins,
-        **drafted(sources, chosen.winds, _reading(chosen, None), lake, folder=chosen.draft.resolve().parent),
+        **draft_recordings(sources, chosen.winds, _reading(chosen, None), lake, folder=chosen.draft.resolve().parent),
     }
-    write_file(chosen.draft, to_toml(filled(content)))
+    write_file(chosen.draft, to_toml(filled_entries(content)))
     if chosen.as_json:
         document("close-loop-draft", {"recipe": str(chosen.draft)})
     else:
@@ -379,7 +379,7 @@ def _axis(chosen: CloseLoopCommand) -> tuple[float, float, float] | None:
     """Returns where the air goes; None where north is given."""
     text = chosen.axis
     if chosen.north is not None:
-        if "axis" in typed(chosen):
+        if "axis" in typed_names(chosen):
             raise UsageError("both --axis and --north are given", where="--north", fix="keep one of them")
         return None
     try:
@@ -394,7 +394,7 @@ def _axis(chosen: CloseLoopCommand) -> tuple[float, float, float] | None:
 def _up(chosen: CloseLoopCommand, recipe: ExperimentRecipe | None) -> Up:
     from measure.observe import Up
 
-    if recipe is not None and "up" not in typed(chosen):
+    if recipe is not None and "up" not in typed_names(chosen):
         return recipe.up
     if chosen.up not in list(Up):
         raise UnknownNameError.of("axis", chosen.up, list(Up), where="--up")
@@ -404,13 +404,13 @@ def _up(chosen: CloseLoopCommand, recipe: ExperimentRecipe | None) -> Up:
 def _setup(setup: Setup, chosen: CloseLoopCommand, *, joint: bool = False) -> Setup:
     """Replaces what the command line states in a setup."""
     from measure.observe import sheet
-    from sim.cloth.material import MATERIALS, named
+    from sim.cloth.material import MATERIALS, named_material
 
     if chosen.material is not None:
         if chosen.material not in MATERIALS.names():
             raise UnknownNameError.of("material", chosen.material, MATERIALS.names(), where="--material")
-        setup = replace(setup, material=named(chosen.material))
-    setup = setup.weighed(None if joint else chosen.area_weight, chosen.density_uncertainty)
+        setup = replace(setup, material=named_material(chosen.material))
+    setup = setup.state_weight(None if joint else chosen.area_weight, chosen.density_uncertainty)
     if chosen.flag_size is not None and not joint:
         try:
             width, height = (float(part) for part in chosen.flag_size.lower().split("x"))

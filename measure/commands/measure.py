@@ -163,7 +163,7 @@ class _Job:
     def do(self, subject: Subject) -> _Done:
         """Measure one film; commit and write what is to be shown."""
         from flagdata.core.files.outputs import fresh_folder, write_file
-        from flagdata.lake.results import placed
+        from flagdata.lake.results import place_result
         from measure.commands.measure_film import run, wind_elsewhere
         from measure.commands.measurement_artifact import artifact as artifact_of
         from measure.commands.measurement_artifact import keep, write
@@ -175,13 +175,13 @@ class _Job:
         subject.film.searched = None
         wind = None if subject.record is None else subject.record.wind()
         series = beside(measured, start=subject.film.start, wind=wind)
-        _warn(measured.noticed(anyway=self.chosen.anyway))
+        _warn(measured.notices(anyway=self.chosen.anyway))
         reported = measured.shown(anyway=self.chosen.anyway)
         refinement = None
         if self.request.options.refine is not None and reported:
-            from measure.estimate.refined import refined
+            from measure.estimate.refined import refine_window
 
-            refinement = refined(
+            refinement = refine_window(
                 measured, subject, estimator, budget=self.request.options.refine, cache=self.chosen.cache
             )
             _warn(refinement.findings)
@@ -190,7 +190,7 @@ class _Job:
         artifact = None
         if lake is not None:
             row = artifact_of(measured, subject, self.network, self.request.reading)
-            artifact = placed(lake, row, branch=self.chosen.branch).artifact.id
+            artifact = place_result(lake, row, branch=self.chosen.branch).artifact.id
         elsewhere = wind_elsewhere(measured, self.chosen)
         text = None
         if self.chosen.report is not None:

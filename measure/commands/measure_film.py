@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from flagdata.answer.measured import Answer, Measured, Windows
-from flagdata.answer.wind_elsewhere import WindComparison, compared
+from flagdata.answer.wind_elsewhere import WindComparison, compare_winds
 from flagdata.api.measuring_verbs import Measuring
 from flagdata.core.findings import Finding, Severity
 from flagdata.core.stated import Stated
@@ -109,7 +109,7 @@ class Request:
         return cls(options=options, reading=FilmReading.of(chosen, size), origin=origin)
 
 
-def measured(chosen: Measuring) -> Measured:
+def measure_one(chosen: Measuring) -> Measured:
     """Measures one film from Python; see `flagdata.measure`.
 
     Raises:
@@ -137,9 +137,9 @@ def measured(chosen: Measuring) -> Measured:
             )
             for reason in verdict.reasons
         ),
-        findings=measurement.noticed(anyway=chosen.anyway),
+        findings=measurement.notices(anyway=chosen.anyway),
         figures=subject.film.as_dict(),
-        given=answered(measurement) if measurement.shown(anyway=chosen.anyway) else None,
+        given=answer_of(measurement) if measurement.shown(anyway=chosen.anyway) else None,
         elsewhere=wind_elsewhere(measurement, chosen),
     )
 
@@ -149,7 +149,7 @@ def wind_elsewhere(measurement: Measurement, chosen: Measuring) -> WindCompariso
     if chosen.wind is None or not measurement.shown(anyway=chosen.anyway):
         return None
     (wind,) = (quantity for quantity in measurement.quantities if quantity.name == "wind_speed")
-    return compared(
+    return compare_winds(
         measurement.draws[:, measurement.names.index("wind_speed")],
         Stated.of(chosen.wind),
         is_bound=wind.span.bound is not None,
@@ -168,7 +168,7 @@ def _subjects(source: Path | str | Frames, *, lake: Lake | None, at: str | None,
     return [Subject(film=reading.conditioned(source))]
 
 
-def answered(measurement: Measurement) -> Answer:
+def answer_of(measurement: Measurement) -> Answer:
     """Returns what a film says, as arrays."""
     quantities = {quantity.name: quantity for quantity in measurement.quantities}
     rows = {name: [window.quantity(name) for window in measurement.windows] for name in measurement.names}

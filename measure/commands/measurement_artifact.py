@@ -45,7 +45,7 @@ def artifact(measured: Measurement, subject: Subject, network: Network, reading:
         q.name: q for q in measured.quantities if q.constrained and q.value is not None
     }  # no bounds among them
     wind = estimates.get(WIND)
-    flags = quality_flags(measured.noticed(anyway=True))
+    flags = quality_flags(measured.notices(anyway=True))
     return Artifact(
         kind=Kind.MEASUREMENT,
         name=measured.film,
@@ -85,7 +85,7 @@ def report(measured: Measurement) -> Mapping[str, Any]:
         "quantities": {q.name: q.as_dict() for q in measured.quantities},
         "gate": measured.verdict.as_dict(),
         "combined": measured.combined,
-        "findings": [finding.as_dict() for finding in measured.noticed(anyway=True)],
+        "findings": [finding.as_dict() for finding in measured.notices(anyway=True)],
     }
 
 

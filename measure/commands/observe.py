@@ -91,7 +91,7 @@ def observe(chosen: ObserveCommand) -> None:
             echo(line)
 
 
-def observed(chosen: Observing) -> Rows:
+def observe_film(chosen: Observing) -> Rows:
     """Observes a film from Python; see `flagdata.observe`.
 
     Raises:
@@ -111,7 +111,7 @@ def _table(chosen: Observing, lake: Lake | None, *, at: str | None) -> tuple[Obs
     from measure.film.film_source import FilmReading, subjects
     from measure.film.similarity import FlagSize
     from measure.observables.observables_table import table_of
-    from measure.observables.watching import count_of, watched
+    from measure.observables.watching import count_of, watch_film
 
     if chosen.window < 1.0:
         raise UsageError(f"windows of {chosen.window:g} s", where="--window", fix="give 1s or more: a flutter's period")
@@ -120,7 +120,7 @@ def _table(chosen: Observing, lake: Lake | None, *, at: str | None) -> tuple[Obs
     (subject,) = subjects(str(chosen.source), query=None, lake=lake, at=at, reading=reading)
     part = {"first": chosen.start, "last": chosen.end, "seconds": chosen.window}
     with progress(count_of(subject.film, **part), label="observe", unit="window") as advance:
-        windows = watched(subject.film, size, **part, advance=advance)
+        windows = watch_film(subject.film, size, **part, advance=advance)
     table = table_of(
         windows,
         film=subject.film.name,

@@ -26,12 +26,12 @@ from measure.simulated_camera import write_film
 from sim.assets import Assets
 from sim.cloth import handles
 from sim.cloth.handles import Handles
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.mesh import Diagonals, Mesh, grid
-from sim.cloth.scene import Scene, assemble, roughened
+from sim.cloth.scene import Scene, assemble, roughen_start
 from sim.cloth.state import State
 from sim.cloth.system import System
-from sim.datasets.anemometer import logged, velocities
+from sim.datasets.anemometer import log_of_air, velocities
 from sim.effects import EFFECTS, apply
 from sim.effects.gusts import Gusts
 from sim.integrate.implicit import BackwardEuler
@@ -230,7 +230,7 @@ def make_recording(
         video=video,
         log=log,
         sensor=sensor,
-        noted=_noted(recipe, sequence, zeta, offset),
+        noted=_note_truth(recipe, sequence, zeta, offset),
         clock_offset=offset,
         wind=np.hypot(velocity[:, 0], velocity[:, 1]),
         area_weight=cloth[0],
@@ -252,7 +252,7 @@ def look(recipe: RecordingRecipe) -> RenderParameters:
         "width": recipe.width,
         "height": recipe.rows,
     }
-    outdoor = render_prior.named("outdoor").with_quantities(quantities, source="the demonstration")
+    outdoor = render_prior.named_prior("outdoor").with_quantities(quantities, source="the demonstration")
     plain = replace(outdoor, textures=("flag", "stripes"), backgrounds=("sky", "hills"))
     return plain.draw(child_seed(recipe.seed, "demo", "look"), Assets())
 
@@ -271,10 +271,10 @@ def _flag(recipe: RecordingRecipe) -> tuple[System, State]:
     flat = recipe.mesh
     attachment = Handles(vertices=handles.corners(flat.rest))
     area_weight, bending, damping = _cloth(recipe)
-    base = named(MATERIAL)
+    base = named_material(MATERIAL)
     material = replace(base.scaled(bending=bending), area_weight=area_weight, damping=max(damping - recipe.step, 0.0))
     start = np.stack([flat.rest[:, 0], 0 * flat.rest[:, 0], flat.rest[:, 1]], axis=1)
-    start = roughened(start, attachment, stream(recipe.seed, "demo", "start"), _ROUGH)
+    start = roughen_start(start, attachment, stream(recipe.seed, "demo", "start"), _ROUGH)
     speed = recipe.wind
     scene = Scene(mesh=flat, position=start, material=material, handles=attachment, wind=(speed, 0.0, 0.0))
     gusts = Gusts(intensity=recipe.intensity).with_series(
@@ -311,7 +311,7 @@ def _log(recipe: RecordingRecipe, path: Path, times: FloatArray, velocity: Float
     """Write the anemometer's log; what must be added to the camera's clock to reach the logger's [s]."""
     begin = from_datetime(START) - round(BEFORE * NANOSECONDS)
     seed = child_seed(recipe.seed, "demo", "anemometer")
-    series = logged(CUP, times, velocity, instrument=seed, seed=seed, begin=begin).series
+    series = log_of_air(CUP, times, velocity, instrument=seed, seed=seed, begin=begin).series
     offset = recipe.drawn("clock", -_LARGEST_OFFSET, _LARGEST_OFFSET)
     first = (int(series.time[0]) - begin) / NANOSECONDS - BEFORE  # by the camera's clock, from its start
     stamp = START + timedelta(seconds=first + offset)
@@ -326,7 +326,7 @@ def _log(recipe: RecordingRecipe, path: Path, times: FloatArray, velocity: Float
     return offset
 
 
-def _noted(recipe: RecordingRecipe, sequence: MeshSequence, zeta: RenderParameters, offset: float) -> Noted:
+def _note_truth(recipe: RecordingRecipe, sequence: MeshSequence, zeta: RenderParameters, offset: float) -> Noted:
     camera = stage(Meshes.flag(sequence, heading=0.0), zeta).camera
     true = {
         "azimuth": zeta.camera_angle,

@@ -63,7 +63,7 @@ def write_page(
     values = {
         "minutes": f"{len(record.frame_times) / FRAME_RATE / 60:.2g}",
         "seconds": seconds,
-        "clock": recovered(row, recording.clock_offset),
+        "clock": compare_clock(row, recording.clock_offset),
         "images": {
             "wind": wind_image,
             "alignment": data_url((folder / "alignment.png").read_bytes(), "image/png"),
@@ -83,7 +83,7 @@ def write_page(
     return target
 
 
-def recovered(recording: dict[str, Any], truth: float) -> Recovered:
+def compare_clock(recording: dict[str, Any], truth: float) -> Recovered:
     """Compares the recording's clock at mid-recording with the true offset [s] that the generator kept."""
     clock = ClockModel.from_json(recording["clock_model"])
     middle = (recording["start"] + recording["end"]) // 2

@@ -30,7 +30,7 @@ from measure.demo.demo_recording import (
     RecordingRecipe,
     make_recording,
 )
-from measure.demo.recording_page import recovered, write_page
+from measure.demo.recording_page import compare_clock, write_page
 from measure.demo.transcript import Transcript
 from measure.verdict.verdict_record import Conclusion
 
@@ -64,12 +64,12 @@ def field_steps(shell: Transcript, seed: int) -> Recording:
             ("anemometer.csv", "--sensor", "cup-logger.toml", "--zone", "+02:00", "--session", "demo"),
         ):
             step.found += _head(shell.show("ingest", *arguments, "--lake", "lake"), 6)
-    _aligned(shell, recording)
+    _align_step(shell, recording)
     page = write_page(
         shell.folder, recording=recording, at="demo", transcript=tuple(shell.entries), seconds=time.monotonic() - began
     )
     shell.cards[-1] = replace(shell.cards[-1], page=page.name)
-    _measured(shell, recording)
+    _measure_step(shell, recording)
     return recording
 
 
@@ -239,7 +239,7 @@ def _film(shell: Transcript, recipe: RecordingRecipe) -> Recording:
     return recording
 
 
-def _aligned(shell: Transcript, recording: Recording) -> None:
+def _align_step(shell: Transcript, recording: Recording) -> None:
     done = (
         "The flag moves more in a stronger wind, a moment later. So the gusts in the log and the motion in the film "
         "give the offset of the two clocks, if they agree clearly enough; with it, each clip of the film has its wind."
@@ -264,7 +264,7 @@ def _aligned(shell: Transcript, recording: Recording) -> None:
         shell.show("verify", "--lake", "lake")
         step.picture = data_url((shell.folder / "alignment.png").read_bytes(), "image/png")
         (row,) = Lake.open(shell.folder / "lake").rows("kind = 'recording'", at="demo").to_pylist()
-        clock = recovered(row, recording.clock_offset)
+        clock = compare_clock(row, recording.clock_offset)
         inferred = Judgement.RIGHT if clock.covered else Judgement.MISSED
         step.beside(
             "the log's clock minus the camera's",
@@ -274,7 +274,7 @@ def _aligned(shell: Transcript, recording: Recording) -> None:
         )
 
 
-def _measured(shell: Transcript, recording: Recording) -> None:
+def _measure_step(shell: Transcript, recording: Recording) -> None:
     done = "From the film alone, a network that was trained on simulated flags estimates the wind."
     alt = "The wind read off the film, beside the log and the true wind"
     with _Step(shell, "Wind from the film", done, alt=alt, page="measured.html") as step:

@@ -19,9 +19,9 @@ from flagdata.errors import InputError
 from measure.observe.interpolation import onto
 from sim.cloth import handles
 from sim.cloth.handles import Handles
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.mesh import Diagonals, Mesh, grid
-from sim.cloth.scene import Scene, assemble, roughened
+from sim.cloth.scene import Scene, assemble, roughen_start
 from sim.effects import EFFECTS, apply
 from sim.integrate.symplectic import Symplectic
 from sim.run.simulation_loop import Batch, Divergence, after
@@ -162,13 +162,13 @@ def make_tracks(recipe: TrackedRecipe, folder: Path, *, advance: Callable[[int],
 
 def _flight(recipe: TrackedRecipe, flat: Mesh, advance: Callable[[int], object]) -> FloatArray:
     """Simulates positions (frame, vertex, 3, recording) [m]."""
-    nominal = named(MATERIAL)
+    nominal = named_material(MATERIAL)
     material = replace(nominal.scaled(area_weight=recipe.area_weight, bending=recipe.bending), damping=recipe.damping)
     attachment = Handles(vertices=handles.corners(flat.rest))
     scenes = []
     for index, speed in enumerate(recipe.speeds):
         start = np.stack([flat.rest[:, 0], 0 * flat.rest[:, 0], flat.rest[:, 1]], axis=1)
-        start = roughened(start, attachment, stream(recipe.seed, "tracked", "start", index), _ROUGH)
+        start = roughen_start(start, attachment, stream(recipe.seed, "tracked", "start", index), _ROUGH)
         scenes.append(Scene(mesh=flat, position=start, material=material, handles=attachment, wind=(speed, 0.0, 0.0)))
     effect = EFFECTS[recipe.effect](**{recipe.parameter: recipe.strength})
     method = Symplectic(outer=_OUTER)

@@ -32,7 +32,7 @@ class Transcript:
         Raises:
             FlagdataError: when it does not exit with 0.
         """
-        printed, code = self._typed(arguments)
+        printed, code = self._type_command(arguments)
         if code:
             raise FlagdataError(
                 f"`{self.entries[-1][0]}` ended with {code}", where="the demonstration", fix="see its message above"
@@ -45,7 +45,7 @@ class Transcript:
         Raises:
             FlagdataError: when it ends with anything but 0 and 3.
         """
-        printed, code = self._typed(arguments)
+        printed, code = self._type_command(arguments)
         echo_lines(printed, aside=self.aside)
         if code not in (0, RefusedError.exit_code):
             raise FlagdataError(
@@ -53,7 +53,7 @@ class Transcript:
             )
         return None if code else printed
 
-    def _typed(self, arguments: tuple[str, ...]) -> tuple[str, int]:
+    def _type_command(self, arguments: tuple[str, ...]) -> tuple[str, int]:
         """Runs `flagdata ARGUMENTS` and returns its stdout and exit code."""
         typed = " ".join(map(_word, ("flagdata", *arguments)))
         say("")

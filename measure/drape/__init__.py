@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from measure.drape.drape_answer import answered
+    from measure.drape.drape_answer import answer_of
     from measure.drape.drape_shape import rim_of, shape_of
     from measure.drape.drape_simulation import (
         BENDING_LENGTH,
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
         material,
         mesh,
         ratio,
-        simulated,
+        simulated_drapes,
     )
-    from measure.drape.fit import Face, Fit, Model, Surface, fitted, together
+    from measure.drape.fit import Face, Fit, Model, Surface, fit_drapes, together
 
 __getattr__ = lazy_exports(__name__, __file__)

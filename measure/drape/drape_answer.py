@@ -21,9 +21,9 @@ from flagdata.errors import InputError, NotFoundError, RefusedError, UsageError
 from flagdata.ingest.meshes import read_obj
 from flagdata.recipes.typed_tables import Range, Scale
 from measure.cloth import Uncertain, folder_of, quantity
-from measure.drape.drape_shape import placed, shape_of
-from measure.drape.drape_simulation import ANISOTROPY, BENDING_LENGTH, SHEAR, simulated
-from measure.drape.fit import UNLIKE, Face, Fit, Model, Surface, fitted, together
+from measure.drape.drape_shape import place_scan, shape_of
+from measure.drape.drape_simulation import ANISOTROPY, BENDING_LENGTH, SHEAR, simulated_drapes
+from measure.drape.fit import UNLIKE, Face, Fit, Model, Surface, fit_drapes, together
 from sim.cloth.mesh import Mesh
 from sim.cloth.scene import GRAVITY
 
@@ -62,7 +62,7 @@ class Draped:
         count = len(together(self.faces).specimen)
         length, bending, *_ = self.cloth
         if bending.value is None:
-            phrase = length.span.worded(lambda value: f"{value * 1e3:.1f}", " mm")
+            phrase = length.span.word(lambda value: f"{value * 1e3:.1f}", " mm")
             return f"bending length {phrase}, {length.span.percent}, n = {count} drapes"
         low, high = bending.interval
         return (
@@ -116,12 +116,12 @@ def face_of(folder: Path, *, first: int = 0) -> Face:
                 where=str(path),
                 fix="export the mesh with texture coordinates of the flat disc",
             )
-        flat, position = placed(scan.rest, scan.positions, where=str(path))
+        flat, position = place_scan(scan.rest, scan.positions, where=str(path))
         shapes.append(shape_of(Mesh(rest=flat, faces=scan.faces), position).numbers())
     return Face(shapes=np.stack(shapes), specimen=first + np.arange(len(files)))
 
 
-def draped(chosen: Calibrating, *, workers: int, advance: Callable[[int], object] | None = None) -> Draped:
+def read_drapes(chosen: Calibrating, *, workers: int, advance: Callable[[int], object] | None = None) -> Draped:
     """Finds the cloth of the drapes in a folder, or in two, the second of drapes with the other face up.
 
     Args:
@@ -151,18 +151,18 @@ def draped(chosen: Calibrating, *, workers: int, advance: Callable[[int], object
     for folder in folders:
         faces.append(face_of(folder, first=sum(len(face.specimen) for face in faces)))
     kept = folder_of(chosen)
-    found = simulated(chosen.simulations, seed=chosen.seed, folder=kept, workers=workers, advance=advance)
+    found = simulated_drapes(chosen.simulations, seed=chosen.seed, folder=kept, workers=workers, advance=advance)
     weight = Stated.of(chosen.area_weight or 0.0)
-    return answered(Surface.fit(*found), faces, weight, level=chosen.level, seed=chosen.seed)
+    return answer_of(Surface.fit(*found), faces, weight, level=chosen.level, seed=chosen.seed)
 
 
-def calibrated(chosen: Calibrating) -> Calibrated:
+def calibrate_drapes(chosen: Calibrating) -> Calibrated:
     """Finds the cloth of drapes from Python; see `flagdata.calibrate`.
 
     Raises:
-        FlagdataError: see `draped`.
+        FlagdataError: see `read_drapes`.
     """
-    found = draped(chosen, workers=chosen.workers)
+    found = read_drapes(chosen, workers=chosen.workers)
     return Calibrated(
         sentence=found.sentence,
         level=found.level,
@@ -175,7 +175,7 @@ def calibrated(chosen: Calibrating) -> Calibrated:
     )
 
 
-def answered(surface: Surface, faces: Sequence[Face], area_weight: Stated, *, level: float, seed: int) -> Draped:
+def answer_of(surface: Surface, faces: Sequence[Face], area_weight: Stated, *, level: float, seed: int) -> Draped:
     """Returns the answer from measured drapes.
 
     Raises:
@@ -187,7 +187,7 @@ def answered(surface: Surface, faces: Sequence[Face], area_weight: Stated, *, le
         raise UsageError(
             f"the area weight is {area_weight.text} kg/m²", where="--area-weight", fix="give kg/m² above 0, as in 0.192"
         )
-    fit = fitted(surface, [together(faces)], model=Model.BASE, seed=seed)
+    fit = fit_drapes(surface, [together(faces)], model=Model.BASE, seed=seed)
     if fit.tail < UNLIKE:
         shown = fit.predicted[:, 0, 0]
         raise RefusedError(
@@ -261,7 +261,9 @@ def _differ(surface: Surface, faces: Sequence[Face], *, seed: int) -> tuple[Find
     """Reports whether two faces drape differently, and whether rest curvature explains it."""
     if len(faces) < 2:
         return ()
-    base, curled, sided = (fitted(surface, faces, model=m, seed=seed) for m in (Model.BASE, Model.CURLED, Model.SIDED))
+    base, curled, sided = (
+        fit_drapes(surface, faces, model=m, seed=seed) for m in (Model.BASE, Model.CURLED, Model.SIDED)
+    )
     gain, rival = curled.evidence - base.evidence, sided.evidence - base.evidence
     if max(gain, rival) < 3:
         return ()

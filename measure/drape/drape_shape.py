@@ -89,7 +89,7 @@ def shape_of(
     )
 
 
-def placed(
+def place_scan(
     rest: FloatArray, position: FloatArray, *, where: str, radius: float = DISC, pedestal: float = PEDESTAL
 ) -> tuple[FloatArray, FloatArray]:
     """Moves a scan's axis to the origin and the pedestal's top to z = 0, and scales its flat cloth to metres.

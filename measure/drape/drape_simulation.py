@@ -27,7 +27,7 @@ from sim.cloth.scene import GRAVITY, assemble
 from sim.cloth.stiffness_tables import direction_rows
 from sim.effects import apply
 from sim.effects.rest_curvature import RestCurvature
-from sim.run.cusick_drape import DISC, PEDESTAL, at_rest, disc, draped
+from sim.run.cusick_drape import DISC, PEDESTAL, at_rest, disc, drape_scene
 
 REVISION = 1
 """Raised where the same cloth drapes otherwise than before."""
@@ -148,7 +148,8 @@ class DrapeBatch:
         columns = [self.values[about.name] for about in (BENDING_LENGTH, ANISOTROPY, SHEAR)]
         cloths = [material(*map(float, row)) for row in zip(*columns, strict=True)]
         scenes = [
-            draped(made, cloth, stream(seed, "drape", "start")) for cloth, seed in zip(cloths, self.seeds, strict=True)
+            drape_scene(made, cloth, stream(seed, "drape", "start"))
+            for cloth, seed in zip(cloths, self.seeds, strict=True)
         ]
         system, state = assemble(scenes)
         curl = torch.tensor(self.values[CURVATURE.name], dtype=system.cloth.dtype)
@@ -174,7 +175,7 @@ def batches(count: int, *, seed: int) -> list[DrapeBatch]:
     ]
 
 
-def simulated(
+def simulated_drapes(
     count: int, *, seed: int, folder: Path, workers: int = 1, advance: Callable[[int], object] | None = None
 ) -> tuple[Mapping[str, FloatArray], FloatArray]:
     """Returns the values, name → (drape,), and the shapes (drape, 7) of simulated drapes; those that the folder lacks

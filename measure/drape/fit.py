@@ -197,7 +197,7 @@ class Fit:
     effective: float
 
 
-def fitted(surface: Surface, faces: Sequence[Face], *, model: Model, seed: int) -> Fit:
+def fit_drapes(surface: Surface, faces: Sequence[Face], *, model: Model, seed: int) -> Fit:
     """Finds the cloths that drape as scans of one face do, or of two.
 
     Raises:
@@ -211,12 +211,12 @@ def fitted(surface: Surface, faces: Sequence[Face], *, model: Model, seed: int) 
         )
     direction = direction_of(faces)
     quantities = (*CLOTH, WET_MASS, SIDEDNESS)
-    drawn = _weighed(surface, faces, direction, model, quantities, seed=seed)
+    drawn = _weigh_draws(surface, faces, direction, model, quantities, seed=seed)
     narrowed = quantities
     for _ in range(_ROUNDS):
         near = drawn.log_weight > drawn.log_weight.max() - _NEAR
-        narrowed = tuple(_narrowed(about, drawn.values[about.name][near]) for about in narrowed)
-        drawn = _weighed(surface, faces, direction, model, narrowed, seed=seed)
+        narrowed = tuple(_narrow_range(about, drawn.values[about.name][near]) for about in narrowed)
+        drawn = _weigh_draws(surface, faces, direction, model, narrowed, seed=seed)
     volume = sum(_log_share(about, within) for about, within in zip(quantities, narrowed, strict=True))
     best = drawn.log_weight.max()
     weight = np.exp(drawn.log_weight - best)
@@ -254,7 +254,7 @@ class _Weighed:
     misfit: FloatArray
 
 
-def _weighed(
+def _weigh_draws(
     surface: Surface,
     faces: Sequence[Face],
     direction: float,
@@ -289,7 +289,7 @@ def _weighed(
     return _Weighed(values=values, across=across, predicted=predicted, log_weight=log_weight, misfit=misfit)
 
 
-def _narrowed(about: Uncertain, near: FloatArray) -> Uncertain:
+def _narrow_range(about: Uncertain, near: FloatArray) -> Uncertain:
     """Returns a quantity within the range of draws that are not too far off."""
     if not isinstance(about.prior, Range):
         return about

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from measure.estimate.combine import CARD_KEY, OWN, UNKNOWN, Dependence, combined, of_model
+    from measure.estimate.combine import CARD_KEY, OWN, UNKNOWN, Dependence, combine_windows, of_model
     from measure.estimate.film_answer import LEAST_INFORMATION, SHORT, information
     from measure.estimate.film_measuring import Measurement, measure
     from measure.estimate.film_posterior import DRAWS, FilmAnswer

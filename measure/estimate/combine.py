@@ -99,7 +99,7 @@ def effective(count: int, correlation: float) -> float:
     return count / (1 + (count - 1) * correlation)
 
 
-def combined(
+def combine_windows(
     logits: NDArray[np.floating],
     *,
     names: Sequence[str],

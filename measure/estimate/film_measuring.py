@@ -100,7 +100,7 @@ class Measurement:
         """Returns whether it is reported: a refused film only `anyway`, one with nothing to measure never."""
         return self.verdict.measurable and (anyway or not self.verdict.refused)
 
-    def noticed(self, *, anyway: bool) -> tuple[Finding, ...]:
+    def notices(self, *, anyway: bool) -> tuple[Finding, ...]:
         """Returns the findings, those on the answer where it is `shown`."""
         return (*self.findings, *self.bounds) if self.shown(anyway=anyway) else self.findings
 
@@ -124,7 +124,7 @@ class Measurement:
                 "source": self.dependence.source,
             },
             "gusts": None if self.gusts is None or not reported else self.gusts.as_dict(),
-            "findings": [finding.as_dict() for finding in self.noticed(anyway=anyway)],
+            "findings": [finding.as_dict() for finding in self.notices(anyway=anyway)],
         }
 
 
@@ -195,10 +195,10 @@ def measure(
     kept_looks = [look.only(gate_verdict.sizes) for look in looks]
     # One answer of the windows that count, its draws shared by cloth, its winds one gusty series.
     alone = [answer.window(look, layout, p) for look, p in zip(kept_looks, gate_verdict.window_p, strict=True)]
-    counted = _counted(gate_verdict)
+    counted = _counted_windows(gate_verdict)
     errors = errors_of_model(model)
     apart = _why_apart([alone[k] for k in counted], errors, model.name)
-    used = _used(kept_looks, counted, layout)
+    used = _used_windows(kept_looks, counted, layout)
     among = None
     if errors is not None and apart is None and len(used) > 1:
         places = [counted.index(k) for k in used]
@@ -290,7 +290,7 @@ def _of_flags(finding: Finding) -> bool:
     return finding.kind in REASONS and REASONS[finding.kind].of_flags
 
 
-def _contradicted(stated: Sequence[str], factor: float) -> Finding:
+def _contradiction_finding(stated: Sequence[str], factor: float) -> Finding:
     """Reports that the film speaks against what the user gave, by this Bayes factor."""
     words = (
         f"the film much less probable (Bayes factor {factor:.2g}): either that is wrong, or the model errs on this film"
@@ -359,7 +359,7 @@ def _without_windows(
     )
 
 
-def _counted(gate_verdict: Verdict) -> list[int]:
+def _counted_windows(gate_verdict: Verdict) -> list[int]:
     """Selects windows that show something to measure where others do, of a familiar recording none that are strange."""
     left_out = np.array(gate_verdict.blank) & gate_verdict.measurable
     if not gate_verdict.refused:
@@ -386,7 +386,7 @@ def _why_apart(windows: Sequence[WindowAnswer], errors: SeriesErrors | None, mod
     return None
 
 
-def _used(looks: Sequence[Look], counted: Sequence[int], layout: WindowLayout) -> list[int]:
+def _used_windows(looks: Sequence[Look], counted: Sequence[int], layout: WindowLayout) -> list[int]:
     """Selects windows that the answer rests on: of those that count none that overlap."""
     length = layout.frames * max(layout.spacings)
     chosen: list[int] = []
@@ -414,7 +414,7 @@ def _about_windows(
     findings = []
     factor = float(np.median([np.exp(look.log_factor).mean() for look in looks]))
     if factor < CONTRADICTION:
-        findings.append(_contradicted(stated, factor))
+        findings.append(_contradiction_finding(stated, factor))
     excluded = float(np.isneginf(looks[0].log_factor).mean())
     if excluded > EXCLUDED:
         findings.append(

@@ -18,7 +18,7 @@ from flagdata.core.arrays import Float32Array, FloatArray
 from flagdata.core.findings import Finding
 from flagdata.core.rng import child_seed, stream
 from flagdata.core.stated import Stated
-from measure.estimate.combine import OWN, Dependence, combined, effective
+from measure.estimate.combine import OWN, Dependence, combine_windows, effective
 from measure.estimate.film_answer import quantities
 from measure.estimate.gusty_series import Course, GustPrior, Gusty, SeriesErrors, log_moments
 from measure.estimate.measuring_options import Options
@@ -252,7 +252,7 @@ class FilmAnswer:
         parts, places, orders = [], [], []
         for stratum in range(len(self.sizes.scale)):
             prior = self.prior_logits[stratum]
-            winds, shared = combined(
+            winds, shared = combine_windows(
                 np.stack([look.logits[stratum] for look in looks]),
                 names=self.names,
                 centre=prior.mean(axis=0),
@@ -284,7 +284,7 @@ class FilmAnswer:
             draws=draws,
             places=np.concatenate(places, axis=1)[:, rows].reshape(-1, len(self.names)),
             rows=rows,
-            series=None if among is None else among.series.reordered(orders),
+            series=None if among is None else among.series.reorder_draws(orders),
         )
 
     def _film_rows(self, looks: Sequence[Look], dependence: Dependence) -> NDArray[np.intp]:
@@ -299,20 +299,20 @@ class FilmAnswer:
             wind: of the window in the film's gusty series; None for what the window says by itself.
         """
         values = [self._values(logits) for logits in look.logits]
-        draws, places = self._placed(values)
+        draws, places = self._placed_draws(values)
         rows = self._rows(look.log_factor, "window")
         draws, places = draws[rows], places[rows]
         if wind is not None:
             column = self.names.index(WIND)
             for of_size, winds in zip(values, wind.winds, strict=True):
                 of_size[:, column] = winds
-            series_draws, series_places = self._placed(values)
+            series_draws, series_places = self._placed_draws(values)
             draws[:, column], places[:, column] = series_draws[wind.rows, column], series_places[wind.rows, column]
         return WindowAnswer(
             start=look.start, end=look.start + layout.length, quantities=self.quantities(draws, places), p=p
         )
 
-    def _placed(self, values: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    def _placed_draws(self, values: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
         """Returns draws of all sizes in a row, at the flag's own size [SI], and their places in the network's range."""
         draws = [scaled_back(v, self.names, s) for v, s in zip(values, self.sizes.draws, strict=True)]
         return np.concatenate(draws), np.concatenate([self._places(v) for v in values])

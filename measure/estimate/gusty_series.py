@@ -199,7 +199,7 @@ class Gusty:
     winds: FloatArray
     intensity: FloatArray
 
-    def reordered(self, orders: Sequence[NDArray[np.intp]]) -> Gusty:
+    def reorder_draws(self, orders: Sequence[NDArray[np.intp]]) -> Gusty:
         """Returns the draws of each size in another order, (i, n) their places."""
         return Gusty(
             winds=np.stack([winds[:, order] for winds, order in zip(self.winds, orders, strict=True)]),
@@ -241,7 +241,7 @@ class Gusts:
         """Phrases them, "gusts of 14 % [9, 21]" with the level; without a value where the film narrows nothing."""
         if not self.intensity.constrained or self.intensity.value is None:
             return f"gusts: {self.windows} windows do not constrain how strong they are"
-        interval = self.intensity.span.worded(lambda share: f"{100 * share:.0f}")
+        interval = self.intensity.span.word(lambda share: f"{100 * share:.0f}")
         return f"gusts of {100 * self.intensity.value:.0f} % {interval} of the wind, {self.intensity.span.percent}"
 
     def as_dict(self) -> dict[str, Any]:

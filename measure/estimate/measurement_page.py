@@ -70,7 +70,7 @@ def page(
             nothing to measure, none are shown.
         sections: what comes between the answer and its provenance, each under its own heading.
     """
-    shown, noticed = measured.shown(anyway=anyway), measured.noticed(anyway=anyway)
+    shown, noticed = measured.shown(anyway=anyway), measured.notices(anyway=anyway)
     rows = [_row(quantity, context.known) for quantity in measured.quantities]
     spacing = measured.windows[0].end - measured.windows[0].start
     clip_rate = (len(measured.clip) - 1) / spacing if spacing > 0 else context.rate

@@ -10,7 +10,7 @@ from flagdata.errors import UnknownNameError, UsageError
 from flagdata.lake import Lake
 from flagdata.recipes.documents import from_stored_json
 from flagdata.recipes.retired_names import hashed_name
-from sim.cloth.material import MATERIALS, named
+from sim.cloth.material import MATERIALS, named_material
 
 
 def weight_of(name: str, *, lake: Lake | None, at: str | None) -> tuple[Stated, str]:
@@ -28,9 +28,9 @@ def weight_of(name: str, *, lake: Lake | None, at: str | None) -> tuple[Stated, 
         UsageError: films of the lake declare several weights for it.
     """
     if name in MATERIALS.names():
-        material = named(name)
+        material = named_material(name)
         return Stated.of(material.area_weight), material.source
-    fabrics = {} if lake is None else _declared(lake, at)
+    fabrics = {} if lake is None else _declared_weights(lake, at)
     weights = fabrics.get(name, set())
     if not weights:
         raise UnknownNameError.of("material", name, {*MATERIALS.names(), *fabrics}, where="--material")
@@ -43,7 +43,7 @@ def weight_of(name: str, *, lake: Lake | None, at: str | None) -> tuple[Stated, 
     return Stated.of(next(iter(weights))), "declared by films of the lake"
 
 
-def _declared(lake: Lake, at: str | None) -> Mapping[str, set[float]]:
+def _declared_weights(lake: Lake, at: str | None) -> Mapping[str, set[float]]:
     """Collects the area weights of the fabrics that films declare, by name."""
     weights: dict[str, set[float]] = {}
     rows = lake.rows({"kind": Kind.RECORDING}, at=at, columns=["session", "recipe"]).to_pylist()

@@ -22,7 +22,7 @@ from models.networks.targets import ASPECT, Cloth
 from models.trained.estimator import Estimator
 
 
-def refined(
+def refine_window(
     measured: Measurement, subject: Subject, model: Estimator, *, budget: int, cache: Path | None
 ) -> Refinement:
     """Refines the first window that counts of a film of a flag whose size is known.
@@ -55,13 +55,13 @@ def refined(
         seed=options.seed,
         level=options.level,
         cache=cache,
-        area_weight=None if area_weight is None else _searched(area_weight, s),
+        area_weight=None if area_weight is None else _searched_range(area_weight, s),
         aspect=None if options.size is None or ASPECT not in options.stated(model) else options.size.aspect,
     )
-    return scaled(refinement, s)
+    return scale_refinement(refinement, s)
 
 
-def _searched(area_weight: Stated, s: float) -> tuple[float, float]:
+def _searched_range(area_weight: Stated, s: float) -> tuple[float, float]:
     """Returns the range of area weights searched for a flag of s times the size [kg/m²]: two standard deviations either
     way of what was stated, or 1 % either way of an exact value, since a search needs a width."""
     low, high = area_weight.within(2.0)
@@ -69,7 +69,7 @@ def _searched(area_weight: Stated, s: float) -> tuple[float, float]:
     return (low - slack) / s, (high + slack) / s
 
 
-def scaled(refinement: Refinement, s: float) -> Refinement:
+def scale_refinement(refinement: Refinement, s: float) -> Refinement:
     """Scales a refinement to a flag s times as large as the one simulated."""
     if math.isclose(s, 1.0):
         return refinement
@@ -84,10 +84,10 @@ def scaled(refinement: Refinement, s: float) -> Refinement:
 
 
 def _all_scaled(intervals: tuple[Interval, ...], s: float) -> tuple[Interval, ...]:
-    return tuple(_scaled(interval, s) for interval in intervals)
+    return tuple(_scale_interval(interval, s) for interval in intervals)
 
 
-def _scaled(interval: Interval, s: float) -> Interval:
+def _scale_interval(interval: Interval, s: float) -> Interval:
     name = interval.name.partition(".")[0]
     factor = s ** POWERS.get(name, 0.0)
     shift = LOGARITHMS.get(name, 0.0) * math.log10(s)

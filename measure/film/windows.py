@@ -21,7 +21,7 @@ from flagdata.ingest.films.film import Film
 from measure.film.conditioned_film import ConditionedFilm
 from measure.film.similarity import spacing
 from models.conditioning.frame_interpolation import Interpolator, TimedFrame, at_instants
-from models.conditioning.grain import grained
+from models.conditioning.grain import add_grain
 from models.conditioning.repeats import Distinct
 from models.trained.estimator import Estimator
 
@@ -269,7 +269,7 @@ def _window(buffer: deque[TimedFrame], layout: WindowLayout, index: int, interpo
         if within < _FEWEST * (layout.frames - 1):
             return f"{within} pictures were taken in it, of {layout.frames - 1} at least {_FEWEST:.0%} must be"
         clip, between = at_instants(buffer, instants, period=layout.period, interpolator=interpolator)
-        clips.append(grained(clip, seed=index))
+        clips.append(add_grain(clip, seed=index))
         interpolated += between
     return Window(index=index, start=start, clips=np.stack(clips), interpolated=interpolated)
 

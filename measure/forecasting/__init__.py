@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from measure.forecasting.alignment import aligned
+    from measure.forecasting.alignment import align_experiment
     from measure.forecasting.calibrated_parameters import PRIOR, THETA, Calibration
     from measure.forecasting.model import Model, errors_of
     from measure.forecasting.observer import Forecaster

@@ -14,7 +14,7 @@ _CALM = 0.3
 """Wind below which the flag, not the log, says where the wind goes [m/s]."""
 
 
-def aligned(experiment: Experiment) -> Experiment:
+def align_experiment(experiment: Experiment) -> Experiment:
     """Turns the experiment about the vertical through the lowest attachment, each recording by its own angle.
 
     Attachments on one vertical stay where they are; others are those of the first recording.

@@ -54,7 +54,7 @@ class Model:
         strengths = (b - a for (_, a), (_, b) in zip(origin.effects, self.effects, strict=True))
         return (*self.calibration.steps_from(origin.calibration), *strengths)
 
-    def stepped(self, parameter: int, size: float) -> tuple[Model, float]:
+    def take_step(self, parameter: int, size: float) -> tuple[Model, float]:
         """Takes a step along one parameter, and returns the step: back, where bounds cut the one ahead shorter."""
         count = len(THETA) + len(self.effects)
         ways = [self.moved(tuple(way if k == parameter else 0.0 for k in range(count))) for way in (size, -size)]
@@ -62,7 +62,7 @@ class Model:
         longer = int(abs(taken[1]) > abs(taken[0]) + 1e-9 * size)
         return ways[longer], taken[longer]
 
-    def halved(self) -> Model:
+    def halfway_to_nominal(self) -> Model:
         """Returns the model halfway from here to the nominal base model."""
         nominal = Calibration()
         area_weight, bending, damping = (step / 2 for step in self.calibration.steps_from(nominal))
@@ -96,12 +96,12 @@ def errors_of(models: Sequence[Model], forecaster: Forecaster, segments: Segment
     return errors
 
 
-def linearised(model: Model, forecaster: Forecaster, segments: Segments) -> tuple[Tensor, list[Tensor]]:
+def linearise_model(model: Model, forecaster: Forecaster, segments: Segments) -> tuple[Tensor, list[Tensor]]:
     """Computes the errors of a model (frame, marker, 3, segment) [m] and, per unit, what each of its parameters takes
     away."""
     strengths = (max(column.step, _SHARE * abs(value)) for column, value in model.effects)
     sizes = [*(step for _, _, step in THETA), *strengths]
-    steps = [model.stepped(index, size) for index, size in enumerate(sizes)]
+    steps = [model.take_step(index, size) for index, size in enumerate(sizes)]
     base, *errors = errors_of([model, *(moved for moved, _ in steps)], forecaster, segments)
     return base, [(base - changed) / taken for changed, (_, taken) in zip(errors, steps, strict=True)]
 

@@ -72,7 +72,7 @@ class Forecaster:
         return self._real(onto(self.specimen.mesh.rest, self.markers))
 
     @cached_property
-    def _lifted(self) -> Tensor:
+    def _marker_weights(self) -> Tensor:
         """(vertex, marker): markers onto vertices."""
         return self._real(onto(self.markers, self.specimen.mesh.rest))
 
@@ -149,8 +149,10 @@ class Forecaster:
         period, copies = segments.period, state.position.shape[-1] // len(segments)
         observed = self._real(segments.positions)
         mask, counted = self._shares(segments.seen, copies), self._shares(segments.counted, copies)
-        x = torch.einsum("vm,mcb->vcb", self._lifted, observed[1]).repeat(1, 1, copies)
-        v = torch.einsum("vm,mcb->vcb", self._lifted, observed[2] - observed[0]).repeat(1, 1, copies) / (2 * period)
+        x = torch.einsum("vm,mcb->vcb", self._marker_weights, observed[1]).repeat(1, 1, copies)
+        v = torch.einsum("vm,mcb->vcb", self._marker_weights, observed[2] - observed[0]).repeat(1, 1, copies) / (
+            2 * period
+        )
         state = replace(state, position=x, velocity=v, time=period)
         errors: list[Tensor] = []
         predictions: list[Tensor] = []
@@ -164,7 +166,7 @@ class Forecaster:
                 if k >= segments.first:
                     errors.append(error if counted is None else error * counted[k - segments.first][:, None])
                     predictions.append(predicted)
-                lifted = torch.einsum("vm,mcb->vcb", self._lifted, error)
+                lifted = torch.einsum("vm,mcb->vcb", self._marker_weights, error)
                 state = replace(
                     state, position=state.position + lifted, velocity=state.velocity + lifted / period, time=k * period
                 )
@@ -200,17 +202,25 @@ class Forecaster:
         steps = [index for index, parameter in enumerate(wanted) if not isinstance(parameter, WrittenColumn)]
         exact = [index for index in steps if self.dtype != torch.float64 and _name(wanted[index]) in DOUBLE]
         plain = [index for index in steps if index not in exact]
-        changes = dict(zip(plain, self._stepped([wanted[p] for p in plain], segments, calibrations, base), strict=True))
+        changes = dict(
+            zip(
+                plain,
+                self._sensitivities_by_steps([wanted[p] for p in plain], segments, calibrations, base),
+                strict=True,
+            )
+        )
         if exact:
             changes |= zip(
-                exact, self.double._stepped([wanted[p] for p in exact], segments, calibrations, None), strict=True
+                exact,
+                self.double._sensitivities_by_steps([wanted[p] for p in exact], segments, calibrations, None),
+                strict=True,
             )
         return [
             self._written(parameter, segments) if isinstance(parameter, WrittenColumn) else changes[index].to(base)
             for index, parameter in enumerate(wanted)
         ]
 
-    def _stepped(
+    def _sensitivities_by_steps(
         self,
         wanted: Sequence[Column | int],
         segments: Segments,
@@ -226,7 +236,7 @@ class Forecaster:
         for parameter in wanted:
             if isinstance(parameter, int):
                 sizes.append(THETA[parameter][2])
-                batches.append(self.system(segments, _moved(calibrations, parameter, sizes[-1])))
+                batches.append(self.system(segments, _moved_calibrations(calibrations, parameter, sizes[-1])))
             elif isinstance(parameter, StepColumn):
                 try:
                     batches.append(parameter.system(*nominal))
@@ -281,5 +291,5 @@ def _tied_to_anchors(start: FloatArray, vertices: Sequence[int], anchors: FloatA
     return position
 
 
-def _moved(calibrations: Sequence[Calibration], parameter: int, size: float) -> list[Calibration]:
+def _moved_calibrations(calibrations: Sequence[Calibration], parameter: int, size: float) -> list[Calibration]:
     return [c.moved([size if k == parameter else 0.0 for k in range(len(THETA))]) for c in calibrations]

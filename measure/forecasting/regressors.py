@@ -87,9 +87,9 @@ class EffectColumn(StepColumn):
         return EFFECTS[self.effect].revision
 
     def system(self, system: System, state: State) -> tuple[System, State]:
-        return self.strengthened(self.step, system, state)
+        return self.apply_strength(self.step, system, state)
 
-    def strengthened(self, coefficient: float, system: System, state: State) -> tuple[System, State]:
+    def apply_strength(self, coefficient: float, system: System, state: State) -> tuple[System, State]:
         """Applies the effect to the batch at a strength `coefficient` beyond its null value."""
         return apply([self.at(coefficient)], system, state)
 
@@ -200,10 +200,10 @@ class WrittenColumn(Column):
             period: between the frames [s].
         """
         shape = torch.as_tensor(cosine(self.mode, markers, rest), dtype=observed.dtype, device=observed.device)
-        return self._moved(observed, period) * shape[None, :, None, None]
+        return self._move(observed, period) * shape[None, :, None, None]
 
     @abstractmethod
-    def _moved(self, observed: Tensor, period: float) -> Tensor:
+    def _move(self, observed: Tensor, period: float) -> Tensor:
         """Computes (frame − 2, marker, 3, segment) T² f [m per unit]."""
 
 
@@ -226,10 +226,8 @@ class MotionColumn(WrittenColumn):
     def unit(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
         return ("1/s", "1")[self.derivative - 1]
 
-    def _moved(self, observed: Tensor, period: float) -> Tensor:
-        return (
-            _travelled(observed) * period if self.derivative == 1 else observed[2:] - 2 * observed[1:-1] + observed[:-2]
-        )
+    def _move(self, observed: Tensor, period: float) -> Tensor:
+        return _travel(observed) * period if self.derivative == 1 else observed[2:] - 2 * observed[1:-1] + observed[:-2]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -250,11 +248,11 @@ class AcrossColumn(WrittenColumn):
     def unit(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
         return "1/s"
 
-    def _moved(self, observed: Tensor, period: float) -> Tensor:
-        return left_of(_travelled(observed), axis=2) * period
+    def _move(self, observed: Tensor, period: float) -> Tensor:
+        return left_of(_travel(observed), axis=2) * period
 
 
-def _travelled(observed: Tensor) -> Tensor:
+def _travel(observed: Tensor) -> Tensor:
     """Computes what the velocity makes of a period between frames, (frame − 2, …), by central differences of (frame, …)
     [m]."""
     return (observed[2:] - observed[:-2]) / 2

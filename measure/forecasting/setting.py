@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flagdata.core.arrays import FloatArray, IntArray
-from measure.forecasting.alignment import aligned
+from measure.forecasting.alignment import align_experiment
 from measure.forecasting.calibrated_parameters import PRIOR_WITHOUT_MASS, Calibration, prior
 from measure.forecasting.observer import Forecaster
 from measure.forecasting.segments import Segments
@@ -56,7 +56,7 @@ class Setting:
         Raises:
             InputError: recordings that cannot be used together, or are too short.
         """
-        turned = aligned(experiment)
+        turned = align_experiment(experiment)
         segments = Segments.of(turned.recordings)
         forecaster = Forecaster(
             specimen=turned.specimen, markers=segments.markers, integrator=SplitEuler(), workers=workers

@@ -70,10 +70,10 @@ def _phase_shift(first_tile: Float32Array, second_tile: Float32Array, noise: flo
     floor = (1.0 + noise**2) * np.square(window).sum()
     surface = np.fft.irfft2(cross / (np.abs(cross) + floor), s=(_TILE, _TILE))
     y, x = (int(index) for index in np.unravel_index(surface.argmax(), surface.shape))
-    return _refined(surface[:, x], y), _refined(surface[y], x)
+    return _refined_peak(surface[:, x], y), _refined_peak(surface[y], x)
 
 
-def _refined(line: FloatArray, index: int) -> float:
+def _refined_peak(line: FloatArray, index: int) -> float:
     """Refines a periodic line's peak by the parabola through three values; returns it as a signed shift."""
     before, peak, after = line[index - 1], line[index], line[(index + 1) % len(line)]
     bend = before - 2 * peak + after
@@ -104,7 +104,7 @@ def uneven(clip: ClipStatistics) -> float:
     return float(np.abs(change[1:-1] - middle).mean() / (change.mean() + _LEAST))
 
 
-def stopped(clip: ClipStatistics) -> float:
+def stopping_ratio(clip: ClipStatistics) -> float:
     """Computes the common logarithm of the mean change over the last third of the clip over that of the whole clip."""
     change = _changes(clip)
     return float(np.log10((change[-(len(change) // 3) :].mean() + _LEAST) / (change.mean() + _LEAST)))
@@ -265,7 +265,7 @@ CHECKS: dict[str, Check] = {
         resolution=0.03,
     ),
     "stopped": Check(
-        measure=stopped,
+        measure=stopping_ratio,
         what="change in the last third of the clip over all of it",
         low="repeated-frames",
         resolution=0.05,
@@ -281,7 +281,7 @@ CHECKS: dict[str, Check] = {
 }
 
 
-def measured(frames: UInt8Array) -> FloatArray:
+def measure_statistics(frames: UInt8Array) -> FloatArray:
     """Computes the statistics (len(CHECKS),) of frames (n, height, width) in the order of the table.
 
     Raises:

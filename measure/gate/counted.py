@@ -267,7 +267,7 @@ def _no_flags_hoist(hoist: Hoist, *, height: float) -> Figure | None:
     return None
 
 
-def _padded(film: _Film) -> Figure | None:
+def _padding_figure(film: _Film) -> Figure | None:
     height, width = film.watch.shape
     beyond = film.conditioning.square.beyond(width, height)
     if not beyond > _PADDED:
@@ -275,7 +275,7 @@ def _padded(film: _Film) -> Figure | None:
     return beyond, f"{beyond:.0%} of the square about it lie beyond the picture, {_PADDED:.0%} at most can be measured"
 
 
-def _stretched(film: _Film) -> Figure | None:
+def _stretching_figure(film: _Film) -> Figure | None:
     left, top, right, bottom = film.box
     if film.aspect is None or not right - left > _STRETCHED * film.aspect * (bottom - top):
         return None
@@ -305,8 +305,8 @@ OF_CLOTH: tuple[tuple[Rule, ...], ...] = (
         ("no-hoist", _without_hoist),
     ),
     (*_HIDING, ("upside-down", _upside_down)),
-    (("no-background", _padded),),
-    (("another-shape", _stretched),),
+    (("no-background", _padding_figure),),
+    (("another-shape", _stretching_figure),),
     (("scale", _small), ("unlike-cloth", _fine)),
 )
 """The same for films of cloth."""

@@ -69,12 +69,12 @@ def _camera(film: Film, second: Film, rng: np.random.Generator, count: int) -> F
     shake = rng.normal(0, rng.uniform(0.001, 0.01) * side, (2, count))
     path = drift + swing + shake
     margin = int(np.ceil(np.abs(path).max())) + 1
-    moved = np.stack([_shifted(film[k], path[:, k]) for k in range(count)])
+    moved = np.stack([_shift_frames(film[k], path[:, k]) for k in range(count)])
     margin = min(margin, side // 4)
     return moved[:, margin:-margin, margin:-margin]
 
 
-def _repeated(film: Film, second: Film, rng: np.random.Generator, count: int) -> Film:
+def _repeat_frames(film: Film, second: Film, rng: np.random.Generator, count: int) -> Film:
     """Repeats a few frames in a loop, forth and back, or followed by the last one."""
     few = int(rng.integers(5, 14))
     order = rng.choice(3)
@@ -113,7 +113,7 @@ def _pair(film: Film, second: Film, rng: np.random.Generator, count: int) -> Fil
         joined = np.concatenate([first_square[:, :, low : low + keep], second_square[:, :, low : low + keep]], axis=2)
     else:
         joined = np.concatenate([first_square[:, low : low + keep], second_square[:, low : low + keep]], axis=1)
-    return _squared(joined)
+    return _square_film(joined)
 
 
 def _small(film: Film, second: Film, rng: np.random.Generator, count: int) -> Film:
@@ -167,7 +167,7 @@ def _patchwork(film: Film, second: Film, rng: np.random.Generator, count: int) -
     return clip
 
 
-def _shifted(frame: Film, offset: FloatArray) -> Film:
+def _shift_frames(frame: Film, offset: FloatArray) -> Film:
     return np.asarray(ndimage.shift(frame, offset, order=1, mode="nearest"), dtype=np.uint8)
 
 
@@ -176,7 +176,7 @@ def _noisy(clip: Pixels | Film, sigma: float, rng: np.random.Generator) -> Film:
     return np.clip(np.round(clip + noise), 0, 255).astype(np.uint8)
 
 
-def _squared(clip: Film) -> Film:
+def _square_film(clip: Film) -> Film:
     """Averages the longer sides down to the shorter one's length."""
     side = min(clip.shape[1:])
     zoom = (1, side / clip.shape[1], side / clip.shape[2])
@@ -188,7 +188,7 @@ DISTORTIONS: dict[str, Distortion] = {
     "still": Distortion(reason="no-motion", apply=_at_rest),
     "cut": Distortion(reason="cut-off", apply=_cut),
     "camera": Distortion(reason="moving-camera", apply=_camera),
-    "repeated": Distortion(reason="repeated-frames", apply=_repeated),
+    "repeated": Distortion(reason="repeated-frames", apply=_repeat_frames),
     "held": Distortion(reason="low-frame-rate", apply=_low_rate),
     "dark": Distortion(reason="too-dark", apply=_dark),
     "pair": Distortion(reason="several-flags", apply=_pair),

@@ -120,12 +120,12 @@ class Gate:
         first, rest = plain[:learned], plain[learned:]
         low, centre, high = np.quantile(first, (0.25, 0.5, 0.75), axis=0)
         scale = np.maximum((high - low) / 1.349, 0.2 * first.std(axis=0)) + 1e-3
-        z = squashed(first, centre, scale)
+        z = squash_tails(first, centre, scale)
         # For each distortion the linear discriminant between it and plain clips.
         directions, offsets = [], []
         z_centred = z - z.mean(axis=0)
         for name in DISTORTIONS:
-            z_distorted = squashed(distorted[name], centre, scale)
+            z_distorted = squash_tails(distorted[name], centre, scale)
             pooled, _ = shrunk_covariance(np.concatenate([z_centred, z_distorted - z_distorted.mean(axis=0)]))
             direction = np.linalg.solve(pooled, z_distorted.mean(axis=0) - z.mean(axis=0))
             directions.append(direction)
@@ -141,15 +141,15 @@ class Gate:
             calibration=np.zeros(0),
             statistics=calibration[:, : len(CHECKS)],
         )
-        return gate._calibrated(rest, calibration)
+        return gate._calibrate_thresholds(rest, calibration)
 
-    def _calibrated(self, rest: FloatArray, calibration: FloatArray) -> Gate:
+    def _calibrate_thresholds(self, rest: FloatArray, calibration: FloatArray) -> Gate:
         gate = replace(self, tails=ExponentialTails.of(self.scores(rest), _RESOLUTION))
         return replace(gate, calibration=np.sort(gate.surprises(calibration).max(axis=1)))
 
     def scores(self, vectors: FloatArray) -> FloatArray:
         """Computes scores (n, len(SCORES)) of feature vectors (n, f); high is suspicious."""
-        z = squashed(vectors, self.centre, self.scale)
+        z = squash_tails(vectors, self.centre, self.scale)
         sided = np.stack([sign * vectors[:, index] for _, index, sign, _ in _SIDED], axis=1)
         distances = vectors[:, -1 - len(MOVES) :]
         everything = np.log10(np.linalg.norm(z @ self.whitening.T, axis=1, keepdims=True)) * 10
@@ -164,6 +164,6 @@ class Gate:
         return float(conformal_p(self.calibration, surprise))
 
 
-def squashed(vectors: FloatArray, centre: FloatArray, scale: FloatArray) -> FloatArray:
+def squash_tails(vectors: FloatArray, centre: FloatArray, scale: FloatArray) -> FloatArray:
     """Standardises feature vectors (n, f) and draws in their far tails as a logarithm does: asinh."""
     return np.arcsinh((vectors - centre) / scale)

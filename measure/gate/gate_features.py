@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flagdata.core.arrays import FloatArray, UInt8Array
 from flagdata.errors import InputError
-from measure.gate.checks import measured
+from measure.gate.checks import measure_statistics
 from models.regression.handmade import features as handmade
 from models.trained.estimator import Estimator
 from models.trained.outliers import Familiarity
@@ -68,7 +68,7 @@ def features_of(model: Estimator, frames: UInt8Array, summary: NDArray[np.floati
     embedding = summaries[0] if summary is None else np.asarray(summary, dtype=np.float64)
     moved = (summaries[-len(MOVES) :] - embedding) @ cloud.whitening.T
     return Features(
-        checks=measured(frames),
+        checks=measure_statistics(frames),
         handmade=handmade(torch.from_numpy(square.copy())[None, None], rate=model.front_end.rate)[0].double().numpy(),
         summary=embedding,
         distance=float(cloud.distance(embedding[None])[0]),

@@ -137,18 +137,18 @@ class Verdict:
         return self.p <= self.level
 
     @property
-    def undecided(self) -> bool:
+    def is_undecided(self) -> bool:
         """Whether the flag's size decides, which was not given."""
         return len(self.sizes) < self.considered
 
     @property
     def refused(self) -> bool:
-        return bool(self.faults) or self.unlike or self.undecided
+        return bool(self.faults) or self.unlike or self.is_undecided
 
     @property
     def reasons(self) -> tuple[Reason, ...]:
         """Returns all reasons, the weightiest first."""
-        if self.undecided:
+        if self.is_undecided:
             sentence = f"at {len(self.sizes)} of {self.considered} sizes of the flag it is, at the others it is not"
             return (*self.faults, Reason(kind="size-needed", what=sentence, p=self.p, fix=GIVE_SIZE))
         return self.faults if self.faults and not self.unlike else (*self.faults, *self.window_reasons)
@@ -185,7 +185,7 @@ class Verdict:
                 f"a window is unfamiliar at p ≤ {self.level:.2g}, which refuses {self.false_alarm:.0%} of familiar "
                 "films at most"
             )
-        if self.undecided:
+        if self.is_undecided:
             return (
                 "whether this is like the films that the network was trained on depends on the size: "
                 f"{self.reasons[0].what}"

@@ -84,9 +84,9 @@ class FilmWatch:
         if (self._frames - 1) % step:
             return
         self.shape = (picture.shape[0], picture.shape[1])
-        small = _averaged(picture, SIDE)
+        small = _average_down(picture, SIDE)
         self.times.append(time)
-        self._thumbs.append(_averaged(small.astype(np.float32), _THUMB))
+        self._thumbs.append(_average_down(small.astype(np.float32), _THUMB))
         self._change(small.astype(np.float32))
         if len(self.times) % _SAMPLED == 1 and len(self._sample) < _KEPT:
             self._sample.append(small)
@@ -167,7 +167,7 @@ class FilmWatch:
         """
         if self._fine is None or self._coarse is None:
             return 1.0
-        fine, coarse = (float(of[_resized(mask, of.shape)].mean()) for of in (self._fine, self._coarse))
+        fine, coarse = (float(of[_resize_mask(mask, of.shape)].mean()) for of in (self._fine, self._coarse))
         return coarse / fine if fine > 0 else 1.0
 
     def spot(self) -> float:
@@ -190,14 +190,14 @@ class FilmWatch:
         return int(np.median(counts)) if counts else 0
 
 
-def _averaged(picture: NDArray[_Gray], side: int) -> NDArray[_Gray]:
+def _average_down(picture: NDArray[_Gray], side: int) -> NDArray[_Gray]:
     """Averages a picture (height, width) down to this longer side [px]."""
     scale = min(1.0, side / max(picture.shape))
     size = (max(1, round(picture.shape[1] * scale)), max(1, round(picture.shape[0] * scale)))
     return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=picture.dtype)
 
 
-def _resized(mask: BoolArray, shape: tuple[int, ...]) -> BoolArray:
+def _resize_mask(mask: BoolArray, shape: tuple[int, ...]) -> BoolArray:
     return cv2.resize(mask.astype(np.uint8), shape[::-1], interpolation=cv2.INTER_NEAREST).astype(bool)
 
 

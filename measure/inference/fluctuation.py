@@ -39,7 +39,7 @@ def fluctuation(evidence: Evidence, column: int, along: Chosen = ()) -> Fluctuat
     size = across / (len(score) * (evidence.columns - 1))
     score, curvature = score / size, curvature / size
     grid: FloatArray = np.concatenate([np.zeros(1), np.geomspace(1e-3, 10.0, 200)]) ** 2
-    likelihood = _restricted(grid, score, curvature)
+    likelihood = _restricted_likelihood(grid, score, curvature)
     best = int(np.argmax(likelihood))
     deviation = float(np.sqrt(grid[best]))
     # Of τ where information is a normal variance's: Σ h²/(1 + τ² h)²/2 for τ², 4 τ² times that for τ.
@@ -65,7 +65,7 @@ def fluctuation_gains(evidence: Evidence, column: int) -> FloatArray:
     return result
 
 
-def _restricted(variances: FloatArray, score: FloatArray, curvature: FloatArray) -> FloatArray:
+def _restricted_likelihood(variances: FloatArray, score: FloatArray, curvature: FloatArray) -> FloatArray:
     """Computes the restricted log likelihood of coefficients s/h ± 1/√h that vary by τ² about a constant, over none,
     (variance,)."""
     single = score / curvature

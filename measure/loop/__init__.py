@@ -14,6 +14,6 @@ if TYPE_CHECKING:
     from measure.loop.effect_selection import GUST_COLUMN, LibraryJudgement, estimate, finalists, judge
     from measure.loop.run import LoopOptions, LoopOutcome, solve
     from measure.loop.set_up import HOIST
-    from measure.loop.validation import folds, paired, total_error
+    from measure.loop.validation import folds, paired_difference, total_error
 
 __getattr__ = lazy_exports(__name__, __file__)

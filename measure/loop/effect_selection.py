@@ -21,14 +21,14 @@ from measure.forecasting.regressors import TURNED, EffectColumn, columns, names
 from measure.inference.fluctuation import fluctuation, fluctuation_gains
 from measure.inference.segment_evidence import Evidence, gains
 from measure.loop.refit import Refit
-from measure.loop.set_up import HOIST, SetUp, beyond_tolerance, turned
+from measure.loop.set_up import HOIST, SetUp, beyond_tolerance, wind_turn
 from measure.loop.validation import total_error
 from measure.nulls.directions import Move
 from measure.nulls.reference import GUSTS, Reference
 from measure.probes.lines import SpectralLine
 from measure.probes.wind_course import ALONG, Variation
 from measure.verdict.criteria import CRITERIA
-from measure.verdict.decided import undecided
+from measure.verdict.decided import undecided_sentences
 from measure.verdict.quantity import number
 from measure.verdict.verdict_record import Candidate, Conclusion, Estimate
 from sim.effects import EFFECTS
@@ -148,12 +148,12 @@ def judge(
         )
         for (column, effect), linear in zip(effects, held_out, strict=True)
     ]
-    direction, declared = turned(evidence, reference), set_up or SetUp()
+    direction, declared = wind_turn(evidence, reference), set_up or SetUp()
     beyond = beyond_tolerance(direction, declared.tolerance)
     if direction is not None:
         turned_column = names().index(TURNED)
         candidates = [_within(w, direction, declared.tolerance) if w.column == turned_column else w for w in candidates]
-    ranking = _ranked([*candidates, _gusts(evidence, reference, float(statistics[len(names())]))])
+    ranking = _rank_candidates([*candidates, _gusts(evidence, reference, float(statistics[len(names())]))])
     departing = {
         names().index(name)
         for name, declared_otherwise in ((TURNED, beyond), (HOIST, declared.attached))
@@ -204,7 +204,7 @@ def judge(
         return judgement(Conclusion.PARTLY, departed)
     if p_value > level:
         why, shares = "the base model is not rejected", [share for _, share in power]
-        reasons = undecided(p_value, level=level, departure=_departure(evidence, reference), power=shares)
+        reasons = undecided_sentences(p_value, level=level, departure=_departure(evidence, reference), power=shares)
         return judgement(Conclusion.UNDECIDED if reasons else Conclusion.SUFFICIENT, (), why, reasons)
     if reference.suspected is not None and not confident:
         confident = [w for w in ranking if w.column == reference.suspected[0] and w.admissible]
@@ -528,7 +528,7 @@ def estimate(value: float, error: float, unit: str) -> Estimate:
     )
 
 
-def _ranked(candidates: Sequence[Weighed]) -> list[Weighed]:
+def _rank_candidates(candidates: Sequence[Weighed]) -> list[Weighed]:
     """Ranks candidates by held-out gain, those first that are admissible."""
     ordered = sorted(candidates, key=lambda w: (-w.admissible, -w.gains.sum()))
     return [replace(w, candidate=replace(w.candidate, behind=_behind(ordered[0], w))) for w in ordered]

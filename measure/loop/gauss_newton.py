@@ -10,14 +10,14 @@ import numpy as np
 from flagdata.core.arrays import BoolArray, FloatArray
 from flagdata.errors import ErrorKind, FlagdataError
 from measure.forecasting.calibrated_parameters import PRIOR, THETA, Calibration
-from measure.forecasting.model import Model, errors_of, linearised
+from measure.forecasting.model import Model, errors_of, linearise_model
 from measure.forecasting.observer import Forecaster
 from measure.forecasting.regressors import DOUBLE, Column, EffectColumn
 from measure.forecasting.segments import Segments
 from measure.inference.random_effect import NullModel
 from measure.inference.segment_evidence import Evidence
 from measure.inference.whitened_misfit import WhitenedMisfit
-from measure.probes.statistics import Statistics, reduced
+from measure.probes.statistics import Statistics, reduce_errors
 
 ROUNDS = 3
 _FEW = 8
@@ -105,7 +105,7 @@ def refine(
             break
         reached = _round(forecaster, segments, reached.model, part, whitened.speeds, tuple(chosen), anchor=anchor)
     all_segments = np.ones(len(segments), dtype=bool)
-    ((model, errors),) = finished(forecaster, segments, whitened, [reached.model], chosen, [all_segments])
+    ((model, errors),) = finish_step(forecaster, segments, whitened, [reached.model], chosen, [all_segments])
     return replace(reached, model=model, errors=errors)
 
 
@@ -116,7 +116,7 @@ def _where_least_is_left(forecaster: Forecaster, segments: Segments, whitened: W
     if len(model.effects) != 1:
         return model
     ((column, linear),) = model.effects
-    tried = [replace(model, effects=((column, value),)) for value in (linear, *_expected(column))]
+    tried = [replace(model, effects=((column, value),)) for value in (linear, *_expected_strengths(column))]
     misfits: list[float] = []
     for errors in errors_of(tried, forecaster, segments):
         finite = bool(errors.isfinite().all())
@@ -124,7 +124,7 @@ def _where_least_is_left(forecaster: Forecaster, segments: Segments, whitened: W
     return tried[int(np.argmin(misfits))] if np.isfinite(misfits).any() else model
 
 
-def _expected(column: EffectColumn) -> list[float]:
+def _expected_strengths(column: EffectColumn) -> list[float]:
     """Strengths beyond null across the prior: spaced by factors where all have one sign."""
     low, high = (end - column.described.null for end in column.described.prior)
     if low * high > 0:
@@ -132,7 +132,7 @@ def _expected(column: EffectColumn) -> list[float]:
     return [share * end for end in (low, high) if end for share in (0.5, 1.0)]
 
 
-def finished(
+def finish_step(
     forecaster: Forecaster,
     segments: Segments,
     whitened: WhitenedMisfit,
@@ -167,10 +167,10 @@ def _round(
     anchor: Calibration,
 ) -> Refined:
     for _ in range(_HALVINGS):
-        measured = _linearised(forecaster, segments, origin)
+        measured = _linearise_models(forecaster, segments, origin)
         if np.isfinite(measured.r).all() and np.isfinite(measured.response).all():
             break
-        origin = origin.halved()
+        origin = origin.halfway_to_nominal()
     else:
         raise FitDivergedError(
             "its cloth does not stay one",
@@ -206,11 +206,11 @@ def _part(null: NullModel, places: list[int]) -> NullModel:
     )
 
 
-def _linearised(forecaster: Forecaster, segments: Segments, model: Model) -> Statistics:
+def _linearise_models(forecaster: Forecaster, segments: Segments, model: Model) -> Statistics:
     if any(column.name in DOUBLE for column, _ in model.effects):
         forecaster = forecaster.double
-    base, changes = linearised(model, forecaster, segments)
-    return reduced(base, changes, segments.recording, segments.noise, segments.counted)
+    base, changes = linearise_model(model, forecaster, segments)
+    return reduce_errors(base, changes, segments.recording, segments.noise, segments.counted)
 
 
 def _step(

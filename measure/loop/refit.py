@@ -110,7 +110,7 @@ class Profile:
         return replace(logarithmic, low=math.exp(logarithmic.low), high=float(np.exp(logarithmic.high)))
 
 
-def profiled(
+def profile_strength(
     forecaster: Forecaster, segments: Segments, whitened: WhitenedMisfit, model: Model, index: int = 0
 ) -> Profile:
     """Computes the misfit of a model across the strengths of one of its effects, the others as they are.
@@ -264,7 +264,7 @@ def refit(fits: Fits, reference: Reference, candidates: Sequence[int], *, worker
             gains=gains,
             leftover=reference.p_left_by(evidence, names(), [column]),
             evidence=evidence,
-            profile=profiled(fits.forecaster, fits.segments, fits.whitened, fitted.model),
+            profile=profile_strength(fits.forecaster, fits.segments, fits.whitened, fitted.model),
         )
 
     with ThreadPoolExecutor(max_workers=workers) as pool:

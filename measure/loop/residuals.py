@@ -27,7 +27,10 @@ def residuals(
     residuals_of: list[Residual] = []
     for index, trajectory in enumerate(experiment.recordings):
         places = np.flatnonzero(recording == index)
-        first, second = _joined(before.errors, places), None if after is None else _joined(after.errors, places)
+        first, second = (
+            _join_segments(before.errors, places),
+            None if after is None else _join_segments(after.errors, places),
+        )
         counted = np.ones(first.shape[:2], dtype=bool)
         if segments.counted is not None:
             counted = np.concatenate([segments.counted[..., segment] for segment in places])
@@ -36,7 +39,7 @@ def residuals(
         times = np.concatenate([start + np.arange(length) * segments.period for start in starts])
         frequencies, spectrum = _spectrum(first, segments.period)
         first_frames = slice(0, _SHOWN)
-        predicted = _joined(before.predicted, places)[first_frames]
+        predicted = _join_segments(before.predicted, places)[first_frames]
         residuals_of.append(
             Residual(
                 recording=trajectory.name,
@@ -54,13 +57,13 @@ def residuals(
                 spectrum_after=[] if second is None else _list(_spectrum(second, segments.period)[1]),
                 observed=np.where(counted[first_frames, :, None], predicted + first[first_frames], np.nan).tolist(),
                 before=predicted.tolist(),
-                after=[] if after is None else _joined(after.predicted, places)[first_frames].tolist(),
+                after=[] if after is None else _join_segments(after.predicted, places)[first_frames].tolist(),
             )
         )
     return tuple(residuals_of)
 
 
-def _joined(values: FloatArray, places: IntArray) -> FloatArray:
+def _join_segments(values: FloatArray, places: IntArray) -> FloatArray:
     """Joins one recording's segments one after another, (frame, marker, 3)."""
     return np.concatenate([values[..., segment] for segment in places])
 

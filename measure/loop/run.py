@@ -58,7 +58,7 @@ from measure.nulls.reference import NullBank, Reference
 from measure.observe.checks.attachment import hoist_stands_still
 from measure.observe.trajectory import Experiment
 from measure.probes.lines import SpectralLine
-from measure.probes.statistics import Projection, Statistics, projected
+from measure.probes.statistics import Projection, Statistics, projected_statistics
 from measure.probes.wind_course import Variation
 from measure.probes.wind_log import lags
 from measure.verdict.criteria import CRITERIA
@@ -209,25 +209,25 @@ def solve(experiment: Experiment, options: LoopOptions, *, stage: Stage | None =
         setting = setting.moved(late)
         measured, projection = _looked_at(setting)
     report("sensitivities", 1, 1)
-    nominal, suspected = setting, _suspected(measured, options.suspected)
+    nominal, suspected = setting, _suspected_effect(measured, options.suspected)
 
-    def tested(nulls: int) -> tuple[Setting, Fits, NullBank, Reference]:
+    def test_against(nulls: int) -> tuple[Setting, Fits, NullBank, Reference]:
         bank = null_plan.bank_for(nominal, options, nulls=nulls, stage=report)
         reference = bank.reference(
             len(nominal.segments), noise=nominal.design.noise, seed=options.seed, prior=nominal.prior
         )
         report("base model", 0, 1)
-        fitted, fits = _calibrated(nominal, _fits(nominal, measured, projection, bank), bank)
+        fitted, fits = _calibrate_statistics(nominal, _fits(nominal, measured, projection, bank), bank)
         fits = _settling(fitted, fits, options.seed)
         report("base model", 1, 1)
         reference = reference.at(fitted.calibration)
         return fitted, fits, bank, reference if suspected is None else reference.along(*suspected)
 
     nulls = null_plan.first_round(options)
-    setting, fits, bank, reference = tested(nulls)
+    setting, fits, bank, reference = test_against(nulls)
     evidence = fits.whitened.evidence(fits.whitened.statistics)
     while (wanted := _nulls_wanted(options, nulls, reference, evidence)) is not None:
-        setting, fits, bank, reference = tested(nulls := wanted)
+        setting, fits, bank, reference = test_against(nulls := wanted)
         evidence = fits.whitened.evidence(fits.whitened.statistics)
     set_up = SetUp(tolerance=setting.tolerance, attached=hoist_stands_still(setting.experiment))
     judgement, refits = judge(evidence, reference, level=options.level, set_up=set_up), dict[int, Refit | None]()
@@ -254,7 +254,7 @@ def _nulls_wanted(options: LoopOptions, nulls: int, reference: Reference, eviden
     )
 
 
-def _suspected(measured: Statistics, suspected: Suspicion | None) -> tuple[int, int] | None:
+def _suspected_effect(measured: Statistics, suspected: Suspicion | None) -> tuple[int, int] | None:
     """Returns column and sign of an effect that is suspected; None where none is.
 
     Raises:
@@ -329,7 +329,7 @@ class Solved:
 def _looked_at(setting: Setting) -> tuple[Statistics, Projection]:
     """Errors of the base model along all columns, and the directions."""
     starts = [setting.calibration] * len(setting.segments)
-    return projected(setting.forecaster, setting.segments, starts, columns())
+    return projected_statistics(setting.forecaster, setting.segments, starts, columns())
 
 
 def _fits(setting: Setting, statistics: Statistics, projection: Projection, bank: NullBank) -> Fits:
@@ -344,7 +344,7 @@ def _fits(setting: Setting, statistics: Statistics, projection: Projection, bank
     return Fits(forecaster=setting.forecaster, segments=setting.segments, whitened=whitened)
 
 
-def _calibrated(setting: Setting, fits: Fits, bank: NullBank) -> tuple[Setting, Fits]:
+def _calibrate_statistics(setting: Setting, fits: Fits, bank: NullBank) -> tuple[Setting, Fits]:
     """Takes statistics at the base model that all directions lead to, anew until a step is within its errors, or leaves
     more than there was before it: beyond that, directions follow what numerics do."""
     for _ in range(_LOOKS):

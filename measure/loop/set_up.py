@@ -27,7 +27,7 @@ class SetUp:
     attached: bool = False
 
 
-def turned(evidence: Evidence, reference: Reference) -> Estimate | None:
+def wind_turn(evidence: Evidence, reference: Reference) -> Estimate | None:
     """Estimates by how much the wind is turned from where its logs have it, counter-clockwise [rad], whatever their
     tolerance; None in still air, which has no direction."""
     column, undirected = names().index(TURNED), evidence.with_directions()

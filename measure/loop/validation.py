@@ -20,7 +20,7 @@ from measure.forecasting.observer import Forecaster
 from measure.forecasting.segments import Segments
 from measure.forecasting.setting import Setting
 from measure.inference.whitened_misfit import WhitenedMisfit
-from measure.loop.gauss_newton import Refined, finished
+from measure.loop.gauss_newton import Refined, finish_step
 from measure.nulls import tracks, winds
 from measure.nulls.null_simulation import NullBatch
 from measure.observe.attachment_anchors import as_seen
@@ -89,7 +89,7 @@ class Predictions:
     @property
     def squared(self) -> FloatArray:
         """(segment,) mean squared distance [m²]."""
-        return _squared(self.errors)
+        return _squared_distance(self.errors)
 
 
 def folds(segments: Segments, speeds: Sequence[float]) -> tuple[Fold, ...]:
@@ -142,12 +142,12 @@ def left_out(
 ) -> list[LeftOut]:
     """Computes what a model leaves, each time fitted to the other segments alone."""
     begun = [fitted.without(outside) for outside in outsides]
-    ended = finished(forecaster, segments, whitened, begun, fitted.chosen, [~outside for outside in outsides])
+    ended = finish_step(forecaster, segments, whitened, begun, fitted.chosen, [~outside for outside in outsides])
     models = [model for model, _ in ended]
-    return measured(forecaster, segments, models, whitened, outsides, fitted.chosen)
+    return measure_left_out(forecaster, segments, models, whitened, outsides, fitted.chosen)
 
 
-def measured(
+def measure_left_out(
     forecaster: Forecaster,
     segments: Segments,
     models: Sequence[Model],
@@ -160,14 +160,14 @@ def measured(
     errors_of_models = errors_of(models, forecaster, segments)
     return [
         LeftOut(
-            squared=_squared(_array(errors))[outside] / segments.tracked[outside],
+            squared=_squared_distance(_array(errors))[outside] / segments.tracked[outside],
             misfit=whitened.of(errors).left_out(outside, chosen),
         )
         for errors, outside in zip(errors_of_models, outsides, strict=True)
     ]
 
 
-def _squared(errors: FloatArray) -> FloatArray:
+def _squared_distance(errors: FloatArray) -> FloatArray:
     """Computes the mean squared distance, (segment,) [m²]."""
     return (errors**2).sum(axis=2).mean(axis=(0, 1))
 
@@ -196,7 +196,7 @@ def compare(
         frames=frames,
         before=root(old),
         after=root(new),
-        reduction=paired(old, new),
+        reduction=paired_difference(old, new),
         floor=root(floor),
         share=share_removed(old, new, floor),
         control=None if control is None else root(control.squared),
@@ -240,7 +240,7 @@ def root(squared: FloatArray) -> Estimate:
     )
 
 
-def paired(before: FloatArray, after: FloatArray) -> Estimate:
+def paired_difference(before: FloatArray, after: FloatArray) -> Estimate:
     """Computes the difference of roots of means, paired by segment: linear in the squares, for which Student's interval
     is valid."""
     slope = 1 / (math.sqrt(float(before.mean())) + math.sqrt(float(after.mean())))

@@ -18,7 +18,7 @@ import numpy as np
 from flagdata.core.arrays import FloatArray, read_arrays
 from flagdata.core.console import say_beside_bars
 from flagdata.core.files.outputs import rewrite
-from flagdata.core.numbered import bounded
+from flagdata.core.numbered import read_bounded
 from flagdata.core.provenance import code_version
 from flagdata.core.rng import child_seed, stream
 from flagdata.errors import CorruptError, NotFoundError, UsageError
@@ -37,7 +37,7 @@ from measure.observe.trajectory import Specimen, Trajectory
 from measure.probes.statistics import Statistics, statistics
 from measure.probes.wind_course import Course
 from sim.integrate.split import SplitEuler
-from sim.workers import connected
+from sim.workers import connect_workers
 
 WINDS = 4
 """Recordings of a batch: one cloth in so many winds, one experiment of one kind of numerics. What experiments leave
@@ -176,7 +176,7 @@ def build(
         progress(len(batches) - len(missing))
     if not missing:
         return
-    with connected(scheduler, workers=min(workers, len(missing)), say=say_beside_bars) as pool:
+    with connect_workers(scheduler, workers=min(workers, len(missing)), say=say_beside_bars) as pool:
         for index, content in pool.results((_content_of, (batches[index], index)) for index in missing):
             rewrite(_file(folder, index), content)
             if progress is not None:
@@ -254,7 +254,7 @@ def _content(path: Path) -> Mapping[str, np.ndarray]:
 
 
 def _number(path: Path) -> int:
-    number = bounded(path.stem.partition("-")[2], most=SEED_LIMIT)
+    number = read_bounded(path.stem.partition("-")[2], most=SEED_LIMIT)
     if number is None:
         raise CorruptError("it is not a file of a bank", where=str(path), fix="move it out of the folder")
     return number

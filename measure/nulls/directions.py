@@ -54,7 +54,7 @@ def moves(columns: tuple[str, ...]) -> list[Move]:
     ]
 
 
-def pulled(evidence: Evidence) -> FloatArray:
+def pulls_of(evidence: Evidence) -> FloatArray:
     """Computes the root of each column's drop over what is left with it, with the sign of its coefficient, (column,
     part); parts are the errors', and their moments' about the pole where these are looked at."""
     parts = [evidence] if evidence.turning is None else [evidence, evidence.turning]
@@ -62,12 +62,12 @@ def pulled(evidence: Evidence) -> FloatArray:
     return np.stack([np.sign(pulls) * np.sqrt(shares_of(pulls**2, remainder)) for pulls, remainder in fits], axis=1)
 
 
-def standardised(pulls: FloatArray, centre: FloatArray, width: FloatArray) -> FloatArray:
+def standardise_pulls(pulls: FloatArray, centre: FloatArray, width: FloatArray) -> FloatArray:
     """Standardises (…, column, part) pulls: less what is usual, over how much they vary; −∞ where nothing is seen."""
     return np.where(width > np.cbrt(NOTHING), (pulls - centre) / np.maximum(width, np.cbrt(NOTHING)), -np.inf)
 
 
-def directed(pulls: FloatArray, column: int, sign: int) -> FloatArray:
+def pull_along(pulls: FloatArray, column: int, sign: int) -> FloatArray:
     """Computes how far standardised pulls (group, column, part) go the way of one effect, by the farther part,
     (group,)."""
     of_column = pulls[:, column]

@@ -12,7 +12,7 @@ from flagdata.core.rng import child_seed, stream
 from measure.forecasting.calibrated_parameters import Calibration
 from measure.nulls.null_simulation import NullBatch
 from measure.observe.trajectory import Trajectory
-from measure.probes.settled import settled
+from measure.probes.settled import settling_of
 from measure.verdict.criteria import CRITERIA
 
 _COPIES = 2
@@ -44,10 +44,10 @@ def settled_off(recordings: Sequence[Trajectory], batch: NullBatch) -> FloatArra
         stride = max(1, round(recording.rate / batch.rate))
         positions, period = recording.positions[::stride], stride / recording.rate
         modelled = [
-            settled(batch.markers, runs[: len(positions), ..., run], period=1 / batch.rate)
+            settling_of(batch.markers, runs[: len(positions), ..., run], period=1 / batch.rate)
             for run in range(number, runs.shape[-1], count)
         ]
-        observed = settled(recording.markers, positions, period=period, noise=recording.noise)
+        observed = settling_of(recording.markers, positions, period=period, noise=recording.noise)
         off.append(observed - np.mean(modelled, axis=0))
     return np.stack(off)
 

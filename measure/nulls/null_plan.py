@@ -16,7 +16,7 @@ from measure.nulls import tracks, winds
 from measure.nulls.conformal import GroupedConformal, kinds_needed
 from measure.nulls.null_simulation import NullBatch
 from measure.nulls.reference import NullBank
-from measure.observe.trajectory import described
+from measure.observe.trajectory import describe_cloth
 from measure.verdict.criteria import CRITERIA
 
 _CARRIED = ", carried along the recordings' own ways from other instants on"
@@ -71,7 +71,7 @@ def bank_for(setting: Setting, options: NullOptions, *, nulls: int | None = None
     """
     if options.bank is not None:
         return load_bank(options.bank, setting)
-    return simulated(
+    return simulate_bank(
         setting,
         nulls=options.nulls if nulls is None else nulls,
         seed=options.seed,
@@ -186,7 +186,7 @@ def batches(setting: Setting, *, kinds: int, seed: int) -> list[NullBatch]:
     ]
 
 
-def simulated(
+def simulate_bank(
     setting: Setting, *, nulls: int, seed: int, workers: int, stage: Stage, scheduler: str | None = None
 ) -> NullBank:
     """Simulates a bank of `batches`, kept in the user's cache folder by the hash of its design: what is there already
@@ -217,7 +217,7 @@ def design_hash(setting: Setting) -> str:
     """Hashes all of an experiment that shapes its nulls, SHA-256: cloth, markers, rate, noise, lengths, winds and
     ways."""
     segments, recordings = setting.segments, setting.experiment.recordings
-    content, arrays = described(setting.experiment.specimen)
+    content, arrays = describe_cloth(setting.experiment.specimen)
     del content["density-uncertainty"]  # nulls are judged under it, not made by it
     content |= {
         "period": segments.period,

@@ -19,7 +19,7 @@ from flagdata.core.rng import stream
 from flagdata.errors import ErrorKind, FlagdataError
 from measure.forecasting.calibrated_parameters import Calibration
 from measure.nulls.stiffness import StiffnessFactors
-from measure.observe.attachment_anchors import carried
+from measure.observe.attachment_anchors import carry_attachments
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import AttachmentTrack, Specimen, Trajectory, WindTrack
 from sim.cloth.anchors import AnchorTracks
@@ -101,7 +101,11 @@ class NullBatch:
             )
             for number, wind in enumerate(self.winds or [WindTrack.constant((u, 0.0, 0.0)) for u in self.speeds])
         ]
-        return [carried(recording, self.specimen.seats) for recording in trajectories] if self.tracks else trajectories
+        return (
+            [carry_attachments(recording, self.specimen.seats) for recording in trajectories]
+            if self.tracks
+            else trajectories
+        )
 
     @property
     def effort(self) -> float:

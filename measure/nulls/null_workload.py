@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from flagdata.core.workload import announced
+from flagdata.core.workload import announce_work
 from measure.forecasting.segments import Cut
 from measure.nulls import bank as banks
 from measure.nulls.null_plan import NullOptions
@@ -22,7 +22,7 @@ def of_batches(batches: Sequence[NullBatch], *, workers: int) -> str:
     """Announces what is simulated for a bank, and for about how long."""
     seconds = [len(batch.speeds) * (SETTLE + batch.duration) for batch in batches]
     work = sum(lasting * batch.specimen.mesh.vertex_count for lasting, batch in zip(seconds, batches, strict=True))
-    return _simulated(sum(seconds), work, workers=workers)
+    return _simulated_words(sum(seconds), work, workers=workers)
 
 
 def of_recordings(
@@ -38,17 +38,17 @@ def of_recordings(
     """
     if options.bank is not None:
         judging = sets * _JUDGED * sum(len(recording.positions) / recording.rate for recording in recordings)
-        return announced(
+        return announce_work(
             "judging the recordings" if sets == 1 else f"judging {sets} sets of recordings", judging, workers=workers
         )
     cuts = [(Cut.of(recording.rate, len(recording.positions)), len(recording.positions)) for recording in recordings]
     lasting = cuts[0][0].lasting(banks.segments_of_each(sum(cut.segments(frames) for cut, frames in cuts)))
     seconds = sets * options.nulls * (SETTLE + lasting)
-    return _simulated(seconds, seconds * vertices, workers=workers)
+    return _simulated_words(seconds, seconds * vertices, workers=workers)
 
 
-def _simulated(seconds: float, work: float, *, workers: int) -> str:
-    return announced(
+def _simulated_words(seconds: float, work: float, *, workers: int) -> str:
+    return announce_work(
         f"simulating null recordings of {seconds / 60:.0f} minutes in all",
         work / _PACE,
         workers=workers,

@@ -20,7 +20,7 @@ from measure.inference.growth import power
 from measure.inference.random_effect import NullModel, Nulls
 from measure.inference.segment_evidence import Evidence, best_gain
 from measure.nulls.conformal import GroupedConformal, kinds_needed
-from measure.nulls.directions import APPEARS, NOTHING, Move, directed, moves, pulled, shares_of, standardised
+from measure.nulls.directions import APPEARS, NOTHING, Move, moves, pull_along, pulls_of, shares_of, standardise_pulls
 from measure.nulls.tails import as_normal, freedom
 from measure.probes.lines import Lines, SpectralLine, strongest
 from measure.probes.segment_rows import StatisticRows
@@ -163,7 +163,7 @@ class _NullGroups(StatisticRows):
     """Statistics of null groups.
 
     Attributes:
-        shares: (group, column) of `unscaled`.
+        shares: (group, column) of `unscaled_drops`.
         pulls: (group, column, part) of `pulled`.
         left: (group,) what the base model leaves.
         gained: (group,) best held-out gains.
@@ -201,10 +201,10 @@ class _NullGroups(StatisticRows):
         nominal = -segment.calibration[0] * np.minimum(evidence.prior / PRIOR, 1.0)
         swing, settles = (np.zeros(0) if values is None else values for values in (evidence.swing, evidence.settles))
         return cls(
-            shares=unscaled(evidence, columns)[None],
-            pulls=pulled(evidence)[None],
+            shares=unscaled_drops(evidence, columns)[None],
+            pulls=pulls_of(evidence)[None],
             left=np.array([evidence.fit(()).remainder]),
-            gained=np.array([best_gain(evidence, without=_uncounted(columns))]),
+            gained=np.array([best_gain(evidence, without=_uncounted_columns(columns))]),
             swings=swing[None],
             settled=settles[None],
             lines=None if evidence.lines is None else strongest(evidence.lines)[None],
@@ -247,7 +247,7 @@ class _Usual:
     def pulled(self, pulls: FloatArray) -> FloatArray:
         """Computes how far each column pulls more than it does in nulls, in their standard deviations, (group, column,
         part)."""
-        return standardised(pulls, self.pull, self.pull_width)
+        return standardise_pulls(pulls, self.pull, self.pull_width)
 
     def far(self, groups: _NullGroups) -> FloatArray:
         """Computes how far groups are from their mean, in deviations by each one's own tail, (group, column + 2 to
@@ -290,7 +290,7 @@ class Reference:
     had a part in, 3 % of true nulls were rejected at 2 %, and 7 % at 5 % (20 kinds; by other kinds 2 and 4 %).
 
     Attributes:
-        scaled: (group, column) of `unscaled`: columns, gusts, then moments.
+        scaled: (group, column) of `unscaled_drops`: columns, gusts, then moments.
         spread: (column,) mean share of nulls as noisy as the data.
         far: (group, column + 2 to 11) how far the cube root of each is from its mean in other kinds' nulls as noisy, in
             standard deviations; after the columns that of what the base model leaves, then the best held-out gain,
@@ -437,13 +437,15 @@ class Reference:
         """That of the base model: along all, or along the suspected effect."""
         if self.suspected is None:
             return self.conformal
-        return GroupedConformal(null=directed(self.pulled, *self.suspected), kinds=self.kinds)
+        return GroupedConformal(null=pull_along(self.pulled, *self.suspected), kinds=self.kinds)
 
     def tested(self, evidence: Evidence, columns: tuple[str, ...]) -> float:
         """Computes the statistic of data that the base model is tested by."""
         if self.suspected is None:
             return self.farthest(evidence, columns)
-        return float(directed(standardised(pulled(evidence), self.pull, self.pull_width)[None], *self.suspected)[0])
+        return float(
+            pull_along(standardise_pulls(pulls_of(evidence), self.pull, self.pull_width)[None], *self.suspected)[0]
+        )
 
     def power(self, level: float) -> tuple[tuple[Move, float], ...]:
         """Lists effects that are tested for, each with the share of nulls beyond the critical value once it acts on
@@ -475,11 +477,11 @@ class Reference:
         usual = self.usual[int(segment.numerics[0])]
         if self.suspected is None:
             return float(usual.far(_NullGroups.of(evidence, self.columns, segment)).max())
-        return float(directed(usual.pulled(pulled(evidence)[None]), *self.suspected)[0])
+        return float(pull_along(usual.pulled(pulls_of(evidence)[None]), *self.suspected)[0])
 
     def statistics(self, evidence: Evidence, columns: tuple[str, ...], along: Sequence[int] = ()) -> FloatArray:
         """Computes (column,) statistics of data, as `scaled` has them, where some columns are fitted already."""
-        shares = unscaled(evidence, columns, along)
+        shares = unscaled_drops(evidence, columns, along)
         return shares / self.spread[: len(shares)]
 
     def p_family(self, statistic: float, column: int) -> float:
@@ -503,11 +505,11 @@ class Reference:
     def farthest(self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int] = ()) -> float:
         """Computes how far the farthest of data is, where some columns are fitted already: the statistic of the global
         test."""
-        shares, remainder = unscaled(evidence, columns, chosen), evidence.fit(chosen).remainder
+        shares, remainder = unscaled_drops(evidence, columns, chosen), evidence.fit(chosen).remainder
         distance = max(
             float(self._distance(shares, slice(len(shares))).max()), float(self._distance(remainder, len(self.spread)))
         )
-        best = best_gain(evidence, chosen, without=_uncounted(columns))
+        best = best_gain(evidence, chosen, without=_uncounted_columns(columns))
         gained = float(self._distance(best, len(self.spread) + 1))
         swing, line, settles = self.swing(evidence), self.line(evidence), self.settles(evidence)
         further = [swing, None if line is None else line.far, None if settles is None else float(settles.max())]
@@ -575,13 +577,13 @@ class Reference:
         return as_normal((values - self.centre[columns]) / self.width[columns], self.degrees[columns])
 
 
-def _uncounted(columns: tuple[str, ...]) -> list[int]:
+def _uncounted_columns(columns: tuple[str, ...]) -> list[int]:
     """Columns whose held-out gains do not count in the test: what a log may be off by within its tolerance gains on
     recordings whose own log was not fitted."""
     return [columns.index(TURNED)] if TURNED in columns else []
 
 
-def unscaled(evidence: Evidence, columns: tuple[str, ...], along: Sequence[int] = ()) -> FloatArray:
+def unscaled_drops(evidence: Evidence, columns: tuple[str, ...], along: Sequence[int] = ()) -> FloatArray:
     """Computes each column's drop over what is left with it in some segments, and the likelihood ratio of gusts; where
     moments about the pole are looked at, then the same drops of these, and what they leave.
 

@@ -38,7 +38,7 @@ def like(
         duration: of a null recording behind the time in which it settles [s].
         seed: of the draws.
     """
-    ways = [smoothed(recording, seats) for recording in recordings if recording.attachments is not None]
+    ways = [smooth_way(recording, seats) for recording in recordings if recording.attachments is not None]
     if not ways:
         return ()
     rng = stream(seed, "null", "tracks")
@@ -55,7 +55,7 @@ def like(
     return tuple(drawn)
 
 
-def smoothed(recording: Trajectory, seats: FloatArray) -> CubicSpline:
+def smooth_way(recording: Trajectory, seats: FloatArray) -> CubicSpline:
     """Smooths the way of a recording's attachments (held, 3) [m] over its time [s], free of the noise of the markers.
 
     It is the smoothest, by its third differences, that lies as far from the tracked one as the noise does (Whittaker,

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from measure.observables.observable import WINDOW, Observable
     from measure.observables.observables_table import table_of
     from measure.observables.tracked_cloth import ClothWindow, View, edges_of, seen_from
-    from measure.observables.watching import watched
+    from measure.observables.watching import watch_film
 
 
 __all__ = [

@@ -33,9 +33,9 @@ class _Drawing(ctypes.Structure):
 @functools.cache
 def library() -> ctypes.CDLL | None:
     """Compiles the kernel; None, with one warning, where it cannot be built."""
-    from sim.compiler import compiled  # a film is measured without the simulator, and loads nothing of it
+    from sim.compiler import compile_library  # a film is measured without the simulator, and loads nothing of it
 
-    return compiled(
+    return compile_library(
         "measure.observables", ("drawing.cpp",), without="silhouettes are drawn by numpy, many times slower"
     )
 

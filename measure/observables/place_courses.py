@@ -53,13 +53,13 @@ def spectrum(times: FloatArray, course: FloatArray) -> tuple[FloatArray, FloatAr
         UnseenError: as `even`.
     """
     at, places = even(times, course)
-    transform = transformed(at, places)
+    transform = fourier_transform(at, places)
     frequency = np.asarray(np.fft.rfftfreq(len(at), 1 / RATE), np.float64)
     band = (frequency >= LOWEST - 1e-9) & (frequency <= HIGHEST)
     return frequency[band], np.square(np.abs(transform[band])).sum(axis=1)
 
 
-def transformed(at: FloatArray, places: FloatArray) -> NDArray[np.complex128]:
+def fourier_transform(at: FloatArray, places: FloatArray) -> NDArray[np.complex128]:
     """Computes the Fourier transform (f, d) of a course (n, d) at even instants less its straight line, under a Hann
     window."""
     line = np.polynomial.polynomial.polyvander(at - at.mean(), 1)

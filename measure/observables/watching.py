@@ -15,7 +15,7 @@ from measure.film.similarity import FlagSize
 from measure.observables.film_window import FilmWindow
 from measure.observables.observable import WINDOW
 from models.conditioning.outline import Outliner
-from models.conditioning.stills import halved
+from models.conditioning.stills import halve_picture
 
 CHUNK = 30.0
 """Length of film [s] that one still picture is of: light and shade change over longer ones."""
@@ -49,7 +49,7 @@ class Watched:
 def count_of(
     film: ConditionedFilm, *, first: float | None = None, last: float | None = None, seconds: float = WINDOW
 ) -> int:
-    """Counts the complete windows of a part of a film; the parameters as for `watched`.
+    """Counts the complete windows of a part of a film; the parameters as for `watch_film`.
 
     Raises:
         RefusedError: the film has no whole window.
@@ -65,7 +65,7 @@ def count_of(
     return count
 
 
-def watched(
+def watch_film(
     film: ConditionedFilm,
     size: FlagSize,
     *,
@@ -172,7 +172,7 @@ def _chunk(
     nothing: list[FilmWindow | None] = [None] * count
     if film.found is None or not timed_frames:
         return nothing
-    frames = np.stack([halved(frame) for _, frame in timed_frames])
+    frames = np.stack([halve_picture(frame) for _, frame in timed_frames])
     outliner = Outliner.of(frames)
     if outliner is None or outliner.hoist[1, 1] - outliner.hoist[0, 1] < _LEAST_HOIST:
         return nothing

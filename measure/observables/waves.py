@@ -9,7 +9,7 @@ import numpy as np
 
 from measure.observables.chord import Window, chord
 from measure.observables.not_shown import EDGE_ON, NO_WAVE, UnseenError
-from measure.observables.place_courses import HIGHEST, LOWEST, RATE, even, transformed
+from measure.observables.place_courses import HIGHEST, LOWEST, RATE, even, fourier_transform
 
 _SECTIONS = np.linspace(0.35, 0.85, 6)
 """Of the mean chord, where the middle line is followed."""
@@ -50,7 +50,7 @@ def wave(window: Window) -> Wave:
         raise UnseenError(EDGE_ON)
     course = np.stack([line[:, section].mean(axis=1) for section in sections], axis=1)
     at, places = even(shapes.times, course)
-    spectra = transformed(at, places)
+    spectra = fourier_transform(at, places)
     frequency = np.fft.rfftfreq(len(at), 1 / RATE)
     band = (frequency >= LOWEST - 1e-9) & (frequency <= HIGHEST)
     spectra, frequency = spectra[band], frequency[band]

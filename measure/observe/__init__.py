@@ -13,7 +13,7 @@ from measure.observe.setup import Hold, Setup, sheet
 from measure.observe.trajectory import Experiment, Specimen, Trajectory, WindTrack
 
 if TYPE_CHECKING:
-    from measure.observe.attachment_anchors import as_seen, carried
+    from measure.observe.attachment_anchors import as_seen, carry_attachments
     from measure.observe.checks.attachment import hoist_stands_still
     from measure.observe.cloth_mesh import model_mesh
     from measure.observe.experiment import hold, observe

@@ -25,7 +25,7 @@ def anchors_of(recordings: Sequence[Trajectory], seats: FloatArray) -> FloatArra
     return np.mean(means, axis=0)
 
 
-def carried(recording: Trajectory, seats: FloatArray) -> Trajectory:
+def carry_attachments(recording: Trajectory, seats: FloatArray) -> Trajectory:
     """Moves the recording's attachments where its markers say that points (held, 2) of the cloth go."""
     attachments = np.einsum("sm,fmi->fsi", onto(recording.markers, seats), recording.positions)
     return replace(recording, attachments=attachments)

@@ -73,7 +73,7 @@ def at_same_points(
     first = recordings[0]
     if all(_same_markers(recording.markers, first.markers) for recording in recordings):
         return tuple(replace(recording, markers=first.markers) for recording in recordings), ()
-    if (shared := _shared(recordings)) is not None:
+    if (shared := _shared_markers(recordings)) is not None:
         return shared
     moved: list[Trajectory] = []
     findings: list[Finding] = []
@@ -112,7 +112,7 @@ def at_same_points(
     return tuple(moved), tuple(findings)
 
 
-def _shared(recordings: Sequence[Trajectory]) -> tuple[tuple[Trajectory, ...], tuple[Finding, ...]] | None:
+def _shared_markers(recordings: Sequence[Trajectory]) -> tuple[tuple[Trajectory, ...], tuple[Finding, ...]] | None:
     """Selects the markers that all recordings have; None where these are too few to speak of one layout."""
     most = max(recordings, key=lambda recording: len(recording.markers))
     size = _SAME * float(np.ptp(most.markers, axis=0).max())

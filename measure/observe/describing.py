@@ -22,7 +22,7 @@ from sim.arcsim import STAGES
 from sim.cloth import handles
 from sim.cloth.air import AIR_FORCES, AirForce, QuadraticNormal
 from sim.cloth.handles import ARCSIM_STIFFNESS
-from sim.cloth.material import BENDING_SHAPE, MATERIALS, STRETCHING_SHAPE, Material, named
+from sim.cloth.material import BENDING_SHAPE, MATERIALS, STRETCHING_SHAPE, Material, named_material
 
 
 def of_arcsim(scene: Mapping[str, Any], rest: FloatArray, *, where: str) -> tuple[Known, tuple[Finding, ...]]:
@@ -116,7 +116,7 @@ def _arcsim_material(entry: Mapping[str, Any], where: str) -> Material | None:
     if name not in MATERIALS.names():
         return None
     thicken = _number(entry, "thicken", 1.0, where)
-    return named(name).scaled(
+    return named_material(name).scaled(
         area_weight=thicken * _number(entry, "density_mult", 1.0, where),
         stretching=thicken * _number(entry, "stretching_mult", 1.0, where),
         bending=thicken * _number(entry, "bending_mult", 1.0, where),

@@ -28,7 +28,7 @@ from flagdata.core.arrays import FloatArray, IntArray
 from flagdata.core.findings import Finding
 from flagdata.errors import InputError
 from measure.observe import cloth_mesh
-from measure.observe.attachment_anchors import anchors_of, carried
+from measure.observe.attachment_anchors import anchors_of, carry_attachments
 from measure.observe.checks import attachment, cloth_lengths, frames, inertia_check, surroundings
 from measure.observe.common import at_same_points, at_same_rate
 from measure.observe.gaps import fill_positions
@@ -217,14 +217,14 @@ def observe(observations: Sequence[Observation], setup: Setup | None = None) -> 
     corners, findings = _outline(observations, setup)
     low = corners.min(axis=0)
     mesh = cloth_mesh.model_mesh(corners - low, vertices=setup.vertices)
-    prepared = [_prepared(observation, corners) for observation in observations]
+    prepared = [_prepare_recording(observation, corners) for observation in observations]
     at_rate, resampled = at_same_rate([_trajectory(observation, low) for observation in prepared])
     recordings, moved = at_same_points(at_rate, mesh.rest)
     descriptions = [observation.known for observation in prepared]
     mesh, vertices = hold(mesh, _pins(descriptions, setup, low))
     seats = mesh.rest[list(vertices)]
     if setup.carried:
-        recordings = tuple(carried(recording, seats) for recording in recordings)
+        recordings = tuple(carry_attachments(recording, seats) for recording in recordings)
     specimen = Specimen(
         mesh=mesh,
         material=_material(descriptions, setup),
@@ -235,11 +235,11 @@ def observe(observations: Sequence[Observation], setup: Setup | None = None) -> 
         anchors_given=False,
         stiffness=_stiffness(descriptions, setup),
         gravity=(
-            _agreed([k.gravity for k in descriptions], None, GRAVITY, "gravity")
+            _agreed_value([k.gravity for k in descriptions], None, GRAVITY, "gravity")
             if setup.gravity is None
             else (0.0, 0.0, -setup.gravity)
         ),
-        air=_agreed([k.air for k in descriptions], setup.air, QuadraticNormal(), "wind force"),
+        air=_agreed_value([k.air for k in descriptions], setup.air, QuadraticNormal(), "wind force"),
     )
     experiment = Experiment(specimen=specimen, recordings=recordings)
     findings = (
@@ -247,12 +247,12 @@ def observe(observations: Sequence[Observation], setup: Setup | None = None) -> 
         *(f for observation in prepared for f in observation.findings),
         *resampled,
         *moved,
-        *_checked(experiment),
+        *_check_experiment(experiment),
     )
     return Observed(experiment=experiment, findings=findings)
 
 
-def _prepared(observation: Observation, corners: FloatArray) -> Observation:
+def _prepare_recording(observation: Observation, corners: FloatArray) -> Observation:
     """Prepares a recording with even frames and no gaps, its noise settled, its lengths those of the rest shape.
 
     Wrong values become NaN and are reported; then all NaN are filled or left out together.
@@ -312,7 +312,7 @@ def _noise(observation: Observation) -> float:
     return estimate(observation.markers, observation.positions, where=f"recording {observation.name!r}")
 
 
-def _checked(experiment: Experiment) -> tuple[Finding, ...]:
+def _check_experiment(experiment: Experiment) -> tuple[Finding, ...]:
     """Checks the cloth, its pins and its wind. Whether pins stand still, and whether the motion about them is that of
     the wind's moment, is not asked where they are carried.
 
@@ -342,7 +342,9 @@ def _stiffness(descriptions: Sequence[Known], setup: Setup) -> float:
     """Chooses the stiffness of the pins [N/m]; those that are carried hold rigidly."""
     if setup.carried:
         return math.inf
-    return _agreed([k.stiffness for k in descriptions], setup.stiffness, ARCSIM_STIFFNESS, "stiffness of the pins")
+    return _agreed_value(
+        [k.stiffness for k in descriptions], setup.stiffness, ARCSIM_STIFFNESS, "stiffness of the pins"
+    )
 
 
 def _outline(observations: Sequence[Observation], setup: Setup) -> tuple[FloatArray, tuple[Finding, ...]]:
@@ -440,7 +442,7 @@ def _pins(descriptions: Sequence[Known], setup: Setup, low: FloatArray) -> Hold 
 T = TypeVar("T")
 
 
-def _agreed(descriptions: Sequence[T | None], chosen: T | None, default: T, quantity: str) -> T:
+def _agreed_value(descriptions: Sequence[T | None], chosen: T | None, default: T, quantity: str) -> T:
     """Returns what the user gives, else what the recordings' descriptions agree on, else the default."""
     if chosen is not None:
         return chosen

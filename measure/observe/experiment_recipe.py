@@ -46,7 +46,7 @@ from flagdata.ingest.meshes import read_obj
 from flagdata.lake import Lake
 from flagdata.recipes import typed_tables
 from flagdata.recipes.retired_names import OF_LOGS, TABLES, with_present_keys
-from flagdata.recipes.shelves import parsed, read_recipe
+from flagdata.recipes.shelves import parse_recipe, read_recipe
 from flagdata.recipes.typed_tables import WHOLE_LIMIT, Angle, Count, NotNegative, Positive
 from flagdata.verbs.shared_options import BOTH_STATED
 from measure.observe import markers, mesh_observations, wind_tracks
@@ -57,7 +57,7 @@ from measure.observe.setup import Hold, Setup, sheet
 from measure.observe.trajectory import AREA_WEIGHT_UNCERTAINTY, WindTrack
 from measure.observe.wind_tracks import LogPlacement
 from sim.cloth.air import QuadraticNormal
-from sim.cloth.material import Material, named
+from sim.cloth.material import Material, named_material
 from sim.run.simulation_toml import material_file
 
 Triple: TypeAlias = tuple[float, float, float]
@@ -158,7 +158,7 @@ def parse(path: Path) -> ExperimentRecipe:
         UsageError: values that do not fit together.
     """
     where, folder = str(path), path.parent
-    form = typed_tables.read(_ExperimentTables, parsed(read_recipe(path).text, where=where), where=where)
+    form = typed_tables.read(_ExperimentTables, parse_recipe(read_recipe(path).text, where=where), where=where)
     return ExperimentRecipe(
         title=form.title or path.stem,
         up=form.up,
@@ -298,7 +298,7 @@ def _setup(form: _ExperimentTables, folder: Path, *, where: str) -> Setup:
         air=QuadraticNormal(**air) if air else None,
         vertices=cloth.vertices,
     )
-    return setup if weight is None or weight.exact else setup.weighed(weight)
+    return setup if weight is None or weight.exact else setup.state_weight(weight)
 
 
 def _weight(material: Mapping[str, Any], *, where: str) -> Stated | None:
@@ -358,7 +358,7 @@ def _material(form: Mapping[str, Any], folder: Path, *, where: str) -> Material 
         return None
     if name is not None and file is not None:
         raise UsageError("both name and file are given", where=where, fix="keep one of them")
-    base = named(name, where=where) if name is not None else material_file(folder / local_path(file or ""))
+    base = named_material(name, where=where) if name is not None else material_file(folder / local_path(file or ""))
     thicken = form.get("thicken", 1.0)
     material = base.scaled(
         area_weight=thicken,
@@ -402,7 +402,7 @@ def _wind(content: Any, folder: Path, *, where: str) -> WindSource:
 
 
 def _observation(source: RecordingSource, recipe: ExperimentRecipe, lake: Lake | None) -> Observation:
-    observation = _take(opened(source, recipe.folder, lake), source)
+    observation = _take(open_recordings(source, recipe.folder, lake), source)
     return blown(
         replace(observation.turned(recipe.up), name=source.name or observation.name), source.wind, recipe.folder, lake
     )
@@ -421,7 +421,7 @@ def blown(observation: Observation, source: WindSource | None, folder: Path, lak
     return replace(observation, wind=source.certain(track), findings=(*observation.findings, *findings))
 
 
-def opened(source: RecordingSource, folder: Path, lake: Lake | None) -> tuple[Observation, ...]:
+def open_recordings(source: RecordingSource, folder: Path, lake: Lake | None) -> tuple[Observation, ...]:
     """Opens all recordings of a source, as they are: neither turned, nor with the wind beside them.
 
     Raises:

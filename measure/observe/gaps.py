@@ -140,13 +140,13 @@ def fill_positions(positions: FloatArray, markers: FloatArray, *, period: float,
             value=missing / tracked_used.size,
         )
     )
-    complete = _filled(
+    complete = _fill_gaps(
         positions[frames][:, markers_used], tracked_used, markers[markers_used], frames_of(LONGEST, period)
     )
     return Filled(frames=frames, markers=markers_used, positions=complete, seen=tracked_used, findings=tuple(findings))
 
 
-def _filled(positions: FloatArray, tracked: BoolArray, markers: FloatArray, longest: int) -> FloatArray:
+def _fill_gaps(positions: FloatArray, tracked: BoolArray, markers: FloatArray, longest: int) -> FloatArray:
     """Fills (frame, marker, 3)."""
     complete = np.array(positions)
     index = np.arange(len(complete))
@@ -161,7 +161,7 @@ def _filled(positions: FloatArray, tracked: BoolArray, markers: FloatArray, long
                 complete[begin:end, marker] = spline(index[begin:end])
                 continue
             if carried is None:
-                carried = _carried(positions, tracked, markers, neighbours[marker], marker)
+                carried = _carry_marker(positions, tracked, markers, neighbours[marker], marker)
             complete[begin:end, marker] = _long_gap(positions[:, marker], carried, index[begin:end])
     return complete
 
@@ -192,7 +192,7 @@ def _swing(series: FloatArray, half: int) -> float:
     return float((finite**2).sum(axis=1).mean()) if len(finite) else np.inf
 
 
-def _carried(
+def _carry_marker(
     positions: FloatArray, tracked: BoolArray, markers: FloatArray, neighbours: IntArray, marker: int
 ) -> FloatArray:
     """Maps a marker by the quadratic map of its nearest tracked neighbours, (frame, 3) [m].

@@ -183,7 +183,7 @@ def from_sequence(sequence: MeshSequence | RaggedMeshSequence, *, name: str, mar
     first = sequence.frame(0)
     rest, faces = first.rest.astype(np.float64), first.faces.astype(np.int64)
     corners = outline(rest, faces, where=where)
-    description, findings = _described(sequence.attributes, rest, where)
+    description, findings = _described_mesh(sequence.attributes, rest, where)
     fixed = isinstance(sequence, MeshSequence)
     if isinstance(sequence, MeshSequence) and len(rest) <= MARKERS:
         used = np.unique(faces)  # vertices that no face uses are no part of the cloth
@@ -191,7 +191,7 @@ def from_sequence(sequence: MeshSequence | RaggedMeshSequence, *, name: str, mar
     else:
         mesh = model_mesh(corners, vertices=markers)
         seats, positions = mesh.rest, sample(sequence, mesh.rest)
-        findings = (*findings, _resampled(len(seats), remeshed=not fixed, where=where))
+        findings = (*findings, _resampled_finding(len(seats), remeshed=not fixed, where=where))
     return Observation(
         name=name,
         markers=seats,
@@ -203,14 +203,14 @@ def from_sequence(sequence: MeshSequence | RaggedMeshSequence, *, name: str, mar
     )
 
 
-def _described(attributes: Mapping[str, Any], rest: Any, where: str) -> tuple[Known, tuple[Finding, ...]]:
+def _described_mesh(attributes: Mapping[str, Any], rest: Any, where: str) -> tuple[Known, tuple[Finding, ...]]:
     scene = attributes.get("scene")
     if attributes.get("source") != "arcsim" or not isinstance(scene, Mapping):
         return Known(), ()
     return of_arcsim(scene, rest, where=f"{where}, conf.json")
 
 
-def _resampled(count: int, *, remeshed: bool, where: str) -> Finding:
+def _resampled_finding(count: int, *, remeshed: bool, where: str) -> Finding:
     why = "its topology changes" if remeshed else f"it has more than {MARKERS} vertices"
     return Finding.of(
         "mesh-resampled",

@@ -89,7 +89,7 @@ class Setup:
         if self.vertices < 16:
             raise self._wrong(f"the model mesh has {self.vertices} vertices", "ask for at least 16")
 
-    def weighed(self, area_weight: Stated | None, relative: float | None = None) -> Setup:
+    def state_weight(self, area_weight: Stated | None, relative: float | None = None) -> Setup:
         """Puts what the user states of the cloth's weight in place of the material's; with neither, nothing changes.
 
         Args:

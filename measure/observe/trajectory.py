@@ -326,7 +326,7 @@ def _frozen(values: FloatArray) -> FloatArray:
     return array
 
 
-def described(specimen: Specimen) -> tuple[dict[str, Any], list[AnyArray]]:
+def describe_cloth(specimen: Specimen) -> tuple[dict[str, Any], list[AnyArray]]:
     """Lists plain values and arrays that say all of a cloth and its uncertainties, to be hashed; no names and files."""
     material = specimen.material
     content: dict[str, Any] = {

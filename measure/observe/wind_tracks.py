@@ -18,7 +18,7 @@ from flagdata.core.provenance import file_hash
 from flagdata.core.schema import UNUSABLE, Kind
 from flagdata.errors import InputError, UsageError
 from flagdata.ingest.anemometer import WindOptions, read_log
-from flagdata.ingest.anemometer.log_confirmation import UNASKED, Answers, Confirm, confirmed
+from flagdata.ingest.anemometer.log_confirmation import UNASKED, Answers, Confirm, confirm_readings
 from flagdata.lake import Artifact, Lake
 from flagdata.record.parent import open_parent
 from flagdata.record.signals import WindSeries
@@ -125,14 +125,14 @@ def from_log(
     def read(answers: Answers) -> tuple[WindTrack, tuple[Finding, ...]]:
         completed = replace(options or WindOptions(), **dict(answers))  # type: ignore[arg-type]
         log = read_log(path, completed)
-        confirmed(path, file_hash(path), [(log, completed)], confirm)
+        confirm_readings(path, file_hash(path), [(log, completed)], confirm)
         wind, findings = track(log.series, placement, where=f"wind log {path.name}")
-        return wind, (*_typed(answers), *log.findings, *findings)
+        return wind, (*_typed_findings(answers), *log.findings, *findings)
 
     return confirm.answered(read)
 
 
-def _typed(answers: Answers) -> tuple[Finding, ...]:
+def _typed_findings(answers: Answers) -> tuple[Finding, ...]:
     """Reports what was answered at a terminal about a file, so that the result states it."""
     if not answers:
         return ()

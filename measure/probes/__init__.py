@@ -12,7 +12,7 @@ from flagdata.packages.lazy import lazy_exports
 if TYPE_CHECKING:
     from measure.probes.lines import REDUCED, Lines, SpectralLine, strongest
     from measure.probes.segment_rows import StatisticRows
-    from measure.probes.statistics import Projection, Statistics, error_scale, projected, reduced
+    from measure.probes.statistics import Projection, Statistics, error_scale, projected_statistics, reduce_errors
     from measure.probes.wind_course import ALONG, LEFT, Course, Variation
     from measure.probes.wind_log import by_recording, lags
 

@@ -24,7 +24,7 @@ _LEAST = 1e-4
 """Of the cloth's size: what moves less moves as much, so that a hoist that stands still has a finite logarithm."""
 
 
-def settled(markers: FloatArray, positions: FloatArray, *, period: float, noise: float = 0.0) -> FloatArray:
+def settling_of(markers: FloatArray, positions: FloatArray, *, period: float, noise: float = 0.0) -> FloatArray:
     """Computes what the markers settle at, (quantity,) as `NAMES` has them.
 
     Args:

@@ -161,7 +161,7 @@ class Projection:
 
     def of(self, errors: Tensor) -> FloatArray:
         """Computes r of errors (frame, marker, 3, segment) [m], (segment, column)."""
-        clipped = _clipped(errors, self.scale).flatten(1).to(self.directions)
+        clipped = _clip_errors(errors, self.scale).flatten(1).to(self.directions)
         return torch.einsum("sck,sk->sc", self.directions, clipped).double().cpu().numpy()
 
     def turned(self, errors: Tensor) -> FloatArray | None:
@@ -174,7 +174,7 @@ class Projection:
 
     def course(self, errors: Tensor) -> Course | None:
         """Computes the wind's course by the errors (frame, marker, 3, segment) [m]; None where not asked for."""
-        return None if self.gauge is None else self.gauge.course(_clipped(errors, self.scale))
+        return None if self.gauge is None else self.gauge.course(_clip_errors(errors, self.scale))
 
     def lines(self, errors: Tensor) -> FloatArray | None:
         """Computes the prominence of the errors' spectra, (segment, reduced frequency, direction): see `lines`; None
@@ -197,7 +197,7 @@ def statistics(
     return Statistics.joined([piece.statistics for piece in _pieces(forecaster, segments, calibrations, columns)])
 
 
-def projected(
+def projected_statistics(
     forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], columns: Sequence[Column]
 ) -> tuple[Statistics, Projection]:
     """Computes the same statistics, with how they move with what the wind's log may be off by, and with the directions,
@@ -251,12 +251,12 @@ def _pieces(
         pole_moment = PoleMoment.of(base, chosen_segments, forecaster.specimen)
         scale = error_scale(base, recording, chosen_segments.noise, chosen_segments.counted)
         gauge = Gauge.of(blown, scale, period=chosen_segments.period)
-        turned, turning = _turned(pole_moment, base, changes, recording)
+        turned, turning = _turned_statistics(pole_moment, base, changes, recording)
         piece_statistics = replace(
-            reduced(base, changes, recording, chosen_segments.noise, chosen_segments.counted),
+            reduce_errors(base, changes, recording, chosen_segments.noise, chosen_segments.counted),
             lines=_spectrum(forecaster, chosen_segments).prominence(base),
             turning=turned,
-            course=gauge.course(_clipped(base, scale)),
+            course=gauge.course(_clip_errors(base, scale)),
         )
         yield _Piece(
             segments=chosen_segments,
@@ -288,7 +288,7 @@ def _with_log(piece: _Piece, along: Projection, off: Sequence[Tensor]) -> Statis
     return replace(piece.statistics, log=along.response(off), turning=turning, course=course)
 
 
-def _turned(
+def _turned_statistics(
     pole_moment: PoleMoment, base: Tensor, changes: Sequence[Tensor], recording: IntArray
 ) -> tuple[Statistics, Tensor]:
     """Statistics of moments of errors and sensitivities (frame, marker, 3, segment), with their directions, (segment,
@@ -346,14 +346,14 @@ def _plain(changes: Tensor, scale: Tensor) -> Tensor:
     return (changes / scale[None, :, None]).permute(3, 0, 1, 2).flatten(2)
 
 
-def _clipped(errors: Tensor, scale: Tensor) -> Tensor:
+def _clip_errors(errors: Tensor, scale: Tensor) -> Tensor:
     """Divides errors as `_plain` does changes, long ones clipped."""
     errors = errors / scale[None, :, None]
     size = errors.norm(dim=2, keepdim=True) / 3**0.5
     return (errors * (_CLIP / size.clamp(min=_CLIP))).permute(3, 0, 1, 2).flatten(2)
 
 
-def reduced(
+def reduce_errors(
     base: Tensor,
     changes: Sequence[Tensor],
     recording: IntArray,
@@ -371,7 +371,7 @@ def reduced(
     response = np.empty((len(recording), len(changes), len(changes)))
     stacked = torch.stack(list(changes))
     scale = error_scale(base, recording, noise, counted)
-    errors = _clipped(base, scale)
+    errors = _clip_errors(base, scale)
     for segment in range(len(recording)):
         error = errors[segment].flatten().double()
         moved = (stacked[..., segment] / scale[None, None, :, segment, None]).reshape(len(changes), -1).double()

@@ -88,10 +88,10 @@ class Course(StatisticRows):
 
     def _about(self, recording: IntArray) -> FloatArray:
         """Computes c less its recording's mean, and less what its log may be off by, (segment, window, part)."""
-        value = self._centred(self.score, recording)
+        value = self._centre_scores(self.score, recording)
         if self.log is None:
             return value
-        off = np.stack([self._centred(self.log[..., k], recording) for k in range(self.log.shape[-1])], axis=-1)
+        off = np.stack([self._centre_scores(self.log[..., k], recording) for k in range(self.log.shape[-1])], axis=-1)
         for index in np.unique(recording):
             in_recording = recording == index
             weighted = self._diagonal[in_recording][..., None] * off[in_recording]
@@ -101,7 +101,7 @@ class Course(StatisticRows):
             )
         return value
 
-    def _centred(self, score: FloatArray, recording: IntArray) -> FloatArray:
+    def _centre_scores(self, score: FloatArray, recording: IntArray) -> FloatArray:
         """Computes scores over h, less their recording's mean, (segment, window, part)."""
         value = score / self._diagonal
         for index in np.unique(recording):

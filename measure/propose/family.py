@@ -68,7 +68,7 @@ class Family:
         return np.maximum(self.shares.mean(axis=0), _NOTHING)
 
     @cached_property
-    def _scaled(self) -> FloatArray:
+    def _scaled_terms(self) -> FloatArray:
         return self.shares[:, len(THETA) :] / self._spread[len(THETA) :]
 
     def statistics(self, evidence_of_data: Evidence, along: Sequence[int] = ()) -> FloatArray:
@@ -77,7 +77,7 @@ class Family:
 
     def p_value(self, statistic: float, columns: Sequence[int]) -> float:
         """Computes the share of the groups in which the largest statistic of these columns is at least this one."""
-        largest = self._scaled[:, [column - len(THETA) for column in columns]].max(axis=1)
+        largest = self._scaled_terms[:, [column - len(THETA) for column in columns]].max(axis=1)
         return float((1 + (largest >= statistic).sum()) / (1 + len(largest)))
 
 

@@ -124,7 +124,7 @@ class Retest:
     control_names: tuple[str, ...]
 
     @property
-    def decided(self) -> tuple[Decision, str]:
+    def decision(self) -> tuple[Decision, str]:
         """Whether the proposal is kept, and why: misfits must fall beyond their interval, and below the control's."""
         if self.helped.low <= 0:
             return Decision.REJECTED, "the misfit on unseen data is not significantly lower than before"

@@ -25,14 +25,14 @@ from torch import Tensor
 
 from flagdata.core.arrays import FloatArray, IntArray
 from measure.forecasting.calibrated_parameters import THETA, Calibration
-from measure.forecasting.model import Model, linearised
+from measure.forecasting.model import Model, linearise_model
 from measure.forecasting.observer import WIDEST, Forecaster
 from measure.forecasting.regressors import Column
 from measure.forecasting.segments import Segments
 from measure.inference.random_effect import NullModel
 from measure.inference.segment_evidence import Evidence
 from measure.inference.whitened_misfit import WhitenedMisfit
-from measure.probes.statistics import Projection, Statistics, error_scale, reduced
+from measure.probes.statistics import Projection, Statistics, error_scale, reduce_errors
 from measure.propose.terms import MASS, TermColumn
 from sim.cloth.cloth_batch import Cloth
 from sim.effects.effect import ClothEffect, Effect
@@ -153,7 +153,7 @@ class ProjectedSegments:
         [m/s]."""
         recording, noise = self.segments.recording, self.segments.noise
         return WhitenedMisfit(
-            statistics=reduced(self.base, self.directions, recording, noise, self.segments.counted),
+            statistics=reduce_errors(self.base, self.directions, recording, noise, self.segments.counted),
             projection=Projection.along(
                 self.directions, error_scale(self.base, recording, noise, self.segments.counted)
             ),
@@ -164,7 +164,7 @@ class ProjectedSegments:
     @property
     def calibrated(self) -> Statistics:
         """Statistics of the calibrated parameters, at the nominal model."""
-        return self.projected(self.base, self.directions[: len(THETA)])
+        return self.project_errors(self.base, self.directions[: len(THETA)])
 
     def of_columns(self, columns: Sequence[Column]) -> Statistics:
         """Computes statistics of the calibrated parameters and some columns, at the nominal model."""
@@ -172,17 +172,17 @@ class ProjectedSegments:
         for first in range(0, len(columns), _TOGETHER):
             chunk = columns[first : first + _TOGETHER]
             changes = of_columns(self.forecaster, self.segments, self.base, chunk)
-            parts.append(self.projected(self.base, [changes[column.name] for column in chunk]))
+            parts.append(self.project_errors(self.base, [changes[column.name] for column in chunk]))
         return replace(parts[0], response=np.concatenate([part.response for part in parts], axis=2))
 
     def at(self, model: Model) -> Statistics:
         """Statistics of the calibrated parameters and the effects of a model, there."""
-        base, changes = linearised(model, self.forecaster, self.segments)
-        return self.projected(base, changes)
+        base, changes = linearise_model(model, self.forecaster, self.segments)
+        return self.project_errors(base, changes)
 
-    def projected(self, base: Tensor, changes: Sequence[Tensor]) -> Statistics:
+    def project_errors(self, base: Tensor, changes: Sequence[Tensor]) -> Statistics:
         """Projects errors, r (segment, direction), and their response to changes (segment, direction, change)."""
-        both_responses = reduced(
+        both_responses = reduce_errors(
             base, [*self.directions, *changes], self.segments.recording, self.segments.noise, self.segments.counted
         )
         count = len(self.directions)

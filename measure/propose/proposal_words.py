@@ -26,11 +26,11 @@ def words(outcome: ProposalOutcome) -> str:
         lines.append(f"{strength.name} {interval(strength.estimate)}: {strength.words}")
         lines.append(f"  {strength.course.words}")
     if outcome.retest is not None:
-        lines += _tested(outcome.retest)
+        lines += _test_sentences(outcome.retest)
     return "\n".join(lines)
 
 
-def _tested(tested: Retest) -> list[str]:
+def _test_sentences(tested: Retest) -> list[str]:
     errors = (
         f"on {tested.what}, unseen, n = {tested.segments} segments: error {interval(tested.before)} before, "
         f"{interval(tested.after)} after, reduction {interval(tested.reduction)}"

@@ -33,7 +33,15 @@ from measure.inference.segment_evidence import Evidence, gains
 from measure.inference.whitened_misfit import WhitenedMisfit
 from measure.loop.effect_selection import estimate
 from measure.loop.gauss_newton import ROUNDS, STAYS, cut
-from measure.loop.validation import LeftOut, a_segment, measured, numerical_floor, paired, root, share_removed
+from measure.loop.validation import (
+    LeftOut,
+    a_segment,
+    measure_left_out,
+    numerical_floor,
+    paired_difference,
+    root,
+    share_removed,
+)
 from measure.nulls import null_plan
 from measure.nulls.reference import NullBank
 from measure.observe.trajectory import Experiment
@@ -73,7 +81,7 @@ def retest(
     """
 
     def misfits_left(model: Model) -> LeftOut:
-        return measured(setting.forecaster, setting.segments, [model], whitened, [~used])[0]
+        return measure_left_out(setting.forecaster, setting.segments, [model], whitened, [~used])[0]
 
     first, second, recording = misfits_left(before), misfits_left(after), setting.recording[~used]
     wrong = None if control is None else misfits_left(control)
@@ -83,7 +91,7 @@ def retest(
         segments=int((~used).sum()),
         before=root(first.squared),
         after=root(second.squared),
-        reduction=paired(first.squared, second.squared),
+        reduction=paired_difference(first.squared, second.squared),
         helped=a_segment(first.misfit - second.misfit, recording),
         floor=root(floor),
         share=share_removed(first.squared, second.squared, floor),
@@ -283,7 +291,7 @@ def weigh(
     all_segments = ProjectedSegments.of(setting.forecaster, setting.segments, along)
     projected = all_segments.select(np.flatnonzero(parts.used))
     speeds = projected.speeds(setting.speeds)
-    tried = _tried(projected, null, speeds, candidates, [*acting_columns, *controls])
+    tried = _try_terms(projected, null, speeds, candidates, [*acting_columns, *controls])
     projected_evidence = evidence(tried.statistics, speeds, null)
     noise = max(segment.noise for segment in projected.segments.items)
     family = Family.of(bank.nulls, tried.statistics, noise=noise, seed=options.seed)
@@ -301,7 +309,7 @@ def weigh(
     stage("terms", 1, 1)
     taken = [step for step in steps if step.taken]
 
-    def fitted(columns: Sequence[int]) -> FittedModel:
+    def fit_columns(columns: Sequence[int]) -> FittedModel:
         linear = projected_evidence.fit(columns)
         start = [linear.of(column)[0] for column in (*range(len(THETA)), *columns)]
         return fit(projected, null, speeds, [tried.columns[column - len(THETA)] for column in columns], start)
@@ -311,7 +319,7 @@ def weigh(
     decision, reason = Decision.REJECTED, steps[0].reason if steps else "no term was given"
     if taken:
         stage("test on untouched data", 0, 1)
-        before, after = fitted(acting), fitted([*acting, *(step.column for step in taken)])
+        before, after = fit_columns(acting), fit_columns([*acting, *(step.column for step in taken)])
         kinds = {_kind(tried.columns[step.column - len(THETA)]) for step in taken}
         unlike = [column for column in physical if _kind(tried.columns[column - len(THETA)]) not in kinds]
         instead = wrong(projected_evidence, unlike, [step.column for step in taken], acting)
@@ -323,11 +331,11 @@ def weigh(
             after.model,
             words=parts.words,
             seed=options.seed,
-            control=fitted([*acting, *instead]).model if instead else None,
+            control=fit_columns([*acting, *instead]).model if instead else None,
             control_names=[labels[column] for column in instead],
         )
         strengths = _strengths(setting, projected_evidence, family, taken, acting, after)
-        decision, reason = tested.decided
+        decision, reason = tested.decision
         stage("test on untouched data", 1, 1)
     return ProposalOutcome(
         decision=decision,
@@ -364,7 +372,7 @@ class _Tried:
     statistics: Statistics
 
 
-def _tried(
+def _try_terms(
     projected: ProjectedSegments,
     null: NullModel,
     speeds: FloatArray,
@@ -379,7 +387,7 @@ def _tried(
         gained = gains(
             evidence(tried.statistics, speeds, null), [[c] for c in range(first, len(THETA) + len(tried.columns))]
         )
-        moved = _moved(dict(zip(tried.columns[len(fixed) :], gained.sum(axis=1).tolist(), strict=True)), size)
+        moved = _move_best_term(dict(zip(tried.columns[len(fixed) :], gained.sum(axis=1).tolist(), strict=True)), size)
         if not moved:
             break
         added = projected.of_columns(moved).response[:, :, len(THETA) :]
@@ -388,7 +396,7 @@ def _tried(
     return tried
 
 
-def _moved(gained: dict[EffectColumn, float], size: float) -> list[TermColumn]:
+def _move_best_term(gained: dict[EffectColumn, float], size: float) -> list[TermColumn]:
     """Moves the best local term to places nearby, if it is among the best at all."""
     best = max(gained.values(), default=0.0)
     leading = {c: g for c, g in gained.items() if isinstance(c, TermColumn) and c.term.at.place and g >= _CLOSE * best}

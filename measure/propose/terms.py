@@ -13,7 +13,7 @@ from typing import Annotated
 
 from torch import Tensor
 
-from flagdata.core.numbered import bounded
+from flagdata.core.numbered import read_bounded
 from flagdata.errors import UsageError
 from measure.forecasting.regressors import EffectColumn
 from sim.cloth.cloth_batch import Cloth
@@ -81,7 +81,7 @@ def shape_named(name: str) -> TermShape:
     if name in SHAPES:
         return TermShape(method=name, words=SHAPES[name])
     match = _LOCAL.fullmatch(name)
-    numbers = [] if match is None else [bounded(part, most=100) for part in match.groups()[1:] if part is not None]
+    numbers = [] if match is None else [read_bounded(part, most=100) for part in match.groups()[1:] if part is not None]
     arguments = tuple(number / 100 for number in numbers if number is not None)
     if match is None or len(arguments) != (2 if match[1] == "near" else 1):
         raise UsageError(

@@ -15,7 +15,7 @@ from flagdata.packages.lazy import lazy_exports
 if TYPE_CHECKING:
     from measure.refine.evaluator import Evaluator, fingerprint
     from measure.refine.metamodel import Metamodel
-    from measure.refine.procedure import Settings, refine, squared
+    from measure.refine.procedure import Settings, refine, squared_embedding_distance
     from measure.refine.refine_command import Clip, run
     from measure.refine.refinement import Interval, Refinement, Round
     from measure.refine.simulator import FilmRequest, Simulator

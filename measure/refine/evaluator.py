@@ -16,7 +16,7 @@ import numpy as np
 import torch
 
 from flagdata.core.arrays import FloatArray, UInt8Array, read_arrays
-from flagdata.core.files.checksums import is_sealed, sealed
+from flagdata.core.files.checksums import is_sealed, seal_bytes
 from flagdata.core.files.outputs import rewrite
 from flagdata.core.provenance import canonical, digest
 from flagdata.core.rng import child_seed
@@ -80,17 +80,17 @@ class Evaluator:
             CorruptError: a file of the cache that cannot be read.
         """
         asked = [[self._request(point, number) for number in range(replicates)] for point in points.tolist()]
-        missing = [request for requests in asked for request in requests if self._cached(request) is None]
+        missing = [request for requests in asked for request in requests if self._read_cached(request) is None]
         size = self.simulator.batch
         for first in range(0, len(missing), size):
             part = missing[first : first + size]
-            for request, evaluated in zip(part, self._simulated(part), strict=True):
+            for request, evaluated in zip(part, self._simulate_requests(part), strict=True):
                 self._keep(request, evaluated)
             if advance is not None:
                 advance(len(part))
         if advance is not None:
             advance(sum(len(requests) for requests in asked) - len(missing))
-        return [_together([self._cached(request) for request in requests]) for requests in asked]
+        return [_together([self._read_cached(request) for request in requests]) for requests in asked]
 
     def clip(self, point: FloatArray, replicate: int = 0) -> UInt8Array | None:
         """Simulates all frames (frame, height, width) of one clip again; None where that fails."""
@@ -104,7 +104,7 @@ class Evaluator:
             replicate=replicate,
         )
 
-    def _simulated(self, requests: list[FilmRequest]) -> list[Evaluated]:
+    def _simulate_requests(self, requests: list[FilmRequest]) -> list[Evaluated]:
         films = self.simulator.films(requests)
         clips = [film.clip for film in films if film.clip is not None]
         begun = time.perf_counter()
@@ -135,7 +135,7 @@ class Evaluator:
             return None
         return self.folder / self.identity[:32] / f"{digest(repr(request))[:32]}.npz"
 
-    def _cached(self, request: FilmRequest) -> Evaluated | None:
+    def _read_cached(self, request: FilmRequest) -> Evaluated | None:
         key, path = repr(request), self._path(request)
         if key not in self._kept and path is not None and path.exists():
             self._kept[key] = _read(path)
@@ -174,7 +174,7 @@ def _write(path: Path, evaluated: Evaluated) -> None:
         frame=frame,
         seconds=np.array([evaluated.seconds[stage] for stage in STAGES]),
     )
-    rewrite(path, sealed(buffer.getvalue()))
+    rewrite(path, seal_bytes(buffer.getvalue()))
 
 
 def _read(path: Path) -> Evaluated:

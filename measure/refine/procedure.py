@@ -46,7 +46,7 @@ from models.trained.outliers import shrunk_covariance
 from sim.run.simulation_recipe import Recipe
 
 
-def squared(embedding: FloatArray, target: FloatArray) -> FloatArray:
+def squared_embedding_distance(embedding: FloatArray, target: FloatArray) -> FloatArray:
     """Computes the squared Euclidean distance of embeddings (…, d) to one (d,): (…), infinite where a simulation
     failed.
 
@@ -105,7 +105,7 @@ class ReplicateMetric:
 
     def squared(self, embedding: FloatArray, target: FloatArray) -> FloatArray:
         """Computes the squared distance of embeddings (…, d) to one (d,): (…), infinite where a simulation failed."""
-        return squared(embedding @ self.whitening.T, self.whitening @ target)
+        return squared_embedding_distance(embedding @ self.whitening.T, self.whitening @ target)
 
 
 OWN = "refine"
@@ -229,7 +229,9 @@ class _Run:
         observed = [refinement_start.summaries(self.estimator, row[None])[0] for row in embedded]
         seed, aspect = child_seed(self.settings.seed, "amortised"), self.evaluators[0].simulator.aspect
         estimates = [
-            refinement_start.amortised(self.estimator, target.clip, self.space, aspect=aspect, seed=seed, draws=400)
+            refinement_start.amortised_draws(
+                self.estimator, target.clip, self.space, aspect=aspect, seed=seed, draws=400
+            )
             for target in self.targets
         ]
         points: list[FloatArray] = []  # (clip, θ, 17) of each round
@@ -261,7 +263,7 @@ class _Run:
                 )
             )
             reached = nearest <= floor
-            if reached and self.settings.to_floor and _settled(rounds, self.settings.settled):
+            if reached and self.settings.to_floor and _is_settled(rounds, self.settings.settled):
                 stopped = "the nearest parameters fit as well as they fit themselves, and the wind's interval settled"
                 break
             if len(ends) + self.settings.replicates > self.settings.budget:
@@ -290,11 +292,11 @@ class _Run:
         """Draws points (clip, θ, 17): draws of the amortised posteriors, widened; the cloth of each clip's in turn."""
         count = self.settings.fewest // self.settings.replicates
         rng = stream(self.settings.seed, OWN, "first")
-        wide = [refinement_start.widened(draws, self.settings.widening, self.space) for draws in estimates]
+        wide = [refinement_start.widen_draws(draws, self.settings.widening, self.space) for draws in estimates]
         chosen = np.stack([draws[rng.choice(len(draws), count, replace=False)] for draws in wide])
         turn = np.arange(count) % len(estimates)
         shared = chosen[turn, np.arange(count)]
-        base = refinement_start.completed(self.space, shared, seed=self.settings.seed)
+        base = refinement_start.complete_points(self.space, shared, seed=self.settings.seed)
         return self._with_winds(base, chosen[:, :, 0])
 
     def _next(self, current: Posterior, done: int, number: int) -> FloatArray:
@@ -327,16 +329,16 @@ class _Run:
             number_of_point = np.repeat(np.arange(len(group)), [len(g.embedding) for g in group])
             finite = np.isfinite(rows).all(axis=1)
             summaries = refinement_start.summaries(self.estimator, rows[finite])
-            predictors = regressors(self.space.reported(points[clip]), self.space)[number_of_point[finite]]
+            predictors = regressors(self.space.reported_quantities(points[clip]), self.space)[number_of_point[finite]]
             models.append(Metamodel.fit(predictors, summaries, number_of_point[finite]))
         return posterior(self.space, models, observed, seed=child_seed(self.settings.seed, OWN, "posterior", number))
 
     def _prior(self) -> FloatArray:
-        return self.space.reported(self.space.prior(stream(self.settings.seed, OWN, "prior"), 4000))
+        return self.space.reported_quantities(self.space.prior(stream(self.settings.seed, OWN, "prior"), 4000))
 
     def _intervals(self, current: Posterior) -> tuple[Interval, ...]:
         prior = self._prior()
-        spans = self._spans(self.space.reported(current.points), prior)
+        spans = self._spans(self.space.reported_quantities(current.points), prior)
         for clip in range(1, len(self.targets)):
             wind = self._spans(current.winds[:, [clip]], prior[:, :1])[0]
             spans = (*spans, replace(wind, name=f"{wind.name}.{clip}"))
@@ -447,7 +449,7 @@ def _nearest(
     return float(distances.mean(axis=0).min())
 
 
-def _settled(rounds: Sequence[Round], share: float) -> bool:
+def _is_settled(rounds: Sequence[Round], share: float) -> bool:
     if len(rounds) < 2:
         return False
     before, now = (r.intervals[0].span.high - r.intervals[0].span.low for r in rounds[-2:])

@@ -18,7 +18,7 @@ from measure.refine.target import Target, of_recording
 from measure.refine.target_view import DrawnView, View
 from models.trained.estimator import Estimator
 from sim.assets import Assets
-from sim.render.render_prior import named
+from sim.render.render_prior import named_prior
 from sim.run import load
 from sim.run.simulation_recipe import Recipe
 
@@ -79,7 +79,7 @@ def scenes_of(estimator: Estimator, *, aspect: float | None = None) -> tuple[Rec
     Raises:
         InputError: a model of another kind of cloth.
     """
-    recipes = tuple(load(name) for name in _learned(estimator).scenes)
+    recipes = tuple(load(name) for name in _learned_of(estimator).scenes)
     if aspect is None:
         return recipes
     return tuple(replace(recipe, scene=replace(recipe.scene, height=recipe.scene.width / aspect)) for recipe in recipes)
@@ -91,13 +91,13 @@ def space_of(estimator: Estimator) -> Space:
     Raises:
         InputError: a model of another kind of cloth.
     """
-    learned_from = _learned(estimator)
+    learned_from = _learned_of(estimator)
     return Space.of(load(learned_from.scenes[0])).learned(
         [(Space.of(load(name)), float(films)) for name, films in learned_from.films.items()]
     )
 
 
-def _learned(estimator: Estimator) -> Learned:
+def _learned_of(estimator: Estimator) -> Learned:
     """Finds what a model of flags learned from, by its targets."""
     names = estimator.learners[0].scaling.names
     matching = [data for targets, data in LEARNED.items() if set(targets) <= set(names)]
@@ -143,7 +143,7 @@ def run(
             replace(recipe, material=replace(recipe.material, area_weight=stated_range)) for recipe in recipes
         )
         space = Space.of(recipes[0])
-    otherwise = view or DrawnView(prior=named(RENDERS), assets=Assets())
+    otherwise = view or DrawnView(prior=named_prior(RENDERS), assets=Assets())
     targets = [
         Target(name=clip.name, clip=clip.frames, view=otherwise)
         if view is not None or clip.recording is None

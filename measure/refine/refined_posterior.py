@@ -80,7 +80,7 @@ def posterior(
     low, high = space.wind.low, space.wind.high
     step = (high - low) / winds
     grid = low + step * (np.arange(winds, dtype=np.float64) + 0.5)
-    reported = space.reported(prior)
+    reported = space.reported_quantities(prior)
     likelihoods = np.stack(
         [_likelihood(model, reported, grid, y, space) for model, y in zip(models, observed, strict=True)]
     )

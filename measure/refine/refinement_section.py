@@ -14,7 +14,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from flagdata.core.arrays import UInt8Array
-from flagdata.core.numbered import bounded
+from flagdata.core.numbered import read_bounded
 from flagdata.pages.page_pictures import figure_url, moving, still
 from flagdata.pages.render import render
 from measure.refine.evaluator import Evaluator
@@ -163,7 +163,7 @@ def _rows(refinement: Refinement) -> list[dict[str, str]]:
     rows = []
     for entry in refinement.intervals:
         name, _, clip = entry.name.partition(".")
-        quantity, number = about[name], bounded(clip, most=_CLIPS)
+        quantity, number = about[name], read_bounded(clip, most=_CLIPS)
         note = "the clip hardly narrows the prior" if entry.prior_share > 0.9 else ""
         rows.append(
             {

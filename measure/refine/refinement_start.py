@@ -68,7 +68,7 @@ def summaries(estimator: Estimator, embedding: FloatArray) -> FloatArray:
     return out
 
 
-def amortised(
+def amortised_draws(
     estimator: Estimator, clip: UInt8Array, space: Space, *, aspect: float, seed: int, draws: int
 ) -> FloatArray:
     """Draws `TARGETS` for a clip (frame, height, width): (draw, 4), in the targets' units. Where the space's area
@@ -98,7 +98,7 @@ def _ends(space: Space) -> tuple[FloatArray, FloatArray]:
     return np.array([entry.low for entry in space.start_ranges]), np.array([entry.high for entry in space.start_ranges])
 
 
-def widened(values: FloatArray, factor: float, space: Space) -> FloatArray:
+def widen_draws(values: FloatArray, factor: float, space: Space) -> FloatArray:
     """Draws (n, 4) of `TARGETS` with their logits' deviations from the mean enlarged."""
     low, high = _ends(space)
     z = _logits(values, space)
@@ -106,11 +106,11 @@ def widened(values: FloatArray, factor: float, space: Space) -> FloatArray:
     return low + (high - low) / (1 + np.exp(-z))
 
 
-def completed(space: Space, drawn: FloatArray, *, seed: int) -> FloatArray:
+def complete_points(space: Space, drawn: FloatArray, *, seed: int) -> FloatArray:
     """Completes points (n, 17) of [−1, 1]¹⁷ with the wind and area weight of `drawn` (n, 4), and bending of the prior
     as near to its scale and anisotropy as 20,000 draws come, no draw twice."""
     pool = space.prior(stream(seed, "refine", "pool"), _POOL)
-    offered, wanted = space.reported(pool)[:, 2:4], drawn[:, 2:4]
+    offered, wanted = space.reported_quantities(pool)[:, 2:4], drawn[:, 2:4]
     spread = offered.std(axis=0)
     tree = KDTree(offered / spread)
     taken: set[int] = set()

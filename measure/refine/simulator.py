@@ -30,7 +30,7 @@ from models.conditioning.conditioning import VERSION
 from models.training.conditioned_clips import FitFilm
 from sim.assets import Assets
 from sim.cloth.material import BENDING_SHAPE
-from sim.cloth.scene import roughened
+from sim.cloth.scene import roughen_start
 from sim.render import RENDERERS, Meshes
 from sim.render.renderer import Renderer
 from sim.run.member_batch import Stepper, run
@@ -206,7 +206,7 @@ class SimulatedScene:
         """Makes the flag of a request."""
         values = self.space.values(np.array([request.point]))[0]
         scene = self._template.scene
-        start = roughened(scene.position, scene.handles, stream(request.seed, "start"), START_NOISE)
+        start = roughen_start(scene.position, scene.handles, stream(request.seed, "start"), START_NOISE)
         damping = self.recipe.material.damping
         material = replace(
             scene.material,

@@ -217,7 +217,7 @@ class Space:
         shares[:, :BENDING] = (drawn - low) / (high - low)
         return np.clip(2 * shares - 1, -1.0, 1.0)
 
-    def reported(self, unit: FloatArray) -> FloatArray:
+    def reported_quantities(self, unit: FloatArray) -> FloatArray:
         """Computes the `QUANTITIES` of points (n, 17): (n, quantity), in their units."""
         values = self.values(unit)
         logs = np.log10(values[:, :BENDING]).reshape(-1, _ROWS, _COLUMNS)

@@ -76,5 +76,5 @@ def _truth(content: Mapping[str, Any], space: Space) -> dict[str, float]:
     if any(name not in content for name in names):
         return {name: float(content[name]) for name in ("area_weight", "wind_speed") if name in content}
     point = space.unit(np.array([[float(content[name]) for name in names]]))
-    truth = dict(zip((q.name for q in QUANTITIES), space.reported(point)[0].tolist(), strict=True))
+    truth = dict(zip((q.name for q in QUANTITIES), space.reported_quantities(point)[0].tolist(), strict=True))
     return {**truth, "area_weight": float(content["area_weight"]), "wind_speed": float(content["wind_speed"])}

@@ -54,7 +54,7 @@ class FilmCamera:
             shot_noise=self.shot_noise,
             frame_slot=1,
         )
-        coded = camera_picture.coded(frames, camera_picture.settings(spec, seed=seed), spec, seed=seed)
+        coded = camera_picture.encode_pictures(frames, camera_picture.settings(spec, seed=seed), spec, seed=seed)
         return np.stack(decode(coded, where="a simulated film"))
 
 

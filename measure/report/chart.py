@@ -99,10 +99,10 @@ class Logarithmic(Scale):
     def ticks(self, room: Callable[[str], float]) -> list[tuple[float, str]]:
         first, last = math.ceil(math.log10(self.low)), math.floor(math.log10(self.high))
         if last - first < 2:
-            return self._spaced([(v, number(v, digits=1)) for v in _within_decade(self.low, self.high)], room)
-        return self._spaced([(10.0**n, _decade(n)) for n in range(first, last + 1)], room)
+            return self._spaced_ticks([(v, number(v, digits=1)) for v in _within_decade(self.low, self.high)], room)
+        return self._spaced_ticks([(10.0**n, _decade(n)) for n in range(first, last + 1)], room)
 
-    def _spaced(self, ticks: list[tuple[float, str]], room: Callable[[str], float]) -> list[tuple[float, str]]:
+    def _spaced_ticks(self, ticks: list[tuple[float, str]], room: Callable[[str], float]) -> list[tuple[float, str]]:
         """Selects as many of the ticks, from the first on, as do not touch."""
         spaced: list[tuple[float, str]] = []
         for value, label in ticks:
@@ -136,7 +136,7 @@ class Chart:
 
     def line(self, xs: Sequence[float], ys: Sequence[float], kind: str) -> None:
         """Draws a line through the points; broken where a value is missing."""
-        path = path_through(*thinned([(self.x, xs), (self.y, ys)]))
+        path = path_through(*thin_line([(self.x, xs), (self.y, ys)]))
         if path:
             self.marks.append(f'<path class="line {kind}" d="{path}"/>')
 
@@ -196,7 +196,7 @@ def drawing(width: float, height: float, title: str, description: str, inside: s
     )
 
 
-def thinned(axes: Sequence[tuple[Scale, Sequence[float]]]) -> tuple[list[float], list[float]]:
+def thin_line(axes: Sequence[tuple[Scale, Sequence[float]]]) -> tuple[list[float], list[float]]:
     """Thins a line's points: of each stretch too dense to show, its lowest and highest; NaN where none is shown."""
     (x, xs), (y, ys) = axes
     places = [(x(a), y(b)) if x.shows(a) and y.shows(b) else (math.nan, math.nan) for a, b in zip(xs, ys, strict=True)]

@@ -34,7 +34,7 @@ def as_document(verdict: Verdict) -> dict[str, Any]:
     """Returns the verdict as JSON values, with its schema tag."""
     content = plain({**verdict.as_dict(), "residuals": ()})
     content["residuals"] = [
-        {**plain({**residual, **dict.fromkeys(_MOVING)}), **{name: _packed(residual[name]) for name in _MOVING}}
+        {**plain({**residual, **dict.fromkeys(_MOVING)}), **{name: _pack_frames(residual[name]) for name in _MOVING}}
         for residual in map(dataclasses.asdict, verdict.residuals)
     ]
     return content
@@ -80,12 +80,12 @@ def plain(value: Any) -> Any:
     return [plain(v) for v in value] if isinstance(value, list | tuple) else value
 
 
-def _packed(frames: _Moving) -> dict[str, Any]:
+def _pack_frames(frames: _Moving) -> dict[str, Any]:
     values = np.asarray(frames, dtype="<f4").reshape(len(frames), len(frames[0]) if frames else 0, 3)
     return {"shape": list(values.shape), "float32": base64.b64encode(values.tobytes()).decode("ascii")}
 
 
-def _unpacked(value: Mapping[str, Any], where: str) -> _Moving:
+def _unpack_frames(value: Mapping[str, Any], where: str) -> _Moving:
     try:
         data = np.frombuffer(base64.b64decode(value["float32"], validate=True), dtype="<f4")
         return data.astype(np.float64).reshape(value["shape"]).tolist()
@@ -101,18 +101,18 @@ def _read(value: Any, kind: Any, where: str) -> Any:
         (present,) = (k for k in get_args(kind) if k is not types.NoneType)
         return None if value is None else _read(value, present, where)
     if kind == _Moving and isinstance(value, Mapping):
-        return _unpacked(value, where)
+        return _unpack_frames(value, where)
     if dataclasses.is_dataclass(kind):
         return _record(value, kind, where)
     if get_origin(kind) in (tuple, list):
         return _sequence(value, kind, where)
     if get_origin(kind) is dict:
-        return dict(_expected(value, Mapping, "an object", where))
+        return dict(_expected_value(value, Mapping, "an object", where))
     if kind is float:
         return _number(value, where)
     if kind in _SCALARS:
-        return _expected(value, kind, _SCALARS[kind], where)
-    text = _expected(value, str, "a text", where)
+        return _expected_value(value, kind, _SCALARS[kind], where)
+    text = _expected_value(value, str, "a text", where)
     try:
         return kind(text)
     except ValueError as error:
@@ -121,7 +121,7 @@ def _read(value: Any, kind: Any, where: str) -> Any:
 
 
 def _record(value: Any, kind: Any, where: str) -> Any:
-    content = _expected(value, Mapping, "an object", where)
+    content = _expected_value(value, Mapping, "an object", where)
     hints = get_type_hints(kind)
     needed = {
         f.name
@@ -137,7 +137,7 @@ def _record(value: Any, kind: Any, where: str) -> Any:
 
 
 def _sequence(value: Any, kind: Any, where: str) -> Any:
-    items = _expected(value, list, "a list", where)
+    items = _expected_value(value, list, "a list", where)
     inner = get_args(kind)
     if kind == list[float]:
         return [_number(item, where) for item in items]
@@ -155,10 +155,10 @@ def _number(value: Any, where: str) -> float:
         return math.nan
     if isinstance(value, str) and value in _INFINITE:
         return _INFINITE[value]
-    return float(_expected(value, int | float, "a number", where))
+    return float(_expected_value(value, int | float, "a number", where))
 
 
-def _expected(value: Any, kind: Any, wanted: str, where: str) -> Any:
+def _expected_value(value: Any, kind: Any, wanted: str, where: str) -> Any:
     if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
         raise InputError(
             f"the value is of type {type(value).__name__}, not {wanted}", where=where, fix=f"give {wanted}"

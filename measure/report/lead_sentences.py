@@ -8,14 +8,14 @@ from collections.abc import Sequence
 from measure.loop.effect_selection import heterogeneous
 from measure.report.verdict_sentences import (
     candidate_title,
-    contradicted,
+    contradicting_findings,
     erring_text,
     heading,
-    joined,
-    listed,
+    join_strengths,
+    list_names,
     named_candidates,
     readable,
-    shortened,
+    shorten_list,
 )
 from measure.verdict.decided import erring
 from measure.verdict.quantity import known, number, probability, with_level
@@ -34,23 +34,23 @@ def lead(verdict: Verdict) -> str:
             f"The base model cannot be tested at level {test.level:g}: with {test.kinds} numerical set-ups no p is "
             f"below {probability(test.least)}; at least {test.kinds_needed} are needed."
         )
-    if verdict.conclusion is Conclusion.SUFFICIENT and contradicted(verdict):
+    if verdict.conclusion is Conclusion.SUFFICIENT and contradicting_findings(verdict):
         return f"{heading(verdict)}."
     p = f"p = {probability(verdict.test.p_value.value)}"
     if verdict.conclusion is Conclusion.UNDECIDED:
-        return _closed(
+        return _add_remainder(
             f"Nothing is decided: the base model is not rejected, {p}, but {'; '.join(verdict.open)}", verdict
         )
     if verdict.conclusion is Conclusion.SUFFICIENT:
         does = "is not rejected" if erring(verdict) else "explains these recordings"
-        return _closed(
+        return _add_remainder(
             f"The base model {does}, no effect is needed; {evidence(verdict.test)} that anything is missing, {p}",
             verdict,
         )
-    return _closed(f"{_what_was_found(verdict)}; {_strength(verdict)}", verdict)
+    return _add_remainder(f"{_what_was_found(verdict)}; {_strength(verdict)}", verdict)
 
 
-def _closed(sentence: str, verdict: Verdict) -> str:
+def _add_remainder(sentence: str, verdict: Verdict) -> str:
     """Adds where the model that is offered errs, if it does by more than may be called explained."""
     return ". ".join([sentence, *([text] if (text := erring_text(verdict)) else [])]) + "."
 
@@ -68,7 +68,7 @@ def p_text(test: NullTest) -> str:
     return f"{text}, could be up to {probability(p.high)}" if p.high > p.value else text
 
 
-def explained(verdict: Verdict) -> str:
+def explained_words(verdict: Verdict) -> str:
     """Words the explained part, as "33 % of the error that a better model could remove", on data that neither model was
     fitted to.
 
@@ -91,13 +91,13 @@ def _what_was_found(verdict: Verdict) -> str:
     if verdict.conclusion is Conclusion.OUTSIDE or not verdict.named:
         return "The base model lacks something that no effect of the library explains"
     effects = _by_effect(named_candidates(verdict) or [c for c in verdict.ranking if not c.why_not])
-    share_explained = explained(verdict)
+    share_explained = explained_words(verdict)
     explains = "removes" if erring(verdict) else "explains"
     if verdict.conclusion is Conclusion.ONE_OF:
-        either = " or ".join(shortened([_sized(verdict, effect) for effect in effects]))
+        either = " or ".join(shorten_list([_strength_words(verdict, effect) for effect in effects]))
         does = f"{explains} {share_explained}" if share_explained else f"{explains} what the base model lacks"
         return f"Adding {'one of ' if len(effects) > 1 else ''}{either} {does}; these recordings do not decide which"
-    added = listed([_sized(verdict, effect) for effect in effects])
+    added = list_names([_strength_words(verdict, effect) for effect in effects])
     if verdict.conclusion is Conclusion.PARTLY:
         does = (
             f"{explains} {share_explained}, not all that is missing"
@@ -116,11 +116,11 @@ def _by_effect(candidates: Sequence[Candidate]) -> list[list[Candidate]]:
     return list(by_effect.values())
 
 
-def _sized(verdict: Verdict, candidates: Sequence[Candidate]) -> str:
+def _strength_words(verdict: Verdict, candidates: Sequence[Candidate]) -> str:
     """Names an effect with its strength, or its strengths."""
     if len(candidates) > 1:
         strengths = [f"{readable(candidate.parameter)} {with_level(candidate.strength)}" for candidate in candidates]
-        return f"{candidates[0].effect} ({joined(strengths, verdict)})"
+        return f"{candidates[0].effect} ({join_strengths(strengths, verdict)})"
     (candidate,) = candidates
     several = sum(c.effect == candidate.effect for c in verdict.ranking) > 1
     parameter = "" if several else f"{readable(candidate.parameter)} "

@@ -102,8 +102,8 @@ class MotionClip:
             "rise": self.rise,
             "azimuth": self.azimuth,
             "factor": self.factor,
-            "observed": _packed(self.observed, size),
-            "errors": [_packed(e, reach) for e in errors],
+            "observed": _pack_values(self.observed, size),
+            "errors": [_pack_values(e, reach) for e in errors],
         }
 
 
@@ -230,6 +230,6 @@ def _rate(times: Sequence[float]) -> float:
     return float(1 / np.median(steps)) if steps.size else math.nan
 
 
-def _packed(values: FloatArray, reach: float) -> str:
+def _pack_values(values: FloatArray, reach: float) -> str:
     scaled = np.where(np.isfinite(values), values / reach * _REACH, MISSING)
     return base64.b64encode(scaled.round().astype("<i2").tobytes()).decode("ascii")

@@ -129,7 +129,7 @@ def page(verdict: Verdict) -> str:
         "test_sentence": verdict_sentences.test_sentence(verdict),
         "remark": verdict_sentences.test_remark(verdict.test),
         "named": named_candidates,
-        "rejected": verdict_sentences.rejected(verdict),
+        "rejected": verdict_sentences.rejected_candidates(verdict),
         "control_summary": verdict_sentences.control_summary(verdict),
         "has_control": any(quantity.known(c.control) for c in verdict.comparisons),
         "has_shift": any(quantity.known(p.after) for p in verdict.parameters),
@@ -147,7 +147,7 @@ def page(verdict: Verdict) -> str:
         "against_wind": figures.against_wind(verdict.residuals),
         **_residuals(verdict.residuals, verdict_sentences.after_label(verdict)),
         **_motions(motions, verdict_sentences.after_label(verdict)),
-        "provenance": list(_flattened(verdict.provenance)),
+        "provenance": list(_flatten_values(verdict.provenance)),
     }
     return render("measure.report", "page.html.j2", values, filters=FILTERS)
 
@@ -213,11 +213,11 @@ def _motions(motions: list[moving_cloth.MotionClip], after_label: str) -> dict[s
     }
 
 
-def _flattened(values: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, str]]:
+def _flatten_values(values: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, str]]:
     """Yields (dotted name, value) of nested provenance."""
     for name, value in values.items():
         if isinstance(value, Mapping):
-            yield from _flattened(value, f"{prefix}{name}.")
+            yield from _flatten_values(value, f"{prefix}{name}.")
         else:
             yield f"{prefix}{name}", value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
 

@@ -22,10 +22,10 @@ _FACTORS = ("of nominal", "s")
 
 def heading(verdict: Verdict) -> str:
     """Writes the conclusion in one line; what contradicts it in the set-up, if anything does, before it."""
-    contradicting = contradicted(verdict)
+    contradicting = contradicting_findings(verdict)
     if verdict.conclusion is Conclusion.SUFFICIENT and contradicting:
         return f"The set-up is not as declared, so that this verdict does not count: {contradicting[0]}"
-    effects, either = listed(titles(verdict)), listed(shortened(titles(verdict)))
+    effects, either = list_names(titles(verdict)), list_names(shorten_list(titles(verdict)))
     partly = f"the base model lacked {effects}, and something more" if verdict.named else "something is still missing"
     return {
         Conclusion.UNTESTED: "The base model cannot be tested: there are too few kinds of nulls for the level",
@@ -54,11 +54,11 @@ def erring_text(verdict: Verdict) -> str:
     comparisons = erring(verdict)
     if not comparisons:
         return ""
-    names = shortened(
+    names = shorten_list(
         [f"{comparison.what} by {number(times_floor(comparison, verdict), digits=2)}" for comparison in comparisons]
     )
     model = f"the model {after_label(verdict)}" if verdict.named else "the base model"
-    return f"In floors, {model} errs on {listed(names)}: it does not explain that"
+    return f"In floors, {model} errs on {list_names(names)}: it does not explain that"
 
 
 def error_warnings(verdict: Verdict) -> list[str]:
@@ -66,17 +66,17 @@ def error_warnings(verdict: Verdict) -> list[str]:
     return [f"{text}." for text in [erring_text(verdict)] if text]
 
 
-def contradicted(verdict: Verdict) -> list[str]:
+def contradicting_findings(verdict: Verdict) -> list[str]:
     """Lists the findings by which the recordings contradict what was declared."""
     return [text for kind, text in verdict.findings if kind in CONTRADICTING]
 
 
-def listed(names: Sequence[str]) -> str:
+def list_names(names: Sequence[str]) -> str:
     """Lists names as `a`, `a and b`, `a, b and c`."""
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names) or "an unnamed effect"
 
 
-def shortened(names: Sequence[str]) -> list[str]:
+def shorten_list(names: Sequence[str]) -> list[str]:
     """Shortens a list to the names, or if there are many the first of them and "12 more"."""
     return list(names) if len(names) <= _LISTED + 1 else [*names[:_LISTED], f"{len(names) - _LISTED} more"]
 
@@ -88,8 +88,8 @@ def after_label(verdict: Verdict) -> str:
     if not verdict.named:
         return "with the corrective field"
     if verdict.conclusion is Conclusion.ONE_OF:
-        return f"with the best of {listed(shortened(titles(verdict)))}"
-    return f"with {listed(titles(verdict))}"
+        return f"with the best of {list_names(shorten_list(titles(verdict)))}"
+    return f"with {list_names(titles(verdict))}"
 
 
 def leads_with_p(verdict: Verdict) -> bool:
@@ -97,7 +97,7 @@ def leads_with_p(verdict: Verdict) -> bool:
     could not be tested, nor where the recordings contradict the declared set-up."""
     if verdict.conclusion is Conclusion.UNTESTED:
         return False
-    return verdict.conclusion is not Conclusion.SUFFICIENT or not contradicted(verdict)
+    return verdict.conclusion is not Conclusion.SUFFICIENT or not contradicting_findings(verdict)
 
 
 def test_sentence(verdict: Verdict) -> str:
@@ -117,12 +117,12 @@ def test_sentence(verdict: Verdict) -> str:
     return (
         f"The base model {says}{along} at level {test.level:g}: {as_large(test)} of {len(null)} "
         f"{'groups of simulations' if test.effective is None else 'null flags'} deviate as much as the recordings "
-        f"(statistic {number(test.statistic)}). {value} is {_counted(test)}; its sampling interval is "
+        f"(statistic {number(test.statistic)}). {value} is {_counting_sentence(test)}; its sampling interval is "
         f"[{probability(p.low)}, {probability(p.high)}] {level_text(p.level)}.{_tail(test)}"
     )
 
 
-def _counted(test: NullTest) -> str:
+def _counting_sentence(test: NullTest) -> str:
     """Explains how p is counted."""
     if test.effective is None:
         return (
@@ -204,7 +204,7 @@ def control_warnings(verdict: Verdict) -> list[str]:
 def _parts(comparisons: Sequence[Comparison], verdict: Verdict) -> str:
     """Names which parts of the data, the first few by name, and of how many."""
     names = [c.what for c in comparisons]
-    which = _begun(listed(shortened(names)))
+    which = _begun(list_names(shorten_list(names)))
     return (
         which if len(verdict.comparisons) == 1 else f"{which}, {len(comparisons)} of {len(verdict.comparisons)} parts"
     )
@@ -258,7 +258,7 @@ def named_candidates(verdict: Verdict) -> list[Candidate]:
     return [c for name in verdict.named for c in verdict.ranking if c.effect == name and not c.why_not]
 
 
-def rejected(verdict: Verdict) -> list[Candidate]:
+def rejected_candidates(verdict: Verdict) -> list[Candidate]:
     """Lists the candidates that the verdict does not name."""
     return [c for c in verdict.ranking if c not in named_candidates(verdict)]
 
@@ -291,14 +291,14 @@ def titles(verdict: Verdict) -> tuple[str, ...]:
             continue
         of_effect = [c for c in verdict.ranking if c.effect == name]
         acting = [c for c in of_effect if not c.why_not]
-        which = joined([readable(c.parameter) for c in acting], verdict)
+        which = join_strengths([readable(c.parameter) for c in acting], verdict)
         names.append(f"{name} ({which})" if acting and len(of_effect) > 1 else name)
     return tuple(names)
 
 
-def joined(parts: Sequence[str], verdict: Verdict) -> str:
+def join_strengths(parts: Sequence[str], verdict: Verdict) -> str:
     """Strengths of one effect: `lean and sway` that act together, `lean or sway` of which one may."""
-    return " or ".join(parts) if verdict.conclusion is Conclusion.ONE_OF else listed(parts)
+    return " or ".join(parts) if verdict.conclusion is Conclusion.ONE_OF else list_names(parts)
 
 
 def title(effect: str, parameter: str) -> str:

@@ -19,7 +19,7 @@ from measure.observe.trajectory import Experiment, Specimen
 from measure.probes.lines import STROUHAL, SpectralLine
 from measure.probes.wind_course import ALONG, LEFT, Variation
 from measure.report.lead_sentences import lead
-from measure.report.verdict_sentences import listed
+from measure.report.verdict_sentences import list_names
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.quantity import number, with_error
 from measure.verdict.verdict_record import Conclusion, NullTest, Verdict
@@ -55,7 +55,7 @@ def with_sentences(outcome: LoopOutcome) -> Verdict:
         words=" ".join(parts),
         separating=separating(verdict),
         proposal=_lacking(outcome),
-        assumptions=(*assumptions(experiment), *unweighed(verdict), *clocks(experiment, outcome.lags)),
+        assumptions=(*assumptions(experiment), *unweighed_effects(verdict), *clocks(experiment, outcome.lags)),
     )
 
 
@@ -108,13 +108,13 @@ def clocks(experiment: Experiment, late: Sequence[float]) -> tuple[str, ...]:
     return (f"by the motion of the cloth the log of the wind lags; it was moved: {', '.join(moved)}",) if moved else ()
 
 
-def unweighed(verdict: Verdict) -> tuple[str, ...]:
+def unweighed_effects(verdict: Verdict) -> tuple[str, ...]:
     """Lists which effects of the library a cloth cannot have as it is held; nothing where it can have all."""
     ranked = {(candidate.effect, candidate.parameter) for candidate in verdict.ranking}
     absent = [column.effect for column in library() if (column.effect, column.parameter) not in ranked]
     missing = list(dict.fromkeys(absent))
     why = "not weighed, since the cloth cannot have it as it is held and in its wind"
-    return (f"{why}: {listed(missing)}",) if missing else ()
+    return (f"{why}: {list_names(missing)}",) if missing else ()
 
 
 def separating(verdict: Verdict) -> str:

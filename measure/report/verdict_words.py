@@ -36,8 +36,8 @@ def words(verdict: Verdict) -> str:
 def _parts(verdict: Verdict) -> Iterator[list[str]]:
     yield [verdict_sentences.heading(verdict)]
     if power := verdict_sentences.power_mean(verdict):
-        yield wrapped(f"{power}.")
-    yield [*wrapped(verdict.words), ""]
+        yield wrap_lines(f"{power}.")
+    yield [*wrap_lines(verdict.words), ""]
     remark = verdict_sentences.test_remark(verdict.test)
     yield item("test", " ".join([verdict_sentences.test_sentence(verdict), remark]).strip())
     if power := verdict_sentences.power_text(verdict):
@@ -45,7 +45,7 @@ def _parts(verdict: Verdict) -> Iterator[list[str]]:
     for candidate in verdict_sentences.named_candidates(verdict):
         yield item(verdict_sentences.candidate_title(verdict, candidate), _candidate_text(candidate))
     for comparison in verdict.comparisons:
-        yield item(comparison.what, _compared(comparison, verdict_sentences.after_label(verdict)))
+        yield item(comparison.what, _comparison_line(comparison, verdict_sentences.after_label(verdict)))
     if control := verdict_sentences.control_summary(verdict):
         yield item("control", control)
     for warning in verdict_sentences.control_warnings(verdict) + verdict_sentences.reduction_warnings(verdict):
@@ -55,7 +55,7 @@ def _parts(verdict: Verdict) -> Iterator[list[str]]:
         if known(parameter.after):
             moved = f" → {estimate_text(parameter.after)}, a shift of {in_errors(parameter.shift)} standard errors"
         yield item(parameter.name, f"{verdict_sentences.parameter_text(parameter.before)}{moved}")
-    rejected = verdict_sentences.rejected(verdict)
+    rejected = verdict_sentences.rejected_candidates(verdict)
     for candidate in rejected[:_RUNNERS_UP]:
         yield item(
             f"not {verdict_sentences.candidate_title(verdict, candidate)}",
@@ -82,10 +82,10 @@ def _candidate_text(candidate: Candidate) -> str:
     ]
     if candidate.heterogeneity is not None:
         parts.append(f"p = {probability(candidate.heterogeneity)} for the same strength in all recordings")
-    return _joined(parts)
+    return _join_parts(parts)
 
 
-def _compared(comparison: Comparison, after_label: str) -> str:
+def _comparison_line(comparison: Comparison, after_label: str) -> str:
     in_unit = display([e.value for e in (comparison.before, comparison.floor) if known(e)], "m")
     parts = [f"error {estimate_text(comparison.before, display_as=in_unit)}"]
     if known(comparison.after):
@@ -98,20 +98,20 @@ def _compared(comparison: Comparison, after_label: str) -> str:
         if known(comparison.apart):
             parts[-1] += f", worse by {estimate_text(comparison.apart)} nat per segment"
     parts.append(f"intervals {level_text(comparison.before.level)}, n = {comparison.frames} frames")
-    return _joined(parts)
+    return _join_parts(parts)
 
 
-def _joined(parts: Sequence[str]) -> str:
+def _join_parts(parts: Sequence[str]) -> str:
     """Joins the parts in a row; lines break between them, not within."""
     return "; ".join(part.replace(" ", _NO_BREAK) for part in parts)
 
 
 def item(label: str, text: str) -> list[str]:
     """Wraps `label: text`, its further lines set in."""
-    return wrapped(f"  {label}: {text}" if label else f"  {text}", indent="    ")
+    return wrap_lines(f"  {label}: {text}" if label else f"  {text}", indent="    ")
 
 
-def wrapped(text: str, *, indent: str = "") -> list[str]:
+def wrap_lines(text: str, *, indent: str = "") -> list[str]:
     """Breaks a text into lines of at most 100 characters, but for longer names."""
     lines = textwrap.wrap(text, _WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
     return [line.replace(_NO_BREAK, " ") for line in lines]

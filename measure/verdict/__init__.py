@@ -11,7 +11,7 @@ from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from measure.verdict.criteria import CRITERIA
-    from measure.verdict.decided import NOT_REJECTED, erring, undecided
+    from measure.verdict.decided import NOT_REJECTED, erring, undecided_sentences
     from measure.verdict.quantity import (
         display,
         estimate_text,

@@ -13,7 +13,7 @@ NOT_REJECTED = (Conclusion.UNTESTED, Conclusion.SUFFICIENT, Conclusion.UNDECIDED
 """Conclusions that state nothing to be missing."""
 
 
-def undecided(p: float, *, level: float, departure: float, power: Sequence[float]) -> tuple[str, ...]:
+def undecided_sentences(p: float, *, level: float, departure: float, power: Sequence[float]) -> tuple[str, ...]:
     """Explains, in sentences, why a base model that is not rejected is not shown to suffice; nothing where it does.
 
     Args:

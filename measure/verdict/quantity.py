@@ -63,11 +63,11 @@ def number(value: float | None, *, digits: int = _DIGITS) -> str:
     if value is None or math.isnan(value):
         return NONE
     if value == 0 or math.isinf(value):
-        return _fixed(value, 0)
+        return _round_fixed(value, 0)
     exponent = math.floor(math.log10(float(f"{abs(value):.{digits - 1}e}")))
     if _NARROWEST <= abs(value) < _WIDEST:
-        return _fixed(value, digits - 1 - exponent)
-    return f"{_fixed(value / 10.0**exponent, digits - 1)} × {_power(exponent)}"
+        return _round_fixed(value, digits - 1 - exponent)
+    return f"{_round_fixed(value / 10.0**exponent, digits - 1)} × {_power(exponent)}"
 
 
 def probability(value: float | None) -> str:
@@ -88,7 +88,7 @@ def estimate_parts(estimate: Estimate | None, *, display_as: Display | None = No
     if estimate is None or not known(estimate):
         return NONE, ""
     if estimate.bound is not None:
-        return _bounded(estimate, estimate.bound, display_as), ""
+        return _bound_words(estimate, estimate.bound, display_as), ""
     inside = display_as or display((estimate.value, estimate.low, estimate.high), estimate.unit)
     value, low, high = (inside.factor * v for v in (estimate.value, estimate.low, estimate.high))
     half = (high - low) / 2
@@ -104,11 +104,11 @@ def estimate_parts(estimate: Estimate | None, *, display_as: Display | None = No
         value, low, high = (v / 10.0**exponent for v in (value, low, high))
         rounded_to += exponent
         power = f" × {_power(exponent)}"
-    ends = f"[{_fixed(low, rounded_to)}{power}, {_fixed(high, rounded_to)}{power}]"
-    return f"{_fixed(value, rounded_to)}{power}{inside.suffix}", ends
+    ends = f"[{_round_fixed(low, rounded_to)}{power}, {_round_fixed(high, rounded_to)}{power}]"
+    return f"{_round_fixed(value, rounded_to)}{power}{inside.suffix}", ends
 
 
-def _bounded(estimate: Estimate, bound: str, display_as: Display | None) -> str:
+def _bound_words(estimate: Estimate, bound: str, display_as: Display | None) -> str:
     """Formats `at least 900 N/m²`."""
     if bound not in _BOUNDS:
         return "not determined"
@@ -129,12 +129,12 @@ def in_errors(value: float | None) -> str:
     """Formats a number of standard errors: one decimal, none from 10 on."""
     if value is None or math.isnan(value):
         return NONE
-    return _fixed(value, 0 if abs(value) >= 9.95 else 1)
+    return _round_fixed(value, 0 if abs(value) >= 9.95 else 1)
 
 
 def share(value: float | None) -> str:
     """Formats a fraction, two decimals."""
-    return NONE if value is None or math.isnan(value) else _fixed(value, 2)
+    return NONE if value is None or math.isnan(value) else _round_fixed(value, 2)
 
 
 def level_text(level: float) -> str:
@@ -149,14 +149,14 @@ def with_error(value: float, error: float) -> str:
     if not 0 < error < math.inf:
         return number(value)
     rounded_to = decimals(error)
-    return f"{_fixed(value, rounded_to)} ± {_fixed(error, rounded_to)}"
+    return f"{_round_fixed(value, rounded_to)} ± {_round_fixed(error, rounded_to)}"
 
 
 def _power(exponent: int) -> str:
     return f"10{str(exponent).translate(_SUPERSCRIPTS)}"
 
 
-def _fixed(value: float, places: int) -> str:
+def _round_fixed(value: float, places: int) -> str:
     """Rounds `value` to `places` decimals (negative: to tens, hundreds), zero without a sign."""
     if math.isinf(value):
         return f"{MINUS if value < 0 else ''}∞"

@@ -9,18 +9,18 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from flagdata.packages.lazy import lazy_exports
-from models.conditioning.conditioning import Conditioned, Conditioning, Follower, conditioned, conditioning_of
+from models.conditioning.conditioning import Conditioned, Conditioning, Follower, condition_film, conditioning_of
 
 if TYPE_CHECKING:
-    from models.conditioning.conditioning import VERSION, Conditioning, Follower, conditioned, conditioning_of
+    from models.conditioning.conditioning import VERSION, Conditioning, Follower, condition_film, conditioning_of
     from models.conditioning.frame_interpolation import Interpolator, TimedFrame
-    from models.conditioning.grain import grained
+    from models.conditioning.grain import add_grain
     from models.conditioning.mask_network import MaskNetwork, inputs_of
     from models.conditioning.outline import Outliner
     from models.conditioning.repeats import Distinct
-    from models.conditioning.stills import HALVED, Stills, halved
+    from models.conditioning.stills import HALVED, Stills, halve_picture
 
 
-__all__ = ["Conditioned", "Conditioning", "Follower", "conditioned", "conditioning_of"]
+__all__ = ["Conditioned", "Conditioning", "Follower", "condition_film", "conditioning_of"]
 
 __getattr__ = lazy_exports(__name__, __file__)

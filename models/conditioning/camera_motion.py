@@ -59,7 +59,7 @@ class Edges:
     @classmethod
     def of(cls, reference: UInt8Array, outside: BoolArray) -> Edges | None:
         """Finds the edges of a picture (height, width) within the background's mask; None where there are too few."""
-        smoothed = [_smoothed(reference, blur) for blur in _BLURS]
+        smoothed = [_smooth_picture(reference, blur) for blur in _BLURS]
         slopes = [
             np.stack([cv2.Sobel(picture, cv2.CV_32F, x, 1 - x, ksize=3) / 8 for x in (1, 0)], axis=-1)
             for picture in smoothed
@@ -87,7 +87,7 @@ class Edges:
     def misfit(self, picture: UInt8Array, shift: tuple[float, float]) -> float:
         """Computes the mean difference of a picture from the reference at a shift [gray levels], each clipped at `2 *
         _HUBER`."""
-        away = self._difference(_smoothed(picture, _BLURS[-1]), -1, np.array(shift))
+        away = self._difference(_smooth_picture(picture, _BLURS[-1]), -1, np.array(shift))
         return float(np.minimum(np.abs(away), 2 * _HUBER).mean())
 
     def shift(self, picture: UInt8Array, guess: tuple[float, float]) -> tuple[float, float] | None:
@@ -96,14 +96,14 @@ class Edges:
         Args:
             guess: of a frame nearby.
         """
-        smoothed = [_smoothed(picture, blur) for blur in _BLURS]
+        smoothed = [_smooth_picture(picture, blur) for blur in _BLURS]
         start = np.array(guess, dtype=np.float64)
-        shift = self._refined(smoothed, start)
+        shift = self._refine_guess(smoothed, start)
         if shift is None:
-            shift = self._refined(smoothed, self._searched(smoothed[0], start))
+            shift = self._refine_guess(smoothed, self._search_grid(smoothed[0], start))
         return None if shift is None else (float(shift[0]), float(shift[1]))
 
-    def _refined(self, smoothed: list[Float32Array], guess: FloatArray) -> FloatArray | None:
+    def _refine_guess(self, smoothed: list[Float32Array], guess: FloatArray) -> FloatArray | None:
         """Refines a guess of the shift by Gauss–Newton steps, coarse to fine; None where it does not fit."""
         shift, difference = guess.copy(), np.zeros(len(self.places))
         for level, picture in enumerate(smoothed):
@@ -123,7 +123,7 @@ class Edges:
         fits = (np.abs(difference) < 2 * _HUBER).mean() >= _FITS
         return shift if fits else None
 
-    def _searched(self, smoothed: Float32Array, guess: FloatArray) -> FloatArray:
+    def _search_grid(self, smoothed: Float32Array, guess: FloatArray) -> FloatArray:
         """Searches a grid of shifts about a guess for the best one, as is needed after a jerk of the camera."""
         steps = np.arange(-_JERK, _JERK + 1, _GRID, dtype=np.float64)
         shifts = (
@@ -142,7 +142,7 @@ class Edges:
         return np.asarray(values, dtype=np.float64)[:, 0] - self.values[level]
 
 
-def _smoothed(picture: UInt8Array, blur: float) -> Float32Array:
+def _smooth_picture(picture: UInt8Array, blur: float) -> Float32Array:
     return np.asarray(cv2.GaussianBlur(picture.astype(np.float32), (0, 0), blur), dtype=np.float32)
 
 
@@ -218,7 +218,7 @@ class Camera:
         if self.edges is not None:
             shift = self.edges.shift(picture, (float(guess[0, 2]), float(guess[1, 2])))
             return None if shift is None else np.array([[1.0, 0.0, shift[0]], [0.0, 1.0, shift[1]]])
-        places, matched = _followed(self.reference, picture, self.corners, guess)
+        places, matched = _follow_corners(self.reference, picture, self.corners, guess)
         return _similarity(self.corners[matched], places[matched])
 
 
@@ -247,7 +247,7 @@ def camera_of(
     unmoved = [STILL] * len(pictures)
     if len(corners) < _FEWEST:
         return still, unmoved
-    places, follows, transforms = _sampled(pictures, corners)
+    places, follows, transforms = _track_corners(pictures, corners)
     consistent = corners[follows.mean(axis=0) >= _CONSISTENT]
     stays = (np.linalg.norm(places - corners, axis=2) < _STAYS).mean(axis=0) >= _CONSISTENT
     if not _spread(consistent, (height, width)):
@@ -276,7 +276,7 @@ def by_edges(
     if edges is None:
         return still, unmoved
     both_axes, one_axis = (
-        _aligned(pictures, replace(still, edges=candidate, moves=True)) for candidate in (edges, edges.across)
+        _align_pictures(pictures, replace(still, edges=candidate, moves=True)) for candidate in (edges, edges.across)
     )
     aligned = both_axes if both_axes.misfit < _BETTER * one_axis.misfit else one_axis
     if aligned.lost > _LOST * len(pictures):
@@ -297,7 +297,7 @@ class _Aligned:
     misfit: float
 
 
-def _aligned(pictures: Sequence[UInt8Array], camera: Camera) -> _Aligned:
+def _align_pictures(pictures: Sequence[UInt8Array], camera: Camera) -> _Aligned:
     middle, lost = len(pictures) // 2, 0
     transforms = [STILL] * len(pictures)
     for order in (range(middle + 1, len(pictures)), range(middle - 1, -1, -1)):
@@ -324,7 +324,9 @@ def path(transforms: Sequence[Transform], point: tuple[float, float]) -> FloatAr
     return np.stack([transform @ np.array([*point, 1.0]) for transform in transforms])
 
 
-def _sampled(pictures: Sequence[UInt8Array], corners: Float32Array) -> tuple[Float32Array, BoolArray, list[Transform]]:
+def _track_corners(
+    pictures: Sequence[UInt8Array], corners: Float32Array
+) -> tuple[Float32Array, BoolArray, list[Transform]]:
     """Tracks corners through a sample: (frame, corner, 2) positions, (frame, corner) whether each follows its frame's
     transform, and the transforms."""
     count, middle = len(pictures), len(pictures) // 2
@@ -335,11 +337,11 @@ def _sampled(pictures: Sequence[UInt8Array], corners: Float32Array) -> tuple[Flo
     for order in (range(middle + 1, count), range(middle - 1, -1, -1)):
         guess = STILL
         for k in order:
-            places[k], tracked = _followed(pictures[middle], pictures[k], corners, guess)
+            places[k], tracked = _follow_corners(pictures[middle], pictures[k], corners, guess)
             transform = _similarity(corners[tracked], places[k][tracked])
             if transform is not None:
                 guess = transform
-                away = np.linalg.norm(places[k] - _moved(corners, transform), axis=1)
+                away = np.linalg.norm(places[k] - _move_places(corners, transform), axis=1)
                 follows[k] = tracked & (away < _INLIER)
             transforms[k] = guess
     return places, follows, transforms
@@ -353,10 +355,10 @@ def _again(camera: Camera, pictures: Sequence[UInt8Array], guesses: Sequence[Tra
     return transforms
 
 
-def _followed(
+def _follow_corners(
     reference: UInt8Array, picture: UInt8Array, corners: Float32Array, guess: Transform
 ) -> tuple[Float32Array, BoolArray]:
-    start = _moved(corners, guess)
+    start = _move_places(corners, guess)
     places, status, _ = cv2.calcOpticalFlowPyrLK(
         reference,
         picture,
@@ -370,7 +372,7 @@ def _followed(
     return np.asarray(places, dtype=np.float32).reshape(-1, 2), status.ravel().astype(bool)
 
 
-def _moved(places: Float32Array, transform: Transform) -> Float32Array:
+def _move_places(places: Float32Array, transform: Transform) -> Float32Array:
     return (places @ transform[:, :2].T + transform[:, 2]).astype(np.float32)
 
 

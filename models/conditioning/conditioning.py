@@ -17,7 +17,7 @@ from models.conditioning.framing import Square
 from models.conditioning.outline import FEWEST, Hoist, hoist_of
 from models.conditioning.regions import Region, regions_of
 from models.conditioning.standing import Box, Standing
-from models.conditioning.stills import halved
+from models.conditioning.stills import halve_picture
 from models.conditioning.whole import CUT, SIDES, at_edges
 
 VERSION = 2
@@ -126,7 +126,7 @@ class Conditioning:
     def show(self, frame: UInt8Array, transform: Transform) -> UInt8Array:
         """Returns the (size, size) picture of the flag: registered, cropped, scaled, all else frozen."""
         return self._frozen(
-            _framed(frame, self.square, self.size, transform, scale=self.scale, moves=self.camera.moves)
+            _frame_square(frame, self.square, self.size, transform, scale=self.scale, moves=self.camera.moves)
         )
 
     def hoists(self) -> Iterator[Hoist]:
@@ -135,7 +135,7 @@ class Conditioning:
         places it. Light, camera and the wind's direction may change in a long film."""
         if self.size < _LEAST_SIZE:
             return
-        pictures = np.stack([halved(self._frozen(picture)) for picture in self.framed])
+        pictures = np.stack([halve_picture(self._frozen(picture)) for picture in self.framed])
         parts = min(int(self.seconds / _PART), _PARTS, len(pictures) // FEWEST)
         for part in (pictures, *(np.array_split(pictures, parts) if parts > 1 else ())):
             if (hoist := hoist_of(part)) is not None:
@@ -169,7 +169,7 @@ class Conditioned:
     lost: int
 
 
-def conditioned(frames: UInt8Array, times: FloatArray, *, size: int = 300, flag: int | None = None) -> Conditioned:
+def condition_film(frames: UInt8Array, times: FloatArray, *, size: int = 300, flag: int | None = None) -> Conditioned:
     """Conditions a short film in memory.
 
     Args:
@@ -279,7 +279,7 @@ def conditioning_of(
     square = framing.square_about(box, width=width, height=height, allow_centred=not camera.moves or not regions)
     step = -(-len(sample) // _BACKGROUND)
     framed = [
-        _framed(frame, square, size, transform, scale=scale, moves=camera.moves)
+        _frame_square(frame, square, size, transform, scale=scale, moves=camera.moves)
         for frame, transform in zip(sample[::step], transforms[::step], strict=True)
     ]
     weight, cut = np.ones((size, size), np.float32), np.zeros((len(small), len(SIDES)))
@@ -330,7 +330,7 @@ def _camera_and_regions(
     least = _LEAST_MOTION * unit
     camera, transforms = camera_of(small, least=least)
     if camera.known:
-        regions = regions_of(_registered(small, transforms), times, within=inside)
+        regions = regions_of(_register_pictures(small, transforms), times, within=inside)
         again, moved = (
             camera_of(small, outside=_outside(regions, small[0].shape), least=least) if regions else (camera, [])
         )
@@ -343,7 +343,7 @@ def _camera_and_regions(
         )
     if regions and again.known:
         camera, transforms = again, moved
-    registered = _registered(small, transforms)
+    registered = _register_pictures(small, transforms)
     return camera, transforms, registered, regions_of(registered, times, within=inside)
 
 
@@ -351,11 +351,11 @@ def _outside(regions: Sequence[Region], shape: tuple[int, ...]) -> BoolArray:
     """Masks the background: away from all moving cloth."""
     outside = np.ones(shape, bool)
     for region in regions:
-        outside &= ~_widened(region.mask, _AHEAD).astype(bool)
+        outside &= ~_widen_mask(region.mask, _AHEAD).astype(bool)
     return outside
 
 
-def _registered(small: list[UInt8Array], transforms: list[Transform]) -> UInt8Array:
+def _register_pictures(small: list[UInt8Array], transforms: list[Transform]) -> UInt8Array:
     height, width = small[0].shape
     moved = [
         picture
@@ -372,20 +372,20 @@ def _registered(small: list[UInt8Array], transforms: list[Transform]) -> UInt8Ar
     return np.stack(moved).astype(np.uint8)
 
 
-def _framed(
+def _frame_square(
     frame: UInt8Array, square: Square, size: int, transform: Transform, *, scale: float, moves: bool
 ) -> UInt8Array:
     if not moves:
         return framing.cut(frame, square, size)
-    return framing.warp(frame, square, size, framing.scaled(transform, scale))
+    return framing.warp(frame, square, size, framing.rescale_transform(transform, scale))
 
 
 def _centre(square: Square, transform: Transform, scale: float) -> FloatArray:
     middle = (square.x + square.side / 2, square.y + square.side / 2)
-    return path([framing.scaled(transform, scale)], middle)[0]
+    return path([framing.rescale_transform(transform, scale)], middle)[0]
 
 
-def _widened(mask: BoolArray, share: float) -> UInt8Array:
+def _widen_mask(mask: BoolArray, share: float) -> UInt8Array:
     """Widens the mask by a share of its size."""
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     radius = max(1, round(share * max(np.ptp(rows), np.ptp(columns))))
@@ -396,7 +396,7 @@ def _widened(mask: BoolArray, share: float) -> UInt8Array:
 def _weight(mask: BoolArray, square: Square, size: int, scale: float) -> Float32Array:
     """Weighs pixels (size, size): 1 on and about the cloth, falling to 0 across the feather."""
     extent = max(np.ptp(np.flatnonzero(mask.any(axis=1))), np.ptp(np.flatnonzero(mask.any(axis=0)))) + 1
-    near = _in_square(_widened(mask, _AROUND + _FEATHER), square, size, scale)
+    near = _in_square(_widen_mask(mask, _AROUND + _FEATHER), square, size, scale)
     feather = max(_FEATHER * extent / scale / (square.side / size), 1.0)
     away = cv2.distanceTransform(near, cv2.DIST_L2, 5)
     return np.clip(away / feather, 0.0, 1.0).astype(np.float32)

@@ -99,9 +99,12 @@ class Interpolator:
         if key not in self._flows:
             while len(self._flows) >= self._kept:
                 self._flows.pop(next(iter(self._flows)))
-            self._flows[key] = (self._calculated(first[1], second[1]), self._calculated(second[1], first[1]))
+            self._flows[key] = (
+                self._interpolate_between(first[1], second[1]),
+                self._interpolate_between(second[1], first[1]),
+            )
         return self._flows[key]
 
-    def _calculated(self, a: UInt8Array, b: UInt8Array) -> Float32Array:
+    def _interpolate_between(self, a: UInt8Array, b: UInt8Array) -> Float32Array:
         start = np.zeros((*a.shape, 2), dtype=np.float32)
         return np.asarray(self._search.calc(np.ascontiguousarray(a), np.ascontiguousarray(b), start), np.float32)

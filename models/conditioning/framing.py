@@ -56,7 +56,7 @@ def square_about(box: tuple[float, float, float, float], *, width: int, height: 
     """
     left, top, right, bottom = box
     extent = max(right - left, bottom - top)
-    middle = centred(width, height)
+    middle = centred_square(width, height)
     side = middle.side
     margin_x, margin_y = (_MARGIN * side if longest > side else 0.0 for longest in (width, height))
     inside = (
@@ -71,7 +71,7 @@ def square_about(box: tuple[float, float, float, float], *, width: int, height: 
     return Square(x=_begin(left, right, side, width), y=_begin(top, bottom, side, height), side=side)
 
 
-def centred(width: int, height: int) -> Square:
+def centred_square(width: int, height: int) -> Square:
     """Returns the largest centred square of a picture of this size [px]."""
     side = min(width, height)
     return Square(x=(width - side) // 2, y=(height - side) // 2, side=side)
@@ -87,14 +87,14 @@ def _begin(low: float, high: float, side: int, length: int) -> int:
 
 def cut(picture: UInt8Array, square: Square, size: int) -> UInt8Array:
     """Crops a square of an unmoved picture (height, width) to (size, size)."""
-    part = _continued(picture, square)
+    part = _continued_square(picture, square)
     if square.side == size:
         return np.ascontiguousarray(part)
     image = Image.fromarray(np.ascontiguousarray(part))
     return np.asarray(image.resize((size, size), Image.Resampling.HAMMING))
 
 
-def _continued(picture: UInt8Array, square: Square) -> UInt8Array:
+def _continued_square(picture: UInt8Array, square: Square) -> UInt8Array:
     """Returns a square of a picture (height, width), its edges continued where the square reaches beyond."""
     height, width = picture.shape
     left, top = min(max(square.x, 0), width - 1), min(max(square.y, 0), height - 1)
@@ -130,7 +130,7 @@ def warp(picture: UInt8Array, square: Square, size: int, transform: Transform) -
     return np.asarray(grid, dtype=np.uint8)
 
 
-def scaled(transform: Transform, scale: float) -> Transform:
+def rescale_transform(transform: Transform, scale: float) -> Transform:
     """Rescales a transform between pictures shrunk by `scale` (new over old) to one between the pictures themselves."""
     linear = transform[:, :2]
     shift = scale / 2 - 0.5

@@ -21,7 +21,7 @@ DEVIATION = 0.5
 """Of that noise [gray levels], the median over places of what films of the training's cameras have in time."""
 
 
-def grained(clip: UInt8Array, *, seed: int) -> UInt8Array:
+def add_grain(clip: UInt8Array, *, seed: int) -> UInt8Array:
     """Adds noise to a clip (n, height, width) gray where it never changes, if that is most of it; else returns the clip
     itself. else the clip itself. What is black all the time lies beyond the picture, and neither counts nor changes.
     """

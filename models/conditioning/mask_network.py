@@ -96,7 +96,7 @@ def _lit(stills: Stills) -> BoolArray:
 
 
 @cache
-def shipped() -> MaskNetwork:
+def load_shipped_mask() -> MaskNetwork:
     """Loads the mask network that comes with the package.
 
     Raises:

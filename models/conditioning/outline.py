@@ -18,7 +18,7 @@ import torch
 from torch import Tensor
 
 from flagdata.core.arrays import BoolArray, FloatArray, UInt8Array
-from models.conditioning.mask_network import MaskNetwork, inputs_of, shipped
+from models.conditioning.mask_network import MaskNetwork, inputs_of, load_shipped_mask
 from models.conditioning.stills import SAMPLE, Stills
 
 _CLOTH = 0.45
@@ -105,7 +105,7 @@ def hoist_of(pictures: UInt8Array) -> Hoist | None:
         return None
     small = pictures[:: -(-len(pictures) // SAMPLE)]
     stills = Stills.of(small)
-    logits = torch.cat(list(_maps(shipped(), small[:: -(-len(small) // _LOOKED_AT)], stills)))
+    logits = torch.cat(list(_maps(load_shipped_mask(), small[:: -(-len(small) // _LOOKED_AT)], stills)))
     ends, certainties = zip(*(_end(of_end) for of_end in logits[:, 1:].mean(dim=0).double()), strict=True)
     return Hoist(stills=stills, logits=logits, ends=np.stack(ends), certainty=min(certainties))
 
@@ -143,7 +143,9 @@ class Outliner:
         if np.quantile(stills.greatest[usual > 0].astype(int) - stills.least[usual > 0], 0.95) < _MOVES:
             return None
         side = _side(usual, places)
-        return cls(stills=stills, hoist=_lowered(usual > 0.5, places, side), side=side, network=shipped())
+        return cls(
+            stills=stills, hoist=_lower_hoist_end(usual > 0.5, places, side), side=side, network=load_shipped_mask()
+        )
 
     def masks(self, pictures: UInt8Array) -> tuple[Masks, FloatArray]:
         """Segments the cloth in pictures (n, size / 2, size / 2), `halved`, that follow one another in the film: the
@@ -194,7 +196,7 @@ def _side(usual: FloatArray, ends: FloatArray) -> float:
     return 1.0 if usual.sum(axis=0) @ (np.arange(usual.shape[1]) + 0.5 - ends[:, 0].mean()) >= 0 else -1.0
 
 
-def _lowered(usual: Masks, places: FloatArray, side: float) -> FloatArray:
+def _lower_hoist_end(usual: Masks, places: FloatArray, side: float) -> FloatArray:
     """Moves the hoist's upper end (2, 2) to where the cloth's upper edge beside it meets the hoist's line: a pole's top
     is not the cloth's corner. The network's point is unchanged where the cloth does not show the edge, or shows one
     that does not lead there.

@@ -137,7 +137,7 @@ class Standing:
         columns = columns[(columns >= 0) & (columns < places.shape[1])]
         high, middle = bottom - top, (top + bottom) / 2
         within = np.asarray(cv2.erode(places.astype(np.uint8), np.ones((3, 3), np.uint8)), np.uint8)
-        lines = _lines(_widened(self.upright), middle, columns, _STEEP) > 0
+        lines = _lines(_widen_edges(self.upright), middle, columns, _STEEP) > 0
         moving = _lines(within, middle, columns, _STEEP) > 0
         heights = (lines & moving).sum(axis=1) / high
         if not heights.size:
@@ -160,7 +160,7 @@ def _slopes(picture: UInt8Array) -> Float32Array:
     return np.stack([cv2.Sobel(smooth, cv2.CV_32F, x, 1 - x, ksize=3) / 8 for x in (1, 0)]).astype(np.float32)
 
 
-def _widened(edges: BoolArray) -> UInt8Array:
+def _widen_edges(edges: BoolArray) -> UInt8Array:
     """Widens edges (height, width) by a pixel to each side."""
     return np.asarray(cv2.dilate(edges.astype(np.uint8), np.ones((1, 3), np.uint8)), np.uint8)
 
@@ -194,7 +194,7 @@ def _longest(edges: BoolArray, ends: tuple[float, float], places: tuple[tuple[fl
     wanted = np.any([(columns >= low) & (columns <= high) for low, high in places], axis=0)
     if not wanted.any():
         return Line(length=0.0, above=0.0, below=0.0)
-    lines = _lines(_widened(edges), (ends[0] + ends[1]) / 2, columns[wanted], _TILT)
+    lines = _lines(_widen_edges(edges), (ends[0] + ends[1]) / 2, columns[wanted], _TILT)
     gap = 2 * round(_GAP * extent / 2) + 1
     longest, last = 0, 0
     run, reaches = np.zeros(lines.shape[::2], int), np.zeros(lines.shape[::2], bool)

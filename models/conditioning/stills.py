@@ -48,7 +48,7 @@ class Stills:
         return cls(usual=_bytes(middle), least=_bytes(low), greatest=_bytes(high))
 
 
-def halved(picture: UInt8Array) -> UInt8Array:
+def halve_picture(picture: UInt8Array) -> UInt8Array:
     """Averages a picture down by `HALVED`."""
     size = (picture.shape[1] // HALVED, picture.shape[0] // HALVED)
     return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)

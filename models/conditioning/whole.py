@@ -45,7 +45,7 @@ def at_edges(registered: UInt8Array, times: FloatArray, transforms: Sequence[Tra
     near_before = np.concatenate([[False], nearby(times)])
     for k in np.flatnonzero(near_before).tolist():
         overlap = inside[k] & inside[k - 1]
-        ring = overlap & ~_eroded(overlap, _STRIP) & cloth
+        ring = overlap & ~_erode_mask(overlap, _STRIP) & cloth
         moving = nearest[ring & (np.abs(pictures[k] - pictures[k - 1]) > _CHANGE)]
         lengths[k] = np.bincount(moving, minlength=len(SIDES)) / _STRIP / size
     for k in np.flatnonzero(~near_before)[::-1].tolist():
@@ -59,10 +59,10 @@ def _inside(transform: Transform, shape: tuple[int, int]) -> BoolArray:
     if transform is not STILL:
         moved = cv2.warpAffine(ones, transform, shape[::-1], flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP)
         ones = np.asarray(moved, dtype=np.uint8)
-    return _eroded(ones > 0, 1)
+    return _erode_mask(ones > 0, 1)
 
 
-def _eroded(mask: BoolArray, width: int) -> BoolArray:
+def _erode_mask(mask: BoolArray, width: int) -> BoolArray:
     square = np.ones((2 * width + 1, 2 * width + 1), np.uint8)
     eroded = cv2.erode(mask.astype(np.uint8), square, borderType=cv2.BORDER_CONSTANT, borderValue=0)
     return np.asarray(eroded, dtype=np.bool_)

@@ -14,7 +14,7 @@ from models.evaluation.bootstrap import Resamples, estimate
 from models.evaluation.curves import FramesPoint
 from models.evaluation.evaluation import Read
 from models.evaluation.linear import bouman
-from models.evaluation.predict import embedded
+from models.evaluation.predict import embed_entries
 from models.evaluation.predictions import Predictions
 from models.maps.crops import Cropping
 from models.maps.frontend import FrontEnd
@@ -47,7 +47,7 @@ def triplet_accuracies(
         clips = films(replace(first.front_end, frames=count), cropping)
         resamples = Resamples.of(clips.sequence, generator=stream(seed, "evaluation", "bootstrap"))
         chosen = triplets.draw(clips.sequence, seed=seed)
-        values = [triplets.accuracy_values(embedded(run.learners[0], clips), chosen, resamples) for run in runs]
+        values = [triplets.accuracy_values(embed_entries(run.learners[0], clips), chosen, resamples) for run in runs]
         accuracy = estimate(np.mean(values, axis=0), clips=len(clips), groups=resamples.groups)
         points.append(
             FramesPoint(label=first.name, frames=count, accuracy=accuracy.value, interval=(accuracy.low, accuracy.high))

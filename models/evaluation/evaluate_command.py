@@ -52,13 +52,13 @@ def evaluate(chosen: Evaluating) -> Iterator[Result]:
     \b
       flagdata evaluate flow sdn --at v1 --lake lake --out evaluation
     """
-    from flagdata.dataset.lake_source import opened
+    from flagdata.dataset.lake_source import open_source
     from models.evaluation import evaluation_report
     from models.evaluation.evaluation import as_document
 
     out = local_path(chosen.out)
     evaluation_report.check(out, name=chosen.name)
-    source = opened(chosen.lake)
+    source = open_source(chosen.lake)
     folder = chosen.inputs(source.lake)
     weight = None if chosen.area_weight is None else Stated.of(chosen.area_weight)
     desk = _Desk(source, chosen.dataset, chosen.at, folder, chosen.processes, chosen.seed, weight)
@@ -101,7 +101,7 @@ def refuse_learned(catalog: pa.Table, learned: Iterable[DataSpec], *, dataset: s
         explicit_sides(catalog, ExplicitSplit(where={**evaluated, **before}))
 
 
-def labelled(found: Sequence[tuple[Artifact, Estimator]]) -> list[tuple[Artifact, Estimator]]:
+def label_networks(found: Sequence[tuple[Artifact, Estimator]]) -> list[tuple[Artifact, Estimator]]:
     """Names networks of one name so that those of one training, which differ by their seeds alone, have one label.
 
     Where the recipe or the data changed meanwhile, the beginning of an artifact's identity is added.
@@ -255,7 +255,7 @@ class _Desk:
         chosen: list[tuple[Artifact | None, Estimator]] = []
         for name in names:
             if name == "shipped" or name.startswith("shipped/"):
-                ours = estimator.shipped(name.partition("/")[2] or estimator.DEFAULT)
+                ours = estimator.load_shipped(name.partition("/")[2] or estimator.DEFAULT)
                 chosen.append((None, replace(ours, name=f"{ours.name}, as shipped")))  # beside its seeds, if they are
                 continue
             same = {row["artifact"]: row["head"] for row in meant(rows.values(), name)}
@@ -263,7 +263,7 @@ class _Desk:
                 raise UnknownNameError.of("network", name, sorted({row["name"] for row in rows.values()} | {"shipped"}))
             self._head_of |= same
             found = [lake.artifact(artifact, at=same[artifact]) for artifact in sorted(same)]
-            chosen += labelled([(row, estimator.load(lake.object_path(str(row.object)))) for row in found])
+            chosen += label_networks([(row, estimator.load(lake.object_path(str(row.object)))) for row in found])
         return chosen
 
     def _side(self, side: str) -> Pairs:

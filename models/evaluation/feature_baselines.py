@@ -19,7 +19,7 @@ from models.evaluation.predict import DRAWS, milliseconds, timed_clips
 from models.evaluation.predictions import Predictions
 from models.maps.crops import Cropping
 from models.maps.frontend import FrontEnd
-from models.networks.targets import stated
+from models.networks.targets import stated_targets
 from models.regression.boosting import ENSEMBLES, Boosting, fit_boosting
 from models.regression.handmade import FEATURES, features
 from models.regression.ridge import Ridge, check_folds, fit_ridge
@@ -58,7 +58,7 @@ def check_stated(train: Pairs, *judged: Pairs) -> tuple[str, ...]:
     """
     targets = TARGETS
     for pairs in (train, *judged):
-        targets = stated(pairs.table.parameter_columns(), targets)
+        targets = stated_targets(pairs.table.parameter_columns(), targets)
     if not targets:
         raise InputError(
             "not all clips state any of the targets of hand-made features",
@@ -69,7 +69,7 @@ def check_stated(train: Pairs, *judged: Pairs) -> tuple[str, ...]:
     return targets
 
 
-def fitted(train: Pairs, *judged: Pairs, cache: Path, workers: int, seed: int, bars: Bars) -> Fitted:
+def fit_baselines(train: Pairs, *judged: Pairs, cache: Path, workers: int, seed: int, bars: Bars) -> Fitted:
     """Fits ridge and gradient boosting on crops of the training side's films, to what the judged clips state, too.
 
     Raises:
@@ -90,7 +90,7 @@ def fitted(train: Pairs, *judged: Pairs, cache: Path, workers: int, seed: int, b
 
 def predictions(train: Pairs, pairs: Pairs, *, cache: Path, workers: int, seed: int, bars: Bars) -> list[Predictions]:
     """Predicts the targets of another side's clips by both models."""
-    models = fitted(train, pairs, cache=cache, workers=workers, seed=seed, bars=bars)
+    models = fit_baselines(train, pairs, cache=cache, workers=workers, seed=seed, bars=bars)
     targets, ridge, boosting = models.targets, models.ridge, models.boosting
     with bars(len(pairs), "hand-made features to judge", "clip") as advance:
         inputs = prepare_clips(pairs, _FRONT_END, _CROPPING, folder=cache, workers=workers, advance=advance)

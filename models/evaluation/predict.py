@@ -18,7 +18,7 @@ from flagdata.errors import InputError
 from models.evaluation.predictions import Predictions
 from models.maps.frontend import FrontEnd
 from models.networks.learner import Learner, Loss
-from models.networks.targets import Scaling, stated
+from models.networks.targets import Scaling, stated_targets
 from models.trained.estimator import Estimator
 from models.trained.restriction import Known
 from models.training.inputs import Prepared, clip_as_taken
@@ -43,7 +43,7 @@ def judged_targets(estimator: Estimator, *clips: Mapping[str, FloatArray]) -> tu
     learner = estimator.learners[0]
     names = READ_FROM if learner.objective is Loss.CONTRASTIVE else learner.scaling.names
     for parameters in clips:
-        names = stated(parameters, names)
+        names = stated_targets(parameters, names)
     if not names:
         raise InputError(
             f"not all clips state any of the targets of the model {estimator.name!r}",
@@ -80,14 +80,14 @@ def predict(
     if learner.objective is Loss.CONTRASTIVE:
         fitted_on = fitted_on if fitted_on is not None else prepared
         names = targets = judged_targets(estimator, prepared.parameters, fitted_on.parameters)
-        embedding = embedded(learner, prepared)
+        embedding = embed_entries(learner, prepared)
         mean = _read(embedding, prepared, fitted_on, learner, names)
         samples, truth, left_out = None, prepared.truth(names), set(READ_FROM) - set(names)
     else:
         names = judged_targets(estimator, prepared.parameters)
         judged = Scaling(names=names)
         columns = [learner.scaling.names.index(name) for name in names]
-        samples, mean, embedding = _predicted(estimator, prepared, seed=seed, known=known)
+        samples, mean, embedding = _predict_entries(estimator, prepared, seed=seed, known=known)
         samples, mean = None if samples is None else samples[:, :, columns], mean[:, columns]
         targets, truth = judged.quantities, prepared.truth(names)
         left_out = set(learner.scaling.quantities) - set(targets)
@@ -108,7 +108,7 @@ def predict(
     )
 
 
-def _predicted(
+def _predict_entries(
     estimator: Estimator, prepared: Prepared, *, seed: int, known: Mapping[str, Stated] | None
 ) -> tuple[np.ndarray | None, np.ndarray, np.ndarray]:
     learner = estimator.learners[0]
@@ -132,7 +132,7 @@ def _predicted(
 
 
 @torch.no_grad()
-def embedded(learner: Learner, prepared: Prepared) -> np.ndarray:
+def embed_entries(learner: Learner, prepared: Prepared) -> np.ndarray:
     """Computes (n, dimension) float32 embeddings of the first variant of each entry."""
     device = next(learner.parameters()).device
     parts = [
@@ -146,7 +146,7 @@ def _read(
     embedding: np.ndarray, prepared: Prepared, fitted_on: Prepared, learner: Learner, targets: tuple[str, ...]
 ) -> np.ndarray:
     """Predicts (n, target) by ridge regression on the embeddings of `fitted_on`."""
-    fitted = embedded(learner, fitted_on).astype(np.float64)
+    fitted = embed_entries(learner, fitted_on).astype(np.float64)
     truth = fitted_on.truth(targets)
     centre, level = fitted.mean(axis=0), truth.mean(axis=0)
     gram = (fitted - centre).T @ (fitted - centre)

@@ -121,10 +121,10 @@ def coverage(
     """Measures the covered share of central intervals at nominal levels, mean over runs of one model, with intervals
     over groups."""
     ranks = [cells(run, target) for run in runs]
-    return tuple(_covered(level, [of.central(level) for of in ranks], resamples) for level in levels)
+    return tuple(_coverage_of(level, [of.central(level) for of in ranks], resamples) for level in levels)
 
 
-def _covered(level: float, shares: list[FloatArray], resamples: Resamples) -> Coverage:
+def _coverage_of(level: float, shares: list[FloatArray], resamples: Resamples) -> Coverage:
     values = np.mean([_mean(share, resamples) for share in shares], axis=0)
     return Coverage(level=level, share=estimate(values, clips=len(shares[0]), groups=resamples.groups))
 
@@ -176,7 +176,7 @@ def tarp(
     """
     reference = generator.uniform(size=runs[0].truth.shape)
     ranks = [_ball(run, reference) for run in runs]
-    return tuple(_covered(level, [of.below(level) for of in ranks], resamples) for level in levels)
+    return tuple(_coverage_of(level, [of.below(level) for of in ranks], resamples) for level in levels)
 
 
 def _ball(predictions: Predictions, reference: FloatArray) -> Cells:

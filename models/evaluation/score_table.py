@@ -154,13 +154,13 @@ def metric_values(predictions: Predictions, resamples: Resamples, triplets: IntA
         values["area_weight_error"] = SCORES["relative_error"].values(predictions, AREA_WEIGHT, resamples)
     if predictions.samples is not None and WIND in predictions.targets:
         for level in LEVELS:
-            values[_covered(level)] = coverage_values(predictions, WIND, level, resamples)
+            values[_coverage_heading(level)] = coverage_values(predictions, WIND, level, resamples)
     if predictions.embedding is not None and triplets is not None:
         values["triplets"] = accuracy_values(predictions.embedding, triplets, resamples)
     return values
 
 
-def _covered(level: float) -> str:
+def _coverage_heading(level: float) -> str:
     return f"covered_{100 * level:.0f}"
 
 
@@ -302,7 +302,7 @@ def cell(score: ScoreEstimate | None, digits: int) -> tuple[str, ...]:
     return (number(score.value, digits), f"[{number(score.low, digits)}, {number(score.high, digits)}]")
 
 
-def _scored(metric: str, digits: int) -> Callable[[Row], tuple[str, ...]]:
+def _scored_cells(metric: str, digits: int) -> Callable[[Row], tuple[str, ...]]:
     def lines(row: Row) -> tuple[str, ...]:
         texts = cell(row.scores.get(metric), digits)
         if metric not in row.spread:
@@ -320,7 +320,7 @@ def _model(row: Row) -> tuple[str, ...]:
 
 
 def _coverage(row: Row) -> tuple[str, ...]:
-    scores = [row.scores.get(_covered(level)) for level in LEVELS]
+    scores = [row.scores.get(_coverage_heading(level)) for level in LEVELS]
     if any(score is None for score in scores):
         return (_NONE,)
     values = " / ".join(number(100 * score.value, 0) for score in scores if score is not None)
@@ -330,13 +330,13 @@ def _coverage(row: Row) -> tuple[str, ...]:
 
 COLUMNS = (
     TableColumn(heading="model", cell=_model),
-    TableColumn(heading="wind RMSE [m/s]", cell=_scored("rmse", 3)),
+    TableColumn(heading="wind RMSE [m/s]", cell=_scored_cells("rmse", 3)),
     TableColumn(heading="bound", cell=lambda row: (_NONE if row.bound is None else f"≥ {number(row.bound, 3)}",)),
-    TableColumn(heading="Acc@0.5", cell=_scored("accuracy", 3)),
-    TableColumn(heading="wind bias [m/s]", cell=_scored("bias", 3)),
-    TableColumn(heading="area weight error / spread", cell=_scored("area_weight_error", 3)),
+    TableColumn(heading="Acc@0.5", cell=_scored_cells("accuracy", 3)),
+    TableColumn(heading="wind bias [m/s]", cell=_scored_cells("bias", 3)),
+    TableColumn(heading="area weight error / spread", cell=_scored_cells("area_weight_error", 3)),
     TableColumn(heading="wind covered [%] at 50 / 80 / 90", cell=_coverage),
-    TableColumn(heading="triplet accuracy", cell=_scored("triplets", 3)),
+    TableColumn(heading="triplet accuracy", cell=_scored_cells("triplets", 3)),
     TableColumn(heading="parameters", cell=lambda row: (f"{row.parameters:,}",)),
     TableColumn(heading="ms a clip", cell=lambda row: (number(row.milliseconds, 1),)),
     TableColumn(heading="note", cell=lambda row: (row.note or _NONE,)),

@@ -79,7 +79,7 @@ class Cropping:
         Raises:
             InputError: the film is shorter than a clip.
         """
-        count, height, width = self._checked(shape)
+        count, height, width = self._check_shape(shape)
         side = round(float(rng.choice(self.scales)) * min(height, width))
         return Crop(
             first=int(rng.integers(count - self.frames + 1)),
@@ -95,7 +95,7 @@ class Cropping:
         Raises:
             InputError: the film ends before the clip does.
         """
-        count, height, width = self._checked(shape)
+        count, height, width = self._check_shape(shape)
         if first + self.frames > count:
             raise InputError(f"{count} frames end before frame {first + self.frames}", fix="begin earlier")
         side = min(height, width)
@@ -115,7 +115,7 @@ class Cropping:
         size = (self.size, self.size)
         return functional.interpolate(clip[None].float(), size, mode="bilinear", antialias=True, align_corners=False)
 
-    def _checked(self, shape: tuple[int, int, int]) -> tuple[int, int, int]:
+    def _check_shape(self, shape: tuple[int, int, int]) -> tuple[int, int, int]:
         if shape[0] < self.frames:
             raise InputError(f"the film has {shape[0]} frames", fix=f"give at least {self.frames}")
         return shape

@@ -276,7 +276,7 @@ class FrontEnd:
         return torch.stack([self._maps_of(clip[0]) for clip in clips])
 
     def _maps_of(self, clip: Tensor) -> Tensor:
-        frames = standardised(clip)
+        frames = standardise_clip(clip)
         if self.maps == "frames":
             return frames.unsqueeze(0)
         if self.maps == "handmade":
@@ -315,7 +315,7 @@ class FrontEnd:
         return torch.cat(maps, dim=1).flatten(0, 1)
 
 
-def standardised(clip: Tensor) -> Tensor:
+def standardise_clip(clip: Tensor) -> Tensor:
     """Standardises a clip: less its mean, over its standard deviation, float32; one without contrast is 0
     everywhere."""
     frames = clip.float()
@@ -349,11 +349,11 @@ def _phases(real: Tensor, imaginary: Tensor, frequency: Tensor) -> Tensor:
     (a, b, c, d), (e, f, g, h) = corners[:4], corners[4:]
     power = [re.square() + im.square() for re, im in ((a, e), (b, f), (c, g), (d, h))]
 
-    def crossed(ahead: tuple[Tensor, Tensor], behind: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
+    def cross_spectrum(ahead: tuple[Tensor, Tensor], behind: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
         return ahead[0] * behind[0] + ahead[1] * behind[1], ahead[1] * behind[0] - ahead[0] * behind[1]
 
     def along(pairs: list[tuple[tuple[Tensor, Tensor], tuple[Tensor, Tensor]]], norm: Tensor) -> tuple[Tensor, Tensor]:
-        crosses = [crossed(later, earlier) for later, earlier in pairs]
+        crosses = [cross_spectrum(later, earlier) for later, earlier in pairs]
         re, im = crosses[0][0] + crosses[1][0], crosses[0][1] + crosses[1][1]
         return torch.atan2(im, re) / math.pi, (re.square() + im.square()).sqrt() / (norm.sqrt() + _TINY)
 

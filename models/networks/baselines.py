@@ -32,7 +32,7 @@ def evenly_spaced(clip_frames: int, count: int) -> Tensor:
     return ((2 * torch.arange(count) + 1) * clip_frames) // (2 * count)
 
 
-def _selected(x: Tensor, count: int) -> Tensor:
+def _select_frames(x: Tensor, count: int) -> Tensor:
     """Returns evenly spaced frames of clips (batch, 1, time, height, width) as images (batch · count, 1, h, w)."""
     if x.ndim != 5 or x.shape[1] != 1 or min(x.shape[3:]) < SMALLEST:
         raise InputError(
@@ -71,7 +71,7 @@ class ResNetOfFrames(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """Embeds clips (batch, 1, time, height, width) as (batch, dimension). (batch, dimension)."""
-        images = _selected(x, self.frames)
+        images = _select_frames(x, self.frames)
         return self.trunk(images).mean(dim=(2, 3)).unflatten(0, (-1, self.frames)).mean(dim=1)
 
 
@@ -110,7 +110,7 @@ class Cardona(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """Embeds clips (batch, 1, time, height, width) as (batch, dimension). (batch, dimension)."""
-        descriptions = self.pool(self.trunk(_selected(x, self.frames))).flatten(1)
+        descriptions = self.pool(self.trunk(_select_frames(x, self.frames))).flatten(1)
         states, _ = self.memory(descriptions.unflatten(0, (-1, self.frames)))
         return states[:, -1]
 
@@ -164,7 +164,7 @@ class Yang(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """Embeds clips (batch, 1, time, height, width) as (batch, dimension). (batch, dimension)."""
-        features = self.sixth(self.convolutions(_selected(x, self.frames)).flatten(1))
+        features = self.sixth(self.convolutions(_select_frames(x, self.frames)).flatten(1))
         states, _ = self.memory(features.unflatten(0, (-1, self.frames)))
         return states[:, -1]
 

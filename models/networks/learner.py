@@ -132,7 +132,7 @@ class Learner(nn.Module):
         Raises:
             InputError: a target that is the same in all of it.
         """
-        learned = self._learned(values)
+        learned = self._learned_logits(values)
         spread, centre = torch.std_mean(learned, dim=0, correction=0)
         if not bool((spread > 0).all()):
             raise InputError(
@@ -157,7 +157,7 @@ class Learner(nn.Module):
         embedding = self.network(inputs).float()
         if self.objective is Loss.CONTRASTIVE:
             return contrastive_loss(embedding, sequence, margin=self.margin, positive_share=0.5)
-        wanted = (self._learned(values) - self.centre) / self.spread
+        wanted = (self._learned_logits(values) - self.centre) / self.spread
         if self.objective is Loss.REGRESSION:
             return (self.head(embedding) - wanted).square().mean()
         return -self.head(embedding).log_prob(wanted).mean()
@@ -179,7 +179,7 @@ class Learner(nn.Module):
             raise InputError(f"a {self.objective.value} gives no distribution", fix="take a model of a posterior loss")
         return self.head(embedding)
 
-    def _learned(self, values: Tensor) -> Tensor:
+    def _learned_logits(self, values: Tensor) -> Tensor:
         return self.scaling.learned(values) if self.objective is Loss.POSTERIOR else values.float()
 
     def _values(self, learned: Tensor) -> Tensor:

@@ -142,7 +142,7 @@ class Mixture:
         noise = torch.randn(location.shape, generator=generator, dtype=location.dtype, device=location.device)
         return location + (factor @ noise.unsqueeze(-1)).squeeze(-1)
 
-    def rescaled(self, *, scale: Tensor, shift: Tensor) -> Mixture:
+    def rescale_by(self, *, scale: Tensor, shift: Tensor) -> Mixture:
         """Returns the mixture of scale · y + shift, scale (t,) above 0 and shift (t,), or (n, 1, t) for each clip."""
         return Mixture(
             log_weight=self.log_weight,

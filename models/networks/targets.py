@@ -159,7 +159,7 @@ def truth(parameters: Mapping[str, FloatArray], names: Sequence[str]) -> FloatAr
     return np.stack([_target_values(parameters, name) for name in names], axis=1)
 
 
-def stated(parameters: Mapping[str, FloatArray], names: Sequence[str]) -> tuple[str, ...]:
+def stated_targets(parameters: Mapping[str, FloatArray], names: Sequence[str]) -> tuple[str, ...]:
     """Selects the targets of these names that every clip states; parameters as in `truth`.
 
     Raises:

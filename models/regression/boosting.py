@@ -118,7 +118,7 @@ def fit_boosting(
     if len(ascending) < 2 or ascending != tuple(sorted(set(ascending))) or not 0 < ascending[0] < ascending[-1] < 1:
         raise InputError(f"the levels are {ascending}", fix="give at least two between 0 and 1, ascending")
 
-    def fitted(target: FloatArray, loss: str, level: float | None) -> HistGradientBoostingRegressor:
+    def fit_one(target: FloatArray, loss: str, level: float | None) -> HistGradientBoostingRegressor:
         trees = HistGradientBoostingRegressor(
             loss=loss,
             quantile=level,
@@ -132,8 +132,8 @@ def fit_boosting(
         return trees
 
     return Boosting(
-        means=tuple(fitted(target, "squared_error", None) for target in y.T),
-        quantiles=tuple(tuple(fitted(target, "quantile", level) for level in ascending) for target in y.T),
+        means=tuple(fit_one(target, "squared_error", None) for target in y.T),
+        quantiles=tuple(tuple(fit_one(target, "quantile", level) for level in ascending) for target in y.T),
         levels=ascending,
         features=x.shape[1],
     )

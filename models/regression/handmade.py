@@ -103,7 +103,7 @@ def features(frames: Tensor, *, rate: float) -> Tensor:
 
 
 def _of_clip(clip: Tensor, rate: float) -> Tensor:
-    gray = _reduced(clip.float())
+    gray = _reduce_clip(clip.float())
     mean = gray.mean()
     gray = gray - mean
     deviation = gray.square().mean().sqrt()
@@ -130,7 +130,7 @@ def _of_clip(clip: Tensor, rate: float) -> Tensor:
     return torch.stack([torch.as_tensor(number, dtype=torch.float32, device=clip.device) for number in numbers])
 
 
-def _reduced(clip: Tensor) -> Tensor:
+def _reduce_clip(clip: Tensor) -> Tensor:
     """Returns the clip averaged over whole blocks of pixels, so that its shorter side is near `SIDE`."""
     block = max(1, round(min(clip.shape[1:]) / SIDE))
     height, width = (side // block * block for side in clip.shape[1:])
@@ -182,17 +182,17 @@ def _spectral(wave: tuple[Tensor, Tensor, Tensor], slope_x: Tensor, slope_y: Ten
             power *= (2 * (math.pi * frequency / rate).sin()).square()[:, None, None]
             strongest, index = power.max(dim=0)
             weight = strongest + FLOOR
-            middle = _weighted(frequency[index], weight)
-            local = [middle, _weighted((frequency[index] - middle).square(), weight).sqrt()]
+            middle = _weighted_mean(frequency[index], weight)
+            local = [middle, _weighted_mean((frequency[index] - middle).square(), weight).sqrt()]
         spectrum = power.mean(dim=(1, 2))
         powers += list(_log(_band_shares(frequency, float(frequency[0])) @ spectrum))
         weight = spectrum + FLOOR / len(spectrum)
-        middle = _weighted(frequency, weight)
-        shapes += [frequency[spectrum.argmax()], middle, _weighted((frequency - middle).square(), weight).sqrt()]
+        middle = _weighted_mean(frequency, weight)
+        shapes += [frequency[spectrum.argmax()], middle, _weighted_mean((frequency - middle).square(), weight).sqrt()]
     return powers + shapes + local
 
 
-def _weighted(values: Tensor, weight: Tensor) -> Tensor:
+def _weighted_mean(values: Tensor, weight: Tensor) -> Tensor:
     return (values * weight).sum() / weight.sum()
 
 
@@ -238,9 +238,9 @@ def _shape(motion: Tensor) -> list[Tensor]:
     x = (torch.arange(width, device=motion.device, dtype=motion.dtype) - (width - 1) / 2) / SIDE
     y = (torch.arange(height, device=motion.device, dtype=motion.dtype) - (height - 1) / 2) / SIDE
     column, row = weight.sum(dim=0), weight.sum(dim=1)
-    mean_x, mean_y = _weighted(x, column), _weighted(y, row)
-    spread_x = _weighted((x - mean_x).square(), column).sqrt()
-    spread_y = _weighted((y - mean_y).square(), row).sqrt()
+    mean_x, mean_y = _weighted_mean(x, column), _weighted_mean(y, row)
+    spread_x = _weighted_mean((x - mean_x).square(), column).sqrt()
+    spread_y = _weighted_mean((y - mean_y).square(), row).sqrt()
     mixed = ((y - mean_y) @ weight @ (x - mean_x)) / weight.sum()
     return [
         mean_x.abs(),
@@ -250,8 +250,8 @@ def _shape(motion: Tensor) -> list[Tensor]:
         (spread_x / spread_y).log10(),
         (mixed / (spread_x * spread_y)).abs(),
         weight.sum().square() / (weight.square().sum() * weight.numel()),
-        (_weighted((x - mean_x) ** 3, column) / spread_x**3).abs(),
-        _weighted((y - mean_y) ** 3, row) / spread_y**3,
+        (_weighted_mean((x - mean_x) ** 3, column) / spread_x**3).abs(),
+        _weighted_mean((y - mean_y) ** 3, row) / spread_y**3,
     ]
 
 

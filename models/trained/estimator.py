@@ -27,7 +27,7 @@ from models.networks.mixture import Mixture
 from models.networks.targets import Cloth, Target
 from models.trained.model_folder import WEIGHTS, check_model, read_card, read_tensors
 from models.trained.outliers import Familiarity
-from models.trained.restriction import Known, Restricted, restricted
+from models.trained.restriction import Known, Restricted, restrict_mixtures
 
 SHIPPED = Path(__file__).parents[1] / "shipped"
 """Models that come with the package, a folder each."""
@@ -197,7 +197,7 @@ class Estimator:
             InputError: a model without distributions.
         """
         parts = [
-            learner.mixture(embedding).double().rescaled(scale=learner.spread.double(), shift=learner.centre.double())
+            learner.mixture(embedding).double().rescale_by(scale=learner.spread.double(), shift=learner.centre.double())
             for learner, embedding in zip(self.learners, embeddings, strict=True)
         ]
         together = Mixture(
@@ -206,17 +206,17 @@ class Estimator:
             factor=torch.cat([part.factor for part in parts], dim=1),
         )
         widening = self.widening.to(together.location)
-        return together.rescaled(scale=widening, shift=(together.mean() * (1 - widening))[:, None])
+        return together.rescale_by(scale=widening, shift=(together.mean() * (1 - widening))[:, None])
 
     @torch.no_grad()
     def given(self, posterior: Mixture, known: Sequence[Known], *, seed: int, draws: int) -> Restricted:
         """Draws from distributions of `posterior` restricted to what is known.
 
         Raises:
-            InputError: see `models.trained.restriction.restricted`.
+            InputError: see `models.trained.restriction.restrict_mixtures`.
         """
         generator = torch_generator(seed, "known", device=posterior.location.device)
-        return restricted(posterior, self.learners[0].scaling, known, draws=draws, generator=generator)
+        return restrict_mixtures(posterior, self.learners[0].scaling, known, draws=draws, generator=generator)
 
     def prior(self, count: int) -> Mixture:
         """Describes what the training set's targets are like: `count` times the Gaussian of their logits' means and
@@ -291,7 +291,7 @@ def load(folder: Path) -> Estimator:
 _FIX = "train it again, or update flagdata"
 
 
-def shipped(name: str = DEFAULT) -> Estimator:
+def load_shipped(name: str = DEFAULT) -> Estimator:
     """Loads a model that comes with the package.
 
     Raises:

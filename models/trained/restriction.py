@@ -134,7 +134,7 @@ class Restricted:
     log_mass: Tensor
 
 
-def restricted(
+def restrict_mixtures(
     mixture: Mixture, scaling: Scaling, known: Sequence[Known], *, draws: int, generator: torch.Generator
 ) -> Restricted:
     """Draws from mixtures restricted by statements about some of their quantities.

@@ -21,7 +21,7 @@ from torch import Tensor
 from flagdata.core.files.checksums import SUMS, check_sums, files_of, write_sums
 from flagdata.core.files.durable import flush_file
 from flagdata.core.files.file_locks import LOCK
-from flagdata.core.numbered import bounded
+from flagdata.core.numbered import read_bounded
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, RefusedError
 from models.networks.learner import Learner
 from models.trained.model_folder import CARD, WEIGHTS, read_card, read_tensors, write_card, write_tensors
@@ -188,7 +188,7 @@ def _take_moments(standing: Standing, tensors: dict[str, Tensor]) -> None:
     moments: dict[int, dict[str, Tensor]] = {}
     for name, tensor in tensors.items():
         digits, _, kind = name.partition(".")
-        index = bounded(digits, most=len(shapes))
+        index = read_bounded(digits, most=len(shapes))
         if index not in shapes:
             raise ValueError(f"moments are of parameter {digits!r}, which is none of the model")
         moments.setdefault(index, {})[kind] = tensor

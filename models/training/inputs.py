@@ -27,7 +27,7 @@ import torch
 from torch import Tensor
 
 from flagdata.core.arrays import AnyArray, BoolArray, FloatArray, IntArray, UInt8Array
-from flagdata.core.files.checksums import is_sealed, sealed
+from flagdata.core.files.checksums import is_sealed, seal_bytes
 from flagdata.core.files.file_locks import alone_in
 from flagdata.core.files.outputs import rewrite
 from flagdata.core.provenance import canonical, digest
@@ -38,7 +38,7 @@ from flagdata.errors import CorruptError, FlagdataError, InputError
 from flagdata.timebase import NANOSECONDS
 from models.conditioning.conditioning import VERSION
 from models.maps.crops import Cropping
-from models.maps.frontend import FrontEnd, standardised
+from models.maps.frontend import FrontEnd, standardise_clip
 from models.networks import targets
 from models.training.augment import Augment
 from models.training.conditioned_clips import FitFilm
@@ -159,7 +159,7 @@ def as_input(stored: Tensor) -> Tensor:
     """Converts what was stored to what a network takes: maps as float32, frames standardised clip by clip."""
     if stored.dtype != torch.uint8:
         return stored.float()
-    return torch.stack([standardised(clip) for clip in stored])
+    return torch.stack([standardise_clip(clip) for clip in stored])
 
 
 def prepare_films(
@@ -210,7 +210,7 @@ def prepare_films(
         drawn = [cropping.draw(stream(0, "crop", recording, variant), _shape(film)) for variant in range(variants)]
         return [cropping.cut(film, crop) for crop in drawn]
 
-    return _prepared(pairs, rows, front_end, key, crops, variants, folder, workers, advance)
+    return _prepare_pairs(pairs, rows, front_end, key, crops, variants, folder, workers, advance)
 
 
 def film_rows(pairs: Pairs, *, sequences: int | None, seed: int) -> IntArray:
@@ -247,7 +247,7 @@ def prepare_clips(
         )
         return [cropping.cut(clip, cropping.whole(_shape(clip)))]
 
-    return _prepared(pairs, np.arange(len(pairs)), front_end, key, crops, 1, folder, workers, advance)
+    return _prepare_pairs(pairs, np.arange(len(pairs)), front_end, key, crops, 1, folder, workers, advance)
 
 
 def clip_as_taken(pairs: Pairs, row: int, front_end: FrontEnd) -> UInt8Array:
@@ -301,7 +301,7 @@ def _conditioned_clip(pairs: Pairs, row: int, front_end: FrontEnd) -> UInt8Array
     return film.clip_near(int(pairs.table.frame_first[row]), front_end.frames, front_end.rate)
 
 
-def _prepared(
+def _prepare_pairs(
     pairs: Pairs,
     rows: IntArray,
     front_end: FrontEnd,
@@ -406,7 +406,7 @@ def _write(path: Path, clips: Sequence[Tensor], front_end: FrontEnd) -> None:
         stored = np.stack([front_end(clip[None])[0].to(torch.float16).numpy() for clip in clips])
     content = io.BytesIO()
     np.save(content, stored)
-    rewrite(path, sealed(content.getvalue()))
+    rewrite(path, seal_bytes(content.getvalue()))
 
 
 def _first_sequences(pairs: Pairs, rows: IntArray, *, count: int | None, seed: int) -> BoolArray:

@@ -49,7 +49,7 @@ class LossCourse:
         """The epoch with the smallest validation loss, the first of equals."""
         return min(self.epochs, key=lambda epoch: epoch.validation, default=None)
 
-    def stalled(self, patience: int) -> bool:
+    def is_stalled(self, patience: int) -> bool:
         """Returns whether the last `patience` epochs were no better than the best before them."""
         best = self.best
         return best is not None and len(self.epochs) - 1 - best.number >= patience

@@ -262,7 +262,7 @@ class Training:
         self._values(self.validation, learner)  # what cannot be learned is refused before the first step
         module = _Loss(learner)
         stepped: nn.Module = module if _share()[1] == 1 else DistributedDataParallel(module)
-        while len(course.epochs) < spec.epochs and not course.stalled(spec.patience):
+        while len(course.epochs) < spec.epochs and not course.is_stalled(spec.patience):
             self._epoch(standing, batches, stepped, values)
         if standing.best is not None:
             learner.load_state_dict(standing.best)

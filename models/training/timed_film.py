@@ -49,7 +49,7 @@ class TimedFilm:
     _interpolator: Interpolator = field(default_factory=lambda: Interpolator(capacity=1000))
 
     @cached_property
-    def _timed(self) -> list[TimedFrame]:
+    def _timed_frames(self) -> list[TimedFrame]:
         return list(zip(self.times.tolist(), self.frames, strict=True))
 
     def starts(self, count: int, rate: float) -> IntArray:
@@ -82,7 +82,7 @@ class TimedFilm:
         """Resamples (count, height, width) pictures at `rate` [Hz] from a frame on, and returns their times [s]."""
         instants = self.times[first] + np.arange(count) / rate
         period = float(np.median(np.diff(self.times)))
-        return at_instants(self._timed, instants, period=period, interpolator=self._interpolator)[0], instants
+        return at_instants(self._timed_frames, instants, period=period, interpolator=self._interpolator)[0], instants
 
     def clip_near(self, first: int, count: int, rate: float) -> UInt8Array:
         """Resamples a clip, as `clip`, from a frame on or from as early as the film has to be entered for its length.

@@ -19,7 +19,7 @@ from flagdata.core.console import echo, progress, say
 from flagdata.core.files.checksums import write_sums
 from flagdata.core.provenance import canonical, code_version
 from flagdata.core.schema import Kind
-from flagdata.core.workload import announced
+from flagdata.core.workload import announce_work
 from flagdata.dataset import Pairs
 from flagdata.errors import ConflictError, UsageError
 from flagdata.lake import Artifact, Lake
@@ -158,7 +158,7 @@ def train(chosen: Training) -> Iterator[Result]:
         loaded = replace(loaded, seed=chosen.seed)
     if chosen.sequences is not None:
         loaded = replace(loaded, data=replace(loaded.data, sequences=chosen.sequences))
-    report = trained(loaded, chosen, bars=progress)
+    report = train_and_publish(loaded, chosen, bars=progress)
     if report is None:  # another rank of a torchrun reports
         return
     yield Result("train", report)
@@ -170,7 +170,7 @@ def train(chosen: Training) -> Iterator[Result]:
     echo(f"{report['artifact']}  network {report['name']}, seed {report['seed']}")
 
 
-def trained(
+def train_and_publish(
     recipe: TrainingRecipe,
     chosen: Training,
     *,
@@ -186,7 +186,7 @@ def trained(
 
     from flagdata.core.files.file_locks import alone_in
     from flagdata.core.provenance import digest
-    from flagdata.dataset.lake_source import opened
+    from flagdata.dataset.lake_source import open_source
     from flagdata.lake.remaking import present, said
     from models.trained.model_folder import read_card
     from models.training.beginning import check_clips
@@ -198,7 +198,7 @@ def trained(
     at, branch, workers, device = chosen.at, chosen.branch, chosen.processes, chosen.device
     if chosen.run is not None:
         check_folder(chosen.run)
-    source = opened(chosen.lake)
+    source = open_source(chosen.lake)
     source.lake.check_writable()
     cache = chosen.inputs(source.lake)
     train_pairs, validation_pairs = (sides_of(source, recipe, side, at=at) for side in ("train", "validation"))
@@ -229,7 +229,7 @@ def trained(
             ranks.barrier()  # the first prepares the inputs for all
         if first:
             say(
-                announced(
+                announce_work(
                     f"preparing {len(films)} films and {len(validation_pairs)} clips",
                     _PREPARED * (len(films) * recipe.variants + len(validation_pairs)),
                     workers=workers,
@@ -273,7 +273,7 @@ def trained(
                 say(f"the training goes on from its checkpoint: {_place(standing, recipe.optimiser.epochs)}")
             if left := recipe.optimiser.epochs - len(standing.course.epochs):
                 say(
-                    announced(
+                    announce_work(
                         f"training for up to {left} {'more ' if standing.has_begun else ''}epochs",
                         training.length(left) * workers,
                         workers=workers,

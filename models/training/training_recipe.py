@@ -33,7 +33,7 @@ from flagdata.errors import InputError, LimitError, NotFoundError, UnknownNameEr
 from flagdata.lake import Lake
 from flagdata.lake.matching import Values
 from flagdata.recipes.retired_names import NAMES, hashed_name
-from flagdata.recipes.shelves import Shelf, is_name, parsed
+from flagdata.recipes.shelves import Shelf, is_name, parse_recipe
 from flagdata.recipes.typed_tables import WHOLE_LIMIT, Count, Named, Whole, read
 from models.conditioning.conditioning import VERSION
 from models.maps.crops import Cropping
@@ -296,7 +296,7 @@ class _Input:
 
 def parse(text: str, *, name: str, where: str, folder: Path = Path()) -> TrainingRecipe:
     """Parses a recipe from its text; raises as `load`."""
-    form = read(_TrainingTables, parsed(text, where=where), where=where)
+    form = read(_TrainingTables, parse_recipe(text, where=where), where=where)
     front_end, cropping = _input(form.input, where=f"{where} [input]")
     return TrainingRecipe(
         name=name,

@@ -165,7 +165,7 @@ def read_scene(path: Path, *, root: Path | None = None, accept: Collection[str] 
     for stage in (*accept, *_list(content, "disable", where)):
         if stage not in STAGES:
             raise UnknownNameError.of("ArcSim stage", str(stage), STAGES, where=where)
-    left_out = _supported(content, where, frozenset(accept))
+    left_out = _supported_stages(content, where, frozenset(accept))
     cloth = _single(content, "cloths", where)
     entry = _single(cloth, "materials", where)
 
@@ -185,8 +185,8 @@ def read_scene(path: Path, *, root: Path | None = None, accept: Collection[str] 
         nodes += [int(node) for node in handle.get("nodes", [])]
     scene = Scene(
         mesh=mesh,
-        position=_placed(shape.positions, transform, where),
-        material=_scaled(read_material(folder / _text(entry, "data", where)), entry, where),
+        position=_place_positions(shape.positions, transform, where),
+        material=_scale_material(read_material(folder / _text(entry, "data", where)), entry, where),
         handles=Handles(
             vertices=tuple(nodes), stiffness=_number(magic, "handle_stiffness", ARCSIM_STIFFNESS, f"{where}, magic")
         ),
@@ -223,7 +223,7 @@ def _frames(content: Mapping[str, Any], frame_time: float, where: str) -> int:
     return math.floor(frames + 1e-9)
 
 
-def _supported(content: Mapping[str, Any], where: str, accept: frozenset[str]) -> tuple[str, ...]:
+def _supported_stages(content: Mapping[str, Any], where: str, accept: frozenset[str]) -> tuple[str, ...]:
     """Lists the stages that act and are left out.
 
     Raises:
@@ -317,7 +317,7 @@ def _strange(content: Any, schema: Mapping[str, Any], path: str, where: str) -> 
     return unknown
 
 
-def _scaled(material: Material, entry: Mapping[str, Any], where: str) -> Material:
+def _scale_material(material: Material, entry: Mapping[str, Any], where: str) -> Material:
     thicken = _number(entry, "thicken", 1.0, where)
     scaled = material.scaled(
         area_weight=thicken * _number(entry, "density_mult", 1.0, where),
@@ -327,7 +327,7 @@ def _scaled(material: Material, entry: Mapping[str, Any], where: str) -> Materia
     return replace(scaled, damping=_number(entry, "damping", 0.0, where))
 
 
-def _placed(positions: FloatArray, transform: Mapping[str, Any], where: str) -> FloatArray:
+def _place_positions(positions: FloatArray, transform: Mapping[str, Any], where: str) -> FloatArray:
     """Applies a transform: scaled, turned (angle in degrees about an axis), then moved."""
     placed = positions * _number(transform, "scale", 1.0, where)
     if "rotate" in transform:

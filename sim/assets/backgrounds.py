@@ -13,7 +13,7 @@ import numpy as np
 from flagdata.core.arrays import FloatArray
 from sim.assets.colour import Hue, hue
 from sim.assets.seeded import Seeded
-from sim.assets.smooth_fields import Picture, Plane, defocused, fractal, over, ridge, smoothstep
+from sim.assets.smooth_fields import Picture, Plane, defocus, fractal, over, ridge, smoothstep
 
 _ROWS, _COLUMNS = 400, 512  # px
 _HEIGHT: Plane = np.linspace(1.0, 0.0, _ROWS)[:, None] * np.ones((1, _COLUMNS))  # 1 at the upper edge
@@ -167,22 +167,22 @@ def _house(rng: np.random.Generator, picture: Picture, distance: float, haze: Fl
     return result
 
 
-def _photographed(paint: Callable[[np.random.Generator], Picture]) -> Callable[[np.random.Generator], Picture]:
+def _photograph(paint: Callable[[np.random.Generator], Picture]) -> Callable[[np.random.Generator], Picture]:
     """Wraps a painter so that its picture gets a focus, a tint, a contrast and a side of its own."""
 
-    def painted(rng: np.random.Generator) -> Picture:
+    def paint_and_expose(rng: np.random.Generator) -> Picture:
         picture = np.clip(paint(rng), 0.0, 1.2)
         if rng.random() < 0.6:
-            picture = defocused(picture, rng.uniform(0.3, 3.0))
+            picture = defocus(picture, rng.uniform(0.3, 3.0))
         picture = picture * (1 + rng.uniform(-0.06, 0.06, 3)) * rng.uniform(0.8, 1.15)
         picture = 0.5 + (picture - 0.5) * rng.uniform(0.75, 1.2)
         return picture[:, ::-1] if rng.random() < 0.5 else picture
 
-    return painted
+    return paint_and_expose
 
 
-SKY = Seeded(kind="sky", paint=_photographed(_sky))
-CLOUDS = Seeded(kind="clouds", paint=_photographed(_clouds))
-HILLS = Seeded(kind="hills", paint=_photographed(_hills))
-FOLIAGE = Seeded(kind="foliage", paint=_photographed(_foliage))
-BUILDINGS = Seeded(kind="buildings", paint=_photographed(_buildings))
+SKY = Seeded(kind="sky", paint=_photograph(_sky))
+CLOUDS = Seeded(kind="clouds", paint=_photograph(_clouds))
+HILLS = Seeded(kind="hills", paint=_photograph(_hills))
+FOLIAGE = Seeded(kind="foliage", paint=_photograph(_foliage))
+BUILDINGS = Seeded(kind="buildings", paint=_photograph(_buildings))

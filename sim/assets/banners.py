@@ -77,7 +77,7 @@ def _dye_beside(field: FloatArray, rng: np.random.Generator) -> FloatArray:
     return dye
 
 
-def painted(layout: str, colours: FloatArray, rng: np.random.Generator) -> FloatArray:
+def paint_layout(layout: str, colours: FloatArray, rng: np.random.Generator) -> FloatArray:
     """Paints a layout of drawn proportions: (384, 576, 3) encoded values in [0, 1].
 
     Args:
@@ -122,14 +122,14 @@ def _bands(rng: np.random.Generator) -> list[tuple[float, float]]:
 
 
 def _cross(sheet: FlagSheet, parts: Sequence[str], rng: np.random.Generator) -> None:
-    _crossed(sheet, parts, rng, x=_WIDTH / 2)
+    _paint_cross(sheet, parts, rng, x=_WIDTH / 2)
 
 
 def _nordic(sheet: FlagSheet, parts: Sequence[str], rng: np.random.Generator) -> None:
-    _crossed(sheet, parts, rng, x=rng.uniform(0.45, 0.6))
+    _paint_cross(sheet, parts, rng, x=rng.uniform(0.45, 0.6))
 
 
-def _crossed(sheet: FlagSheet, parts: Sequence[str], rng: np.random.Generator, *, x: float) -> None:
+def _paint_cross(sheet: FlagSheet, parts: Sequence[str], rng: np.random.Generator, *, x: float) -> None:
     """Paints an upright cross about (x, 1/2), with a border or without."""
     arm, border = rng.uniform(0.1, 0.3), rng.uniform(0.0, 0.08) * (rng.random() < 0.5)
     for width, colour in ((arm + 2 * border, parts[1]), (arm, parts[0])):
@@ -161,7 +161,7 @@ def _canton(sheet: FlagSheet, parts: Sequence[str], rng: np.random.Generator) ->
         sheet.star(width / 2, height / 2, rng.uniform(0.25, 0.45) * min(width, height), parts[2])
 
 
-def _striped(sheet: FlagSheet, parts: Sequence[str], rng: np.random.Generator) -> None:
+def _paint_stripes(sheet: FlagSheet, parts: Sequence[str], rng: np.random.Generator) -> None:
     """Paints stripes of two colours, and a canton that ends where a stripe does, some of them with rows of stars."""
     stripes = int(rng.integers(3, 8)) * 2 - 1
     for index in range(0, stripes, 2):
@@ -213,7 +213,7 @@ LAYOUTS: Mapping[str, _Layout] = {
     "plain": _plain,
     "quarters": _quarters,
     "saltire": _saltire,
-    "stripes-with-canton": _striped,
+    "stripes-with-canton": _paint_stripes,
     "triangle": _triangle,
     "vertical-bands": _vertical,
 }
@@ -222,7 +222,7 @@ LAYOUTS: Mapping[str, _Layout] = {
 
 def _banner(rng: np.random.Generator) -> FloatArray:
     banner = drawn(rng)
-    return painted(banner.layout, banner.colours, rng)
+    return paint_layout(banner.layout, banner.colours, rng)
 
 
 BANNER = Seeded(kind="banner", paint=_banner)

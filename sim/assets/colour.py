@@ -25,13 +25,13 @@ def of_hex(text: str) -> FloatArray:
     return np.array([int(text[i : i + 2], 16) for i in (1, 3, 5)], dtype=np.float64) / 255
 
 
-def decoded(code: ArrayLike) -> FloatArray:
+def decode_values(code: ArrayLike) -> FloatArray:
     """Converts encoded values to linear ones."""
     value = np.asarray(code, dtype=np.float64)
     return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
 
 
-def encoded(linear: ArrayLike) -> FloatArray:
+def encode_values(linear: ArrayLike) -> FloatArray:
     """Converts linear values to encoded ones."""
     value = np.asarray(linear, dtype=np.float64)
     return np.where(value <= 0.0031308, 12.92 * value, 1.055 * np.maximum(value, 0.0) ** (1 / 2.4) - 0.055)

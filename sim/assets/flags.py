@@ -17,7 +17,7 @@ import numpy as np
 
 from flagdata.core.arrays import BoolArray, Float32Array, UInt8Array
 from flagdata.errors import UnknownNameError
-from sim.assets.colour import decoded, encoded, of_hex
+from sim.assets.colour import decode_values, encode_values, of_hex
 
 _FINE = 4  # sub-samples of a pixel in each direction
 
@@ -104,8 +104,8 @@ class FlagSheet:
         mean = np.zeros((rows, columns, 3))
         for index, colour in enumerate(self.colours):
             share = (blocks == index).sum(axis=(1, 3)) / _FINE**2
-            mean += share[:, :, None] * decoded(of_hex(colour))
-        return np.rint(encoded(mean) * 255).astype(np.uint8)
+            mean += share[:, :, None] * decode_values(of_hex(colour))
+        return np.rint(encode_values(mean) * 255).astype(np.uint8)
 
     def _index(self, colour: str) -> int:
         if colour not in self.colours:
@@ -303,11 +303,11 @@ class _National:
     def image(self, member: str) -> UInt8Array:
         if member not in FLAGS:
             raise UnknownNameError.of("flag", member, FLAGS)
-        return _painted(member)
+        return _paint_flag(member)
 
 
 @functools.cache
-def _painted(name: str) -> UInt8Array:
+def _paint_flag(name: str) -> UInt8Array:
     sheet = FlagSheet.blank(rows=ROWS, columns=ROWS * 3 // 2, colour=_WHITE)
     FLAGS[name].draw(sheet)
     image = sheet.bytes()

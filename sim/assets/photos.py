@@ -35,7 +35,7 @@ class Photos:
         Raises:
             InputError: it is no folder, or holds no photographs.
         """
-        return _listed(folder.resolve())
+        return _list_photos(folder.resolve())
 
     def draw(self, rng: np.random.Generator) -> str:
         return self.members[int(rng.integers(len(self.members)))]
@@ -60,7 +60,7 @@ class Photos:
 
 
 @functools.cache
-def _listed(folder: Path) -> Photos:
+def _list_photos(folder: Path) -> Photos:
     if not folder.is_dir():
         raise InputError("there is no such folder", where=str(folder), fix="name a folder of photographs")
     members = sorted(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flagdata.core.arrays import FloatArray, UInt8Array
-from flagdata.core.numbered import bounded
+from flagdata.core.numbered import read_bounded
 from flagdata.core.rng import stream
 from flagdata.errors import InputError
 from flagdata.recipes.typed_tables import SEED_LIMIT
@@ -35,7 +35,7 @@ class Seeded:
         Raises:
             InputError: the member is no seed.
         """
-        seed = bounded(member, most=SEED_LIMIT)
+        seed = read_bounded(member, most=SEED_LIMIT)
         if seed is None:
             raise InputError(f"{member!r} is no seed", where=f"{self.kind}/…", fix=f"write {self.kind}/ and a number")
         values = self.paint(stream(seed, "assets", self.kind))

@@ -50,7 +50,7 @@ def over(below: Picture, colour: FloatArray, share: Plane) -> Picture:
     return below + share[:, :, None] * (colour - below)
 
 
-def defocused(picture: Picture, radius: float) -> Picture:
+def defocus(picture: Picture, radius: float) -> Picture:
     """Blurs a picture by a Gaussian of standard deviation `radius` [px], mirrored at its edges."""
     from scipy.ndimage import gaussian_filter
 

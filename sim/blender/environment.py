@@ -182,7 +182,7 @@ def create(folder: Path, *, python: str | None = None, say: Callable[[str], None
         (str(target), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", REQUIREMENT),
         folder,
         fix="see what pip said above: the index that pip is set to must offer this version for Python "
-        f"{_dotted(PYTHON)}; delete the folder if it is of another Python",
+        f"{_dotted_version(PYTHON)}; delete the folder if it is of another Python",
     )
     check.cache_clear()
     return check(target)
@@ -195,15 +195,15 @@ def _is_own(folder: Path) -> bool:
 
 def _python_for_blender(requested: str | None) -> str:
     """Finds the path of a Python of version `PYTHON`."""
-    for candidate in (requested,) if requested else (sys.executable, f"python{_dotted(PYTHON)}", "python3"):
+    for candidate in (requested,) if requested else (sys.executable, f"python{_dotted_version(PYTHON)}", "python3"):
         path = shutil.which(candidate)
         if path and _version(path) == PYTHON:
             return path
     raise NotFoundError(
-        f"{requested or 'the running Python'} is not Python {_dotted(PYTHON)}, the only version that Blender {SERIES} "
-        "is built for" + ("" if requested else f", and the search path has no python{_dotted(PYTHON)}"),
+        f"{requested or 'the running Python'} is not Python {_dotted_version(PYTHON)}, the only version that Blender {SERIES} "
+        "is built for" + ("" if requested else f", and the search path has no python{_dotted_version(PYTHON)}"),
         where="flagdata blender-setup",
-        fix=f"install Python {_dotted(PYTHON)} and name it with --python",
+        fix=f"install Python {_dotted_version(PYTHON)} and name it with --python",
     )
 
 
@@ -214,7 +214,7 @@ def _version(python: str) -> tuple[int, ...] | None:
     return tuple(int(part) for part in done.stdout.split()) if done.returncode == 0 else None
 
 
-def _dotted(version: tuple[int, ...]) -> str:
+def _dotted_version(version: tuple[int, ...]) -> str:
     return ".".join(str(part) for part in version)
 
 

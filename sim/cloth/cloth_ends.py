@@ -40,7 +40,7 @@ class Ends:
     within: IntArray
     weights: FloatArray
 
-    def continued(self, field: Tensor) -> Tensor:
+    def continue_field(self, field: Tensor) -> Tensor:
         """Replaces a field's values (vertex, …) at the ends by those continued from within."""
         if not len(self.vertices):
             return field

@@ -63,11 +63,11 @@ class StrainLimits:
 
 def stretches(cloth: Cloth, position: Tensor) -> tuple[Tensor, Tensor]:
     """Computes larger and smaller principal stretch of the faces: (face, batch) each."""
-    _, squares = _decomposed(cloth, position)
+    _, squares = _decompose_deformation(cloth, position)
     return squares[0].sqrt(), squares[1].sqrt()
 
 
-def _decomposed(cloth: Cloth, position: Tensor) -> tuple[tuple[Tensor, Tensor], tuple[Tensor, Tensor]]:
+def _decompose_deformation(cloth: Cloth, position: Tensor) -> tuple[tuple[Tensor, Tensor], tuple[Tensor, Tensor]]:
     """Computes x_u, x_v (face, 3, batch), and the eigenvalues of FᵀF, larger first (face, batch)."""
     corners = cloth.at_corners(position)
     d = cloth.gradients[..., None, None]
@@ -81,7 +81,7 @@ def _decomposed(cloth: Cloth, position: Tensor) -> tuple[tuple[Tensor, Tensor], 
 
 def correction(cloth: Cloth, limits: StrainLimits, position: Tensor) -> Tensor:
     """Computes what one sweep moves the vertices by: (vertex, 3, batch) [m]."""
-    (xu, xv), (large, small) = _decomposed(cloth, position)
+    (xu, xv), (large, small) = _decompose_deformation(cloth, position)
     scale_large = large.sqrt().clamp(limits.low, limits.high) / large.sqrt()
     scale_small = small.sqrt().clamp(limits.low, limits.high) / small.sqrt()
     # V diag(s) Vᵀ − I = α I + β C, a polynomial of C = FᵀF with the values s − 1 at its eigenvalues.
@@ -107,7 +107,7 @@ def least_correction(cloth: Cloth, limits: StrainLimits, position: Tensor) -> Te
     shape function. `correction` moves them as the nearest F does, which is the same for equal sides; among slivers it
     is no nearest point, and sweeps of it diverge.
     """
-    (xu, xv), squares = _decomposed(cloth, position)
+    (xu, xv), squares = _decompose_deformation(cloth, position)
     a, b, c = (xu * xu).sum(1), (xu * xv).sum(1), (xv * xv).sum(1)
     turn = torch.atan2(2 * b, a - c) / 2
     directions = (turn.cos(), turn.sin()), (-turn.sin(), turn.cos())
@@ -126,7 +126,7 @@ def least_correction(cloth: Cloth, limits: StrainLimits, position: Tensor) -> Te
     return gather_sum(moves, cloth.face_slots) / areas[:, None, None]
 
 
-def limited(
+def limit_strains(
     cloth: Cloth, limits: StrainLimits, position: Tensor, velocity: Tensor, step: float, free: Tensor
 ) -> tuple[Tensor, Tensor]:
     """Positions and velocities after a step [s]; `free` (vertex, 1, 1) is 0 for what the handles hold, else 1."""
@@ -137,7 +137,7 @@ def limited(
 def limited_among_slivers(
     cloth: Cloth, limits: StrainLimits, position: Tensor, velocity: Tensor, step: float, free: Tensor
 ) -> tuple[Tensor, Tensor]:
-    """Positions and velocities after a step [s], as `limited`, on a mesh of triangles with unequal sides."""
+    """Positions and velocities after a step [s], as `limit_strains`, on a mesh of triangles with unequal sides."""
     sweep = partial(least_correction, cloth, limits)
     return _swept(sweep, chebyshev_weights(limits.sweeps, RADIUS_AMONG_SLIVERS), position, velocity, step, free)
 

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from flagdata.core.arrays import FloatArray
 from flagdata.errors import InputError
 from flagdata.recipes.retired_names import with_present_keys
-from flagdata.recipes.shelves import Shelf, parsed
+from flagdata.recipes.shelves import Shelf, parse_recipe
 
 STRETCHING_SHAPE = (6, 4)
 BENDING_SHAPE = (3, 5)
@@ -164,7 +164,7 @@ def isotropic(
 
 
 @functools.cache
-def named(name: str, *, where: str | None = None) -> Material:
+def named_material(name: str, *, where: str | None = None) -> Material:
     """Reads a material of the catalog.
 
     Args:
@@ -174,4 +174,4 @@ def named(name: str, *, where: str | None = None) -> Material:
         UnknownNameError: with the nearest name that is there.
     """
     entry = MATERIALS.named(name, where=where)
-    return Material.from_mapping(parsed(entry.text, where=entry.where), name=name)
+    return Material.from_mapping(parse_recipe(entry.text, where=entry.where), name=name)

@@ -82,15 +82,15 @@ def fold(hinges: Tensor, position: Tensor) -> tuple[Tensor, tuple[Tensor, Tensor
     """Computes fold angles (hinge, batch) of hinges (hinge, 4) and their gradients at the corners: see
     `sim.cloth.bending.Fold`."""
     i, j, k, opposite = (position.new_empty((len(hinges), 3, position.shape[-1])) for _ in range(4))
-    return _folded(hinges, position, _places([i, j, k, opposite])), (i, j, k, opposite)
+    return _fold_angles(hinges, position, _places([i, j, k, opposite])), (i, j, k, opposite)
 
 
 def fold_angle(hinges: Tensor, position: Tensor) -> Tensor:
     """Computes fold angles (hinge, batch) alone."""
-    return _folded(hinges, position, None)
+    return _fold_angles(hinges, position, None)
 
 
-def _folded(hinges: Tensor, position: Tensor, gradients: ctypes.Array[ctypes.c_void_p] | None) -> Tensor:
+def _fold_angles(hinges: Tensor, position: Tensor, gradients: ctypes.Array[ctypes.c_void_p] | None) -> Tensor:
     batch = position.shape[-1]
     x, angle = _side_by_side(position, batch), position.new_empty((len(hinges), batch))
     _call("fold", hinges, len(hinges), batch, _view(x), angle, gradients)
@@ -119,10 +119,10 @@ def _call(name: str, *arguments: Tensor | int | _View | ctypes.Array[ctypes.c_vo
     dtype = next(a.dtype for a in reversed(arguments) if isinstance(a, Tensor))
     function = getattr(library(), f"{name}_{_NAMES[dtype]}")
     function.restype = None
-    function(*map(_passed, arguments))
+    function(*map(_pass_argument, arguments))
 
 
-def _passed(argument: Tensor | int | _View | ctypes.Array[ctypes.c_void_p] | None) -> object:
+def _pass_argument(argument: Tensor | int | _View | ctypes.Array[ctypes.c_void_p] | None) -> object:
     if isinstance(argument, Tensor):
         return ctypes.c_void_p(argument.data_ptr())
     return ctypes.c_int64(argument) if isinstance(argument, int) else argument

@@ -105,7 +105,7 @@ def upright(mesh: Mesh) -> FloatArray:
     return np.stack([zero, mesh.rest[:, 0], mesh.rest[:, 1]], axis=1)
 
 
-def roughened(flat: FloatArray, handles: Handles, rng: np.random.Generator, sigma: float) -> FloatArray:
+def roughen_start(flat: FloatArray, handles: Handles, rng: np.random.Generator, sigma: float) -> FloatArray:
     """Returns a start (vertex, 3) [m]: a flat one, with normal noise of deviation `sigma` [m] on what nothing holds."""
     noise = rng.normal(0.0, sigma, flat.shape)
     noise[list(handles.vertices)] = 0.0

@@ -68,7 +68,7 @@ class Remeshing:
 
 def vertex_metrics(mesh: Mesh, position: FloatArray, velocity: FloatArray, criteria: Remeshing) -> FloatArray:
     """Computes the metric (vertex, 2, 2) [1/m²] of a cloth at positions and velocities (vertex, 3) [m, m/s]."""
-    metrics = bounded(face_metrics(mesh, position, velocity, criteria), criteria)
+    metrics = bound_metric(face_metrics(mesh, position, velocity, criteria), criteria)
     total = np.zeros((mesh.vertex_count, 2, 2))
     for corner in range(3):
         np.add.at(total, mesh.faces[:, corner], metrics * (mesh.areas / 3)[:, None, None])
@@ -78,16 +78,16 @@ def vertex_metrics(mesh: Mesh, position: FloatArray, velocity: FloatArray, crite
 def face_metrics(mesh: Mesh, position: FloatArray, velocity: FloatArray, criteria: Remeshing) -> FloatArray:
     """Computes the metric (face, 2, 2) [1/m²] that the criteria ask for, without its bounds below `size_max`."""
     folds, turning = fold_curvature(mesh, position), gradient(mesh, vertex_normals(mesh, position))
-    bent, turned = _squared(folds), _squared(turning)
+    bent, turned = _squared_norm(folds), _squared_norm(turning)
     stretch = gradient(mesh, position)
     # A ridge stiffens the cloth along itself.
     ridges = np.trace(turned, axis1=1, axis2=2)[:, None, None] * np.eye(2) - turned
-    compression = (np.eye(2) - _squared(stretch)) / 2 - 2 * criteria.refine_compression**2 * ridges
+    compression = (np.eye(2) - _squared_norm(stretch)) / 2 - 2 * criteria.refine_compression**2 * ridges
     metric = np.broadcast_to(np.eye(2) / criteria.size_max**2, bent.shape)
     for other in (
         bent / criteria.refine_angle**2,
         turned / criteria.refine_angle**2,
-        _squared(gradient(mesh, velocity)) / criteria.refine_velocity**2,
+        _squared_norm(gradient(mesh, velocity)) / criteria.refine_velocity**2,
         _positive(compression) / criteria.refine_compression**2,
     ):
         metric = larger(metric, other)
@@ -142,31 +142,31 @@ def face_of_edges(mesh: Mesh) -> dict[tuple[int, int], int]:
     }
 
 
-def bounded(metric: FloatArray, criteria: Remeshing) -> FloatArray:
+def bound_metric(metric: FloatArray, criteria: Remeshing) -> FloatArray:
     """Bounds the eigenvalues of metrics (n, 2, 2) by the sizes, and the lesser one by the aspect."""
     values, axes = np.linalg.eigh(metric)
     values = np.clip(values, criteria.size_max**-2, criteria.size_min**-2)
     values = np.maximum(values, values.max(axis=1, keepdims=True) * criteria.aspect_min**2)
-    return _composed(values, axes)
+    return _compose_metric(values, axes)
 
 
 def larger(first: FloatArray, second: FloatArray) -> FloatArray:
     """Returns the smallest metrics (n, 2, 2) that are, in any direction, not less than a positive definite and another
     one."""
     values, axes = np.linalg.eigh(first)
-    root, inverse = _composed(np.sqrt(values), axes), _composed(1 / np.sqrt(values), axes)
+    root, inverse = _compose_metric(np.sqrt(values), axes), _compose_metric(1 / np.sqrt(values), axes)
     values, axes = np.linalg.eigh(inverse @ second @ inverse)
-    return root @ _composed(np.maximum(values, 1), axes) @ root
+    return root @ _compose_metric(np.maximum(values, 1), axes) @ root
 
 
 def _positive(tensor: FloatArray) -> FloatArray:
     values, axes = np.linalg.eigh(tensor)
-    return _composed(np.maximum(values, 0), axes)
+    return _compose_metric(np.maximum(values, 0), axes)
 
 
-def _squared(derivative: FloatArray) -> FloatArray:
+def _squared_norm(derivative: FloatArray) -> FloatArray:
     return np.einsum("fki,fkj->fij", derivative, derivative)
 
 
-def _composed(values: FloatArray, axes: FloatArray) -> FloatArray:
+def _compose_metric(values: FloatArray, axes: FloatArray) -> FloatArray:
     return np.einsum("nik,nk,njk->nij", axes, values, axes)

@@ -19,7 +19,7 @@ from sim.cloth.air import AirForce
 from sim.cloth.cloth_batch import Cloth
 from sim.cloth.contact import Contact
 from sim.cloth.handles import Handles
-from sim.cloth.limits import StrainLimits, limited, limited_among_slivers
+from sim.cloth.limits import StrainLimits, limit_strains, limited_among_slivers
 from sim.cloth.sizing import Remeshing
 from sim.cloth.state import State
 from sim.wind import Wind
@@ -154,10 +154,12 @@ class Drive:
     def select(self, members: slice) -> Drive:
         """Selects the drive of some members only."""
 
-        def selected(pair: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
+        def select_members(pair: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
             return pair[0][..., members], pair[1][..., members]
 
-        return replace(self, wind=selected(self.wind), targets=selected(self.targets), rate=self.rate[..., members])
+        return replace(
+            self, wind=select_members(self.wind), targets=select_members(self.targets), rate=self.rate[..., members]
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -212,7 +214,7 @@ class System:
     def free(self) -> Tensor:
         """(vertex, 1, 1): 0 for rigidly held vertices, 1 for all others."""
         free = torch.ones_like(self.cloth.mass[:, :1]).unsqueeze(-1)
-        if self.clamped:
+        if self.is_clamped:
             free[self.held] = 0
         return free
 
@@ -221,11 +223,11 @@ class System:
         """(vertex, 1, 1): 0 for what the handles hold, rigidly or by springs, 1 for all others."""
         return torch.ones_like(self.cloth.mass[:, :1]).unsqueeze(-1).index_fill(0, self.held, 0.0)
 
-    def limited(self, position: Tensor, velocity: Tensor, step: float) -> tuple[Tensor, Tensor]:
+    def limit_strains(self, position: Tensor, velocity: Tensor, step: float) -> tuple[Tensor, Tensor]:
         """Positions and velocities after a step [s], brought within the strain limits."""
         if self.limits is None:
             return position, velocity
-        bring_within = limited if self.remeshing is None else limited_among_slivers
+        bring_within = limit_strains if self.remeshing is None else limited_among_slivers
         return bring_within(self.cloth, self.limits, position, velocity, step, self.loose)
 
     def effective(self, position: Tensor, force: Tensor) -> Tensor:
@@ -250,7 +252,7 @@ class System:
             return None
         return torch.stack([tie.stiffness(self.cloth, time, position) for tie in self.ties]).sum(0).unsqueeze(1)
 
-    def remembered(
+    def remember_step(
         self,
         memory: tuple[Tensor, ...],
         wind: Tensor,
@@ -382,7 +384,7 @@ class System:
         return bool(self.handles.vertices) and not self.handles.rigid
 
     @property
-    def clamped(self) -> bool:
+    def is_clamped(self) -> bool:
         """Whether any vertex is held rigidly."""
         return bool(self.handles.vertices) and self.handles.rigid
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from sim.datasets.anemometer import logged, velocities
-    from sim.datasets.camera_picture import coded, settings
+    from sim.datasets.anemometer import log_of_air, velocities
+    from sim.datasets.camera_picture import encode_pictures, settings
     from sim.datasets.cast import Cast, Roll, casts
     from sim.datasets.dataset_films import EPOCH, PlannedFilm, Sequences
     from sim.datasets.dataset_recipe import AnemometerSpec, CameraSpec, DatasetRecipe, Truth, with_counts

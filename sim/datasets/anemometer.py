@@ -53,10 +53,10 @@ def read(spec: AnemometerSpec, crew: Crew, member: Member, *, instrument: int, s
         begin: instant at which the simulation's time is 0 [UTC ns].
     """
     time, velocity = air(spec, crew, member)
-    return logged(spec, time, velocity, instrument=instrument, seed=seed, begin=begin)
+    return log_of_air(spec, time, velocity, instrument=instrument, seed=seed, begin=begin)
 
 
-def logged(
+def log_of_air(
     spec: AnemometerSpec,
     time: FloatArray,
     velocity: FloatArray,

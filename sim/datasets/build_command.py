@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from flagdata.api.learning import Building
 from flagdata.core.console import echo, following, in_steps, progress, say, say_beside_bars, table
 from flagdata.core.files.addresses import lake_place
-from flagdata.core.printable import counted
+from flagdata.core.printable import count_of
 from flagdata.verbs.verb_options import Result, verb
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def build(chosen: Building) -> Iterator[Result]:
     from sim.datasets import card as cards
     from sim.datasets.build import Build
     from sim.datasets.build_plan import length
-    from sim.workers import connected
+    from sim.workers import connect_workers
 
     cards.check(chosen.card)
     lake = lake or _made(str(chosen.lake))
@@ -75,7 +75,7 @@ def build(chosen: Building) -> Iterator[Result]:
         say(lasting)
     with (
         in_steps(added_since(lake, branch)),
-        connected(scheduler, workers=chosen.processes, say=say_beside_bars) as workers,
+        connect_workers(scheduler, workers=chosen.processes, say=say_beside_bars) as workers,
     ):
         report = Build(
             lake=lake, recipe=loaded, workers=workers, bars=progress, branch=branch, device=device, shard=shard
@@ -87,7 +87,7 @@ def build(chosen: Building) -> Iterator[Result]:
     yield Result("build", {"lake": str(lake.path), "recipe": loaded.name, "card": written, **vars(report)})
     for failure in report.failed:
         say(f"replaced: {failure}")
-    replaced = f"; {counted(report.healed, 'damaged or missing object')} replaced" if report.healed else ""
+    replaced = f"; {count_of(report.healed, 'damaged or missing object')} replaced" if report.healed else ""
     say(
         f"{report.new_sequences} of {report.sequences} sequences and {report.new_films} of {report.films} films made "
         f"in {report.seconds:.0f} s; {report.clips} clips{replaced}"
@@ -115,9 +115,9 @@ def _made(path: str) -> Lake:
 def _workers(chosen: Building) -> int:
     if chosen.scheduler is None:
         return chosen.processes
-    from sim.workers import connected
+    from sim.workers import connect_workers
 
-    with connected(chosen.scheduler, workers=0) as workers:
+    with connect_workers(chosen.scheduler, workers=0) as workers:
         return max(1, workers.count)
 
 

@@ -31,7 +31,7 @@ from sim.datasets.film_record import Content, parameters_of, record_bytes, texts
 from sim.render import RENDERERS, Meshes, RenderParameters
 from sim.run.member_batch import BatchOutcome, Stepper, run
 from sim.run.members import Crew
-from sim.run.publish import Deposited, deposited
+from sim.run.publish import Deposited, deposit_meshes
 from sim.run.simulation_recipe import Recipe as Simulation
 from sim.run.simulation_recipe import Shape
 
@@ -121,7 +121,7 @@ def film(recipe: DatasetRecipe, job: PlannedFilm, sequence: MeshSequence | Ragge
     reading = anemometer.read(recipe.anemometer, crew, member, instrument=job.look, seed=job.seed, begin=job.begin)
     drawn = camera_picture.settings(recipe.camera, seed=job.look)
     rendered = shot(recipe, job, sequence, zeta, assets, device=device).cpu().numpy()
-    frames = camera_picture.coded(rendered, drawn, recipe.camera, seed=job.seed)
+    frames = camera_picture.encode_pictures(rendered, drawn, recipe.camera, seed=job.seed)
     parameters = parameters_of(
         member, zeta, {**job.cast.stated, **reading.parameters, **drawn}, recipe.anemometer.truth
     )
@@ -153,7 +153,7 @@ def put_sequences(lake: str, simulation: Simulation, base: int, indices: Sequenc
     """
     done = simulate(simulation, base, indices, device)
     failed = {o.member.index: o.failure[1] for o in done.outcomes if o.failure is not None}
-    stored = deposited(_lake(lake), simulation, done.outcomes, step=done.step)
+    stored = deposit_meshes(_lake(lake), simulation, done.outcomes, step=done.step)
     return PutSequences(name=simulation.name, stored=stored, failed=failed)
 
 

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 from flagdata.core.files.checksums import files_of
 from flagdata.core.schema import CLIP_FRAMES
-from flagdata.core.workload import announced, one_thread
+from flagdata.core.workload import announce_work, one_thread
 from flagdata.errors import FlagdataError
 from flagdata.lake import Lake
 from flagdata.lake.mesh_sequences import MeshSequence, RaggedMeshSequence, write_meshes
@@ -161,7 +161,7 @@ def length(
     if not usual.missing_sequences and not usual.missing_films:
         return None
     estimate = usual if usual.seconds < _BRIEF else replace(usual, rates=measure(recipe, typical, device=device))
-    return announced(
+    return announce_work(
         f"building {estimate.missing_sequences} sequences and {estimate.missing_films} films",
         estimate.seconds * workers,
         workers=workers,
@@ -193,17 +193,17 @@ def measure(recipe: DatasetRecipe, cast: Cast, *, device: str = "cpu") -> Rates:
     Raises:
         FlagdataError: no sequence can be simulated, or a renderer that is not installed or fails.
     """
-    shorter, longer = (_shortened(cast, frames) for frames in (_FEW, _MORE))
+    shorter, longer = (_shorten_cast(cast, frames) for frames in (_FEW, _MORE))
     spec = cast.simulation.time
     bases = range(len(cast.simulation.material.bases))
     with one_thread():
-        runs = [(_simulated(shorter, base, device), _simulated(longer, base, device)) for base in bases]
-        films = [_filmed(recipe, cast, run, device) for run in runs[0]]
+        runs = [(_simulate_few(shorter, base, device), _simulate_few(longer, base, device)) for base in bases]
+        films = [_film_cost(recipe, cast, run, device) for run in runs[0]]
     sequences = [_line(a.seconds, b.seconds, spec.total) for a, b in runs]
     return Rates(
         sequence_seconds=sum(sequences) / len(sequences),
         film_seconds=_line(films[0][0], films[1][0], spec.frames),
-        sequence_bytes=_line(_stored(runs[0][0].sequence), _stored(runs[0][1].sequence), spec.frames),
+        sequence_bytes=_line(_stored_size(runs[0][0].sequence), _stored_size(runs[0][1].sequence), spec.frames),
         film_bytes=_line(films[0][1], films[1][1], spec.frames),
     )
 
@@ -217,37 +217,37 @@ class _Run:
     seconds: float
 
 
-def _shortened(cast: Cast, frames: int) -> Cast:
+def _shorten_cast(cast: Cast, frames: int) -> Cast:
     time_ = replace(cast.simulation.time, settle=0.0, frames=frames)
     return replace(cast, simulation=replace(cast.simulation, time=time_))
 
 
-def _simulated(cast: Cast, base: int, device: str) -> _Run:
+def _simulate_few(cast: Cast, base: int, device: str) -> _Run:
     simulation, crew = cast.simulation, Roll(cast=cast).crew
     indices = list(islice((i for i in itertools.count() if crew.base(i) == base), simulation.batch))
-    build_jobs.simulate(_shortened(cast, 1).simulation, base, indices[:1], device)  # the kernel is compiled once
-    done, seconds = _timed(partial(build_jobs.simulate, simulation, base, indices, device))
+    build_jobs.simulate(_shorten_cast(cast, 1).simulation, base, indices[:1], device)  # the kernel is compiled once
+    done, seconds = _time_call(partial(build_jobs.simulate, simulation, base, indices, device))
     for outcome in done.outcomes:
         if outcome.sequence is not None:
             return _Run(index=outcome.member.index, sequence=outcome.sequence, seconds=seconds / len(indices))
     raise FlagdataError("no sequence could be simulated", where=simulation.name, fix="correct the scene")
 
 
-def _filmed(recipe: DatasetRecipe, cast: Cast, run: _Run, device: str) -> tuple[float, float]:
+def _film_cost(recipe: DatasetRecipe, cast: Cast, run: _Run, device: str) -> tuple[float, float]:
     """Seconds and bytes of a film of few frames, with the whole sequence's anemometer."""
     members = ((cast, run.index, "0" * 32),)
     film = next(Sequences(recipe=recipe, side=cast.side.name, members=members).films())
     build_jobs.film(recipe, film, run.sequence, device)  # the renderer starts once
-    filmed, seconds = _timed(partial(build_jobs.film, recipe, film, run.sequence, device))
+    filmed, seconds = _time_call(partial(build_jobs.film, recipe, film, run.sequence, device))
     return seconds, len(filmed.data)
 
 
-def _timed(function: Callable[[], T]) -> tuple[T, float]:
+def _time_call(function: Callable[[], T]) -> tuple[T, float]:
     begun = time.perf_counter()
     return function(), time.perf_counter() - begun
 
 
-def _stored(sequence: MeshSequence | RaggedMeshSequence) -> float:
+def _stored_size(sequence: MeshSequence | RaggedMeshSequence) -> float:
     """Measures the size of a sequence in the lake [B]."""
     with tempfile.TemporaryDirectory(prefix="flagdata-plan-") as folder:
         path = Path(folder) / "sequence.zarr"

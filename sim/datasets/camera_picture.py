@@ -38,7 +38,7 @@ def settings(spec: CameraSpec, *, seed: int) -> dict[str, float]:
     }
 
 
-def coded(frames: UInt8Array, drawn: dict[str, float], spec: CameraSpec, *, seed: int) -> list[bytes]:
+def encode_pictures(frames: UInt8Array, drawn: dict[str, float], spec: CameraSpec, *, seed: int) -> list[bytes]:
     """Encodes frames (n, height, width, 3) as the camera stores them, one message each.
 
     Args:
@@ -83,7 +83,7 @@ def jpegs(frames: UInt8Array, drawn: dict[str, float], *, slot: int, seed: int) 
             )
         quality -= 1
         coded.clear()
-    return [filled(jpeg, slot) for jpeg in coded], quality
+    return [pad_jpeg(jpeg, slot) for jpeg in coded], quality
 
 
 def _noisy(frames: UInt8Array, drawn: dict[str, float], *, seed: int) -> Iterator[UInt8Array]:
@@ -106,6 +106,6 @@ def noisy(gray: UInt8Array, drawn: Mapping[str, float], rng: np.random.Generator
     return np.clip(np.rint(light + sigma * rng.standard_normal(light.shape, dtype=np.float32)), 0, 255).astype(np.uint8)
 
 
-def filled(jpeg: bytes, length: int) -> bytes:
+def pad_jpeg(jpeg: bytes, length: int) -> bytes:
     """Pads a JPEG to a length that is not below its own; the picture stays the same."""
     return jpeg[: -len(_END)] + _FILL * (length - len(jpeg)) + _END

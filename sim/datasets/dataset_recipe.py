@@ -203,7 +203,7 @@ class DatasetRecipe:
             "filming": self.filming(),
             "sessions": None if self.sessions is None else {"drawn": _SESSIONS_DRAWN, **vars(self.sessions)},
             "sides": [vars(side).copy() for side in self.sides],
-            **_grouped(self.groups, self.simulation.batch),
+            **_group_description(self.groups, self.simulation.batch),
         }
 
     @cached_property
@@ -212,7 +212,7 @@ class DatasetRecipe:
         return recipe_hash(self.identity())
 
 
-def _grouped(groups: GroupSpec | None, batch: int) -> dict[str, Any]:
+def _group_description(groups: GroupSpec | None, batch: int) -> dict[str, Any]:
     """Describes what is drawn per batch, and the batch size; nothing where there are no groups."""
     if groups is None:
         return {}

@@ -29,7 +29,7 @@ from msgspec import Meta
 from flagdata.core.files.addresses import local_path
 from flagdata.core.schema import TRUTH_WINDOW
 from flagdata.errors import InputError, LimitError, UnknownNameError, UsageError
-from flagdata.recipes.shelves import Shelf, parsed
+from flagdata.recipes.shelves import Shelf, parse_recipe
 from flagdata.recipes.typed_tables import Count, Named, PositiveQuantity, Quantity, Seed, entries, read, value, within
 from flagdata.record.writer import Coding
 from sim.datasets.dataset_recipe import AnemometerSpec, CameraSpec, DatasetRecipe, GroupSpec, SessionSpec, Side, Truth
@@ -119,7 +119,7 @@ def parse(text: str, *, name: str, folder: Path, where: str) -> DatasetRecipe:
     Raises:
         UnknownNameError, InputError, UsageError: as `load`.
     """
-    form = read(_DatasetTables, parsed(text, where=where), where=where)
+    form = read(_DatasetTables, parse_recipe(text, where=where), where=where)
     if form.sessions is not None and form.groups is not None:
         raise UsageError("both sessions and groups are given", where=where, fix="keep one of the tables")
     scene = form.simulation.scene
@@ -133,7 +133,7 @@ def parse(text: str, *, name: str, folder: Path, where: str) -> DatasetRecipe:
         seed=form.seed,
         renderer=render.renderer,
         simulation=simulation,
-        prior=priors.named(render.prior).with_quantities(sizes, source=source),
+        prior=priors.named_prior(render.prior).with_quantities(sizes, source=source),
         sessions=form.sessions,
         groups=None if form.groups is None else _groups(form.groups, simulation, where=f"{where} [groups]"),
         photos=None if render.photos is None else folder / local_path(render.photos),

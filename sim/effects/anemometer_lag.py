@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from sim.effects.parameter import NOT_NEGATIVE, Value, strength
-from sim.effects.recursion import decayed
+from sim.effects.recursion import decaying_sum
 from sim.effects.sensor import AnemometerEffect
 
 _TINY = 1e-12
@@ -42,5 +42,5 @@ class AnemometerLag(AnemometerEffect):
         slope = torch.diff(speed, dim=0) / step
         memory = torch.exp(-step / lag.clamp(min=_TINY))
         # m₁ = u₁ − τ s + (m₀ − u₀ + τ s) e^(−h/τ) for the difference e = m − u: e₁ = e₀ k − τ s (1 − k).
-        behind = decayed(memory, -lag * slope * (1 - memory))
+        behind = decaying_sum(memory, -lag * slope * (1 - memory))
         return speed + torch.cat([torch.zeros_like(speed[:1]), behind])

@@ -36,7 +36,7 @@ def left_of(vectors: Tensor, *, axis: int) -> Tensor:
     return torch.stack([-y, x, torch.zeros_like(z)], axis)
 
 
-def disturbed(wind: Tensor, relative: Tensor) -> Tensor:
+def disturbed_wind(wind: Tensor, relative: Tensor) -> Tensor:
     """Returns the wind (3, batch) with disturbances relative to its horizontal speed.
 
     Args:

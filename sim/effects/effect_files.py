@@ -12,7 +12,7 @@ from flagdata.core.files.plain_text import plain_text
 from flagdata.core.files.regular_files import check_input
 from flagdata.core.provenance import file_hash
 from flagdata.errors import NotFoundError, UsageError
-from flagdata.packages.installed_names import renamed, renaming
+from flagdata.packages.installed_names import rename_packages, renaming
 from sim.effects.effect import Effect
 
 
@@ -53,7 +53,7 @@ def _module(path: Path) -> object:
     try:
         source = plain_text(path.read_bytes(), noun="file of an effect", where=str(path))
         if renaming():  # the file imports sim as in a checkout
-            source = renamed(source, path.parent)
+            source = rename_packages(source, path.parent)
         exec(compile(source, str(path), "exec"), vars(module))
     except Exception as error:
         del sys.modules[name]

@@ -33,7 +33,7 @@ class ExposureBlur(CameraEffect):
         ),
     ] = 0.0
 
-    def sampled(self, sampling: Sampling) -> Sampling:
+    def change_instants(self, sampling: Sampling) -> Sampling:
         nodes = sampling.instants.new_tensor(_NODES)[:, None] / 2
         weights = sampling.instants.new_tensor(_WEIGHTS) / 2
         moved = sampling.instants.unsqueeze(3) + nodes * self.exposure

@@ -34,7 +34,7 @@ class FrameJitter(CameraEffect):
     ] = 0.0
     draws: Tensor = field(default_factory=lambda: torch.zeros(1, 1, dtype=torch.float64))
 
-    def sampled(self, sampling: Sampling) -> Sampling:
+    def change_instants(self, sampling: Sampling) -> Sampling:
         if len(self.draws) < len(sampling.stamps):
             raise UsageError(
                 f"there are {len(self.draws)} draws for {len(sampling.stamps)} frames",

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from sim.effects.cloth_geometry import disturbed
+from sim.effects.cloth_geometry import disturbed_wind
 from sim.effects.effect import WindEffect
 from sim.effects.parameter import NOT_NEGATIVE, Value, shape, strength
 from sim.wind import sampled
@@ -60,7 +60,7 @@ class Gusts(WindEffect):
             self.intensity * self.lateral * leftward,
             self.intensity * self.vertical * up,
         ]
-        return disturbed(wind, torch.stack(torch.broadcast_tensors(*relative)))
+        return disturbed_wind(wind, torch.stack(torch.broadcast_tensors(*relative)))
 
     def with_series(
         self,

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from torch import Tensor
 
 from flagdata.record.signals import WindSeries
-from sim.effects.cloth_geometry import disturbed
+from sim.effects.cloth_geometry import disturbed_wind
 from sim.effects.effect import WindEffect
 from sim.effects.parameter import Value, strength
 from sim.wind import sampled
@@ -44,7 +44,7 @@ class LoggedGusts(WindEffect):
 
     def velocity(self, time: float, wind: Tensor) -> Tensor:
         now = sampled.place(self.times, time, sampled.Beyond.REFUSE, where="logged gusts")
-        return disturbed(wind, self.share * sampled.between(self.samples, *now))
+        return disturbed_wind(wind, self.share * sampled.between(self.samples, *now))
 
     @classmethod
     def of(cls, time: ArrayLike, speed: ArrayLike, *, direction: ArrayLike | None = None, share: Value = 1.0) -> Self:

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from sim.effects.parameter import NOT_NEGATIVE, Value, shape, strength
-from sim.effects.recursion import decayed
+from sim.effects.recursion import decaying_sum
 from sim.effects.sensor import AnemometerEffect
 
 
@@ -42,18 +42,18 @@ class Overspeeding(AnemometerEffect):
 
     def read(self, time: Tensor, speed: Tensor) -> Tensor:
         memory = torch.exp(-torch.diff(time)[:, None] / self.window).expand(-1, speed.shape[1])
-        weight = self._smoothed(torch.ones_like(speed), memory)
-        mean = self._smoothed(speed, memory) / weight
+        weight = self._smooth_values(torch.ones_like(speed), memory)
+        mean = self._smooth_values(speed, memory) / weight
         # About the mean of all, so that the difference of squares loses no digits.
         middle = speed.mean(0)
-        square = self._smoothed((speed - middle) ** 2, memory) / weight
+        square = self._smooth_values((speed - middle) ** 2, memory) / weight
         variance = (square - (mean - middle) ** 2).clamp(min=0)
         return speed * (1 + self.coefficient * variance / (mean**2).clamp(min=1e-12))
 
     @staticmethod
-    def _smoothed(values: Tensor, memory: Tensor) -> Tensor:
+    def _smooth_values(values: Tensor, memory: Tensor) -> Tensor:
         """Sums values (n, batch) with weights that decay on both sides, by `memory` (n − 1, batch) a step."""
         none = torch.zeros_like(values[:1])
-        before = decayed(torch.cat([none, memory]), values)
-        after = decayed(torch.cat([none, memory.flip(0)]), values.flip(0)).flip(0)
+        before = decaying_sum(torch.cat([none, memory]), values)
+        after = decaying_sum(torch.cat([none, memory.flip(0)]), values.flip(0)).flip(0)
         return before + after - values

@@ -73,7 +73,7 @@ def momentum_rates(
     across = (relative * normal).sum(1, keepdim=True)
     slip = across * normal - relative
     if ends is not None:
-        across, slip = ends.continued(across), ends.continued(slip)
+        across, slip = ends.continue_field(across), ends.continue_field(slip)
 
     g0, g1, g2 = shape_gradients(cloth, position)
     v0, v1, v2 = cloth.at_corners(across)

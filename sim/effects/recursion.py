@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 
-def decayed(memory: Tensor, addend: Tensor) -> Tensor:
+def decaying_sum(memory: Tensor, addend: Tensor) -> Tensor:
     """Computes e_i = memory_i e_{i−1} + addend_i from e = 0, by doubling: (n, batch) each."""
     shift = 1
     while shift < len(addend):

@@ -38,10 +38,10 @@ class RestCurvature(Effect):
     ] = 0.0
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
-        curl = Curl(angle=bending.fold_angle(system.cloth, self.rolled(system.cloth)))
+        curl = Curl(angle=bending.fold_angle(system.cloth, self.roll_cloth(system.cloth)))
         return replace(system, effects=(*system.effects, curl)), state
 
-    def rolled(self, cloth: Cloth) -> Tensor:
+    def roll_cloth(self, cloth: Cloth) -> Tensor:
         """Rolls the cloth on its cylinder: (vertex, 3, batch) [m]."""
         rest = torch.tensor(cloth.mesh.rest, dtype=cloth.dtype, device=cloth.device)
         u, v = rest[:, :1], rest[:, 1:].expand(-1, cloth.batch)

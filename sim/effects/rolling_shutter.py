@@ -27,5 +27,5 @@ class RollingShutter(CameraEffect):
         ),
     ] = 0.0
 
-    def sampled(self, sampling: Sampling) -> Sampling:
+    def change_instants(self, sampling: Sampling) -> Sampling:
         return replace(sampling, instants=sampling.instants + (sampling.rows[:, None, None] - 0.5) * self.readout)

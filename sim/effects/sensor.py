@@ -101,5 +101,5 @@ class CameraEffect(Parametrised, ABC):
     """What a camera does to the instants it sees."""
 
     @abstractmethod
-    def sampled(self, sampling: Sampling) -> Sampling:
+    def change_instants(self, sampling: Sampling) -> Sampling:
         """Returns the changed instants."""

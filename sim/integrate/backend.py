@@ -42,7 +42,7 @@ def kernel_for(system: System, state: State, backend: Backend, *, kind: str | No
             where="integrator",
             fix="use the integrator symplectic, or another backend",
         )
-    differentiated = _differentiated(system, state)
+    differentiated = _is_differentiated(system, state)
     if backend is Backend.TORCH or (backend is Backend.AUTO and differentiated):
         return None
     kernel = Kernel.of(system, kind=kind)
@@ -61,12 +61,12 @@ def warp_kernel_for(system: System, state: State) -> WarpKernel:
     Raises:
         UsageError: it cannot run this system (see `WarpKernel.of`), or gradients are wanted from it.
     """
-    if _differentiated(system, state):
+    if _is_differentiated(system, state):
         raise UsageError("the Warp kernel gives no gradients", where="integrator", fix="use the backend torch")
     return WarpKernel.of(system)
 
 
-def _differentiated(system: System, state: State) -> bool:
+def _is_differentiated(system: System, state: State) -> bool:
     return torch.is_grad_enabled() and any(
         tensor.requires_grad for tensor in (state.position, state.velocity, *system.tensors())
     )

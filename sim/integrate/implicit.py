@@ -75,7 +75,7 @@ class BackwardEuler:
         if kernel is not None and system.limits is None and not system.remembering:
             return self._at_once(kernel, system, state, h, steps)
         for _ in range(steps):
-            state = self.stepped(system, state, system.drive(state.time, state.time + h), h)
+            state = self.take_step(system, state, system.drive(state.time, state.time + h), h)
         return state
 
     def _kernel(self, system: System, state: State) -> Kernel | None:
@@ -103,7 +103,7 @@ class BackwardEuler:
     def _lag(self, h: float) -> float:
         return h if self.air_shape is AirShape.PREVIOUS else 0.0
 
-    def stepped(self, system: System, state: State, drive: Drive, h: float) -> State:
+    def take_step(self, system: System, state: State, drive: Drive, h: float) -> State:
         """Computes the state one step of `h` [s] later, whatever `step` is, with what moves the cloth from outside
         meanwhile."""
         cloth = system.cloth
@@ -121,8 +121,8 @@ class BackwardEuler:
                 offsets=drive.offset[:1],
                 memory=system.checked(state.memory),
             )
-            return self._ended(system, state, drive, *system.limited(x, v, h), h)
-        if system.clamped:
+            return self._end_of_step(system, state, drive, *system.limit_strains(x, v, h), h)
+        if system.is_clamped:
             v = v.index_copy(0, system.held, (drive.targets[1] - x[system.held]) / h)
         mass = cloth.mass.unsqueeze(1)
         faces = membrane.LinearisedMembrane.at(cloth, x)
@@ -167,7 +167,7 @@ class BackwardEuler:
             diagonal = diagonal.index_add(0, system.held, hold)
 
         free = torch.ones_like(x[:, :1])
-        if system.clamped:
+        if system.is_clamped:
             free[system.held] = 0
 
         def operator(field: Tensor) -> Tensor:
@@ -188,11 +188,11 @@ class BackwardEuler:
             operator, right, weight + factor * diagonal, tolerance=self.tolerance, iterations=self.iterations
         )
         v = v + change
-        return self._ended(system, state, drive, *system.limited(x + h * v, v, h), h)
+        return self._end_of_step(system, state, drive, *system.limit_strains(x + h * v, v, h), h)
 
-    def _ended(self, system: System, state: State, drive: Drive, x: Tensor, v: Tensor, h: float) -> State:
+    def _end_of_step(self, system: System, state: State, drive: Drive, x: Tensor, v: Tensor, h: float) -> State:
         """Computes the end of a step from a state, with what forces remember of it in the wind of its start."""
-        memory = system.remembered(state.memory, drive.wind[0], state.time, x, v, elapsed=h)
+        memory = system.remember_step(state.memory, drive.wind[0], state.time, x, v, elapsed=h)
         return State(position=x, velocity=v, time=state.time + h, memory=memory)
 
 

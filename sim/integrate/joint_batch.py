@@ -65,24 +65,24 @@ class _Loosening:
         return Springs(
             vertices=of_tie.vertices,
             anchors=anchors,
-            stiffness=self._widened(of_tie.stiffness),
-            slack=self._widened(of_tie.slack),
+            stiffness=self._widen_members(of_tie.stiffness),
+            slack=self._widen_members(of_tie.slack),
             share=of_tie.share,
         )
 
     def force(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
         """Computes forces (vertex, 3, batch) [N]."""
-        return self._widened(self.tie.force(self.cloth, time, position[..., self.members]))
+        return self._widen_members(self.tie.force(self.cloth, time, position[..., self.members]))
 
     def stiffness(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
         """Computes stiffnesses (vertex, batch) [N/m]."""
-        return self._widened(self.tie.stiffness(self.cloth, time, position[..., self.members]))
+        return self._widen_members(self.tie.stiffness(self.cloth, time, position[..., self.members]))
 
     def stiffest(self, cloth: Cloth) -> Tensor:
         """Computes stiffnesses (vertex, batch) [N/m]."""
-        return self._widened(self.tie.stiffest(self.cloth))
+        return self._widen_members(self.tie.stiffest(self.cloth))
 
-    def _widened(self, of_members: Tensor) -> Tensor:
+    def _widen_members(self, of_members: Tensor) -> Tensor:
         """Widens (…, members of the batch) to (…, batch), 0 for all others."""
         of_batch = of_members.new_zeros((*of_members.shape[:-1], self.batch))
         of_batch[..., self.members] = of_members
@@ -112,7 +112,7 @@ class JointBatch:
                 where="joint batch",
                 fix="start all of them at once",
             )
-        return cls(systems=tuple(system for system, _ in batches)), _joined([state for _, state in batches])
+        return cls(systems=tuple(system for system, _ in batches)), _join_states([state for _, state in batches])
 
     @cached_property
     def plain(self) -> System:
@@ -171,7 +171,7 @@ class JointBatch:
             yield system, members, replace(state.select(members), memory=of_system)
 
 
-def _joined(states: Sequence[State]) -> State:
+def _join_states(states: Sequence[State]) -> State:
     return State(
         position=torch.cat([state.position for state in states], dim=-1),
         velocity=torch.cat([state.velocity for state in states], dim=-1),

@@ -48,8 +48,8 @@ class SplitEuler:
         if (kernels := self._kernels(plain, [system], state)) is not None:
             return self._at_once(plain, *kernels, state, h, steps)
         for drive in system.drives(_times(state.time, h, steps)):
-            begun = replace(state, velocity=self._pushed(system, state, drive, h), memory=())
-            state = _carried(system, state, self.base.stepped(plain, begun, drive, h), drive, h)
+            begun = replace(state, velocity=self._pushed_velocity(system, state, drive, h), memory=())
+            state = _carried_state(system, state, self.base.take_step(plain, begun, drive, h), drive, h)
         return state
 
     def advance_jointly(self, batches: JointBatch, state: State, duration: float) -> State:
@@ -67,12 +67,12 @@ class SplitEuler:
             velocity = state.velocity.clone()
             for system, members, part_state in parts:
                 if system.extra or system.ties:
-                    velocity[..., members] = self._pushed(system, part_state, drive.select(members), h)
-            after = self.base.stepped(plain, replace(state, velocity=velocity, memory=()), drive, h)
+                    velocity[..., members] = self._pushed_velocity(system, part_state, drive.select(members), h)
+            after = self.base.take_step(plain, replace(state, velocity=velocity, memory=()), drive, h)
             memory: list[Tensor] = []
             for system, members, part_state in parts:
                 if system.loads or system.remembering:
-                    carried = _carried(system, part_state, after.select(members), drive.select(members), h)
+                    carried = _carried_state(system, part_state, after.select(members), drive.select(members), h)
                     after.position[..., members] = carried.position
                     after.velocity[..., members] = carried.velocity
                     memory += carried.memory
@@ -121,7 +121,7 @@ class SplitEuler:
         steps = max(1, math.ceil(duration / self.base.step - 1e-9))
         return steps, duration / steps
 
-    def _pushed(self, system: System, state: State, drive: Drive, h: float) -> Tensor:
+    def _pushed_velocity(self, system: System, state: State, drive: Drive, h: float) -> Tensor:
         """Computes the velocity (vertex, 3, batch) [m/s] that the base model's step begins with."""
         x, v, time = state.position, state.velocity, state.time
         mass = system.cloth.mass.unsqueeze(1)
@@ -139,7 +139,7 @@ def _times(start: float, h: float, steps: int) -> list[float]:
     return list(accumulate([h] * steps, initial=start))
 
 
-def _carried(system: System, before: State, after: State, drive: Drive, h: float) -> State:
+def _carried_state(system: System, before: State, after: State, drive: Drive, h: float) -> State:
     """Computes the end of a step, after the base model's: with air that moves along, and what forces remember of it in
     the wind of its start."""
     if system.loads:
@@ -148,5 +148,5 @@ def _carried(system: System, before: State, after: State, drive: Drive, h: float
         change = mass * (after.velocity - v)
         change = effective(change, mass=system.cloth.mass, added=system.added_mass, normals=normals) / mass
         after = replace(after, position=x + h * (v + change), velocity=v + change)
-    memory = system.remembered(before.memory, drive.wind[0], before.time, after.position, after.velocity, elapsed=h)
+    memory = system.remember_step(before.memory, drive.wind[0], before.time, after.position, after.velocity, elapsed=h)
     return replace(after, memory=memory)

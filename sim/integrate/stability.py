@@ -127,8 +127,8 @@ def outer_limit(system: System, state: State, drive: Drive) -> float:
     x, v = state.position, state.velocity
     inverse = system.free / system.cloth.mass.unsqueeze(1)
 
-    def accelerated(position: Tensor, velocity: Tensor) -> Tensor:
-        memory = system.remembered(state.memory, drive.wind[0], state.time, position, velocity, elapsed=0.0)
+    def acceleration(position: Tensor, velocity: Tensor) -> Tensor:
+        memory = system.remember_step(state.memory, drive.wind[0], state.time, position, velocity, elapsed=0.0)
         force = system.extra_force(drive, 0.0, state.time, position, velocity, memory=memory)
         return inverse * system.effective(position, force)
 
@@ -136,8 +136,8 @@ def outer_limit(system: System, state: State, drive: Drive) -> float:
     size = 1e-3 * float(system.cloth.areas.mean()) ** 0.5
     speed = 1e-2 * max(1.0, float(drive.wind[0].norm(dim=0).max()))
     with torch.no_grad():
-        damped = _largest(lambda field: accelerated(x, v + field) - accelerated(x, v - field), x, speed)
-        turned = _largest(lambda field: accelerated(x + field, v) - accelerated(x - field, v), x, size)
+        damped = _largest(lambda field: acceleration(x, v + field) - acceleration(x, v - field), x, speed)
+        turned = _largest(lambda field: acceleration(x + field, v) - acceleration(x - field, v), x, size)
     return min(_DAMPED / damped if damped > 0 else math.inf, _TURNED / math.sqrt(turned) if turned > 0 else math.inf)
 
 

@@ -123,7 +123,7 @@ def advance(
     """
     drive = system.drive(state.time, state.time + duration)
     x, v = state.position, state.velocity
-    if system.clamped:
+    if system.is_clamped:
         v = v.index_copy(0, system.held, drive.rate)
     start = State(position=x, velocity=v, time=state.time, memory=state.memory)
     if backend is Backend.WARP:
@@ -159,7 +159,7 @@ def _base(
         acceleration = inverse_mass * system.effective(x, force)
         v = v + (h / 2 if index in (0, steps) else h) * acceleration
         if index < steps:
-            x, v = system.limited(x + h * v, v, h)
+            x, v = system.limit_strains(x + h * v, v, h)
     return x, v
 
 
@@ -175,7 +175,7 @@ def _each_step(
         time = state.time + share * duration
         level = v + h / 2 * acceleration
         if index > 0:
-            memory = system.remembered(memory, torch.lerp(*drive.wind, share), time, x, level, elapsed=h)
+            memory = system.remember_step(memory, torch.lerp(*drive.wind, share), time, x, level, elapsed=h)
         if kernel is None:
             force = system.force(drive, share, time, x, v, memory=memory, effect_velocity=level)
         else:
@@ -184,7 +184,7 @@ def _each_step(
         acceleration = inverse_mass * system.effective(x, force)
         v = v + (h / 2 if index in (0, steps) else h) * acceleration
         if index < steps:
-            x, v = system.limited(x + h * v, v, h)
+            x, v = system.limit_strains(x + h * v, v, h)
     return State(position=x, velocity=v, time=state.time + duration, memory=memory)
 
 
@@ -202,7 +202,7 @@ def _impulses(
         level = v + length / 2 * acceleration
         time = state.time + share * duration
         if index > 0:
-            memory = system.remembered(memory, torch.lerp(*drive.wind, share), time, x, level, elapsed=length)
+            memory = system.remember_step(memory, torch.lerp(*drive.wind, share), time, x, level, elapsed=length)
         force = extra_force(complete, system, drive, share, time, x, level, memory=memory)
         acceleration = inverse_mass * system.effective(x, force)
         v = v + (length / 2 if index in (0, outer) else length) * acceleration
@@ -232,4 +232,4 @@ def _check_outer(system: System, state: State, drive: Drive, length: float) -> N
 def _inverse_mass(system: System) -> Tensor:
     """Computes inverse masses (vertex, 1, batch) [1/kg]: 0 where held rigidly."""
     inverse = 1 / system.cloth.mass.unsqueeze(1)
-    return inverse.index_fill(0, system.held, 0.0) if system.clamped else inverse
+    return inverse.index_fill(0, system.held, 0.0) if system.is_clamped else inverse

@@ -80,7 +80,7 @@ def acting(system: System, kind: str, pack: Callable[[Tensor], Tensor]) -> Actin
     entries: list[ActingEntry] = []
     tensors: list[Tensor] = []
     for part, fitting in _parts(system):
-        built = None if part is None else _compiled(part, system.cloth, kind, fitting)
+        built = None if part is None else _compiled_effect(part, system.cloth, kind, fitting)
         if built is None:
             return None
         given, number, act = built
@@ -112,7 +112,9 @@ def _parts(system: System) -> Iterator[tuple[Compilable | None, tuple[Kind, ...]
             yield part if isinstance(part, Compilable) else None, fitting
 
 
-def _compiled(part: Compilable, cloth: Cloth, kind: str, fitting: Sequence[Kind]) -> tuple[Given, int, int] | None:
+def _compiled_effect(
+    part: Compilable, cloth: Cloth, kind: str, fitting: Sequence[Kind]
+) -> tuple[Given, int, int] | None:
     """Loads an effect's C++ function: what it reads, its kind and its address."""
     given = part.given(cloth)
     source = header(given.of)

@@ -179,7 +179,7 @@ class Kernel:
         lanes = int(_function(code, "lanes", kind)())
         blocks = math.ceil(cloth.batch / lanes)
         inverse_mass = 1 / cloth.mass
-        if system.clamped:
+        if system.is_clamped:
             inverse_mass = inverse_mass.index_fill(0, system.held, 0.0)
         air = system.air.plain
         empty = cloth.mass[:0]
@@ -258,13 +258,13 @@ class Kernel:
     def _drive(self, drive: Drive) -> tuple[_Problem, list[Tensor]]:
         """Sets wind and handles of the problem; the tensors must outlive the call it is made for."""
         tensors = {
-            "wind": self._stacked(drive.wind),
-            "targets": self._stacked(drive.targets),
+            "wind": self._stack_parts(drive.wind),
+            "targets": self._stack_parts(drive.targets),
             "rate": self.pack(drive.rate),
         }
         if self.tied is not None:
             start, end = drive.offset
-            tensors["tie_targets"] = self._stacked((self.tied + start[:, None], self.tied + end[:, None]))
+            tensors["tie_targets"] = self._stack_parts((self.tied + start[:, None], self.tied + end[:, None]))
             tensors["tie_rate"] = self.pack(drive.drift[:, None].expand(3, self.batch))
         return self._problem_with(**tensors)
 
@@ -272,7 +272,7 @@ class Kernel:
         """Locates the ties' anchors at displacements (3,) [m]; nothing where there are no ties."""
         if self.tied is None:
             return {}
-        return {"tie_targets": self._stacked([self.tied + offset[:, None] for offset in offsets])}
+        return {"tie_targets": self._stack_parts([self.tied + offset[:, None] for offset in offsets])}
 
     def _problem_with(self, **tensors: Tensor) -> tuple[_Problem, list[Tensor]]:
         """Sets some tensors of the problem, which must outlive the call it is made for."""
@@ -281,7 +281,7 @@ class Kernel:
             setattr(problem, name, tensor.data_ptr())
         return problem, list(tensors.values())
 
-    def _stacked(self, parts: Sequence[Tensor]) -> Tensor:
+    def _stack_parts(self, parts: Sequence[Tensor]) -> Tensor:
         """Stacks (…, batch) at several times to (time, block, …, lane)."""
         return _to_blocks(torch.stack(tuple(parts)), self.lanes, self.blocks).movedim(1, 0).contiguous()
 
@@ -330,7 +330,7 @@ class Kernel:
         Args:
             level: the velocity that effects see (vertex, 3, batch) [m/s].
         """
-        problem, alive = self._problem_with(wind=self._stacked(drive.wind))
+        problem, alive = self._problem_with(wind=self._stack_parts(drive.wind))
         past = self._remember(problem, memory)
         xb, vb, lb = self.pack(x), self.pack(v), self.pack(level)
         out = torch.empty_like(xb)
@@ -366,7 +366,7 @@ class Kernel:
             NaN for members whose solve did not converge.
         """
         problem, alive = self._problem_with(
-            wind=self._stacked(winds), targets=self._stacked(targets), **self._tie_targets(offsets)
+            wind=self._stack_parts(winds), targets=self._stack_parts(targets), **self._tie_targets(offsets)
         )
         past = self._remember(problem, memory)
         xb, vb = self.pack(x), self.pack(v)
@@ -375,7 +375,7 @@ class Kernel:
         numbers = (ctypes.c_double(h), ctypes.c_double(lag), ctypes.c_double(tolerance), *counts)
         self._call("implicit", problem, xb, vb, failed, *numbers)
         del alive, past
-        return self._solved(xb, vb, failed)
+        return self._solve_blocks(xb, vb, failed)
 
     def split(
         self,
@@ -401,7 +401,7 @@ class Kernel:
             memory: of the forces of all parts that remember, in order.
         """
         problem, alive = self._problem_with(
-            wind=self._stacked(winds), targets=self._stacked(targets), **self._tie_targets(offsets)
+            wind=self._stack_parts(winds), targets=self._stack_parts(targets), **self._tie_targets(offsets)
         )
         problems: list[_Problem] = []
         remembered: list[tuple[Kernel, Tensor]] = []
@@ -432,9 +432,9 @@ class Kernel:
             ctypes.c_int64(len(parts)),
         )
         del alive, problems
-        return *self._solved(xb, vb, failed), tuple(part.unpack(tensor) for part, tensor in remembered)
+        return *self._solve_blocks(xb, vb, failed), tuple(part.unpack(tensor) for part, tensor in remembered)
 
-    def _solved(self, x: Tensor, v: Tensor, failed: Tensor) -> tuple[Tensor, Tensor]:
+    def _solve_blocks(self, x: Tensor, v: Tensor, failed: Tensor) -> tuple[Tensor, Tensor]:
         """Positions and velocities (vertex, 3, batch) of blocks, NaN for members whose solve did not converge."""
         after, lost = (self.unpack(x), self.unpack(v)), self.unpack(failed) != 0
         if bool(lost.any()):
@@ -489,15 +489,15 @@ def _groups(points: FloatArray, width: int) -> IntArray:
     Halved across the longer side until few enough are left, always at a multiple of the width.
     """
 
-    def halved(chosen: IntArray) -> list[IntArray]:
+    def halve_group(chosen: IntArray) -> list[IntArray]:
         if len(chosen) <= width:
             return [np.pad(chosen, (0, width - len(chosen)), constant_values=-1)]
         longer = int(np.argmax(np.ptp(points[chosen], axis=0)))
         ordered = chosen[np.argsort(points[chosen, longer], kind="stable")]
         middle = max(1, round(len(chosen) / (2 * width))) * width
-        return [*halved(ordered[:middle]), *halved(ordered[middle:])]
+        return [*halve_group(ordered[:middle]), *halve_group(ordered[middle:])]
 
-    return np.stack(halved(np.arange(len(points))))
+    return np.stack(halve_group(np.arange(len(points))))
 
 
 _KERNELS: weakref.WeakKeyDictionary[System, dict[str, Kernel]] = weakref.WeakKeyDictionary()

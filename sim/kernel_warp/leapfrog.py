@@ -134,7 +134,7 @@ def upper(pair: int):
 
 
 @wp.func
-def located(place: float, count: int):
+def locate_cell(place: float, count: int):
     """Finds cell and share of a coordinate of the stretching grid."""
     inside = wp.clamp(place, 0.0, float(count - 1))
     cell = wp.clamp(int(inside), 0, count - 2)
@@ -152,9 +152,9 @@ def node(members: Members, at: int):
 @wp.func
 def stretching(members: Members, first: int, g00: float, g11: float, g01: float):
     """Interpolates k0 to k3 at a strain."""
-    c0, w0 = located((g00 - members.origin) * members.fineness, members.counts[0])
-    c1, w1 = located((g11 - members.origin) * members.fineness, members.counts[1])
-    c2, w2 = located(wp.abs(g01) * members.fineness, members.counts[2])
+    c0, w0 = locate_cell((g00 - members.origin) * members.fineness, members.counts[0])
+    c1, w1 = locate_cell((g11 - members.origin) * members.fineness, members.counts[1])
+    c2, w2 = locate_cell(wp.abs(g01) * members.fineness, members.counts[2])
     line = members.counts[2]
     plane = members.counts[1] * line
     at = first + c0 * plane + c1 * line + c2

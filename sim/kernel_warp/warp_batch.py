@@ -116,7 +116,7 @@ class WarpKernel:
         members.symmetric = int(cloth.evaluation is Evaluation.CORRECTED)
         members.damping = array(cloth.damping)
         inverse = 1 / cloth.mass
-        members.inverse_mass = array(inverse.index_fill(0, system.held, 0.0) if system.clamped else inverse)
+        members.inverse_mass = array(inverse.index_fill(0, system.held, 0.0) if system.is_clamped else inverse)
         members.gravity = array(system.gravity)
         members.density, members.drag = system.air.plain.density, system.air.plain.drag
         members.stiffness = system.handles.stiffness if system.sprung else 0.0

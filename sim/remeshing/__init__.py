@@ -7,6 +7,6 @@ from typing import TYPE_CHECKING
 from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from sim.remeshing.adapting import remeshed
+    from sim.remeshing.adapting import remesh_state
 
 __getattr__ = lazy_exports(__name__, __file__)

@@ -61,7 +61,7 @@ class Adapted:
         return self.triangles.carried(field)[self.vertices]
 
 
-def adapted(
+def adapt_mesh(
     mesh: Mesh, position: FloatArray, velocity: FloatArray, criteria: Remeshing, *, fixed: Iterable[int] = ()
 ) -> Adapted:
     """Remeshes a cloth at positions and velocities (vertex, 3) [m, m/s].
@@ -78,7 +78,7 @@ def adapted(
     return Adapted(mesh=remeshed, triangles=triangles, vertices=vertices)
 
 
-def remeshed(system: System, state: State) -> tuple[System, State]:
+def remesh_state(system: System, state: State) -> tuple[System, State]:
     """Returns a cloth on a mesh that suits its shape and motion, and its state there; both as they are where the system
     has no remeshing.
 
@@ -91,7 +91,7 @@ def remeshed(system: System, state: State) -> tuple[System, State]:
     check(system)
     old = system.cloth
     position, velocity = (field[..., 0].double().cpu().numpy() for field in (state.position, state.velocity))
-    new = adapted(old.mesh, position, velocity, criteria, fixed=system.handles.vertices)
+    new = adapt_mesh(old.mesh, position, velocity, criteria, fixed=system.handles.vertices)
     cloth = Cloth.build(new.mesh, old.materials, evaluation=old.evaluation, dtype=old.dtype, device=old.device)
     held = np.searchsorted(new.vertices, np.array(system.handles.vertices, dtype=np.int64)).tolist()
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from sim.render.parameters import RenderParameters
     from sim.render.pinhole_camera import Camera
     from sim.render.raster import Raster
-    from sim.render.render_prior import RenderPrior, named
+    from sim.render.render_prior import RenderPrior, named_prior
     from sim.render.rendered_meshes import Meshes
     from sim.render.renderer import Renderer
     from sim.render.staging import stage

@@ -75,12 +75,12 @@ def fragments(triangles: Triangles, *, width: int, height: int) -> list[Fragment
     while begin < len(counts) or not parts:
         done = int(ends[begin - 1]) if begin else 0
         end = min(len(counts), max(begin + 1, int(torch.searchsorted(ends, done + _FRAGMENTS, right=True))))
-        parts.append(_covered(triangles, begin, end, first, span, counts, width=width))
+        parts.append(_cover_pixels(triangles, begin, end, first, span, counts, width=width))
         begin = end
     return parts
 
 
-def _covered(
+def _cover_pixels(
     triangles: Triangles, begin: int, end: int, first: Tensor, span: Tensor, counts: Tensor, *, width: int
 ) -> Fragments:
     part = counts[begin:end]

@@ -25,7 +25,7 @@ from sim.render.develop import develop, plate
 from sim.render.parameters import RenderParameters
 from sim.render.pinhole_camera import Camera
 from sim.render.rendered_meshes import Meshes
-from sim.render.shutter import moved
+from sim.render.shutter import move_frames
 from sim.render.staging import POLE_ALBEDO, Stage, stage
 
 _MOST_PICTURES = 8
@@ -88,7 +88,7 @@ class Cycles:
     def _pictures(self, meshes: Meshes, zeta: RenderParameters, camera: Camera) -> int:
         """Counts the pictures that make one exposure."""
         half = zeta.exposure_time / 2
-        first, last = (camera.project(moved(meshes, offset).positions)[0] for offset in (-half, half))
+        first, last = (camera.project(move_frames(meshes, offset).positions)[0] for offset in (-half, half))
         return min(_MOST_PICTURES, max(1, math.ceil(float((last - first).norm(dim=-1).max()))))
 
     def _scene(self, placed: Stage, zeta: RenderParameters, pictures: int) -> Message:
@@ -133,7 +133,7 @@ def _frames(meshes: Meshes, placed: Stage, zeta: RenderParameters, pictures: int
         "faces/pole": placed.pole_faces.cpu().int().numpy(),
         "uv/pole": torch.zeros(len(placed.pole_positions), 2).numpy(),
     }
-    instants = [moved(meshes, zeta.exposure_time * ((k + 0.5) / pictures - 0.5)) for k in range(pictures)]
+    instants = [move_frames(meshes, zeta.exposure_time * ((k + 0.5) / pictures - 0.5)) for k in range(pictures)]
     for index in range(len(meshes)):
         messages: list[Message] = []
         for picture, instant in enumerate(instants):

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from flagdata.core.arrays import Float32Array, UInt8Array
 from flagdata.core.schema import FRAME_SIZE
-from sim.assets.colour import decoded
+from sim.assets.colour import decode_values
 from sim.render.parameters import RenderParameters
 
 _WHOLE = 0.6  # the background scale at which an image's shorter side just fills the frame
@@ -20,7 +20,7 @@ _WHOLE = 0.6  # the background scale at which an image's shorter side just fills
 
 @functools.cache
 def _decoding() -> Float32Array:
-    return decoded(np.arange(256) / 255).astype(np.float32)
+    return decode_values(np.arange(256) / 255).astype(np.float32)
 
 
 def to_linear(image: UInt8Array) -> Float32Array:

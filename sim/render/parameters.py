@@ -127,7 +127,7 @@ class RenderParameters:
     @classmethod
     def described(cls) -> Mapping[str, RenderQuantity]:
         """Names → unit and bounds of every number, in the order of the fields."""
-        return _described(cls)
+        return _described_quantities(cls)
 
     @classmethod
     def _types(cls) -> Mapping[str, type]:
@@ -139,7 +139,7 @@ class RenderParameters:
 
 
 @functools.cache
-def _described(cls: type[Any]) -> Mapping[str, RenderQuantity]:
+def _described_quantities(cls: type[Any]) -> Mapping[str, RenderQuantity]:
     hints = get_type_hints(cls, include_extras=True)
     notes = {entry.name: getattr(hints[entry.name], "__metadata__", ()) for entry in fields(cls)}
     return {name: note for name, described in notes.items() for note in described if isinstance(note, RenderQuantity)}
@@ -148,4 +148,4 @@ def _described(cls: type[Any]) -> Mapping[str, RenderQuantity]:
 @functools.cache
 def _number_types(cls: type[Any]) -> Mapping[str, type]:
     hints = get_type_hints(cls)
-    return {name: hints[name] for name in _described(cls)}
+    return {name: hints[name] for name in _described_quantities(cls)}

@@ -66,12 +66,12 @@ class Raster:
         for begin in range(first, last, _TOGETHER):
             end = min(begin + _TOGETHER, last)
             moving = motion and motion.part(meshes.vertex_offset[begin], meshes.vertex_offset[end])
-            scene = _exposed(meshes.part(begin, end), moving, placed, samples, zeta, pyramid)
-            film.append(_developed(scene, behind, gain=zeta.gain))
+            scene = _accumulate_samples(meshes.part(begin, end), moving, placed, samples, zeta, pyramid)
+            film.append(_develop_scene(scene, behind, gain=zeta.gain))
         return torch.cat(film)
 
 
-def _exposed(
+def _accumulate_samples(
     meshes: Meshes,
     motion: VertexMotion | None,
     placed: Stage,
@@ -95,7 +95,7 @@ def _exposed(
     return out
 
 
-def _developed(scene: Tensor, behind: Tensor, *, gain: float) -> Tensor:
+def _develop_scene(scene: Tensor, behind: Tensor, *, gain: float) -> Tensor:
     code = _code(scene.device)
     return develop(scene, behind, gain=gain) if code is None else raster_kernel.develop(code, scene, behind, gain=gain)
 

@@ -8,7 +8,7 @@ import functools
 import torch
 from torch import Tensor
 
-from sim.compiler import compiled
+from sim.compiler import compile_library
 from sim.render.pixel_view import RasterView
 from sim.render.scene_geometry import Geometry
 from sim.render.scene_light import Light
@@ -61,7 +61,9 @@ class _Film(ctypes.Structure):
 @functools.cache
 def library() -> ctypes.CDLL | None:
     """Compiles the kernel; None, with one warning, where it cannot be built."""
-    return compiled("sim.render", ("raster.cpp",), without="the raster renderer runs as plain torch, many times slower")
+    return compile_library(
+        "sim.render", ("raster.cpp",), without="the raster renderer runs as plain torch, many times slower"
+    )
 
 
 def add_sample(

@@ -16,7 +16,7 @@ from sim.assets import Assets
 from sim.render import RENDERERS, Meshes, render_prior
 
 
-def rendered(
+def render_film(
     sequence: MeshSequence | RaggedMeshSequence | Simulated,
     *,
     look: str,
@@ -41,7 +41,7 @@ def rendered(
             fix="give one of its members, as in simulated[0]",
         )
     assets = Assets(photos=photos)
-    zeta = render_prior.named(look).with_quantities(dict(parameters), source="given").draw(seed, assets)
+    zeta = render_prior.named_prior(look).with_quantities(dict(parameters), source="given").draw(seed, assets)
     toward = _toward(sequence) if heading is None else heading
     meshes = Meshes.flag(sequence, heading=toward) if cloth == "flag" else Meshes.hanging(sequence, heading=toward)
     with torch.no_grad():

@@ -9,7 +9,7 @@ from typing import Any
 
 from flagdata.core.rng import stream
 from flagdata.errors import InputError, UnknownNameError
-from flagdata.recipes.shelves import Shelf, parsed
+from flagdata.recipes.shelves import Shelf, parse_recipe
 from flagdata.recipes.typed_tables import DEGREES, NotNegative, Quantity, Range, ends, entries, in_radians, plain
 from sim.assets import Assets
 from sim.render.parameters import RenderParameters
@@ -108,14 +108,14 @@ class RenderPrior:
         }
 
 
-def named(name: str) -> RenderPrior:
+def named_prior(name: str) -> RenderPrior:
     """Reads a render prior of the catalog.
 
     Raises:
         UnknownNameError: with the nearest name that is there.
     """
     entry = PRIORS.named(name)
-    return read(parsed(entry.text, where=entry.where), name=name)
+    return read(parse_recipe(entry.text, where=entry.where), name=name)
 
 
 def read(content: Mapping[str, Any], *, name: str) -> RenderPrior:

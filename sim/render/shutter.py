@@ -63,7 +63,7 @@ class VertexMotion:
         return self.positions + share * (self.forth if share > 0 else self.back) if share else self.positions
 
 
-def moved(meshes: Meshes, offset: float) -> Meshes:
+def move_frames(meshes: Meshes, offset: float) -> Meshes:
     """Moves every frame of the meshes to `offset` seconds later than its instant, see `VertexMotion`."""
     return replace(meshes, positions=VertexMotion.of(meshes).at(offset)) if offset else meshes
 

@@ -24,7 +24,7 @@ from sim.cloth.air import QuadraticNormal
 from sim.cloth.handles import Handles
 from sim.cloth.material import Material
 from sim.cloth.mesh import Mesh
-from sim.cloth.scene import Scene, roughened
+from sim.cloth.scene import Scene, roughen_start
 from sim.cloth.state import State
 from sim.cloth.system import System
 from sim.integrate.implicit import BackwardEuler
@@ -82,7 +82,7 @@ def on_pedestal(mesh: Mesh, pedestal: float = PEDESTAL) -> tuple[int, ...]:
     return tuple(np.flatnonzero(radius <= rings[0] + 1e-8).tolist())
 
 
-def draped(
+def drape_scene(
     mesh: Mesh, material: Material, rng: np.random.Generator, *, pedestal: float = PEDESTAL, sigma: float = 1e-3
 ) -> Scene:
     """Makes the scene of one drape: the cloth flat on its pedestal, with normal noise of `sigma` [m] on its border."""
@@ -90,7 +90,7 @@ def draped(
     flat = np.concatenate([mesh.rest, np.zeros((mesh.vertex_count, 1))], axis=1)
     return Scene(
         mesh=mesh,
-        position=roughened(flat, handles, rng, sigma),
+        position=roughen_start(flat, handles, rng, sigma),
         material=material,
         handles=handles,
         air=QuadraticNormal(density=0.0),

@@ -65,7 +65,7 @@ class Diagnosis:
     compression: tuple[float, ...]
 
     @property
-    def crumpled(self) -> bool:
+    def is_crumpled(self) -> bool:
         """Whether the sheet is a ball of noise at the end."""
         return self.late_compression > CRUMPLED
 
@@ -250,7 +250,7 @@ def run(
     outcomes: list[BatchOutcome] = []
     for index, member in enumerate(members):
         diagnosis = monitor.of(index)
-        failure = failures.get(index) or _crumpled(diagnosis)
+        failure = failures.get(index) or _crumpled_reason(diagnosis)
         sequence = None
         if failure is None:
             sequence = _sequence(
@@ -290,8 +290,8 @@ def _sequence(
     )
 
 
-def _crumpled(diagnosis: Diagnosis) -> tuple[str, str] | None:
-    if not diagnosis.crumpled:
+def _crumpled_reason(diagnosis: Diagnosis) -> tuple[str, str] | None:
+    if not diagnosis.is_crumpled:
         return None
     rate = f"{diagnosis.late_compression:.0%} (root mean square)"
     return "crumpled", f"it crumpled: its faces are compressed by {rate}; declare more damping"

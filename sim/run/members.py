@@ -19,7 +19,7 @@ from sim.cloth import handles as held
 from sim.cloth.handles import Handles
 from sim.cloth.material import BENDING_SHAPE, Material
 from sim.cloth.mesh import Mesh, grid
-from sim.cloth.scene import Scene, assemble, roughened, upright
+from sim.cloth.scene import Scene, assemble, roughen_start, upright
 from sim.cloth.state import State
 from sim.cloth.system import System
 from sim.effects import EFFECTS, Effect, apply
@@ -196,7 +196,7 @@ class Crew:
     def _start(self, seed: int) -> FloatArray:
         spec = self.recipe.scene
         flat = self._flat(spec)
-        return roughened(flat, self.handles, stream(seed, "start"), spec.start_noise) if spec.start_noise else flat
+        return roughen_start(flat, self.handles, stream(seed, "start"), spec.start_noise) if spec.start_noise else flat
 
     def _flat(self, spec: SceneSpec) -> FloatArray:
         """Returns where the cloth starts, before its noise, (vertex, 3) [m]."""

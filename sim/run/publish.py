@@ -193,11 +193,13 @@ def publish(lake: Lake, recipe: Recipe, outcomes: Sequence[BatchOutcome], *, ste
                 continue
             staged = transaction.staging(".zarr")
             write_meshes(staged, outcome.sequence)
-            transaction.add(_published(recipe, identity, outcome, step, stored=transaction.put(staged)))
+            transaction.add(_publish_row(recipe, identity, outcome, step, stored=transaction.put(staged)))
     return transaction.result
 
 
-def deposited(lake: Lake, recipe: Recipe, outcomes: Sequence[BatchOutcome], *, step: float) -> dict[int, Deposited]:
+def deposit_meshes(
+    lake: Lake, recipe: Recipe, outcomes: Sequence[BatchOutcome], *, step: float
+) -> dict[int, Deposited]:
     """Puts the meshes of outcomes that have some into the store; returns index → row and object.
 
     Args:
@@ -208,7 +210,7 @@ def deposited(lake: Lake, recipe: Recipe, outcomes: Sequence[BatchOutcome], *, s
     for outcome in outcomes:
         if outcome.sequence is not None:
             put = deposit(lake, ".zarr", partial(write_meshes, sequence=outcome.sequence))
-            stored[outcome.member.index] = _published(recipe, identity, outcome, step, stored=put.name), put
+            stored[outcome.member.index] = _publish_row(recipe, identity, outcome, step, stored=put.name), put
     return stored
 
 
@@ -238,7 +240,7 @@ def member_artifact(recipe: Recipe, identity: Mapping[str, Any], index: int, see
     )
 
 
-def _published(
+def _publish_row(
     recipe: Recipe, identity: Mapping[str, Any], outcome: BatchOutcome, step: float, *, stored: str
 ) -> Artifact:
     member, diagnosis = outcome.member, outcome.diagnosis

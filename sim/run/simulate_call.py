@@ -10,7 +10,7 @@ import numpy as np
 
 from flagdata.answer.simulated import Simulated
 from flagdata.errors import InputError, UsageError
-from flagdata.recipes.shelves import parsed
+from flagdata.recipes.shelves import parse_recipe
 from sim.run.member_batch import BatchOutcome, Stepper
 from sim.run.members import Crew
 from sim.run.publish import batches, check_device, outcomes
@@ -22,7 +22,7 @@ PLAIN: Content = {"material": {"name": "camel-ponte-roma"}}
 """What is simulated where no recipe is named: a flag of a measured knit."""
 
 
-def simulated(recipe: str | Content | None, overrides: Content, *, device: str, workers: int) -> Simulated:
+def simulate_members(recipe: str | Content | None, overrides: Content, *, device: str, workers: int) -> Simulated:
     """Simulates the members of a recipe, with entries of the caller's in place of its own.
 
     Args:
@@ -47,12 +47,12 @@ def simulated(recipe: str | Content | None, overrides: Content, *, device: str, 
 
 
 def recipe_of(recipe: str | Content | None, overrides: Content) -> Recipe:
-    """Reads a recipe and puts the overrides in place of its entries; as `simulated`."""
+    """Reads a recipe and puts the overrides in place of its entries; as `simulate_members`."""
     name, folder, where = "simulation", Path(), "recipe"
     if isinstance(recipe, str):
         file = SCENES.find(recipe)
         name, folder, where = file.name, file.folder, file.where
-        recipe = parsed(file.text, where=file.where)
+        recipe = parse_recipe(file.text, where=file.where)
     content = dict(PLAIN if recipe is None else recipe)
     for key, value in overrides.items():
         entry = content.get(key)

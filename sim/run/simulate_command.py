@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from flagdata.api.physics import Members
 from flagdata.core.console import echo, in_steps, progress, say
-from flagdata.core.printable import counted
+from flagdata.core.printable import count_of
 from flagdata.verbs.shared_options import Computed, OnBranch, OnLake
 from flagdata.verbs.verb_options import Result, argument, options, verb
 
@@ -67,7 +67,7 @@ def _print(report: RunReport) -> None:
         say(f"member {failure['index']} is not stored: {failure['kind']}: {failure['what']}")
     steps = [f"{step * 1e3:.3g}" for step in sorted(report.steps.values())]
     speed = f"{report.rate:.2f} flags/s, steps of {'–'.join(dict.fromkeys((steps[0], steps[-1])))} ms"
-    replaced = f", {counted(len(report.healed), 'damaged or missing object')} replaced" if report.healed else ""
+    replaced = f", {count_of(len(report.healed), 'damaged or missing object')} replaced" if report.healed else ""
     say(
         f"{len(report.added) + len(report.healed)} simulated in {report.seconds:.1f} s ({speed}), "
         f"{len(report.existing)} in the lake already, {len(report.failed)} failed{replaced}"

@@ -19,7 +19,7 @@ from flagdata.errors import ErrorKind, FlagdataError, UsageError
 from sim.cloth.state import SPEED_LIMIT, State
 from sim.cloth.system import System
 from sim.integrate import Integrator
-from sim.remeshing.adapting import remeshed
+from sim.remeshing.adapting import remesh_state
 
 
 class Divergence(StrEnum):
@@ -77,7 +77,7 @@ class Batch:
     diverged: dict[int, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.system, self.state = remeshed(self.system, self.state)
+        self.system, self.state = remesh_state(self.system, self.state)
         self._start = self.system, self.state
 
     def states(self, numbers: Iterable[int], rate: float) -> Iterator[State]:
@@ -100,7 +100,7 @@ class Batch:
                 now = number
                 if self.divergence is not Divergence.KEEP:
                     self._check()
-                self.system, self.state = remeshed(self.system, self.state)
+                self.system, self.state = remesh_state(self.system, self.state)
             yield self.state
 
     def positions(self, numbers: range, rate: float, *, look: Callable[[State], object] | None = None) -> FloatArray:
@@ -141,7 +141,7 @@ class Batch:
         if self.system.remeshing is not None:
             self.system, self.state = self._start[0], replace(start, time=self.state.time)
             return
-        self.state = _restarted(self.state, start, failed)
+        self.state = _restart_failed(self.state, start, failed)
 
 
 def after(settle: float, duration: float, rate: float) -> range:
@@ -154,7 +154,7 @@ def after(settle: float, duration: float, rate: float) -> range:
     return range(round(settle * rate) + 1, round((settle + duration) * rate) + 1)
 
 
-def _restarted(state: State, start: State, failed: Tensor) -> State:
+def _restart_failed(state: State, start: State, failed: Tensor) -> State:
     return replace(
         state,
         position=torch.where(failed, start.position, state.position),

@@ -44,7 +44,7 @@ from flagdata.core.files.addresses import local_path
 from flagdata.core.provenance import canonical, digest
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.recipes.retired_names import KEYS
-from flagdata.recipes.shelves import Shelf, parsed, read_recipe
+from flagdata.recipes.shelves import Shelf, parse_recipe, read_recipe
 from flagdata.recipes.typed_tables import (
     AngleQuantity,
     Count,
@@ -111,7 +111,7 @@ def load(source: str, *, logs: Logs | None = None) -> Recipe:
     if source.endswith(".json"):
         return _of_scene_file(local_path(source))
     file = SCENES.find(source)
-    content = parsed(file.text, where=file.where)
+    content = parse_recipe(file.text, where=file.where)
     return of_content(content, name=file.name, folder=file.folder, where=file.where, logs=logs)
 
 
@@ -124,7 +124,7 @@ def parse(text: str, *, name: str, folder: Path, where: str) -> Recipe:
     Raises:
         UnknownNameError, InputError: as `load`.
     """
-    return of_content(parsed(text, where=where), name=name, folder=folder, where=where)
+    return of_content(parse_recipe(text, where=where), name=name, folder=folder, where=where)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -370,7 +370,7 @@ def _bases(cloth: _Cloth, folder: Path, scene: SceneSpec, *, where: str) -> tupl
         return (Material.from_mapping(cloth.table, name=str(cloth.table.get("title", "material"))),)
     chosen = (cloth.name,) if cloth.name is not None else cloth.names
     if chosen:
-        return tuple(material.named(name, where=where) for name in chosen)
+        return tuple(material.named_material(name, where=where) for name in chosen)
     if cloth.file is not None:
         return (material_file(folder / local_path(cloth.file)),)
     if scene.arcsim is not None:
@@ -387,7 +387,7 @@ def material_file(path: Path) -> Material:
     """
     if path.suffix == ".json":
         return read_material(path)
-    return Material.from_mapping(parsed(read_recipe(path).text, where=str(path)), name=path.stem)
+    return Material.from_mapping(parse_recipe(read_recipe(path).text, where=str(path)), name=path.stem)
 
 
 def _wind(

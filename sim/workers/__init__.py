@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from sim.workers.connect import connected
+    from sim.workers.connect import connect_workers
     from sim.workers.jobs import Job, WorkerError, Workers
     from sim.workers.local import LocalWorkers, single_threaded
     from sim.workers.scheduled import Scheduled

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 
-from flagdata.core.extras import explained
+from flagdata.core.extras import explaining_missing
 from sim.workers.jobs import Workers
 from sim.workers.local import processes
 
 
-def connected(
+def connect_workers(
     scheduler: str | None, *, workers: int, say: Callable[[str], object] = lambda line: None
 ) -> AbstractContextManager[Workers]:
     """Connects to the Dask scheduler at an address ("tcp://host:8786"), or takes this machine if it is None.
@@ -26,6 +26,6 @@ def connected(
     """
     if scheduler is None:
         return processes(workers, say=say)
-    with explained():
-        from sim.workers.scheduled import scheduled
-    return scheduled(scheduler, say=say)
+    with explaining_missing():
+        from sim.workers.scheduled import scheduler_at
+    return scheduler_at(scheduler, say=say)

@@ -27,7 +27,7 @@ PATIENCE = 120.0
 
 
 @contextmanager
-def scheduled(address: str, *, say: Callable[[str], object]) -> Iterator[Scheduled]:
+def scheduler_at(address: str, *, say: Callable[[str], object]) -> Iterator[Scheduled]:
     """Connects to a scheduler.
 
     Raises:

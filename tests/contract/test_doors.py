@@ -13,14 +13,16 @@ from pathlib import Path
 
 import pytest
 
-from flagdata.packages.lazy import exported, exports
+from flagdata.packages.lazy import export_blocks, exports
 from flagdata.packages.verb_package import VerbPackage
 from tests.contract.imports import ROOT, modules, statements, tree
 from tests.contract.test_import_circles import PRODUCT, name_of
 from tests.contract.test_part_circles import part
 
 MODULES = {name_of(str(path.relative_to(ROOT))): path for path in modules(*PRODUCT)}
-DOORS = {name: exports(str(path)) for name, path in MODULES.items() if path.stem == "__init__" and exported(tree(path))}
+DOORS = {
+    name: exports(str(path)) for name, path in MODULES.items() if path.stem == "__init__" and export_blocks(tree(path))
+}
 
 
 def defined(module: ast.Module) -> set[str]:

@@ -21,7 +21,7 @@ from flagdata.core.rng import stream
 from flagdata.errors import InputError, UsageError
 from sim.cloth import scene
 from sim.cloth.handles import Handles
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.mesh import Mesh, grid
 from sim.cloth.scene import Scene, assemble
 from sim.cloth.state import State
@@ -50,7 +50,7 @@ def flag(turn: np.ndarray | None = None, shift: tuple[float, float, float] = (0.
         Scene(
             mesh=mesh,
             position=start @ turn.T + shift,
-            material=named(material),
+            material=named_material(material),
             handles=Handles(vertices=(0, 3)),
             wind=tuple(turn @ wind),
         )
@@ -257,7 +257,7 @@ def test_compiled_and_eager_forces_agree(name: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_a_flag_lives_through_half_a_second_at_both_ends_of_the_prior(name: str) -> None:
     """With the integrator's own step, in single precision, in winds of 3 and 8 m/s."""
-    scenes = [scene.flag(material=named("camel-ponte-roma"), wind_speed=w, columns=6) for w in (3.0, 8.0)]
+    scenes = [scene.flag(material=named_material("camel-ponte-roma"), wind_speed=w, columns=6) for w in (3.0, 8.0)]
     for end in (0, 1):
         values = {label: torch.full((BATCH,), p.prior[end]) for label, p in EFFECTS[name].parameters().items()}
         system, state = with_effect(replace(drawn(name), **values), *assemble(scenes))

@@ -17,7 +17,7 @@ from flagdata.core.rng import stream
 from flagdata.errors import UsageError
 from sim.cloth import scene
 from sim.cloth.air import AIR_FORCES, Stokes
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.scene import assemble
 from sim.cloth.state import State
 from sim.cloth.system import System
@@ -93,7 +93,7 @@ def test_forces_are_those_of_torch(name: str, dtype: torch.dtype, tolerance: flo
     drive = system.drive(state.time, state.time + 0.01)
     moved = 0.97 * state.position.roll(1, 1) + state.position
     level = state.velocity.roll(1, 0)
-    memory = system.remembered(state.memory, drive.wind[0], state.time, moved, level, elapsed=0.2)
+    memory = system.remember_step(state.memory, drive.wind[0], state.time, moved, level, elapsed=0.2)
     expected = system.extra_force(drive, 0.3, state.time, moved, state.velocity, memory=memory, effect_velocity=level)
     computed = kernel_of(system).extra(drive, 0.3, moved, state.velocity, level, memory=memory)
     air = system.air.plain.force(system.cloth, moved, state.velocity, drive.wind[0])
@@ -104,7 +104,9 @@ def test_forces_are_those_of_torch(name: str, dtype: torch.dtype, tolerance: flo
 @pytest.mark.parametrize("name", BESIDE)
 def test_members_of_every_block_have_their_own_numbers(name: str) -> None:
     """Twenty members in single precision: a full block, and one with spare lanes."""
-    scenes = [scene.flag(material=named("camel-ponte-roma"), wind_speed=3 + 0.2 * b, columns=4) for b in range(20)]
+    scenes = [
+        scene.flag(material=named_material("camel-ponte-roma"), wind_speed=3 + 0.2 * b, columns=4) for b in range(20)
+    ]
     system, state = assemble(scenes)
     system, state = (
         EFFECTS[name]
@@ -115,7 +117,7 @@ def test_members_of_every_block_have_their_own_numbers(name: str) -> None:
     moved = state.position + 0.02 * torch.sin(30 * state.position.roll(1, 1))
     velocity = torch.cos(11 * moved.roll(1, 0))
     drive = system.drive(START, START + 0.01)
-    memory = system.remembered(state.memory, drive.wind[0], START, moved, velocity, elapsed=0.2)
+    memory = system.remember_step(state.memory, drive.wind[0], START, moved, velocity, elapsed=0.2)
     expected = system.extra_force(drive, 0.3, START, moved, velocity, memory=memory)
     computed = kernel_of(system).extra(drive, 0.3, moved, velocity, velocity, memory=memory)
     air = system.air.plain.force(system.cloth, moved, velocity, drive.wind[0])

@@ -9,7 +9,7 @@ import ast
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
 
-from flagdata.packages.lazy import exported
+from flagdata.packages.lazy import export_blocks
 from tests.contract.imports import ROOT, imported_names, modules, tree
 
 PRODUCT = ("flagdata", "sim", "models", "measure")
@@ -31,7 +31,7 @@ def circle(sources: dict[str, ast.Module]) -> list[str]:
     """The first circle of imports among some modules, by their dotted names; empty where there is none."""
     graph: dict[str, set[str]] = {}
     for name, source in sources.items():
-        handed_out = {id(node) for block in exported(source) for node in block.body}
+        handed_out = {id(node) for block in export_blocks(source) for node in block.body}
         statements = (node for node in at_the_top(source) if id(node) not in handed_out)
         imports = [node for node in statements if isinstance(node, ast.Import | ast.ImportFrom)]
         names = imported_names(ast.Module(body=list(imports), type_ignores=[])) & set(sources)

@@ -19,7 +19,7 @@ import torch
 
 import flagdata
 import flagdata.dataset
-from flagdata.core.arguments import checked, plain, real, whole
+from flagdata.core.arguments import check_arguments, plain, real, whole
 from flagdata.core.rng import stream
 from flagdata.dataset import PairLoader, Sample
 from flagdata.dataset.loader import Batchable
@@ -144,7 +144,7 @@ class Path3:
     "given", ["film.mp4", np.str_("film.mp4"), b"film.mp4", Path("film.mp4"), PurePosixPath("film.mp4"), Path3()]
 )
 def test_whatever_names_a_path_is_that_path(given: object) -> None:
-    @checked
+    @check_arguments
     def call(source: Path | str) -> Path:
         return Path(source)
 

@@ -41,7 +41,7 @@ def observed(effect: Parametrised, *, shift: float = 0.0) -> Tensor:
         case ClockEffect():
             return effect.stamps((TIME + shift)[:, None].expand(-1, BATCH)) - shift
         case CameraEffect():
-            return effect.sampled(Sampling.ideal(STAMPS + shift, ROWS)).observe(TIME + shift, TRAJECTORY)
+            return effect.change_instants(Sampling.ideal(STAMPS + shift, ROWS)).observe(TIME + shift, TRAJECTORY)
     raise AssertionError(effect)
 
 

@@ -14,7 +14,7 @@ import flagdata
 from flagdata.cli import main
 from flagdata.errors import InputError
 from flagdata.ingest import Head, WindOptions
-from flagdata.ingest.anemometer.identify import opened
+from flagdata.ingest.anemometer.identify import open_log
 from flagdata.lake import Lake
 from measure.demo import SENSOR
 from tests.docs.pages import DOCS, Shell, blocks, commands, files
@@ -161,7 +161,7 @@ def test_the_format_of_the_page_reads_its_own_lines(tmp_path: Path) -> None:
     exec(compile(files("wind-formats.md")["calmlog.py"], "calmlog.py", "exec"), names)
     path = tmp_path / "calm.log"
     path.write_text("CALM 2026-05-01T12:00:00Z 4.2\nCALM 2026-05-01T12:00:01Z 4.3\n", encoding="utf-8")
-    source = opened(path, WindOptions())
+    source = open_log(path, WindOptions())
     reader = names["CalmLog"]()
     assert reader.recognise(Head(lines=tuple(source.head()))).format == "calmlog"
     assert reader.recognise(Head(lines=("time,speed",))) is None
@@ -170,7 +170,7 @@ def test_the_format_of_the_page_reads_its_own_lines(tmp_path: Path) -> None:
     assert np.diff(reading.time).tolist() == [1_000_000_000]
     path.write_text("CALM 2026-05-01T12:00:00Z 4.2\nnonsense\n", encoding="utf-8")
     with pytest.raises(InputError, match="line 2"):
-        reader.read(opened(path, WindOptions()), WindOptions())
+        reader.read(open_log(path, WindOptions()), WindOptions())
 
 
 def test_no_page_with_commands_is_forgotten() -> None:

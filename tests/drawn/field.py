@@ -15,7 +15,7 @@ from flagdata.core.rng import stream
 from flagdata.timebase import NANOSECONDS, from_datetime
 from measure.demo import BEFORE, CUP, START
 from measure.demo.logger import write_log
-from sim.datasets import logged
+from sim.datasets import log_of_air
 from sim.wind import VonKarman
 from tests.drawn.flag import DrawnFlag
 
@@ -67,7 +67,7 @@ def write_drawn_log(path: Path, recipe: DrawnRecipe) -> float:
     times = np.arange(len(wind)) / WIND_RATE
     begin = from_datetime(START) - round(BEFORE * NANOSECONDS)
     velocity = np.stack([wind, 0 * wind, 0 * wind], axis=1)
-    series = logged(CUP, times, velocity, instrument=recipe.seed, seed=recipe.seed, begin=begin).series
+    series = log_of_air(CUP, times, velocity, instrument=recipe.seed, seed=recipe.seed, begin=begin).series
     first = (int(series.time[0]) - begin) / NANOSECONDS - BEFORE
     stamp = START + timedelta(seconds=first + recipe.offset)
     write_log(

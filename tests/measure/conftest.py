@@ -11,7 +11,7 @@ import torch
 from measure.forecasting import Calibration, Forecaster, Segments
 from measure.observe import Specimen, Trajectory, WindTrack
 from sim.cloth import handles
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.mesh import grid
 from sim.integrate import SplitEuler
 
@@ -24,7 +24,7 @@ def specimen() -> Specimen:
     mesh = grid(width=0.75, height=0.5, columns=8, rows=6)
     return Specimen(
         mesh=mesh,
-        material=named("camel-ponte-roma"),
+        material=named_material("camel-ponte-roma"),
         held=handles.corners(mesh.rest),
         anchors=np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.5]]),
     )

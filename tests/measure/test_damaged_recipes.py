@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from flagdata.errors import CorruptError, FlagdataError, InputError, LimitError
 from flagdata.recipes.documents import NESTING_LIMIT
-from flagdata.recipes.shelves import parsed
+from flagdata.recipes.shelves import parse_recipe
 from measure.nulls import bank
 from sim.arcsim import read_material, read_scene
 from tests.damage import QUICK, as_toml, changed, damaged, damages, paths, wild
@@ -69,17 +69,17 @@ def test_a_recipe_with_a_value_no_one_meant_is_read_or_refused(form: str, tmp_pa
 @pytest.mark.parametrize("deep", [NESTING_LIMIT + 1, 1000, 100_000])
 def test_lists_that_are_nested_too_deep_are_refused_by_the_limit(deep: int) -> None:
     with pytest.raises(LimitError, match=f"more than {NESTING_LIMIT} deep"):
-        parsed("x = " + "[" * deep + "]" * deep, where="recipe")
+        parse_recipe("x = " + "[" * deep + "]" * deep, where="recipe")
 
 
 def test_tables_that_are_nested_too_deep_are_refused_by_the_limit() -> None:
     with pytest.raises(LimitError, match=f"more than {NESTING_LIMIT} deep"):
-        parsed("[" + ".".join(["a"] * 1000) + "]", where="recipe")
+        parse_recipe("[" + ".".join(["a"] * 1000) + "]", where="recipe")
 
 
 def test_a_whole_number_of_thousands_of_digits_is_refused() -> None:
     with pytest.raises(InputError, match="not TOML"):
-        parsed("x = " + "9" * 5000, where="recipe")
+        parse_recipe("x = " + "9" * 5000, where="recipe")
 
 
 SCENE = """

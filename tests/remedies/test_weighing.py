@@ -229,7 +229,7 @@ def test_windows_with_more_wind_show_the_cloth(user: User, monkeypatch: pytest.M
 @pytest.mark.usefixtures("cheap")
 def test_more_simulations_widen_intervals_that_are_too_narrow(user: User, monkeypatch: pytest.MonkeyPatch) -> None:
     """What is found of simulations left out stands in: few are held of 64."""
-    plain = calibrate.checked
+    plain = calibrate.check_coverage
 
     def checked(made: Any, options: calibrate.Options) -> calibrate.Check:
         found = plain(made, options)
@@ -237,7 +237,7 @@ def test_more_simulations_widen_intervals_that_are_too_narrow(user: User, monkey
             count=found.count, contained=found.count * (options.simulations > 100), error=found.error
         )
 
-    monkeypatch.setattr(calibrate, "checked", checked)
+    monkeypatch.setattr(calibrate, "check_coverage", checked)
     (user.folder / "t.csv").write_text(GUSTY)
     user.meets(
         "cloth/calibration.py",

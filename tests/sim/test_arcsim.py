@@ -24,7 +24,7 @@ from sim.cloth.air import QuadraticNormal, Stokes
 from sim.cloth.contact import Contact
 from sim.cloth.handles import Handles
 from sim.cloth.limits import StrainLimits
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.mesh import Mesh
 from sim.cloth.scene import Scene, assemble, flag
 from sim.cloth.sizing import Remeshing
@@ -188,7 +188,7 @@ def test_strain_limits_are_the_materials_unless_disabled(write: Write) -> None:
 def test_a_scene_that_is_written_comes_back(
     contact: Contact | None, limits: StrainLimits | None, tmp_path: Path
 ) -> None:
-    scene = flag(material=replace(named("gray-interlock"), damping=1e-3), wind_speed=4.5, columns=6)
+    scene = flag(material=replace(named_material("gray-interlock"), damping=1e-3), wind_speed=4.5, columns=6)
     scene = replace(
         scene,
         air=QuadraticNormal(density=1.2, drag=0.1),
@@ -228,7 +228,7 @@ def test_a_scene_that_is_written_comes_back(
     ],
 )
 def test_what_arcsim_cannot_represent_is_not_written(changes: dict[str, Any], word: str, tmp_path: Path) -> None:
-    scene = replace(flag(material=named("paper"), wind_speed=4, columns=6), **changes)
+    scene = replace(flag(material=named_material("paper"), wind_speed=4, columns=6), **changes)
     with pytest.raises(InputError, match=word):
         write_scene(ArcsimScene(scene=scene, frame_time=0.04, frame_steps=8, frames=1), tmp_path)
     assert not list(tmp_path.iterdir())
@@ -236,7 +236,7 @@ def test_what_arcsim_cannot_represent_is_not_written(changes: dict[str, Any], wo
 
 def test_a_scene_and_its_material_do_not_take_each_others_place(tmp_path: Path) -> None:
     file = ArcsimScene(
-        scene=flag(material=named("paper"), wind_speed=4, columns=6), frame_time=0.04, frame_steps=8, frames=1
+        scene=flag(material=named_material("paper"), wind_speed=4, columns=6), frame_time=0.04, frame_steps=8, frames=1
     )
     with pytest.raises(InputError, match="both named paper"):
         write_scene(file, tmp_path, name="paper")
@@ -303,7 +303,7 @@ def test_a_material_file_is_complete_and_says_no_more(tmp_path: Path) -> None:
 def test_the_reference_materials_are_the_catalogs(reference_data: Path) -> None:
     # The catalog's entries are transcriptions of the same tables (Wang et al. 2011).
     read = read_material(reference_data / "materials" / "camel-ponte-roma.json")
-    camel = named("camel-ponte-roma")
+    camel = named_material("camel-ponte-roma")
     np.testing.assert_allclose(read.bending, camel.bending, rtol=1e-6)
     np.testing.assert_allclose(read.stretching, camel.stretching, rtol=1e-6)
 
@@ -333,7 +333,9 @@ def test_the_papers_own_scene_has_its_contact_and_limits(papers_scene: Scene) ->
     assert scene.contact == Contact(thickness=0.01, stiffness=1e6, friction=0.6)
     assert scene.limits == StrainLimits(low=0.95, high=1.05, sweeps=SWEEPS)
     # thicken = 2
-    np.testing.assert_allclose(scene.material.area_weight, 2 * named("camel-ponte-roma").area_weight, rtol=1e-9)
+    np.testing.assert_allclose(
+        scene.material.area_weight, 2 * named_material("camel-ponte-roma").area_weight, rtol=1e-9
+    )
 
 
 def centre(positions: NDArray[np.floating], mesh: Mesh | MeshFrame) -> FloatArray:

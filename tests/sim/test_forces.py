@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from flagdata.errors import InputError
 from sim.cloth import bending, membrane
 from sim.cloth.air import QuadraticNormal, Stokes
-from sim.cloth.material import Material, named
+from sim.cloth.material import Material, named_material
 from sim.cloth.mesh import Mesh
 from sim.cloth.stiffness_tables import Evaluation
 from tests.refusals import unrefused
@@ -45,7 +45,7 @@ def test_force_is_minus_the_gradient_of_the_energy_for_constant_stiffness(part, 
 @pytest.mark.parametrize("part", [membrane, bending])
 @pytest.mark.parametrize("evaluation", list(Evaluation))
 def test_internal_forces_turn_with_the_cloth_and_do_not_see_where_it_is(part, evaluation, distorted) -> None:
-    system, _ = make_system(distorted, [named("camel-ponte-roma")], evaluation=evaluation)
+    system, _ = make_system(distorted, [named_material("camel-ponte-roma")], evaluation=evaluation)
     position = crumpled(distorted, 1)
     velocity = velocity_like(position)
     turn = torch.tensor(Rotation.from_rotvec([0.3, -1.1, 0.7]).as_matrix())
@@ -59,7 +59,7 @@ def test_internal_forces_turn_with_the_cloth_and_do_not_see_where_it_is(part, ev
 
 @pytest.mark.parametrize("part", [membrane, bending])
 def test_internal_forces_have_no_resultant_and_no_moment(part, distorted) -> None:
-    system, _ = make_system(distorted, [named("white-swim-solid")])
+    system, _ = make_system(distorted, [named_material("white-swim-solid")])
     position = crumpled(distorted, 1)
     force = part.force(system.cloth, position, velocity_like(position))
     scale = float(force.abs().sum())
@@ -71,7 +71,7 @@ def test_internal_forces_have_no_resultant_and_no_moment(part, distorted) -> Non
 
 @pytest.mark.parametrize("part", [membrane, bending])
 def test_rigid_motion_is_not_damped_and_damping_takes_energy(part, distorted) -> None:
-    system, _ = make_system(distorted, [named("camel-ponte-roma")])
+    system, _ = make_system(distorted, [named_material("camel-ponte-roma")])
     position = crumpled(distorted, 1)
     still = part.force(system.cloth, position, torch.zeros_like(position))
     spin = torch.tensor([0.4, -2.0, 1.3], dtype=torch.float64)[None, :, None].expand_as(position)
@@ -84,7 +84,7 @@ def test_rigid_motion_is_not_damped_and_damping_takes_energy(part, distorted) ->
 
 def test_patch_a_uniform_stretch_leaves_inner_vertices_free_on_a_distorted_mesh(distorted) -> None:
     # Patch test: constant strain gives constant stress, whose forces cancel at inner vertices.
-    system, state = make_system(distorted, [named("camel-ponte-roma")])
+    system, state = make_system(distorted, [named_material("camel-ponte-roma")])
     stretch = torch.tensor([[1.0, 0.0, 0.0], [0.0, 1.08, 0.05], [0.0, 0.02, 0.97]], dtype=torch.float64)
     position = torch.einsum("ij,vjb->vib", stretch, state.position)
     force = membrane.force(system.cloth, position, state.velocity)

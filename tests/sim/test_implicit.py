@@ -13,7 +13,7 @@ from flagdata.errors import UsageError
 from sim.cloth import membrane
 from sim.cloth.air import QuadraticNormal
 from sim.cloth.handles import Handles
-from sim.cloth.material import isotropic, named
+from sim.cloth.material import isotropic, named_material
 from sim.cloth.mesh import grid
 from sim.cloth.state import State
 from sim.integrate import AirShape, Backend, BackwardEuler, Symplectic
@@ -57,7 +57,7 @@ def test_a_member_that_does_not_converge_is_marked_and_the_others_are_solved() -
 
 def test_a_free_mass_point_under_gravity_falls_as_the_method_says(distorted) -> None:
     # v_n = g n h exactly, x_n = g h² n(n+1)/2.
-    system, state = make_system(distorted, [named("camel-ponte-roma")], gravity=(0.0, 0.0, -10.0))
+    system, state = make_system(distorted, [named_material("camel-ponte-roma")], gravity=(0.0, 0.0, -10.0))
     final = BackwardEuler(step=0.01, tolerance=1e-12).advance(system, state, 0.1)
     torch.testing.assert_close(final.velocity[:, 2], torch.full_like(final.velocity[:, 2], -1.0))
     fall = final.position[:, 2] - state.position[:, 2]
@@ -111,7 +111,7 @@ def test_impossible_settings_are_refused() -> None:
 @pytest.mark.parametrize(("dtype", "tolerance"), [(torch.float64, 1e-9), (torch.float32, 1e-4)])
 def test_kernel_and_torch_take_the_same_step(stiffness, shape, dtype, tolerance, distorted) -> None:
     handles = Handles(vertices=(0, 4), stiffness=stiffness, times=(0.0, 0.1), offsets=((0, 0, 0), (0.02, 0.0, 0.01)))
-    materials = [named(name) for name in ("camel-ponte-roma", "11oz-black-denim", "gray-interlock")]
+    materials = [named_material(name) for name in ("camel-ponte-roma", "11oz-black-denim", "gray-interlock")]
     system, state = make_system(
         distorted,
         materials,
@@ -134,7 +134,7 @@ def test_kernel_and_torch_take_the_same_step(stiffness, shape, dtype, tolerance,
 
 @pytest.mark.parametrize("backend", [Backend.TORCH, Backend.KERNEL])
 def test_a_diverged_member_is_marked_and_does_not_change_the_others(backend, distorted) -> None:
-    system, state = make_system(distorted, [named("camel-ponte-roma")] * 2, wind=(5.0, 0.0, 0.0))
+    system, state = make_system(distorted, [named_material("camel-ponte-roma")] * 2, wind=(5.0, 0.0, 0.0))
     broken = state.position.clone()
     broken[7, 0, 1] = torch.nan
     method = BackwardEuler(backend=backend)
@@ -149,7 +149,7 @@ def test_stiff_materials_take_the_papers_steps() -> None:
     mesh = grid(width=0.3, height=0.2, columns=6, rows=4)
     handles = Handles(vertices=(0, 4))
     system, state = make_system(
-        mesh, [named("aluminium")], handles=handles, gravity=(0.0, 0.0, -9.81), wind=(3.0, 0.0, 0.0)
+        mesh, [named_material("aluminium")], handles=handles, gravity=(0.0, 0.0, -9.81), wind=(3.0, 0.0, 0.0)
     )
     final = BackwardEuler().advance(system, state, 0.4)
     assert bool(final.healthy().all())
@@ -163,7 +163,10 @@ def test_stiff_materials_take_the_papers_steps() -> None:
 def test_steps_in_one_call_are_those_taken_one_by_one_to_the_bit(distorted, stiffness: float) -> None:
     handles = Handles(vertices=(0, 4), stiffness=stiffness, times=(0.0, 0.1), offsets=((0, 0, 0), (0.02, 0.0, 0.01)))
     system, state = make_system(
-        distorted, [named("camel-ponte-roma"), named("white-swim-solid")], handles=handles, gravity=(0.0, 0.0, -9.81)
+        distorted,
+        [named_material("camel-ponte-roma"), named_material("white-swim-solid")],
+        handles=handles,
+        gravity=(0.0, 0.0, -9.81),
     )
 
     class Rising:
@@ -173,7 +176,7 @@ def test_steps_in_one_call_are_those_taken_one_by_one_to_the_bit(distorted, stif
     system, method = replace(system, wind=Rising()), BackwardEuler(step=2e-3, backend=Backend.KERNEL)
     together, alone = method.advance(system, state, 0.04), state
     for _ in range(20):
-        alone = method.stepped(system, alone, system.drive(alone.time, alone.time + 2e-3), 2e-3)
+        alone = method.take_step(system, alone, system.drive(alone.time, alone.time + 2e-3), 2e-3)
     assert torch.equal(together.position, alone.position)
     assert torch.equal(together.velocity, alone.velocity)
     assert together.time == alone.time

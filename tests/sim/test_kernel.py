@@ -14,7 +14,7 @@ from flagdata.errors import UsageError
 from sim import compiler as build
 from sim.cloth.air import QuadraticNormal, Stokes
 from sim.cloth.handles import Handles
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.state import State
 from sim.cloth.stiffness_tables import Evaluation
 from sim.integrate import Backend, BackwardEuler, Symplectic, advance
@@ -24,7 +24,7 @@ from tests.sim.conftest import PLAIN, make_system
 
 @pytest.fixture
 def materials() -> list:
-    return [named(name) for name in ("camel-ponte-roma", "white-swim-solid", "royal-target")]
+    return [named_material(name) for name in ("camel-ponte-roma", "white-swim-solid", "royal-target")]
 
 
 def stirred(state: State) -> State:
@@ -111,7 +111,9 @@ def test_other_air_and_effects_are_added_to_the_kernels_forces(materials, distor
 # crosses for some faces and the gradient does not see: 0.1 %.
 @pytest.mark.parametrize(("measured", "tolerance"), [(False, 1e-7), (True, 1e-3)])
 def test_gradients_go_through_torch_and_are_right(measured, tolerance, distorted) -> None:
-    system, state = make_system(distorted, [named("camel-ponte-roma") if measured else PLAIN], wind=(5.0, 0.0, 0.0))
+    system, state = make_system(
+        distorted, [named_material("camel-ponte-roma") if measured else PLAIN], wind=(5.0, 0.0, 0.0)
+    )
     start = stirred(state)
 
     def outcome(shift: torch.Tensor) -> torch.Tensor:
@@ -140,12 +142,12 @@ def no_compiler(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @pytest.mark.usefixtures("no_compiler")
 def test_without_a_compiler_torch_does_the_work_after_one_warning(distorted) -> None:
-    system, state = make_system(distorted, [named("paper")])
+    system, state = make_system(distorted, [named_material("paper")])
     with pytest.warns(RuntimeWarning, match="no C\\+\\+ compiler") as caught:
         state = advance(system, stirred(state), 1e-5, steps=2)
     assert len(caught) == 1
     advance(system, state, 1e-5, steps=2)  # a second warning would be an error
-    other, state = make_system(distorted, [named("paper")])
+    other, state = make_system(distorted, [named_material("paper")])
     with pytest.raises(UsageError, match="kernel"):
         advance(other, state, 1e-5, steps=2, backend=Backend.KERNEL)
 
@@ -168,7 +170,7 @@ def test_processes_that_build_at_once_all_get_a_kernel(tmp_path) -> None:
 
 
 def test_a_forced_step_beyond_the_limit_is_refused_with_the_limit(distorted) -> None:
-    system, state = make_system(distorted, [named("11oz-black-denim")])
+    system, state = make_system(distorted, [named_material("11oz-black-denim")])
     with pytest.raises(UsageError, match="unstable: the limit"):
         Symplectic(step=5e-3).advance(system, state, 0.04)
 
@@ -177,7 +179,7 @@ def test_just_below_the_limit_is_stable_and_well_above_is_not(distorted) -> None
     # The estimate is for 15 % stretch and the largest table entries; at small strain the true limit is some way above.
     from sim.integrate import stable_step
 
-    system, state = make_system(distorted, [named("11oz-black-denim")])
+    system, state = make_system(distorted, [named_material("11oz-black-denim")])
     quiet = State(position=state.position, velocity=1e-3 * stirred(state).velocity)
     limit = stable_step(system)
     for share, stable in ((0.95, True), (2.0, False)):

@@ -24,13 +24,13 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.syspath_prepend(str(source.parent))
     folder = tmp_path / "own" / "cache"
     monkeypatch.setenv("FLAGDATA_CACHE", str(folder))
-    assert build.compiled("tiny_kernel", ("tiny.cpp",), without="nothing") is not None
+    assert build.compile_library("tiny_kernel", ("tiny.cpp",), without="nothing") is not None
     assert len(list(folder.glob("*.so"))) == 1
     return folder
 
 
 def again() -> object:
-    return build.compiled("tiny_kernel", ("tiny.cpp",), without="nothing")
+    return build.compile_library("tiny_kernel", ("tiny.cpp",), without="nothing")
 
 
 def test_a_library_in_a_folder_of_the_users_own_is_loaded_again(cache: Path) -> None:

@@ -16,7 +16,7 @@ from sim.cloth.air import QuadraticNormal, Stokes
 from sim.cloth.contact import Contact
 from sim.cloth.handles import Handles
 from sim.cloth.limits import StrainLimits
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.mesh import grid
 from sim.cloth.scene import assemble, flag
 from sim.cloth.state import State
@@ -35,7 +35,7 @@ def flapping(distorted):
     """Three fabrics in a breeze, held by springs at two corners: a system and its start."""
     return make_system(
         distorted,
-        [named(name) for name in FABRICS],
+        [named_material(name) for name in FABRICS],
         handles=Handles(vertices=(0, 28)),
         gravity=(0.0, 0.0, -9.81),
         wind=(3.0, 0.5, 0.0),
@@ -46,7 +46,9 @@ def flapping(distorted):
 def test_a_second_of_flags_is_the_compiled_kernels_to_a_tenth_of_a_millimetre() -> None:
     # Where rounding grows little: the compiled kernel in float64 is 1e-5 m away by then. On fine meshes, where it grows
     # a hundredfold in 0.2 s, no two ways of adding up agree for a second.
-    flags = [flag(material=named("camel-ponte-roma"), wind_speed=speed, columns=6) for speed in (1.0, 2.0, 3.0)]
+    flags = [
+        flag(material=named_material("camel-ponte-roma"), wind_speed=speed, columns=6) for speed in (1.0, 2.0, 3.0)
+    ]
     system, start = assemble(flags)
     steps = Symplectic().steps(system, 0.04)
     ends = []
@@ -65,7 +67,7 @@ def test_twenty_steps_agree_with_torch_to_rounding(evaluation, stiffness, distor
     handles = Handles(vertices=(0, 4), stiffness=stiffness, times=(0.0, 0.1), offsets=((0, 0, 0), (0.02, 0.0, 0.01)))
     system, state = make_system(
         distorted,
-        [named(name) for name in FABRICS],
+        [named_material(name) for name in FABRICS],
         handles=handles,
         gravity=(0.0, 0.0, -9.81),
         wind=(5.0, 1.0, 0.0),

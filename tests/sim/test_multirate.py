@@ -14,7 +14,7 @@ from flagdata.core.rng import stream
 from flagdata.errors import UsageError
 from sim.cloth.air import NO_AIR, Stokes
 from sim.cloth.handles import Handles
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.mesh import grid
 from sim.cloth.scene import assemble, flag
 from sim.effects import EFFECTS, Lift, TangentialLinearDrag, apply
@@ -30,7 +30,7 @@ def drawn(name: str, *, batch: int = 2) -> Any:
 
 def flying(*effects: Any, winds: tuple[float, ...] = (4.0, 5.0), dtype: torch.dtype = torch.float64):
     """Flags of 9 columns, a tenth of a second under way without the effects, and the system with them."""
-    scenes = [flag(material=named("camel-ponte-roma"), wind_speed=speed, columns=9) for speed in winds]
+    scenes = [flag(material=named_material("camel-ponte-roma"), wind_speed=speed, columns=9) for speed in winds]
     system, state = assemble(scenes, dtype=dtype)
     state = replace(Symplectic(step=STEP).advance(system, state, 0.1), time=0.0)
     return apply(effects, system, state)

@@ -10,13 +10,13 @@ import pytest
 import torch
 
 from flagdata.core.arrays import FloatArray
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.scene import Scene, assemble, flag
 from sim.integrate import AirShape, BackwardEuler, Symplectic
 from tests.verification.motion import EdgeMotion, edge_motion
 
 pytestmark = pytest.mark.reference
-CAMEL = named("camel-ponte-roma")
+CAMEL = named_material("camel-ponte-roma")
 RATE = 25.0
 
 

@@ -13,13 +13,13 @@ from flagdata.core.arrays import FloatArray
 from flagdata.errors import InputError, UsageError
 from sim.cloth.contact import Contact
 from sim.cloth.limits import StrainLimits, correction, least_correction, stretches
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.mesh import Mesh, grid
 from sim.cloth.scene import Scene, assemble, flag
-from sim.cloth.sizing import Remeshing, bounded, face_metrics, larger, vertex_metrics
+from sim.cloth.sizing import Remeshing, bound_metric, face_metrics, larger, vertex_metrics
 from sim.effects import EFFECTS, apply
 from sim.integrate import BackwardEuler
-from sim.remeshing.adapting import Adapted, adapted
+from sim.remeshing.adapting import Adapted, adapt_mesh
 from sim.remeshing.triangles import Triangles
 from sim.run.simulation_loop import Batch, Divergence
 from tests.sim.conftest import make_system
@@ -120,7 +120,7 @@ def test_a_vertex_of_a_corner_or_of_a_held_edge_stays() -> None:
 
 def test_a_flat_sheet_at_rest_stays_flat_and_becomes_as_coarse_as_it_may() -> None:
     fine = grid(width=1.5, height=1.0, columns=30, rows=20)
-    new = adapted(fine, flat(fine), np.zeros((fine.vertex_count, 3)), NOTHING, fixed=(0, 20))
+    new = adapt_mesh(fine, flat(fine), np.zeros((fine.vertex_count, 3)), NOTHING, fixed=(0, 20))
     assert len(new.mesh.faces) < 200
     assert new.mesh.areas.sum() == pytest.approx(1.5, abs=1e-12)
     # Every vertex lies where the material has it, and no edge is longer than the largest size.
@@ -129,9 +129,9 @@ def test_a_flat_sheet_at_rest_stays_flat_and_becomes_as_coarse_as_it_may() -> No
 
 
 def test_edges_that_are_too_long_are_split_until_none_is() -> None:
-    new = adapted(SHEET, flat(SHEET), np.zeros((SHEET.vertex_count, 3)), replace(NOTHING, size_max=0.1))
+    new = adapt_mesh(SHEET, flat(SHEET), np.zeros((SHEET.vertex_count, 3)), replace(NOTHING, size_max=0.1))
     assert new.mesh.hinge_lengths.max() <= 0.1
-    again = adapted(new.mesh, flat(new.mesh), 0 * flat(new.mesh), replace(NOTHING, size_max=0.1))
+    again = adapt_mesh(new.mesh, flat(new.mesh), 0 * flat(new.mesh), replace(NOTHING, size_max=0.1))
     assert len(again.mesh.faces) == pytest.approx(len(new.mesh.faces), rel=0.05)
 
 
@@ -173,7 +173,7 @@ def test_of_two_metrics_none_is_larger_than_the_larger_one_in_any_direction() ->
 
 def test_bounds_hold_for_sizes_and_aspect() -> None:
     metric = np.array([np.diag([1e9, 1e-9]), np.diag([4.0, 400.0])])
-    sizes = np.linalg.eigvalsh(bounded(metric, Remeshing(size_min=0.02, size_max=2.0, aspect_min=0.2))) ** -0.5
+    sizes = np.linalg.eigvalsh(bound_metric(metric, Remeshing(size_min=0.02, size_max=2.0, aspect_min=0.2))) ** -0.5
     np.testing.assert_allclose(sizes, [[0.1, 0.02], [0.25, 0.05]])
 
 
@@ -181,7 +181,7 @@ def test_a_wave_gets_finer_where_it_bends_and_short_edges_lie_across_it() -> Non
     mesh = grid(width=1.0, height=0.5, columns=40, rows=20)
     waved = flat(mesh)
     waved[:, 2] = np.where(mesh.rest[:, 0] < 0.5, 0, 0.02 * np.sin(8 * np.pi * mesh.rest[:, 0]))
-    new = adapted(mesh, waved, 0 * waved, replace(NOTHING, refine_angle=0.3, aspect_min=0.2))
+    new = adapt_mesh(mesh, waved, 0 * waved, replace(NOTHING, refine_angle=0.3, aspect_min=0.2))
     left = new.mesh.rest[new.mesh.faces].mean(axis=1)[:, 0] < 0.45
     right = new.mesh.rest[new.mesh.faces].mean(axis=1)[:, 0] > 0.55
     assert right.sum() > 4 * left.sum()
@@ -205,7 +205,7 @@ def test_impossible_criteria_are_refused(changes: dict[str, float], word: str) -
 
 # What the loop does with it.
 FLAG: Scene = replace(
-    flag(material=named("camel-ponte-roma"), wind_speed=5.0, width=0.9, height=0.6, columns=6),
+    flag(material=named_material("camel-ponte-roma"), wind_speed=5.0, width=0.9, height=0.6, columns=6),
     remeshing=Remeshing(size_min=0.05),
 )
 
@@ -262,7 +262,7 @@ def test_several_members_and_positions_in_one_array_are_refused() -> None:
 # Strain limits among slivers.
 def test_the_least_moves_are_those_of_the_nearest_deformation_where_sides_are_equal() -> None:
     equal = Mesh(rest=[[0, 0], [1, 0], [0.5, np.sqrt(0.75)]], faces=[[0, 1, 2]])
-    system, state = make_system(equal, [named("paper")])
+    system, state = make_system(equal, [named_material("paper")])
     position = state.position * torch.tensor([1.0, 1.3, 0.8], dtype=torch.float64)[:, None]
     ways = [sweep(system.cloth, StrainLimits(), position) for sweep in (correction, least_correction)]
     torch.testing.assert_close(*ways, rtol=1e-9, atol=1e-12)
@@ -270,7 +270,7 @@ def test_the_least_moves_are_those_of_the_nearest_deformation_where_sides_are_eq
 
 def test_sweeps_of_the_least_moves_bring_slivers_to_the_limits() -> None:
     mesh = grid(width=1.0, height=0.05, columns=4, rows=4)
-    system, state = make_system(mesh, [named("paper")])
+    system, state = make_system(mesh, [named_material("paper")])
     generator = torch.Generator().manual_seed(1)
     position = state.position + 0.01 * torch.randn(state.position.shape, generator=generator, dtype=torch.float64)
     areas = torch.tensor(mesh.vertex_areas)[:, None, None]

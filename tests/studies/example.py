@@ -20,7 +20,7 @@ from flagdata.timebase import NANOSECONDS, from_datetime
 from measure.demo import CUP
 from measure.simulated_camera import write_film
 from sim.assets import Assets
-from sim.datasets import logged, velocities
+from sim.datasets import log_of_air, velocities
 from sim.render import render_prior
 from sim.run import Crew, Stepper, recipe_of, run
 
@@ -65,7 +65,7 @@ def make(folder: Path, *, seed: int) -> None:
     (outcome,) = run(crew, Stepper.of(crew, member.base), [member], size=1)
     assert outcome.sequence is not None, outcome.failure
     zeta = (
-        render_prior.named("outdoor")
+        render_prior.named_prior("outdoor")
         .with_quantities({"width": 400, "height": 300, "raster_samples": 4}, source="the example")
         .draw(child_seed(seed, "example", "look"), Assets())
     )
@@ -84,7 +84,7 @@ def make(folder: Path, *, seed: int) -> None:
     velocity = velocities(crew.assemble([member])[0], times)
     wind = float(np.hypot(velocity[:, 0], velocity[:, 1])[times >= settled].mean())
     begin = from_datetime(START) - round(settled * NANOSECONDS)
-    series = logged(CUP, times, velocity, instrument=seed, seed=seed, begin=begin).series
+    series = log_of_air(CUP, times, velocity, instrument=seed, seed=seed, begin=begin).series
     first = START + timedelta(seconds=(int(series.time[0]) - from_datetime(START)) / NANOSECONDS + OFFSET)
     speeds, degrees = series.channels["wind_speed"], np.degrees(series.channels["wind_direction"])
     lines = [

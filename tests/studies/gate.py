@@ -20,7 +20,7 @@ from flagdata.core.console import LocalPath, progress, say
 from flagdata.core.rng import stream
 from flagdata.core.schema import Kind
 from flagdata.dataset import HashedSplit
-from flagdata.dataset.sides import divide, selected
+from flagdata.dataset.sides import divide, select_columns
 from flagdata.errors import InputError
 from flagdata.lake.matching import matching
 from flagdata.timebase import NANOSECONDS
@@ -107,7 +107,7 @@ class FilmsOf(Sequence[Film]):
         self._lake, self._rate = flagdata.open(lake_path).lake, rate
         catalog = self._lake.table(self._lake.view(at))
         films = matching(catalog, {"kind": Kind.RECORDING, **data.rows})
-        of_side = divide(catalog, selected(films), hashed=HashedSplit()).artifacts.get(side, frozenset())
+        of_side = divide(catalog, select_columns(films), hashed=HashedSplit()).artifacts.get(side, frozenset())
         rows = matching(films, {"artifact": of_side}).select(["name", "seed", "object"]).to_pylist()
         if not rows:
             raise InputError(

@@ -169,7 +169,7 @@ def _batch(
         )
         zeta, drawn = recipe.prior.draw(seed, assets), camera_picture.settings(recipe.camera, seed=seed)
         seen = build_jobs.shot(recipe, job, outcome.sequence, zeta, assets, device="cpu").numpy()
-        film = np.stack(decode(camera_picture.coded(seen, drawn, recipe.camera, seed=seed), where=job.name))
+        film = np.stack(decode(camera_picture.encode_pictures(seen, drawn, recipe.camera, seed=seed), where=job.name))
         if model.cropping.conditioned:
             film = FitFilm.of(film, np.arange(len(film)) / simulation.time.rate).frames
         yield LongFilm(

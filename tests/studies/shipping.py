@@ -25,7 +25,7 @@ from flagdata.core.files.outputs import check_folder, fresh_folder
 from flagdata.core.schema import Kind
 from flagdata.errors import UsageError
 from flagdata.recipes.documents import column_json
-from models.evaluation.predict import embedded
+from models.evaluation.predict import embed_entries
 from models.trained.estimator import CLOUD, SHIPPED, Estimator, load
 from models.trained.model_folder import WEIGHTS, write_card, write_tensors
 from models.trained.outliers import Familiarity
@@ -70,7 +70,9 @@ def _miss(logits: Tensor, centre: Tensor, truth: Tensor, factor: float) -> float
 def familiar(estimator: Estimator, train: Prepared, validation: Prepared) -> Familiarity:
     """The summaries of the training clips; the false-alarm rate is that of one validation clip a simulation."""
     first = np.unique(validation.sequence, return_index=True)[1]
-    return Familiarity.of(embedded(estimator.learners[0], train), embedded(estimator.learners[0], validation)[first])
+    return Familiarity.of(
+        embed_entries(estimator.learners[0], train), embed_entries(estimator.learners[0], validation)[first]
+    )
 
 
 def write(folder: Path, members: Sequence[Path], *, train: Prepared, validation: Prepared, name: str) -> Estimator:

@@ -50,7 +50,7 @@ def test_a_window_as_wide_as_the_prior_has_no_score() -> None:
 
 
 def test_the_cards_entry_is_what_was_measured() -> None:
-    model, found = estimator.shipped(), simulated(0.5, noise=1.0)
+    model, found = estimator.load_shipped(), simulated(0.5, noise=1.0)
     entry = card_entry(found)
     stored = of_model(replace(model, card={**model.card, CARD_KEY: entry}))
     assert stored == found.dependence()

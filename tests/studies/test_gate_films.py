@@ -57,6 +57,6 @@ def test_films_of_a_network_of_conditioned_films_are_conditioned_and_shown_at_it
     data = DataSpec(datasets=("made",))
     assert FilmsOf(tmp_path / "lake", data, "validation")[0].shape == (14, 40, 48)
     assert FilmsOf(tmp_path / "lake", data, "validation", rate=25.0)[0].shape == (11, 300, 300)
-    plain = estimator.shipped("flow")
+    plain = estimator.load_shipped("flow")
     assert rate_of(plain) is None
     assert rate_of(replace(plain, cropping=replace(plain.cropping, conditioned=True))) == 25.0

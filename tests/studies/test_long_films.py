@@ -18,7 +18,7 @@ from tests.studies.long_films import LongFilm, _casts, _shares, gusty, simulated
 
 @pytest.fixture(scope="module")
 def shipped() -> Estimator:
-    return estimator.shipped("flow")
+    return estimator.load_shipped("flow")
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +65,7 @@ def test_what_cannot_be_measured_is_refused(films: list[LongFilm], shipped: Esti
 
 
 def test_films_in_gusts_state_the_wind_of_each_half_of_a_window() -> None:
-    model = estimator.shipped()
+    model = estimator.load_shipped()
     (film,) = gusty(
         model, dataset="outdoor-damped", count=1, windows=2, seed=5, speed=(6.0, 7.0), intensity=(0.2, 0.25)
     )

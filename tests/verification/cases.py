@@ -21,7 +21,7 @@ from scipy.special import j0, jn_zeros
 from flagdata.core.arrays import FloatArray
 from sim.cloth.air import QuadraticNormal
 from sim.cloth.handles import Handles
-from sim.cloth.material import isotropic, named
+from sim.cloth.material import isotropic, named_material
 from sim.cloth.mesh import grid
 from sim.cloth.scene import assemble, flag
 from sim.cloth.state import State
@@ -219,7 +219,9 @@ def step_errors(counts: Sequence[int], *, finest: int, frames: int = 4) -> Float
         finest: steps a frame of the run they are compared with.
         frames: of 40 ms, from rest at 4 m/s.
     """
-    system, start = assemble([flag(material=named("camel-ponte-roma"), wind_speed=4, columns=12)], dtype=torch.float64)
+    system, start = assemble(
+        [flag(material=named_material("camel-ponte-roma"), wind_speed=4, columns=12)], dtype=torch.float64
+    )
 
     def after(steps: int) -> torch.Tensor:
         state = start
@@ -241,7 +243,7 @@ def mesh_differences(counts: Sequence[int], *, frames: int = 4) -> FloatArray:
     places = []
     for columns in counts:
         system, state = assemble(
-            [flag(material=named("camel-ponte-roma"), wind_speed=4, columns=columns)], dtype=torch.float64
+            [flag(material=named_material("camel-ponte-roma"), wind_speed=4, columns=columns)], dtype=torch.float64
         )
         state = Symplectic().advance(system, state, frames * FRAME)
         every = columns // counts[0]
@@ -254,7 +256,7 @@ def mesh_differences(counts: Sequence[int], *, frames: int = 4) -> FloatArray:
 def edge_statistics(columns: int, *, seed: int, wind: float, members: int, share: float) -> FloatArray:
     """(member, 8) of a settled flag: its free edge's height [m], distance downwind [m], speed [m/s] and frequency [Hz],
     and the power of its upper corner's motion across the wind in each of `OCTAVES` [m²]."""
-    scene = flag(material=named("camel-ponte-roma"), wind_speed=wind, columns=columns)
+    scene = flag(material=named_material("camel-ponte-roma"), wind_speed=wind, columns=columns)
     edge = np.flatnonzero(scene.mesh.rest[:, 0] > 1.5 - 1e-6)
     noise = np.random.default_rng(seed).normal(0, 1e-3, (members, *scene.position.shape))
     system, state = assemble([replace(scene, position=scene.position + n) for n in noise])

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import torch
 
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.state import State
 from sim.integrate import BackwardEuler, advance
 from tests.verification.cases import KICKED_MESH, energy_drift, kicked
@@ -15,7 +15,7 @@ from tests.verification.systems import build
 
 
 def test_free_flight_keeps_momentum_and_angular_momentum() -> None:
-    system, state = build(KICKED_MESH, [named("camel-ponte-roma"), named("ivory-rib-knit")])
+    system, state = build(KICKED_MESH, [named_material("camel-ponte-roma"), named_material("ivory-rib-knit")])
     state = kicked(state)
     mass = system.cloth.mass.unsqueeze(1)
 
@@ -52,7 +52,7 @@ def test_undamped_vibration_keeps_energy_to_second_order_in_the_step() -> None:
 
 
 def test_declared_damping_takes_energy_and_nothing_gives_any() -> None:
-    system, state = build(KICKED_MESH, [named("camel-ponte-roma")])
+    system, state = build(KICKED_MESH, [named_material("camel-ponte-roma")])
     state = kicked(state)
     first = lowest = float(sum(system.energies(state).values()))
     for _ in range(20):

@@ -106,10 +106,10 @@ class Child:
             FlagdataError: whatever of these it raised.
             RuntimeError: it raised anything else.
         """
-        self.started()
+        self.wait_for_start()
         return self._exchange(message, seconds)
 
-    def started(self) -> None:
+    def wait_for_start(self) -> None:
         """Wait until it has started, which takes none of the time of a message.
 
         Raises:
@@ -135,7 +135,7 @@ class Child:
             questions.flush()
             answered, value = pickle.load(answers)
         except (EOFError, OSError, pickle.UnpicklingError):
-            end, detail = (End.LATE, "") if late.is_set() else self._ended()
+            end, detail = (End.LATE, "") if late.is_set() else self._find_end()
             self.close()
             raise EndedError(end, detail) from None
         except BaseException:  # an interrupt: what it answers later would be taken for the next answer
@@ -151,7 +151,7 @@ class Child:
             raise value
         return value
 
-    def _ended(self) -> tuple[End, str]:
+    def _find_end(self) -> tuple[End, str]:
         """Finds out how it ended without having been asked to.
 
         A limit of memory leaves no trace in the exit code: the library that is refused memory aborts, as for any other

@@ -11,7 +11,7 @@ from __future__ import annotations
 import pyarrow as pa
 
 
-def owned(data: bytes) -> pa.Buffer:
+def own_copy(data: bytes) -> pa.Buffer:
     """Copies the bytes to memory of Arrow's own, which its threads let go without the interpreter."""
     content = pa.allocate_buffer(len(data))
     if data:

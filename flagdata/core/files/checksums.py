@@ -124,7 +124,7 @@ def check_sums(folder: Path, *, fix: str) -> None:
             raise CorruptError("its bytes have changed since it was written", where=str(folder / name), fix=fix)
 
 
-def sealed(data: bytes) -> bytes:
+def seal_bytes(data: bytes) -> bytes:
     """Appends to the bytes of a file their SHA-256."""
     return data + hashlib.sha256(data).digest()
 

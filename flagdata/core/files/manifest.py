@@ -35,11 +35,11 @@ def write_manifest(
     return content
 
 
-def unlisted(folder: Path, *, schema: str) -> list[str]:
+def unlisted_files(folder: Path, *, schema: str) -> list[str]:
     """Paths of what lies in a folder and is not listed in its manifest as it is now: other files, changed files, links,
     and the manifest itself where it cannot be read or is of another schema. Missing files and empty folders do not
     count."""
-    listed = _listed(folder / MANIFEST, schema)
+    listed = _listed_entries(folder / MANIFEST, schema)
     paths = [path for path in sorted(_entries(folder)) if path != MANIFEST or not listed]
     return [path for path in paths if not _same(folder / path, listed.get(path))]
 
@@ -50,9 +50,9 @@ def remove_listed(folder: Path, *, schema: str) -> None:
     The manifest goes last, so that a removal that was interrupted can be repeated.
 
     Raises:
-        OSError: the disk refuses it, or something else lies in the folder (see `unlisted`).
+        OSError: the disk refuses it, or something else lies in the folder (see `unlisted_files`).
     """
-    listed = _listed(folder / MANIFEST, schema)
+    listed = _listed_entries(folder / MANIFEST, schema)
     for path in _entries(folder):  # never a path of the manifest's own making, which may lead elsewhere
         if _same(folder / path, listed.get(path)):
             (folder / path).unlink()
@@ -63,7 +63,7 @@ def remove_listed(folder: Path, *, schema: str) -> None:
     folder.rmdir()
 
 
-def _listed(manifest: Path, schema: str) -> dict[str, Mapping[str, Any]]:
+def _listed_entries(manifest: Path, schema: str) -> dict[str, Mapping[str, Any]]:
     """Reads the entries of a manifest by path; none where it is absent, cannot be read or is of another schema."""
     try:
         content = json.loads(manifest.read_text(encoding="utf-8"))

@@ -86,7 +86,7 @@ def is_whole(name: str, suffix: str) -> bool:
     return False
 
 
-def fetched(name: str, suffix: str, *, size: int, fetch: Callable[[Path], None], where: str) -> Path:
+def fetch_copy(name: str, suffix: str, *, size: int, fetch: Callable[[Path], None], where: str) -> Path:
     """Fetches a local copy of an object anew.
 
     Args:
@@ -195,11 +195,11 @@ def _state(path: Path) -> bytes:
     Raises:
         FileNotFoundError: there is no copy.
     """
-    lines = [boot() or "", *sorted(_stated(path))]
+    lines = [boot() or "", *sorted(_stated_problems(path))]
     return "\n".join(lines).encode(errors="surrogateescape")
 
 
-def _stated(path: Path) -> Iterator[str]:
+def _stated_problems(path: Path) -> Iterator[str]:
     status = path.lstat()
     if not stat.S_ISDIR(status.st_mode):
         yield _line(path.name, status)
@@ -255,7 +255,7 @@ def _swept(folder: Path, size: int, limit: int) -> int:
         if path.name not in (LOCK, _TALLY) and path.suffix != _STAMP:
             for entry in path.iterdir() if path.suffix == _BLOCKS else (path,):
                 with suppress(FileNotFoundError, InputError):  # another process has just renamed its part
-                    entries.append((_used(entry), entry, size_of(entry)))
+                    entries.append((_use(entry), entry, size_of(entry)))
     total = sum(bytes_held for _, _, bytes_held in entries) + size
     room = limit if total <= limit else limit * _FILLED
     for used, path, bytes_held in sorted(entries):
@@ -267,7 +267,7 @@ def _swept(folder: Path, size: int, limit: int) -> int:
     return total
 
 
-def _used(entry: Path) -> float:
+def _use(entry: Path) -> float:
     """Returns when a copy, block or part was used last [s since 1970]."""
     stamp = _stamp_of(entry)
     return (stamp if stamp.exists() else entry).lstat().st_mtime

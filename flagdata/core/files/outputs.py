@@ -30,7 +30,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from flagdata.core.files.durable import confirming, disk_errors, flush_file, flush_folder, lacks, make_folders
-from flagdata.core.files.manifest import remove_listed, unlisted, write_manifest
+from flagdata.core.files.manifest import remove_listed, unlisted_files, write_manifest
 from flagdata.errors import ConflictError, InputError
 
 _COMMENTS = {
@@ -48,7 +48,7 @@ _TAIL = 512  # bytes at the end of a file that hold its statement
 _PNG, _PNG_END = b"\x89PNG\r\n\x1a\n", 12  # signature; bytes of the last chunk
 
 
-def signed(data: bytes, *, name: str, command: str) -> bytes:
+def sign_output(data: bytes, *, name: str, command: str) -> bytes:
     """Adds to the bytes of a file `name` the statement that `flagdata COMMAND` wrote them.
 
     A format that has no place for it leaves them as they are."""
@@ -71,7 +71,7 @@ def is_signed(path: Path, *, command: str) -> bool:
     block, end = _block(data, path.name, command, "0" * 64)
     at = len(data) - end
     rest = data[: at - len(block)] + data[at:]
-    return len(rest) < len(data) and signed(rest, name=path.name, command=command) == data
+    return len(rest) < len(data) and sign_output(rest, name=path.name, command=command) == data
 
 
 def _block(data: bytes, name: str, command: str, digest: str) -> tuple[bytes, int]:
@@ -127,7 +127,7 @@ def check_folder(path: Path, *, schema: str | None = None) -> None:
             return
         if schema is None:
             raise _taken(path)
-        if foreign := unlisted(path, schema=schema):
+        if foreign := unlisted_files(path, schema=schema):
             further = f" and {len(foreign) - _NAMED:,} more" if len(foreign) > _NAMED else ""
             raise ConflictError(
                 f"the folder holds what this command did not write there, or what was changed since: "
@@ -188,7 +188,7 @@ def write_files(folder: Path, contents: Mapping[str, str | bytes | None], *, com
         FlagdataError: the disk refuses it.
     """
     check_files(folder, *contents, command=command)
-    with disk_errors("writing the output", folder), _removed() as scratch:
+    with disk_errors("writing the output", folder), _scratch_paths() as scratch:
         make_folders(folder)
         for name, content in contents.items():
             if content is not None:
@@ -213,7 +213,7 @@ def rewrite(path: Path, content: str | bytes) -> None:
         FlagdataError: the disk refuses it; the file is as it was.
     """
     check_rewrite(path)
-    with disk_errors("writing the file", path), _removed() as scratch:
+    with disk_errors("writing the file", path), _scratch_paths() as scratch:
         make_folders(path.parent)
         scratch[path.name] = _scratch(path.parent)
         scratch[path.name].write_bytes(_bytes(path.name, content, None))
@@ -230,7 +230,7 @@ def fresh_file(path: Path, *, command: str | None = None) -> Iterator[Path]:
         FlagdataError: no space, no permission.
     """
     check_file(path, command=command)
-    with disk_errors("writing the output", path), _removed() as scratch:
+    with disk_errors("writing the output", path), _scratch_paths() as scratch:
         scratch[path.name] = _scratch(path.absolute().parent)
         yield scratch[path.name]
         flush_file(scratch[path.name])
@@ -250,7 +250,7 @@ def fresh_folder(path: Path, *, schema: str | None = None) -> Iterator[Path]:
     """
     check_folder(path, schema=schema)
     parent = path.absolute().parent
-    with disk_errors("writing the output", path), _removed() as scratch:
+    with disk_errors("writing the output", path), _scratch_paths() as scratch:
         make_folders(parent)
         scratch[path.name] = _scratch(parent)
         scratch[path.name].mkdir()
@@ -303,7 +303,7 @@ def _scratch(folder: Path) -> Path:
 
 
 @contextmanager
-def _removed() -> Iterator[dict[str, Path]]:
+def _scratch_paths() -> Iterator[dict[str, Path]]:
     """Collects scratch paths by the name that each is for; what is left of them is removed at the end."""
     scratch: dict[str, Path] = {}
     try:
@@ -319,7 +319,7 @@ def _removed() -> Iterator[dict[str, Path]]:
 
 def _bytes(name: str, content: str | bytes, command: str | None) -> bytes:
     data = content.encode() if isinstance(content, str) else content
-    return data if command is None else signed(data, name=name, command=command)
+    return data if command is None else sign_output(data, name=name, command=command)
 
 
 def _publish(scratch: Path, path: Path, command: str | None) -> None:

@@ -23,12 +23,12 @@ from flagdata.ingest.anemometer import sensor_recipe as recipes
 from flagdata.ingest.anemometer import untimed
 from flagdata.ingest.anemometer.draft import doubts
 from flagdata.ingest.anemometer.formats.log_formats import FORMATS, Format
-from flagdata.ingest.anemometer.identify import opened, recognised, signed, unknown
+from flagdata.ingest.anemometer.identify import open_log, recognise_file, signing_formats, unknown
 from flagdata.ingest.anemometer.instants import zones
 from flagdata.ingest.anemometer.log_reading import WIND_CHANNELS, Reading
 from flagdata.ingest.anemometer.samples import platform, rules, zero
 from flagdata.ingest.anemometer.samples.order import in_order
-from flagdata.ingest.anemometer.table.delimited import Delimited, drafted
+from flagdata.ingest.anemometer.table.delimited import Delimited, draft_recipe
 from flagdata.ingest.anemometer.text.text_file import TextFile
 from flagdata.ingest.anemometer.wind_options import WindOptions
 from flagdata.record.signals import LogRow, Series, WindLog, WindSeries
@@ -123,10 +123,10 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
     path = local_path(path)
     options = options or WindOptions()
     recipe = recipes.load(options.recipe) if options.recipe is not None else None
-    source = opened(path, options, recipe.file.encoding if recipe else None)
+    source = open_log(path, options, recipe.file.encoding if recipe else None)
     if options.rate is not None:
         options = replace(options, start=None, rate=None)
-    if recipe is None and options.columns is None and not signed(source) and untimed.clocked(source):
+    if recipe is None and options.columns is None and not signing_formats(source) and untimed.has_clock_times(source):
         if options.date is None:
             day = untimed.year_alone(source)
             lacking = "dates without a year" if day else "times of day without a date"
@@ -135,7 +135,7 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
             year = ", with its year in place of YYYY" if day else ""
             fix = f"give the day of the first: {command_line('--date', example)}{year}, and its --zone"
             raise TimeError(message, where=str(path), fix=fix)
-        source, options = untimed.dated(source, options.date), replace(options, date=None)
+        source, options = untimed.add_date(source, options.date), replace(options, date=None)
     name, options, reasons = _choose(source, options)
     reader: Format = FORMATS[name]()
     unused = options.given() - reader.uses
@@ -177,7 +177,7 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
         raise InputError(error.what, where=f"{path}, {error.where}", fix=error.fix) from None
     reading = rules.future(reading, now=time.time_ns())
     answered = recipe.expect if isinstance(recipe, recipes.Recipe) else frozenset[str]()
-    findings = (*reading.findings, *(() if reading.drafted else doubts.reported(reading, answered)))
+    findings = (*reading.findings, *(() if reading.drafted else doubts.report_doubts(reading, answered)))
     findings = (*findings, *_nothing_measured(reading, where=str(path)))
     series = WindSeries(
         time=reading.time,
@@ -254,9 +254,9 @@ def _choose(source: TextFile, options: WindOptions) -> tuple[str, WindOptions, t
         return name, options, (f"the recipe {options.recipe} was named",)
     if options.columns is not None:
         return "delimited", options, ("its columns were named",)
-    guesses = recognised(source)
+    guesses = recognise_file(source)
     if not guesses:
-        if drafted(source, options) is None:
+        if draft_recipe(source, options) is None:
             guess = unknown(source)
             message = f"not a log of a known format: {'; '.join(guess.reasons)}"
             raise InputError(message, where=str(source.path), fix=guess.fix or "describe it by a recipe")

@@ -14,7 +14,7 @@ from flagdata.ingest.anemometer.containers import json_lines
 from flagdata.ingest.anemometer.draft.drafting import Draft
 from flagdata.ingest.anemometer.formats.log_formats import FORMATS, SIGNATURES, Format
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, NAMED, SURE, Guess, GuessKind, Head
-from flagdata.ingest.anemometer.table.delimited import Delimited, drafted
+from flagdata.ingest.anemometer.table.delimited import Delimited, draft_recipe
 from flagdata.ingest.anemometer.text.text_file import TextFile, first_bytes, is_workbook, open_text, signature
 from flagdata.ingest.anemometer.wind_options import Limits, WindOptions
 from flagdata.ingest.meshes import others
@@ -23,7 +23,7 @@ _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp"}
 _MESHES = {".obj"}
 
 
-def opened(path: Path, options: WindOptions, encoding: str | None = None) -> TextFile:
+def open_log(path: Path, options: WindOptions, encoding: str | None = None) -> TextFile:
     """Opens a log as lines: JSON lines as a table, rows that carry no time on the clock that was given.
 
     Raises:
@@ -34,19 +34,19 @@ def opened(path: Path, options: WindOptions, encoding: str | None = None) -> Tex
     flat = first.startswith("{") and first.endswith("}")
     if options.rate is not None:
         table = json_lines.as_table(source) if flat else source
-        return untimed.timed(table, rate=options.rate, start=options.start, columns=options.columns)
-    if not flat or options.format is not None or options.recipe is not None or recognised(source):
+        return untimed.add_times(table, rate=options.rate, start=options.start, columns=options.columns)
+    if not flat or options.format is not None or options.recipe is not None or recognise_file(source):
         return source
     return json_lines.as_table(source)
 
 
-def signed(source: TextFile) -> tuple[str, ...]:
+def signing_formats(source: TextFile) -> tuple[str, ...]:
     """Formats by which a file's first line names itself."""
     first = "".join(source.head(1)).lstrip("\ufeff")
     return tuple(name for name, marks in SIGNATURES.items() if first.startswith(marks))
 
 
-def recognised(source: TextFile) -> tuple[Guess, ...]:
+def recognise_file(source: TextFile) -> tuple[Guess, ...]:
     """Lists the formats and recipes that know a file, the surest first; none where it is unknown."""
     return tuple(guess for guess in _guesses(source) if guess.score >= SURE)
 
@@ -54,7 +54,7 @@ def recognised(source: TextFile) -> tuple[Guess, ...]:
 def _guesses(source: TextFile) -> tuple[Guess, ...]:
     head = Head(lines=tuple(source.head(HEAD_LINES)), counted=source.counted)
     candidates: list[Guess] = []
-    for _, form in FORMATS.usable(signed(source) or None):
+    for _, form in FORMATS.usable(signing_formats(source) or None):
         reader: Format = form()
         guess = reader.recognise(head)
         if guess is not None and guess.score >= NAMED:
@@ -108,21 +108,21 @@ def sniff(path: Path | str, *, encoding: str | None = None) -> tuple[Guess, ...]
         reason = f"the name ends in {path.suffix}"
         return (Guess(format="mesh", score=0.9, reasons=(reason,), kind="meshes", fix="ingest the folder it is in"),)
     try:
-        source = opened(path, WindOptions(limits=Limits(), encoding=encoding))
+        source = open_log(path, WindOptions(limits=Limits(), encoding=encoding))
         rewritten = tuple(finding.what for finding in source.findings)
-        formats = recognised(source) or tuple(filter(None, [completed(path, WindOptions(encoding=encoding))]))
+        formats = recognise_file(source) or tuple(filter(None, [complete_guess(path, WindOptions(encoding=encoding))]))
     except FlagdataError as error:
         return (Guess(format="unknown", score=0.0, reasons=(error.what,), kind="other", fix=error.fix),)
     return tuple(replace(guess, notes=(*rewritten, *guess.notes)) for guess in formats) or (unknown(source),)
 
 
-def completed(path: Path | str, options: WindOptions) -> Guess | None:
+def complete_guess(path: Path | str, options: WindOptions) -> Guess | None:
     """Drafts a table that no recipe describes, with what the user gives; `None` where it is no table of a log.
 
     Raises:
         FlagdataError: the file cannot be read as text.
     """
-    draft = drafted(opened(Path(path), options), options)
+    draft = draft_recipe(open_log(Path(path), options), options)
     return None if draft is None else guess_of(draft)
 
 
@@ -137,10 +137,10 @@ def anemometers(path: Path | str, options: WindOptions | None = None) -> tuple[s
     options = options or WindOptions()
     if options.recipe is not None or options.format not in (None, Delimited.name) or options.wind is not None:
         return ()
-    source = opened(Path(path), options)
-    if options.format is None and options.columns is None and recognised(source):
+    source = open_log(Path(path), options)
+    if options.format is None and options.columns is None and recognise_file(source):
         return ()
-    draft = drafted(source, options)
+    draft = draft_recipe(source, options)
     return draft.winds if draft is not None and len(draft.winds) > 1 else ()
 
 

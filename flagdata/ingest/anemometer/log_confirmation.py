@@ -143,7 +143,7 @@ UNASKED = Accepting()
 """Refuses every draft."""
 
 
-def confirmed(
+def confirm_readings(
     path: Path, source_hash: str, readings: Sequence[tuple[WindLog, WindOptions]], confirm: Confirm
 ) -> str | None:
     """Confirms the drafted ones of a file's readings and returns how; `None` where none of them is a draft.

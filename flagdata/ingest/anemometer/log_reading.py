@@ -136,7 +136,7 @@ class Reading:
         return marked.take(~rows) if rows.any() else marked
 
 
-def described(by: str) -> Finding:
+def followed_finding(by: str) -> Finding:
     """Reports that a reader follows a description and was never tested on a real file."""
     return Finding.of(
         "read-by-description",

@@ -32,7 +32,7 @@ from flagdata.ingest.anemometer.instants import dates
 from flagdata.ingest.anemometer.instants.stamp_text import EPOCH, pattern
 from flagdata.ingest.anemometer.wind_options import ZeroOffset, check_zero_offset
 from flagdata.recipes import typed_tables
-from flagdata.recipes.shelves import Shelf, parsed
+from flagdata.recipes.shelves import Shelf, parse_recipe
 from flagdata.recipes.typed_tables import Named, Spelled
 from flagdata.record.signals import Sensor
 from flagdata.timebase import zone
@@ -298,18 +298,18 @@ def load(recipe: str) -> Recipe | OpenRecipe:
         InputError: not TOML; a key missing, unknown or of the wrong type.
     """
     file = SENSORS.find(recipe)
-    data = parsed(file.text, where=file.where)
-    return _opened(data, where=file.where) if _is_open(data) else of_data(data, where=file.where)
+    data = parse_recipe(file.text, where=file.where)
+    return _open_recipe(data, where=file.where) if _is_open(data) else of_data(data, where=file.where)
 
 
 def parse(text: str, *, where: str) -> Recipe:
     """Reads the complete recipe written in `text`; raises as `of_data`, and InputError for what is not TOML."""
-    return of_data(parsed(text, where=where), where=where)
+    return of_data(parse_recipe(text, where=where), where=where)
 
 
 def parse_open(text: str, *, where: str) -> OpenRecipe:
     """Reads the open recipe written in `text`; raises as `parse`."""
-    return _opened(parsed(text, where=where), where=where)
+    return _open_recipe(parse_recipe(text, where=where), where=where)
 
 
 def of_data(data: Mapping[str, Any], *, where: str) -> Recipe:
@@ -352,7 +352,7 @@ def _is_open(data: Mapping[str, Any]) -> bool:
     return listed or "match" in data or (isinstance(time, Mapping) and isinstance(time.get("format"), list))
 
 
-def _opened(data: Mapping[str, Any], *, where: str) -> OpenRecipe:
+def _open_recipe(data: Mapping[str, Any], *, where: str) -> OpenRecipe:
     """Checks every key of an open recipe, as far as that is possible without a file, and returns the recipe."""
     typed_tables.entries(
         {"header": tuple[str, ...], **dict.fromkeys(MATCH.split()[1:], Any)},

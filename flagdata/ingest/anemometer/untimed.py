@@ -42,7 +42,7 @@ _CLOCK = "time (UTC), as given"
 """Heading of the instants that are counted."""
 
 
-def timed(source: TextFile, *, rate: float, start: int | None, columns: str | None = None) -> TextFile:
+def add_times(source: TextFile, *, rate: float, start: int | None, columns: str | None = None) -> TextFile:
     """Puts a time in every row of a file.
 
     Args:
@@ -66,18 +66,18 @@ def timed(source: TextFile, *, rate: float, start: int | None, columns: str | No
     lines = source.head(HEAD_LINES)
     if columns is not None:
         text, findings = _table(source, rate, start, where)
-        return _counted(source, text, rate, start, findings)
+        return _file_of_lines(source, text, rate, start, findings)
     if sum(bool(_WIND.search(line)) for line in lines) and sum(line.startswith(("$", "!", "\\")) for line in lines):
         _refuse_times(_runs(_all_lines(source)), where)
         text = [line for line in _sentences(source, rate, start) if _TIMED.search(line.partition(" ")[2]) is None]
     else:
         _refuse_times(any(split_stamp(line)[0] for line in lines), where)
-        stamped = list(_stamped(source, rate, start))
+        stamped = list(_stamped_lines(source, rate, start))
         if not of_an_instrument(stamped[:HEAD_LINES]):
             text, findings = _table(source, rate, start, where)
-            return _counted(source, text, rate, start, findings)
+            return _file_of_lines(source, text, rate, start, findings)
         text = stamped
-    return _counted(source, text, rate, start)
+    return _file_of_lines(source, text, rate, start)
 
 
 def of_an_instrument(lines: Sequence[str]) -> bool:
@@ -91,7 +91,7 @@ def of_an_instrument(lines: Sequence[str]) -> bool:
     return False
 
 
-def clocked(source: TextFile) -> bool:
+def has_clock_times(source: TextFile) -> bool:
     """Checks whether the lines are those of an instrument, each after a time of day without a date, and say no other
     time."""
     lines = [line for line in source.head(HEAD_LINES) if line.strip()]
@@ -135,7 +135,7 @@ def _of_year(match: re.Match[str], before: dt.date, *, first: bool, where: str) 
     return date
 
 
-def dated(source: TextFile, date: dt.date) -> TextFile:
+def add_date(source: TextFile, date: dt.date) -> TextFile:
     """Puts the date before the lines of an instrument, each after a time of day.
 
     Args:
@@ -172,7 +172,7 @@ def _of_day(clock: str) -> int:
     return (60 * int(clock[:2]) + int(clock[3:5])) * HOUR // 60
 
 
-def _counted(
+def _file_of_lines(
     source: TextFile, text: Sequence[str], rate: float, start: int, findings: Sequence[Finding] = ()
 ) -> TextFile:
     """Returns the file with these lines, and the finding that says whose clock they are on beside others."""
@@ -225,7 +225,7 @@ def _key(text: str) -> str:
     return re.sub(r",[^,]*,", ",", text)
 
 
-def _stamped(source: TextFile, rate: float, start: int) -> Iterator[str]:
+def _stamped_lines(source: TextFile, rate: float, start: int) -> Iterator[str]:
     filled = (line for line in _all_lines(source) if line.strip(NOTHING))
     for count, line in enumerate(filled):
         yield f"{_stamp(start, count, rate)} {line.strip()}"

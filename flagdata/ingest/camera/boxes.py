@@ -139,7 +139,7 @@ def _entries(stream: BufferedIOBase, listed: Box, scale: int) -> list[Edit]:
     ]
 
 
-def edited(edit_list: Sequence[Edit]) -> str | None:
+def edit_list_remark(edit_list: Sequence[Edit]) -> str | None:
     """Describes how an edit list shows a medium otherwise than from one place on at its own pace; None where it does
     not."""
     parts = [edit for edit in edit_list if edit.begins >= 0]

@@ -74,7 +74,7 @@ class Pictured:
     codec: str
 
 
-def pictured(path: Path) -> Pictured | None:
+def first_picture(path: Path) -> Pictured | None:
     """Decode the first picture of a file; `None` where none of its packets gives one.
 
     Raises:

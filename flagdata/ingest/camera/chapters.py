@@ -15,7 +15,7 @@ from fractions import Fraction
 from pathlib import Path
 
 from flagdata.core.findings import Finding
-from flagdata.core.numbered import bounded
+from flagdata.core.numbered import read_bounded
 from flagdata.errors import FlagdataError
 from flagdata.ingest.camera.camera_options import Limits
 from flagdata.ingest.camera.video_container import open_container
@@ -52,7 +52,7 @@ def chapter_of(path: Path) -> Chapter | None:
     earlier = _earlier(path.name)
     if not earlier:
         digits = counted["number"]
-        number = bounded(digits, most=_MOST)
+        number = read_bounded(digits, most=_MOST)
         if not number:
             return None
         former = f"{counted['head']}{number - 1:0{len(digits)}}{counted['rest']}"
@@ -98,7 +98,7 @@ def place_by_name(name: str) -> tuple[str, int] | None:
 
 
 def _chapter(match: re.Match[str]) -> int:
-    return bounded(match["chapter"], most=_CHAPTERS) or 0
+    return read_bounded(match["chapter"], most=_CHAPTERS) or 0
 
 
 def _earlier(name: str) -> list[str]:

@@ -44,9 +44,9 @@ class Counter:
         """Replaces the stamps of the next packet of the file."""
         if self._length is None:
             return
-        packet.pts, packet.dts = (self._counted(stamp, self._length) for stamp in (packet.pts, packet.dts))
+        packet.pts, packet.dts = (self._unwrapped_count(stamp, self._length) for stamp in (packet.pts, packet.dts))
 
-    def _counted(self, stamp: int | None, length: int) -> int | None:
+    def _unwrapped_count(self, stamp: int | None, length: int) -> int | None:
         if stamp is None:
             return None
         counted = stamp + self._shift
@@ -80,7 +80,7 @@ def restart(stamps: IntArray, *, tick: Fraction) -> int | None:
     return None
 
 
-def restarted(*, frame: int, after: float, count: int) -> Finding:
+def restarted_finding(*, frame: int, after: float, count: int) -> Finding:
     """Reports that the clock started anew.
 
     Args:

@@ -61,7 +61,9 @@ class Damage:
                     count=self.suspect,
                 )
             )
-        findings += resized(self.resized, fix="bring all frames to one size: ffmpeg -i IN -vf scale=WIDTH:HEIGHT OUT")
+        findings += resized_findings(
+            self.resized, fix="bring all frames to one size: ffmpeg -i IN -vf scale=WIDTH:HEIGHT OUT"
+        )
         missing = expected - self.packets - self.decoded
         if missing > 0:
             findings.append(
@@ -74,7 +76,7 @@ class Damage:
         return findings
 
 
-def undecoded(count: int, *, total: int, first: str | None = None) -> list[Finding]:
+def undecoded_findings(count: int, *, total: int, first: str | None = None) -> list[Finding]:
     """Reports frames whose bytes a source could not decode; empty where `count` is 0.
 
     Args:
@@ -94,7 +96,7 @@ def undecoded(count: int, *, total: int, first: str | None = None) -> list[Findi
     ]
 
 
-def resized(
+def resized_findings(
     count: int, *, than: str = "the first", fix: str = "ingest the frames of each size as a recording of their own"
 ) -> list[Finding]:
     """Reports frames of another size than the one that was kept; empty where `count` is 0.

@@ -80,7 +80,7 @@ def gps_times(container: InputContainer, stream: DataStream, *, origin: Fraction
         container: at its begin; it is read on.
         origin: time of the first frame by the container's clock [s].
     """
-    timed = list(islice(_timed(container, stream), _ENOUGH))
+    timed = list(islice(_time(container, stream), _ENOUGH))
     if not timed:
         return None
     instants, begins, lengths = zip(*timed, strict=True)
@@ -91,7 +91,7 @@ def gps_times(container: InputContainer, stream: DataStream, *, origin: Fraction
     )
 
 
-def _timed(container: InputContainer, stream: DataStream) -> Iterator[tuple[int, Fraction, Fraction]]:
+def _time(container: InputContainer, stream: DataStream) -> Iterator[tuple[int, Fraction, Fraction]]:
     """Yields (instant, begin, length) of each payload with a fix; damage of the container ends them."""
     try:
         for packet in container.demux(stream):

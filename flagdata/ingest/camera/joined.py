@@ -141,7 +141,7 @@ class JoinedSource:
         Returns:
             what to report: how they were joined, and a warning where nothing states that they follow one another.
         """
-        created = [_created(part.facts) for part in self._parts]
+        created = [_creation_time(part.facts) for part in self._parts]
         lengths = [_length(part.facts.timing) for part in self._parts]
         names = ", ".join(path.name for path in self._paths)
         by_name = [place_by_name(path.name) for path in self._paths]
@@ -212,7 +212,7 @@ class JoinedSource:
         for part, offset in zip(self._parts, self._offsets, strict=True):
             origin = part.facts.timing.origin
             for picture in part.pictures():
-                yield _moved(picture, offset - origin)
+                yield _move_picture(picture, offset - origin)
 
     def samples(self, runs: int, count: int, stride: int) -> Iterator[list[Picture]]:
         spans = np.array([max(1, part.facts.timing.count) for part in self._parts], dtype=np.float64)
@@ -221,7 +221,7 @@ class JoinedSource:
             if end > begin:
                 origin = part.facts.timing.origin
                 for run in part.samples(end - begin, count, stride):
-                    yield [_moved(picture, offset - origin) for picture in run]
+                    yield [_move_picture(picture, offset - origin) for picture in run]
 
     def damage(self) -> list[Finding]:
         return [
@@ -254,7 +254,7 @@ def _length(timing: Timing) -> Fraction:
     return (timing.span + timing.period) * timing.tick
 
 
-def _created(facts: SourceFacts) -> int | None:
+def _creation_time(facts: SourceFacts) -> int | None:
     """Reads a file's creation time [UTC ns]; None where it states none that can be read."""
     text = facts.metadata.get("creation_time")
     try:
@@ -263,5 +263,5 @@ def _created(facts: SourceFacts) -> int | None:
         return None
 
 
-def _moved(picture: Picture, by: int) -> Picture:
+def _move_picture(picture: Picture, by: int) -> Picture:
     return replace(picture, stamp=None if picture.stamp is None else picture.stamp + by)

@@ -35,7 +35,7 @@ from flagdata.core.findings import Finding, Severity
 from flagdata.core.printable import printable
 from flagdata.errors import CorruptError, InputError, LimitError, NotFoundError, TimeError, UnknownNameError
 from flagdata.ingest.camera.camera_options import CameraOptions
-from flagdata.ingest.camera.damage import undecoded
+from flagdata.ingest.camera.damage import undecoded_findings
 from flagdata.ingest.camera.frame_stamps import survey
 from flagdata.ingest.camera.luma import BROKEN, STILLS, luma_of_frame, luma_of_image
 from flagdata.ingest.camera.picture_geometry import Orientation
@@ -220,7 +220,7 @@ class EpisodeSource:
             raise InputError("no picture of the episode can be decoded", where=self._where, fix="copy it again")
         luma = first[0].luma()
         data_set, side_findings = stated_of(folder, info, row)
-        findings = [*([] if self._stamped else [_counted()]), *side_findings]
+        findings = [*([] if self._stamped else [_counted_finding()]), *side_findings]
         self.facts = SourceFacts(
             container="lerobot",
             codec=self._kind,
@@ -241,7 +241,7 @@ class EpisodeSource:
 
     def pictures(self) -> Iterator[Picture]:
         count = 0
-        for picture in self._decoded():
+        for picture in self._decode_pictures():
             count += 1
             yield picture
         self._broken = len(self._stamps) - count
@@ -252,17 +252,17 @@ class EpisodeSource:
         for run in range(runs):
             start = max(first, length * run // runs)
             first = min(start + count * stride, length)
-            pictures = list(islice(self._decoded(start), 0, count * stride, stride))
+            pictures = list(islice(self._decode_pictures(start), 0, count * stride, stride))
             if pictures:
                 yield pictures
 
     def damage(self) -> list[Finding]:
-        return undecoded(self._broken, total=len(self._stamps))
+        return undecoded_findings(self._broken, total=len(self._stamps))
 
     def close(self) -> None:
         """Files are open only while pictures are read."""
 
-    def _decoded(self, start: int = 0) -> Iterator[Picture]:
+    def _decode_pictures(self, start: int = 0) -> Iterator[Picture]:
         if self._film is not None:
             yield from self._of_film(start)
             return
@@ -315,11 +315,11 @@ def _path(template: str, row: Mapping[str, Any], prefix: str, where: str, **name
     """
     numbers = {part: round(_number(row, f"{prefix}/{part}", where)) for part in ("chunk_index", "file_index")}
 
-    def filled(match: re.Match[str]) -> str:
+    def fill_field(match: re.Match[str]) -> str:
         values = {**numbers, **names}
         return str(values[match[1]]).zfill(int(match[2] or 0)) if match[1] in values else match[0]
 
-    text = _FIELD.sub(filled, template)
+    text = _FIELD.sub(fill_field, template)
     if "{" in text:
         raise CorruptError(f"{template!r} names no file", where=f"{where}/{LEROBOT_INFO}", fix="copy it again")
     return _inside(text, where)
@@ -428,7 +428,7 @@ def _table(path: Path, columns: list[str], episode: int) -> pa.Table:
     return table
 
 
-def _counted() -> Finding:
+def _counted_finding() -> Finding:
     return Finding.of(
         "stamps-synthetic",
         "LeRobot counts a frame's time as its number / fps: gaps and jitter of the camera are not in the data set",

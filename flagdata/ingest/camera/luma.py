@@ -61,7 +61,7 @@ def luma_of_frame(frame: av.VideoFrame, *, codec: str) -> Luma:
     if name.startswith(("xyz", "bayer", "vaapi", "cuda")):
         raise InputError(f"pixel format {name} is neither gray, YUV nor RGB", fix="convert the file to H.264 first")
     if frame.format.is_rgb or frame.format.has_palette or name.startswith("mono"):
-        rgb = _converted(frame, "rgb24")
+        rgb = _convert(frame, "rgb24")
         plane = rgb.planes[0]
         colour = Image.frombuffer("RGB", (rgb.width, rgb.height), bytes(plane), "raw", "RGB", plane.line_size, 1)
         return Luma(image=colour.convert("L"), black=0.0, white=255.0)
@@ -70,7 +70,7 @@ def luma_of_frame(frame: av.VideoFrame, *, codec: str) -> Luma:
     alone = sum(component.plane == 0 for component in frame.format.components) == 1
     if not (alone and (bits == 8 or (name.startswith(("yuv", "gray")) and name.endswith("le")))):
         bits = 8 if bits == 8 else 16
-        frame = _converted(frame, "yuv444p" if bits == 8 else "yuv444p16le")
+        frame = _convert(frame, "yuv444p" if bits == 8 else "yuv444p16le")
     plane = frame.planes[0]
     if bits == 8:
         memory = cast(bytes, plane)  # Pillow takes any buffer, and keeps it alive
@@ -98,7 +98,7 @@ def luma_of_image(image: Image.Image) -> Luma:
     return Luma(image=gray, black=0.0, white=255.0)
 
 
-def _converted(frame: av.VideoFrame, pixel_format: str) -> av.VideoFrame:
+def _convert(frame: av.VideoFrame, pixel_format: str) -> av.VideoFrame:
     """Converts a picture to another layout, by one thread: with several, swscale mixed up bands of rows."""
     return frame.reformat(format=pixel_format, threads=1)
 

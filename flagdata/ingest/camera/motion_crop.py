@@ -253,7 +253,7 @@ def _draw(image: UInt8Array, motion: NDArray[np.floating], box: CropBox, *, wide
     rgb = np.stack([dim + (255 - dim) * strength, dim * (1 - strength), dim * (1 - strength)], axis=-1)
     picture = Image.fromarray(np.rint(rgb).astype(np.uint8), mode="RGB")
     scale = image.shape[1] / wide
-    corners = _scaled(box, scale)
+    corners = _scale_box(box, scale)
     pen = ImageDraw.Draw(picture)
     pen.rectangle(corners, outline=(255, 220, 0), width=3)
     pen.text((corners[0] + 6, corners[1] + 6), str(box), fill=(255, 220, 0))
@@ -262,7 +262,7 @@ def _draw(image: UInt8Array, motion: NDArray[np.floating], box: CropBox, *, wide
     return stream.getvalue()
 
 
-def _scaled(box: CropBox, scale: float) -> Sequence[float]:
+def _scale_box(box: CropBox, scale: float) -> Sequence[float]:
     return (
         box.x * scale,
         box.y * scale,

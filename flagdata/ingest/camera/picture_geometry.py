@@ -48,11 +48,11 @@ class Orientation:
 
     def upright(self, image: Image.Image) -> Image.Image:
         """As `apply`, of a Pillow image."""
-        return _turned(image, self._steps)
+        return _turn_image(image, self._steps)
 
     def stored(self, image: Image.Image) -> Image.Image:
         """Turns an upright picture back to the stored one: undoes `upright`."""
-        return _turned(image, self._steps[::-1])
+        return _turn_image(image, self._steps[::-1])
 
     @property
     def _steps(self) -> tuple[Image.Transpose, ...]:
@@ -160,10 +160,10 @@ class Geometry:
         target, box = (high, wide) if self.orientation.transpose else (wide, high), self._stored_box
         is_whole = luma.size == target and box == (0, 0, *target)
         scaled = luma if is_whole else luma.resize(target, Image.Resampling.HAMMING, box=box)
-        return self.orientation.apply(_stretched(scaled, black=black, white=white))
+        return self.orientation.apply(_stretch(scaled, black=black, white=white))
 
 
-def _stretched(image: Image.Image, *, black: float, white: float) -> UInt8Array:
+def _stretch(image: Image.Image, *, black: float, white: float) -> UInt8Array:
     """Stretches `black` … `white` of an image of mode L or F to 0 … 255."""
     if image.mode == "L" and (black, white) == (0, 255):
         return np.asarray(image)
@@ -175,7 +175,7 @@ def _stretched(image: Image.Image, *, black: float, white: float) -> UInt8Array:
     return np.clip(np.rint((values - black) * factor), 0, 255).astype(np.uint8)
 
 
-def _turned(image: Image.Image, steps: Sequence[Image.Transpose]) -> Image.Image:
+def _turn_image(image: Image.Image, steps: Sequence[Image.Transpose]) -> Image.Image:
     for step in steps:
         image = image.transpose(step)
     return image

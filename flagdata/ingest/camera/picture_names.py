@@ -21,7 +21,7 @@ from pathlib import PurePath
 from statistics import median
 
 from flagdata.core.findings import Finding
-from flagdata.core.numbered import Ordinal, bounded
+from flagdata.core.numbered import Ordinal, read_bounded
 from flagdata.errors import InputError
 from flagdata.timebase import NANOSECONDS
 
@@ -203,7 +203,7 @@ class _Reading:
     ranked: bool = False
 
 
-def ordered(names: Sequence[str], *, rate: Fraction, where: str) -> Ordered:
+def order_pictures(names: Sequence[str], *, rate: Fraction, where: str) -> Ordered:
     """Pictures in the order of the numbers in their names, and the frame that each is.
 
     A number that is missing is a missing frame. Numbers in steps, and times in about even ones, count one frame a step.
@@ -311,7 +311,7 @@ def _values(digits: Sequence[str], names: Sequence[str], where: str) -> list[int
     Raises:
         InputError: they are longer, and vary.
     """
-    values = [value for text in digits if (value := bounded(text, most=_LARGEST)) is not None]
+    values = [value for text in digits if (value := read_bounded(text, most=_LARGEST)) is not None]
     if len(values) == len(digits):
         return values
     if len(set(digits)) > 1:
@@ -346,7 +346,7 @@ def _with_fractions(columns: list[_Column]) -> list[_Column]:
         values = tuple(integer * 10**width + int(text) for integer, text in zip(column.values, padded, strict=True))
         tick = Fraction(1, 10**width) if seconds else None
         merged = _Column(before=column.before, values=values, digits=part.digits, tick=tick)
-        even = _spaced(sorted(values)) if merged.distinguishes else None
+        even = _evenly_counted(sorted(values)) if merged.distinguishes else None
         if seconds or (even is not None and even.places[-1] < 2 * len(values)):
             return [*columns[:k], merged, *columns[k + 2 :]]
     return columns
@@ -356,13 +356,13 @@ def _by_number(columns: Sequence[_Column], names: Sequence[str], rate: Fraction,
     varying = [column for column in columns if column.varies]
     ordering = [column for column in varying if column.distinguishes]
     if not ordering:
-        raise _undecided(columns, names, where)
+        raise _undecided_error(columns, names, where)
     order = sorted(range(len(names)), key=ordering[0].values.__getitem__)
     _check_rising(varying, order, names, where)
     readings = []
     for column in ordering:
         values = [column.values[i] for i in order]
-        reading = _spaced(values)
+        reading = _evenly_counted(values)
         instants = None if column.tick is None else [round(v * column.tick * NANOSECONDS) for v in values]
         if reading is None and instants is not None:
             reading = _at_rate(instants, rate)
@@ -392,19 +392,19 @@ def _by_clock(clock: Clock, columns: Sequence[_Column], names: Sequence[str], ra
         raise _open_order(names, where)
     full = [(*key, *(column.values[i] for column in later)) for i, key in enumerate(keys)]
     if len(set(full)) < len(full):
-        raise _undecided(columns, names, where)
+        raise _undecided_error(columns, names, where)
     if clock.problem is not None:
         raise InputError(clock.problem[0], where=where, fix=clock.problem[1])
     order = sorted(range(len(names)), key=full.__getitem__)
     _check_rising(other_columns, order, names, where)
     instants = [clock.times[i] for i in order]
     distinct = len(set(instants)) == len(instants)
-    timed = _spaced(instants, clock=True) if distinct else None
+    timed = _evenly_counted(instants, clock=True) if distinct else None
     counted = [
         (reading, column.values[order[0]])
         for column in columns
         if column.distinguishes and _rises(column, order)
-        if (reading := _spaced([column.values[i] for i in order])) is not None
+        if (reading := _evenly_counted([column.values[i] for i in order])) is not None
     ]
     # Numbers from 0 or 1 on that look like times are counted frames.
     readings = [reading for reading, least in counted if least <= 1] + ([timed] if timed is not None else [])
@@ -422,7 +422,7 @@ def _by_clock(clock: Clock, columns: Sequence[_Column], names: Sequence[str], ra
     )
 
 
-def _spaced(values: Sequence[int], *, clock: bool = False) -> _Reading | None:
+def _evenly_counted(values: Sequence[int], *, clock: bool = False) -> _Reading | None:
     """Places of rising numbers that count in a common step, or that rise by about one step as times do; else None."""
     steps = [b - a for a, b in pairwise(values)]
     common, middle = math.gcd(*steps), median(steps)
@@ -477,7 +477,7 @@ def _open_order(names: Sequence[str], where: str) -> InputError:
     )
 
 
-def _undecided(columns: Sequence[_Column], names: Sequence[str], where: str) -> InputError:
+def _undecided_error(columns: Sequence[_Column], names: Sequence[str], where: str) -> InputError:
     """Returns the error of pictures that no number distinguishes: all numbers of two are alike, or several numbers
     vary."""
     first: dict[tuple[int, ...], str] = {}

@@ -79,7 +79,7 @@ def find_start(
         return Start(instant=option, source="option", sigma=None)
     if stamped is not None:
         try:
-            return _checked(stamped, "stamps of the frames", 0.0)
+            return _check_start(stamped, "stamps of the frames", 0.0)
         except TimeError as error:
             raise TimeError(f"the frames' stamps begin at {error.what}", where=where, fix=error.fix) from None
     default = zone(zone_name, where="zone") if zone_name else None
@@ -97,7 +97,7 @@ def find_start(
             if key == "creation_time":
                 start = _from_creation_time(text, default=default, duration=duration, where=where, chapter=chapter)
             else:
-                start = _checked(parse(text, default=default, where=where), key, _WHOLE_SECOND)
+                start = _check_start(parse(text, default=default, where=where), key, _WHOLE_SECOND)
         except TimeError as error:
             message = f"{key} {text!r} is unusable ({error.what})"
             passed_over.append(Finding.of("start-passed-over", message))
@@ -126,7 +126,7 @@ def _from_gps(instant: int, sigma: float, *, created: str | None, default: tzinf
 def _from_creation_time(
     text: str, *, default: tzinfo | None, duration: float, where: str, chapter: Chapter | None
 ) -> Start:
-    created = _checked(parse(text, default=default, where=where), "creation_time", None)
+    created = _check_start(parse(text, default=default, where=where), "creation_time", None)
     before = chapter.before if chapter is not None else 0.0
     duration += before
     # Uniform from start to end of the recording, as far as it is known, and over the second it is cut to.
@@ -142,7 +142,7 @@ def _from_creation_time(
     return replace(created, instant=created.instant + round(before * NANOSECONDS), sigma=sigma, findings=findings)
 
 
-def _checked(instant: int, key: str, sigma: float | None) -> Start:
+def _check_start(instant: int, key: str, sigma: float | None) -> Start:
     if instant < _EARLIEST:
         raise TimeError(f"{iso(instant)} looks like a clock that was never set", fix="give --start")
     return Start(instant=instant, source=f"metadata: {key}", sigma=sigma)

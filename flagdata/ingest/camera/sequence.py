@@ -20,11 +20,11 @@ from flagdata.core.findings import Finding
 from flagdata.errors import InputError, LimitError, TimeError
 from flagdata.ingest.camera import depth
 from flagdata.ingest.camera.camera_options import CameraOptions, Limits, exact
-from flagdata.ingest.camera.damage import resized, undecoded
+from flagdata.ingest.camera.damage import resized_findings, undecoded_findings
 from flagdata.ingest.camera.frame_stamps import survey
 from flagdata.ingest.camera.luma import BROKEN, DEEP, Luma, luma_of_image
 from flagdata.ingest.camera.picture_geometry import Orientation
-from flagdata.ingest.camera.picture_names import ordered
+from flagdata.ingest.camera.picture_names import order_pictures
 from flagdata.ingest.camera.picture_source import Picture, SourceFacts
 
 PICTURES = {
@@ -175,7 +175,7 @@ class SequenceSource:
                 "images have no time stamps", where=self._where, fix="give the camera's frame rate: --sequence-fps HZ"
             )
         rate = exact(options.sequence_fps)
-        order = ordered([path.name for path in paths], rate=rate, where=self._where)
+        order = order_pictures([path.name for path in paths], rate=rate, where=self._where)
         self._paths = [paths[i] for i in order.order]
         self._stamps = order.places
         self._broken: list[str] = []
@@ -337,7 +337,9 @@ class SequenceSource:
 
     def damage(self) -> list[Finding]:
         first = self._broken[0] if self._broken else None
-        return undecoded(len(self._broken), total=len(self._paths), first=first) + resized(self._resized, than="most")
+        return undecoded_findings(len(self._broken), total=len(self._paths), first=first) + resized_findings(
+            self._resized, than="most"
+        )
 
     def close(self) -> None:
         """Closes nothing: no file stays open between images."""

@@ -53,7 +53,9 @@ class CameraStream:
         self._scale = Fraction(1)
         if options.true_fps is not None:
             self._scale = timing.mean_rate / exact(options.true_fps)
-            self._opening.append(_rescaled(timing.variable, self._scale, options.true_fps, float(timing.mean_rate)))
+            self._opening.append(
+                _rescaled_finding(timing.variable, self._scale, options.true_fps, float(timing.mean_rate))
+            )
         duration = timing.duration * float(self._scale)
         if duration > options.limits.duration:
             raise LimitError(
@@ -82,7 +84,7 @@ class CameraStream:
         self.proposal: CropProposal | None = None
         if options.crop == "auto":
             self.proposal = propose(source, rate=float(timing.rate / self._scale), where=str(path))
-            self._opening.append(_proposed(self.proposal))
+            self._opening.append(_proposed_finding(self.proposal))
         crop = settle_crop(self.proposal.box if self.proposal else options.crop, width=width, height=height)
         self._geometry = Geometry(
             width=facts.width,
@@ -169,7 +171,7 @@ class CameraStream:
     def __iter__(self) -> Iterator[Frame]:
         return self._once(self._geometry.render)
 
-    def unpadded(self) -> Iterator[Frame]:
+    def unpadded_frames(self) -> Iterator[Frame]:
         """Yields the same frames, their images (height, width) the crop alone, without the padding about it."""
         return self._once(self._geometry.content)
 
@@ -182,7 +184,7 @@ class CameraStream:
     def _frames(self, render: Callable[..., UInt8Array]) -> Iterator[Frame]:
         repair: StampRepair[Picture] = StampRepair(period=self._period)
         sampler = self._sampler()
-        for stamp, picture in self._repaired(repair):
+        for stamp, picture in self._repair_instants(repair):
             for pick in sampler.push(stamp, picture):
                 yield self._frame(pick, render)
         for pick in sampler.finish():
@@ -209,7 +211,7 @@ class CameraStream:
         )
         return Resampler(start=0, rate=rate, tolerance=int(tolerance), tail=int(period / 2))
 
-    def _repaired(self, repair: StampRepair[Picture]) -> Iterator[tuple[int, Picture]]:
+    def _repair_instants(self, repair: StampRepair[Picture]) -> Iterator[tuple[int, Picture]]:
         """Yields source pictures with strictly increasing instants, counted from the start [ns]."""
         timing = self._source.facts.timing
         for picture in self._source.pictures():
@@ -272,7 +274,7 @@ class CameraStream:
         return findings
 
 
-def _proposed(proposal: CropProposal) -> Finding:
+def _proposed_finding(proposal: CropProposal) -> Finding:
     return Finding.of(
         "crop-proposed",
         f"automatic crop {proposal.box}, with {proposal.share:.0%} of the motion; check it by --crop-picture",
@@ -280,7 +282,7 @@ def _proposed(proposal: CropProposal) -> Finding:
     )
 
 
-def _rescaled(variable: bool, scale: Fraction, true_fps: float, container: float) -> Finding:
+def _rescaled_finding(variable: bool, scale: Fraction, true_fps: float, container: float) -> Finding:
     message = (
         f"the camera ran at {true_fps:g} Hz, the container states {container:g}: times are scaled by {float(scale):.6g}"
     )

@@ -26,9 +26,9 @@ from flagdata.core.files.regular_files import check_input
 from flagdata.core.findings import Finding, Severity
 from flagdata.core.shell import command_line
 from flagdata.errors import InputError, LimitError, TimeError, UsageError
-from flagdata.ingest.camera.boxes import edited, edits, is_cut, is_mp4, whole_part
+from flagdata.ingest.camera.boxes import edit_list_remark, edits, is_cut, is_mp4, whole_part
 from flagdata.ingest.camera.camera_options import CameraOptions, Limits, exact
-from flagdata.ingest.camera.container_clock import COUNTERS, Counter, restart, restarted
+from flagdata.ingest.camera.container_clock import COUNTERS, Counter, restart, restarted_finding
 from flagdata.ingest.camera.frame_stamps import Timing, survey
 
 _EBML, _SEGMENT = b"\x1a\x45\xdf\xa3", b"\x18\x53\x80\x67"
@@ -239,12 +239,12 @@ def open_container(
         UsageError: no such stream of pictures that can be decoded.
         LimitError: its header states frames beyond the limit.
     """
-    container = _opened(path, limits)
+    container = _open_container(path, limits)
     try:
         stream = _choose(container, path, wanted)
-        if stream.id and edited(edits(path, stream.id)) is not None:
+        if stream.id and edit_list_remark(edits(path, stream.id)) is not None:
             container.close()
-            container = _opened(path, limits, ignore_editlist="1")
+            container = _open_container(path, limits, ignore_editlist="1")
             stream = _choose(container, path, wanted)
         context = stream.codec_context
         if context.width * context.height > limits.frame_pixels:
@@ -259,7 +259,7 @@ def open_container(
     return container, stream
 
 
-def _opened(path: Path, limits: Limits, **options: str) -> InputContainer:
+def _open_container(path: Path, limits: Limits, **options: str) -> InputContainer:
     """Opens the container; of a file that is cut off, what is whole."""
     with _reading(path):
         end = whole_part(path)
@@ -356,11 +356,13 @@ def survey_file(path: Path, options: CameraOptions) -> tuple[Timing, list[Findin
         tally = _tally(container, stream, path, options.limits)
         first_part = tally if container.format.name in UNTIMED else _before_restart(tally, tick=_tick(stream))
         timing = replace(_timing(path, options, container, stream, first_part), end=first_part.end)
-        passed_over = edited(edits(path, stream.id)) if stream.id else None
+        passed_over = edit_list_remark(edits(path, stream.id)) if stream.id else None
         findings = [tally.problem] if tally.problem is not None else []
         if first_part.end is not None:
             after = timing.duration + 1 / float(timing.rate)
-            findings.append(restarted(frame=first_part.frames, after=after, count=tally.frames - first_part.frames))
+            findings.append(
+                restarted_finding(frame=first_part.frames, after=after, count=tally.frames - first_part.frames)
+            )
         findings = findings or truncation(path, container, stream, timing, read=tally.frames + tally.discarded)
         return timing, findings + ([_edit_list(passed_over)] if passed_over is not None else [])
 

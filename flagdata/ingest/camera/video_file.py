@@ -199,7 +199,7 @@ class VideoSource:
             interlaced=bool(first.interlaced_frame),
             timing=self._timing,
             metadata=self._metadata(),
-            recorded=_recorded(first),
+            recorded=_recording_time(first),
             sequence=self._container.format.name in UNTIMED,
             findings=tuple(findings),
             gps=self._gps,
@@ -436,7 +436,7 @@ def _orientation(frame: av.VideoFrame) -> Orientation:
     return Orientation()
 
 
-def _recorded(frame: av.VideoFrame) -> str | None:
+def _recording_time(frame: av.VideoFrame) -> str | None:
     for data in _side_data(frame):
         if data.type is Type.SEI_UNREGISTERED:
             text = recording_time(bytes(memoryview(data)))

@@ -102,7 +102,7 @@ class CameraFilm:
     def frames(self, first: float, last: float) -> Iterator[tuple[float, UInt8Array]]:
         with open_camera(self.path, self._options) as stream:
             try:
-                for frame in stream.unpadded():
+                for frame in stream.unpadded_frames():
                     time = frame.time / NANOSECONDS
                     if time > last:
                         break

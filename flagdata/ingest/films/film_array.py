@@ -110,7 +110,7 @@ def gray(picture: UInt8Array) -> UInt8Array:
     return (picture @ np.array([0.299, 0.587, 0.114]) + 0.5).astype(np.uint8)
 
 
-def collected(film: Film, *, first: float, last: float | None) -> Frames:
+def collect_frames(film: Film, *, first: float, last: float | None) -> Frames:
     """Collects the frames of a film from `first` to `last` [s] in an array.
 
     Raises:

@@ -39,7 +39,7 @@ def film_at(
         return CameraFilm(path, true_fps=true_fps, sequence_fps=sequence_fps), path
     if true_fps is not None or sequence_fps is not None:
         raise frames_have_instants()
-    artifact = named(lake, str(source), at)
+    artifact = find_artifact(lake, str(source), at)
     return stored_film(lake, artifact), artifact
 
 
@@ -52,7 +52,7 @@ def frames_have_instants() -> UsageError:
     )
 
 
-def named(
+def find_artifact(
     lake: Lake, source: str, at: str | None, *, kinds: tuple[Kind, ...] = FILMED, noun: str = "file or film of the lake"
 ) -> Artifact:
     """Finds the artifact of a name or id; of a recording and what it was aligned from, which has its name, the

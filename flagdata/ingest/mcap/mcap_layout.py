@@ -26,7 +26,7 @@ from flagdata.core.shell import command_line
 from flagdata.errors import CorruptError, LimitError
 from flagdata.record.mcap_container import CHUNK_HEAD, RECORD_HEAD, parse
 from flagdata.record.salvage import CHUNK_LIMIT
-from flagdata.record.unpacking import check_stated, unpacked
+from flagdata.record.unpacking import check_stated, unpack_chunk
 
 _RUN = 1 << 20
 """Bytes of messages outside chunks that are read at once, and one message more."""
@@ -81,7 +81,7 @@ class Layout:
         """Messages of some channels that the summary states and the file does not have."""
         return sum(max(0, self.announced.get(channel, 0) - self.counts.get(channel, 0)) for channel in channels)
 
-    def undefined(self) -> tuple[Finding, ...]:
+    def undefined_findings(self) -> tuple[Finding, ...]:
         """Reports messages whose channel the file does not define; empty where there are none."""
         lost = sum(count for channel, count in self.counts.items() if channel not in self.channels)
         if not lost:
@@ -124,11 +124,11 @@ def layout_of(path: Path) -> Layout:
     """
     check_input(path)
     state = path.stat()
-    return _scanned(path, state.st_size, state.st_mtime_ns)
+    return _scan_file(path, state.st_size, state.st_mtime_ns)
 
 
 @lru_cache(maxsize=1024)  # a long bag has hundreds of parts
-def _scanned(path: Path, size: int, changed: int) -> Layout:
+def _scan_file(path: Path, size: int, changed: int) -> Layout:
     with path.open("rb") as stream:
         return _Scan(path, stream, size).run()
 
@@ -172,11 +172,11 @@ class _Scan:
             elif opcode == Opcode.FOOTER and ended:
                 closed = True
             elif opcode == 0 or opcode in (Opcode.MESSAGE, Opcode.CHUNK, Opcode.FOOTER):
-                raise self._damaged(f"a record of the kind {opcode} at byte {start}")
+                raise self._damage_error(f"a record of the kind {opcode} at byte {start}")
             else:
                 self._describe(opcode, length)
         self._check_end(at)
-        return self._described()
+        return self._layout_found()
 
     def _head(self, at: int) -> tuple[int, int]:
         self.stream.seek(at)
@@ -188,7 +188,7 @@ class _Scan:
     def _loose(self, start: int, length: int) -> None:
         """Takes a message outside chunks."""
         if length < _MESSAGE.size - RECORD_HEAD:
-            raise self._damaged(f"a message of {length} bytes at byte {start}")
+            raise self._damage_error(f"a message of {length} bytes at byte {start}")
         if length > CHUNK_LIMIT:
             raise LimitError(
                 f"a message of {length} bytes", where=str(self.path), fix=f"at most {CHUNK_LIMIT} are read"
@@ -206,7 +206,7 @@ class _Scan:
 
     def _chunk(self, start: int, length: int) -> None:
         if length < CHUNK_HEAD - RECORD_HEAD:
-            raise self._damaged(f"a chunk of {length} bytes at byte {start}")
+            raise self._damage_error(f"a chunk of {length} bytes at byte {start}")
         *_, size, _, compression = _CHUNK.unpack(self.stream.read(_CHUNK.size))
         if compression:
             check_stated(size, where=str(self.path))
@@ -275,14 +275,14 @@ class _Scan:
             )
         raise CorruptError(f"{rest} bytes follow the end of the MCAP file", where=str(self.path), fix=f"cut it: {cut}")
 
-    def _described(self) -> Layout:
+    def _layout_found(self) -> Layout:
         counts: Counter[int] = Counter()
         counted = True
         for block in self.blocks:
             counts.update(block.counts or {})
             counted &= block.counts is not None
         if not counted or counts.keys() - self.channels.keys():
-            counts = self._counted()
+            counts = self._count_messages()
         return Layout(
             path=self.path,
             profile=self.profile,
@@ -293,7 +293,7 @@ class _Scan:
             announced=self.announced,
         )
 
-    def _counted(self) -> Counter[int]:
+    def _count_messages(self) -> Counter[int]:
         """Counts the messages by channel, one by one; definitions that stand only in chunks are taken on the way."""
         total: Counter[int] = Counter()
         for number, block in enumerate(self.blocks):
@@ -312,7 +312,7 @@ class _Scan:
             f"the MCAP file is damaged or cut off: it ends before the end of {noun}", where=str(self.path), fix=_RECOVER
         )
 
-    def _damaged(self, noun: str) -> CorruptError:
+    def _damage_error(self, noun: str) -> CorruptError:
         return CorruptError(f"the MCAP file is damaged: {noun}", where=str(self.path), fix=_RECOVER)
 
 
@@ -329,7 +329,7 @@ def read_block(stream: BinaryIO, block: Block, *, where: str) -> memoryview:
         raise CorruptError("the file ends within a message", where=where, fix=_RECOVER)
     if not block.chunk:
         return memoryview(data)
-    return unpacked(parse(Chunk.read, data[RECORD_HEAD:], where=where), where=where)
+    return unpack_chunk(parse(Chunk.read, data[RECORD_HEAD:], where=where), where=where)
 
 
 def split(records: memoryview, *, where: str) -> Iterator[tuple[int, int, memoryview]]:

@@ -26,8 +26,8 @@ from flagdata.core.findings import Finding
 from flagdata.errors import InputError, LimitError, TimeError
 from flagdata.ingest.camera import depth
 from flagdata.ingest.camera.camera_options import CameraOptions
-from flagdata.ingest.camera.container_clock import restart, restarted
-from flagdata.ingest.camera.damage import resized, undecoded
+from flagdata.ingest.camera.container_clock import restart, restarted_finding
+from flagdata.ingest.camera.damage import resized_findings, undecoded_findings
 from flagdata.ingest.camera.frame_stamps import survey
 from flagdata.ingest.camera.luma import BROKEN, DEEP, STILLS, Luma, luma_of_frame, luma_of_image
 from flagdata.ingest.camera.picture_geometry import Orientation
@@ -95,11 +95,11 @@ class TopicSource:
         messages_index = index(self._path, self._topic.name, limit=self._limits.frames, sort=self._kind != MOVING)
         if not len(messages_index.stamps):
             raise InputError(f"{self._topic.name} has no messages", where=where, fix="choose another topic")
-        findings = [*_other_topics(present, self._topic), *_joined(parts_of(path)), *messages_index.findings]
+        findings = [*_other_topics(present, self._topic), *_joined_findings(parts_of(path)), *messages_index.findings]
         end = None if messages_index.in_time else restart(messages_index.stamps, tick=_NANOSECOND)
         if end is not None:
             after = int(messages_index.stamps[end - 1] - messages_index.stamps[0]) / NANOSECONDS
-            findings.append(restarted(frame=end, after=after, count=len(messages_index.stamps) - end))
+            findings.append(restarted_finding(frame=end, after=after, count=len(messages_index.stamps) - end))
         self._index = messages_index = messages_index.part(0, end)
         timing = survey(
             np.sort(messages_index.stamps) if messages_index.in_time else messages_index.stamps,
@@ -108,7 +108,7 @@ class TopicSource:
             fallback_rate=Fraction(1),
             where=where,
         )
-        decoded = self._decoded(messages(self._path, self._topic.name, picked=messages_index))
+        decoded = self._decode_pictures(messages(self._path, self._topic.name, picked=messages_index))
         first = next(decoded, None)
         if first is None:
             raise InputError(
@@ -182,18 +182,18 @@ class TopicSource:
             if start >= length:
                 return
             part = messages(self._path, self._topic.name, picked=self._index.part(start))
-            sound = (picture for picture in self._decoded(part, tally=False) if picture[1:3] == self._size)
+            sound = (picture for picture in self._decode_pictures(part, tally=False) if picture[1:3] == self._size)
             pictures = [self._picture(picture) for picture in islice(sound, 0, count * stride, stride)]
             if pictures:
                 yield pictures
 
     def damage(self) -> list[Finding]:
-        return undecoded(self._broken, total=len(self._index.stamps)) + resized(self._resized)
+        return undecoded_findings(self._broken, total=len(self._index.stamps)) + resized_findings(self._resized)
 
     def close(self) -> None:
         """Closes nothing: the file is open only while pictures are read."""
 
-    def _decoded(self, decoded: Iterator[Decoded], *, tally: bool = True) -> Iterator[_Shown]:
+    def _decode_pictures(self, decoded: Iterator[Decoded], *, tally: bool = True) -> Iterator[_Shown]:
         decode = {STILL: self._stills, MOVING: self._moving, RAW: self._plain}[str(self._kind)]
         for frame in decode(decoded):
             if frame is None:
@@ -323,7 +323,7 @@ def _data(values: Mapping[str, Any]) -> bytes | None:
         return None
 
 
-def _joined(files: Sequence[Path]) -> Iterator[Finding]:
+def _joined_findings(files: Sequence[Path]) -> Iterator[Finding]:
     if len(files) > 1:
         yield Finding.of(
             "chapters-joined",

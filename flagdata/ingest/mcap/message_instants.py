@@ -57,11 +57,11 @@ def stamp_of(values: Mapping[str, Any]) -> Stamp:
                 has_field = True
                 instant = _instant(holder[name])
                 if instant:
-                    return Stamp(instant=checked(instant), field=True)
+                    return Stamp(instant=check_instant(instant), field=True)
     return Stamp(instant=None, field=has_field)
 
 
-def checked(instant: int) -> int:
+def check_instant(instant: int) -> int:
     """Returns an instant, unless 64 bits do not hold it.
 
     Raises:
@@ -131,7 +131,7 @@ def order_of(stamps: IntArray, logged: IntArray, *, sort: bool, where: str) -> O
     if not _late(stamps):
         in_time, findings = True, ()
     elif not _late(stamps[by_log]):
-        in_time, findings, rows = True, (_disordered(stamps, logged, where),), by_log
+        in_time, findings, rows = True, (_disordered_finding(stamps, logged, where),), by_log
     else:
         in_time, findings = False, ()
     if in_time and sort:
@@ -144,7 +144,7 @@ def _late(stamps: IntArray) -> bool:
     return bool(np.any(np.maximum.accumulate(stamps) - stamps > SLIP)) if len(stamps) else False
 
 
-def _disordered(stamps: IntArray, logged: IntArray, where: str) -> Finding:
+def _disordered_finding(stamps: IntArray, logged: IntArray, where: str) -> Finding:
     back = float((np.maximum.accumulate(stamps) - stamps).max()) / NANOSECONDS
     steps = int((np.diff(logged) < -SLIP).sum())
     return Finding.of(

@@ -31,7 +31,14 @@ from flagdata.errors import CorruptError, FlagdataError, InputError, LimitError,
 from flagdata.ingest.mcap import cdr
 from flagdata.ingest.mcap.bags import is_described, parts_of
 from flagdata.ingest.mcap.mcap_layout import Layout, Message, Messages, layout_of
-from flagdata.ingest.mcap.message_instants import Stamp, checked, clock_findings, few_without_date, order_of, stamp_of
+from flagdata.ingest.mcap.message_instants import (
+    Stamp,
+    check_instant,
+    clock_findings,
+    few_without_date,
+    order_of,
+    stamp_of,
+)
 from flagdata.recipes.documents import from_stored_json
 from flagdata.timebase import NANOSECONDS
 
@@ -122,7 +129,7 @@ class Decoded:
         if self.dated is not None:
             return self.dated
         instant = self.said.instant
-        return checked(self.log_time) if instant is None else instant
+        return check_instant(self.log_time) if instant is None else instant
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -237,7 +244,7 @@ def messages(path: Path, topic: str, *, picked: Index | None = None) -> Iterator
         opened = [stack.enter_context(closing(Messages(layout))) for layout in layouts]
         decoders: dict[tuple[int, int], Callable[[bytes], Mapping[str, Any]]] = {}
 
-        def decoded(part: int, message: Message) -> Decoded:
+        def decode_message(part: int, message: Message) -> Decoded:
             key = (part, message.channel)
             if key not in decoders:
                 channel = layouts[part].channels[message.channel]
@@ -248,7 +255,7 @@ def messages(path: Path, topic: str, *, picked: Index | None = None) -> Iterator
         if picked is not None:
             for (part, block, offset), dated in zip(picked.places.tolist(), picked.stamps.tolist(), strict=True):
                 with _readable(layouts[part].path):
-                    read_message = decoded(part, opened[part].at(block, offset))
+                    read_message = decode_message(part, opened[part].at(block, offset))
                 yield replace(read_message, dated=dated)
             return
         for part, file in enumerate(opened):
@@ -256,7 +263,7 @@ def messages(path: Path, topic: str, *, picked: Index | None = None) -> Iterator
             while True:
                 with _readable(layouts[part].path):
                     message = next(walk, None)
-                    read_message = None if message is None else decoded(part, message)
+                    read_message = None if message is None else decode_message(part, message)
                 if read_message is None:
                     break
                 yield read_message
@@ -289,7 +296,7 @@ def index(
                 where=str(path),
                 fix="cut the file, or raise the limit",
             )
-        stamp, logged = message.said, checked(message.log_time)
+        stamp, logged = message.said, check_instant(message.log_time)
         states_instant.append(stamp.instant is not None)
         has_field.append(stamp.field)
         numbers.extend((*message.position, logged if stamp.instant is None else stamp.instant, logged))
@@ -354,7 +361,7 @@ def _missing(path: Path, topic: str) -> Iterator[Finding]:
             fix="copy the file again, or record it again",
         )
     for layout in layouts:
-        yield from layout.undefined()
+        yield from layout.undefined_findings()
 
 
 def _layouts(path: Path) -> list[Layout]:

@@ -111,7 +111,7 @@ def frame_files(path: Path) -> list[tuple[int, Path]]:
         if (m := _FRAME.fullmatch(entry.name)) is not None
     ]
     if not frames_of_cloths:
-        frames_of_cloths = _numbered([entry for entry in entries if entry.suffix.lower() == ".obj"], path)
+        frames_of_cloths = _number_frames([entry for entry in entries if entry.suffix.lower() == ".obj"], path)
     if len(frames_of_cloths) > FRAME_LIMIT:
         raise LimitError(
             f"the folder has {len(frames_of_cloths)} frames", where=str(path), fix=f"at most {FRAME_LIMIT} are read"
@@ -146,7 +146,7 @@ def frame_files(path: Path) -> list[tuple[int, Path]]:
     return frames
 
 
-def _numbered(entries: list[Path], path: Path) -> list[tuple[Ordinal, Ordinal, Path]]:
+def _number_frames(entries: list[Path], path: Path) -> list[tuple[Ordinal, Ordinal, Path]]:
     """Frames of other programs: names that differ in one number."""
     if not entries:
         raise NotFoundError("there are no .obj files", where=str(path), fix=FIX)
@@ -200,7 +200,8 @@ def _sequence(
     attributes = {"source": "obj"} if configuration is None else {"source": "arcsim", "scene": configuration}
     first = frames[0]
     if all(
-        np.array_equal(_listed(f.faces), _listed(first.faces)) and np.array_equal(f.rest, first.rest) for f in frames
+        np.array_equal(_sorted_faces(f.faces), _sorted_faces(first.faces)) and np.array_equal(f.rest, first.rest)
+        for f in frames
     ):
         return MeshSequence(
             time=time,
@@ -220,7 +221,7 @@ def _sequence(
     )
 
 
-def _listed(faces: IntArray) -> IntArray:
+def _sorted_faces(faces: IntArray) -> IntArray:
     """Faces (face, 3) in one order, each from its least vertex on, with its orientation."""
     begin = faces.argmin(axis=1)[:, None]
     turned = np.take_along_axis(faces, (begin + np.arange(3)) % 3, axis=1)

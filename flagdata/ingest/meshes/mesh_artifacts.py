@@ -32,7 +32,7 @@ from flagdata.core.units import unit
 from flagdata.errors import InputError, UsageError
 from flagdata.ingest.ingest_report import REPORT_SCHEMA
 from flagdata.ingest.meshes.folder import read_folder
-from flagdata.ingest.meshes.pieces import in_pieces, slits, welded
+from flagdata.ingest.meshes.pieces import in_pieces, slits, weld_vertices
 from flagdata.ingest.source_artifacts import IngestResult, Labels, find, kept, result_of
 from flagdata.ingest.source_file import Source
 from flagdata.lake import Artifact, Lake
@@ -98,7 +98,7 @@ def ingest_meshes(
     metre = float(unit(options.unit).to_si(1.0))
     sequence = read_folder(path, rate=options.rate, metre=metre, progress=progress)
     check_units(sequence, where=str(path))
-    sequence, merged = welded(sequence)
+    sequence, merged = weld_vertices(sequence)
     all_findings = (*merged, *findings(sequence))
     source.check_unchanged()
     parameters = scene_wind(sequence.attributes.get("scene"))
@@ -175,10 +175,10 @@ _FAR = 0.2
 
 def continuity(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]:
     """Return what speaks against one cloth in motion: `edges-stretched`, `cloth-jumps`, `topology-changes`."""
-    return (*_stretched(sequence), *_jumps(sequence), *_changes(sequence))
+    return (*_stretched_findings(sequence), *_jumps(sequence), *_changes(sequence))
 
 
-def _stretched(sequence: MeshSequence | RaggedMeshSequence) -> Iterator[Finding]:
+def _stretched_findings(sequence: MeshSequence | RaggedMeshSequence) -> Iterator[Finding]:
     counts = np.array([_long_edges(sequence.frame(index)) for index in range(len(sequence))])
     worst = int(counts.argmax())
     if not counts[worst]:

@@ -22,7 +22,7 @@ _NEXT = 1e-2
 """Distance of two vertices at one place, in edge lengths; exporters keep four digits or more."""
 
 
-def welded(
+def weld_vertices(
     sequence: MeshSequence | RaggedMeshSequence,
 ) -> tuple[MeshSequence | RaggedMeshSequence, tuple[Finding, ...]]:
     """Merges vertices whose material coordinates and whole trajectories agree to the bit.
@@ -84,7 +84,7 @@ def slits(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]:
     """Reports vertices of one piece that lie at or next to others that no edge joins them to, of the frame with most of
     them: a slit, or a seam that an exporter left open."""
     frames = range(1) if isinstance(sequence, MeshSequence) else range(len(sequence))
-    open_vertices = [_unjoined(sequence.frame(index)) for index in frames]
+    open_vertices = [_unjoined_vertices(sequence.frame(index)) for index in frames]
     worst = max(frames, key=lambda index: len(open_vertices[index]))
     vertices = open_vertices[worst]
     if not len(vertices):
@@ -102,7 +102,7 @@ def slits(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]:
     )
 
 
-def _unjoined(mesh: Mesh) -> IntArray:
+def _unjoined_vertices(mesh: Mesh) -> IntArray:
     """Vertices at open edges that lie next to another such one of their piece, without an edge between them."""
     edges = np.sort(np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]), axis=1)
     edges, counts = np.unique(edges, axis=0, return_counts=True)

@@ -226,7 +226,7 @@ def read_obj(path: Path) -> Obj:
         sizes=np.frombuffer(sizes, dtype=np.int64),
         lines=np.frombuffer(face_lines, dtype=np.int64),
     )
-    return _assembled(faces, np.array(positions).reshape(-1, 3), np.array(texture).reshape(-1, 2), velocities)
+    return _assemble_mesh(faces, np.array(positions).reshape(-1, 3), np.array(texture).reshape(-1, 2), velocities)
 
 
 def _numbers(values: list[str], count: int, where: str) -> list[float]:
@@ -310,7 +310,9 @@ class _Faces:
         return places
 
 
-def _assembled(faces: _Faces, positions: FloatArray, texture: FloatArray, velocities: dict[int, list[float]]) -> Obj:
+def _assemble_mesh(
+    faces: _Faces, positions: FloatArray, texture: FloatArray, velocities: dict[int, list[float]]
+) -> Obj:
     counts = np.array([len(positions), len(texture)])
     wrong = (faces.corners[:, 0] < 1) | (faces.corners > counts).any(axis=1) | (faces.corners[:, 1] < 0)
     faces.refuse(wrong, "a corner names what is not there", fix="correct the face")

@@ -100,7 +100,7 @@ def wind_shown(recording: Trajectory, specimen: Specimen) -> float | None:
     motion, mesh = MarkerMotion.of(recording, specimen), specimen.mesh
     arms = motion.position - origin
     needed = motion.mass[:, None] * (motion.acceleration - np.array(specimen.gravity))
-    moment = _centred((np.cross(arms, needed) @ direction).sum(axis=1))
+    moment = _centre_values((np.cross(arms, needed) @ direction).sum(axis=1))
     corners = [motion.position[:, mesh.faces[:, c]] for c in range(3)]
     normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
     normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), np.finfo(np.float64).tiny)
@@ -113,7 +113,9 @@ def wind_shown(recording: Trajectory, specimen: Specimen) -> float | None:
             (
                 (
                     moment
-                    - _centred((weight * np.abs(q * blown - along_normal) * (q * blown - along_normal)).sum(axis=1))
+                    - _centre_values(
+                        (weight * np.abs(q * blown - along_normal) * (q * blown - along_normal)).sum(axis=1)
+                    )
                 )
                 ** 2
             ).sum()
@@ -137,7 +139,7 @@ def swing(recording: Trajectory, specimen: Specimen) -> float | None:
     step = float(motion.times[1] - motion.times[0])
     kinetic = (motion.mass[:, None] * motion.velocity**2).sum(axis=(1, 2)) / 2
     height = -np.einsum("v,fvi,i->f", motion.mass, motion.position, np.array(specimen.gravity))
-    gained, lost = (_centred((e[2:] - e[:-2]) / (2 * step)) for e in (kinetic, -height))
+    gained, lost = (_centre_values((e[2:] - e[:-2]) / (2 * step)) for e in (kinetic, -height))
     power = float(lost @ lost)
     if power == 0 or (gained @ lost) ** 2 < _CLEAR * power * float(gained @ gained):
         return None
@@ -175,5 +177,5 @@ def _axis(recording: Trajectory, specimen: Specimen) -> tuple[FloatArray, FloatA
     return None if spread[1] > _LINE * size else (origin, directions[0])
 
 
-def _centred(values: FloatArray) -> FloatArray:
+def _centre_values(values: FloatArray) -> FloatArray:
     return values - values.mean()

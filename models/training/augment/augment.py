@@ -135,7 +135,7 @@ class Augment:
             other_film: see `Drawn`.
         """
         everywhere = np.ones(film.shape[1:], dtype=np.float32)
-        return self._applied(BEFORE, film, times, (source,), other_film, everywhere)
+        return self._apply_disturbances(BEFORE, film, times, (source,), other_film, everywhere)
 
     def after(self, clip: Film, times: FloatArray, *, source: str, variant: int, weight: Float32Array) -> Film:
         """Disturbs a conditioned clip by what conditioning leaves."""
@@ -143,9 +143,9 @@ class Augment:
         def none() -> Film:
             raise TypeError("what happens after conditioning takes no other film")
 
-        return self._applied(AFTER, clip, times, (source, variant), none, weight)
+        return self._apply_disturbances(AFTER, clip, times, (source, variant), none, weight)
 
-    def _applied(
+    def _apply_disturbances(
         self,
         disturbances: Registry,
         film: Film,

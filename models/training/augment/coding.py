@@ -10,7 +10,7 @@ from models.training.augment.augment import Disturbance, Drawn, Film
 _PRESET = "superfast"
 
 
-def _coded(drawn: Drawn) -> Film:
+def _encode_film(drawn: Drawn) -> Film:
     """Encodes and decodes the film; the strength is x264's constant rate factor; of an odd side the last row or column
     is left out."""
     film = drawn.film[:, : drawn.film.shape[1] // 2 * 2, : drawn.film.shape[2] // 2 * 2]
@@ -20,4 +20,4 @@ def _coded(drawn: Drawn) -> Film:
     return np.stack(decode([encoder.encode(np.ascontiguousarray(frame)) for frame in film], where="augmentation"))
 
 
-CODING = Disturbance(apply=_coded, unit="of rate factor", most=51.0)
+CODING = Disturbance(apply=_encode_film, unit="of rate factor", most=51.0)

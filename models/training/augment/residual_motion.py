@@ -53,7 +53,7 @@ def _left_over_shake(drawn: Drawn) -> Film:
     """Moves the film by a camera's motion that was not removed; the strength is its root mean square along each axis
     [px]."""
     path = drawn.strength * course(drawn.rng, drawn.times, 2)
-    return _moved(drawn, path, np.ones(drawn.film.shape[1:], dtype=np.float32))
+    return _move_frames(drawn, path, np.ones(drawn.film.shape[1:], dtype=np.float32))
 
 
 def _pole_sway(drawn: Drawn) -> Film:
@@ -63,10 +63,10 @@ def _pole_sway(drawn: Drawn) -> Film:
     frequency = np.exp(drawn.rng.uniform(np.log(_SLOWEST), np.log(_FASTEST)))
     sway = drawn.strength * np.sin(2 * np.pi * frequency * drawn.times + drawn.rng.uniform(0, 2 * np.pi))
     up = np.linspace(1.0, 0.5, height, dtype=np.float32)[:, None]
-    return _moved(drawn, np.stack([sway, 0 * sway], axis=1), np.repeat(up, width, axis=1))
+    return _move_frames(drawn, np.stack([sway, 0 * sway], axis=1), np.repeat(up, width, axis=1))
 
 
-def _moved(drawn: Drawn, path: FloatArray, share: Float32Array) -> Film:
+def _move_frames(drawn: Drawn, path: FloatArray, share: Float32Array) -> Film:
     """Moves each frame by its row of the path times `share`, where it is not frozen."""
     rows, columns = np.indices(drawn.film.shape[1:], dtype=np.float32)
     share = share * drawn.weight

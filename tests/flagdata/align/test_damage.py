@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from flagdata.align import ClockOptions, Method, Pair, make_recording
-from flagdata.align.methods import declared
+from flagdata.align.methods import declared_clock
 from flagdata.core.files.checksums import content_hash
 from flagdata.core.rng import stream
 from flagdata.core.schema import TOPIC_IMAGE, TOPIC_WIND, Kind
@@ -42,7 +42,7 @@ def align(folder: Path, camera: str, wind: str) -> str:
     lake = Lake.open(folder)
     pair = Pair.of(lake, camera, wind)
     options = ClockOptions(by=Method.GIVEN, offset=1.0, offset_sigma=0.1)
-    outcome = declared(pair, options, recipe=options.recipe())
+    outcome = declared_clock(pair, options, recipe=options.recipe())
     return str(make_recording(lake, pair, outcome.alignment).recording.object)
 
 

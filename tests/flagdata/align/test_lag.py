@@ -33,7 +33,7 @@ def refusals(found: LagEstimate) -> set[str]:
 @pytest.mark.parametrize("offset", [-97.4, -12.3, 0.0, 31.7, 118.0])
 def test_offset_of_a_gusty_ten_minutes_is_recovered_within_half_a_second(offset: float) -> None:
     found = estimate(scene(seed=3, offset=offset, apart=1.5, flag_noise=0.3))
-    assert found.accepted, found.reasons
+    assert found.is_accepted, found.reasons
     assert found.offset == pytest.approx(offset, abs=0.5)  # the acceptance bound
     assert found.interval[0] <= offset <= found.interval[1]
 
@@ -64,7 +64,7 @@ def test_intervals_of_field_recordings_cover_the_offset_at_their_level() -> None
             ),
             surrogates=60,
         )
-        if found.accepted:
+        if found.is_accepted:
             errors.append(found.offset - offset)
             sigmas.append(found.sigma)
             covered += bool(found.interval[0] <= offset <= found.interval[1])
@@ -122,13 +122,13 @@ def test_one_missing_minute_of_either_side_leaves_the_offset_within_its_interval
         ),
     )
     found = estimate(holes, surrogates=60)
-    assert found.accepted, found.reasons
+    assert found.is_accepted, found.reasons
     assert found.interval[0] <= 5.0 <= found.interval[1]
 
 
 def test_steady_wind_is_refused() -> None:
     found = estimate(scene(seed=4, turbulence=0.005))
-    assert not found.accepted
+    assert not found.is_accepted
     assert refusals(found) == {"steady-wind"}
 
 
@@ -144,7 +144,7 @@ def test_unrelated_wind_is_accepted_no_more_often_than_stated() -> None:
     accepted = 0
     for seed in range(FIELDS):
         found = estimate(scene(seed=seed, other=gusts_alone(seed + 10_000, 900.0)), surrogates=60, sigma=10.0)
-        accepted += found.accepted
+        accepted += found.is_accepted
     assert accepted <= binom.ppf(0.999, FIELDS, 0.01)
 
 
@@ -166,7 +166,7 @@ def test_a_peak_at_the_edge_of_the_search_is_refused() -> None:
 
 def test_an_offset_beyond_the_search_is_refused() -> None:
     found = estimate(scene(seed=3, offset=60.0, apart=1.5, flag_noise=0.2), window=30.0, surrogates=60)
-    assert not found.accepted
+    assert not found.is_accepted
 
 
 def test_a_still_film_is_refused() -> None:
@@ -241,7 +241,7 @@ def test_a_real_sonics_gusts_tie_a_flag_to_its_clock(reference_data: Path) -> No
                 flag_noise=0.3,
             )
         )
-        assert found.accepted, found.reasons
+        assert found.is_accepted, found.reasons
         assert found.offset == pytest.approx(offset, abs=0.5)  # the acceptance bound
         covered += bool(found.interval[0] <= offset <= found.interval[1])
     assert covered >= 3  # of five at 90 %: fewer has a chance below 1 %

@@ -21,7 +21,7 @@ def evidence(pair: tuple[MotionSeries, WindAverage]) -> Evidence:
     search, generator = LagSearch(surrogates=60), stream(0, "chance")
     motion, wind = pair
     estimate = estimate_offset(motion, wind, search=search, generator=generator)
-    line = clock_line(motion, wind, estimate, search=search, generator=generator) if estimate.accepted else None
+    line = clock_line(motion, wind, estimate, search=search, generator=generator) if estimate.is_accepted else None
     return Evidence(motion=motion, wind=wind, estimate=estimate, line=line, response=search.response)
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from flagdata.answer.wind_elsewhere import OPEN_LAND, SUBURB, compared, share_of_station
+from flagdata.answer.wind_elsewhere import OPEN_LAND, SUBURB, compare_winds, share_of_station
 from flagdata.core.stated import Stated
 
 DRAWS = 4.0 + 0.6 * np.random.default_rng(5).standard_normal(200_000)
@@ -23,20 +23,20 @@ DRAWS = 4.0 + 0.6 * np.random.default_rng(5).standard_normal(200_000)
     ],
 )
 def test_a_statement_is_compared_with_the_posterior(text: str, agrees: bool, words: str) -> None:
-    comparison = compared(DRAWS, Stated.of(text), is_bound=False, level=0.9, seed=1)
+    comparison = compare_winds(DRAWS, Stated.of(text), is_bound=False, level=0.9, seed=1)
     assert comparison.agrees is agrees
     assert words in comparison.sentence
 
 
 def test_the_interval_is_that_of_the_difference_of_two_normals() -> None:
     """N(4, 0.6²) − N(3, 1²) = N(1, 1.36); 90 % lie within 1.6449 of its deviations."""
-    comparison = compared(DRAWS, Stated.of("3±1"), is_bound=False, level=0.9, seed=1)
+    comparison = compare_winds(DRAWS, Stated.of("3±1"), is_bound=False, level=0.9, seed=1)
     half = 1.6449 * math.hypot(0.6, 1.0)
     assert comparison.difference == pytest.approx((1 - half, 1 + half), abs=0.02)
 
 
 def test_a_film_that_only_bounds_the_wind_is_not_compared() -> None:
-    comparison = compared(DRAWS, Stated.of("3"), is_bound=True, level=0.9, seed=1)
+    comparison = compare_winds(DRAWS, Stated.of("3"), is_bound=True, level=0.9, seed=1)
     assert (comparison.agrees, comparison.difference) == (None, None)
     assert "only bounds the wind" in comparison.sentence
 

@@ -5,13 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flagdata.core.numbered import Ordinal, bounded, by_numbers, gap
+from flagdata.core.numbered import Ordinal, by_numbers, gap, read_bounded
 
 
 def test_a_bounded_number_is_at_most_its_bound() -> None:
-    assert [bounded(digits, most=120) for digits in ("0", "007", "120", "121", "9" * 5000)] == [0, 7, 120, None, None]
-    assert [bounded(text, most=120) for text in ("", "-1", "1.5", "1e3", "²", " 1")] == [None] * 6
-    assert bounded("٣", most=120) == 3
+    assert [read_bounded(digits, most=120) for digits in ("0", "007", "120", "121", "9" * 5000)] == [
+        0,
+        7,
+        120,
+        None,
+        None,
+    ]
+    assert [read_bounded(text, most=120) for text in ("", "-1", "1.5", "1e3", "²", " 1")] == [None] * 6
+    assert read_bounded("٣", most=120) == 3
 
 
 @pytest.mark.parametrize(

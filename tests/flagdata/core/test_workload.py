@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from flagdata.core import workload
-from flagdata.core.workload import announced, cores, one_thread
+from flagdata.core.workload import announce_work, cores, one_thread
 
 
 @pytest.mark.parametrize(
@@ -23,11 +23,11 @@ from flagdata.core.workload import announced, cores, one_thread
     ],
 )
 def test_the_length_is_shared_by_the_workers(seconds: float, workers: int, said: str) -> None:
-    assert announced("simulating", seconds, workers=workers) == said
+    assert announce_work("simulating", seconds, workers=workers) == said
 
 
 def test_what_is_kept_follows() -> None:
-    assert announced("simulating", 0.0, kept="all is kept").endswith("on one idle core; all is kept")
+    assert announce_work("simulating", 0.0, kept="all is kept").endswith("on one idle core; all is kept")
 
 
 GROUPS: dict[str, tuple[str, dict[str, str], int]] = {

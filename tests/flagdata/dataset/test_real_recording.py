@@ -9,7 +9,7 @@ import pytest
 
 import flagdata
 from flagdata.align import ClockOptions, Method, Pair, make_recording
-from flagdata.align.methods import declared
+from flagdata.align.methods import declared_clock
 from flagdata.dataset import Tolerance
 from flagdata.errors import RefusedError
 from flagdata.ingest import CameraIngest, CameraOptions, Labels, WindIngest, WindOptions, ingest_camera, ingest_wind
@@ -45,7 +45,7 @@ def test_a_real_film_and_a_real_sonic_become_pairs_with_the_sonics_mean(referenc
     wind = ingest_wind(lake, log, WindIngest(wind=WindOptions(zone="UTC")), labels=labels)
     options = ClockOptions(by=Method.GIVEN, offset=2.5, offset_sigma=0.4)
     pair = Pair.of(lake, camera.artifact.id, wind.artifact.id)
-    make_recording(lake, pair, declared(pair, options, recipe=options.recipe()).alignment)
+    make_recording(lake, pair, declared_clock(pair, options, recipe=options.recipe()).alignment)
 
     for window in (60.0, 20.0):
         pairs = flagdata.open(lake.path).pairs(window=window)

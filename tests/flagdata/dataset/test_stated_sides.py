@@ -10,7 +10,7 @@ import pytest
 
 from flagdata.core.schema import Kind, catalog_schema
 from flagdata.dataset import ExplicitSplit, HashedSplit
-from flagdata.dataset.sides import Division, clips_of, divide, selected, stated_sides
+from flagdata.dataset.sides import Division, clips_of, divide, select_columns, stated_sides
 from flagdata.errors import RefusedError, UnknownNameError
 from flagdata.lake import Artifact
 
@@ -73,7 +73,7 @@ def test_a_narrower_filter_moves_nothing_and_still_names_every_side() -> None:
 def test_a_recording_is_on_its_own_side_with_or_without_clips() -> None:
     rows = [row for row in data_set() if row.kind is Kind.RECORDING]
     table = catalog(*rows)
-    assert len(divide(table, selected(table), hashed=HashedSplit()).on("train")) == COUNTS["train"]
+    assert len(divide(table, select_columns(table), hashed=HashedSplit()).on("train")) == COUNTS["train"]
 
 
 def test_a_side_that_no_data_set_states_is_unknown() -> None:
@@ -180,7 +180,7 @@ def test_what_is_stated_is_described_even_where_relatives_are_on_two_sides() -> 
         *film(1, dataset="made", side="test", session="barn"),
     ]
     table = catalog(*rows, *film(2))
-    found = stated_sides(table, selected(table))
+    found = stated_sides(table, select_columns(table))
     assert found is not None
     assert {side: size.clips for side, size in found.sizes.items()} == {"train": 2, "test": 2}
-    assert stated_sides(table, selected(catalog(*film(2)))) is None
+    assert stated_sides(table, select_columns(catalog(*film(2)))) is None

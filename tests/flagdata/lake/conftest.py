@@ -31,7 +31,7 @@ _ENDS = {"done", "failed", "killed"}
 def dead_owner() -> dict[str, object]:
     """What a process of this machine noted that has ended."""
     with subprocess.Popen(["sleep", "60"]) as process:
-        started = lake_locks._started(process.pid)
+        started = lake_locks._start_of_process(process.pid)
         process.kill()
     return {**lake_locks.owner(), "pid": process.pid, "started": started}
 

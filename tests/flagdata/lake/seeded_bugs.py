@@ -27,7 +27,7 @@ _CLASHES = label_columns.clashes
 _CHECK_LABELS = commits.check_labels
 _CHECK_REFS = copying._check_refs
 _COMMIT = commits.commit
-_UNFINISHED = removal.unfinished
+_UNFINISHED = removal.find_unfinished
 
 
 @dataclass(frozen=True, kw_only=True)

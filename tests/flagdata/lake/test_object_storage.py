@@ -570,7 +570,7 @@ def test_a_lake_that_a_living_process_is_making_is_left_to_it(bucket_folder: str
 def test_an_answer_that_breaks_off_is_asked_for_again_and_a_listing_goes_on_behind_its_last_name(
     bucket_folder: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    folder, listed, broken = RemotePath.parse(bucket_folder), RemotePath._listed, [2, 3]
+    folder, listed, broken = RemotePath.parse(bucket_folder), RemotePath._list_beneath, [2, 3]
     for number in range(5):
         (folder / str(number)).write_bytes(b"1")
 
@@ -583,7 +583,7 @@ def test_an_answer_that_breaks_off_is_asked_for_again_and_a_listing_goes_on_behi
                 raise error
             yield meta
 
-    monkeypatch.setattr(RemotePath, "_listed", breaking)
+    monkeypatch.setattr(RemotePath, "_list_beneath", breaking)
     assert [name for name, _ in folder.names()] == ["0", "1", "2", "3", "4"]
     broken[:] = [0] * 9
     with pytest.raises(StoreError, match="broken off"):

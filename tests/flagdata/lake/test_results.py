@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from flagdata.core.schema import Kind
-from flagdata.lake import Artifact, Lake, Placed, Request, Selection, keep, placed, versions
+from flagdata.lake import Artifact, Lake, Placed, Request, Selection, keep, place_result, versions
 from flagdata.lake.ancestry import ancestry
 from tests.flagdata.lake.conftest import put_text
 from tests.program import Run, invoke
@@ -107,7 +107,7 @@ def test_a_version_stays_one_where_the_first_was_withdrawn(lake: Lake, recording
     first, second = (kept(lake, verdict(recording, code)).artifact for code in (OLD, NEW))
     lake.withdraw(sorted({first.id, *lake.descendants([first.id])}), "it was wrong")
     assert lake.artifact("flag").id == second.id
-    assert placed(lake, verdict(recording, NEW)).artifact.id == second.id
+    assert place_result(lake, verdict(recording, NEW)).artifact.id == second.id
 
 
 def test_ls_and_show_say_which_version_is_superseded(

@@ -35,7 +35,9 @@ def stated(lake: Lake) -> list[dict[str, Any]]:
     """What a process that finds no summary reads of the log's own entries, newest first."""
     log = lake.catalog._entries
     versions = range(lake.catalog.head() + 1)
-    return [lake.catalog._stated(*pair) for pair in zip(versions, log.entries(versions, head=-1), strict=True)][::-1]
+    return [lake.catalog._version_entry(*pair) for pair in zip(versions, log.entries(versions, head=-1), strict=True)][
+        ::-1
+    ]
 
 
 def test_a_fresh_process_reads_the_history_in_few_files(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:

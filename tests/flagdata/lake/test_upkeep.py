@@ -28,7 +28,7 @@ from flagdata.lake import (
     garbage,
     is_healthy,
     object_names,
-    sampled,
+    sample_names,
     verify,
     verify_catalog,
 )
@@ -497,10 +497,10 @@ def test_a_link_in_staging_is_deleted_and_what_it_leads_to_is_not(lake: Lake, tm
 
 def test_a_sample_is_of_the_size_asked_for_and_never_larger_than_all() -> None:
     names = [f"mcap/{i}" for i in range(10)]
-    drawn = sampled(names, 4)
+    drawn = sample_names(names, 4)
     assert len(set(drawn)) == 4
     assert set(drawn) <= set(names)
-    assert sampled(names, 99) == names
+    assert sample_names(names, 99) == names
 
 
 def test_values_in_the_log_that_no_writer_writes_are_refused(lake: Lake) -> None:

@@ -10,7 +10,7 @@ import pytest
 from flagdata.cli import NAMES
 from flagdata.core.parts import attribute
 from flagdata.errors import FlagdataError, InputError, NotFoundError, UnknownNameError
-from flagdata.recipes.shelves import Shelf, parsed
+from flagdata.recipes.shelves import Shelf, parse_recipe
 from tests.program import invoke
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -29,7 +29,7 @@ def test_the_catalog_prints_a_recipe_that_can_be_copied(kind: str, tmp_path: Pat
     for name in shelf.names():
         copy = tmp_path / f"{name}.toml"
         copy.write_text(invoke("catalog", kind, name).out)
-        assert parsed(shelf.find(str(copy)).text, where="") == parsed(shelf.named(name).text, where="")
+        assert parse_recipe(shelf.find(str(copy)).text, where="") == parse_recipe(shelf.named(name).text, where="")
     assert invoke("catalog", kind, "generic-csw").code == 2
 
 
@@ -47,7 +47,7 @@ def test_a_path_is_the_users_file_and_its_folder_is_where_its_own_paths_begin(tm
     found = SENSORS.find(str(file))
     assert (found.name, found.folder, found.where) == ("generic-csv", tmp_path, str(file))
     assert found.text == "title = 'Zürich'\r\n"
-    assert parsed(found.text, where=found.where) == {"title": "Zürich"}
+    assert parse_recipe(found.text, where=found.where) == {"title": "Zürich"}
 
 
 def test_an_unknown_name_suggests_the_nearest_and_says_where_it_stands() -> None:
@@ -83,4 +83,4 @@ def test_a_file_that_is_not_there_or_no_recipe_is_refused_by_its_path(
 
 def _read(source: str) -> dict[str, Any]:
     found = SENSORS.find(source)
-    return parsed(found.text, where=found.where)
+    return parse_recipe(found.text, where=found.where)

@@ -15,7 +15,7 @@ from flagdata.errors import ConflictError
 from flagdata.record import Record, RecordWriter, messages, writer
 from flagdata.record.mcap_file import McapFile, MessageBlock
 from flagdata.record.signals import Sensor, WindAverage, WindSeries
-from flagdata.record.writer import packed, pieces_of
+from flagdata.record.writer import compress_pieces, pieces_of
 
 START = 1_620_950_400_000_000_000
 CHUNK = 3000
@@ -173,4 +173,4 @@ def test_a_file_that_grows_while_it_is_attached_is_refused(tmp_path: Path) -> No
     source.write_bytes(b"x" * 100)
     with pytest.raises(ConflictError, match="the file had 99 bytes and then 100"):
         list(pieces_of(source, 99))
-    assert packed([b"x" * 100], 100) is not None
+    assert compress_pieces([b"x" * 100], 100) is not None

@@ -16,7 +16,7 @@ from mcap.writer import CompressionType, Writer
 
 from flagdata.errors import CorruptError, LimitError
 from flagdata.ingest import messages, topics
-from flagdata.record import salvage, unpacked, unpacking
+from flagdata.record import salvage, unpack_chunk, unpacking
 from flagdata.record.mcap_container import MESSAGE_HEAD
 
 BOMB = 96 << 20
@@ -71,7 +71,7 @@ def test_a_chunk_unpacks_to_no_more_than_it_states(packing: str, stated: int) ->
 
     def refused() -> None:
         with pytest.raises(CorruptError, match=f"more than the {stated} bytes"):
-            unpacked(lie)
+            unpack_chunk(lie)
 
     assert _peak(refused) < stated * 1.2 + BOUND  # a growing buffer may be an eighth too large
 
@@ -79,19 +79,19 @@ def test_a_chunk_unpacks_to_no_more_than_it_states(packing: str, stated: int) ->
 @pytest.mark.parametrize("packing", PACKERS)
 def test_a_chunk_that_is_cut_off_or_damaged_is_corrupt(packing: str) -> None:
     data = PACKERS[packing](bytes(range(256)) * 100)
-    assert bytes(unpacked(_chunk(packing, data, 25_600))) == bytes(range(256)) * 100
+    assert bytes(unpack_chunk(_chunk(packing, data, 25_600))) == bytes(range(256)) * 100
     for wrong in (data[:-20], data[:3], b"", b"\xff" * 40, data[:10] + b"\xff" * 20 + data[30:]):
         with pytest.raises(CorruptError):
-            unpacked(_chunk(packing, wrong, 25_600))
+            unpack_chunk(_chunk(packing, wrong, 25_600))
     with pytest.raises(CorruptError, match="checksum"):
-        unpacked(_chunk(packing, data, 25_600, crc=1))
+        unpack_chunk(_chunk(packing, data, 25_600, crc=1))
     with pytest.raises(CorruptError, match="compression is 'bz2'"):
-        unpacked(_chunk("bz2", data, 25_600))
+        unpack_chunk(_chunk("bz2", data, 25_600))
 
 
 def test_a_chunk_that_states_more_than_the_limit_is_not_unpacked() -> None:
     with pytest.raises(LimitError, match="claims to unpack"):
-        unpacked(_chunk("lz4", b"", unpacking.UNPACKED_LIMIT + 1))
+        unpack_chunk(_chunk("lz4", b"", unpacking.UNPACKED_LIMIT + 1))
 
 
 @pytest.mark.parametrize("packing", PACKERS)

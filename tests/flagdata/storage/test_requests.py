@@ -9,7 +9,7 @@ from botocore.auth import S3SigV4Auth
 from botocore.awsrequest import AWSRequest
 from botocore.credentials import Credentials
 
-from flagdata.storage.requests import signed
+from flagdata.storage.requests import signed_headers
 
 WHEN = datetime(2026, 11, 28, 6, 30, tzinfo=UTC)
 
@@ -28,7 +28,7 @@ def test_a_request_is_signed_as_amazons_library_signs_it(
 ) -> None:
     options = {"aws_access_key_id": "AKIDEXAMPLE", "aws_secret_access_key": "secret/key+", "aws_region": "eu-west-1"}
     options |= {"aws_session_token": token} if token else {}
-    ours = signed(method, url, query, options, when=WHEN)
+    ours = signed_headers(method, url, query, options, when=WHEN)
     monkeypatch.setattr("botocore.auth.get_current_datetime", lambda: WHEN.replace(tzinfo=None))
     request = AWSRequest(method=method, url=f"{url}?{query}")
     S3SigV4Auth(Credentials("AKIDEXAMPLE", "secret/key+", token), "s3", "eu-west-1").add_auth(request)
@@ -36,4 +36,6 @@ def test_a_request_is_signed_as_amazons_library_signs_it(
 
 
 def test_without_keys_a_request_is_not_signed() -> None:
-    assert "Authorization" not in signed("HEAD", "https://store/bucket", "", {"aws_region": "us-east-1"}, when=WHEN)
+    assert "Authorization" not in signed_headers(
+        "HEAD", "https://store/bucket", "", {"aws_region": "us-east-1"}, when=WHEN
+    )

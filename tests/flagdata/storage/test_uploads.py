@@ -12,7 +12,7 @@ from flagdata.core.findings import Severity
 from flagdata.lake import Lake, Lease, collect, doctor, garbage
 from flagdata.storage import RemotePath, StoreError, Upload, connection
 from flagdata.storage.path import BLOCK
-from flagdata.storage.uploads import unfinished
+from flagdata.storage.uploads import list_unfinished
 from tests.flagdata.storage.conftest import Answering
 from tests.program import invoke
 from tests.s3 import Failing, Scripted, refusing, serving
@@ -49,7 +49,7 @@ def test_an_upload_that_was_cut_off_is_named_by_doctor_and_aborted_by_gc(remote_
     assert str(place) in ended.out
     assert "1 unfinished upload aborted" in ended.err
     assert doctor(remote_lake, grace=NOW) == ()
-    assert [upload.identity for upload in unfinished("bucket", root(remote_lake).key)] == [elsewhere]
+    assert [upload.identity for upload in list_unfinished("bucket", root(remote_lake).key)] == [elsewhere]
 
 
 def test_an_upload_of_a_running_transaction_is_left_alone(remote_lake: Lake, s3_server: str) -> None:
@@ -72,7 +72,7 @@ def test_young_uploads_stay_for_the_grace_period_and_pages_are_read_to_the_end(a
     more = "<IsTruncated>true</IsTruncated><NextKeyMarker>lake/mcap/2</NextKeyMarker>"
     space = 'xmlns="http://s3.amazonaws.com/doc/2006-03-01/"'
     answering((200, {}, f"<ListMultipartUploadsResult {space}>{text}{more}</ListMultipartUploadsResult>".encode()))
-    found = unfinished("case", "lake/")
+    found = list_unfinished("case", "lake/")
     assert [upload.begun for upload in found if upload.key.endswith("1")] == pytest.approx(
         [now.timestamp() - 3600] * 2, abs=1
     )

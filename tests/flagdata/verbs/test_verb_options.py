@@ -17,7 +17,16 @@ from flagdata.cli import VERBS, root
 from flagdata.core.provenance import recipe_hash
 from flagdata.errors import UsageError
 from flagdata.verbs.option_types import DURATION
-from flagdata.verbs.verb_options import LongCommand, argument, called, command, described, option, options, typed
+from flagdata.verbs.verb_options import (
+    LongCommand,
+    argument,
+    command,
+    described_fields,
+    make_call,
+    option,
+    options,
+    typed_names,
+)
 
 FORMS = {
     "align": recording_verbs.Aligning,
@@ -51,7 +60,7 @@ def verb(name: str) -> click.Command:
 @pytest.mark.parametrize("name", FORMS)
 def test_a_call_takes_what_its_command_takes_with_the_same_defaults(name: str) -> None:
     of_call = inspect.signature(getattr(flagdata, name)).parameters
-    assert set(of_call) == set(described(FORMS[name]))
+    assert set(of_call) == set(described_fields(FORMS[name]))
     of_command = {one.name: one for one in verb(name).params}
     wrong = {}
     for key, parameter in of_call.items():
@@ -91,7 +100,7 @@ def test_a_measurement_is_asked_for_alike_and_keeps_its_recipe(monkeypatch: pyte
     words = "flag.mp4 --flag-size 1.5x1.0 --area-weight 0.19±0.01 --windows 1.2s --seed 3 --level 0.8 --end 3s"
     of_command = typed_words("measure", MeasureCommand, *words.split(), "--crop", "10,10,240,240")
     of_call = called_with(
-        "measure.commands.measure_film.measured",
+        "measure.commands.measure_film.measure_one",
         lambda: flagdata.measure(
             "flag.mp4",
             flag_size=(1.5, 1.0),
@@ -133,7 +142,7 @@ def test_a_calibration_is_asked_for_alike_and_keeps_its_recipe(monkeypatch: pyte
     of_command = typed_words("calibrate", CalibrateCommand, *words.split(), "--level", "0.8", "--attachment", "hoist")
     of_films = typed_words("close-loop", CloseLoopCommand, *words.split(), "--attachment", "hoist")
     of_call = called_with(
-        "measure.cloth.calibrate_call.calibrated",
+        "measure.cloth.calibrate_call.calibrate_arrays",
         lambda: flagdata.calibrate(
             "t.csv",
             flag_size=(1.5, 1.0),
@@ -162,7 +171,7 @@ def test_an_ingest_is_asked_for_alike_and_keeps_its_recipes(monkeypatch: pytest.
     words = "a.mp4 b.csv --rate 10 --archive h264 --crop 1,2,30,40 --start 2026-05-01T12:00:00Z --unit km/h"
     of_command = typed_words("ingest", IngestCommand, *words.split(), "--azimuth", "90", "--missing", "-99.9")
     of_call = called_with(
-        "flagdata.commands.ingest_sources.ingested",
+        "flagdata.commands.ingest_sources.ingest_from_python",
         lambda: flagdata.ingest(
             ["a.mp4", Path("b.csv")],
             rate="10",
@@ -188,7 +197,7 @@ def test_an_alignment_is_asked_for_alike_and_keeps_its_recipe(monkeypatch: pytes
     of_command = typed_words("align", AlignCommand, "film", "mast", "--search", "30", "--response", "0.5")
     handed: list[Any] = []
     report = Report(tag="align", content={}, lines=())
-    monkeypatch.setattr("flagdata.commands.align.aligned", lambda chosen: handed.append(chosen) or report)
+    monkeypatch.setattr("flagdata.commands.align.align_pair", lambda chosen: handed.append(chosen) or report)
     assert flagdata.align("film", "mast", search=30, response=0.5, lake="x") == {}
     for chosen in (of_command, handed[0]):
         assert (chosen.first, chosen.second) == ("film", "mast")
@@ -223,12 +232,12 @@ def test_the_name_of_the_last_version_is_read_with_a_warning(capsys: pytest.Capt
     @command(Renamed)
     def shift(chosen: Renamed) -> None:
         """Shift it."""
-        taken.append((chosen.clock_offset, typed(chosen)))
+        taken.append((chosen.clock_offset, typed_names(chosen)))
 
-    @called(Renamed)
+    @make_call(Renamed)
     def call(chosen: Renamed) -> None:
         """Shifts it."""
-        taken.append((chosen.clock_offset, typed(chosen)))
+        taken.append((chosen.clock_offset, typed_names(chosen)))
 
     said = []
     for run in (
@@ -277,7 +286,7 @@ def made(taken: list[Made]) -> tuple[LongCommand, Callable[..., None]]:
         """Make it."""
         taken.append(chosen)
 
-    @called(Made)
+    @make_call(Made)
     def call(chosen: Made) -> None:
         """Makes it.
 
@@ -297,8 +306,8 @@ def test_what_was_typed_is_known_also_where_it_is_the_default(made: Any, taken: 
     assert make_it.name == "make-it"
     assert taken[0] == taken[1] == Made(source="x", window=2.5, names=("a", "b"), loud=False)
     assert str(taken[2].window) == "3.0"  # the same in a recipe as on the command line
-    assert [typed(one) for one in taken[:2]] == [{"source", "window", "names"}] * 2
-    assert typed(Made(source="x")) == set()
+    assert [typed_names(one) for one in taken[:2]] == [{"source", "window", "names"}] * 2
+    assert typed_names(Made(source="x")) == set()
 
 
 def test_a_value_that_does_not_fit_is_refused_by_the_name_that_the_user_knows(made: Any) -> None:

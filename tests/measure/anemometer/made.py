@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 from flagdata.core.arrays import FloatArray
 from flagdata.core.rng import stream
 from flagdata.record.signals import Sensor
-from measure.anemometer import Calibrated, Features, Place, Recording, calibrated
+from measure.anemometer import Calibrated, Features, Place, Recording, calibrate_reading
 from measure.cloth import Log
 from measure.film import FlagSize, WindowLayout
 
@@ -97,4 +97,4 @@ def recording(
 
 def model(*recordings: Recording) -> Calibrated:
     """Calibrated on recordings, by default one of four minutes."""
-    return calibrated(recordings or (recording(),), network=NETWORK, size=SIZE, level=0.9)
+    return calibrate_reading(recordings or (recording(),), network=NETWORK, size=SIZE, level=0.9)

@@ -9,7 +9,7 @@ import pytest
 
 from flagdata.errors import InputError, RefusedError
 from measure.anemometer.intervals import half_width, mean_errors
-from measure.anemometer.regression import Ridge, blocks_of, validated, with_neighbours
+from measure.anemometer.regression import Ridge, blocks_of, validate_penalties, with_neighbours
 from measure.cloth import Log
 from tests.measure.anemometer.made import STEP, features, gusts, model, recording, slow
 
@@ -40,7 +40,7 @@ def test_slow_noise_is_not_read_as_skill() -> None:
     out; single windows that are left out are interpolated between their neighbours, which looks like skill."""
     both = slow(np.random.default_rng(3).standard_normal((300, 81)), 8.0)
     rows, wind = both[:, :80], both[:, 80]
-    by_blocks = validated(
+    by_blocks = validate_penalties(
         rows, wind, blocks_of(STEP * np.arange(300, dtype=np.float64), np.zeros(300, int)), np.zeros(80, bool)
     )
     assert by_blocks.rmse > 0.97 * wind.std()
@@ -58,8 +58,8 @@ def test_a_few_features_that_say_much_have_a_penalty_of_their_own() -> None:
     wind = rows[:, 0] + 0.2 * rng.standard_normal(200)
     blocks = blocks_of(STEP * np.arange(200, dtype=np.float64), np.zeros(200, int))
     named = np.arange(100) == 0
-    assert validated(rows, wind, blocks, named).rmse < 1.15 * 0.2
-    assert validated(rows, wind, blocks, np.zeros(100, bool)).rmse > 1.3 * 0.2
+    assert validate_penalties(rows, wind, blocks, named).rmse < 1.15 * 0.2
+    assert validate_penalties(rows, wind, blocks, np.zeros(100, bool)).rmse > 1.3 * 0.2
 
 
 def test_intervals_contain_the_wind_and_the_error_is_that_of_the_features() -> None:

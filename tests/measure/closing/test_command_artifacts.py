@@ -23,7 +23,7 @@ from measure.closing.verdict_artifacts import fingerprint, keep, read
 from measure.loop import LoopOptions
 from measure.observe import Experiment, Specimen, Trajectory, WindTrack
 from measure.verdict import Conclusion, Estimate, Parameter, Verdict
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.mesh import Mesh
 from sim.run import Crew, of_content
 from tests.measure.report.verdicts import Size, verdict
@@ -205,7 +205,7 @@ def test_a_model_has_the_parameters_of_the_verdict(specimen: Specimen, place: in
     model = models(concluded(Conclusion.EFFECT), experiment(specimen, speed=5.0), name="x", seed=0)[place]
     text = to_toml(model.content)
     crew = Crew(of_content(tomllib.loads(text), name="x", folder=Path(), where="x"))
-    member, nominal = crew.member(0), named("camel-ponte-roma")
+    member, nominal = crew.member(0), named_material("camel-ponte-roma")
     area_weight, bending, damping = (values[stage] for values in FITTED.values())
     assert member.scene.material.area_weight == pytest.approx(nominal.area_weight * area_weight)
     np.testing.assert_allclose(member.scene.material.bending, nominal.bending * bending)

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from measure.closing import joined
-from measure.closing.joint_verdict import Joint, _combined
+from measure.closing import join_verdicts
+from measure.closing.joint_verdict import Joint, _multiply_likelihoods
 from measure.closing.verdict_output import joint_page
 from measure.report.document import plain
 from measure.verdict import CRITERIA, Conclusion, Estimate, Parameter, Verdict
@@ -32,7 +32,7 @@ def judged(conclusion: Conclusion, p: float, *, named: tuple[str, ...] | None = 
 
 
 def both(markers: Verdict, films: Verdict) -> Joint:
-    return joined(markers, films, level=0.05, nominal=NOMINAL)
+    return join_verdicts(markers, films, level=0.05, nominal=NOMINAL)
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_the_joint_document_is_what_it_was() -> None:
 
 def test_likelihoods_are_multiplied() -> None:
     """Two of 0.1 about ln 1 and ln 1.1: 0.1/√2 about their mean."""
-    found = _combined("x", interval(1.0, 0.1), interval(1.1, 0.1, unit="m"))
+    found = _multiply_likelihoods("x", interval(1.0, 0.1), interval(1.1, 0.1, unit="m"))
     expected = interval(math.sqrt(1.1), 0.1 / math.sqrt(2), unit="m")
     assert found.together is not None
     for name in ("value", "low", "high"):
@@ -100,7 +100,7 @@ def test_an_error_that_both_share_is_not_averaged_out() -> None:
     for _ in range(4000):
         common = rng.normal(0.0, shared)
         drawn = [interval(math.exp(common + rng.normal(0.0, sigma)), math.hypot(sigma, shared)) for sigma in own]
-        found = _combined("x", *drawn, shared=shared).together
+        found = _multiply_likelihoods("x", *drawn, shared=shared).together
         assert found is not None
         held += found.low <= 1.0 <= found.high
     assert held / 4000 == pytest.approx(0.9, abs=0.015)
@@ -109,11 +109,11 @@ def test_an_error_that_both_share_is_not_averaged_out() -> None:
 def test_an_upper_limit_is_not_combined_and_opposite_signs_are_apart() -> None:
     limit = Estimate(value=0.0, low=0.0, high=3.0, unit="1")
     known = interval(1.0, 0.1)
-    assert _combined("x", limit, known).together == known
-    assert _combined("x", None, limit).together == limit
-    assert _combined("x", None, None).together is None
+    assert _multiply_likelihoods("x", limit, known).together == known
+    assert _multiply_likelihoods("x", None, limit).together == limit
+    assert _multiply_likelihoods("x", None, None).together is None
     opposite = Estimate(value=-1.0, low=-1.2, high=-0.8, unit="1")
-    found = _combined("x", opposite, known)
+    found = _multiply_likelihoods("x", opposite, known)
     assert found.together is None
     assert found.apart == math.inf
 

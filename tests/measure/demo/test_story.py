@@ -144,7 +144,7 @@ def aligned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, codes: dict[str, in
         lake = SimpleNamespace(rows=lambda *_, **__: SimpleNamespace(to_pylist=lambda: [{}]))
         monkeypatch.setattr(story.Lake, "open", lambda _: lake)
         made = cast(Any, SimpleNamespace(noted=SimpleNamespace(clock=-12.34), clock_offset=-12.0))
-        story._aligned(shell, made)
+        story._align_step(shell, made)
         return shell.cards[-1]
 
     return step

@@ -16,7 +16,7 @@ from flagdata.core.findings import Finding
 from flagdata.core.stated import Stated
 from flagdata.errors import InputError, RefusedError, UsageError
 from measure.commands.calibrate import calibrate
-from measure.drape import DrapeBatch, Face, Model, Surface, answered, fitted, material, ratio, rim_of, shape_of
+from measure.drape import DrapeBatch, Face, Model, Surface, answer_of, fit_drapes, material, ratio, rim_of, shape_of
 from sim.cloth.mesh import Mesh
 from sim.run.cusick_drape import disc
 from tests.golden_answers import changes
@@ -100,7 +100,7 @@ def test_a_surface_finds_the_function_that_made_it(surface: Surface) -> None:
 
 
 def test_the_bending_length_and_the_stiffer_thread_are_found(surface: Surface) -> None:
-    found = fitted(surface, faces_of(1)[:1], model=Model.BASE, seed=0)
+    found = fit_drapes(surface, faces_of(1)[:1], model=Model.BASE, seed=0)
     low, high = np.quantile(found.cloth["bending_length"], [0.05, 0.95])
     assert low < 0.02 < high
     assert high / low < 1.25  # shear within a factor of 8 makes 0.06 of the drape coefficient, a tenth of a length
@@ -116,8 +116,8 @@ def test_lobes_distinguish_what_differs_between_faces(
     surface: Surface, truth: dict[str, float], named: Model, other: Model
 ) -> None:
     faces = faces_of(2, **truth)
-    base = fitted(surface, faces, model=Model.BASE, seed=0).evidence
-    gain = {model: fitted(surface, faces, model=model, seed=0).evidence - base for model in Model}
+    base = fit_drapes(surface, faces, model=Model.BASE, seed=0).evidence
+    gain = {model: fit_drapes(surface, faces, model=model, seed=0).evidence - base for model in Model}
     assert gain[named] > 3
     assert gain[named] > gain[other]
     # What is the same on both faces cannot make them differ.
@@ -125,7 +125,7 @@ def test_lobes_distinguish_what_differs_between_faces(
     assert gain[Model.ALIKE] < 1
     if named is Model.CURLED:
         signs = [
-            np.sign(np.median(fitted(surface, pair, model=named, seed=0).cloth["rest_curvature"]))
+            np.sign(np.median(fit_drapes(surface, pair, model=named, seed=0).cloth["rest_curvature"]))
             for pair in (faces, faces[::-1])
         ]
         assert signs == [1.0, -1.0]
@@ -134,7 +134,7 @@ def test_lobes_distinguish_what_differs_between_faces(
 def test_one_drape_is_no_sample(surface: Surface) -> None:
     alone = faces_of(1)[0].of([0])
     with pytest.raises(InputError, match="two pieces of cloth"):
-        fitted(surface, [alone], model=Model.BASE, seed=0)
+        fit_drapes(surface, [alone], model=Model.BASE, seed=0)
 
 
 def _run(*arguments: str | Path) -> Result:
@@ -162,7 +162,7 @@ def test_folders_of_scans_give_bending_on_the_command_line_and_in_python(scanned
 
 def test_faces_that_drape_differently_are_reported(surface: Surface) -> None:
     def findings(faces: list[Face]) -> dict[str, Finding]:
-        return {one.kind: one for one in answered(surface, faces, Stated.of(0.2), level=0.9, seed=0).findings}
+        return {one.kind: one for one in answer_of(surface, faces, Stated.of(0.2), level=0.9, seed=0).findings}
 
     finding = findings(faces_of(2, sidedness=0.06))["faces-drape-differently"]
     assert finding.value == pytest.approx(-2 * 0.06 * 0.55, abs=0.01)

@@ -10,7 +10,7 @@ import pytest
 from flagdata.core.arrays import FloatArray
 from flagdata.core.rng import stream
 from flagdata.errors import CorruptError, InputError
-from measure.estimate import CARD_KEY, UNKNOWN, Dependence, combined, of_model
+from measure.estimate import CARD_KEY, UNKNOWN, Dependence, combine_windows, of_model
 from measure.estimate.combine import effective
 from models.trained.estimator import Estimator
 
@@ -27,7 +27,7 @@ def posterior(observed: float, noise: float, n: int, rng: np.random.Generator) -
 def cloth_of(logits: FloatArray, correlation: float, seed: int = 0) -> FloatArray:
     dependence = Dependence(wind=correlation, cloth=correlation, source="given")
     size = logits.shape[2]
-    return combined(
+    return combine_windows(
         logits,
         names=CLOTH[:size],
         centre=np.zeros(size),
@@ -39,7 +39,7 @@ def cloth_of(logits: FloatArray, correlation: float, seed: int = 0) -> FloatArra
 
 def test_one_window_is_left_as_it_is() -> None:
     draws = stream(1, "one").normal(size=(1, 50, 2))
-    wind, cloth = combined(
+    wind, cloth = combine_windows(
         draws,
         names=BOTH,
         centre=np.zeros(2),
@@ -110,7 +110,7 @@ def test_intervals_cover_as_stated_when_errors_correlate_as_given(correlation: f
 def test_the_mean_of_winds_has_the_variance_of_correlated_estimates(correlation: float) -> None:
     rng = stream(6, "winds")
     draws = rng.normal(3.0, 1.0, size=(8, 20_000, 1))
-    wind, cloth = combined(
+    wind, cloth = combine_windows(
         draws,
         names=("wind_speed",),
         centre=np.zeros(1),
@@ -129,7 +129,7 @@ def test_a_wind_that_trades_with_the_cloth_follows_what_all_windows_say_of_the_c
     rng = stream(7, "trade")
     cloth = np.stack([posterior(1.0, 0.2, 20_000, rng) for _ in range(10)])
     wind = 2 + cloth + rng.normal(0, 0.05, size=cloth.shape)
-    winds, shared = combined(
+    winds, shared = combine_windows(
         np.concatenate([wind, cloth], axis=2),
         names=BOTH,
         centre=np.zeros(2),

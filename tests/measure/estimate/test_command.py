@@ -30,7 +30,7 @@ from flagdata.timebase import NANOSECONDS
 from measure.commands import read
 from measure.estimate import DRAWS, weight_of
 from measure.estimate.nearest import nearest
-from models.conditioning import conditioned
+from models.conditioning import condition_film
 from models.trained.estimator import DEFAULT, Estimator
 from tests.measure.estimate.conftest import FRAMES, RATE, pictures, write_video
 from tests.program import Ended, invoke
@@ -296,7 +296,7 @@ def test_the_nearest_simulated_clips_are_those_of_other_recordings(lake: Path, m
     opened = Lake.open(lake)
     first, other = opened.rows("kind = 'recording'").to_pylist()
     record_ = Record.open(opened.object_path(first["object"]))
-    film = conditioned(record_.frames(0, FRAMES), np.arange(FRAMES) / RATE).frames
+    film = condition_film(record_.frames(0, FRAMES), np.arange(FRAMES) / RATE).frames
     with torch.no_grad():
         summary = model.embeddings(model.inputs(film[None]))[0][0].numpy()
     found, compared = nearest(opened, model, summary, without=None, at=None, seed=0)

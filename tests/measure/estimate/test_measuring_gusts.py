@@ -12,7 +12,7 @@ import pytest
 from flagdata.core.stated import Stated
 from flagdata.ingest.films.film_array import Frames
 from measure.commands.measure import _Done, _report
-from measure.commands.measure_film import answered
+from measure.commands.measure_film import answer_of
 from measure.estimate import SERIES_KEY, Measurement, Options, Pair, SeriesErrors, beside, measure
 from models.trained.estimator import Estimator
 from tests.measure.estimate.conftest import FRAMES, RATE, even
@@ -166,8 +166,8 @@ def test_python_has_the_gusts_with_their_interval(model: Estimator, series_model
     film = even(6 * FRAMES)
     found = measured(film, series_model)
     assert found.gusts is not None
-    gusts = answered(found).gusts
+    gusts = answer_of(found).gusts
     assert gusts is not None
     assert (gusts.value, gusts.interval) == (found.gusts.intensity.value, found.gusts.intensity.interval)
     assert gusts.constrained == found.gusts.as_dict()["constrained"]
-    assert answered(measured(film, model)).gusts is None
+    assert answer_of(measured(film, model)).gusts is None

@@ -21,7 +21,7 @@ SIZE = FlagSize(length=1.5, height=1.0)
 def test_every_window_of_the_film_has_a_wind_in_the_range_that_was_assumed(reference_data: Path) -> None:
     film = CameraFilm(reference_data / CLIP)
     assert film.rate == pytest.approx(25.0)
-    model = estimator.shipped()
+    model = estimator.load_shipped()
     found = measure(film, model, gate=gate_of(model), dependence=UNKNOWN, options=Options(size=SIZE))
     assert len(found.windows) == 8
     winds = [window.quantity("wind_speed") for window in found.windows]

@@ -13,7 +13,7 @@ import pytest
 from flagdata.answer import Bound, Span
 from flagdata.core.stated import parse
 from measure.estimate import Options
-from measure.estimate.refined import _searched, refined, scaled
+from measure.estimate.refined import _searched_range, refine_window, scale_refinement
 from measure.refine import Clip, Interval, Refinement, Round
 from models.networks.targets import Cloth
 
@@ -59,7 +59,7 @@ def test_a_flag_four_times_as_long_has_twice_the_wind_four_times_the_weight_and_
     found: Refinement,
 ) -> None:
     """Froude number U²/(gL), mass ratio ρ_s/(ρ_air L) and B/(ρ_air U² L³) are those of the simulated flag."""
-    larger = scaled(found, 4.0)
+    larger = scale_refinement(found, 4.0)
     by_name = {entry.name: entry for entry in larger.intervals}
     assert (by_name["wind_speed"].median, by_name["wind_speed"].span.high) == (8.0, 9.0)
     assert by_name["wind_speed.1"].span.low == 10.0
@@ -72,7 +72,7 @@ def test_a_flag_four_times_as_long_has_twice_the_wind_four_times_the_weight_and_
 def test_a_bound_scales_and_stays_one(found: Refinement) -> None:
     least = Span(low=9.4, high=math.inf, level=0.95, bound=Bound.LEAST, estimated=False)
     strong = replace(found.intervals[0], median=None, span=least)
-    larger = scaled(replace(found, intervals=(strong, *found.intervals[1:])), 4.0)
+    larger = scale_refinement(replace(found, intervals=(strong, *found.intervals[1:])), 4.0)
     assert larger.intervals[0].span == replace(least, low=18.8)
     interval = larger.intervals[0].as_dict()
     assert (interval["median"], interval["low"], interval["high"], interval["bound"]) == (None, 18.8, None, "at-least")
@@ -81,19 +81,19 @@ def test_a_bound_scales_and_stays_one(found: Refinement) -> None:
 
 def test_what_has_no_size_stays(found: Refinement) -> None:
     before = {entry.name: entry for entry in found.intervals}
-    after = {entry.name: entry for entry in scaled(found, 0.5).intervals}
+    after = {entry.name: entry for entry in scale_refinement(found, 0.5).intervals}
     for name in ("anisotropy", "nonlinearity"):
         assert after[name] == before[name]
 
 
 def test_rounds_and_the_networks_first_estimate_scale_alike(found: Refinement) -> None:
-    larger = scaled(found, 4.0)
+    larger = scale_refinement(found, 4.0)
     assert larger.amortised == larger.intervals[:4]
     assert larger.rounds == (replace(found.rounds[0], intervals=larger.intervals[:2]),)
 
 
 def test_a_flag_of_the_simulated_size_is_left_as_it_is(found: Refinement) -> None:
-    assert scaled(found, 1.0) is found
+    assert scale_refinement(found, 1.0) is found
 
 
 def test_the_view_that_a_record_states_is_that_of_the_simulated_clips_whatever_part_of_the_picture_is_judged(
@@ -110,12 +110,12 @@ def test_the_view_that_a_record_states_is_that_of_the_simulated_clips_whatever_p
     )
     cut: Any = SimpleNamespace(artifact=recording)
     model: Any = SimpleNamespace(cloth=Cloth.FLAG)
-    refined(measured, cut, model, budget=20, cache=None)
+    refine_window(measured, cut, model, budget=20, cache=None)
     assert given[0].recording is recording
 
 
 def test_an_area_weight_is_searched_as_a_range_at_the_size_that_is_simulated() -> None:
     # Two standard deviations either way, 1 % of a value; a flag twice as long weighs twice as much.
-    assert _searched(parse("0.12:0.15"), 1.0) == pytest.approx((0.12, 0.15))
-    assert _searched(parse("0.28±0.01"), 2.0) == pytest.approx((0.13, 0.15))
-    assert _searched(parse("0.2"), 1.0) == pytest.approx((0.198, 0.202))
+    assert _searched_range(parse("0.12:0.15"), 1.0) == pytest.approx((0.12, 0.15))
+    assert _searched_range(parse("0.28±0.01"), 2.0) == pytest.approx((0.13, 0.15))
+    assert _searched_range(parse("0.2"), 1.0) == pytest.approx((0.198, 0.202))

@@ -13,11 +13,11 @@ from flagdata.core.rng import stream
 from flagdata.errors import RefusedError, UsageError
 from measure.film import FlagSize, scaled_back, sizes
 from measure.film.similarity import SizePrior, spacing
-from sim.cloth.material import Material, named
+from sim.cloth.material import Material, named_material
 from sim.cloth.scene import assemble, flag
 from sim.integrate import Symplectic
 
-CAMEL = named("camel-ponte-roma")
+CAMEL = named_material("camel-ponte-roma")
 
 
 def flight(scale: float, *, wind: float, material: Material, frames: int = 12) -> FloatArray:

@@ -26,7 +26,7 @@ from measure.forecasting import (
 from measure.forecasting import model as model_module
 from measure.forecasting.regressors import MotionColumn
 from measure.observe import Specimen, Trajectory, WindTrack
-from measure.probes import Projection, reduced
+from measure.probes import Projection, reduce_errors
 from measure.propose import Term, columns_of
 from sim.cloth import handles
 from sim.integrate import JointBatch
@@ -314,7 +314,7 @@ def test_nothing_changes_with_an_effect_that_the_cloth_cannot_have(specimen: Spe
     base = hoist.errors(*hoist.system(segments, [NOMINAL]), segments)
     found = hoist.sensitivities(columns, segments, [NOMINAL], base)[len(THETA) :]
     assert [one.effect for one, own in zip(columns, found, strict=True) if not own.any()] == ["full-hoist"]
-    statistics = reduced(base, found, segments.recording, segments.noise)
+    statistics = reduce_errors(base, found, segments.recording, segments.noise)
     assert np.isfinite(statistics.r).all()
     assert np.isfinite(statistics.response).all()
     assert Projection.along(found, torch.ones(base.shape[1], 1)).directions.isfinite().all()

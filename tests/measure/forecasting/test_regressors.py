@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from measure.forecasting import THETA, TURNED, Calibration, FieldColumn, Model, fields, library
 from measure.forecasting.regressors import motions
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.scene import assemble, flag
 from sim.effects import EFFECTS, WindEffect
 
@@ -52,7 +52,7 @@ def test_steps_between_calibrations_undo_one_another(area_weight: float, bending
 
 
 def test_a_calibration_scales_density_and_bending_and_sets_damping() -> None:
-    nominal = named("camel-ponte-roma")
+    nominal = named_material("camel-ponte-roma")
     material = Calibration(area_weight=1.1, bending=2.0, damping=1e-3).material(nominal)
     assert material.area_weight == pytest.approx(1.1 * nominal.area_weight)
     np.testing.assert_allclose(material.bending, 2 * nominal.bending)
@@ -76,7 +76,9 @@ def test_a_calibration_at_its_bounds_says_so() -> None:
 
 
 def test_a_field_mode_is_a_force_per_mass_along_its_axis() -> None:
-    system, state = assemble([flag(material=named("camel-ponte-roma"), wind_speed=4.0, columns=6)], dtype=torch.float64)
+    system, state = assemble(
+        [flag(material=named_material("camel-ponte-roma"), wind_speed=4.0, columns=6)], dtype=torch.float64
+    )
     column = FieldColumn(axis=2, mode=(1, 0), step=0.5)
     pushed, _ = column.system(system, state)
     (effect,) = pushed.effects

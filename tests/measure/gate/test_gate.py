@@ -9,7 +9,7 @@ import pytest
 
 from flagdata.errors import InputError
 from measure.gate import REASONS, Gate, level
-from measure.gate.gate import SCORES, squashed
+from measure.gate.gate import SCORES, squash_tails
 from tests.measure.gate.made import KINDS, distorted, learned, plain
 
 
@@ -53,7 +53,7 @@ def test_the_log_likelihood_ratio_is_that_of_linear_discriminant_analysis() -> N
 
     clips, other = plain(3, 500), distorted(4, 300, "camera", strength=2.0)
     gate = Gate.of(clips, dict.fromkeys(KINDS, other), clips[:100])
-    first, second, fresh = (squashed(x, gate.centre, gate.scale) for x in (clips[:300], other, plain(5, 200)))
+    first, second, fresh = (squash_tails(x, gate.centre, gate.scale) for x in (clips[:300], other, plain(5, 200)))
     _, shrinkage = ledoit_wolf(np.concatenate([first - first.mean(axis=0), second - second.mean(axis=0)]))
     theirs = LinearDiscriminantAnalysis(solver="lsqr", shrinkage=shrinkage, priors=[0.5, 0.5])
     theirs.fit(np.concatenate([first, second]), np.repeat([0, 1], 300))

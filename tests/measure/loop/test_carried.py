@@ -30,7 +30,7 @@ from measure.observe import (
     sheet,
 )
 from measure.verdict import NOT_REJECTED
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.effects import EFFECTS, Effect
 from tests.program import invoke
 
@@ -41,7 +41,7 @@ LEVEL = 0.1
 CLOTH = Calibration(area_weight=1.05, bending=0.8, damping=3e-3)
 SETUP = Setup(
     outline=sheet(SIZE, SIZE),
-    material=named("camel-ponte-roma"),
+    material=named_material("camel-ponte-roma"),
     pins=Hold.TOP_CORNERS,
     carried=True,
     vertices=VERTICES,
@@ -55,7 +55,7 @@ def specimen() -> Specimen:
     anchors = np.stack([seats[:, 0], 0 * seats[:, 0], seats[:, 1]], axis=1)
     return Specimen(
         mesh=mesh,
-        material=named("camel-ponte-roma"),
+        material=named_material("camel-ponte-roma"),
         held=held,
         anchors=anchors,
         stiffness=math.inf,

@@ -36,7 +36,7 @@ def null(count: int) -> NullModel:
 
 
 def test_halfway_is_halfway_in_the_units_of_the_parameters() -> None:
-    half = FAR.halved()
+    half = FAR.halfway_to_nominal()
     np.testing.assert_allclose(
         np.array(half.calibration.steps_from(Calibration())), np.array(FAR.calibration.steps_from(Calibration())) / 2
     )
@@ -47,7 +47,7 @@ def test_halfway_is_halfway_in_the_units_of_the_parameters() -> None:
 def test_a_model_that_diverges_is_drawn_back(
     monkeypatch: pytest.MonkeyPatch, effects: tuple[tuple[EffectColumn, float], ...]
 ) -> None:
-    monkeypatch.setattr(gauss_newton, "_linearised", linearised)
+    monkeypatch.setattr(gauss_newton, "_linearise_models", linearised)
     model = Model(calibration=FAR.calibration, effects=effects)
     found = gauss_newton._round(  # pyright: ignore[reportPrivateUsage]
         *NOTHING, model, null(len(THETA) + len(effects)), np.full(4, 5.0), (5,) * len(effects), anchor=Calibration()
@@ -58,7 +58,7 @@ def test_a_model_that_diverges_is_drawn_back(
 
 def test_a_model_that_always_diverges_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     lost = linearised(*NOTHING, Model(calibration=FAR.calibration))
-    monkeypatch.setattr(gauss_newton, "_linearised", lambda *_: lost)
+    monkeypatch.setattr(gauss_newton, "_linearise_models", lambda *_: lost)
     with pytest.raises(gauss_newton.FitDivergedError, match="does not stay one"):
         gauss_newton._round(  # pyright: ignore[reportPrivateUsage]
             *NOTHING, Model(calibration=FAR.calibration), null(len(THETA)), np.full(4, 5.0), (), anchor=Calibration()
@@ -71,7 +71,7 @@ def test_sensitivities_at_a_bound_are_taken_from_within(bending: float, steps: t
     model = Model(calibration=Calibration(bending=bending), effects=((LIFT, 1.0),))
     for place, step in ((1, steps[0]), (3, steps[1])):
         size = abs(step)
-        moved, taken = model.stepped(place, size)
+        moved, taken = model.take_step(place, size)
         assert taken == pytest.approx(step)
         np.testing.assert_allclose(moved.steps_from(model), np.where(np.arange(4) == place, step, 0.0), atol=1e-12)
 
@@ -108,4 +108,4 @@ def test_a_fit_begins_where_across_the_prior_least_is_left(monkeypatch: pytest.M
 
 def test_strengths_of_a_prior_of_both_signs_are_tried_on_either_side() -> None:
     turned = EffectColumn(effect="direction-change", parameter="angle", step=0.05)
-    assert gauss_newton._expected(turned) == [-0.4, -0.8, 0.4, 0.8]  # pyright: ignore[reportPrivateUsage]
+    assert gauss_newton._expected_strengths(turned) == [-0.4, -0.8, 0.4, 0.8]  # pyright: ignore[reportPrivateUsage]

@@ -25,7 +25,7 @@ from measure.loop.corrective_field import corrective_field
 from measure.nulls import NullBatch
 from measure.nulls import bank as banks
 from measure.observe import Experiment, Specimen, Trajectory
-from measure.probes import projected
+from measure.probes import projected_statistics
 from measure.report import as_document, from_document, lead, page
 from measure.report.verdict_words import words
 from measure.verdict import NOT_REJECTED, Conclusion, Verdict, number
@@ -189,7 +189,7 @@ def test_the_same_data_and_seed_give_the_same_verdict(pulled: Experiment, bank: 
 def test_the_corrective_field_is_the_force_that_acts(specimen: Specimen, bank: Path) -> None:
     setting = Setting.of(recorded(specimen, Push(acceleration=6.0), seed=11))
     nominal = [setting.calibration] * len(setting.segments)
-    found, projection = projected(setting.forecaster, setting.segments, nominal, columns())
+    found, projection = projected_statistics(setting.forecaster, setting.segments, nominal, columns())
     null = banks.load(bank, words="made").model(setting.design)
     whitened = WhitenedMisfit(
         statistics=found, projection=projection, null=null, speeds=setting.speeds[setting.recording]
@@ -288,7 +288,7 @@ def test_the_base_model_is_led_on_only_to_where_less_is_left(
     monkeypatch.setattr(run, "_looked_at", lambda setting: ())
     monkeypatch.setattr(run, "_fits", lambda setting, bank: setting)
     monkeypatch.setattr(run, "_base_fit", fitted)
-    ended, fits = run._calibrated(*cast(Any, (At(), At(), None)))  # pyright: ignore[reportPrivateUsage]
+    ended, fits = run._calibrate_statistics(*cast(Any, (At(), At(), None)))  # pyright: ignore[reportPrivateUsage]
     assert ended.calibration.bending == pytest.approx(2.0 ** (looks - 1))
     assert fits is ended or looks == 1
 

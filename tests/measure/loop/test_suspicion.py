@@ -11,7 +11,7 @@ from flagdata.errors import InputError, UnknownNameError
 from measure.forecasting import Suspicion, all_strengths, names, on_markers
 from measure.inference import Evidence, NullModel
 from measure.loop import judge
-from measure.loop.run import _suspected  # pyright: ignore[reportPrivateUsage]
+from measure.loop.run import _suspected_effect  # pyright: ignore[reportPrivateUsage]
 from measure.nulls import Reference
 from measure.verdict import CRITERIA, Conclusion
 from tests.measure.loop.drawn_statistics import drawn, made, named, seen, strengths
@@ -151,9 +151,9 @@ def test_only_what_markers_weigh_can_be_suspected_of_them() -> None:
 def test_what_the_cloth_cannot_have_is_refused_as_a_suspicion() -> None:
     suspicion = Suspicion.parse("lift", on_markers())
     found = drawn(np.random.default_rng(1), strengths({}), np.zeros((3, len(names()))), np.array([3.5, 5.0, 7.0]))
-    assert _suspected(found, suspicion) == (LIFT, 1)
-    assert _suspected(found, None) is None
+    assert _suspected_effect(found, suspicion) == (LIFT, 1)
+    assert _suspected_effect(found, None) is None
     found.response[:, LIFT] = 0.0
     with pytest.raises(InputError, match="moves nothing of this cloth") as refused:
-        _suspected(found, suspicion)
+        _suspected_effect(found, suspicion)
     assert refused.value.where == "--suspect"

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import t as student
 
 from measure.forecasting import Segments
-from measure.loop import folds, paired, total_error
+from measure.loop import folds, paired_difference, total_error
 from measure.observe import Specimen, Trajectory, WindTrack
 
 RNG = np.random.default_rng(1)
@@ -46,7 +46,7 @@ def test_of_a_recording_with_one_segment_the_error_is_that_of_all() -> None:
 
 def test_a_paired_reduction_is_the_difference_of_roots_with_students_interval() -> None:
     before, after = np.full(12, 4e-4), np.full(12, 1e-4) + 1e-5 * NOISE
-    found = paired(before, after)
+    found = paired_difference(before, after)
     assert found.value == pytest.approx(0.02 - 0.01, rel=1e-12)
     # d√x = dx/(2√x), here by the secant between the two roots: 1/(0.02 + 0.01).
     reach = student.ppf(0.95, 11) * 1e-5 / 12**0.5 / 0.03

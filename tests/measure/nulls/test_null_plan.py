@@ -33,7 +33,7 @@ def asked(
     monkeypatch.setenv("FLAGDATA_CACHE", str(cache))
     monkeypatch.setattr(banks, "build", build)
     monkeypatch.setattr(banks, "load", lambda folder, words, kinds: SimpleNamespace(kinds=kinds))
-    bank = null_plan.simulated(setting, nulls=nulls, seed=seed, workers=1, stage=lambda *_: None)
+    bank = null_plan.simulate_bank(setting, nulls=nulls, seed=seed, workers=1, stage=lambda *_: None)
     ((folder, count),) = found
     return folder, count, bank.kinds  # pyright: ignore[reportAttributeAccessIssue]
 

@@ -9,11 +9,11 @@ import pytest
 
 from measure.nulls import StiffnessFactors
 from measure.nulls.stiffness import drawn
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 
 
 def test_without_factors_it_is_the_nominal_material() -> None:
-    nominal = named("camel-ponte-roma")
+    nominal = named_material("camel-ponte-roma")
     made = StiffnessFactors().of(nominal)
     np.testing.assert_array_equal(made.stretching, nominal.stretching)
     np.testing.assert_array_equal(made.bending, nominal.bending)
@@ -22,7 +22,7 @@ def test_without_factors_it_is_the_nominal_material() -> None:
 
 def test_factors_are_on_their_own_directions_and_the_coupling_between_them() -> None:
     """C11 and C22 are multiplied by 2·3 and 2·12, C12 by their geometric mean 2·6, C33 by 2·0.5."""
-    nominal = named("camel-ponte-roma")
+    nominal = named_material("camel-ponte-roma")
     made = StiffnessFactors(stretching=2.0, warp=3.0, weft=12.0, shear=0.5, bending=(1.0, 2.0, 4.0)).of(nominal)
     shape = (1,) * (nominal.stretching.ndim - 1) + (4,)
     np.testing.assert_allclose(made.stretching, nominal.stretching * np.reshape([6.0, 12.0, 24.0, 1.0], shape))

@@ -10,7 +10,7 @@ import pytest
 from flagdata.core.arrays import FloatArray
 from measure.nulls import SETTLE, tracks
 from measure.nulls.null_simulation import CARRIED
-from measure.observe import Trajectory, WindTrack, carried
+from measure.observe import Trajectory, WindTrack, carry_attachments
 
 RATE, SECONDS, FAR, FREQUENCY = 25.0, 8.0, 0.15, 0.7
 MARKERS = np.array([[0.0, 0.0], [0.4, 0.0], [0.0, 0.4], [0.4, 0.4]])
@@ -26,7 +26,7 @@ def swinging(noise: float = 0.0, *, name: str = "swung", height: float = 0.0) ->
     places += noise * np.random.default_rng(3).standard_normal(places.shape)
     still = WindTrack.constant((0.0, 0.0, 0.0))
     plain = Trajectory(name=name, markers=MARKERS, positions=places, rate=RATE, wind=still, noise=noise)
-    return carried(plain, SEATS)
+    return carry_attachments(plain, SEATS)
 
 
 def velocity(places: FloatArray) -> FloatArray:
@@ -70,14 +70,14 @@ def test_noise_is_taken_out_of_a_way_and_motion_is_not() -> None:
     tracked, plain = swinging(noise), swinging()
     assert tracked.attachments is not None
     assert plain.attachments is not None
-    made = tracks.smoothed(tracked, SEATS)(tracked.times)
+    made = tracks.smooth_way(tracked, SEATS)(tracked.times)
     off, before = made - plain.attachments, tracked.attachments - plain.attachments
     assert np.sqrt((before**2).mean()) == pytest.approx(noise, rel=0.05)
     # 25 frames a second of a swing of 0.7 Hz: a smooth way through them has some five coefficients a second and axis.
     assert np.sqrt((off**2).mean()) < 0.6 * noise
     # What is taken out is as large as the noise, by definition of the way.
     assert np.sqrt(((made - tracked.attachments) ** 2).mean()) == pytest.approx(noise, rel=0.01)
-    exact = tracks.smoothed(plain, SEATS)
+    exact = tracks.smooth_way(plain, SEATS)
     np.testing.assert_allclose(exact(plain.times), plain.attachments, rtol=0, atol=1e-12)
 
 

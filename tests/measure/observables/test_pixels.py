@@ -13,7 +13,7 @@ import pytest
 from flagdata.core.arrays import BoolArray, FloatArray, UInt8Array
 from measure.observables import OBSERVABLES, ClothWindow, FilmWindow, table_of
 from measure.observables.watching import Watched
-from models.conditioning import HALVED, Outliner, conditioned, halved
+from models.conditioning import HALVED, Outliner, condition_film, halve_picture
 from tests.measure.observables.shapes import HEIGHT, LENGTH, window
 
 SIDE = 300
@@ -63,7 +63,9 @@ def painted(*, contrast: float, seconds: float = 2.6, house: bool = False) -> Pa
             cv2.fillConvexPoly(mask, triangle, 255, shift=4)
         picture = cv2.resize(large, (SIDE, SIDE), interpolation=cv2.INTER_AREA)
         frames.append(np.clip(np.rint(picture + rng.normal(0, 1.0, picture.shape)), 0, 255).astype(np.uint8))
-        masks.append(halved(np.asarray(cv2.resize(mask, (SIDE, SIDE), interpolation=cv2.INTER_AREA), np.uint8)) > 127)
+        masks.append(
+            halve_picture(np.asarray(cv2.resize(mask, (SIDE, SIDE), interpolation=cv2.INTER_AREA), np.uint8)) > 127
+        )
     return Painted(cloth=cloth, frames=np.stack(frames), silhouettes=np.stack(masks))
 
 
@@ -79,8 +81,8 @@ class Seen:
 @pytest.fixture(scope="module")
 def seen() -> Seen:
     film = painted(contrast=90.0)
-    found = conditioned(film.frames, film.cloth.times, size=SIDE)
-    small = np.stack([halved(frame) for frame in found.frames])
+    found = condition_film(film.frames, film.cloth.times, size=SIDE)
+    small = np.stack([halve_picture(frame) for frame in found.frames])
     outliner = Outliner.of(small)
     assert outliner is not None
     masks, expected = outliner.masks(small)
@@ -117,8 +119,8 @@ def test_the_expected_agreement_is_what_is_reached(seen: Seen) -> None:
 
 def test_a_houses_windows_are_not_cloth() -> None:
     film = painted(contrast=90.0, house=True)
-    found = conditioned(film.frames, film.cloth.times, size=SIDE)
-    small = np.stack([halved(frame) for frame in found.frames])
+    found = condition_film(film.frames, film.cloth.times, size=SIDE)
+    small = np.stack([halve_picture(frame) for frame in found.frames])
     outliner = Outliner.of(small)
     assert outliner is not None
     masks, _ = outliner.masks(small)
@@ -130,8 +132,8 @@ def test_a_houses_windows_are_not_cloth() -> None:
 
 def test_a_mirrored_film_shows_the_mirrored_cloth(seen: Seen) -> None:
     film = seen.painted
-    found = conditioned(film.frames[:, :, ::-1].copy(), film.cloth.times, size=SIDE)
-    small = np.stack([halved(frame) for frame in found.frames])
+    found = condition_film(film.frames[:, :, ::-1].copy(), film.cloth.times, size=SIDE)
+    small = np.stack([halve_picture(frame) for frame in found.frames])
     outliner = Outliner.of(small)
     assert outliner is not None
     assert outliner.side == -1.0

@@ -13,7 +13,7 @@ from flagdata.core.findings import Finding
 from flagdata.errors import RefusedError
 from measure.commands import observe as command
 from measure.film import ConditionedFilm, FlagSize
-from measure.observables import watched, watching
+from measure.observables import watch_film, watching
 from tests.program import invoke
 
 SIZE = FlagSize(length=1.5, height=1.0)
@@ -37,12 +37,12 @@ class Still:
 
 def test_a_film_in_which_nothing_moves_is_refused() -> None:
     with pytest.raises(RefusedError, match="no motion like cloth"):
-        watched(ConditionedFilm(Still()), SIZE)
+        watch_film(ConditionedFilm(Still()), SIZE)
 
 
 def test_a_film_shorter_than_a_window_is_refused() -> None:
     with pytest.raises(RefusedError, match="no window"):
-        watched(ConditionedFilm(Still()), SIZE, last=1.0)
+        watch_film(ConditionedFilm(Still()), SIZE, last=1.0)
 
 
 def test_the_bar_of_observe_ends_at_the_whole_windows_of_the_part(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -59,7 +59,7 @@ def test_the_bar_of_observe_ends_at_the_whole_windows_of_the_part(monkeypatch: p
         raise RefusedError("the film is read", fix="none")
 
     monkeypatch.setattr(command, "progress", bar)
-    monkeypatch.setattr(watching, "watched", read)
+    monkeypatch.setattr(watching, "watch_film", read)
     for part in ([], ["--start", "5s", "--window", "2s"]):
         invoke("observe", "example:flag", "--flag-size", "1.5x1.0", *part)
     assert lengths == [4, 3]

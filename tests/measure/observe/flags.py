@@ -8,11 +8,11 @@ import numpy as np
 
 from flagdata.core.arrays import FloatArray
 from measure.observe import Hold, Known, Observation, Setup, WindTrack, sheet
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.mesh import grid
 
 WIDTH, HEIGHT, RATE = 1.2, 0.8, 50.0
-SETUP = Setup(outline=sheet(WIDTH, HEIGHT), material=named("camel-ponte-roma"), pins=Hold.HOIST)
+SETUP = Setup(outline=sheet(WIDTH, HEIGHT), material=named_material("camel-ponte-roma"), pins=Hold.HOIST)
 WIND = WindTrack.constant((5.0, 0.0, 0.0))
 _GRAIN = 400  # steps of the integral along u
 

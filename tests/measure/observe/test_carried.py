@@ -10,19 +10,23 @@ import pytest
 import torch
 
 from flagdata.errors import InputError, UsageError
-from measure.forecasting import Calibration, Forecaster, Segments, aligned, columns
+from measure.forecasting import Calibration, Forecaster, Segments, align_experiment, columns
 from measure.observe import Experiment, Hold, Observation, Setup, WindTrack, from_arrays, observe, parse, sheet
 from sim.cloth import handles
 from sim.cloth.anchors import AnchorTracks
 from sim.cloth.handles import Handles
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.mesh import Diagonals, grid
 from sim.cloth.scene import Scene, assemble, upright
 from sim.integrate import BackwardEuler, SplitEuler
 
 SIZE, RATE, SECONDS = 0.4, 25.0, 4.0
 SETUP = Setup(
-    outline=sheet(SIZE, SIZE), material=named("camel-ponte-roma"), pins=Hold.TOP_CORNERS, carried=True, vertices=64
+    outline=sheet(SIZE, SIZE),
+    material=named_material("camel-ponte-roma"),
+    pins=Hold.TOP_CORNERS,
+    carried=True,
+    vertices=64,
 )
 
 
@@ -31,7 +35,7 @@ def swung() -> Observation:
     """A cloth whose corners go to and fro by 0.1 m, by another mesh and shorter steps than the fit's."""
     mesh = grid(width=SIZE, height=SIZE, columns=12, rows=12, diagonals=Diagonals.FORWARD)
     held = Handles(vertices=handles.top_corners(mesh.rest), stiffness=float("inf"))
-    material = replace(named("camel-ponte-roma"), damping=2.5e-3)
+    material = replace(named_material("camel-ponte-roma"), damping=2.5e-3)
     system, state = assemble([Scene(mesh=mesh, position=upright(mesh), material=material, handles=held)])
     times = np.arange(round(SECONDS * RATE) + 1) / RATE
     away = np.zeros((len(times), 2, 3, 1))
@@ -71,7 +75,7 @@ def test_predictions_follow_attachments_that_move(swung: Observation) -> None:
     still = replace(experiment, recordings=tuple(replace(r, attachments=None) for r in experiment.recordings))
     # With the tracks what is left is numerics; without them the corners are pulled back by up to 0.1 m.
     assert _errors(experiment) < 0.25 * _errors(still)
-    assert _errors(aligned(experiment)) == pytest.approx(_errors(experiment), rel=0.02)
+    assert _errors(align_experiment(experiment)) == pytest.approx(_errors(experiment), rel=0.02)
 
 
 def test_pins_that_move_without_being_declared_are_refused(swung: Observation) -> None:

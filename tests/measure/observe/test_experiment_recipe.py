@@ -13,7 +13,7 @@ from flagdata.ingest import MarkerOptions, ingest_markers, ingest_meshes, write_
 from flagdata.lake import Lake, MeshSequence
 from measure.forecasting import Setting
 from measure.observe import from_folder, load, read
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.mesh import grid
 from tests.measure.observe.flags import HEIGHT, RATE, WIDTH, flag, flutter
 
@@ -65,7 +65,7 @@ def test_a_table_of_two_recordings_with_another_axis_up_and_in_millimetres(table
     np.testing.assert_allclose(brisk.wind.velocity, [[6 * math.cos(0.1), 6 * math.sin(0.1), 0]])
     specimen = observed.experiment.specimen
     assert specimen.material.area_weight == 0.2
-    np.testing.assert_array_equal(specimen.material.bending, named("camel-ponte-roma").bending)
+    np.testing.assert_array_equal(specimen.material.bending, named_material("camel-ponte-roma").bending)
     np.testing.assert_allclose(specimen.anchors[:, :2], 0.0, atol=1e-3)
     assert observed.findings == ()
 
@@ -122,7 +122,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_an_arcsim_folder_needs_nothing_else(folder: Path, tmp_path: Path):
     observed = read(load(_recipe(tmp_path, f'[[recording]]\nsource = "{folder}"\n')))
     specimen, (recording,) = observed.experiment.specimen, observed.experiment.recordings
-    base = named("camel-ponte-roma")
+    base = named_material("camel-ponte-roma")
     assert specimen.material.area_weight == pytest.approx(2 * base.area_weight)
     np.testing.assert_allclose(specimen.material.bending, 2 * base.bending)
     assert (specimen.stiffness, specimen.air.plain.density) == (2e3, 1.2)

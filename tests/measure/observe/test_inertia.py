@@ -13,11 +13,11 @@ from flagdata.core.arrays import FloatArray
 from measure.observe import Hold, Known, Observation, Setup, Specimen, Trajectory, WindTrack, observe, sheet
 from measure.observe.checks.inertia_check import check_inertia, swing, wind_shown
 from sim.cloth.air import QuadraticNormal
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.mesh import grid
 
 WIDTH, HEIGHT, RATE, SPEED, DENSITY, GRAVITY = 1.2, 0.8, 50.0, 5.0, 1.3, 9.81
-CLOTH = named("camel-ponte-roma")
+CLOTH = named_material("camel-ponte-roma")
 REST = grid(width=WIDTH, height=HEIGHT, columns=12, rows=8).rest
 TIMES = np.arange(150) / RATE
 

@@ -9,7 +9,7 @@ import torch
 from flagdata.core.rng import stream
 from measure.forecasting import Calibration, EffectColumn, Forecaster, Segments
 from measure.observe import Trajectory
-from measure.probes import projected
+from measure.probes import projected_statistics
 from measure.probes.statistics import PoleMoment, shares, statistics
 
 COLUMNS = (EffectColumn(effect="lift", parameter="coefficient", step=0.3),)
@@ -64,7 +64,7 @@ def test_kept_directions_say_of_the_base_models_moment_what_the_statistics_say(
     forecaster: Forecaster, segments: Segments
 ) -> None:
     nominal = [Calibration(area_weight=1.1)] * len(segments)
-    found, projection = projected(forecaster, segments, nominal, COLUMNS)
+    found, projection = projected_statistics(forecaster, segments, nominal, COLUMNS)
     errors = forecaster.errors(*forecaster.system(segments, nominal), segments)
     turned, kept = found.turning, projection.turned(errors)
     assert turned is not None

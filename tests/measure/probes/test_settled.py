@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from measure.probes.settled import NAMES, settled
+from measure.probes.settled import NAMES, settling_of
 
 PERIOD, WIDTH, HEIGHT = 0.04, 1.5, 1.0
 U, V = (part.ravel() for part in np.meshgrid(np.linspace(0, WIDTH, 16), np.linspace(0, HEIGHT, 11)))
@@ -13,7 +13,7 @@ TIMES = PERIOD * np.arange(250)
 
 
 def found(positions: np.ndarray, noise: float = 0.0) -> dict[str, float]:
-    values = settled(np.stack([U, V], axis=1), positions, period=PERIOD, noise=noise)
+    values = settling_of(np.stack([U, V], axis=1), positions, period=PERIOD, noise=noise)
     return dict(zip(NAMES, values.tolist(), strict=True))
 
 

@@ -11,7 +11,7 @@ import torch
 from flagdata.errors import UsageError
 from measure.forecasting import AcrossColumn, Calibration, EffectColumn, Forecaster, Segments
 from measure.observe import Trajectory
-from measure.probes import Statistics, projected
+from measure.probes import Statistics, projected_statistics
 from measure.probes.statistics import statistics
 
 COLUMNS = (
@@ -27,7 +27,7 @@ def segments(own_recording: Trajectory) -> Segments:
 
 def test_the_projection_of_the_base_models_errors_is_r(forecaster: Forecaster, segments: Segments) -> None:
     nominal = [Calibration(area_weight=1.1)] * len(segments)
-    found, projection = projected(forecaster, segments, nominal, COLUMNS)
+    found, projection = projected_statistics(forecaster, segments, nominal, COLUMNS)
     errors = forecaster.errors(*forecaster.system(segments, nominal), segments)
     np.testing.assert_allclose(projection.of(errors), found.r, rtol=1e-9, atol=1e-12)
     alone = statistics(forecaster, segments, nominal, COLUMNS)
@@ -46,7 +46,7 @@ def test_the_projection_of_the_base_models_errors_is_r(forecaster: Forecaster, s
 
 def test_errors_along_a_sensitivity_project_as_its_response(forecaster: Forecaster, segments: Segments) -> None:
     nominal = [Calibration()] * len(segments)
-    found, projection = projected(forecaster, segments, nominal, COLUMNS)
+    found, projection = projected_statistics(forecaster, segments, nominal, COLUMNS)
     base = forecaster.errors(*forecaster.system(segments, nominal), segments)
     column = 4
     moved = forecaster.sensitivity(COLUMNS[1], segments, nominal, base)
@@ -81,7 +81,7 @@ def test_mirrored_across_the_wind_only_what_pushes_across_the_motion_changes_its
 
 
 def test_what_is_not_along_any_direction_does_not_count(forecaster: Forecaster, segments: Segments) -> None:
-    found, projection = projected(forecaster, segments, [Calibration()] * len(segments), COLUMNS)
+    found, projection = projected_statistics(forecaster, segments, [Calibration()] * len(segments), COLUMNS)
     shape = (-1, *projection.scale.shape[:1], 3)
     directions = projection.directions[0]
     noise = torch.randn(directions.shape[1], dtype=directions.dtype, generator=torch.Generator().manual_seed(1))

@@ -13,7 +13,7 @@ from flagdata.core.rng import stream
 from flagdata.errors import UsageError
 from measure.forecasting import Calibration, EffectColumn, Forecaster, Segments, winds
 from measure.observe import Trajectory, WindTrack
-from measure.probes import ALONG, LEFT, Course, Statistics, error_scale, projected
+from measure.probes import ALONG, LEFT, Course, Statistics, error_scale, projected_statistics
 from measure.probes.statistics import statistics
 from measure.probes.wind_course import Gauge
 from sim.wind import VonKarman
@@ -160,7 +160,7 @@ def test_kept_directions_say_of_the_base_model_what_the_statistics_say(
 ) -> None:
     segments = Segments.of([own_recording])
     nominal = [Calibration(area_weight=1.1)] * len(segments)
-    found, projection = projected(forecaster, segments, nominal, COLUMNS)
+    found, projection = projected_statistics(forecaster, segments, nominal, COLUMNS)
     errors = forecaster.errors(*forecaster.system(segments, nominal), segments)
     kept, own = projection.course(errors), found.course
     assert kept is not None

@@ -13,7 +13,7 @@ from measure.forecasting import THETA, Calibration, Cut, Forecaster, Segments, l
 from measure.forecasting.segments import Segment
 from measure.inference import Evidence, NullModel
 from measure.observe import Trajectory, WindTrack
-from measure.probes import Course, Statistics, by_recording, lags, projected
+from measure.probes import Course, Statistics, by_recording, lags, projected_statistics
 from measure.probes.wind_log import misread
 
 COLUMNS = (next(c for c in library() if c.name == "lift.coefficient"),)
@@ -46,7 +46,7 @@ def null() -> NullModel:
 
 def looked_at(forecaster: Forecaster, recording: Trajectory) -> tuple[Statistics, FloatArray]:
     segments = Segments.of([recording])
-    found, _ = projected(forecaster, segments, [Calibration()] * len(segments), COLUMNS)
+    found, _ = projected_statistics(forecaster, segments, [Calibration()] * len(segments), COLUMNS)
     return replace(found, turning=None, course=None), np.full(len(segments), 4.0)
 
 

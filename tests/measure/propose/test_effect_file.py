@@ -18,7 +18,7 @@ from measure.propose.candidates import from_file
 from measure.propose.outcome import StrengthCourse, TermStrength
 from measure.propose.terms import TermEffect
 from measure.verdict import Estimate
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.scene import assemble, flag
 from sim.effects import apply, load
 
@@ -89,7 +89,9 @@ def test_the_file_is_the_sum_of_its_terms(two: ProposalOutcome, tmp_path: Path) 
     made = load(write(two, tmp_path).spec)
     assert made.strengths() == ("upward_lower", "toward_pole_lower_fly")
     assert made.parameters()["toward_pole_lower_fly"].unit == "1/s²"
-    batch = assemble([flag(material=named("camel-ponte-roma"), wind_speed=4.0, columns=6)], dtype=torch.float64)
+    batch = assemble(
+        [flag(material=named_material("camel-ponte-roma"), wind_speed=4.0, columns=6)], dtype=torch.float64
+    )
     terms = [
         TermEffect(term=Term(shape="lower", field="upward"), coefficient=0.8),
         TermEffect(term=Term(shape="lower_fly", field="toward_pole"), coefficient=-1.5),
@@ -107,7 +109,9 @@ def test_the_file_is_the_sum_of_its_terms(two: ProposalOutcome, tmp_path: Path) 
 def test_mass_of_the_file_is_that_of_its_terms(tmp_path: Path) -> None:
     """Also where no force is beside it."""
     made = load(write(proposal(mass_near_75_30=(2.0, "1"), mass_stripe_60=(0.5, "1")), tmp_path).spec)
-    batch = assemble([flag(material=named("camel-ponte-roma"), wind_speed=4.0, columns=6)], dtype=torch.float64)
+    batch = assemble(
+        [flag(material=named_material("camel-ponte-roma"), wind_speed=4.0, columns=6)], dtype=torch.float64
+    )
     u, v = (batch[0].cloth.mesh.rest / batch[0].cloth.mesh.rest.max(axis=0)).T
     width, height = batch[0].cloth.mesh.rest.max(axis=0)
     square = 0.01 * width * height

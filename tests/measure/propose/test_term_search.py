@@ -103,7 +103,7 @@ def outcome_of(*, low: float, apart: tuple[float, float] | None) -> tuple[Decisi
         control=None if apart is None else some,
         apart=control,
         control_names=("drag",),
-    ).decided
+    ).decision
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from flagdata.errors import InputError
-from measure.refine import squared
+from measure.refine import squared_embedding_distance
 from measure.refine.procedure import ReplicateMetric
 
 
@@ -39,7 +39,7 @@ def test_directions_in_which_replicates_scatter_count_less() -> None:
 
 
 def test_a_failed_simulation_is_infinitely_far() -> None:
-    found = squared(np.array([[1.0, 2.0], [np.nan, np.nan]]), np.zeros(2))
+    found = squared_embedding_distance(np.array([[1.0, 2.0], [np.nan, np.nan]]), np.zeros(2))
     assert found.tolist() == [5.0, np.inf]
 
 

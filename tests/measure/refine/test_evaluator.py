@@ -14,7 +14,7 @@ from measure.refine.target_view import of_parameters
 from models.conditioning import VERSION
 from models.trained.estimator import Estimator
 from sim.assets import Assets
-from sim.render import named
+from sim.render import named_prior
 
 
 def test_an_evaluation_does_not_depend_on_what_is_evaluated_beside_it(evaluator: Evaluator, points: np.ndarray) -> None:
@@ -78,7 +78,7 @@ def test_a_damaged_file_is_named_whichever_bit_of_it_changed(evaluator: Evaluato
 
 
 def test_an_unknown_view_is_drawn_anew_for_each_clip(simulator: Simulator, tmp_path: Path) -> None:
-    view = DrawnView(prior=named("flags"), assets=Assets())
+    view = DrawnView(prior=named_prior("flags"), assets=Assets())
     seen = [view.at(seed) for seed in (1, 1, 2)]
     assert seen[0] == seen[1]
     assert seen[0][0] != seen[2][0]

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from flagdata.core.rng import child_seed
 from flagdata.errors import InputError
-from measure.estimate.refined import scaled
+from measure.estimate.refined import scale_refinement
 from measure.refine import (
     QUANTITIES,
     Evaluator,
@@ -119,7 +119,7 @@ def test_pictures_of_a_flag_four_times_as_large_have_twice_the_winds(
     """Wind goes with the root of the size at one Froude number: points, axis and captions alike, as the intervals."""
     drawn: list[Figure] = []
     monkeypatch.setattr("measure.refine.refinement_section.figure_url", lambda figure, dpi: drawn.append(figure) or "")
-    larger = scaled(whole, 4.0)
+    larger = scale_refinement(whole, 4.0)
     captions = [
         np.array(re.findall(r"step \d+: ([\d.]+) m/s", section(one, in_motion=False))).astype(float)
         for one in (whole, larger)

@@ -11,7 +11,7 @@ from flagdata.core.rng import stream
 from flagdata.recipes.typed_tables import Range
 from measure.posterior_ends import limits_of
 from measure.refine import Interval, Round
-from measure.refine.procedure import _settled
+from measure.refine.procedure import _is_settled
 from measure.refine.refinement import intervals_of
 
 BOX = (Range(low=0.0, high=10.0), Range(low=0.05, high=0.40))
@@ -48,7 +48,7 @@ def test_a_wind_that_is_only_bounded_has_not_settled() -> None:
         return Round(evaluations=8, distance=1.0, floor=1.0, intervals=(interval,), seconds=1.0)
 
     strong, inside = found((8.0, 10.0), (0.1, 0.2))[0], found((6.0, 8.0), (0.1, 0.2))[0]
-    assert _settled([at(inside), at(inside)], 0.1)
-    assert not _settled([at(strong), at(strong)], 0.1)
-    assert not _settled([at(inside), at(strong)], 0.1)
-    assert not _settled([at(strong), at(inside)], 0.1)
+    assert _is_settled([at(inside), at(inside)], 0.1)
+    assert not _is_settled([at(strong), at(strong)], 0.1)
+    assert not _is_settled([at(inside), at(strong)], 0.1)
+    assert not _is_settled([at(strong), at(inside)], 0.1)

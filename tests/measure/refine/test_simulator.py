@@ -12,7 +12,7 @@ from flagdata.errors import InputError
 from flagdata.recipes.typed_tables import Range, Scale
 from measure.refine import FilmCamera, FilmRequest, FixedView, Simulator
 from measure.refine.simulator import SimulatedScene
-from models.conditioning import conditioned
+from models.conditioning import condition_film
 from sim.run import IntegratorSpec, Recipe
 
 FRAMES, RATE = 8, 25.0
@@ -97,4 +97,4 @@ def test_a_simulated_clip_is_what_was_filmed_conditioned_once(
 ) -> None:
     clip = of(recipe, view).films([FilmRequest(point=(*HERE[:-1], wind), seed=11)])[0].clip
     (film,) = filmed
-    np.testing.assert_array_equal(clip, conditioned(film, np.arange(FRAMES) / RATE).frames)
+    np.testing.assert_array_equal(clip, condition_film(film, np.arange(FRAMES) / RATE).frames)

@@ -7,18 +7,18 @@ import pytest
 
 from flagdata.errors import InputError
 from measure.refine import QUANTITIES, Space
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.run import Recipe, load
 
 
 def test_the_centre_is_the_material_at_mid_density_and_mid_wind(recipe: Recipe) -> None:
     values = Space.of(recipe).values(np.zeros((1, 17)))[0]
-    np.testing.assert_allclose(values[:15], named("camel-ponte-roma").bending.ravel())
+    np.testing.assert_allclose(values[:15], named_material("camel-ponte-roma").bending.ravel())
     np.testing.assert_allclose(values[15:], [0.135, 5.0])  # middle of table 1's ranges
 
 
 def test_corners_are_a_tenth_and_ten_times_the_material(recipe: Recipe) -> None:
-    space, bending = Space.of(recipe), named("camel-ponte-roma").bending.ravel()
+    space, bending = Space.of(recipe), named_material("camel-ponte-roma").bending.ravel()
     low, high = space.values(np.array([[-1.0] * 17, [1.0] * 17]))
     np.testing.assert_allclose(low, [*(bending * 0.1), 0.10, 0.0])
     np.testing.assert_allclose(high, [*(bending * 10), 0.17, 10.0])
@@ -32,7 +32,8 @@ def test_normalising_undoes_what_denormalising_did(recipe: Recipe, points: np.nd
 def test_the_prior_is_uniform_in_the_factor_where_the_recipe_is(recipe: Recipe) -> None:
     space = Space.of(recipe)
     drawn = (
-        space.values(space.prior(np.random.default_rng(0), 20_000))[:, :15] / named("camel-ponte-roma").bending.ravel()
+        space.values(space.prior(np.random.default_rng(0), 20_000))[:, :15]
+        / named_material("camel-ponte-roma").bending.ravel()
     )
     # a uniform variable on [0.1, 10] has mean 5.05 and standard deviation 9.9/√12; 4 standard errors of 300,000 draws
     assert abs(drawn.mean() - 5.05) < 4 * 9.9 / np.sqrt(12 * drawn.size)
@@ -45,7 +46,7 @@ def test_combinations_of_bending_follow_their_definitions(recipe: Recipe) -> Non
     table[0] *= 4  # along the warp
     table[:, 3:] *= 3  # at the two largest curvatures
     point = space.unit(np.array([[*table.ravel(), 0.12, 3.0]]))
-    reported = dict(zip((q.name for q in QUANTITIES), space.reported(point)[0], strict=True))
+    reported = dict(zip((q.name for q in QUANTITIES), space.reported_quantities(point)[0], strict=True))
     inside = space.values(point)[0, :15].reshape(3, 5)
     np.testing.assert_allclose(inside, table)  # within the box, so that nothing was moved to its edge
     assert reported["anisotropy"] == pytest.approx(np.log10(4))
@@ -56,7 +57,7 @@ def test_combinations_of_bending_follow_their_definitions(recipe: Recipe) -> Non
 
 def test_a_common_factor_widens_the_box_and_moves_all_coefficients_together() -> None:
     space = Space.of(load("flag-fabrics"))
-    bending = named("camel-ponte-roma").bending.ravel()
+    bending = named_material("camel-ponte-roma").bending.ravel()
     low, high = space.values(np.array([[-1.0] * 17, [1.0] * 17]))
     np.testing.assert_allclose(low, [*(bending * 0.125 * 0.1), 0.05, 0.0])
     np.testing.assert_allclose(high, [*(bending * 4 * 10), 0.40, 10.0])
@@ -67,7 +68,7 @@ def test_a_common_factor_widens_the_box_and_moves_all_coefficients_together() ->
 
 def test_draws_of_the_prior_lie_within_the_start_ranges() -> None:
     space = Space.of(load("flag-fabrics"))
-    drawn = space.reported(space.prior(np.random.default_rng(2), 5_000))[:, :4]
+    drawn = space.reported_quantities(space.prior(np.random.default_rng(2), 5_000))[:, :4]
     for column, entry in zip(drawn.T, space.start_ranges, strict=True):
         assert entry.low <= column.min() <= column.max() <= entry.high
 
@@ -93,9 +94,12 @@ def test_a_prior_of_several_scenes_is_their_mixture_within_the_box() -> None:
     means = 0.135, (0.40 - 0.05) / np.log(0.40 / 0.05)
     assert area_weight.mean() == pytest.approx(0.75 * means[0] + 0.25 * means[1], abs=0.001)
     assert drawn[:, 16].mean() == pytest.approx(5.0, abs=0.06)
-    factor = drawn[:, :15] / named("camel-ponte-roma").bending.ravel()
+    factor = drawn[:, :15] / named_material("camel-ponte-roma").bending.ravel()
     beyond = (factor.max(axis=1) > 10.001) | (factor.min(axis=1) < 0.0999)
-    own = box.values(box.prior(np.random.default_rng(5), 40_000))[:, :15] / named("camel-ponte-roma").bending.ravel()
+    own = (
+        box.values(box.prior(np.random.default_rng(5), 40_000))[:, :15]
+        / named_material("camel-ponte-roma").bending.ravel()
+    )
     of_box = ((own.max(axis=1) > 10.001) | (own.min(axis=1) < 0.0999)).mean()
     assert beyond.mean() == pytest.approx(0.25 * of_box, abs=0.01)
     assert mixed.identity == box.identity

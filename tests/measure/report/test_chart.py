@@ -9,7 +9,7 @@ import re
 import numpy as np
 import pytest
 
-from measure.report.chart import Linear, Logarithmic, path_through, room_below, room_beside, thinned
+from measure.report.chart import Linear, Logarithmic, path_through, room_below, room_beside, thin_line
 
 
 def test_a_linear_axis_maps_its_ends_and_its_middle() -> None:
@@ -56,7 +56,7 @@ def test_a_dense_line_keeps_its_peaks() -> None:
     values = np.zeros_like(times)
     values[12_345] = 1.0
     axes = (Linear(0, 10, 0, 500), times.tolist()), (Linear(0, 1, 100, 0), values.tolist())
-    xs, ys = thinned(axes)
+    xs, ys = thin_line(axes)
     assert len(xs) <= 1000
     assert min(ys) == 0.0
     assert xs[int(np.argmin(ys))] == pytest.approx(times[12_345] * 50)

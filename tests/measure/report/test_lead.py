@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from measure.report import lead, page
-from measure.report.lead_sentences import evidence, explained, p_text
+from measure.report.lead_sentences import evidence, explained_words, p_text
 from measure.verdict import Conclusion, with_level
 from tests.measure.report.pages import parsed
 from tests.measure.report.verdicts import about, verdict
@@ -36,7 +36,7 @@ def test_an_effect_is_named_with_its_size_its_share_of_the_error_and_one_p() -> 
     said = lead(whole)
     strength = next(c.strength for c in whole.ranking if c.effect == "lift")
     assert said.startswith(f"Adding lift (coefficient {strength.value:.2f} [")
-    assert f" explains {explained(whole)}; " in said
+    assert f" explains {explained_words(whole)}; " in said
     assert said.endswith("moderate evidence that something was missing, p = 0.024, could be up to 0.070.")
     assert said.count("p = ") == 1
 
@@ -63,18 +63,18 @@ def test_what_is_explained_is_pooled_over_what_lies_above_the_floor() -> None:
     same = replace(lower, before=about(1.0, 0.1), share=0.0)  # not improved: counts as well
     below = replace(lower, before=about(0.4, 0.1), after=about(0.1, 0.1), share=None)  # than the floor: does not
     of = "of the error that a better model could remove"
-    assert explained(replace(whole, comparisons=(lower,))) == f"80 % {of}"  # (4 − 1) / (4 − 1/4)
+    assert explained_words(replace(whole, comparisons=(lower,))) == f"80 % {of}"  # (4 − 1) / (4 − 1/4)
     # (3/4 + 0) / (15/16 + 3/4)
-    assert explained(replace(whole, comparisons=(lower, same, below))) == f"44 % {of}"
+    assert explained_words(replace(whole, comparisons=(lower, same, below))) == f"44 % {of}"
 
 
 def test_without_a_share_the_error_itself_is_compared() -> None:
     whole = verdict(Conclusion.EFFECT)
     halved = tuple(replace(c, share=None, before=about(2.0, 0.1), after=about(1.0, 0.1)) for c in whole.comparisons)
-    assert explained(replace(whole, comparisons=halved)) == "75 % of the squared error"
-    assert explained(replace(whole, comparisons=())) == ""
+    assert explained_words(replace(whole, comparisons=halved)) == "75 % of the squared error"
+    assert explained_words(replace(whole, comparisons=())) == ""
     worse = replace(whole.comparisons[0], before=about(1.0, 0.1), after=about(1.1, 0.1))
-    assert explained(replace(whole, comparisons=(worse,))) == "none of the error on unseen data"
+    assert explained_words(replace(whole, comparisons=(worse,))) == "none of the error on unseen data"
 
 
 def test_an_upper_end_that_is_the_value_is_not_repeated() -> None:

@@ -55,7 +55,7 @@ def test_of_two_strengths_of_one_effect_the_one_that_acts_is_named() -> None:
     )
     whole = replace(whole, named=("tilted-pole",), ranking=(lean, sway, *whole.ranking[2:]))
     assert verdict_sentences.named_candidates(whole) == [lean]
-    assert verdict_sentences.rejected(whole) == [sway, *whole.ranking[2:]]
+    assert verdict_sentences.rejected_candidates(whole) == [sway, *whole.ranking[2:]]
     assert verdict_sentences.heading(whole) == "The base model lacked tilted-pole (lean angle)"
     assert "  not tilted-pole (sway): far behind" in words(whole).splitlines()
     both = replace(whole, conclusion=Conclusion.ONE_OF, ranking=(lean, replace(sway, why_not=""), *whole.ranking[2:]))
@@ -145,7 +145,7 @@ def test_missing_numbers_raise_no_warning() -> None:
 
 @pytest.mark.parametrize(("names", "text"), [(["a"], "a"), (["a", "b"], "a and b"), (["a", "b", "c"], "a, b and c")])
 def test_names_are_listed_as_people_do(names: list[str], text: str) -> None:
-    assert verdict_sentences.listed(names) == text
+    assert verdict_sentences.list_names(names) == text
 
 
 @pytest.mark.parametrize(

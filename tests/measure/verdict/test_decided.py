@@ -10,14 +10,14 @@ import pytest
 from measure.report import lead, page, verdict_sentences
 from measure.report.verdict_sentences import error_warnings, heading, power_text
 from measure.report.verdict_words import words
-from measure.verdict import NOT_REJECTED, Conclusion, Power, Verdict, erring, undecided
+from measure.verdict import NOT_REJECTED, Conclusion, Power, Verdict, erring, undecided_sentences
 from tests.measure.report.verdicts import about, verdict
 
 SEEN = (0.9, 0.2, 0.4)
 
 
 def test_what_would_have_been_seen_and_was_not_is_not_there() -> None:
-    assert undecided(0.4, level=0.05, departure=1.1, power=SEEN) == ()
+    assert undecided_sentences(0.4, level=0.05, departure=1.1, power=SEEN) == ()
 
 
 @pytest.mark.parametrize(
@@ -30,17 +30,17 @@ def test_what_would_have_been_seen_and_was_not_is_not_there() -> None:
     ],
 )
 def test_each_doubt_leaves_it_undecided(p: float, departure: float, power: tuple[float, ...], said: str) -> None:
-    (reason,) = undecided(p, level=0.05, departure=departure, power=power)
+    (reason,) = undecided_sentences(p, level=0.05, departure=departure, power=power)
     assert said in reason
 
 
 def test_all_doubts_are_stated_together() -> None:
-    assert len(undecided(0.06, level=0.05, departure=9.0, power=(0.0,))) == 3
+    assert len(undecided_sentences(0.06, level=0.05, departure=9.0, power=(0.0,))) == 3
 
 
 @pytest.mark.parametrize(("p", "departure", "power"), [(0.1001, 2.0, (0.3,)), (1.0, 0.0, (0.1, 0.5))])
 def test_at_the_thresholds_themselves_it_suffices(p: float, departure: float, power: tuple[float, ...]) -> None:
-    assert undecided(p, level=0.05, departure=departure, power=power) == ()
+    assert undecided_sentences(p, level=0.05, departure=departure, power=power) == ()
 
 
 def test_what_is_not_decided_is_reported_with_its_reasons_and_no_effect_is_called_needless() -> None:

@@ -11,7 +11,7 @@ import pytest
 from flagdata.core.arrays import BoolArray, FloatArray, UInt8Array
 from flagdata.core.rng import stream
 from flagdata.errors import InputError, UsageError
-from models.conditioning import Conditioned, conditioned
+from models.conditioning import Conditioned, condition_film
 
 HEIGHT, WIDTH, COUNT, RATE = 180, 240, 40, 25.0
 TIMES = np.arange(COUNT) / RATE
@@ -81,7 +81,7 @@ def _cloth(picture: FloatArray, x: int, y: int, width: int, height: int, time: f
 
 
 def made(drawn: Drawn, **options: int) -> Conditioned:
-    return conditioned(drawn.frames(), TIMES, size=120, **options)
+    return condition_film(drawn.frames(), TIMES, size=120, **options)
 
 
 def outside(found: Conditioned) -> BoolArray:
@@ -113,7 +113,7 @@ def test_what_a_moving_camera_leaves_beside_the_flag_is_no_more_than_noise() -> 
 
 def test_a_still_camera_leaves_the_largest_square_of_each_frame_as_it_was_filmed() -> None:
     frames = Drawn().frames()
-    found = conditioned(frames, TIMES, size=HEIGHT)
+    found = condition_film(frames, TIMES, size=HEIGHT)
     assert not found.found.camera.moves
     cloth = found.found.weight == 1
     assert cloth.mean() > 0.15
@@ -137,7 +137,7 @@ def test_the_flag_is_found_among_trembling_leaves_and_they_are_frozen() -> None:
 
 def test_a_flag_hangs_at_the_side_where_it_moves_least() -> None:
     assert made(Drawn()).found.regions[0].hoist == "left"
-    mirrored = conditioned(np.ascontiguousarray(Drawn().frames()[..., ::-1]), TIMES, size=120)
+    mirrored = condition_film(np.ascontiguousarray(Drawn().frames()[..., ::-1]), TIMES, size=120)
     assert mirrored.found.regions[0].hoist == "right"
 
 
@@ -186,7 +186,7 @@ def test_a_pole_before_a_plain_sky_shows_how_the_camera_moves() -> None:
             picture, np.array([[1.0, 0.0, dx], [0.0, 1.0, 0.0]]), (WIDTH, HEIGHT), borderMode=cv2.BORDER_REPLICATE
         )
         frames.append(moved)
-    found = conditioned(np.stack(frames).astype(np.uint8), TIMES, size=120)
+    found = condition_film(np.stack(frames).astype(np.uint8), TIMES, size=120)
     assert found.found.camera.moves
     np.testing.assert_allclose(found.path[:, 0] - found.path[0, 0], shift[:, 0] - shift[0, 0], atol=0.3)
 
@@ -197,7 +197,7 @@ def test_a_single_straight_edge_shows_no_shift_along_it() -> None:
     for picture in Drawn(scenery=False, noise=0.0).frames():
         picture[30:, 63:67] = np.linspace(200, 230, HEIGHT - 30)[:, None]
         frames.append(np.clip(picture + rng.normal(0, 3, picture.shape), 0, 255).astype(np.uint8))
-    found = conditioned(np.stack(frames), TIMES, size=120)
+    found = condition_film(np.stack(frames), TIMES, size=120)
     assert found.found.camera.known
     assert not found.found.camera.moves
 
@@ -215,10 +215,10 @@ def test_the_same_film_gives_the_same_pictures() -> None:
 
 def test_a_film_of_two_frames_is_too_short() -> None:
     with pytest.raises(InputError, match="2 frames"):
-        conditioned(Drawn().frames()[:2], TIMES[:2])
+        condition_film(Drawn().frames()[:2], TIMES[:2])
 
 
 @pytest.mark.parametrize("shape", [(3, 1, 1), (5, 1, 5), (3, 8, 8), (4, 16, 400), (40, 2, 2)])
 def test_films_of_any_shape_become_square_pictures(shape: tuple[int, int, int]) -> None:
     frames = stream(1, "shapes").integers(0, 255, shape).astype(np.uint8)
-    assert conditioned(frames, np.arange(len(frames)) / RATE, size=60).frames.shape == (len(frames), 60, 60)
+    assert condition_film(frames, np.arange(len(frames)) / RATE, size=60).frames.shape == (len(frames), 60, 60)

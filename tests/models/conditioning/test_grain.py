@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flagdata.core.arrays import UInt8Array
-from models.conditioning import grained
+from models.conditioning import add_grain
 from models.conditioning.grain import DEVIATION, STILL
 
 SHAPE = (30, 40, 50)
@@ -25,16 +25,16 @@ def clip(*, still: float) -> UInt8Array:
 def test_where_most_of_a_clip_never_changes_that_part_gets_noise() -> None:
     """Of 0.5 gray levels and the rounding's 1/√12; what moves and what is beyond the picture stays to the bit."""
     before = clip(still=0.7)
-    after = grained(before, seed=1)
+    after = add_grain(before, seed=1)
     np.testing.assert_array_equal(after[:, :, :15], before[:, :, :15])
     assert not after[:, :4].any()
     added = after[:, 4:, 15:].astype(float) - before[:, 4:, 15:]
     assert added.std() == pytest.approx(np.hypot(DEVIATION, 12**-0.5), rel=0.03)
     assert abs(added.mean()) < 0.02
-    np.testing.assert_array_equal(grained(before, seed=1), after)
-    assert (grained(before, seed=2) != after).any()
+    np.testing.assert_array_equal(add_grain(before, seed=1), after)
+    assert (add_grain(before, seed=2) != after).any()
 
 
 @pytest.mark.parametrize("still", [0.0, STILL - 0.04, 1.0])
 def test_a_clip_most_of_which_changes_and_one_without_motion_stay_as_they_are(still: float) -> None:
-    assert grained(made := clip(still=still), seed=1) is made
+    assert add_grain(made := clip(still=still), seed=1) is made

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from models.conditioning import Stills, conditioning_of, halved
+from models.conditioning import Stills, conditioning_of, halve_picture
 from models.conditioning.outline import Hoist, hoist_of
 from tests.measure.gate.test_counted import FLAG, drawn
 
@@ -48,7 +48,7 @@ def test_few_and_small_pictures_show_no_hoist() -> None:
     film = drawn()
     assert list(conditioning_of(film[:9], size=300).hoists()) == []
     assert list(conditioning_of(film, size=120).hoists()) == []
-    assert hoist_of(np.stack([halved(frame) for frame in film[:9]])) is None
+    assert hoist_of(np.stack([halve_picture(frame) for frame in film[:9]])) is None
 
 
 def test_a_hoist_has_cloth_beside_it_where_the_network_sees_some() -> None:

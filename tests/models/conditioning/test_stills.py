@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from flagdata.errors import CorruptError
-from models.conditioning import MaskNetwork, Stills, halved, inputs_of, mask_network
+from models.conditioning import MaskNetwork, Stills, halve_picture, inputs_of, mask_network
 
 
 def test_the_usual_value_is_what_a_place_returns_to() -> None:
@@ -23,7 +23,7 @@ def test_the_usual_value_is_what_a_place_returns_to() -> None:
 
 def test_halved_averages() -> None:
     picture = np.array([[0, 2, 10, 10], [4, 6, 10, 10]], np.uint8)
-    assert halved(picture).tolist() == [[3.0, 10.0]]
+    assert halve_picture(picture).tolist() == [[3.0, 10.0]]
 
 
 def test_the_network_takes_any_size_and_gives_three_maps_of_it() -> None:
@@ -58,7 +58,7 @@ def test_weights_that_do_not_fit_are_refused(tmp_path, monkeypatch: pytest.Monke
     write_tensors(tmp_path / WEIGHTS, {"weight": torch.zeros(3)})
     write_sums(tmp_path)
     monkeypatch.setattr(mask_network, "FOLDER", tmp_path)
-    mask_network.shipped.cache_clear()
+    mask_network.load_shipped_mask.cache_clear()
     with pytest.raises(CorruptError, match="do not fit this code"):
-        mask_network.shipped()
-    mask_network.shipped.cache_clear()
+        mask_network.load_shipped_mask()
+    mask_network.load_shipped_mask.cache_clear()

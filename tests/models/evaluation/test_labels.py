@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
-from models.evaluation.evaluate_command import labelled
+from models.evaluation.evaluate_command import label_networks
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,7 +22,7 @@ def trained(number: int, *, seed: int = 1, rate: float = 1e-3, data: str = "a", 
 
 
 def labels(*found: Any) -> list[str]:
-    return [network.name for _, network in labelled(found)]
+    return [network.name for _, network in label_networks(found)]
 
 
 def test_seeds_and_parts_of_one_training_have_its_name() -> None:

@@ -13,7 +13,7 @@ from flagdata.core.arrays import FloatArray
 from flagdata.errors import InputError
 from models.maps import flow
 from models.maps.flow import CHANNELS, CHANNELS_OF_THREE, flow_maps, lucas_kanade
-from models.maps.frontend import FrontEnd, standardised
+from models.maps.frontend import FrontEnd, standardise_clip
 from models.networks.flow_network import FlowNetwork
 
 SIZE, FRAMES = 112, 30
@@ -34,7 +34,7 @@ def warped(along_x: FloatArray, along_y: FloatArray, *, grain: float = 10.0) -> 
         ndimage.map_coordinates(picture, [y - down, x - across], order=3, mode="grid-wrap")
         for across, down in zip(along_x, along_y, strict=True)
     ]
-    return standardised(torch.from_numpy(np.stack(frames)))
+    return standardise_clip(torch.from_numpy(np.stack(frames)))
 
 
 def channel(maps: torch.Tensor, name: str) -> torch.Tensor:

@@ -11,7 +11,14 @@ from scipy import ndimage
 from torch.nn import functional
 
 from flagdata.errors import InputError
-from models.maps.frontend import WAVE_CHANNELS, FrontEnd, gaussian, pooled_derivatives, smoothing_matrix, standardised
+from models.maps.frontend import (
+    WAVE_CHANNELS,
+    FrontEnd,
+    gaussian,
+    pooled_derivatives,
+    smoothing_matrix,
+    standardise_clip,
+)
 from models.maps.spectral_layer import SpectralDecomposition, periodogram
 from tests.refusals import unrefused
 
@@ -84,7 +91,7 @@ def test_smoothing_in_time_is_scipys() -> None:
 def test_spectral_maps_are_the_plain_definition() -> None:
     clip = noise(1)
     found = FrontEnd(maps="spectral-maps", size=SIZE, rate=RATE)(clip[None, None])[0]
-    expected = SpectralDecomposition(rate=RATE)(plain(standardised(clip)))[0].float()
+    expected = SpectralDecomposition(rate=RATE)(plain(standardise_clip(clip)))[0].float()
     torch.testing.assert_close(found[:2], expected[:2], rtol=1e-4, atol=1e-6)
     same = (found[2:] - expected[2:]).abs() < 1e-4
     assert same.float().mean() > 0.999  # two bins may tie to rounding
@@ -93,7 +100,7 @@ def test_spectral_maps_are_the_plain_definition() -> None:
 def test_wave_maps_are_made_of_the_plain_definitions_periodogram() -> None:
     clip = noise(2)
     maps = FrontEnd(maps="wave-maps", size=SIZE, rate=RATE)(clip[None, None])[0]
-    power, frequency = periodogram(plain(standardised(clip)), rate=RATE)
+    power, frequency = periodogram(plain(standardise_clip(clip)), rate=RATE)
     power = functional.avg_pool3d(power[0].float(), (1, 2, 2))  # (2, bin, h, w)
     total = power.sum(dim=1)
     share = (frequency / (RATE / 2)).float()[:, None, None]

@@ -104,7 +104,7 @@ def test_a_change_of_units_changes_the_density_by_its_jacobian() -> None:
     mixture, y = made(), points()
     scale = torch.tensor([0.1, 2.0, 3.0, 0.5], dtype=torch.float64)
     shift = torch.tensor([4.0, -1.0, 0.0, 2.0], dtype=torch.float64)
-    moved = mixture.rescaled(scale=scale, shift=shift)
+    moved = mixture.rescale_by(scale=scale, shift=shift)
     torch.testing.assert_close(moved.log_prob(y * scale + shift), mixture.log_prob(y) - scale.log().sum())
     torch.testing.assert_close(moved.cdf(y * scale + shift), mixture.cdf(y))
     torch.testing.assert_close(moved.mean(), mixture.mean() * scale + shift)

@@ -47,7 +47,7 @@ def test_every_model_that_comes_with_the_package_states_its_checksums(name: str)
 
 @pytest.mark.parametrize("name", ["flow-outdoor", "flow-world", "flow", "wave", "wave-cloth"])
 def test_a_models_distribution_in_closed_form_is_the_one_that_it_draws_from(name: str) -> None:
-    model = estimator.shipped(name)
+    model = estimator.load_shipped(name)
     generator = torch.Generator().manual_seed(0)
     embeddings = [torch.randn((3, 32), generator=generator) for _ in model.learners]
     drawn, posterior = model.logits(embeddings, seed=1, draws=100_000).double(), model.posterior(embeddings)

@@ -12,7 +12,7 @@ from flagdata.core.stated import Stated, parse
 from flagdata.errors import InputError
 from models.networks.mixture import Mixture
 from models.networks.targets import Scaling
-from models.trained.restriction import ASPECT_SLACK, Known, restricted
+from models.trained.restriction import ASPECT_SLACK, Known, restrict_mixtures
 from tests.refusals import unrefused
 
 SCALING = Scaling(names=("wind_speed", "fabric_area_weight", "anisotropy"))
@@ -31,7 +31,7 @@ def _mixture(*, components: int = 3, clips: int = 2) -> Mixture:
 
 def _given(mixture: Mixture, *known: Known, draws: int = DRAWS):
     generator = torch.Generator().manual_seed(1)
-    found = restricted(mixture, SCALING, known, draws=draws, generator=generator)
+    found = restrict_mixtures(mixture, SCALING, known, draws=draws, generator=generator)
     return SCALING.values(found.logits).numpy(), found.log_mass.numpy()
 
 
@@ -74,7 +74,7 @@ def test_one_gaussian_given_an_exact_value_is_the_conditional_gaussian_far_outsi
     covariance = (mixture.factor @ mixture.factor.mT)[0, 0].numpy()
     location = mixture.location[0, 0].numpy()
     for value in (0.15, 0.06):
-        found = restricted(
+        found = restrict_mixtures(
             mixture, SCALING, [_weighed(f"{value}", clips=1)], draws=DRAWS, generator=torch.Generator().manual_seed(3)
         )
         y = _logit(value, 1)
@@ -161,7 +161,9 @@ def test_of_a_flag_that_was_measured_and_weighed_both_restrict_the_wind() -> Non
         factor=torch.linalg.cholesky(covariance)[None, None],
     )
     weighed, measured = _weighed("0.2", clips=1), Known.of_aspect(3.0, 2.0, count=1)
-    both = restricted(mixture, scaling, [weighed, measured], draws=DRAWS, generator=torch.Generator().manual_seed(1))
+    both = restrict_mixtures(
+        mixture, scaling, [weighed, measured], draws=DRAWS, generator=torch.Generator().manual_seed(1)
+    )
     values = scaling.values(both.logits)[0].numpy()
     np.testing.assert_allclose(values[:, 1], 0.2, rtol=1e-9)
     assert np.abs(values[:, 2] - math.log(1.5)).max() <= ASPECT_SLACK + 1e-9
@@ -169,7 +171,7 @@ def test_of_a_flag_that_was_measured_and_weighed_both_restrict_the_wind() -> Non
     gain = np.linalg.solve(covariance[1:, 1:].numpy(), covariance[0, 1:].numpy())
     variance = 1 - gain @ covariance[0, 1:].numpy()
     assert both.logits[0, :, 0].var().item() == pytest.approx(variance, rel=0.06)
-    alone = restricted(mixture, scaling, [weighed], draws=DRAWS, generator=torch.Generator().manual_seed(1))
+    alone = restrict_mixtures(mixture, scaling, [weighed], draws=DRAWS, generator=torch.Generator().manual_seed(1))
     assert alone.logits[0, :, 0].var().item() == pytest.approx(1 - 0.7**2, rel=0.04)
 
 

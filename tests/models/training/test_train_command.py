@@ -283,7 +283,7 @@ def test_a_model_of_hanging_cloth_estimates_the_same_quantities_in_its_own_range
     done = CliRunner().invoke(shipping.main, [str(path), *options], catch_exceptions=False)
     assert done.exit_code == 0, done.output
     monkeypatch.setattr(estimator, "SHIPPED", tmp_path / "shipped")
-    model = estimator.shipped("small-cloth")
+    model = estimator.load_shipped("small-cloth")
     assert trained["name"] == model.name == "small-cloth"
     assert model.cloth is Cloth.HANGING
     assert model.card["trained"]["sequences"] == 8

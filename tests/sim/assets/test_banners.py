@@ -9,7 +9,7 @@ import pytest
 
 from flagdata.core.rng import stream
 from sim.assets import Assets
-from sim.assets.banners import LAYOUTS, drawn, painted
+from sim.assets.banners import LAYOUTS, drawn, paint_layout
 
 GRAY = np.array([0.299, 0.587, 0.114])  # ITU-R BT.601
 COLOURS = np.array([[0.9, 0.1, 0.1], [1.0, 1.0, 1.0], [0.1, 0.2, 0.6], [0.1, 0.1, 0.1]])
@@ -21,7 +21,7 @@ def grays(seed: int) -> np.ndarray:
 
 
 def test_layouts_differ_and_show_all_their_colours() -> None:
-    pictures = {name: painted(name, COLOURS, stream(3, "layouts")) for name in LAYOUTS}
+    pictures = {name: paint_layout(name, COLOURS, stream(3, "layouts")) for name in LAYOUTS}
     for (one, first), (other, second) in combinations(pictures.items(), 2):
         assert (np.abs(first - second).max(axis=2) > 0.2).mean() > 0.02, (one, other)
     for name, picture in pictures.items():
@@ -33,8 +33,8 @@ def test_layouts_differ_and_show_all_their_colours() -> None:
 
 @pytest.mark.parametrize("name", LAYOUTS)
 def test_a_layout_draws_its_proportions_anew(name: str) -> None:
-    one, other = (painted(name, COLOURS, stream(seed, "proportions")) for seed in (1, 2))
-    assert np.array_equal(one, painted(name, COLOURS, stream(1, "proportions")))
+    one, other = (paint_layout(name, COLOURS, stream(seed, "proportions")) for seed in (1, 2))
+    assert np.array_equal(one, paint_layout(name, COLOURS, stream(1, "proportions")))
     assert np.array_equal(one, other) == (name == "plain")
 
 

@@ -12,7 +12,7 @@ from flagdata.errors import InputError, UsageError
 from sim.cloth import handles
 from sim.cloth.anchors import AnchorTracks
 from sim.cloth.handles import Handles
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.mesh import grid
 from sim.cloth.scene import Scene, assemble, upright
 from sim.cloth.state import State
@@ -33,7 +33,7 @@ def _hung(*, stiffness: float = 1e3, offsets: float = 0.0) -> tuple[System, Stat
         times=(0.0, STEP),
         offsets=((0.0, 0.0, 0.0), (offsets, 0.0, 0.0)),
     )
-    scene = Scene(mesh=MESH, position=upright(MESH), material=named("camel-ponte-roma"), handles=held)
+    scene = Scene(mesh=MESH, position=upright(MESH), material=named_material("camel-ponte-roma"), handles=held)
     return assemble([scene], dtype=torch.float64)
 
 

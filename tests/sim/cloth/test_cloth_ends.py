@@ -23,7 +23,7 @@ def test_parabolas_are_continued_exactly(mesh: Mesh) -> None:
     assert not np.isin(ends.within, at_end).any()
     field = 2 + 3 * u - 5 * u**2 + 2 * v
     spoilt = np.where(np.isin(np.arange(len(u)), at_end), 100.0, field)
-    continued = ends.continued(torch.tensor(np.stack([spoilt, -spoilt], axis=1))).numpy()
+    continued = ends.continue_field(torch.tensor(np.stack([spoilt, -spoilt], axis=1))).numpy()
     np.testing.assert_allclose(continued, np.stack([field, -field], axis=1), rtol=1e-9, atol=1e-9)
 
 

@@ -13,7 +13,7 @@ from flagdata.errors import InputError
 from sim.cloth import contact
 from sim.cloth.contact import Contact
 from sim.cloth.handles import Handles
-from sim.cloth.material import isotropic, named
+from sim.cloth.material import isotropic, named_material
 from sim.cloth.mesh import Mesh, grid
 from sim.cloth.scene import assemble, flag
 from sim.cloth.state import State
@@ -41,7 +41,9 @@ def pleated(system, state, *, noise: float = 1e-3):
 @pytest.fixture
 def folded():
     mesh = grid(width=0.8, height=0.3, columns=16, rows=6)
-    system, state = make_system(mesh, [named("camel-ponte-roma"), named("gray-interlock"), named("royal-target")])
+    system, state = make_system(
+        mesh, [named_material("camel-ponte-roma"), named_material("gray-interlock"), named_material("royal-target")]
+    )
     system = replace(system, contact=Contact())
     return system, pleated(system, state)
 
@@ -94,7 +96,7 @@ def test_kernel_finds_and_pushes_what_the_definition_does(folded) -> None:
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
 def test_what_the_kernel_remembers_of_other_states_changes_nothing_to_the_bit(dtype) -> None:
     mesh = grid(width=0.8, height=0.3, columns=16, rows=6)
-    system, state = make_system(mesh, [named("camel-ponte-roma")] * 3, dtype=dtype)
+    system, state = make_system(mesh, [named_material("camel-ponte-roma")] * 3, dtype=dtype)
     used, fresh = replace(system, contact=Contact()), replace(system, contact=Contact())
     start = pleated(used, state)
     for other in (start, state, pleated(used, state, noise=5e-3), replace(start, position=start.position * torch.nan)):
@@ -108,7 +110,7 @@ def test_what_the_kernel_remembers_of_other_states_changes_nothing_to_the_bit(dt
 
 def test_flat_cloth_and_its_neighbouring_faces_do_not_touch() -> None:
     mesh = grid(width=0.4, height=0.2, columns=16, rows=8)
-    system, state = make_system(mesh, [named("gray-interlock")])
+    system, state = make_system(mesh, [named_material("gray-interlock")])
     system = replace(system, contact=Contact())
     # Faces of 25 mm, thickness 10 mm: only what is far in the cloth can touch.
     assert float(contact.energy(system.cloth, system.contact, state.position, pairs_of(system, state.position))) == 0.0
@@ -150,7 +152,7 @@ def test_a_patch_slides_to_rest_as_coulomb_says() -> None:
 # With steps of 5 ms a layer moves a fifth of the thickness in a step before it is pushed back.
 @pytest.mark.parametrize(("method", "frames", "gap"), [(Symplectic(), 50, 4e-3), (BackwardEuler(), 30, 2e-3)])
 def test_layers_of_a_calm_flag_stay_apart_with_contact_and_cross_without(method, frames, gap) -> None:
-    scene = flag(material=named("camel-ponte-roma"), wind_speed=0.5, columns=12)
+    scene = flag(material=named_material("camel-ponte-roma"), wind_speed=0.5, columns=12)
     scene = replace(scene, position=scene.position + np.random.default_rng(1).normal(0, 1e-4, scene.position.shape))
     closest = {}
     for setting in (None, Contact()):
@@ -172,7 +174,7 @@ def test_the_automatic_step_stays_stable_over_ten_seconds_of_layers_on_one_anoth
     # An unstable step feeds the fastest vibrations without end. A flag that hangs keeps less than a tenth of the
     # kinetic energy of its fall: the weak wind moves it a little.
     winds = np.linspace(0.0, 1.0, 16)
-    scenes = [flag(material=named("camel-ponte-roma"), wind_speed=w, columns=15) for w in winds]
+    scenes = [flag(material=named_material("camel-ponte-roma"), wind_speed=w, columns=15) for w in winds]
     system, state = assemble([replace(scene, contact=Contact()) for scene in scenes])
     energies, touches = [], 0
     for frame in range(250):

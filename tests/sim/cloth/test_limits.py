@@ -11,8 +11,8 @@ import torch
 
 from flagdata.errors import InputError
 from sim.cloth.handles import Handles
-from sim.cloth.limits import StrainLimits, correction, limited, stretches
-from sim.cloth.material import named
+from sim.cloth.limits import StrainLimits, correction, limit_strains, stretches
+from sim.cloth.material import named_material
 from sim.cloth.mesh import grid
 from sim.cloth.state import State
 from sim.integrate import Backend, BackwardEuler, Symplectic, advance
@@ -23,7 +23,7 @@ def test_a_single_triangle_is_brought_to_the_limits_with_its_centroid_kept() -> 
     # Stretched by 1.3 along u and to 0.8 along v: principal stretches 1.05 and 0.95 afterwards.
     mesh = grid(width=1.0, height=1.0, columns=1, rows=1)
     one = type(mesh)(rest=mesh.rest[[0, 2, 3]], faces=[[0, 1, 2]])
-    system, state = make_system(one, [named("paper")])
+    system, state = make_system(one, [named_material("paper")])
     position = state.position * torch.tensor([1.0, 1.3, 0.8], dtype=torch.float64)[:, None]
     moved = position + correction(system.cloth, StrainLimits(), position)
     large, small = stretches(system.cloth, moved)
@@ -33,14 +33,14 @@ def test_a_single_triangle_is_brought_to_the_limits_with_its_centroid_kept() -> 
 
 
 def test_within_the_limits_nothing_moves(distorted) -> None:
-    system, state = make_system(distorted, [named("paper")])
+    system, state = make_system(distorted, [named_material("paper")])
     bent = state.position.clone()
     bent[:, 0] = 0.01 * torch.sin(8 * bent[:, 1])
     assert float(correction(system.cloth, StrainLimits(), bent).abs().max()) < 1e-15
 
 
 def test_a_correction_keeps_the_centre_of_mass_and_turns_with_the_cloth(distorted) -> None:
-    system, state = make_system(distorted, [named("camel-ponte-roma")])
+    system, state = make_system(distorted, [named_material("camel-ponte-roma")])
     position = state.position * 1.2 + 0.05 * torch.sin(9 * state.position.roll(1, 1))
     move = correction(system.cloth, StrainLimits(), position)
     assert float(move.abs().max()) > 1e-3
@@ -59,7 +59,7 @@ def test_a_heavy_hanging_cloth_stretches_to_the_limit_and_not_beyond(method, lim
     mesh = grid(width=0.2, height=1.0, columns=4, rows=20)
     top = tuple(int(i) for i in np.flatnonzero(mesh.rest[:, 1] > 1 - 1e-9))
     handles = Handles(vertices=top, stiffness=math.inf)
-    soft = named("camel-ponte-roma").scaled(stretching=0.02)
+    soft = named_material("camel-ponte-roma").scaled(stretching=0.02)
     system, state = make_system(mesh, [soft], handles=handles, gravity=(0.0, 0.0, -9.81))
     longest = {}
     for bounds in (None, limits):
@@ -74,14 +74,14 @@ def test_a_heavy_hanging_cloth_stretches_to_the_limit_and_not_beyond(method, lim
 def test_accelerated_sweeps_keep_the_momentum_and_come_closer(distorted) -> None:
     # By the distance from the limits that is left, root mean square over the faces: 30 plain sweeps against 30 of which
     # 22 are accelerated.
-    system, state = make_system(distorted, [named("camel-ponte-roma")])
+    system, state = make_system(distorted, [named_material("camel-ponte-roma")])
     start = state.position * torch.tensor([1.0, 1.3, 1.2], dtype=torch.float64)[:, None]
     bounds = StrainLimits(sweeps=30)
     free = torch.ones_like(start[:, :1])
     plain = start
     for _ in range(bounds.sweeps):
         plain = plain + correction(system.cloth, bounds, plain)
-    after, velocity = limited(system.cloth, bounds, start, torch.zeros_like(start), 0.01, free)
+    after, velocity = limit_strains(system.cloth, bounds, start, torch.zeros_like(start), 0.01, free)
 
     def left(position: torch.Tensor) -> float:
         large, _ = stretches(system.cloth, position)
@@ -98,7 +98,7 @@ def test_accelerated_sweeps_keep_the_momentum_and_come_closer(distorted) -> None
 def test_what_handles_hold_is_not_moved_by_the_limits(backend, stiffness, distorted) -> None:
     # The start is beyond the limits, and forces have no time: membranes that pull a gram with 10 N move it by 5 nm.
     handles = Handles(vertices=(0, 4), stiffness=stiffness)
-    system, state = make_system(distorted, [named("camel-ponte-roma")], handles=handles)
+    system, state = make_system(distorted, [named_material("camel-ponte-roma")], handles=handles)
     start = State(position=state.position * 1.2, velocity=torch.zeros_like(state.position))
     if math.isfinite(stiffness):
         system = replace(system, anchors=start.position[system.held])
@@ -116,7 +116,7 @@ def test_kernel_and_torch_limit_alike(dtype, tolerance, sweeps, stiffness, disto
     handles = Handles(vertices=(0, 4), stiffness=stiffness)
     system, state = make_system(
         distorted,
-        [named("camel-ponte-roma"), named("gray-interlock")],
+        [named_material("camel-ponte-roma"), named_material("gray-interlock")],
         handles=handles,
         wind=(5.0, 0.0, 0.0),
         dtype=dtype,

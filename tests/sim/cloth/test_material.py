@@ -23,12 +23,12 @@ def test_catalog_has_ten_cloths_with_tables_four_with_drapes_paper_and_aluminium
     assert len(found) == 16
     assert {"paper", "aluminium", "camel-ponte-roma", "11oz-black-denim", *DRAPED} <= set(found)
     for name in found:
-        assert material.named(name).source
+        assert material.named_material(name).source
 
 
 def test_camel_ponte_roma_has_the_published_numbers() -> None:
     # Runia et al. 2020, supplement, listing of the material file (cut to 1e-10 N·m); area weight as measured.
-    cloth = material.named("camel-ponte-roma")
+    cloth = material.named_material("camel-ponte-roma")
     assert cloth.area_weight == 0.284
     np.testing.assert_allclose(
         cloth.bending[0], [36.3483e-6, 49.5855e-6, 45.7440e-6, 47.4133e-6, 20.7266e-6], rtol=0, atol=1e-10
@@ -41,14 +41,14 @@ def test_catalog_agrees_with_the_distributed_files(reference_data: Path) -> None
     for name in set(material.MATERIALS.names()) - DRAPED:
         text = (reference_data / "materials" / f"{name}.json").read_text(encoding="utf-8")
         content = json.loads(re.sub(r"//.*", "", text))
-        cloth = material.named(name)
+        cloth = material.named_material(name)
         assert cloth.area_weight == content["density"]
         np.testing.assert_array_equal(cloth.stretching, content["stretching"])
         np.testing.assert_array_equal(cloth.bending, content["bending"])
 
 
 def test_a_fingerprint_depends_on_mass_and_stiffness_alone() -> None:
-    cloth = material.named("camel-ponte-roma")
+    cloth = material.named_material("camel-ponte-roma")
     assert replace(cloth, name="another", source="", damping=5e-3).fingerprint == cloth.fingerprint
     others = [cloth.scaled(**{what: 1.01}) for what in ("area_weight", "stretching", "bending")]
     assert len({cloth.fingerprint, *(other.fingerprint for other in others)}) == 4
@@ -64,7 +64,7 @@ def test_a_fingerprint_depends_on_mass_and_stiffness_alone() -> None:
 
 
 def test_thicker_cloth_is_heavier_and_stiffer_by_the_same_factor() -> None:
-    thin = material.named("gray-interlock")
+    thin = material.named_material("gray-interlock")
     thick = thin.scaled(area_weight=2, stretching=2, bending=2)
     assert thick.area_weight == 2 * thin.area_weight
     np.testing.assert_allclose(thick.stretching, 2 * thin.stretching)
@@ -84,7 +84,7 @@ def test_impossible_materials_are_refused_with_the_reason() -> None:
         ({"stretching": -np.ones((6, 4))}, "stiffness"),
         ({"stretching": [["a"] * 4] * 6}, "numbers"),
     ]
-    assert not unrefused(lambda change: replace(material.named("paper"), **change), cases, InputError)
+    assert not unrefused(lambda change: replace(material.named_material("paper"), **change), cases, InputError)
 
 
 def test_unknown_and_missing_keys_are_named() -> None:
@@ -99,4 +99,4 @@ def test_unknown_and_missing_keys_are_named() -> None:
 
 def test_unknown_material_suggests_the_nearest() -> None:
     with pytest.raises(UnknownNameError, match="camel-ponte-roma"):
-        material.named("camel-ponte-rom")
+        material.named_material("camel-ponte-rom")

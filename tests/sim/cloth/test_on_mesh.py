@@ -9,7 +9,7 @@ from torch import Tensor
 from sim.cloth import bending, inertia, on_mesh
 from sim.cloth.air import NO_AIR, QuadraticNormal, Stokes, face_wind
 from sim.cloth.cloth_batch import Cloth
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.effects import Permeability, PowerLawDrag
 from tests.sim.conftest import make_system
 
@@ -19,7 +19,7 @@ BATCHES = (1, 3, 8, 20)
 
 @pytest.fixture(params=BATCHES)
 def cloth(request: pytest.FixtureRequest, distorted) -> Cloth:
-    return Cloth.build(distorted, [named("camel-ponte-roma")] * request.param, dtype=torch.float64)
+    return Cloth.build(distorted, [named_material("camel-ponte-roma")] * request.param, dtype=torch.float64)
 
 
 def field(cloth: Cloth, seed: int, *, size: float = 1.0) -> Tensor:
@@ -108,7 +108,10 @@ def test_a_force_of_the_air_is_its_plain_one_and_what_is_beyond(cloth: Cloth, ai
 def test_factors_on_the_pressure_multiply_the_normal_force_alone(distorted) -> None:
     # ρ a |w_n| w_n times the product of the factors, plus the tangential part as it is.
     system, state = make_system(
-        distorted, [named("camel-ponte-roma")] * 3, air=QuadraticNormal(density=1.2, drag=0.1), wind=(5.0, 1.0, 0.0)
+        distorted,
+        [named_material("camel-ponte-roma")] * 3,
+        air=QuadraticNormal(density=1.2, drag=0.1),
+        wind=(5.0, 1.0, 0.0),
     )
     power, porous = PowerLawDrag(exponent=0.4, speed=5.0), Permeability(permeability=0.01)
     for effect in (power, porous):

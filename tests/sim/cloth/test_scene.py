@@ -11,7 +11,7 @@ import torch
 from flagdata.errors import InputError, UsageError
 from sim.cloth import handles as held
 from sim.cloth.handles import Handles
-from sim.cloth.material import MATERIALS, named
+from sim.cloth.material import MATERIALS, named_material
 from sim.cloth.mesh import Mesh, grid
 from sim.cloth.scene import Scene, assemble, flag, hanging_cloth, upright
 from sim.cloth.stiffness_tables import Evaluation
@@ -19,7 +19,7 @@ from sim.integrate import Symplectic, advance
 from sim.wind import UniformWind
 from tests.refusals import unrefused
 
-CAMEL = named("camel-ponte-roma")
+CAMEL = named_material("camel-ponte-roma")
 
 
 def test_a_flag_is_held_at_its_two_hoist_corners_and_a_cloth_at_its_top_ones() -> None:
@@ -32,7 +32,9 @@ def test_a_flag_is_held_at_its_two_hoist_corners_and_a_cloth_at_its_top_ones() -
 
 
 def test_members_differ_in_material_and_wind_but_not_in_mesh() -> None:
-    scenes = [flag(material=named(n), wind_speed=u, columns=6) for n, u in (("paper", 1.0), ("gray-interlock", 7.0))]
+    scenes = [
+        flag(material=named_material(n), wind_speed=u, columns=6) for n, u in (("paper", 1.0), ("gray-interlock", 7.0))
+    ]
     system, state = assemble(scenes, dtype=torch.float64)
     assert state.position.shape == (35, 3, 2)
     np.testing.assert_allclose(system.cloth.mass.sum(0), [0.1 * 1.5, 0.187 * 1.5])
@@ -107,7 +109,7 @@ def test_uniform_wind_refuses_what_is_not_finite() -> None:
 @pytest.mark.parametrize("evaluation", list(Evaluation))
 def test_every_measured_cloth_flies_in_strong_wind(evaluation: Evaluation) -> None:
     cloths = [name for name in MATERIALS.names() if name not in ("paper", "aluminium")]
-    scenes = [flag(material=named(name), wind_speed=10.0, columns=9, evaluation=evaluation) for name in cloths]
+    scenes = [flag(material=named_material(name), wind_speed=10.0, columns=9, evaluation=evaluation) for name in cloths]
     system, state = assemble(scenes)
     state = Symplectic().advance(system, state, 2.0)
     assert bool(state.healthy().all())

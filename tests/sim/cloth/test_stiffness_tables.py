@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.stiffness_tables import (
     GRIDS,
     Evaluation,
@@ -17,7 +17,7 @@ from sim.cloth.stiffness_tables import (
     stretching_stiffness,
 )
 
-CAMEL = named("camel-ponte-roma")
+CAMEL = named_material("camel-ponte-roma")
 
 
 def look_up(g00: float, g11: float, g01: float, evaluation: Evaluation = Evaluation.ARCSIM) -> np.ndarray:
@@ -66,7 +66,7 @@ def test_corrected_evaluation_gives_row_zero_at_zero_strain_and_keeps_the_coupli
     k0, k1, k2, k3 = look_up(0, 0, 0, Evaluation.CORRECTED)
     np.testing.assert_allclose([k0, k1, k2, k3], 2 * CAMEL.stretching[0], rtol=1e-12)
     for name in ("camel-ponte-roma", "paper", "white-swim-solid", "ivory-rib-knit"):
-        samples = sample_stretching(named(name).stretching, Evaluation.CORRECTED)
+        samples = sample_stretching(named_material(name).stretching, Evaluation.CORRECTED)
         assert (samples[..., 0] * samples[..., 2] - samples[..., 1] ** 2).min() > 0
 
 

@@ -14,7 +14,7 @@ from flagdata.errors import InputError
 from flagdata.recipes.typed_tables import Range
 from flagdata.record import Coding
 from sim.datasets import CameraSpec, settings
-from sim.datasets.camera_picture import filled, jpegs
+from sim.datasets.camera_picture import jpegs, pad_jpeg
 
 SLOT = 65536
 EXACT = {"camera.jpeg_quality": 100.0, "camera.read_noise": 0.0, "camera.shot_noise": 0.0}
@@ -28,7 +28,7 @@ def test_a_filled_jpeg_is_the_same_picture_for_two_decoders() -> None:
     image = np.random.default_rng(0).integers(0, 256, (40, 60), dtype=np.uint8)
     plain = simplejpeg.encode_jpeg(image[..., None], quality=80, colorspace="GRAY")
     for length in (len(plain), len(plain) + 1, 4096, 65536):
-        long = filled(plain, length)
+        long = pad_jpeg(plain, length)
         assert len(long) == length
         np.testing.assert_array_equal(decoded(long), decoded(plain))
         np.testing.assert_array_equal(np.asarray(Image.open(io.BytesIO(long))), decoded(plain))

@@ -13,7 +13,7 @@ from flagdata.errors import UsageError
 from sim.cloth.air import QuadraticNormal, Stokes
 from sim.cloth.handles import Handles
 from sim.cloth.inertia import mean_normal_rates, mean_normals
-from sim.cloth.material import isotropic, named
+from sim.cloth.material import isotropic, named_material
 from sim.cloth.mesh import grid
 from sim.cloth.scene import Scene, assemble
 from sim.effects import EFFECTS, AddedMass, Lift, Permeability, Porosity, PowerLawDrag, TangentialLinearDrag, apply
@@ -158,7 +158,7 @@ def test_pressure_and_weight_are_confounded_where_stiffness_is_free() -> None:
     """Newton's law by the mass: a = g + (pressure + inner forces)/m. So a pressure that is 1.6 times as large moves a
     cloth as one that is 1.6 times lighter, and as many times softer in stretching and in bending, and no other."""
     flat = grid(width=0.6, height=0.4, columns=6, rows=4)
-    cloth = replace(named("camel-ponte-roma"), damping=2e-3)
+    cloth = replace(named_material("camel-ponte-roma"), damping=2e-3)
     ends = []
     for material, change in (
         (cloth, 0.6),

@@ -130,7 +130,7 @@ def work_of_cycle(hinge, friction: Hysteresis, amplitude: float, steps: int) -> 
     memory, work = state.memory, 0.0
     still, calm = state.velocity, torch.zeros_like(system.gravity)
     for index, (before, after) in enumerate(pairwise(angles)):
-        then = system.remembered(memory, calm, 0.0, folded(after), still, elapsed=1e-3)
+        then = system.remember_step(memory, calm, 0.0, folded(after), still, elapsed=1e-3)
         if index >= 2 * steps:
             ends = ((memory[0], before), (then[0], after))
             pull = (friction.force(system.cloth, m, folded(a), still, calm) for m, a in ends)

@@ -9,7 +9,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.scene import assemble, flag
 from sim.effects import Flat, Seen, heavier
 
@@ -47,7 +47,9 @@ def seen(
     bulge: float = 0.1,
 ) -> Seen:
     """A flag near the plane of x and z, turned about z with its wind and its velocity."""
-    system, _ = assemble([flag(material=named("camel-ponte-roma"), wind_speed=4.0, columns=6)], dtype=torch.float64)
+    system, _ = assemble(
+        [flag(material=named_material("camel-ponte-roma"), wind_speed=4.0, columns=6)], dtype=torch.float64
+    )
     rest = torch.tensor(system.cloth.mesh.rest)
     c, s = np.cos(turn), np.sin(turn)
     about = torch.tensor([[c, -s, 0], [s, c, 0], [0, 0, 1]])

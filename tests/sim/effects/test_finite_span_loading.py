@@ -11,7 +11,7 @@ from scipy.special import k0, k1
 
 from flagdata.core.arrays import FloatArray
 from sim.cloth.cloth_batch import Cloth
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.mesh import grid
 from sim.cloth.scene import assemble, flag
 from sim.cloth.system import InapplicableError
@@ -83,7 +83,7 @@ def errors_at_the_ends(columns: int, *, still: float = 1.0, celerity: float = 0.
         still: factor on the shape η, and so on U² η_xx; at 0 there is the rate of a flat cloth alone, 2 U η_xt.
     """
     mesh = grid(width=1.5, height=1.0, columns=columns, rows=2 * columns // 3)
-    cloth = Cloth.build(mesh, [named("camel-ponte-roma")], dtype=torch.float64)
+    cloth = Cloth.build(mesh, [named_material("camel-ponte-roma")], dtype=torch.float64)
     effect = FiniteSpanLoading(share=SHARE, density=DENSITY)
     modes, gains = cosines(mesh), relative_masses(mesh)
     root = np.sqrt(profile_over_height(mesh))
@@ -119,6 +119,8 @@ def test_a_wave_that_travels_at_six_tenths_of_the_stream_has_its_load_at_both_en
 
 
 def test_a_strip_of_one_row_of_cells_is_refused() -> None:
-    system, state = assemble([flag(material=named("camel-ponte-roma"), wind_speed=4.0, height=0.05, columns=30)])
+    system, state = assemble(
+        [flag(material=named_material("camel-ponte-roma"), wind_speed=4.0, height=0.05, columns=30)]
+    )
     with pytest.raises(InapplicableError, match="no vertex between"):
         apply([FiniteSpanLoading(share=0.5)], system, state)

@@ -118,21 +118,21 @@ LINEAR = 5e-5
 @pytest.mark.parametrize(("frequency", "exposure"), [(1.0, 0.04), (4.0, 0.04), (10.0, 0.03)])
 def test_an_exposure_keeps_the_sinc_of_a_motion_and_no_phase(frequency, exposure) -> None:
     ideal = frames([0.5])
-    ratio = seen(ExposureBlur(exposure=exposure).sampled(ideal), frequency) / seen(ideal, frequency)
+    ratio = seen(ExposureBlur(exposure=exposure).change_instants(ideal), frequency) / seen(ideal, frequency)
     np.testing.assert_allclose(ratio, np.sinc(frequency * exposure), rtol=0, atol=8 * LINEAR)
 
 
 def test_rows_are_seen_one_after_the_other() -> None:
     """Over T = 20 ms from top to bottom, at 2 Hz: phases of ω T (r − ½)."""
     ideal = frames([0.0, 0.5, 1.0])
-    phase = np.angle(seen(RollingShutter(readout=0.02).sampled(ideal), 2.0) / seen(ideal, 2.0))
+    phase = np.angle(seen(RollingShutter(readout=0.02).change_instants(ideal), 2.0) / seen(ideal, 2.0))
     np.testing.assert_allclose(
         phase, np.tile(2 * np.pi * 2 * 0.02 * np.array([-0.5, 0, 0.5]), (50, 1)), rtol=0, atol=1e-5
     )
 
 
 def test_a_camera_4_percent_fast_shows_a_motion_slow_by_as_much() -> None:
-    sampling = FrameRateError(error=0.04).sampled(frames([0.5]))
+    sampling = FrameRateError(error=0.04).change_instants(frames([0.5]))
     phase = np.unwrap(np.angle(seen(sampling, 3.0)[:, 0]))
     frequency = np.polyfit(sampling.stamps.numpy(), phase, 1)[0] / (2 * np.pi)
     assert frequency == pytest.approx(3.0 / 1.04, rel=1e-5)
@@ -141,7 +141,7 @@ def test_a_camera_4_percent_fast_shows_a_motion_slow_by_as_much() -> None:
 def test_jitter_of_sigma_moves_what_is_seen_by_the_speed_times_sigma() -> None:
     ideal = frames([0.5], count=2000)
     draws = torch.from_numpy(np.random.Generator(np.random.PCG64(1)).standard_normal((2000, 1)))
-    sampling = FrameJitter(deviation=1e-3, draws=draws).sampled(ideal)
+    sampling = FrameJitter(deviation=1e-3, draws=draws).change_instants(ideal)
     phase = np.angle(seen(sampling) / seen(ideal))[:, 0]
     # 2,000 draws: the deviation is known to 1.6 %; 3 σ allowed.
     assert phase.std() == pytest.approx(2 * np.pi * 1e-3, rel=0.05)
@@ -151,7 +151,10 @@ def test_camera_effects_compose() -> None:
     """Blur and shutter: the sinc of one, the phase of the other, in either order."""
     ideal = frames([0.0, 1.0])
     blur, shutter = ExposureBlur(exposure=0.02), RollingShutter(readout=0.01)
-    one, two = seen(blur.sampled(shutter.sampled(ideal)), 3.0), seen(shutter.sampled(blur.sampled(ideal)), 3.0)
+    one, two = (
+        seen(blur.change_instants(shutter.change_instants(ideal)), 3.0),
+        seen(shutter.change_instants(blur.change_instants(ideal)), 3.0),
+    )
     np.testing.assert_allclose(one, two, rtol=0, atol=1e-12)
     expected = np.sinc(0.06) * np.exp(2j * np.pi * 3 * 0.01 * np.array([-0.5, 0.5]))
     np.testing.assert_allclose(one / seen(ideal, 3.0), np.tile(expected, (50, 1)), rtol=0, atol=4 * LINEAR)
@@ -165,4 +168,4 @@ def test_a_camera_sees_nothing_outside_the_trajectory() -> None:
     with pytest.raises(InputError, match="the trajectory has the shape"):
         ideal.observe(time, trajectory.repeat(1, 2, 1, 1))
     with pytest.raises(UsageError, match="there are 1 draws for 50 frames"):
-        replace(FrameJitter(deviation=1e-3)).sampled(ideal)
+        replace(FrameJitter(deviation=1e-3)).change_instants(ideal)

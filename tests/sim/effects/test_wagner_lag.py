@@ -12,7 +12,7 @@ from scipy.special import hankel2
 from flagdata.errors import UsageError
 from sim.cloth import scene
 from sim.cloth.air import Stokes, face_wind
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.scene import assemble
 from sim.effects import apply
 from sim.effects.wagner_lag import HeldBack, WagnerLag
@@ -49,7 +49,7 @@ def test_the_load_of_a_plate_that_is_set_moving_at_once_grows_as_wagners_functio
     final = load((torch.ones_like(state.memory[0]) * -(np.sin(0.3) ** 2) * SPEED**2,))  # z = F = ρ |w·n| w·n, ρ = 1
     memory, time = state.memory, 0.0
     for step in (0.0, 0.01, 0.04, 0.2, 0.001, 0.5, 2.0):
-        memory = system.remembered(memory, wind, 0.0, state.position, velocity, elapsed=step)
+        memory = system.remember_step(memory, wind, 0.0, state.position, velocity, elapsed=step)
         time += step
         tau = 2 * SPEED * time
         late = 0.165 * np.exp(-0.0455 * tau) + 0.335 * np.exp(-0.3 * tau)
@@ -89,7 +89,9 @@ def test_a_lag_that_starts_at_nothing_errs_by_less_than_one_at_the_load_of_the_m
     A start at zᵢ = 0 was measured to move them by 0.29 of what the effect does (9 of 31 mm in root mean square, winds
     of 3 to 8 m/s), a start at zᵢ = F by 1.1 of it.
     """
-    scenes = [scene.flag(material=named("camel-ponte-roma"), wind_speed=w, columns=12) for w in (3.0, 4.5, 6.0, 8.0)]
+    scenes = [
+        scene.flag(material=named_material("camel-ponte-roma"), wind_speed=w, columns=12) for w in (3.0, 4.5, 6.0, 8.0)
+    ]
     base, state = assemble(scenes)
     system, state = apply([WagnerLag(share=1.0)], base, state)
     integrator, (lag,) = Symplectic(), system.remembering

@@ -14,7 +14,7 @@ from flagdata.errors import NotFoundError
 from sim.assets import Assets
 from sim.blender import Environment
 from sim.blender.environment import SETTING
-from sim.render import RENDERERS, Cycles, Meshes, RenderParameters, Workbench, named, plate, to_linear
+from sim.render import RENDERERS, Cycles, Meshes, RenderParameters, Workbench, named_prior, plate, to_linear
 
 needs_blender = pytest.mark.usefixtures("blender")
 SIZE = 96
@@ -46,7 +46,7 @@ def flag(*, frames: int = 1, speed: float = 0.0) -> Meshes:
 
 
 def zeta(seed: int, **changes: object) -> RenderParameters:
-    drawn = named("flags").draw(seed, Assets())
+    drawn = named_prior("flags").draw(seed, Assets())
     return replace(drawn, width=SIZE, height=SIZE, cycles_samples=16, cycles_bounces=1, **changes)
 
 

@@ -52,7 +52,7 @@ PAPER = {
 
 @pytest.mark.parametrize("name", sorted(PAPER))
 def test_draws_fill_the_papers_ranges(name) -> None:
-    prior = priors.named(name)
+    prior = priors.named_prior(name)
     drawn = [prior.draw(seed, Assets()) for seed in range(DRAWS)]
     for parameter, (low, high) in PAPER[name].items():
         values = np.array([getattr(zeta, parameter) for zeta in drawn])
@@ -63,7 +63,7 @@ def test_draws_fill_the_papers_ranges(name) -> None:
 
 
 def test_flags_are_never_seen_along_the_wind() -> None:
-    prior = priors.named("flags")
+    prior = priors.named_prior("flags")
     angles = np.array([prior.draw(seed, Assets()).camera_angle for seed in range(DRAWS)])
     assert np.abs(np.sin(angles)).min() >= math.sin(math.radians(15))
     assert (angles > 0).any()
@@ -72,7 +72,7 @@ def test_flags_are_never_seen_along_the_wind() -> None:
 
 @pytest.mark.parametrize("name", priors.PRIORS.names())
 def test_every_catalog_prior_has_sources_and_draws_what_there_is(name) -> None:
-    prior = priors.named(name)
+    prior = priors.named_prior(name)
     assert set(prior.sources) == set(prior.quantities)
     zeta = prior.draw(1, Assets())
     assert zeta.texture.split("/")[0] in TEXTURES
@@ -80,7 +80,7 @@ def test_every_catalog_prior_has_sources_and_draws_what_there_is(name) -> None:
 
 
 def test_a_seed_gives_one_draw_and_a_changed_range_moves_no_other_parameter() -> None:
-    prior = priors.named("flags")
+    prior = priors.named_prior("flags")
     assert prior.draw(7, Assets()) == prior.draw(7, Assets())
     assert prior.draw(7, Assets()) != prior.draw(8, Assets())
     changed = prior.with_quantities({"sun_height": Range(low=1.0, high=2.0)}, source="a test").draw(7, Assets())
@@ -132,11 +132,11 @@ def test_a_prior_file_that_is_wrong_says_where() -> None:
 def test_a_range_without_an_angle_that_shows_the_flag_is_refused() -> None:
     narrow = Range(low=math.radians(170), high=math.radians(188))
     with pytest.raises(InputError, match="from the heading"):
-        priors.named("flags").with_quantities({"camera_angle": narrow}, source="a test")
+        priors.named_prior("flags").with_quantities({"camera_angle": narrow}, source="a test")
 
 
 def test_unknown_names_are_answered_with_the_nearest() -> None:
     with pytest.raises(UnknownNameError, match="did you mean 'flags'"):
-        priors.named("flag")
+        priors.named_prior("flag")
     with pytest.raises(UnknownNameError, match="sun_height"):
-        priors.named("flags").with_quantities({"sun_hight": 3.0}, source="a test")
+        priors.named_prior("flags").with_quantities({"sun_hight": 3.0}, source="a test")

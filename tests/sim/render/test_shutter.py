@@ -8,7 +8,7 @@ import torch
 
 from flagdata.errors import InputError
 from sim.render import Meshes
-from sim.render.shutter import moved
+from sim.render.shutter import move_frames
 from tests.sim.render.conftest import camera_of, look
 from tests.sim.render.pieces import linear, meshes, sheet
 
@@ -40,17 +40,17 @@ def test_without_exposure_an_edge_is_sharp() -> None:
 def test_steady_motion_goes_on_between_before_and_after_frames(offset) -> None:
     scene = meshes(sheet(), moves=STEADY, rate=RATE)
     assert torch.allclose(
-        moved(scene, offset).positions, scene.positions + torch.tensor([2.5 * offset, 0.0, 0.0]), atol=1e-6
+        move_frames(scene, offset).positions, scene.positions + torch.tensor([2.5 * offset, 0.0, 0.0]), atol=1e-6
     )
 
 
 def test_positions_between_frames_are_their_weighted_mean() -> None:
     moves = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.1, 0.4, 0.0]])
     scene = meshes(sheet(), moves=moves, rate=RATE)
-    later = moved(scene, 0.01).positions.unflatten(0, (3, -1))  # a quarter of a frame's time
+    later = move_frames(scene, 0.01).positions.unflatten(0, (3, -1))  # a quarter of a frame's time
     start = scene.positions.unflatten(0, (3, -1))
     assert torch.allclose(later[1], 0.75 * start[1] + 0.25 * start[2], atol=1e-6)
-    earlier = moved(scene, -0.01).positions.unflatten(0, (3, -1))
+    earlier = move_frames(scene, -0.01).positions.unflatten(0, (3, -1))
     assert torch.allclose(earlier[1], 0.75 * start[1] + 0.25 * start[0], atol=1e-6)
 
 
@@ -73,7 +73,9 @@ def test_cloth_that_is_cut_anew_moves_as_its_material_does(offset) -> None:
     scene = ragged(cells=[3, 5, 4, 1, 2], moves=STEADY)
     assert not scene.one_topology
     expected = scene.positions + torch.tensor([2.5 * offset, 0.0, 0.0])
-    assert torch.allclose(moved(scene, offset).positions, expected, atol=2e-5)  # places on the very edge move by 1e-5
+    assert torch.allclose(
+        move_frames(scene, offset).positions, expected, atol=2e-5
+    )  # places on the very edge move by 1e-5
 
 
 def test_frames_of_any_topology_look_as_they_do_alone() -> None:
@@ -99,7 +101,7 @@ def test_cloth_that_the_next_frame_does_not_have_is_an_error_not_a_guess() -> No
         rate=RATE,
     )
     with pytest.raises(InputError, match="in no face of the other"):
-        moved(torn, 0.01)
+        move_frames(torn, 0.01)
 
 
 def test_frames_are_the_same_however_many_are_worked_on_together(monkeypatch) -> None:

@@ -11,7 +11,7 @@ from flagdata.errors import InputError
 from sim.cloth.material import Material, isotropic
 from sim.cloth.mesh import Mesh
 from sim.cloth.scene import assemble
-from sim.run.cusick_drape import DISC, PEDESTAL, at_rest, disc, draped, on_pedestal
+from sim.run.cusick_drape import DISC, PEDESTAL, at_rest, disc, drape_scene, on_pedestal
 
 _G = 9.81
 
@@ -28,7 +28,7 @@ def _cloth(bending_length: float, *, area_weight: float = 0.2) -> Material:
 
 def _at_rest(mesh: Mesh, materials: list[Material], *, sigma: float = 1e-3, seed: int = 0) -> FloatArray:
     rng = np.random.default_rng(seed)
-    system, state = assemble([draped(mesh, m, rng, sigma=sigma) for m in materials], dtype=torch.float64)
+    system, state = assemble([drape_scene(mesh, m, rng, sigma=sigma) for m in materials], dtype=torch.float64)
     state = at_rest(system, state)
     assert float(state.velocity.abs().max()) < 0.1
     return state.position.numpy()

@@ -10,13 +10,13 @@ import pytest
 import torch
 
 from sim.cloth.air import NO_AIR
-from sim.cloth.material import Material, isotropic, named
+from sim.cloth.material import Material, isotropic, named_material
 from sim.cloth.scene import assemble, flag
 from sim.integrate import Symplectic, advance
 from sim.run import CRUMPLED, Crew, Stepper, parse, run
 from sim.run.member_batch import Monitor
 
-PONTE_ROMA = replace(named("camel-ponte-roma"), damping=0.0)
+PONTE_ROMA = replace(named_material("camel-ponte-roma"), damping=0.0)
 CONSTANT = isotropic(
     name="constant",
     area_weight=PONTE_ROMA.area_weight,

@@ -12,7 +12,7 @@ import torch
 
 from flagdata.errors import UsageError
 from sim.cloth import membrane
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.scene import assemble, flag
 from sim.integrate import BackwardEuler, Symplectic
 from sim.run import BatchOutcome, Crew, Stepper, parse, principal_strains, run
@@ -151,7 +151,9 @@ def test_an_undamped_flag_crumples_which_is_reported_and_not_stored(
 
 
 def test_principal_strains_are_those_of_a_known_deformation() -> None:
-    system, state = assemble([flag(material=named("camel-ponte-roma"), wind_speed=0, columns=4)], dtype=torch.float64)
+    system, state = assemble(
+        [flag(material=named_material("camel-ponte-roma"), wind_speed=0, columns=4)], dtype=torch.float64
+    )
     rest = torch.tensor(system.cloth.mesh.rest)
     # x = F X: stretched by 1.2 and 0.7 along axes turned by 0.4.
     turn = torch.tensor([[math.cos(0.4), -math.sin(0.4)], [math.sin(0.4), math.cos(0.4)]], dtype=torch.float64)

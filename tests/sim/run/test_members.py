@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 import torch
 
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.scene import upright
 from sim.effects import EFFECTS
 from sim.run import Crew, parse
 from tests.sim.run.conftest import make_recipe, small
 
-CAMEL = named("camel-ponte-roma")
+CAMEL = named_material("camel-ponte-roma")
 
 
 def test_draws_cover_the_search_space_uniformly() -> None:
@@ -41,7 +41,7 @@ def test_materials_are_drawn_alike_often() -> None:
     # Binomial: 300/3 ± four standard deviations of √(300 · 1/3 · 2/3).
     assert np.abs(counts - 100).max() < 4 * np.sqrt(300 * 2 / 9)
     for member in drawn[:9]:
-        base = named(str(member.parameters["material"]))
+        base = named_material(str(member.parameters["material"]))
         np.testing.assert_array_equal(member.scene.material.stretching, base.stretching)
     crew.assemble(drawn[:9])
 

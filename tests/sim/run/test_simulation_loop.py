@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from flagdata.errors import FlagdataError
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.scene import assemble, flag
 from sim.cloth.state import SPEED_LIMIT, State
 from sim.cloth.system import System
@@ -39,7 +39,7 @@ class Climbing:
 
 
 def batch(method: Climbing, divergence: Divergence, *, speed_limit: float = SPEED_LIMIT) -> Batch:
-    scenes = [flag(material=named("camel-ponte-roma"), wind_speed=2.0, columns=3) for _ in range(3)]
+    scenes = [flag(material=named_material("camel-ponte-roma"), wind_speed=2.0, columns=3) for _ in range(3)]
     system, state = assemble(scenes, dtype=torch.float64)
     return Batch(system=system, state=state, integrator=method, divergence=divergence, speed_limit=speed_limit)
 

@@ -12,7 +12,7 @@ import pytest
 from distributed import CancelledError
 
 from flagdata.errors import MissingExtraError
-from sim.workers import LocalWorkers, Scheduled, WorkerError, connected, scheduled
+from sim.workers import LocalWorkers, Scheduled, WorkerError, connect_workers, scheduled
 from tests.sim.workers.worked import environment, fatal, fatal_result, once
 
 NAMES = ("OMP_NUM_THREADS", "MALLOC_TRIM_THRESHOLD_", "MALLOC_MMAP_THRESHOLD_")
@@ -24,7 +24,7 @@ def test_processes_keep_their_memory_take_one_thread_each_and_are_replaced_when_
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
     monkeypatch.delenv("MALLOC_TRIM_THRESHOLD_", raising=False)
     said: list[str] = []
-    with connected(None, workers=2, say=said.append) as workers:
+    with connect_workers(None, workers=2, say=said.append) as workers:
         assert list(workers.results([(environment, [NAMES])])) == [["1", str(2**30), str(2**25), 1]]
         results = workers.results((once, [tmp_path / "note", number]) for number in range(6))
         assert sorted(results) == list(range(6))
@@ -42,7 +42,7 @@ def test_one_worker_is_this_process_whose_threads_are_as_many_afterwards() -> No
     before = torch.get_num_threads()
     torch.set_num_threads(2)
     try:
-        with connected(None, workers=1) as workers:
+        with connect_workers(None, workers=1) as workers:
             assert list(workers.results([(os.getpid, []), (torch.get_num_threads, [])])) == [os.getpid(), 1]
         assert torch.get_num_threads() == 2
     finally:
@@ -52,11 +52,11 @@ def test_one_worker_is_this_process_whose_threads_are_as_many_afterwards() -> No
 def test_jobs_of_this_machine_need_no_dask(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("dask", "distributed", "sim.workers.scheduled"):
         monkeypatch.setitem(sys.modules, name, None)
-    with connected(None, workers=1) as workers:
+    with connect_workers(None, workers=1) as workers:
         assert list(workers.results([(max, [(1, 2)])])) == [2]
     monkeypatch.delitem(sys.modules, "sim.workers.scheduled")
     with pytest.raises(MissingExtraError, match="the workers of a scheduler need distributed"):
-        connected("tcp://127.0.0.1:1", workers=1)
+        connect_workers("tcp://127.0.0.1:1", workers=1)
 
 
 def test_an_error_of_a_job_is_that_of_the_iteration() -> None:
@@ -70,7 +70,7 @@ def test_a_worker_that_dies_over_sending_its_result_keeps_nobody_waiting(
 ) -> None:
     monkeypatch.setattr("sim.workers.scheduled.PATIENCE", 2.0)
     said: list[str] = []
-    with connected(doomed.address, workers=1, say=said.append) as workers:
+    with connect_workers(doomed.address, workers=1, say=said.append) as workers:
         assert list(workers.results([(max, [1, 2])])) == [2]
         with pytest.raises(WorkerError, match="no workers for 2 s"):
             list(workers.results([(fatal_result, [])]))

@@ -20,7 +20,7 @@ import torch
 from flagdata.core.rng import stream
 from sim.cloth.air import Stokes
 from sim.cloth.contact import Contact
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.scene import assemble, flag
 from sim.cloth.state import State
 from sim.cloth.system import System
@@ -55,7 +55,9 @@ def run(*, seed: int, out: object) -> dict[str, Any]:
 
 def _ratios(seed: int) -> dict[str, Any]:
     speeds = [4.0 + 0.1 * b for b in range(BATCH)]
-    system, state = assemble([flag(material=named("camel-ponte-roma"), wind_speed=s, columns=30) for s in speeds])
+    system, state = assemble(
+        [flag(material=named_material("camel-ponte-roma"), wind_speed=s, columns=30) for s in speeds]
+    )
     state = Symplectic().advance(system, state, 0.4)
     whole = Symplectic().steps(system, 0.04)
     leapfrog = partial(_leapfrog, 0.04 * STEPS / whole)

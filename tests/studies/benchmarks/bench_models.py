@@ -16,7 +16,7 @@ import torch
 from scipy import ndimage
 from torch.nn import functional
 
-from models.maps.frontend import FrontEnd, Maps, standardised
+from models.maps.frontend import FrontEnd, Maps, standardise_clip
 from models.maps.spectral_layer import SpectralDecomposition
 from models.trained import estimator
 from models.training import load
@@ -33,7 +33,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     clip = (torch.rand((1, 1, 30, 224, 224), generator=generator) * 255).to(torch.uint8)
     kinds: tuple[Maps, ...] = ("frames", "spectral-maps", "wave-maps", "flow-maps", "flow-maps-3", "handmade")
     ends = {maps: _milliseconds(lambda maps=maps: FrontEnd(maps=maps)(clip)) for maps in kinds}
-    model = estimator.shipped()
+    model = estimator.load_shipped()
     film = (torch.rand((1, 30, 300, 300), generator=generator) * 255).to(torch.uint8).numpy()
     return {
         "front_end": ends,
@@ -54,7 +54,7 @@ def _milliseconds(work: Callable[[], object], *, runs: int = _RUNS) -> float:
 
 
 def _plain(clip: torch.Tensor) -> torch.Tensor:
-    video = ndimage.gaussian_filter1d(standardised(clip).numpy(), 1.0, axis=0, mode="nearest")
+    video = ndimage.gaussian_filter1d(standardise_clip(clip).numpy(), 1.0, axis=0, mode="nearest")
     slopes = []
     for along, across in ((2, 1), (1, 2)):
         slope = ndimage.gaussian_filter1d(video, 2.0, axis=along, order=1, mode="nearest")

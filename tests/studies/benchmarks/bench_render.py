@@ -20,11 +20,11 @@ from flagdata.errors import NotFoundError
 from flagdata.lake import MeshSequence
 from flagdata.timebase import NANOSECONDS
 from sim.assets import Assets
-from sim.cloth.material import named as material
+from sim.cloth.material import named_material as material
 from sim.cloth.scene import assemble, flag
 from sim.integrate import Symplectic
 from sim.render import RENDERERS, Meshes, Raster, RenderParameters
-from sim.render import named as prior
+from sim.render import named_prior as prior
 
 FRAME = 0.04  # s
 SETTLE, KEPT = 12, 12  # frames that are simulated

@@ -21,7 +21,7 @@ import torch
 
 from sim.cloth.contact import Contact
 from sim.cloth.limits import StrainLimits
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.scene import assemble, flag
 from sim.cloth.state import State
 from sim.cloth.system import System
@@ -59,7 +59,10 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
 
 
 def _mesh(columns: int) -> dict[str, Any]:
-    scenes = [flag(material=named("camel-ponte-roma"), wind_speed=4.0 + 0.1 * b, columns=columns) for b in range(BATCH)]
+    scenes = [
+        flag(material=named_material("camel-ponte-roma"), wind_speed=4.0 + 0.1 * b, columns=columns)
+        for b in range(BATCH)
+    ]
     system, state = assemble(scenes)
     steps = Symplectic().steps(system, FRAME)
     for _ in range(10):
@@ -97,7 +100,7 @@ def _mesh(columns: int) -> dict[str, Any]:
 def _contact(columns: int, name: str, low: float, high: float) -> dict[str, Any]:
     """What contact costs after a second in winds of a range [m/s]: over a frame, and over equally many steps."""
     speeds = np.linspace(low, high, BATCH).tolist()
-    scenes = [flag(material=named("camel-ponte-roma"), wind_speed=speed, columns=columns) for speed in speeds]
+    scenes = [flag(material=named_material("camel-ponte-roma"), wind_speed=speed, columns=columns) for speed in speeds]
     system, state = assemble(scenes)
     touching = replace(system, contact=Contact())
     fewer, steps = Symplectic().steps(system, FRAME), Symplectic().steps(touching, FRAME)
@@ -155,7 +158,7 @@ def _batches() -> list[dict[str, float]]:
     """Time of a frame against the batch, with one flag's worth of steps: linear beyond one block of 16 lanes."""
     rows = []
     for batch in (16, 32, 64):
-        system, state = assemble([flag(material=named("camel-ponte-roma"), wind_speed=4.0)] * batch)
+        system, state = assemble([flag(material=named_material("camel-ponte-roma"), wind_speed=4.0)] * batch)
         seconds = _median(lambda s=system, x=state: advance(s, x, FRAME, steps=60, backend=Backend.KERNEL), 3)
         rows.append({"batch": batch, "us_a_flag_step": 1e6 * seconds / 61 / batch})
     return rows
@@ -168,7 +171,7 @@ def _accuracy() -> dict[str, Any]:
         return {"skipped": f"no reference data at {path.name}"}
     with np.load(path) as run_:
         expected, seconds = run_["positions"].astype(np.float64), run_["frame_seconds"]
-    system, state = assemble([flag(material=named("camel-ponte-roma"), wind_speed=4.0)])
+    system, state = assemble([flag(material=named_material("camel-ponte-roma"), wind_speed=4.0)])
     distance = {}
     for frame in range(1, 11):
         state = Symplectic(backend=Backend.KERNEL).advance(system, state, FRAME)

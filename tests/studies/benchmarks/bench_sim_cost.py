@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.scene import assemble, flag
 from sim.cloth.state import State
 from sim.cloth.system import System
@@ -68,7 +68,9 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
 
 def _made(columns: int, batch: int) -> tuple[System, State, float]:
     """A batch on its way, and a step that is stable for it [s]."""
-    system, state = assemble([flag(material=named("camel-ponte-roma"), wind_speed=4.0, columns=columns)] * batch)
+    system, state = assemble(
+        [flag(material=named_material("camel-ponte-roma"), wind_speed=4.0, columns=columns)] * batch
+    )
     step = 0.7 * stable_step(system)
     return system, advance(system, state, STEPS * step, steps=STEPS, backend=Backend.KERNEL), step
 

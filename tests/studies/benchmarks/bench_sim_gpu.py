@@ -20,7 +20,7 @@ import torch
 
 from models.maps.frontend import FrontEnd
 from models.networks.learner import Loss, build
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.scene import assemble, flag
 from sim.cloth.state import State
 from sim.cloth.system import System
@@ -56,7 +56,7 @@ def run(
     result: dict[str, Any] = {"device": _named(device), "frame_s": FRAME, "vertices": None}
     with torch.no_grad():
         scenes = [
-            flag(material=named("camel-ponte-roma"), wind_speed=4.0 + 1.5 * i / _DISTINCT, columns=columns)
+            flag(material=named_material("camel-ponte-roma"), wind_speed=4.0 + 1.5 * i / _DISTINCT, columns=columns)
             for i in range(_DISTINCT)
         ]
         few, start = assemble(scenes[:: _DISTINCT // 16])
@@ -175,7 +175,10 @@ def _rate(scenes: Sequence[Any], state: State, steps: int, count: int, device: s
 
 def _agreement(device: str, columns: int) -> dict[str, Any]:
     """Largest distance of a vertex from where the compiled kernel has it, float32, and float64 of the latter [m]."""
-    scenes = [flag(material=named("camel-ponte-roma"), wind_speed=speed, columns=columns) for speed in (1.0, 2.0, 3.0)]
+    scenes = [
+        flag(material=named_material("camel-ponte-roma"), wind_speed=speed, columns=columns)
+        for speed in (1.0, 2.0, 3.0)
+    ]
     ways = {
         "compiled": ("cpu", torch.float32, Backend.KERNEL),
         "compiled_float64": ("cpu", torch.float64, Backend.KERNEL),

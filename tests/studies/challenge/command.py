@@ -48,13 +48,13 @@ def challenge() -> None:
 @json_option
 def make(folder: Path, recipe: str, seed: int, count: int, workers: int, as_json: bool) -> None:
     """Draw keys, simulate, and write sealed data sets into a new folder; one that was stopped goes on."""
-    from flagdata.core.workload import announced
+    from flagdata.core.workload import announce_work
     from tests.studies.challenge.make import make as make_challenge
     from tests.studies.challenge.make import workload
     from tests.studies.challenge.recipe import load
 
     loaded = load(recipe)
-    say(announced(f"simulating {count} sets", workload(loaded, count), workers=workers))
+    say(announce_work(f"simulating {count} sets", workload(loaded, count), workers=workers))
     with progress(count, label=loaded.title, unit="set") as advance:
         made = make_challenge(folder, loaded, seed=seed, count=count, workers=workers, progress=advance)
     if as_json:
@@ -145,7 +145,7 @@ def bank(
 def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path | None, as_json: bool) -> None:
     """Judge the sets that have no verdict yet, and file the verdicts with their hashes."""
     from flagdata.core.files.caches import user_cache
-    from measure.cloth import announced
+    from measure.cloth import announce_simulations
     from measure.cloth.close_films import workload
     from measure.loop import LoopOptions
     from measure.nulls import of_recordings
@@ -162,7 +162,7 @@ def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path
         for name in waiting[:1]:
             given = target.films(name)
             lasting = [float(log.times[-1]) for _, log in given.recordings.values()]
-            say(announced(workload(lasting, films.options(given)), workers=workers))
+            say(announce_simulations(workload(lasting, films.options(given)), workers=workers))
     elif waiting:
         first = target.experiment(waiting[0])
         options = LoopOptions(bank=bank)

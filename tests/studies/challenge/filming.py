@@ -68,7 +68,7 @@ def films_of(
             "exposure_bias": -0.3,
         }
         look = replace(
-            render_prior.named("outdoor").with_quantities(quantities, source="the challenge"),
+            render_prior.named_prior("outdoor").with_quantities(quantities, source="the challenge"),
             backgrounds=filming.backgrounds,
         )
         zeta = look.draw(child_seed(seed, name, "look", index), Assets())

@@ -28,7 +28,7 @@ from flagdata.recipes.documents import read_json
 from flagdata.recipes.shelves import is_name
 from measure.observe import Experiment, Specimen, Trajectory, WindTrack, as_seen
 from sim.cloth.handles import corners
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.mesh import grid
 from tests.studies.challenge.films import Filmed, read_films
 
@@ -224,7 +224,7 @@ def read_set(folder: Path) -> Experiment:
         markers = _array(beside["markers.npy"])
         specimen = Specimen(
             mesh=mesh,
-            material=named(flag["material"]),
+            material=named_material(flag["material"]),
             held=corners(mesh.rest),
             anchors=np.array(flag["pins"]),
             stiffness=flag["pin_stiffness"],

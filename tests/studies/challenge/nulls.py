@@ -21,7 +21,7 @@ from measure.nulls import bank as banks
 from measure.observe import Specimen
 from measure.observe import experiment_recipe as recipes
 from sim.cloth import handles
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.mesh import grid
 from tests.studies.challenge.folder import HEIGHT, MODEL_COLUMNS, MODEL_ROWS, write_json
 from tests.studies.challenge.meshes import layout
@@ -57,7 +57,7 @@ def null_batches(recipe: ChallengeRecipe, *, seed: int, kinds: int) -> list[Null
             )
         specimen = Specimen(
             mesh=mesh,
-            material=named(recipe.materials[index % len(recipe.materials)]),
+            material=named_material(recipe.materials[index % len(recipe.materials)]),
             held=held,
             anchors=along_pole,
             stiffness=handles.ARCSIM_STIFFNESS,

@@ -35,7 +35,7 @@ from msgspec import Meta
 from flagdata.errors import InputError, LimitError
 from flagdata.recipes import typed_tables
 from flagdata.recipes.registry import Registry
-from flagdata.recipes.shelves import Shelf, parsed
+from flagdata.recipes.shelves import Shelf, parse_recipe
 from flagdata.recipes.typed_tables import POSITIVE, WHOLE_LIMIT, Count, Named, NotNegative, Positive, Range
 from sim.cloth import material
 
@@ -238,10 +238,10 @@ def parse(text: str, *, where: str) -> ChallengeRecipe:
     from sim.effects import EFFECTS
     from tests.studies.challenge.outside import OUTSIDE
 
-    form = typed_tables.read(_Form, parsed(text, where=where), where=where)
+    form = typed_tables.read(_Form, parse_recipe(text, where=where), where=where)
     flag, log, films, inside = form.flag, form.log, form.films, f"{where} [recordings]"
     for name in flag.materials:
-        material.named(name, where=f"{where} [flag]")
+        material.named_material(name, where=f"{where} [flag]")
     if films is None:
         run = marked = typed_tables.read(_MarkerRecordings, form.recordings, where=inside)
         rates, noises = tuple(_whole("rates", rate, where=inside) for rate in marked.rates), marked.noises

@@ -15,8 +15,8 @@ from flagdata.core.rng import stream
 from flagdata.errors import FlagdataError, UsageError
 from sim.cloth.contact import Contact
 from sim.cloth.handles import Handles, corners
-from sim.cloth.material import Material, named
-from sim.cloth.scene import Scene, assemble, roughened
+from sim.cloth.material import Material, named_material
+from sim.cloth.scene import Scene, assemble, roughen_start
 from sim.cloth.state import State
 from sim.cloth.system import System
 from sim.effects import Effect, Gusts, apply
@@ -125,7 +125,9 @@ def _simulated(recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey]) ->
 
 def material_of(key: AnswerKey) -> Material:
     """The set's true cloth."""
-    return replace(named(key.material).scaled(area_weight=key.density, bending=key.bending), damping=key.damping)
+    return replace(
+        named_material(key.material).scaled(area_weight=key.density, bending=key.bending), damping=key.damping
+    )
 
 
 def _frames(recipe: ChallengeRecipe, key: AnswerKey) -> int:
@@ -214,7 +216,7 @@ def heading(key: AnswerKey) -> FloatArray:
 
 def _start(rest: FloatArray, key: AnswerKey, rng: np.random.Generator, handles: Handles) -> FloatArray:
     flat = rest[:, :1] * heading(key) + rest[:, 1:] * np.array([0.0, 0.0, 1.0])
-    return roughened(flat, handles, rng, _START_NOISE)
+    return roughen_start(flat, handles, rng, _START_NOISE)
 
 
 def _effect(recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey], name: str) -> Effect:

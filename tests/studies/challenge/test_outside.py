@@ -13,7 +13,7 @@ from torch import Tensor
 
 from flagdata.core.rng import stream
 from sim.cloth.handles import Handles
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.mesh import grid
 from sim.cloth.scene import Scene, assemble, upright
 from sim.cloth.state import State
@@ -56,7 +56,7 @@ def flag(turn: np.ndarray | None = None, shift: tuple[float, float, float] = (0.
         Scene(
             mesh=mesh,
             position=start @ turn.T + shift,
-            material=named("camel-ponte-roma"),
+            material=named_material("camel-ponte-roma"),
             handles=Handles(vertices=(0, 3)),
             wind=tuple(turn @ wind),
         )
@@ -129,7 +129,7 @@ def sheet_across(cells: int = 4) -> tuple[System, State]:
     scene = Scene(
         mesh=mesh,
         position=upright(mesh),
-        material=named("camel-ponte-roma"),
+        material=named_material("camel-ponte-roma"),
         handles=Handles(vertices=(0, cells)),
         wind=(5.0, 0.0, 0.0),
     )

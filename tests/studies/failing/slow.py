@@ -30,7 +30,7 @@ from measure.observe import experiment_recipe as recipes
 from measure.propose import dictionary
 from measure.propose.term_search import propose
 from sim.cloth import handles
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.mesh import grid
 from sim.effects import EFFECTS
 from tests.small import DATA_SET, SIMULATION, TRAINING
@@ -75,7 +75,7 @@ def loop_scene(folder: Path) -> Scene:
     mesh = grid(width=WIDTH, height=HEIGHT, columns=8, rows=6)
     cloth = Specimen(
         mesh=mesh,
-        material=named("camel-ponte-roma"),
+        material=named_material("camel-ponte-roma"),
         held=handles.corners(mesh.rest),
         anchors=np.array([[0.0, 0.0, 0.0], [0.0, 0.0, HEIGHT]]),
     )
@@ -211,7 +211,7 @@ def kept_windows(kept: str) -> None:
     """What is read off a film is read once."""
     import measure.observables.watching
 
-    plain = measure.observables.watching.watched
+    plain = measure.observables.watching.watch_film
 
     def watched(film: Any, size: Any, **others: Any) -> object:
         path = Path(kept) / "windows"
@@ -219,7 +219,7 @@ def kept_windows(kept: str) -> None:
             path.write_bytes(pickle.dumps(plain(film, size, **others)))
         return pickle.loads(path.read_bytes())
 
-    measure.observables.watching.watched = watched
+    measure.observables.watching.watch_film = watched
 
 
 def known_flags(kept: str) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 from hypothesis import strategies as st
 
 from flagdata.ingest.anemometer.sensor_recipe import parse as parse_sensor
-from flagdata.recipes.shelves import parsed
+from flagdata.recipes.shelves import parse_recipe
 from measure.observe import load as load_experiment
 from models.training import parse as parse_training
 from sim.arcsim import read_material, read_scene
@@ -84,9 +84,9 @@ FORMS: dict[str, tuple[str, Callable[[str, Path], object]]] = {
     "challenge": (CHALLENGES.named("films-3").text, lambda text, _: parse_challenge(text, where="recipe")),
     "material": (
         first("materials"),
-        lambda text, _: Material.from_mapping(parsed(text, where="recipe"), name="recipe"),
+        lambda text, _: Material.from_mapping(parse_recipe(text, where="recipe"), name="recipe"),
     ),
-    "render prior": (first("renders"), lambda text, _: read_prior(parsed(text, where="recipe"), name="recipe")),
+    "render prior": (first("renders"), lambda text, _: read_prior(parse_recipe(text, where="recipe"), name="recipe")),
     "scene made ready": (SCENE, ready),
     "experiment": (EXPERIMENT, experiment),
     "training": (training(), lambda text, _: parse_training(text, name="recipe", where="recipe").check()),

@@ -21,10 +21,10 @@ from flagdata.core.arrays import Float32Array, FloatArray, UInt8Array
 from flagdata.core.rng import child_seed, stream
 from flagdata.lake import MeshSequence
 from flagdata.record import decode
-from models.conditioning import HALVED, Conditioning, Stills, conditioned, framing, halved
+from models.conditioning import HALVED, Conditioning, Stills, condition_film, framing, halve_picture
 from models.conditioning.camera_motion import STILL
 from sim.assets import Assets
-from sim.datasets import coded, load, settings
+from sim.datasets import encode_pictures, load, settings
 from sim.render import Meshes, Raster, RenderParameters, render_prior, stage
 
 _CAMERA = "outdoor"
@@ -79,10 +79,10 @@ def example(runs: Sequence[MeshSequence], *, seed: int, assets: Assets) -> Examp
     with torch.no_grad():
         colour = Raster(assets=assets).render(meshes, zeta).numpy()[picked]
     film = _coded(_lit(colour, rng), rng)
-    found = conditioned(film, times).found
+    found = condition_film(film, times).found
     if found.region is None or found.camera.moves:
         return None
-    small = np.stack([halved(found.show(frame, STILL)) for frame in film])
+    small = np.stack([halve_picture(found.show(frame, STILL)) for frame in film])
     kept = np.sort(rng.choice(len(picked), size=min(PICTURES, len(picked)), replace=False))
     places = _places(meshes, zeta, [picked[k] for k in kept])
     cloth = np.stack([_cloth(one, runs[0].faces, zeta, found) for one in places])
@@ -94,7 +94,7 @@ def example(runs: Sequence[MeshSequence], *, seed: int, assets: Assets) -> Examp
 
 
 def _look(rng: np.random.Generator, seed: int, assets: Assets) -> RenderParameters:
-    look = render_prior.named("outdoor").draw(seed, assets)
+    look = render_prior.named_prior("outdoor").draw(seed, assets)
     width, height = ((640, 360), (480, 480), (480, 360))[int(rng.integers(3))]
     bare = {"pole_radius": 0.0} if rng.random() < _BARE else {}
     return replace(look, width=width, height=height, raster_samples=4, **bare)
@@ -124,7 +124,9 @@ def _coded(colour: UInt8Array, rng: np.random.Generator) -> UInt8Array:
     cameras."""
     camera = load(_CAMERA).camera
     seed = int(rng.integers(2**31))
-    return np.stack(decode(coded(colour, settings(camera, seed=seed), camera, seed=seed), where="a simulated film"))
+    return np.stack(
+        decode(encode_pictures(colour, settings(camera, seed=seed), camera, seed=seed), where="a simulated film")
+    )
 
 
 def _places(meshes: Meshes, zeta: RenderParameters, picked: Sequence[int]) -> FloatArray:
@@ -141,7 +143,7 @@ def _cloth(places: FloatArray, faces: NDArray[np.int32], zeta: RenderParameters,
         cv2.fillConvexPoly(fine, corners[face], 255, shift=4)
     film = cv2.resize(fine, (zeta.width, zeta.height), interpolation=cv2.INTER_AREA)
     picture = framing.cut(np.asarray(film, np.uint8), found.square, found.size)
-    return halved(picture)
+    return halve_picture(picture)
 
 
 def _hoist(places: FloatArray, rest: Float32Array, found: Conditioning) -> Float32Array:

@@ -24,7 +24,7 @@ import torch
 from flagdata.core.arrays import FloatArray
 from flagdata.core.findings import Finding
 from flagdata.lake import Lake
-from measure.anemometer import Features, Network, Recording, calibrated, network
+from measure.anemometer import Features, Network, Recording, calibrate_reading, network
 from measure.anemometer.anemometer_measuring import measured_from
 from measure.anemometer.window_features import features_of
 from measure.cloth import Log
@@ -94,7 +94,7 @@ def judged(lake: Lake, name: str, *, seed: int, first: float, kept: Path) -> dic
     kept.mkdir(exist_ok=True)
     own = network(name, lake=None, at=None)
     fitted = _looked(lake, FIRST, own, kept, part=(0.0, first / 2))
-    model = calibrated([_recording(lake, fitted)], network=own, size=SIZE, level=LEVEL)
+    model = calibrate_reading([_recording(lake, fitted)], network=own, size=SIZE, level=LEVEL)
     parts = {FIRST: (first / 2, first), **{name: (0.0, seconds) for name, seconds in SECONDS.items()}}
     truths = {name: _air(shot.film.cast, shot.film.index) for name, shot in shots(seed, first=first)}
     rows = []
@@ -132,7 +132,7 @@ def _recording(lake: Lake, seen: Seen) -> Recording:
         features=seen.features,
         sensor=wind.sensor,
         findings=seen.findings,
-        log=Log.of(wind, start=subject.film.start).unlagged(),
+        log=Log.of(wind, start=subject.film.start).undo_lag(),
     )
 
 

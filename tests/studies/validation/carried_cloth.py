@@ -26,7 +26,7 @@ from measure.nulls import NullBatch, null_plan, tracks
 from measure.nulls import bank as banks
 from measure.observe import Experiment, Hold, Observation, Setup, WindTrack, from_arrays, observe, sheet
 from measure.verdict import Verdict
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.effects import EFFECTS, Effect
 from tests.evidence import ABSENT, REFERENCE
 from tests.studies.validation.robot_cloth import MATERIAL
@@ -53,7 +53,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         return dict(ABSENT)
     torch.set_num_threads(1)
     swings = [read(folder, name) for name in RECORDINGS]
-    cloth = Cloth.seen(swings, named(MATERIAL))
+    cloth = Cloth.seen(swings, named_material(MATERIAL))
     seen = observe([observed(cloth, swing) for swing in swings], setup(cloth))
     options = _bank(seen.experiment, seed)
     found = {"the robot's": _row(close_loop(seen.experiment, options))}
@@ -176,7 +176,7 @@ def _row(verdict: Verdict) -> dict[str, Any]:
 def _bank(experiment: Experiment, seed: int) -> LoopOptions:
     """By `KINDS` kinds of nulls of an experiment's own ways."""
     setting = Setting.of(experiment)
-    null_plan.simulated(setting, nulls=KINDS * banks.WINDS, seed=seed, workers=2, stage=lambda *_: None)
+    null_plan.simulate_bank(setting, nulls=KINDS * banks.WINDS, seed=seed, workers=2, stage=lambda *_: None)
     return LoopOptions(seed=seed, bank=null_plan.kept_in(setting, seed=seed))
 
 

@@ -52,7 +52,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     for i in range(_RECORDINGS // 4):
         calm = VonKarman(mean=5.0, intensity=0.005, length=60.0)
         steady.append(_estimate(DrawnRecipe(seed=seed * 1000 + 500 + i, wind=calm))[0])
-    errors = np.array([abs(e.offset - o) for e, o in gusty if e.accepted])
+    errors = np.array([abs(e.offset - o) for e, o in gusty if e.is_accepted])
     return {
         "recordings": _RECORDINGS,
         "minutes": 10,
@@ -60,8 +60,8 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         "median_error_s": float(np.median(errors)),
         "largest_error_s": float(errors.max()),
         "within_half_a_second": int((errors <= 0.5).sum()),
-        "covered_by_90_percent_interval": sum(e.interval[0] <= o <= e.interval[1] for e, o in gusty if e.accepted),
-        "median_sigma_s": float(np.median([e.sigma for e, _ in gusty if e.accepted])),
+        "covered_by_90_percent_interval": sum(e.interval[0] <= o <= e.interval[1] for e, o in gusty if e.is_accepted),
+        "median_sigma_s": float(np.median([e.sigma for e, _ in gusty if e.is_accepted])),
         "steady_recordings": len(steady),
-        "steady_refused": sum(not e.accepted for e in steady),
+        "steady_refused": sum(not e.is_accepted for e in steady),
     }

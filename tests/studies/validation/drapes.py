@@ -23,11 +23,11 @@ from measure.drape import (
     Fit,
     Model,
     Surface,
-    fitted,
+    fit_drapes,
     ratio,
     rim_of,
     shape_of,
-    simulated,
+    simulated_drapes,
     together,
 )
 from sim.cloth.mesh import Mesh
@@ -49,7 +49,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     folder = REFERENCE / "drapes"
     if not folder.is_dir():
         return dict(ABSENT)
-    surface = Surface.fit(*simulated(SIMULATIONS, seed=0, folder=user_cache() / "drapes"))
+    surface = Surface.fit(*simulated_drapes(SIMULATIONS, seed=0, folder=user_cache() / "drapes"))
     results = {}
     for number, name in enumerate(FABRICS, start=1):
         weight, faces = shapes(folder / f"fabric{number}_{name}.npz")
@@ -106,14 +106,14 @@ def made(curvature: float) -> list[Face]:
 
 def fabric(surface: Surface, weight: float, faces: list[Face], *, seed: int) -> dict[str, Any]:
     """Judges one fabric by the criteria of decision 074."""
-    whole = fitted(surface, [together(faces)], model=Model.BASE, seed=seed)
+    whole = fit_drapes(surface, [together(faces)], model=Model.BASE, seed=seed)
     thirds = [third(surface, faces, out, seed=seed) for out in THIRDS]
     first, second = (face.means(0.0)[:, 0] for face in faces)
     difference = second - first
     test = ttest_1samp(difference, 0.0)
     scatter = together(faces).scatter
     repeats = float(np.sqrt(np.mean([face.scatter**2 for face in faces])))
-    models = {model.value: fitted(surface, faces, model=model, seed=seed) for model in Model}
+    models = {model.value: fit_drapes(surface, faces, model=model, seed=seed) for model in Model}
     errors = {model.value: float(np.sqrt(np.mean([t["squares"][model.value] for t in thirds]))) for model in Model}
     curled = models[Model.CURLED.value]
     found = bool(test.pvalue < SIGNIFICANCE and abs(difference.mean()) > repeats / 3)
@@ -156,13 +156,13 @@ def third(surface: Surface, faces: list[Face], out: tuple[int, ...], *, seed: in
     """Predicts three specimens from the other six."""
     chosen = [n for n in range(1, 10) if n not in out]
     trained, left = [face.of(chosen) for face in faces], [face.of(out) for face in faces]
-    base = fitted(surface, [together(trained)], model=Model.BASE, seed=seed)
+    base = fit_drapes(surface, [together(trained)], model=Model.BASE, seed=seed)
     predicted = float(base.predicted[:, 0, 0].mean())
     measured = float(together(left).shapes[:, 0].mean())
     tolerance = together(trained).scatter
     squares = {}
     for model in Model:
-        several = fitted(surface, trained, model=model, seed=seed).predicted[..., 0].mean(axis=0)
+        several = fit_drapes(surface, trained, model=model, seed=seed).predicted[..., 0].mean(axis=0)
         squares[model.value] = float(
             np.mean([np.square(face.means(0.0)[:, 0] - several[n]).mean() for n, face in enumerate(left)])
         )

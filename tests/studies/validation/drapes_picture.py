@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from measure.cloth import TABLES
 from measure.drape import DrapeBatch, Surface, mesh
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.scene import GRAVITY
 from tests.evidence import REFERENCE
 
@@ -89,7 +89,7 @@ def bending_length(rigidity: np.ndarray, weight: np.ndarray) -> np.ndarray:
 def bank() -> dict[str, list[float]]:
     """Returns area weight [kg/m²] and bending length [mm] of the catalog's measured cloths, a quarter of the mean
     coefficient of their tables."""
-    cloths = {name: named(name) for name in TABLES}
+    cloths = {name: named_material(name) for name in TABLES}
     return {
         name: [
             cloth.area_weight,

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from flagdata.core.arrays import BoolArray, FloatArray
 from flagdata.core.rng import stream
 from sim.cloth.contact import Contact
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.scene import Scene, assemble, flag
 from sim.cloth.state import State
 from sim.cloth.system import System
@@ -35,7 +35,7 @@ STEPS = (1e-3, 2.5e-3, 5e-3, 10e-3)
 ENERGY_EVERY = 4
 REPLICATES = 8
 NOISE = 1e-3
-CAMEL = named("camel-ponte-roma")
+CAMEL = named_material("camel-ponte-roma")
 
 
 @dataclass(frozen=True, kw_only=True)

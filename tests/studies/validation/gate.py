@@ -23,7 +23,7 @@ from flagdata.errors import NotFoundError
 from measure.gate import Gate, judge, read
 from measure.gate.window import CONFIDENCE, FALSE_ALARM, Judgement
 from measure.shares import Share
-from models.trained.estimator import SHIPPED, Estimator, shipped
+from models.trained.estimator import SHIPPED, Estimator, load_shipped
 from tests.evidence import ABSENT, REFERENCE
 from tests.studies.gate import FilmsOf, calibrated, data_of, rate_of
 from tests.studies.validation.gate_clips import KINDS, made, seed_of
@@ -40,7 +40,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     if path is None:
         return {"left_out": f"no lake; set {LAKE} to one with the data sets that the network was trained on"}
     torch.set_num_threads(1)
-    model = shipped()
+    model = load_shipped()
     gate = gate_of(model, Path(path), seed=seed)
     films = FilmsOf(Path(path), data_of(model), "test", rate=rate_of(model))
     with torch.no_grad():

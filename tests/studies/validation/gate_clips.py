@@ -24,12 +24,12 @@ from flagdata.record import VideoEncoder, decode
 from flagdata.timebase import NANOSECONDS
 from sim.assets import Assets
 from sim.cloth.handles import Handles
-from sim.cloth.material import named as material
+from sim.cloth.material import named_material as material
 from sim.cloth.mesh import grid
 from sim.cloth.scene import Scene, assemble, upright
 from sim.integrate import BackwardEuler
 from sim.render import Meshes, Raster, plate, to_bytes
-from sim.render import named as prior
+from sim.render import named_prior as prior
 
 Films: TypeAlias = Sequence[UInt8Array]
 SIZE, FRAMES, RATE = 300, 30, 25.0

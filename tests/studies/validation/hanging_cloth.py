@@ -43,7 +43,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     if place is None:
         return {"left_out": f"no lake; build {_DATASET} and set FLAGDATA_CLOTH_LAKE to its folder"}
     torch.set_num_threads(1)
-    model = estimator.shipped("wave-cloth")
+    model = estimator.load_shipped("wave-cloth")
     source = flagdata.open(place)
     spec = DataSpec(datasets=(_DATASET,))
     train, test = (source.pairs(spec.rows, split=side) for side in ("train", "test"))

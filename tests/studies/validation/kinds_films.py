@@ -97,7 +97,7 @@ def flights(seed: int, count: int) -> list[Flight]:
 
 def look(seed: int) -> RenderParameters:
     """Draws camera, light, texture and background."""
-    zeta = render_prior.named("outdoor").draw(child_seed(seed, "look"), Assets())
+    zeta = render_prior.named_prior("outdoor").draw(child_seed(seed, "look"), Assets())
     rng = stream(seed, "kinds", "camera")
     return replace(
         zeta,
@@ -149,7 +149,7 @@ def pair(first: Flight, second: Flight, seed: int) -> Shot:
     columns, rows = np.flatnonzero(alone.any(axis=(0, 1))), np.flatnonzero(alone.any(axis=(0, 2)))
     across = float(rng.choice([-1, 1]) * rng.uniform(*_APART)) * len(columns) / WIDTH
     down = float(rng.uniform(-_LOWER, _LOWER)) * len(rows) / WIDTH
-    other = render_prior.named("outdoor").draw(child_seed(seed, "second"), Assets())
+    other = render_prior.named_prior("outdoor").draw(child_seed(seed, "second"), Assets())
     back = shot(first, replace(zeta, frame_offset_x=-across / 2), seed)
     front = shot(
         second,

@@ -16,10 +16,10 @@ from flagdata.ingest.films.film_array import Frames
 from flagdata.record import decode
 from measure.cloth import OBSERVED, Flag
 from measure.film import ConditionedFilm, FlagSize
-from measure.observables import OBSERVABLES, ClothWindow, FilmWindow, edges_of, watched
+from measure.observables import OBSERVABLES, ClothWindow, FilmWindow, edges_of, watch_film
 from sim.assets import Assets
 from sim.cloth.mesh import Mesh
-from sim.datasets import coded, load, settings
+from sim.datasets import encode_pictures, load, settings
 from sim.render import Meshes, RenderParameters, render_prior, stage
 
 RATE = 25.0
@@ -96,7 +96,7 @@ class Filmed:
 
 def look(seed: int, *, light: int) -> RenderParameters:
     """A look that is drawn: all of one seed, but for the sun and the sky, which are of another."""
-    own, other = (render_prior.named("outdoor").draw(one, Assets()) for one in (seed, light))
+    own, other = (render_prior.named_prior("outdoor").draw(one, Assets()) for one in (seed, light))
     shown = {
         name: getattr(other, name)
         for name in ("sun_height", "sun_radius", "sun_azimuth", "sun_strength", "sun_softness", "sky_strength")
@@ -136,7 +136,9 @@ def filmed(
     with torch.no_grad():
         colour = render(meshes, zeta).numpy()
     camera = load(_CAMERA).camera
-    pictures = np.stack(decode(coded(colour, settings(camera, seed=seed), camera, seed=seed), where="a filmed flag"))
+    pictures = np.stack(
+        decode(encode_pictures(colour, settings(camera, seed=seed), camera, seed=seed), where="a filmed flag")
+    )
     return read(pictures, places(meshes, zeta), mesh, flag)
 
 
@@ -145,7 +147,7 @@ def read(pictures: UInt8Array, projected: FloatArray, mesh: Mesh, flag: Flag) ->
     times = np.arange(len(pictures)) / RATE
     film = ConditionedFilm(Frames(images=pictures, time=times), aspect=flag.length / flag.height)
     try:
-        seen = watched(film, FlagSize(length=flag.length, height=flag.height))
+        seen = watch_film(film, FlagSize(length=flag.length, height=flag.height))
     except FlagdataError:
         return None
     if all(window is None for window in seen.windows):

@@ -21,7 +21,7 @@ import torch
 from flagdata.core.arrays import BoolArray, FloatArray
 from flagdata.core.console import progress
 from flagdata.core.rng import child_seed, stream
-from measure.estimate import OWN, combined, of_model
+from measure.estimate import OWN, combine_windows, of_model
 from models.evaluation import LEVELS, Predictions, Resamples, coverage, rank_histogram, tarp
 from models.evaluation.predictions import WIND
 from models.evaluation.predictive_calibration import Coverage
@@ -39,7 +39,7 @@ _DRAWS = 400
 def run(*, seed: int, out: Path) -> dict[str, Any]:
     """Calibration of one window and of several, and how errors of windows correlate."""
     torch.set_num_threads(1)
-    model = estimator.shipped()
+    model = estimator.load_shipped()
     own, datasets = child_seed(seed, "measure-windows", "films"), list[str]()
     films = _noted(simulated(model, count=FILMS, windows=WINDOWS, seed=own), datasets)
     found = posteriors(model, films, draws=_DRAWS, seed=own)
@@ -87,7 +87,7 @@ def _answers(model: Estimator, found: Posteriors, count: int, *, seed: int) -> P
     own = np.array([name in OWN for name in names])
     draws = []
     for number, logits in enumerate(found.logits[:, :count]):
-        winds, cloth = combined(
+        winds, cloth = combine_windows(
             logits,
             names=names,
             centre=learner.centre.double().numpy(),

@@ -20,7 +20,7 @@ import numpy as np
 from flagdata.core.arrays import FloatArray
 from flagdata.errors import FlagdataError
 from measure.film import FilmReading, FlagSize, subjects
-from measure.observables import OBSERVABLES, ClothWindow, Observable, edges_of, watched
+from measure.observables import OBSERVABLES, ClothWindow, Observable, edges_of, watch_film
 from tests.evidence import ABSENT, REFERENCE
 from tests.studies.validation.films import chosen
 from tests.studies.validation.vtk_films.designs import Design, designs, scene_of
@@ -67,7 +67,7 @@ def compared(design: Design) -> dict[str, Any]:
         "windows": [],
     }
     try:
-        found = watched(subject.film, FlagSize(length=LENGTH, height=HEIGHT), last=_LONGEST)
+        found = watch_film(subject.film, FlagSize(length=LENGTH, height=HEIGHT), last=_LONGEST)
     except FlagdataError as error:
         return {**row, "refused": error.what}
     for start, window in zip(found.starts.tolist(), found.windows, strict=True):

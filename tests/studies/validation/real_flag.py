@@ -27,7 +27,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         return dict(ABSENT)
     with av.open(str(path)) as container:
         film = np.stack([frame.to_ndarray(format="gray") for frame in container.decode(video=0)])
-    model = estimator.shipped()
+    model = estimator.load_shipped()
     count = model.front_end.frames
     clips = np.stack([film[first : first + count] for first in range(0, len(film) - count + 1, count)])
     found = model.estimate(model.inputs(clips), seed=seed)

@@ -42,18 +42,18 @@ from measure.refine import (
     Trace,
     refine,
     refinement_start,
-    squared,
+    squared_embedding_distance,
 )
 from measure.refine.evaluator import STAGES
 from measure.refine.refine_command import RENDERS, scenes_of, space_of
 from measure.refine.space import DIMENSION
 from measure.refine.target import as_stated, of_recording
-from models.evaluation.feature_baselines import TARGETS, Fitted, fitted
+from models.evaluation.feature_baselines import TARGETS, Fitted, fit_baselines
 from models.trained import estimator as models
 from models.trained.estimator import Estimator
 from models.training import DataSpec, FitFilm
 from sim.assets import Assets
-from sim.render import named
+from sim.render import named_prior
 from tests.evidence import REFERENCE
 from tests.studies.validation.peers.registry import PEERS, minimise
 from tests.studies.validation.transfer import (
@@ -112,7 +112,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     folder = os.environ.get("FLAGDATA_REFINE_CACHE")
     cache = out / "refinement-cache" if folder is None else Path(folder)
     own_model = os.environ.get("FLAGDATA_REFINE_MODEL")
-    estimator = models.shipped() if own_model is None else models.load(Path(own_model))
+    estimator = models.load_shipped() if own_model is None else models.load(Path(own_model))
     scenes = scenes_of(estimator)
     space = space_of(estimator)
     at = os.environ.get("FLAGDATA_REFINE_AT", "v1")
@@ -179,7 +179,7 @@ def _targets(lake: Path, space: Space, *, at: str, count: int, seed: int) -> lis
     """Clips of the test side, each of another simulation, as they were filmed."""
     source = Source.open(lake)
     pairs = source.pairs("side = 'test'", at=at)
-    otherwise = DrawnView(prior=named(RENDERS), assets=Assets())
+    otherwise = DrawnView(prior=named_prior(RENDERS), assets=Assets())
     order = stream(seed, "refinement", "targets").permutation(len(pairs)).tolist()
     taken: set[int] = set()
     found: list[Target] = []
@@ -195,7 +195,7 @@ def _targets(lake: Path, space: Space, *, at: str, count: int, seed: int) -> lis
 
 def _changed(count: int, space: Space, *, frames: int, seed: int, folder: Path) -> list[Target]:
     """Flags of another mesh, integrator, step and texture, the second half rendered by Cycles; films of `frames`."""
-    otherwise = DrawnView(prior=named(RENDERS), assets=Assets())
+    otherwise = DrawnView(prior=named_prior(RENDERS), assets=Assets())
     found: list[Target] = []
     for renderer, flags in (("raster", count - count // 2), ("cycles", count // 2)):
         if not flags:
@@ -213,7 +213,7 @@ def _changed(count: int, space: Space, *, frames: int, seed: int, folder: Path) 
 
 def _arcsim(count: int, *, frames: int, seed: int) -> list[Target]:
     """Runs of the reference simulator, of as many views as there must be; the estimator does not get their cameras."""
-    otherwise = DrawnView(prior=named(RENDERS), assets=Assets())
+    otherwise = DrawnView(prior=named_prior(RENDERS), assets=Assets())
     clips = reference_clips(REFERENCE / "arcsim", seed, frames, views=-(-count // REFERENCE_RUNS))
     return [
         Target(name=name, clip=film[:frames], view=otherwise, truth={"wind_speed": wind, "area_weight": density})
@@ -228,14 +228,14 @@ def _peer(method: str, evaluator: Evaluator, target: Target, *, budget: int, see
     def evaluate(points: FloatArray) -> tuple[FloatArray, FloatArray]:
         made = evaluator.evaluate(points, 1)
         seconds = np.array([sum(entry.seconds[stage] for stage in STAGES) for entry in made])
-        return np.array([float(squared(entry.embedding, wanted)[0]) for entry in made]), seconds
+        return np.array([float(squared_embedding_distance(entry.embedding, wanted)[0]) for entry in made]), seconds
 
     return minimise(method, evaluate, dimension=DIMENSION, budget=budget, seed=seed)
 
 
 def _regression(target: Target, estimator: Estimator, space: Space, seed: int) -> Score:
     begun = time.perf_counter()
-    draws = refinement_start.amortised(estimator, target.clip, space, aspect=1.5, seed=seed, draws=models.DRAWS)
+    draws = refinement_start.amortised_draws(estimator, target.clip, space, aspect=1.5, seed=seed, draws=models.DRAWS)
     seconds = time.perf_counter() - begun
     low, middle, high = np.quantile(draws, [(1 - LEVEL) / 2, 0.5, (1 + LEVEL) / 2], axis=0)
     wind, density = target.truth["wind_speed"], target.truth["area_weight"]
@@ -256,7 +256,7 @@ def _handmade(at: str, seed: int) -> Fitted | None:
         return None
     spec = DataSpec(datasets=("flagsim-wide",))
     train = Source.open(lake).pairs(spec.rows, at=at, split="train")
-    return fitted(train, cache=Path(f"{lake}.inputs"), workers=1, seed=seed, bars=progress)
+    return fit_baselines(train, cache=Path(f"{lake}.inputs"), workers=1, seed=seed, bars=progress)
 
 
 def _boosting(target: Target, models: Fitted) -> Score:

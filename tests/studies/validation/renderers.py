@@ -19,7 +19,18 @@ from PIL import Image
 from flagdata.core.arrays import BoolArray, FloatArray
 from flagdata.lake import MeshSequence
 from sim.assets import Assets
-from sim.render import Cycles, Meshes, Raster, Renderer, RenderParameters, Workbench, named, plate, stage, to_bytes
+from sim.render import (
+    Cycles,
+    Meshes,
+    Raster,
+    Renderer,
+    RenderParameters,
+    Workbench,
+    named_prior,
+    plate,
+    stage,
+    to_bytes,
+)
 from sim.run import Crew, Stepper, load
 from sim.run import run as simulate
 
@@ -34,7 +45,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     """Agreement over all scenes, seconds a frame of one core, and a sheet of the first scenes side by side."""
     torch.set_num_threads(1)
     assets = Assets()
-    prior = named("flags")
+    prior = named_prior("flags")
     flags = _flags(seed)
     overlap, misplaced, brightness, difference, pairs = [], [], [], [], []
     seconds: dict[str, list[float]] = {"cycles": [], "raster": [], "workbench": []}

@@ -40,7 +40,7 @@ from measure.nulls import bank as banks
 from measure.observe import Experiment, Hold, Observation, Setup, Specimen, WindTrack, from_arrays, observe, sheet
 from measure.shares import Share
 from measure.verdict import CRITERIA, Estimate
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.mesh import grid
 from sim.wind import VonKarman
 from tests.studies.validation.flags_runs import CAMEL
@@ -283,7 +283,9 @@ def simulated(case: str, number: int, seed: int, *, across: int = ACROSS_MARKERS
     rng = stream(seed, "stressors", case, "truth", number)
     material, parameters = CAMEL, {}
     if case == _OTHER:
-        other = named(str(rng.choice([name for name in sorted((*TABLES, "aluminium", "paper")) if name != CAMEL.name])))
+        other = named_material(
+            str(rng.choice([name for name in sorted((*TABLES, "aluminium", "paper")) if name != CAMEL.name]))
+        )
         material = replace(other.scaled(area_weight=CAMEL.area_weight / other.area_weight), damping=CAMEL.damping)
     flat = grid(width=WIDTH, height=HEIGHT, columns=11, rows=7)
     ends = [int(np.argmin(np.linalg.norm(flat.rest - corner, axis=1))) for corner in ((0.0, 0.0), (0.0, HEIGHT))]

@@ -12,7 +12,7 @@ import torch
 from measure.observe import parse
 from measure.verdict import Conclusion
 from sim.cloth.cloth_batch import Cloth
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.membrane import energy as stretching
 from sim.cloth.mesh import grid
 from sim.effects import HemMass
@@ -20,7 +20,7 @@ from tests.studies.validation import foreign
 from tests.studies.validation.mujoco import experiments
 from tests.studies.validation.mujoco.experiments import DAMPINGS, NOMINAL, NOTHING, SPREAD, UNDECLARED, Truth, draw
 
-MATERIAL = named("camel-ponte-roma")
+MATERIAL = named_material("camel-ponte-roma")
 TRUTHS = [draw(f"null-{k}", NOTHING, seed=3) for k in range(40)]
 
 

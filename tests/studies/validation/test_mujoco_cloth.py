@@ -18,7 +18,7 @@ from scipy.special import j0
 from flagdata.core.arrays import FloatArray
 from flagdata.errors import NotFoundError
 from sim.cloth.cloth_batch import Cloth
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.mesh import grid
 from sim.effects import FiniteSpanLoading
 from tests.studies.validation.environments import MUJOCO, UnusableError
@@ -175,7 +175,7 @@ def test_the_inertia_of_the_air_about_a_still_wave_is_that_of_its_wavenumbers(mo
         size += 0.3 * ((k / 2) ** 1.5 + (4 / np.pi) ** 1.5) ** (-2 / 3) * part * np.cos(b * np.pi * v)
     expected = mesh.vertex_areas * root(v) * size * 25 * along**2 * wave
     assert np.linalg.norm(found[:, 1] - expected) < 0.05 * np.linalg.norm(expected)
-    cloth = Cloth.build(mesh, [named("camel-ponte-roma")], dtype=torch.float64)
+    cloth = Cloth.build(mesh, [named_material("camel-ponte-roma")], dtype=torch.float64)
     own = FiniteSpanLoading(share=1.0, density=0.3).added_mass(cloth)[:, 0].numpy()
     np.testing.assert_allclose(carried.mass, own, rtol=1e-6)  # places are rounded to a nanometre
 

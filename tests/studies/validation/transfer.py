@@ -51,7 +51,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     """Errors of wind and area weight, coverage and doubt, for each change."""
     del out
     torch.set_num_threads(1)
-    model = estimator.shipped()
+    model = estimator.load_shipped()
     result: dict[str, Any] = {"model": model.name, "level": LEVEL, "false_alarm": FALSE_ALARM, "of": {}}
     for name, change in CHANGES.items():
         recipe = change(unseen(FLAGS // 4 if name == "rendered by Cycles" else FLAGS, seed))

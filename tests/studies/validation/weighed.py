@@ -55,14 +55,14 @@ from measure.cloth import (
     Normal,
     Observed,
     Uncertain,
-    simulated,
+    simulated_values,
 )
-from measure.cloth.cloth_calibration import answered
+from measure.cloth.cloth_calibration import answer_of
 from measure.cloth.flag_simulation import BATCH, windows
 from measure.observables import View
 from sim.cloth import handles
 from sim.cloth.handles import Handles
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.cloth.mesh import Diagonals, Mesh, grid
 from sim.cloth.scene import Scene, assemble
 from sim.effects import AnemometerLag
@@ -244,7 +244,7 @@ def _start(own: Mesh, truth: Mapping[str, Any]) -> FloatArray:
 
 
 def _scene(own: Mesh, truth: Mapping[str, Any], *, damped: float) -> Scene:
-    base = named(truth["fabric"])
+    base = named_material(truth["fabric"])
     material = replace(
         base,
         area_weight=truth["area_weight"],
@@ -275,7 +275,7 @@ def folder() -> Path:
 
 def simulations(at: Path) -> FloatArray:
     """(simulation, window, observable) of the design."""
-    return simulated(design(), folder=at / "batches", workers=int(os.environ.get("FLAGDATA_WORKERS", "1")))
+    return simulated_values(design(), folder=at / "batches", workers=int(os.environ.get("FLAGDATA_WORKERS", "1")))
 
 
 def positions(truth: Mapping[str, Any], at: Path) -> FloatArray:
@@ -344,7 +344,7 @@ def weigh(
     """
     own, stated = of
     one = Observed(name=name, source="", readings=found, log=own.log, sigma=sigma)
-    answer = answered([(one, own.values(), base, MEASURED)], stated)
+    answer = answer_of([(one, own.values(), base, MEASURED)], stated)
     (fitted,), weight = answer.recordings, answer.weight
     low, high = weight.span.ends()
     return {

@@ -35,8 +35,8 @@ from measure.cloth import (
     Observed,
     Sight,
     informative,
-    simulated,
-    weighed,
+    simulated_values,
+    weigh_cloths,
     with_errors,
 )
 from sim.cloth.scene import assemble
@@ -120,7 +120,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     at = Path(os.environ.get("FLAGDATA_WEIGHED") or mkdtemp(prefix="weighed-briefly-"))
     at.mkdir(parents=True, exist_ok=True)
     own, some = loop.designs()[WIND], truths()
-    base = simulated(own, folder=Path(os.environ.get("FLAGDATA_LOOP_ON_FILMS") or at / "batches"))
+    base = simulated_values(own, folder=Path(os.environ.get("FLAGDATA_LOOP_ON_FILMS") or at / "batches"))
     positions = large.kept(at / "positions.npy", moved)
     seen = large.kept(
         at / "geometry.npy",
@@ -132,7 +132,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     emulator = Emulator.fit(own.values(), summaries, shown, name="briefly")
     observed = blank.projection.of(seen).reshape(len(seen), -1)
     sight = Sight(emulator=emulator, azimuth=own.azimuth, elevation=own.elevation)
-    draws = weighed([sight], [observed], seed=SEED)["area_weight"]
+    draws = weigh_cloths([sight], [observed], seed=SEED)["area_weight"]
     low, middle, high = np.quantile(draws, [0.05, 0.5, 0.95], axis=1).tolist()
     for place, truth in enumerate(some):
         rows.append(

@@ -16,7 +16,7 @@ from flagdata.core.arrays import FloatArray, UInt8Array
 from flagdata.core.rng import stream
 from measure.cloth import OBSERVED
 from measure.film import FilmReading, FlagSize, subjects
-from measure.observables import OBSERVABLES, watched
+from measure.observables import OBSERVABLES, watch_film
 from sim.assets import Assets
 from sim.cloth.mesh import Mesh
 from sim.render import Meshes, Raster, RenderParameters, render_prior
@@ -41,7 +41,7 @@ def filmed(truth: Mapping[str, Any], positions: FloatArray, mesh: Mesh, at: Path
     if not path.exists():
         write(path, pictures(truth, positions[: round(SECONDS * RATE) + 1], mesh), seed=truth["seed"])
     (subject,) = subjects(str(path), query=None, lake=None, at=None, reading=FilmReading(aspect=_SIZE.aspect))
-    seen = watched(subject.film, _SIZE, last=SECONDS)
+    seen = watch_film(subject.film, _SIZE, last=SECONDS)
     nothing = [math.nan] * len(OBSERVED)
     return np.array(
         [
@@ -54,7 +54,7 @@ def filmed(truth: Mapping[str, Any], positions: FloatArray, mesh: Mesh, at: Path
 def pictures(truth: Mapping[str, Any], positions: FloatArray, mesh: Mesh) -> UInt8Array:
     """(frame, height, width, 3) of a look that is drawn, from the truth's place."""
     assets = Assets()
-    zeta = placed(render_prior.named("flags").draw(truth["seed"], assets), truth, positions, mesh)
+    zeta = placed(render_prior.named_prior("flags").draw(truth["seed"], assets), truth, positions, mesh)
     count, vertices = positions.shape[:2]
     faces = torch.tensor(mesh.faces, dtype=torch.int64)
     size = mesh.rest.max(axis=0)

@@ -22,9 +22,9 @@ import numpy as np
 
 from flagdata.core.arrays import AnyArray, IntArray
 from flagdata.core.findings import Finding
-from flagdata.core.units import UNITS, spelled
+from flagdata.core.units import UNITS, name_of_unit
 from flagdata.errors import InputError, LimitError, TimeError
-from flagdata.ingest.anemometer.instants.stamp_text import DAY, HOUR, snapped
+from flagdata.ingest.anemometer.instants.stamp_text import DAY, HOUR, snap_to_grid
 from flagdata.ingest.anemometer.text.text_file import TableText
 from flagdata.ingest.anemometer.wind_options import Limits
 from flagdata.timebase import NANOSECONDS, from_datetime, iso
@@ -139,7 +139,7 @@ def instants(values: AnyArray, attributes: Mapping[str, Any], *, where: str) -> 
         time = (floors + units) * count.unit + further + rest.astype(np.int64)
     findings: tuple[Finding, ...] = ()
     step = float(np.spacing(np.abs(counts).max(initial=0))) * count.unit if counts.dtype.kind == "f" else 0.0
-    time = snapped(time, 1_000_000, round(step)) if step <= 1_000 else time
+    time = snap_to_grid(time, 1_000_000, round(step)) if step <= 1_000 else time
     if step > NANOSECONDS / 1000:
         message = (
             f"the times are numbers of {8 * counts.dtype.itemsize} bits, which are {step / NANOSECONDS:.3g} s apart"
@@ -202,7 +202,7 @@ def _table(data: Any, raw: Any, path: Path, limits: Limits) -> TableText:
     unread: list[str] = []
     for variable in data.data_vars.values():
         standard = variable.attrs.get("standard_name", "")
-        channel, unit = _STANDARD.get(standard), spelled(variable.attrs.get("units", ""))
+        channel, unit = _STANDARD.get(standard), name_of_unit(variable.attrs.get("units", ""))
         if channel is None or unit is None or variable.dims != (time,):
             unread.append(repr(variable.name))
             continue

@@ -98,7 +98,7 @@ def doubts(reading: Reading, recipe: Recipe, *, assumed: frozenset[str], left_ou
     return (*of_values, *of_reader)
 
 
-def reported(reading: Reading, answered: frozenset[str]) -> tuple[Finding, ...]:
+def report_doubts(reading: Reading, answered: frozenset[str]) -> tuple[Finding, ...]:
     """Reports what speaks against the column or the unit of the wind that an exact format or a recipe has read.
 
     Args:
@@ -280,7 +280,7 @@ def _tens(sight: _Seen) -> str:
     return f"the directions are whole numbers up to {directions.max():g}, and no unit is stated" if small else ""
 
 
-def _fixed(sight: _Seen) -> str:
+def _fixed_sentence(sight: _Seen) -> str:
     speed, direction = sight.pairs
     same = len(direction) > 10 and bool((direction == direction[0]).all()) and len(np.unique(speed)) > 3
     return f"the direction is {direction[0]:g} in every row, while the speed varies" if same else ""
@@ -349,7 +349,7 @@ CHECKS: Mapping[str, tuple[Callable[[_Seen], str], str]] = {
     "grows": (_grows, "Is this a speed, and no distance, count or sum?"),
     "angles": (_angles, "Are these speeds, and no directions?"),
     "tens": (_tens, "Are these degrees, and no tens of degrees or sectors?"),
-    "fixed": (_fixed, "Did the vane never turn?"),
+    "fixed": (_fixed_sentence, "Did the vane never turn?"),
     "calm": (_calm, "Is 0 the north, and not calm air or a variable wind?"),
     "order": (_order, "Are all rows of one device, in their order? (--clock corrects a clock that was set)"),
     "future": (_future, "Is the clock right?"),

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from flagdata.core import compass
-from flagdata.core.units import UNITS, canonical, spelled
+from flagdata.core.units import UNITS, canonical, name_of_unit
 from flagdata.ingest.anemometer.draft.given_columns import GivenColumns, given_columns
 from flagdata.ingest.anemometer.draft.heading_words import GUSTS, MOVING, Meaning, fits, meaning, named_alike
 from flagdata.ingest.anemometer.draft.questions import ZONE, Open
@@ -62,31 +62,36 @@ def recipe_text(
         'source = "the file"',
         "",
         "[file]",
-        f"delimiter = {quoted(delimiter)}",
-        f"decimal = {quoted(shape.decimal)}",
+        f"delimiter = {quote_for_toml(delimiter)}",
+        f"decimal = {quote_for_toml(shape.decimal)}",
         f"preamble = {shape.preamble}",
         f"header = {shape.header}",
-        f"missing = [{', '.join(map(quoted, missing))}]",
+        f"missing = [{', '.join(map(quote_for_toml, missing))}]",
         "",
         "[time]",
     ]
     columns = ["?"] if time is None else [shape.reference(i) for i in time]
-    lines += [f"columns = [{', '.join(map(reference, columns))}]", f"format = {quoted(form or '?')}"]
-    lines += [f"zone = {quoted(zone)}"] if zone is not None else []
+    lines += [f"columns = [{', '.join(map(reference, columns))}]", f"format = {quote_for_toml(form or '?')}"]
+    lines += [f"zone = {quote_for_toml(zone)}"] if zone is not None else []
     for name, channel in channels.items():
-        lines += ["", f"[channels.{name}]", f"column = {reference(channel.column)}", f"unit = {quoted(channel.unit)}"]
+        lines += [
+            "",
+            f"[channels.{name}]",
+            f"column = {reference(channel.column)}",
+            f"unit = {quote_for_toml(channel.unit)}",
+        ]
         lines += ['convention = "to"'] if channel.towards else []
-    return "\n".join([*lines, "", "[sensor]", f"name = {quoted(label)}", ""])
+    return "\n".join([*lines, "", "[sensor]", f"name = {quote_for_toml(label)}", ""])
 
 
-def quoted(text: str) -> str:
+def quote_for_toml(text: str) -> str:
     """Quotes a text for TOML."""
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\t", "\\t") + '"'
 
 
 def reference(column: str | int) -> str:
     """Writes a column for TOML: its heading, or its number."""
-    return str(column) if isinstance(column, int) else quoted(column)
+    return str(column) if isinstance(column, int) else quote_for_toml(column)
 
 
 Origin = Literal["stated", "inferred", "assumed", "given"]
@@ -207,7 +212,7 @@ def draft(
     if user_columns is None and not winds and time is None:
         return None
     if user_columns is None:
-        _mixed(parts, shape, meanings)
+        _ask_about_sites(parts, shape, meanings)
     parts.facts.insert(0, _cutting(shape, lines))
     label = options.wind or (winds[0] if winds else "anemometer")
     unused_columns = [i for i in range(len(shape.names)) if i not in parts.used and shape.names[i]]
@@ -232,15 +237,15 @@ def draft(
     )
 
 
-def _mixed(parts: _Parts, shape: TableShape, meanings: Sequence[Meaning]) -> None:
+def _ask_about_sites(parts: _Parts, shape: TableShape, meanings: Sequence[Meaning]) -> None:
     """Asks where a column names several sites or units, whose rows must not be mixed."""
     for index, heading in enumerate(meanings):
         values = sorted(set(shape.column(index)) - {""})
-        of_units = bool(values) and all(fits("wind_speed", spelled(value) or "") for value in values)
+        of_units = bool(values) and all(fits("wind_speed", name_of_unit(value) or "") for value in values)
         if (heading.kind == "site" or of_units) and index not in parts.used and 1 < len(values) < len(shape.rows):
             several = f"{len(values)} {'units' if of_units else 'sites'}"
             question = f"rows are of {several} by {shape.shown(index)}: {', '.join(values[:_LISTED])}; which one?"
-            lines = f"[rows]\ncolumn = {reference(shape.reference(index))}\nvalue = {quoted(values[0])}"
+            lines = f"[rows]\ncolumn = {reference(shape.reference(index))}\nvalue = {quote_for_toml(values[0])}"
             parts.open.append(Open(key="sensor", question=question, example="FILE.toml", lines=lines))
 
 
@@ -361,7 +366,7 @@ def _of_wind(
     components = {_AXES[kind]: axes[kind] for kind in ("x", "y", "z") if kind in axes and axes[kind] in numeric}
     if chosen is None and not speeds and {"wind_x", "wind_y"} <= set(components):
         for channel, index in components.items():
-            _measured(parts, shape, meanings, channel, index, options, is_given=False)
+            _add_wind_column(parts, shape, meanings, channel, index, options, is_given=False)
         earth = any(word in shape.names[components["wind_x"]].lower() for word in ("east", "u10"))
         _other_quantities(parts, shape, meanings)
         return (shape.label(components["wind_x"]),), earth
@@ -382,18 +387,18 @@ def _of_wind(
             "moving (the wind is apparent), or corrected (the wind is over ground)?"
         )
         parts.open.append(Open(key="platform", question=question, example="PLATFORM"))
-    _measured(parts, shape, meanings, "wind_speed", chosen, options, is_given=is_given)
+    _add_wind_column(parts, shape, meanings, "wind_speed", chosen, options, is_given=is_given)
     direction = _direction(parts, shape, meanings, chosen)
     doubts = [gust_factor(shape, meanings, chosen)]
     if direction is not None and {"wind_x", "wind_y"} <= set(components):
         axes_columns = (components["wind_x"], components["wind_y"])
-        doubts.append(contradicted(shape, axes_columns, direction, parts.channels["wind_direction"].unit))
+        doubts.append(ask_about_direction(shape, axes_columns, direction, parts.channels["wind_direction"].unit))
     parts.open += [doubt for doubt in doubts if doubt is not None and doubt.example not in options.expect]
     _other_quantities(parts, shape, meanings)
     return tuple(labels), False
 
 
-def _measured(
+def _add_wind_column(
     parts: _Parts,
     shape: TableShape,
     meanings: Sequence[Meaning],
@@ -538,7 +543,7 @@ def gust_factor(shape: TableShape, meanings: Sequence[Meaning], speed: int) -> O
     return None
 
 
-def contradicted(shape: TableShape, axes: tuple[int, int], direction: int, unit: str) -> Open | None:
+def ask_about_direction(shape: TableShape, axes: tuple[int, int], direction: int, unit: str) -> Open | None:
     """Asks about a direction that components towards east and north beside it contradict.
 
     Args:

@@ -14,7 +14,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from flagdata.core.numbered import bounded
+from flagdata.core.numbered import read_bounded
 from flagdata.core.schema import CHANNELS
 from flagdata.core.units import canonical
 from flagdata.errors import InputError, UnknownNameError, UsageError
@@ -110,7 +110,7 @@ def _index(column: str, shape: TableShape) -> int:
         if shape.names.count(column) > 1:
             raise InputError(f"{column!r} heads several columns", where=_WHERE, fix="give its number (from 1)")
         return shape.names.index(column)
-    number = bounded(column, most=len(shape.names))
+    number = read_bounded(column, most=len(shape.names))
     if number:
         return number - 1
     raise UnknownNameError.of("column", column, [name for name in shape.names if name], where=_WHERE)

@@ -12,7 +12,7 @@ from itertools import pairwise
 from typing import Literal
 
 from flagdata.core.schema import CHANNELS
-from flagdata.core.units import UNITS, spelled
+from flagdata.core.units import UNITS, name_of_unit
 
 Kind = Literal[
     "speed", "direction", "site", "sonic", "x", "y", "z", "time", "date", "temperature", "humidity", "pressure", "other"
@@ -153,14 +153,14 @@ def _kind(words: list[str], joined: set[str], unit: str | None) -> Kind:
 
 def _with_unit(name: str, below: str) -> tuple[str, str | None]:
     """Splits a heading into name and unit, which stands in brackets, behind a comma or blank, or in the line below."""
-    if (alone := spelled(name[:40])) is not None:
+    if (alone := name_of_unit(name[:40])) is not None:
         return "", alone
     match = _BRACKET.match(name[:200])
-    if match is not None and (unit := spelled(match["unit"])) is not None:
+    if match is not None and (unit := name_of_unit(match["unit"])) is not None:
         return f"{match['name']} {match['rest']}", unit
     for mark in (",", " - ", " in ", " ", "_"):
         head, _, tail = name[:200].rpartition(mark)
-        unit = spelled(tail) if head and (len(tail) > 1 or mark == ",") else None
+        unit = name_of_unit(tail) if head and (len(tail) > 1 or mark == ",") else None
         if unit is not None and UNITS[unit].si in ("m/s", "rad", "K", "Pa") and tail.lower() not in ("to", "grad"):
             return head, unit
-    return name[:200], spelled(below.strip("[]() ")) if below else None
+    return name[:200], name_of_unit(below.strip("[]() ")) if below else None

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from flagdata.core.units import spelled
+from flagdata.core.units import name_of_unit
 from flagdata.ingest.anemometer.sensor_recipe import MISSING, MISSING_SIGNS
 from flagdata.ingest.anemometer.text.cut_lines import cells_of_lines
 
@@ -119,14 +119,14 @@ def _delimiter(lines: Sequence[str]) -> str | None:
         count, often = counts.most_common(1)[0] if counts else (0, 0)
         if count and often >= _AGREE * len(lines):
             return sign
-    delimiter = _sniffed(lines)
+    delimiter = _sniff_delimiter(lines)
     if delimiter is not None:
         return delimiter
     count, often = Counter(len(line.split()) for line in lines).most_common(1)[0] if lines else (0, 0)
     return " " if count > 1 and often >= _AGREE * len(lines) else None
 
 
-def _sniffed(lines: Sequence[str]) -> str | None:
+def _sniff_delimiter(lines: Sequence[str]) -> str | None:
     """Asks DuckDB for the delimiter, and takes it where it cuts most lines into equally many cells."""
     import duckdb  # costs a tenth of a second, and readers of records need none
 
@@ -178,7 +178,7 @@ def _heading(numbers: Sequence[int], above: Sequence[Sequence[str]], width: int)
 
 def _is_units(row: Sequence[str]) -> bool:
     filled = [cell.strip("[]() ") for cell in row if cell]
-    return sum(spelled(cell) is not None for cell in filled) >= max(1, len(filled) / 3)
+    return sum(name_of_unit(cell) is not None for cell in filled) >= max(1, len(filled) / 3)
 
 
 def _decimal(rows: Sequence[Sequence[str]], numeric: frozenset[int], delimiter: str) -> str:

@@ -99,7 +99,7 @@ def of_columns(
     texts = [text for text in texts if text.strip()]
     forms = [form] if form is not None else _candidates(texts, columns)
     forms = [candidate for candidate in forms if form is not None or _reads_any(texts[:_LOOK], candidate)]
-    fitting = [candidate for candidate in forms if _reads(texts, candidate) and _ordered(candidate, order)]
+    fitting = [candidate for candidate in forms if _reads(texts, candidate) and _has_order(candidate, order)]
     if not fitting:
         return None
     distinct = _distinct(fitting, texts)
@@ -169,7 +169,7 @@ def _letters(form: str) -> str:
     return "".join(_ORDER[part] for part in re.findall(r"%[dmYy]", form))
 
 
-def _ordered(form: str, order: str | None) -> bool:
+def _has_order(form: str, order: str | None) -> bool:
     """Checks whether a form has the order that the user gave; one without numbers of day and month has any."""
     letters = _letters(form)
     return order is None or len(letters) < 3 or letters == order

@@ -33,7 +33,7 @@ from flagdata.core.units import UNITS
 from flagdata.errors import InputError
 from flagdata.ingest.anemometer.formats.serial_lines import Defect, Instrument, Sample, read_lines
 from flagdata.ingest.anemometer.log_reading import Reading
-from flagdata.ingest.anemometer.samples.platform import settled
+from flagdata.ingest.anemometer.samples.platform import settle_platform
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.text.text_file import TextFile
 from flagdata.ingest.anemometer.wind_options import WindOptions
@@ -115,7 +115,7 @@ class Canboat:
             )
         kept_findings = tuple(finding for finding in reading.findings if finding.kind != "non-data-lines")
         knots = [speed / UNITS["kn"].scale for speed in network.speeds]
-        channels, about = settled(reading.channels, options, speeds=knots, source=f"PGN {_WIND}", where=where)
+        channels, about = settle_platform(reading.channels, options, speeds=knots, source=f"PGN {_WIND}", where=where)
         sensor = Sensor(name=f"NMEA 2000 device {next(iter(network.devices))}", resolution=0.01)
         return replace(reading, channels=channels, sensor=sensor, findings=(*kept_findings, about))
 

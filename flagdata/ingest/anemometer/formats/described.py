@@ -33,12 +33,12 @@ import numpy as np
 from flagdata.core.findings import Finding
 from flagdata.core.schema import CHANNELS
 from flagdata.core.shell import command_line
-from flagdata.core.units import UNITS, spelled, unit
+from flagdata.core.units import UNITS, name_of_unit, unit
 from flagdata.errors import InputError
 from flagdata.ingest.anemometer import sensor_recipe as recipes
 from flagdata.ingest.anemometer.formats.recipe_headings import Column, Heading, find, fits, stamp_format
 from flagdata.ingest.anemometer.instants.stamp_text import parse
-from flagdata.ingest.anemometer.log_reading import Reading, described
+from flagdata.ingest.anemometer.log_reading import Reading, followed_finding
 from flagdata.ingest.anemometer.sensor_recipe import OpenRecipe, Recipe
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.table.log_table import Table, read_table, with_horizontal
@@ -91,7 +91,7 @@ class Described:
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self.text, self.open = opened(name)
+        self.text, self.open = open_format(name)
         self.about: str = self.open.data["about"]
         self.uses = frozenset({"zone", "date_order", *(["unit"] if self._whole_in() else [])})
 
@@ -106,7 +106,7 @@ class Described:
     def read(self, source: TextFile, options: WindOptions) -> Reading:
         """Read the rows by what the heading states."""
         done = self.completed(source, options)
-        return self.finished(self.table(source, done, options).reading, done, options, where=str(source.path))
+        return self.finish_reading(self.table(source, done, options).reading, done, options, where=str(source.path))
 
     def completed(self, source: TextFile, options: WindOptions) -> Completed:
         """Reads what the heading of a file states."""
@@ -128,7 +128,7 @@ class Described:
             extra=extra,
         )
 
-    def finished(self, reading: Reading, done: Completed, options: WindOptions, *, where: str) -> Reading:
+    def finish_reading(self, reading: Reading, done: Completed, options: WindOptions, *, where: str) -> Reading:
         """Adds to a reading what the format states of averages, and what is reported of other columns."""
         findings = [*done.findings, *column_findings(done)]
         if done.averaged and len(reading.time) > 1:
@@ -140,7 +140,7 @@ class Described:
             text = f"stamps are of the beginning of averages over {averaging:g} s; moved to their end"
             findings.append(Finding.of("stamps-at-start", text))
         if "described-by" in self.open.data:
-            findings.append(described(self.open.data["described-by"]))
+            findings.append(followed_finding(self.open.data["described-by"]))
         reading = with_horizontal(reading.with_findings(tuple(findings)), options.azimuth, where=where)
         if not done.inferred:
             return replace(reading, described=self.text)
@@ -174,9 +174,9 @@ def complete(
     rows = [row for row in cells_of_lines(lines[heading.rows :], heading.delimiter) if any(map(str.strip, row))]
     at_rows = f"{where}, line {heading.rows + 1}"
     facts = _facts(data, lines[: heading.rows + 1])
-    stamped, zone = _stamped(data["time"], heading, facts, at_rows)
+    stamped, zone = _time_columns(data["time"], heading, facts, at_rows)
     columns, units = _with_units(data, heading, rows, facts, stamped, options, where)
-    taken, unread, rivals = _assigned(data["channels"], columns, where=where, heading=heading)
+    taken, unread, rivals = _assign_columns(data["channels"], columns, where=where, heading=heading)
     if not rows:
         raise InputError("there are no rows below the heading", where=at_rows, fix="export again")
     form, about_time = _format(data["time"], stamped, heading, rows, options, at_rows)
@@ -213,7 +213,7 @@ def complete(
 
 
 @cache
-def opened(name: str) -> tuple[str, OpenRecipe]:
+def open_format(name: str) -> tuple[str, OpenRecipe]:
     """Reads the text of a format of the catalog, and the recipe that it is."""
     text = _SHELF.named(name).text
     return text, recipes.parse_open(text, where=f"table format {name!r}")
@@ -240,7 +240,7 @@ def _file(
     }
 
 
-def _stamped(
+def _time_columns(
     time: Mapping[str, Any], heading: Heading, facts: Mapping[str, str], where: str
 ) -> tuple[list[int], str | None]:
     """Finds the columns of time, and the zone that the recipe or the file states."""
@@ -292,7 +292,7 @@ class _Units:
 def _unit_of(text: str) -> str | None:
     """Names the unit that an export spells as `text`; `None` where it is unknown. Inches are of mercury here."""
     bare = re.sub(r"^\s*[\[(](.*)[\])]\s*$", r"\1", text).strip()
-    return "inHg" if bare.lower() in ("in", "inches") else spelled(bare)
+    return "inHg" if bare.lower() in ("in", "inches") else name_of_unit(bare)
 
 
 def _channel(channels: Mapping[str, Mapping[str, Any]], column: Column) -> str | None:
@@ -392,7 +392,7 @@ def _whole_in(cells: Iterable[str], counted: str) -> str | None:
     return fits[0] if len(speeds) >= _ENOUGH and len(fits) == 1 else None
 
 
-def _assigned(
+def _assign_columns(
     channels: Mapping[str, Mapping[str, Any]], columns: Sequence[Column], *, where: str, heading: Heading
 ) -> tuple[dict[str, Column], tuple[Column, ...], tuple[Column, ...]]:
     """Assigns a column to each channel; also returns the columns that are not read, and further ones of speed.

@@ -48,14 +48,14 @@ from flagdata.ingest.anemometer.formats.serial_lines import (
     Sample,
     read_lines,
     split_stamp,
-    turned,
+    turn_directions,
 )
 from flagdata.ingest.anemometer.log_reading import Reading
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.table.log_table import with_horizontal
 from flagdata.ingest.anemometer.text.text_file import TextFile
 from flagdata.ingest.anemometer.wind_options import WindOptions
-from flagdata.recipes.shelves import Shelf, parsed
+from flagdata.recipes.shelves import Shelf, parse_recipe
 from flagdata.record.signals import Sensor
 
 _SHELF = Shelf(folder="sensors/serial", noun="serial format")
@@ -108,7 +108,7 @@ class Maker:
 @cache
 def maker(name: str) -> Maker:
     """Reads the description of a format of the catalog."""
-    data: dict[str, Any] = parsed(_SHELF.named(name).text, where=name)
+    data: dict[str, Any] = parse_recipe(_SHELF.named(name).text, where=name)
     sensor = Sensor(**data.pop("sensor"))
     fields = {key: Field(**value) for key, value in data.pop("fields").items()}
     return Maker(sensor=sensor, fields=fields, **{key.replace("-", "_"): value for key, value in data.items()})
@@ -263,7 +263,7 @@ class SerialLines:
         )
         reading = read_lines(source, instrument, zone_name=options.zone)
         if not maker.axes_from_south or "wind_x" not in reading.channels:
-            return turned(reading, options.azimuth, where=where)
+            return turn_directions(reading, options.azimuth, where=where)
         # with_horizontal takes wind along +x to come from the azimuth; here it comes from the opposite.
         axes = {name: reading.channels[name] for name in _AXES}
         facing = replace(reading, channels={**reading.channels, **{name: -values for name, values in axes.items()}})

@@ -67,7 +67,7 @@ class Bursts:
         # Of the burst before the first mark only the end may be there.
         starts_of_bursts = np.concatenate(([marks[0] - int(np.median(np.diff(marks)))], marks)).astype(np.int64)
         burst = np.searchsorted(edges, lines, side="right")
-        distinct = np.unique(np.stack([burst, _numbered(winds)]), axis=1).shape[1] == len(lines)
+        distinct = np.unique(np.stack([burst, _marks_of_lines(winds)]), axis=1).shape[1] == len(lines)
         if not distinct or at[0] - self.begins > 2 * np.median(np.diff(at)):
             return None
         time = starts_of_bursts[burst]
@@ -91,7 +91,7 @@ class Bursts:
         return np.where(first_lines <= at, first_lines, at)
 
 
-def _numbered(winds: Sequence[Hashable]) -> IntArray:
+def _marks_of_lines(winds: Sequence[Hashable]) -> IntArray:
     kinds = {kind: number for number, kind in enumerate(dict.fromkeys(winds))}
     return np.array([kinds[kind] for kind in winds], dtype=np.int64)
 
@@ -102,7 +102,7 @@ def _are_bursts(lines: IntArray, winds: Sequence[Hashable], at: IntArray, marks:
     if spacing < max(_LEAST, _SILENT * between * SENTENCE):
         return False
     interval = np.searchsorted(at, lines)
-    pairs = np.stack([interval, _numbered(winds)])
+    pairs = np.stack([interval, _marks_of_lines(winds)])
     _, counts = np.unique(pairs, axis=1, return_counts=True)
     return float((counts == 1).mean()) >= _SHARE
 
@@ -288,7 +288,7 @@ def _one_clock(marks: Instants, at: IntArray, choice: ClockChoice | None) -> tup
     jumps = clocks.set_back(marks[settled])
     jumps = jumps if len(jumps) <= clocks.MOST else ()
     out = marks.copy()
-    out[settled], _ = clocks.continued(marks[settled], jumps, choice)
+    out[settled], _ = clocks.continue_clock(marks[settled], jumps, choice)
     findings = clocks.report(marks[settled], jumps, at[settled], choice)
     if stray.any():
         out[stray] = out[settled[np.maximum(np.searchsorted(settled, np.flatnonzero(stray)) - 1, 0)]]

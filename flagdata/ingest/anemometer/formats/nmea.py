@@ -50,7 +50,7 @@ from flagdata.ingest.anemometer.formats.serial_lines import (
 from flagdata.ingest.anemometer.instants.zones import instants
 from flagdata.ingest.anemometer.log_reading import Reading
 from flagdata.ingest.anemometer.samples import rules
-from flagdata.ingest.anemometer.samples.platform import settled
+from flagdata.ingest.anemometer.samples.platform import settle_platform
 from flagdata.ingest.anemometer.sniffing import Guess, Head
 from flagdata.ingest.anemometer.text.text_file import TextFile
 from flagdata.ingest.anemometer.wind_options import WindOptions
@@ -139,17 +139,17 @@ class Nmea:
     def read(self, source: TextFile, options: WindOptions) -> Reading:
         """Read all wind sentences."""
         where = str(source.path)
-        stream = gathered(source, options, lambda number, line: line)
+        stream = gather_sentences(source, options, lambda number, line: line)
         line = np.array(stream.line, dtype=np.int64)
         winds = [frozenset(row) for row in stream.values]
         placed = stream.times.place(line, date=options.date, where=where, choice=options.clock, winds=winds)
         reading = reading_of(stream, placed.time, options, where=where)
         flags = reading.flags | np.uint16(SampleFlag.TIME_UNSURE)
-        found = _placed(len(line), placed)
+        found = _placed_findings(len(line), placed)
         return replace(reading, flags=flags, findings=(*found, *reading.findings))
 
 
-def gathered(
+def gather_sentences(
     source: TextFile, options: WindOptions, divide: Callable[[int, str], str], *, timed: bool = False
 ) -> Stream:
     """Gathers the wind sentences of one talker.
@@ -209,7 +209,7 @@ def reading_of(stream: Stream, time: Instants, options: WindOptions, *, where: s
         fix = "check that the sensor is connected and gives valid data"
         raise InputError("every wind sentence is empty or invalid", where=f"{where}, line {line[0]}", fix=fix)
     source = _sources(stream, "wind")
-    channels, about = settled(channels, options, speeds=stream.speeds, source=source, where=where)
+    channels, about = settle_platform(channels, options, speeds=stream.speeds, source=source, where=where)
     return Reading(
         time=time,
         channels=channels,
@@ -368,7 +368,7 @@ def _others_seen(kinds: Counter[str]) -> str:
     return f"; there are {counted}" if counted else ""
 
 
-def _placed(count: int, placed: Placed) -> tuple[Finding, ...]:
+def _placed_findings(count: int, placed: Placed) -> tuple[Finding, ...]:
     """Reports sentences that have their time from others."""
     if placed.marks < 2:
         return placed.findings
@@ -466,7 +466,7 @@ class StampedNmea:
                 marks.update({} if instant is None else {number: instant})
             return raw
 
-        stream = gathered(source, options, divide, timed=True)
+        stream = gather_sentences(source, options, divide, timed=True)
         if not texts:
             raise InputError(
                 "no line has an NMEA 0183 sentence after a stamp", where=where, fix="name another format by --as"

@@ -9,7 +9,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from flagdata.core.numbered import bounded
+from flagdata.core.numbered import read_bounded
 from flagdata.ingest.anemometer.formats.described import Described
 from flagdata.ingest.anemometer.formats.recipe_headings import Column, Heading
 from flagdata.ingest.anemometer.log_reading import Reading
@@ -36,7 +36,7 @@ class Nrg(Described):
         history = _history(lines[: heading.at])
         columns = [_column(column, history) for column in heading.columns]
         speed = next((column.name for column in columns if column.name.endswith("wind speed")), "")
-        ordered = sorted(columns, key=lambda column: _hundred(column.name) != _hundred(speed))
+        ordered = sorted(columns, key=lambda column: _hundred_of_channel(column.name) != _hundred_of_channel(speed))
         return replace(heading, columns=ordered)
 
     def read(self, source: TextFile, options: WindOptions) -> Reading:
@@ -55,7 +55,7 @@ class Nrg(Described):
             name=channel.get("description") or reading.sensor.name,
             height=float(height) if re.fullmatch(r"\d+(\.\d+)?", height) and float(height) > 0 else None,
         )
-        return self.finished(replace(reading, sensor=sensor), done, options, where=str(source.path))
+        return self.finish_reading(replace(reading, sensor=sensor), done, options, where=str(source.path))
 
 
 def _history(lines: Sequence[str]) -> Mapping[str, Mapping[str, str]]:
@@ -84,7 +84,7 @@ def _column(column: Column, history: Mapping[str, Mapping[str, str]]) -> Column:
     return replace(column, name=name, unit=_SPELLED.get(spelled.lower(), spelled))
 
 
-def _hundred(name: str) -> int | None:
+def _hundred_of_channel(name: str) -> int | None:
     match = re.match(r"Ch(\d+)", name)
-    number = bounded(match[1], most=_CHANNELS) if match else None
+    number = read_bounded(match[1], most=_CHANNELS) if match else None
     return None if number is None else number // 100

@@ -74,10 +74,10 @@ def find(data: Mapping[str, Any], lines: Sequence[str]) -> Heading | None:
         used = delimiter or ("\t" if "\t" in line else ";" if line.count(";") > 1 or "," not in line else ",")
         cells = cut(line, used)
         if match.get("groups") and at:
-            cells = _grouped(cut(above[at - 1], used), cells)
+            cells = _grouped_names(cut(above[at - 1], used), cells)
         if match.get("stacked") and at:
             used = "\t" if "\t" in line else " "
-            cells = _stacked(above[at - 1].lstrip("\ufeff"), above[at], used)
+            cells = _stacked_names(above[at - 1].lstrip("\ufeff"), above[at], used)
         complete = all(any(fits(name, cell) for cell in cells) for name in match.get("header", ()))
         if complete and re.search(mark, "\n".join(above[: at + 1])):
             heading = _heading_at(match, lines, at, used, cells, file.get("header", 1 + bool(match.get("units"))))
@@ -100,7 +100,7 @@ def _heading_at(
     return Heading(at=at, rows=rows, delimiter=delimiter, cells=cells, columns=columns, below=below)
 
 
-def _grouped(above: Sequence[str], cells: Sequence[str]) -> list[str]:
+def _grouped_names(above: Sequence[str], cells: Sequence[str]) -> list[str]:
     """Names behind the name of their group, which stands above the first of it."""
     joined, group = [], ""
     for at, cell in enumerate(cells):
@@ -109,7 +109,7 @@ def _grouped(above: Sequence[str], cells: Sequence[str]) -> list[str]:
     return joined
 
 
-def _stacked(upper: str, lower: str, delimiter: str) -> list[str]:
+def _stacked_names(upper: str, lower: str, delimiter: str) -> list[str]:
     """Joins names whose first word stands in the line above: in the same cell, or over one of the letters."""
     if delimiter != " ":
         first, second = cut(upper, delimiter), cut(lower, delimiter)

@@ -27,7 +27,7 @@ from flagdata.ingest.anemometer.formats.nmea_sentences import tag_time
 from flagdata.ingest.anemometer.instants.stamp_text import ABBREVIATED, ENGLISH, Stamps
 from flagdata.ingest.anemometer.instants.stamp_text import parse as parse_stamps
 from flagdata.ingest.anemometer.instants.zones import instants
-from flagdata.ingest.anemometer.log_reading import Reading, described
+from flagdata.ingest.anemometer.log_reading import Reading, followed_finding
 from flagdata.ingest.anemometer.samples import rules
 from flagdata.ingest.anemometer.sniffing import Head
 from flagdata.ingest.anemometer.text.text_file import TextFile
@@ -148,27 +148,27 @@ def split_stamp(line: str) -> tuple[str, str]:
         return ("", line) if instant is None else (f"{instant // 1000}{fraction}", line[line.rfind("\\") + 1 :])
     match = _STAMP.match(line)
     if match is not None:
-        stamp, raw = f"{match['date']}T{match['time']}{match['zone'] or ''}", _unquoted(match["raw"])
+        stamp, raw = f"{match['date']}T{match['time']}{match['zone'] or ''}", _unquote_text(match["raw"])
         return stamp, _AFTER.sub("", raw) if raw.startswith(("$", "!")) else raw
     match = _MONTH.match(line) or _CTIME.match(line)
     if match is not None and match["month"].lower() in ENGLISH:
         month = ENGLISH.index(match["month"].lower()) + 1
         east = {"UTC": 0, "GMT": 0, **ABBREVIATED}.get(match["zone"] or "")
         zone = "" if east is None else f"{east:+03d}:00"
-        return f"{match['year']}-{month:02d}-{match['day']:0>2}T{match['time']}{zone}", _unquoted(match["raw"])
+        return f"{match['year']}-{month:02d}-{match['day']:0>2}T{match['time']}{zone}", _unquote_text(match["raw"])
     match = _COMPACT.match(line)
     if match is not None:
         stamp = "{year}-{month}-{day}T{hour}:{minute}:{second}".format(**match.groupdict()) + (match["zone"] or "")
         return stamp, _AFTER.sub("", match["raw"])
     match = _EPOCH.match(line)
     if match is not None:
-        return match["epoch"], _unquoted(match["raw"])
+        return match["epoch"], _unquote_text(match["raw"])
     sentences = _SENTENCE.findall(line)
     if len(sentences) == 1:
         stamp = _stamp_of(_SENTENCE.sub(" ", line))
         if stamp:
             return stamp, sentences[0]
-    return "", _unquoted(line)
+    return "", _unquote_text(line)
 
 
 def _stamp_of(text: str) -> str:
@@ -259,7 +259,7 @@ def stamps_of(texts: Sequence[str]) -> Stamps:
     return parse_stamps(texts, form)
 
 
-def turned(reading: Reading, azimuth: float | None, *, where: str) -> Reading:
+def turn_directions(reading: Reading, azimuth: float | None, *, where: str) -> Reading:
     """Directions relative to the instrument's north mark, by the azimuth of that mark [rad].
 
     Raises:
@@ -284,7 +284,7 @@ def turned(reading: Reading, azimuth: float | None, *, where: str) -> Reading:
     return replace(reading, channels=channels).with_findings((finding,))
 
 
-def _unquoted(raw: str) -> str:
+def _unquote_text(raw: str) -> str:
     raw = raw.strip(" \t")
     return raw[1:-1].replace('""', '"') if len(raw) > 1 and raw[0] == raw[-1] == '"' else raw
 
@@ -365,5 +365,5 @@ def _findings(
     missing = line[(flags & SampleFlag.MISSING) != 0].tolist()
     note(missing, "missing-values", Severity.WARNING, "readings without a wind speed")
     if instrument.described_by is not None:
-        findings.append(described(instrument.described_by))
+        findings.append(followed_finding(instrument.described_by))
     return findings

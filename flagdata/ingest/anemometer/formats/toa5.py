@@ -71,7 +71,7 @@ class Toa5(Described):
         unread = tuple(
             replace(column, name=f"{column.name} [{column.unit}]") for column in done.unread if column.name not in extra
         )
-        return self.finished(reading, replace(done, unread=unread), options, where=where)
+        return self.finish_reading(reading, replace(done, unread=unread), options, where=where)
 
 
 def _header(source: TextFile) -> list[list[str]]:

@@ -156,7 +156,7 @@ def refuse_twelve(wall: IntArray, *, line: IntArray, where: str) -> None:
         )
 
 
-def completed(
+def complete_dates(
     wall: IntArray, form: str, *, date: dt.date | None, line: IntArray, where: str
 ) -> tuple[IntArray, tuple[Finding, ...]]:
     """Completes wall-clock nanoseconds of stamps without a date or a year that `parse` has read, in the order of time.

@@ -197,7 +197,7 @@ def longest_rise(time: Instants) -> IntArray:
     return chain
 
 
-def disordered(time: Instants) -> bool:
+def is_disordered(time: Instants) -> bool:
     """Checks whether rows that run back fill, once sorted, the intervals that they left: fewer steps are then unusual.
 
     Of a clock that was set back the sorted rows share stamps, or lie closer than the log's step.
@@ -224,7 +224,7 @@ def sorted_as_given(time: Instants, line: IntArray, choice: ClockChoice | None) 
     return np.argsort(time, kind="stable"), finding
 
 
-def continued(time: Instants, jumps: Sequence[Jump], choice: ClockChoice | None) -> tuple[Instants, BoolArray]:
+def continue_clock(time: Instants, jumps: Sequence[Jump], choice: ClockChoice | None) -> tuple[Instants, BoolArray]:
     """Puts all rows on one clock through all jumps; also says which rows were shifted for it: (n,) both.
 
     Args:

@@ -258,7 +258,7 @@ def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
     if form in SERIAL:
         return _serial(text, SERIAL[form])
     if form in ELAPSED:
-        return _elapsed(text, form)
+        return _elapsed_counts(text, form)
     if form in PLAIN_FORMS and (plain := _plain(text)) is not None:
         return plain
     fields = pc.extract_regex(text, pattern(form))
@@ -360,14 +360,14 @@ def _serial(text: pa.StringArray, base: float) -> Stamps:
     days = value - base
     valid = valid & (days > _SINCE / 86_400) & (days < _UNTIL / 86_400)
     ns = np.round(np.where(valid, days, 0.0) * 86_400e6).astype(np.int64) * 1_000
-    ns = snapped(ns, 1_000_000, 100_000)
+    ns = snap_to_grid(ns, 1_000_000, 100_000)
     step = max(1_000, round(DAY / 10**digits))
-    minute = snapped(ns, _MINUTE, step)
+    minute = snap_to_grid(ns, _MINUTE, step)
     ns = minute if step > 1_000_000 and not np.any(minute % _MINUTE) else ns
     return _counts(ns, valid, step)
 
 
-def _elapsed(text: pa.StringArray, form: str) -> Stamps:
+def _elapsed_counts(text: pa.StringArray, form: str) -> Stamps:
     """Counts since a start, up to ten years. Thirds and sixths of an hour are no decimal fractions: what is within the
     last digit of a whole second is one."""
     value, valid, digits = _numbers(text)
@@ -375,11 +375,11 @@ def _elapsed(text: pa.StringArray, form: str) -> Stamps:
     valid = valid & (value * (scale / NANOSECONDS) < 3.2e8)
     ns = np.round(np.where(valid, value, 0.0) * scale).astype(np.int64)
     step = max(1, scale // 10 ** min(digits, 9))
-    ns = snapped(ns, NANOSECONDS, step) if scale > NANOSECONDS and step < NANOSECONDS else ns
+    ns = snap_to_grid(ns, NANOSECONDS, step) if scale > NANOSECONDS and step < NANOSECONDS else ns
     return _counts(ns, valid, step)
 
 
-def snapped(ns: IntArray, grid: int, within: int) -> IntArray:
+def snap_to_grid(ns: IntArray, grid: int, within: int) -> IntArray:
     """Instants, those within so much of a multiple of `grid` on it."""
     nearest = np.round(ns / grid).astype(np.int64) * grid
     return np.where(np.abs(ns - nearest) <= within, nearest, ns)

@@ -143,7 +143,7 @@ def _on_one_clock(reading: Reading, where: str, choice: ClockChoice | None) -> R
     time, n = reading.time, len(reading.time)
     lag = np.maximum.accumulate(time) - time
     if not np.any(lag > JITTER):
-        return _continued(reading, log_clock.set_back_a_little(time, choice), choice)
+        return _continue_clock(reading, log_clock.set_back_a_little(time, choice), choice)
     few = max(min(_FEW, n // _SHARE), n // 1000)
     scattered = int((np.diff(time) < -JITTER).sum()) > max(few, log_clock.MOST)
     wild = np.zeros(n, dtype=bool) if scattered else log_clock.excursions(time, most=few)
@@ -156,7 +156,7 @@ def _on_one_clock(reading: Reading, where: str, choice: ClockChoice | None) -> R
         if int(wild.sum()) > few:
             raise _runs_back(reading, where, settable=choice is None and not scattered)
         jumps = ()
-    elif jumps and choice is None and log_clock.disordered(time[~wild]):
+    elif jumps and choice is None and log_clock.is_disordered(time[~wild]):
         raise _runs_back(reading, where, settable=True)
     first = iso(int(time[np.argmax(wild)]))
     message = f"{{n}} rows with stamps far from their neighbours' ({first})"
@@ -169,7 +169,7 @@ def _on_one_clock(reading: Reading, where: str, choice: ClockChoice | None) -> R
         value=worst,
         fix=log_clock.SORT if reading.stamped else None,
     )
-    return _continued(settled, jumps, choice)
+    return _continue_clock(settled, jumps, choice)
 
 
 def _believable(time: IntArray, jump: Jump) -> bool:
@@ -198,7 +198,7 @@ def _runs_back(reading: Reading, where: str, *, settable: bool) -> TimeError:
     )
 
 
-def _continued(reading: Reading, jumps: tuple[Jump, ...], choice: ClockChoice | None) -> Reading:
+def _continue_clock(reading: Reading, jumps: tuple[Jump, ...], choice: ClockChoice | None) -> Reading:
     """Puts the rows on one clock: set back by `jumps`, or set on as `clock.set_on` finds."""
     on = log_clock.set_on(reading.time, returns=jumps)
     if choice is None:
@@ -211,7 +211,7 @@ def _continued(reading: Reading, jumps: tuple[Jump, ...], choice: ClockChoice | 
     all_jumps = tuple(sorted((*jumps, *on), key=lambda jump: jump.row))
     if not all_jumps:
         return reading
-    time, shifted = log_clock.continued(reading.time, all_jumps, choice)
+    time, shifted = log_clock.continue_clock(reading.time, all_jumps, choice)
     flags = np.where(shifted, reading.flags | SampleFlag.TIME_UNSURE, reading.flags)
     findings = log_clock.report(reading.time, all_jumps, reading.line, choice, sortable=reading.stamped)
     return replace(reading, time=time).with_findings(findings, flags=flags)
@@ -258,7 +258,7 @@ def _distinct(reading: Reading, where: str) -> Reading:
             and not counted
             and (hold > 1.5 * reading.step or reading.step >= DAY or not _even(runs, period))
         ):
-            raise _shared(reading, runs, hold, f"{where}, line {reading.line[shared][0]}")
+            raise _shared_stamp_error(reading, runs, hold, f"{where}, line {reading.line[shared][0]}")
         held_stamps, moved = hold > 1.5 * reading.step or hold > _COARSE, np.ones(len(time), dtype=bool)
         kind = "counted-together" if counted else "held-stamps" if held_stamps else "coarse-stamps"
         value = (period if held_stamps and not counted else reading.step) / NANOSECONDS
@@ -323,7 +323,7 @@ def _even(runs: _Runs, period: float) -> bool:
     return bool(off[1 if len(off) > 2 else 0 :].mean() >= _EVEN) if len(off) else True
 
 
-def _shared(reading: Reading, runs: _Runs, hold: int, where: str) -> TimeError:
+def _shared_stamp_error(reading: Reading, runs: _Runs, hold: int, where: str) -> TimeError:
     low, high = int(runs.rows.min()), int(runs.rows.max())
     number, dates = f"{low}" if low == high else f"{low} to {high}", reading.step >= DAY
     message = (

@@ -3,7 +3,7 @@
 Formats that know nothing of platforms deliver `wind_speed` for whatever the sensor read. Where the user says that the
 platform moves, or its own speed or position says so, that becomes `apparent_wind_speed`, which is no ground truth,
 unless the user says that the platform's motion was taken out before the wind was logged ("corrected"). Of the winds of
-a network, `settled` says which are wind over ground.
+a network, `settle_platform` says which are wind over ground.
 """
 
 from __future__ import annotations
@@ -117,30 +117,30 @@ def settle(
         if "wind_speed" not in has and "apparent_wind_speed" in has:
             text += ": apparent wind is wind over ground, its direction still from the sensor's own mark"
             names = {"apparent_wind_speed": "wind_speed"}
-        return _renamed(reading, names, "fixed-platform", text, severity=Severity.NOTE)
+        return _rename(reading, names, "fixed-platform", text, severity=Severity.NOTE)
     if given_platform == "corrected":
         text, names = "wind over ground was computed from a moving platform's motion before it was logged, as given", {}
         if "wind_speed" not in has and "theoretical_wind_speed" in has:
             text += "; what the file calls true wind is kept as wind_speed"
             names = {"theoretical_wind_speed": "wind_speed"}
-        return _renamed(reading, names, "computed-true-wind", text)
+        return _rename(reading, names, "computed-true-wind", text)
     if given_platform is None and motion_shown is None:
         return _of_unknown(reading)
     if {"wind_speed", "apparent_wind_speed"} <= has:
         text = "wind over ground was computed by the instrument from a moving platform's heading and speed"
-        return _renamed(reading, {}, "computed-true-wind", text)
+        return _rename(reading, {}, "computed-true-wind", text)
     names = {name: renamed for name, renamed in _RENAMED.items() if name in has and renamed not in has}
     platform = "a moving platform, as given" if motion_shown is None else f"a platform that {motion_shown.text}"
     text = f"wind relative to {platform}: no ground truth"
     text += "; what the file calls wind speed is kept as apparent_wind_speed" if "wind_speed" in names else ""
     text += ", its direction as one from the bow" if "wind_direction" in names else ""
     fix = None if given_platform else "if the log's wind is over ground all the same, give --platform corrected"
-    return _renamed(
+    return _rename(
         reading, names, "apparent-wind-only", text, value=motion_shown.speed if motion_shown else None, fix=fix
     )
 
 
-def _renamed(
+def _rename(
     reading: Reading,
     names: Mapping[str, str],
     kind: str,
@@ -180,10 +180,10 @@ def _of_unknown(reading: Reading) -> Reading:
     if "theoretical_wind_speed" in has:
         text = "wind that is computed as if its platform did not move (true wind, TWS)"
         fix = "if it is wind over ground, computed with the platform's speed and heading, give --platform corrected"
-    return _renamed(reading, {}, "apparent-wind-only", f"{text}: no ground truth", fix=fix)
+    return _rename(reading, {}, "apparent-wind-only", f"{text}: no ground truth", fix=fix)
 
 
-def settled(
+def settle_platform(
     channels: Mapping[str, Series], options: WindOptions, *, speeds: list[float], source: str, where: str
 ) -> tuple[dict[str, Series], Finding]:
     """Adds wind over ground to the channels where the platform is fixed, with a finding.
@@ -203,7 +203,7 @@ def settled(
         if moving:
             message = f"the platform was given as fixed, but moves at {speed:.1f} kn over ground in the median"
             raise InputError(message, where=where, fix="leave out --platform")
-        return _fixed(channels, options, source, where)
+        return _fixed_platform(channels, options, source, where)
     if options.azimuth is not None:
         fix = "add --platform fixed, or leave it out"
         raise UsageError("an azimuth belongs to a fixed platform", where=where, fix=fix)
@@ -227,7 +227,7 @@ def settled(
     return dict(channels), Finding.of("computed-true-wind", message, fix=fix)
 
 
-def _fixed(
+def _fixed_platform(
     channels: Mapping[str, Series], options: WindOptions, source: str, where: str
 ) -> tuple[dict[str, Series], Finding]:
     kind = "apparent" if "apparent_wind_speed" in channels else "theoretical"

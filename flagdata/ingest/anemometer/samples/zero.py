@@ -146,7 +146,7 @@ def settle(reading: Reading, choice: ZeroOffset) -> Reading:
         finding = Finding.of("zero-offset-given", message, value=shift, count=len(speed))
         reading = reading.with_findings((finding,))
     if zero is not None and abs(zero.offset) > max(0.5 * step, 1e-6):
-        reading = _reported(reading, zero, shift)
+        reading = _report_zero(reading, zero, shift)
     corrected = speed - shift
     calm = np.zeros(len(speed), dtype=bool)
     if shift:
@@ -157,7 +157,7 @@ def settle(reading: Reading, choice: ZeroOffset) -> Reading:
     return replace(reading, channels={**reading.channels, "wind_speed": corrected}).with_findings((), flags=flags)
 
 
-def _reported(reading: Reading, zero: Zero, shift: float) -> Reading:
+def _report_zero(reading: Reading, zero: Zero, shift: float) -> Reading:
     """Reports what calm air reads, whether the `shift` subtracted [m/s] has settled it, and the jump out of it."""
     settled = abs(zero.offset - shift) <= _BAND
     done, fix = "subtracted" if shift else f"left as it is, within {_BAND:g} m/s of zero", None

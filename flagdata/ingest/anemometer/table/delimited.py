@@ -85,7 +85,7 @@ def _by_recipe(source: TextFile, recipe: Recipe, options: WindOptions, azimuth: 
     return platform.settle(reading, options.platform, positions=positions, where=where)
 
 
-def drafted(source: TextFile, options: WindOptions) -> Draft | None:
+def draft_recipe(source: TextFile, options: WindOptions) -> Draft | None:
     """Drafts a recipe for a file; `None` where it holds no table.
 
     Raises:
@@ -98,7 +98,7 @@ def drafted(source: TextFile, options: WindOptions) -> Draft | None:
 
 
 def _by_draft(source: TextFile, options: WindOptions, where: str) -> Reading:
-    draft = drafted(source, options)
+    draft = draft_recipe(source, options)
     if draft is None:
         fix = "describe it by a recipe: --sensor FILE.toml"
         raise UsageError("there is no table in its first lines", where=where, fix=fix)
@@ -123,7 +123,7 @@ def _by_draft(source: TextFile, options: WindOptions, where: str) -> Reading:
     if odd:
         asked = [Open(key="expect", question=f"{doubt.text}. {doubt.question}", example=doubt.key) for doubt in odd]
         raise OpenFactsError.of(asked, where=where)
-    unused = _unused(draft)
+    unused = _unused_findings(draft)
     understood = tuple(fact.line() for fact in draft.facts)
     return replace(reading.with_findings(unused), drafted=draft.recipe, stated=draft.stated, understood=understood)
 
@@ -139,7 +139,7 @@ def _refuse_new_names(source: TextFile, recipe: Recipe, where: str) -> None:
             raise InputError(message, where=f"{where}, line {number}", fix="split the file before it")
 
 
-def _unused(draft: Draft) -> tuple[Finding, ...]:
+def _unused_findings(draft: Draft) -> tuple[Finding, ...]:
     message = f"columns that are not used: {', '.join(draft.unused)}"
     return (Finding.of("columns-not-read", message),) if draft.unused else ()
 

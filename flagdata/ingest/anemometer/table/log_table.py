@@ -312,7 +312,7 @@ def read_table(
                     f"values of {{name}} are 0, and {int(north.sum())} are 360: where 360 is north, 0 may be calm air"
                 )
                 findings.append(_of_cells("zero-beside-360", Severity.WARNING, name, zero, line, message))
-            value = turned(value, layout)
+            value = turn_angles(value, layout)
         channels[name] = value
         if name in WIND_CHANNELS:
             flags |= channel_flags
@@ -334,7 +334,7 @@ def read_table(
     return Table(reading=reading, extra={name: column.value(order) for name, column in gathered.extra.items()})
 
 
-def _listed(names: Collection[str]) -> str:
+def _list_first(names: Collection[str]) -> str:
     """Lists the first of the names, and how many more there are."""
     first_names = [repr(name) for name in sorted(names)[:_LISTED]]
     return " or ".join(first_names) + (f", or one of {len(names) - _LISTED} more" if len(names) > _LISTED else "")
@@ -354,7 +354,7 @@ def _stamp_findings(gathered: _Gathered, rows: Rows, recipe: Recipe, where: str)
         raise InputError(
             f"there is no row with {recipe.rows.value!r} in column {recipe.rows.column!r}, which names the site",
             where=where,
-            fix=f"name a site as the file writes it: {_listed(gathered.sites)}",
+            fix=f"name a site as the file writes it: {_list_first(gathered.sites)}",
         )
     if count == 0:
         refused = InputError if recipe.rows is None else NothingMeasuredError  # of several sites the others are read
@@ -427,7 +427,7 @@ def in_si(value: FloatArray, layout: ChannelLayout) -> FloatArray:
     return value if si_unit.scale == 1.0 and si_unit.offset == 0.0 else si_unit.to_si(value)
 
 
-def turned(angle: FloatArray, layout: ChannelLayout) -> FloatArray:
+def turn_angles(angle: FloatArray, layout: ChannelLayout) -> FloatArray:
     """Turns a vane's angles [rad] to 'from', clockwise, 0 to 2π."""
     mounted = unit(layout.unit).to_si(layout.rotation) + (np.pi if layout.convention == "to" else 0.0)
     return np.mod(angle + mounted, 2 * np.pi)

@@ -120,7 +120,7 @@ class RowClock:
             dates.refuse_twelve(wall, line=line, where=where)
         findings: tuple[Finding, ...] = ()
         if dates.needs_date(self.form):
-            wall, findings = dates.completed(wall, self.form, date=stamp_options.date, line=line, where=where)
+            wall, findings = dates.complete_dates(wall, self.form, date=stamp_options.date, line=line, where=where)
         elif stamp_options.start is not None or stamp_options.date is not None:
             option = "--start" if stamp_options.start is not None else "--date"
             raise UsageError(f"the stamps say when they were: {option} is not used", where=where, fix="leave it out")

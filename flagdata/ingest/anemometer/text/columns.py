@@ -18,7 +18,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from flagdata.core.arrays import BoolArray, IntArray, UInt8Array
-from flagdata.core.files.buffers import owned
+from flagdata.core.files.buffers import own_copy
 
 _LF, _CR, _QUOTE = 10, 13, 34
 
@@ -114,7 +114,7 @@ class Lines:
         if not regular:
             return Columns(cells=[pa.array([], pa.string()) for _ in range(count)])
         table = csv.read_csv(
-            pa.BufferReader(owned(regular)),
+            pa.BufferReader(own_copy(regular)),
             read_options=csv.ReadOptions(use_threads=False, block_size=len(regular) + 1, column_names=names),
             parse_options=csv.ParseOptions(delimiter=chr(self.shape.delimiter), ignore_empty_lines=False),
             convert_options=csv.ConvertOptions(
@@ -176,7 +176,7 @@ def lines_of(data: bytes, shape: LineShape) -> Lines | None:
         regular &= byte[np.minimum(start, len(byte) - 1)] != shape.comment
     quotes = np.flatnonzero(byte == _QUOTE)
     if len(quotes):
-        regular &= ~_misquoted(byte, feeds, quotes, marks, on, shape.delimiter)
+        regular &= ~_misquoted_lines(byte, feeds, quotes, marks, on, shape.delimiter)
     return Lines(data=data, start=start, end=end, regular=regular, shape=shape)
 
 
@@ -193,7 +193,7 @@ def _with(data: bytes, byte: UInt8Array, feeds: IntArray, start: IntArray, shape
     return odd_lines
 
 
-def _misquoted(
+def _misquoted_lines(
     byte: UInt8Array,
     feeds: IntArray,
     quotes: IntArray,

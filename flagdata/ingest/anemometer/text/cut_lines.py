@@ -72,11 +72,13 @@ class RowReader:
     def rows(self, width: int) -> Iterator[tuple[IntArray, list[list[str]]]]:
         """Yields what `blocks` gives, row by row: its definition."""
         for first, lines in self._source.blocks():
-            where, good = self._sorted(list(range(first, first + len(lines))), lines, width)
+            where, good = self._cut_and_sort(list(range(first, first + len(lines))), lines, width)
             if good:
                 yield where, good
 
-    def _sorted(self, numbers: Sequence[int], lines: Sequence[str], width: int) -> tuple[IntArray, list[list[str]]]:
+    def _cut_and_sort(
+        self, numbers: Sequence[int], lines: Sequence[str], width: int
+    ) -> tuple[IntArray, list[list[str]]]:
         """Cuts these lines into rows and keeps those that fit, with their numbers; the others are counted."""
         names = len(self.header) if self.header is not None else None
         comment = self._layout.comment
@@ -116,7 +118,7 @@ class RowReader:
             if lines is None:
                 with io.TextIOWrapper(io.BytesIO(data), encoding=encoding, newline=None) as stream:
                     texts = [line.rstrip("\n") for line in stream]
-                where, good = self._sorted(range(first, first + len(texts)), texts, width)
+                where, good = self._cut_and_sort(range(first, first + len(texts)), texts, width)
                 if good:
                     yield where, good
                 first += len(texts)
@@ -151,7 +153,7 @@ class RowReader:
         columns = lines.columns(width)
         before = self._last_malformed
         texts = [lines.text(at, encoding) for at in (irregular - first).tolist()]
-        where, good = self._sorted(irregular.tolist(), texts, width)
+        where, good = self._cut_and_sort(irregular.tolist(), texts, width)
         self._read += len(regular)
         if len(regular) and (not self._malformed or self._malformed[-1] < regular[-1]):
             self._last_malformed = False

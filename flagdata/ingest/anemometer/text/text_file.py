@@ -70,7 +70,7 @@ class TextFile:
     def raw_blocks(self, size: int = 2 << 20) -> Iterator[bytes]:
         """Yields the file's bytes without a byte-order mark of UTF-8, about `size` at a time; each block ends with a
         line."""
-        with opened(self.path) as stream:
+        with open_bytes(self.path) as stream:
             rest = b""
             first = True
             while chunk := stream.read(size):
@@ -126,7 +126,7 @@ class TableText(TextFile):
         return list(self.text[:count])
 
 
-def opened(path: Path) -> IO[bytes]:
+def open_bytes(path: Path) -> IO[bytes]:
     """Opens the bytes of a file, of one compressed by gzip those that are in it."""
     with path.open("rb") as stream:
         packed = stream.read(2) == GZIP
@@ -135,7 +135,7 @@ def opened(path: Path) -> IO[bytes]:
 
 @contextmanager
 def _text(path: Path, encoding: str) -> Iterator[IO[str]]:
-    with opened(path) as raw, io.TextIOWrapper(raw, encoding=encoding, newline=None) as stream:
+    with open_bytes(path) as raw, io.TextIOWrapper(raw, encoding=encoding, newline=None) as stream:
         yield stream
 
 
@@ -221,7 +221,7 @@ def first_bytes(path: Path) -> bytes:
     """
     check_input(path, noun="log")
     try:
-        with opened(path) as stream:
+        with open_bytes(path) as stream:
             head = stream.read(HEAD)
     except (gzip.BadGzipFile, zlib.error, EOFError):
         return GZIP
@@ -320,7 +320,7 @@ def _settle(path: Path, codec: str | None, limits: Limits) -> tuple[str, tuple[F
         raise InputError(f"{codec!r} is not a text encoding", where=where, fix="give one such as cp1252")
     decoder = info.incrementaldecoder()
     done = size = 0
-    with opened(path) as stream:
+    with open_bytes(path) as stream:
         try:
             while chunk := stream.read(_CHUNK):
                 size += len(chunk)
@@ -359,7 +359,7 @@ def _count(path: Path, limits: Limits, *, wide: bool) -> tuple[int, tuple[Findin
     unix = windows = mac = nul = lines = tail = before = 0
     last = b""
     size = 0
-    with opened(path) as stream:
+    with open_bytes(path) as stream:
         while chunk := stream.read(_CHUNK):
             nul += chunk.count(0)
             size += len(chunk)

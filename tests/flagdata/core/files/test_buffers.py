@@ -9,7 +9,7 @@ from typing import Any
 import pyarrow as pa
 import pytest
 
-from flagdata.core.files.buffers import owned
+from flagdata.core.files.buffers import own_copy
 from flagdata.ingest import ingest_wind
 from flagdata.lake import Lake
 
@@ -18,7 +18,7 @@ from flagdata.lake import Lake
 def test_the_bytes_are_copied_and_their_object_is_let_go(data: bytes) -> None:
     data = bytes(bytearray(data)) or data
     before = sys.getrefcount(data)
-    content = owned(data)
+    content = own_copy(data)
     assert content.to_pybytes() == data
     assert content.size == len(data)
     if data:

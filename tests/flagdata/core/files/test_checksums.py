@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flagdata.core.files.checksums import SUMS, check_sums, is_sealed, sealed, write_sums
+from flagdata.core.files.checksums import SUMS, check_sums, is_sealed, seal_bytes, write_sums
 from flagdata.errors import CorruptError
 
 
@@ -59,7 +59,7 @@ def test_a_sealed_array_is_read_by_numpy_and_every_bit_counts(tmp_path: Path) ->
     path, array = tmp_path / "one.npy", np.arange(6, dtype=np.float16).reshape(2, 3)
     np.save(path, array)
     assert not is_sealed(path)
-    whole = sealed(path.read_bytes())
+    whole = seal_bytes(path.read_bytes())
     path.write_bytes(whole)
     assert is_sealed(path)
     assert np.array_equal(np.load(path, mmap_mode="r"), array)

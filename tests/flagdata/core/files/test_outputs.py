@@ -25,7 +25,7 @@ from flagdata.core.files.outputs import (
     fresh_folder,
     is_signed,
     rewrite,
-    signed,
+    sign_output,
     write_file,
     write_files,
 )
@@ -98,7 +98,7 @@ def test_short_files_are_not_taken_for_sealed_ones(tmp_path: Path) -> None:
     for size in (0, 1, 40, 150):
         (tmp_path / "a.html").write_bytes((b"written by flagdata " * 20)[:size])
         assert not is_signed(tmp_path / "a.html", command="x")
-    assert signed(b"", name="a.html", command="x") != b""
+    assert sign_output(b"", name="a.html", command="x") != b""
 
 
 def test_nothing_but_a_file_is_replaced(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from flagdata.errors import InputError
 from flagdata.ingest import is_marker_table, read_cloths, read_json, read_obj, read_table
-from flagdata.recipes.shelves import parsed, read_recipe
+from flagdata.recipes.shelves import parse_recipe, read_recipe
 
 Bytes = Callable[[str], bytes]
 SAVED: dict[str, Bytes] = {
@@ -49,7 +49,7 @@ MARKERS = "marker,u,v,x,y,z,time\n" + "".join(
 def test_a_recipe_is_read_however_it_was_saved(tmp_path: Path, saved: str) -> None:
     path = tmp_path / "mast.toml"
     path.write_bytes(SAVED[saved]('name = "mast"\nabout = "Böen, 風"\n'))
-    assert parsed(read_recipe(path).text, where="mast") == {"name": "mast", "about": "Böen, 風"}
+    assert parse_recipe(read_recipe(path).text, where="mast") == {"name": "mast", "about": "Böen, 風"}
 
 
 @pytest.mark.parametrize("data", ['about = "Böe"'.encode("cp1252"), 'about = "Böe"'.encode("utf-16-le")])
@@ -57,7 +57,7 @@ def test_a_recipe_of_an_encoding_that_states_nothing_is_refused_with_what_to_do(
     path = tmp_path / "mast.toml"
     path.write_bytes(b"\n\n" + data)
     with pytest.raises(InputError) as refused:
-        parsed(read_recipe(path).text, where="mast")
+        parse_recipe(read_recipe(path).text, where="mast")
     assert "line 3" in refused.value.what
     assert refused.value.fix
 

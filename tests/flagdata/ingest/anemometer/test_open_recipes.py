@@ -109,8 +109,8 @@ def test_another_text_of_a_catalogs_format_is_another_plan(log_file: Write, monk
     assert first.plan["recipe"] == digest(text)
     changed = text.replace("range = [0, 60]", "range = [0, 50]")
     opened = described.recipes.parse_open(changed, where="changed")
-    real = described.opened
-    monkeypatch.setattr(described, "opened", lambda name: (changed, opened) if name == "kestrel" else real(name))
+    real = described.open_format
+    monkeypatch.setattr(described, "open_format", lambda name: (changed, opened) if name == "kestrel" else real(name))
     second = read_log(path, WindOptions(zone="UTC"))
     assert second.plan["recipe"] == digest(changed)
     assert second.series.channels["wind_speed"].tolist() == first.series.channels["wind_speed"].tolist()
@@ -120,7 +120,7 @@ def test_every_format_of_the_catalog_is_in_the_table_and_open() -> None:
     names = {entry.name.removesuffix(".toml") for entry in (files("catalogs") / "sensors/formats").iterdir()}
     assert names <= set(FORMATS)
     for name in names:
-        text, recipe = described.opened(name)
+        text, recipe = described.open_format(name)
         assert recipe.name == name
         assert from_toml(to_toml(recipe.data)) == from_toml(text)
 

@@ -321,7 +321,7 @@ YEARLESS = ("%b %d %H:%M:%S", "%d-%b %H:%M", "%d/%m %H:%M", "%d %B %H:%M", "%b %
 def completed(form: str, stamps: list[dt.datetime], date: dt.date | None) -> np.ndarray:
     found, _ = dates.parse([stamp.strftime(form) for stamp in stamps], form)
     assert found.valid.all()
-    time, (said,) = dates.completed(found.ns, form, date=date, line=np.arange(2, 2 + len(stamps)), where="x")
+    time, (said,) = dates.complete_dates(found.ns, form, date=date, line=np.arange(2, 2 + len(stamps)), where="x")
     assert "as given" in said.what
     return time
 

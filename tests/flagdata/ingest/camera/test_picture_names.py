@@ -10,7 +10,7 @@ from random import Random
 import pytest
 
 from flagdata.errors import InputError
-from flagdata.ingest.camera.picture_names import Ordered, ordered
+from flagdata.ingest.camera.picture_names import Ordered, order_pictures
 
 N = 24
 
@@ -26,7 +26,7 @@ def placed(names: Sequence[str], rate: int = 25) -> tuple[list[int], list[int], 
     """The numbers of `names`, which are in the right order, as they come out of a folder's; their places; and all."""
     mixed = list(range(len(names)))
     Random(1).shuffle(mixed)
-    found = ordered([names[i] for i in mixed], rate=Fraction(rate), where="folder")
+    found = order_pictures([names[i] for i in mixed], rate=Fraction(rate), where="folder")
     return [mixed[i] for i in found.order], list(found.places), found
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from flagdata.core.arrays import Float32Array
 from flagdata.ingest import MeshIngest, ingest_meshes
-from flagdata.ingest.meshes.pieces import in_pieces, slits, welded
+from flagdata.ingest.meshes.pieces import in_pieces, slits, weld_vertices
 from flagdata.lake import Lake, MeshSequence, RaggedMeshSequence, read_meshes
 
 N = 4
@@ -53,14 +53,14 @@ def surface(sequence: MeshSequence) -> Float32Array:
 
 def test_exact_duplicates_are_merged_and_the_surface_stays_what_it_was() -> None:
     whole, loose = sheet(), soup(sheet())
-    merged, (finding,) = welded(loose)
+    merged, (finding,) = weld_vertices(loose)
     assert isinstance(merged, MeshSequence)
     assert len(merged.rest) == (N + 1) ** 2
     np.testing.assert_array_equal(surface(merged), surface(whole))
     np.testing.assert_array_equal(merged.rest[merged.faces], whole.rest[whole.faces])
     assert (finding.kind, finding.count) == ("vertices-merged", 6 * N * N - (N + 1) ** 2)
     assert in_pieces(merged) == ()
-    assert welded(whole) == (whole, ())
+    assert weld_vertices(whole) == (whole, ())
 
 
 def test_vertices_that_part_in_one_frame_stay_apart_and_are_reported() -> None:
@@ -68,7 +68,7 @@ def test_vertices_that_part_in_one_frame_stay_apart_and_are_reported() -> None:
     positions = loose.positions.copy()
     positions[2] += np.arange(positions.shape[1], dtype=np.float32)[:, None] * 1e-6
     torn = soup(sheet(), positions=positions)
-    assert welded(torn) == (torn, ())
+    assert weld_vertices(torn) == (torn, ())
     (finding,) = in_pieces(torn)
     assert (finding.kind, finding.count, finding.where) == ("cloth-in-pieces", 2 * N * N, "frame 0")
     # All but the corners (1, 0) and (0, 1), which one triangle has alone.
@@ -87,7 +87,7 @@ def test_a_seam_with_two_textures_stays_unlike_duplicates() -> None:
     panels = MeshSequence(
         time=whole.time, positions=np.concatenate([whole.positions] * 2, axis=1), faces=faces, rest=rest
     )
-    assert welded(panels) == (panels, ())
+    assert weld_vertices(panels) == (panels, ())
     (finding,) = in_pieces(panels)
     assert finding.count == 2
     assert f"{2 * (N + 1)} of its vertices lie where a vertex of another piece lies, 0 of these" in finding.what
@@ -105,13 +105,13 @@ def test_a_seam_with_two_textures_stays_unlike_duplicates() -> None:
 def test_what_would_leave_no_surface_is_not_merged(faces: Callable[[NDArray[np.int32]], NDArray[np.int32]]) -> None:
     whole = sheet()
     odd = soup(MeshSequence(time=whole.time, positions=whole.positions, rest=whole.rest, faces=faces(whole.faces)))
-    assert welded(odd) == (odd, ())
+    assert weld_vertices(odd) == (odd, ())
     assert in_pieces(odd)[0].count == len(odd.faces)
 
 
 def test_a_scene_that_numbers_vertices_keeps_its_numbers() -> None:
     loose = soup(sheet(), attributes={"scene": {"handles": [{"nodes": [0]}]}})
-    assert welded(loose) == (loose, ())
+    assert weld_vertices(loose) == (loose, ())
 
 
 def test_pieces_of_a_remeshed_cloth_are_those_of_its_worst_frame() -> None:
@@ -125,7 +125,7 @@ def test_pieces_of_a_remeshed_cloth_are_those_of_its_worst_frame() -> None:
         vertex_offset=np.cumsum([0, *(len(p.rest) for p in parts)]),
         face_offset=np.cumsum([0, *(len(p.faces) for p in parts)]),
     )
-    assert welded(ragged) == (ragged, ())
+    assert weld_vertices(ragged) == (ragged, ())
     (finding,) = in_pieces(ragged)
     assert (finding.count, finding.where) == (2 * N * N, "frame 1")
 
@@ -185,7 +185,7 @@ def parted(*, below: int, apart: float = 0.0, texture: float = 0.0, opens: float
     "change", [{"apart": 1e-5}, {"texture": 1e-4}, {"opens": 0.02}, {"apart": 1e-3, "texture": 0.1}]
 )
 def test_a_slit_whose_sides_are_next_to_each_other_is_reported(change: dict[str, float]) -> None:
-    joined, merged = welded(parted(below=N - 1, **change))
+    joined, merged = weld_vertices(parted(below=N - 1, **change))
     assert merged == ()
     (found,) = slits(joined)
     assert (found.kind, found.count) == ("cloth-slit", 2 * (N - 1))
@@ -193,7 +193,7 @@ def test_a_slit_whose_sides_are_next_to_each_other_is_reported(change: dict[str,
 
 def test_what_is_merged_or_apart_is_no_slit() -> None:
     assert slits(sheet()) == ()
-    joined, _ = welded(parted(below=N - 1))
+    joined, _ = weld_vertices(parted(below=N - 1))
     assert slits(joined) == ()
     gaping = parted(below=N - 1, apart=0.05, texture=0.05)
     assert slits(gaping) == ()

@@ -10,7 +10,7 @@ import pytest
 from flagdata.errors import UnknownNameError
 from measure.cloth import TABLES, CalibrationOptions, Design, Flag, Log, Observed, designs_of, nulls
 from measure.cloth.flag_prior import CLASSES, fabric
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 
 FLAG = Flag(length=1.5, height=1.0)
 
@@ -55,7 +55,7 @@ def test_simulations_of_any_fabric_are_the_ones_that_were_kept() -> None:
 
 def test_woven_cloths_are_the_ones_that_hardly_stretch() -> None:
     """At rest, along warp and weft, as the classes' rule has it."""
-    least = {name: float(named(name).stretching[0, [0, 2]].min()) for name in TABLES}
+    least = {name: float(named_material(name).stretching[0, [0, 2]].min()) for name in TABLES}
     assert {name for name, own in least.items() if own >= 200} == set(CLASSES["woven"])
     assert {name for name, own in least.items() if own < 100} == set(CLASSES["knit"])
     assert {name for name in least if 100 <= least[name] < 200} == {"pink-ribbon-brown"}

@@ -21,7 +21,7 @@ from measure.cloth import (
     Sight,
     cloth_posterior,
     designs_of,
-    weighed,
+    weigh_cloths,
 )
 from measure.cloth.emulator import scatter
 
@@ -67,7 +67,7 @@ def test_what_recordings_have_in_common_does_not_average_out(monkeypatch: pytest
     sights = _sights(1)
     weights, shown = _shown(2)
     inner = (weights > 0.1) & (weights < 0.22)  # the prior's ends do not cut their posteriors
-    drawn = np.log(weighed(sights, [own[inner] for own in shown], seed=3)["area_weight"])
+    drawn = np.log(weigh_cloths(sights, [own[inner] for own in shown], seed=3)["area_weight"])
     assert np.median(drawn.std(axis=1)) == pytest.approx(np.hypot(_COMMON, _OWN / 2), rel=0.15)
     low, high = np.quantile(drawn, [0.05, 0.95], axis=1)
     held = ((low <= np.log(weights[inner])) & (np.log(weights[inner]) <= high)).mean()

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from flagdata.core.arrays import FloatArray
-from measure.cloth import OBSERVED, TABLES, Design, Flag, FlagBatch, Log, mean_bending, simulated
+from measure.cloth import OBSERVED, TABLES, Design, Flag, FlagBatch, Log, mean_bending, simulated_values
 from measure.cloth.flag_simulation import cloth
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from sim.integrate import BackwardEuler, Symplectic
 
 _LOG = Log(times=np.arange(-10.0, 20.0), speed=np.full(30, 5.0), distance=0.0)
@@ -53,7 +53,7 @@ def test_a_cloth_has_the_bending_it_is_given() -> None:
     made = cloth(0.2, 7e-5, 0.01, stretching=2.0, fabric="gray-interlock")
     assert mean_bending(made) == pytest.approx(7e-5)
     assert made.area_weight == 0.2
-    assert np.allclose(made.stretching, 2 * named("gray-interlock").stretching)
+    assert np.allclose(made.stretching, 2 * named_material("gray-interlock").stretching)
 
 
 def test_simulations_draw_their_fabrics() -> None:
@@ -83,7 +83,7 @@ def test_no_integrator_damps_more_than_its_cloths() -> None:
     cases = ((3e-4, Symplectic, 3e-4), (1.5e-3, BackwardEuler, 0.5e-3), (2e-2, BackwardEuler, 16e-3))
     for damping, kind, material in cases:
         damped = replace(flags, values={**flags.values, "damping": np.full(2, damping)})
-        system, _, integrator = damped._assembled(flags.flag.mesh(4))
+        system, _, integrator = damped._assemble_flags(flags.flag.mesh(4))
         assert isinstance(integrator, kind)
         assert np.allclose(system.cloth.damping.numpy(), material, rtol=1e-5)
 
@@ -92,7 +92,7 @@ def test_a_clock_moves_the_wind() -> None:
     ramp = replace(_batch([0.2]), log=Log(times=_LOG.times, speed=5 + 0.1 * _LOG.times, distance=0.0))
     early = replace(ramp, values={**ramp.values, "clock_error": np.array([-2.0])})
     mesh = ramp.flag.mesh(4)
-    before, after = (one._wind(one._assembled(mesh)[0]).samples[:, 0].mean().item() for one in (ramp, early))
+    before, after = (one._wind(one._assemble_flags(mesh)[0]).samples[:, 0].mean().item() for one in (ramp, early))
     assert after - before == pytest.approx(0.2, abs=0.05)  # 0.1 m/s a second, for two seconds
 
 
@@ -106,15 +106,15 @@ def test_kept_simulations_are_not_made_anew(tmp_path: Path, monkeypatch: pytest.
     monkeypatch.setattr(FlagBatch, "read", read)
     design = Design(flag=Flag(length=1.5, height=1.0), log=_LOG, duration=5.0, count=24, seed=1)
     steps: list[int] = []
-    first = simulated(design, folder=tmp_path, advance=steps.append)
+    first = simulated_values(design, folder=tmp_path, advance=steps.append)
     assert made == [16, 8]
     assert sum(steps) == 24
     assert np.array_equal(first[:, 0, 0], design.values()["area_weight"])
     (path, *_) = sorted(tmp_path.glob("*.npz"))
     path.unlink()  # interrupted before the last batch
-    again = simulated(design, folder=tmp_path, advance=steps.append)
+    again = simulated_values(design, folder=tmp_path, advance=steps.append)
     assert len(made) == 3
     assert sum(steps) == 48
     assert np.array_equal(again, first)
-    simulated(replace(design, seed=2), folder=tmp_path)
+    simulated_values(replace(design, seed=2), folder=tmp_path)
     assert len(made) == 5

@@ -15,7 +15,7 @@ from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.record.signals import Sensor, WindSeries
 from flagdata.timebase import NANOSECONDS
 from measure.cloth import OBSERVED, Observed, constant_wind, of_table
-from measure.cloth.table_clock import declared, estimated
+from measure.cloth.table_clock import declared_clock, estimated_clock
 from measure.cloth.tables_of_observables import Beside, rows_of
 from measure.cloth.tables_of_observables import read_table as read
 from measure.film import FlagSize
@@ -171,7 +171,7 @@ def test_a_table_whose_clock_is_off_is_joined_by_what_follows_the_wind(tmp_path:
         [START + t - 11.4, 1.2 - 0.1 * u] for t, u in zip(at.tolist(), smooth.tolist(), strict=True)
     ]
     table = rows_of(_write(tmp_path / "t.csv", "time,droop", rows), SIZE)
-    (segment,) = estimated(table, _series(times, speed), names=("log", "t"), seed="x").segments
+    (segment,) = estimated_clock(table, _series(times, speed), names=("log", "t"), seed="x").segments
     assert segment.offset == pytest.approx(11.4, abs=0.1)
     assert abs(segment.offset - 11.4) < 2 * segment.sigma_offset < 0.6
 
@@ -180,7 +180,7 @@ def test_a_log_beside_a_table_is_on_its_clock_with_the_offsets_uncertainty(tmp_p
     times = np.arange(0.0, 60.0, 0.1)
     rows: list[list[float | str]] = [[START + 5.0 + 0.5 * n, 0.3] for n in range(60)]
     path = _write(tmp_path / "t.csv", "time,droop", rows)
-    clock = declared(rows_of(path, SIZE), parse("2.0±0.25"), names=("log", "t"))
+    clock = declared_clock(rows_of(path, SIZE), parse("2.0±0.25"), names=("log", "t"))
     found = _one(path, wind_log=Beside(series=_series(times, 5.0 + times / 10), clock=clock))
     # The first row's span begins at 4.75 s of the table's clock, which is 6.75 s of the log's.
     assert found.speed[0] == pytest.approx(5.0 + (6.75 + 1.25) / 10, abs=0.01)
@@ -190,7 +190,7 @@ def test_a_log_beside_a_table_is_on_its_clock_with_the_offsets_uncertainty(tmp_p
         found.log.mean_speed(np.array([0.0]), np.array([1.0]))
     )
     with pytest.raises(UsageError, match=r"as in 0\.3±0\.1"):
-        declared(rows_of(path, SIZE), parse("2.0"), names=("log", "t"))
+        declared_clock(rows_of(path, SIZE), parse("2.0"), names=("log", "t"))
     own = _write(tmp_path / "own.csv", "time,wind,droop", [[START + 2.5 * n, 5.0, 0.3] for n in range(10)])
     with pytest.raises(InputError, match="in one of them"):
         _one(

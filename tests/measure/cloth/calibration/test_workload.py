@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from measure.cloth import announced
+from measure.cloth import announce_simulations
 
 
 @pytest.mark.parametrize(
@@ -16,4 +16,4 @@ from measure.cloth import announced
     ],
 )
 def test_the_length_is_that_of_the_measured_pace(flags: int, seconds: float, workers: int, said: str) -> None:
-    assert said in announced(flags * seconds, workers=workers)
+    assert said in announce_simulations(flags * seconds, workers=workers)

@@ -11,7 +11,7 @@ from flagdata.core.arrays import FloatArray
 from flagdata.core.rng import stream
 from measure.cloth import AZIMUTH, CLOTH, ELEVATION, NUISANCES, Emulator, Flag, draws, weighable
 from measure.cloth.emulator import regressors
-from measure.cloth.sight import Response, responded
+from measure.cloth.sight import Response, response_of
 
 DRAG = next(one for one in weighable(Flag(length=1.5, height=1.0)) if one.name == "tangential-linear-drag.coefficient")
 COUNT, PAIRS, SUMMARIES = 512, 512, 6
@@ -33,7 +33,7 @@ def response(rng: np.random.Generator, *, own: float, again: bool) -> Response:
     effect = 3 * (strengths / DRAG.high)[:, None] + math.sqrt(own) * rng.standard_normal((PAIRS, SUMMARIES))
     with_it = exact[:PAIRS] + (other if again else noise)[:PAIRS] + effect
     paired: dict[str, FloatArray] = {name: drawn[:PAIRS] for name, drawn in values.items()}
-    found = responded(emulator, DRAG, strengths, paired, with_it, (exact + noise)[:PAIRS])
+    found = response_of(emulator, DRAG, strengths, paired, with_it, (exact + noise)[:PAIRS])
     assert found is not None
     return found
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from flagdata.core.arrays import AnyArray
-from flagdata.core.files.checksums import is_sealed, sealed
+from flagdata.core.files.checksums import is_sealed, seal_bytes
 from flagdata.core.files.outputs import rewrite
 from flagdata.core.provenance import file_hash, recipe_hash
 
@@ -52,5 +52,5 @@ def cached(
     arrays = make()
     buffer = BytesIO()
     np.savez_compressed(buffer, **arrays)  # pyright: ignore[reportArgumentType]
-    rewrite(target, sealed(buffer.getvalue()))
+    rewrite(target, seal_bytes(buffer.getvalue()))
     return arrays

@@ -14,7 +14,7 @@ import numpy as np
 from flagdata.core.arrays import FloatArray
 from flagdata.core.rng import stream
 from sim.cloth.contact import Contact
-from sim.cloth.material import Material, named
+from sim.cloth.material import Material, named_material
 from sim.cloth.scene import Scene, assemble, flag
 from sim.effects import EFFECTS, apply
 from sim.integrate import Symplectic
@@ -71,7 +71,7 @@ c / U; r.m.s. of that middle across the wind over L. NaN where a run diverged or
 
 def material(area_weight: float) -> Material:
     """Camel Ponte Roma with its declared damping, of another area weight [kg/m²]."""
-    return replace(named("camel-ponte-roma"), area_weight=area_weight)
+    return replace(named_material("camel-ponte-roma"), area_weight=area_weight)
 
 
 def scenes_of(one: Flag, numerics: Numerics) -> list[Scene]:

@@ -14,7 +14,7 @@ from typing import Any
 
 import torch
 
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from tests.evidence import ABSENT, REFERENCE
 from tests.studies.validation.robot_cloth.attribution import LEAD, Round
 from tests.studies.validation.robot_cloth.calibrate import at_bounds
@@ -31,7 +31,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     if not folder.is_dir():
         return dict(ABSENT)
     torch.set_num_threads(1)
-    found = study(folder, named(MATERIAL), fitted=FITTED, held_out=HELD_OUT, seed=seed)
+    found = study(folder, named_material(MATERIAL), fitted=FITTED, held_out=HELD_OUT, seed=seed)
     (out / "validate-robot-cloth.md").write_text(page(found), encoding="utf-8")
     settings = {"nominal": MATERIAL, "level": LEVEL, "moved": MOVED}
     return {**settings, **asdict(found), "apart": found.apart.as_dict(), "apart_moved": found.apart_moved.as_dict()}

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from flagdata.core.arrays import FloatArray
 from flagdata.errors import InputError, NotFoundError, UsageError
-from sim.cloth.material import named
+from sim.cloth.material import named_material
 from tests.studies.validation.robot_cloth.attribution import late, left_errors, lower, sought
 from tests.studies.validation.robot_cloth.calibrate import Fit, calibrated, linear
 from tests.studies.validation.robot_cloth.model import Cloth, Parameters, described, predicted, rigid
@@ -29,7 +29,7 @@ from tests.studies.validation.robot_cloth.tracker import (
 )
 
 SIDE, SIZE = 3, 0.3
-CAMEL = named("camel-ponte-roma")
+CAMEL = named_material("camel-ponte-roma")
 
 
 def _square() -> FloatArray:
