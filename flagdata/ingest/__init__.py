@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from flagdata.ingest.anemometer.samples.rules import gaps
     from flagdata.ingest.anemometer.sensor_recipe import FileLayout, QualityRules
     from flagdata.ingest.anemometer.sniffing import Head
-    from flagdata.ingest.anemometer.text.text_file import open_text
+    from flagdata.ingest.anemometer.text.opening import open_text
     from flagdata.ingest.anemometer.wind_options import WindOptions
     from flagdata.ingest.camera.camera_options import CameraOptions, CropBox, parse_crop
     from flagdata.ingest.camera.camera_probing import probe

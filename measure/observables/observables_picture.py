@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from measure.observables import OBSERVABLES
+from measure.observables.observables_by_name import OBSERVABLES
 from measure.observables.observables_table import ObservableTable
 
 if TYPE_CHECKING:

@@ -18,9 +18,9 @@ from flagdata.dataset.truth import TruthSeries, over_ground
 from flagdata.lake.mesh_sequences import write_plain
 from flagdata.record.signals import WindSeries
 from flagdata.timebase import NANOSECONDS
-from measure.observables import OBSERVABLES
 from measure.observables.not_shown import REASONS
 from measure.observables.observable import Observable, WindowReading
+from measure.observables.observables_by_name import OBSERVABLES
 from measure.observables.watching import Watched
 
 if TYPE_CHECKING:

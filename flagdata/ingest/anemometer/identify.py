@@ -15,7 +15,8 @@ from flagdata.ingest.anemometer.draft.drafting import Draft
 from flagdata.ingest.anemometer.formats.log_formats import FORMATS, SIGNATURES, Format
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, NAMED, SURE, Guess, GuessKind, Head
 from flagdata.ingest.anemometer.table.delimited import Delimited, draft_recipe
-from flagdata.ingest.anemometer.text.text_file import TextFile, first_bytes, is_workbook, open_text, signature
+from flagdata.ingest.anemometer.text.opening import open_text
+from flagdata.ingest.anemometer.text.text_file import TextFile, first_bytes, is_workbook, signature
 from flagdata.ingest.anemometer.wind_options import Limits, WindOptions
 from flagdata.ingest.meshes import others
 

@@ -21,9 +21,8 @@ import numpy as np
 
 from flagdata.core.files.regular_files import MCAP, check_input
 from flagdata.core.findings import Finding
-from flagdata.errors import InputError, LimitError, UsageError
+from flagdata.errors import InputError, LimitError
 from flagdata.ingest.anemometer.wind_options import Limits
-from flagdata.ingest.mcap.bags import is_bag
 
 GZIP = b"\x1f\x8b"
 """First bytes of a file compressed by gzip (RFC 1952); a log may be: it is read as what is in it."""
@@ -232,39 +231,14 @@ def first_bytes(path: Path) -> bytes:
     return head
 
 
-def open_text(path: Path, *, limits: Limits, encoding: str | None = None, topic: str | None = None) -> TextFile:
-    """Check a file against the limits and settle its encoding, in one pass over its bytes.
-
-    Args:
-        topic: of an MCAP file; `None` takes the only one that holds numbers.
+def settle_text(path: Path, head: bytes, *, limits: Limits, encoding: str | None = None) -> TextFile:
+    """Settles the encoding of a file that begins so, and checks it against the limits, in one pass over its bytes.
 
     Raises:
-        NotFoundError, InputError: see `first_bytes`; not text, or not in the encoding named.
+        InputError: not text, or not in the encoding named.
         LimitError: larger than `limits` allow.
     """
-    if is_bag(path):
-        from flagdata.ingest.anemometer.containers import mcap_topic
-
-        return mcap_topic.open_topic(path, topic, limits=limits)
-    head = first_bytes(path)
     where = str(path)
-    size = path.stat().st_size
-    if size > limits.size:
-        raise LimitError(
-            f"the file has {size} bytes, more than {limits.size}",
-            where=where,
-            fix="split it",
-        )
-    if is_workbook(path, head):
-        from flagdata.ingest.anemometer.containers import spreadsheet
-
-        return spreadsheet.open_sheet(path, limits=limits)
-    if head.startswith(NETCDF):
-        from flagdata.ingest.anemometer.containers import netcdf
-
-        return netcdf.open_dataset(path, limits=limits)
-    if topic is not None:
-        raise UsageError("a topic was given, but this is no MCAP file", where=where, fix="leave out --topic")
     other_kind = signature(head)
     if other_kind:
         raise InputError(f"this is {other_kind[0]}, not a text log", where=where, fix=other_kind[1])
