@@ -1,4 +1,5 @@
-"""Calls of the site whose options a class states: their signature and docstring are those that Python has of them."""
+"""Calls of the site whose options a class states: their signature and docstring are those that
+Python has of them."""
 
 from __future__ import annotations
 
@@ -10,8 +11,8 @@ from griffe import Docstring, Extension, Function, Parameter, ParameterKind, Par
 
 
 class Called(Extension):
-    """Gives a function that `flagdata.verbs.verb_options.make_call` or `verb` made the parameters and docstring of run
-    time."""
+    """Gives a function that `flagdata.verbs.verb_options.make_call` or `verb` made the parameters
+    and docstring of run time."""
 
     def on_function(self, *, func: Function, **_: Any) -> None:
         """Replaces them; called by griffe, which reads source and runs none."""
@@ -25,4 +26,9 @@ class Called(Extension):
 def _parameter(one: inspect.Parameter) -> Parameter:
     required = one.default is inspect.Parameter.empty
     kind = ParameterKind[one.kind.name.lower()]
-    return Parameter(one.name, kind=kind, annotation=one.annotation, default=None if required else repr(one.default))
+    return Parameter(
+        one.name,
+        kind=kind,
+        annotation=one.annotation,
+        default=None if required else repr(one.default),
+    )

@@ -1,8 +1,9 @@
 """Formulas of the site: TeX between dollar signs becomes MathML while the site is built.
 
-Browsers set MathML by themselves, so that a page needs no script and no font for it, also opened as a file, and one
-without formulas carries nothing; MathJax or KaTeX would be megabytes of scripts and fonts beside the pages. GitHub sets
-the same TeX where it shows docs/; commands that its Markdown takes for escapes, such as a thin space, are avoided.
+Browsers set MathML by themselves, so that a page needs no script and no font for it, also opened as
+a file, and one without formulas carries nothing; MathJax or KaTeX would be megabytes of scripts and
+fonts beside the pages. GitHub sets the same TeX where it shows docs/; commands that its Markdown
+takes for escapes, such as a thin space, are avoided.
 """
 
 from __future__ import annotations
@@ -35,5 +36,7 @@ def _set(element: str, tex: str, page: str) -> str:
     block = element == "div"
     shown = convert(tex, display="block" if block else "inline")
     if unknown := re.findall(r"\\[a-zA-Z]*", shown):
-        raise PluginError(f"{page}: {', '.join(unknown)} in the formula {tex} has no MathML; use another command")
+        raise PluginError(
+            f"{page}: {', '.join(unknown)} in the formula {tex} has no MathML; use another command"
+        )
     return f'<div class="formula">{shown}</div>' if block else shown

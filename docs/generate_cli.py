@@ -1,4 +1,5 @@
-"""The reference of the command line, docs/cli.md, from the commands themselves: `python -m docs.generate_cli`."""
+"""The reference of the command line, docs/cli.md, from the commands themselves: `python -m
+docs.generate_cli`."""
 
 from __future__ import annotations
 
@@ -43,7 +44,9 @@ def reference() -> str:
     for group, (title, verbs) in GROUPS.items():
         rows = [f"[`{verb}`](#flagdata-{verb}) | {about} |" for verb, (_, about) in verbs.items()]
         starts = (f"**{group}**: {title}", *[""] * (len(rows) - 1))
-        parts[-1] += "".join(f"\n| {start} | {row}" for start, row in zip(starts, rows, strict=True))
+        parts[-1] += "".join(
+            f"\n| {start} | {row}" for start, row in zip(starts, rows, strict=True)
+        )
     parts[-1] += "\n"
     parts += [_section(name, command) for name, command in commands()]
     return "\n".join(parts)
@@ -59,12 +62,18 @@ def _section(name: str, command: click.Command) -> str:
         sections = command.sections()
     for title, part in sections.items():
         if shown := [option for option in part if not option.hidden]:
-            lines += [f"| {title} | meaning |", "|---|---|", *(_row(option, context) for option in shown), ""]
+            lines += [
+                f"| {title} | meaning |",
+                "|---|---|",
+                *(_row(option, context) for option in shown),
+                "",
+            ]
     return "\n".join(lines)
 
 
 def _prose(text: str) -> str:
-    """The help text as Markdown: paragraphs that click keeps as they are (after \\b) become code."""
+    """The help text as Markdown: paragraphs that click keeps as they are (after \\b) become
+    code."""
     paragraphs: list[str] = []
     for paragraph in text.split("\n\n"):
         if paragraph.startswith("\b"):
@@ -83,7 +92,11 @@ def _row(option: click.Option, context: click.Context) -> str:
         about.append("Required.")
     if option.multiple:
         about.append("May be repeated.")
-    written = option.show_default if isinstance(option.show_default, str) else option.to_info_dict()["default"]
+    written = (
+        option.show_default
+        if isinstance(option.show_default, str)
+        else option.to_info_dict()["default"]
+    )
     default = _default(written) if option.show_default else ""
     if default:
         about.append(f"Default: `{default}`.")

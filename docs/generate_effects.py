@@ -1,4 +1,5 @@
-"""The page of the effects, docs/effects.md, from their registries: `python -m docs.generate_effects`."""
+"""The page of the effects, docs/effects.md, from their registries: `python -m
+docs.generate_effects`."""
 
 from __future__ import annotations
 
@@ -60,9 +61,15 @@ def _section(name: str, effect: type[Parametrised]) -> str:
             f"{_plain(equation)}\n",
             "| parameter | role | unit | prior | null value |",
             "|---|---|---|---|---|",
-            *(f"| `{label}` | {e.role} | {e.unit} | {_range(e)} | {e.null:g} |" for label, e in parameters),
+            *(
+                f"| `{label}` | {e.role} | {e.unit} | {_range(e)} | {e.null:g} |"
+                for label, e in parameters
+            ),
             "",
-            *(f"- `{label}`: {_plain(meanings[label])} Prior: {_plain(e.source)}." for label, e in parameters),
+            *(
+                f"- `{label}`: {_plain(meanings[label])} Prior: {_plain(e.source)}."
+                for label, e in parameters
+            ),
             "",
         ]
     )
@@ -89,7 +96,9 @@ def _range(entry: Parameter) -> str:
 def _plain(text: str) -> str:
     """Markdown in which no sign of an equation is taken for emphasis."""
     paragraphs = [" ".join(paragraph.split()) for paragraph in text.strip().split("\n\n")]
-    return "\n\n".join(p.replace("*", "\\*").replace("_", "\\_").replace("<", "&lt;") for p in paragraphs if p)
+    return "\n\n".join(
+        p.replace("*", "\\*").replace("_", "\\_").replace("<", "&lt;") for p in paragraphs if p
+    )
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
 """The moving picture of the README's first screen, from the film that comes with the package.
 
-`python -m docs.generate_example_picture` measures the film window by window and writes docs/pictures/example.webp: the
-film beside the wind as it was measured, as the anemometer logged it, and the mean that was simulated.
+`python -m docs.generate_example_picture` measures the film window by window and writes
+docs/pictures/example.webp: the film beside the wind as it was measured, as the anemometer logged
+it, and the mean that was simulated.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ _DPI = 100
 
 
 def chart(found: Measured, flag: Example) -> tuple[Image.Image, float, float]:
-    """The winds over the film's time, and where its first and last instant lie [px from the left]."""
+    """The winds over the film's time, and where its first and last instant lie [px from the
+    left]."""
     figure = Figure(figsize=(_CHART[0] / _DPI, _CHART[1] / _DPI), dpi=_DPI)
     canvas = FigureCanvasAgg(figure)
     axes = figure.add_axes((0.08, 0.2, 0.89, 0.68))
@@ -56,7 +58,14 @@ def chart(found: Measured, flag: Example) -> tuple[Image.Image, float, float]:
     axes.set_title("wind [m/s]", fontsize=11, loc="left")
     axes.tick_params(labelsize=11)
     axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(fontsize=9, frameon=False, loc="lower left", handlelength=1.4, labelspacing=0.1, borderpad=0.1)
+    axes.legend(
+        fontsize=9,
+        frameon=False,
+        loc="lower left",
+        handlelength=1.4,
+        labelspacing=0.1,
+        borderpad=0.1,
+    )
     canvas.draw()
     picture = Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3])
     (left, _), (right, _) = axes.transData.transform([(0, 0), (found.duration, 0)])
@@ -64,9 +73,12 @@ def chart(found: Measured, flag: Example) -> tuple[Image.Image, float, float]:
 
 
 def log_on_film(flag: Example) -> tuple[np.ndarray, np.ndarray]:
-    """Instants on the film's clock [s from its first frame] and logged speeds [m/s], both (sample,)."""
+    """Instants on the film's clock [s from its first frame] and logged speeds [m/s], both
+    (sample,)."""
     wind = flagdata.wind(flag.log)
-    return (wind.start - from_datetime(START)) / NANOSECONDS + wind.time - flag.clock_offset, wind.speed
+    return (
+        wind.start - from_datetime(START)
+    ) / NANOSECONDS + wind.time - flag.clock_offset, wind.speed
 
 
 def moving(found: Measured, flag: Example) -> bytes:

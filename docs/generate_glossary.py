@@ -1,4 +1,5 @@
-"""The glossary of quantities and of the reports' terms, docs/glossary.md: `python -m docs.generate_glossary`."""
+"""The glossary of quantities and of the reports' terms, docs/glossary.md: `python -m
+docs.generate_glossary`."""
 
 from __future__ import annotations
 
@@ -34,8 +35,8 @@ class Quantity:
         name: its one name.
         unit: SI.
         meaning: or its sign.
-        options, keys, columns, calls: by which it is met on the command line, in recipes, in the catalog's columns,
-            their JSON and results, and as a parameter of Python calls.
+        options, keys, columns, calls: by which it is met on the command line, in recipes, in the
+            catalog's columns, their JSON and results, and as a parameter of Python calls.
         was: its names of the last version.
     """
 
@@ -66,8 +67,10 @@ QUANTITIES = (
         title="bending stiffness",
         name="bending",
         unit="N·m",
-        meaning="coefficients of the material's table, or their geometric mean; in a verdict on markers the factor on "
-        "the material's. `bending_scale` is the mean of their logarithms (base 10), `bending-factor` a factor on all, "
+        meaning="coefficients of the material's table, or their geometric mean; in a verdict on "
+        "markers the factor on "
+        "the material's. `bending_scale` is the mean of their logarithms (base 10), "
+        "`bending-factor` a factor on all, "
         "`bending_stiffness` a measured flexural rigidity per metre of width",
         keys=("bending-factor", "bending-factors"),
         columns=("bending", "bending_scale", "bending_stiffness"),
@@ -76,7 +79,8 @@ QUANTITIES = (
         title="attachment",
         name="attachment",
         unit="–",
-        meaning="where the cloth is held: a name, or points (u, v) on the flat cloth [m], which are its pins",
+        meaning="where the cloth is held: a name, or points (u, v) on the flat cloth [m], which "
+        "are its pins",
         options=("--attachment",),
         keys=("attachment",),
         calls=("attachment",),
@@ -86,7 +90,8 @@ QUANTITIES = (
         title="clock offset",
         name="clock_offset",
         unit="s",
-        meaning="added to the clock of the camera, recording or table to reach the wind log's; a clock without dates "
+        meaning="added to the clock of the camera, recording or table to reach the wind log's; a "
+        "clock without dates "
         "starts at its first sample",
         options=("--clock-offset",),
         keys=("clock-offset",),
@@ -109,7 +114,8 @@ QUANTITIES = (
         title="density of the air",
         name="density",
         unit="kg/m³",
-        meaning="of the air alone: in `[air]` of an experiment, `[wind]` of a simulation, and of effects",
+        meaning="of the air alone: in `[air]` of an experiment, `[wind]` of a simulation, and of "
+        "effects",
         keys=("density",),
     ),
 )
@@ -124,7 +130,13 @@ def reference() -> str:
 def _row(quantity: Quantity) -> str:
     lists = (quantity.options, quantity.keys, quantity.columns, quantity.calls, quantity.was)
     cells = (", ".join(f"`{name}`" for name in names) for names in lists)
-    return "| " + " | ".join([quantity.title, f"`{quantity.name}`", quantity.unit, quantity.meaning, *cells]) + " |\n"
+    return (
+        "| "
+        + " | ".join(
+            [quantity.title, f"`{quantity.name}`", quantity.unit, quantity.meaning, *cells]
+        )
+        + " |\n"
+    )
 
 
 if __name__ == "__main__":

@@ -1,7 +1,9 @@
-"""Pictures of the faults on the page of refusals, each of a film that is refused for that very reason.
+"""Pictures of the faults on the page of refusals, each of a film that is refused for that very
+reason.
 
-`python -m docs.generate_refusal_pictures` spoils two seconds of the film that comes with the package, as a careless
-recording would, writes docs/pictures/refusals/REASON.webp, and below each on the page what the program says of it.
+`python -m docs.generate_refusal_pictures` spoils two seconds of the film that comes with the
+package, as a careless recording would, writes docs/pictures/refusals/REASON.webp, and below each on
+the page what the program says of it.
 """
 
 from __future__ import annotations
@@ -75,9 +77,14 @@ def _resized(film: Film, width: int, height: int) -> Film:
 
 
 def _cloth(film: Film) -> NDArray[np.bool_]:
-    """(n, HEIGHT, WIDTH) where the cloth is: it is red, violet or black, and what is behind it is none of these."""
+    """(n, HEIGHT, WIDTH) where the cloth is: it is red, violet or black, and what is behind it is
+    none of these."""
     red, green, blue = (film[:, *_CLOTH, k].astype(int) for k in range(3))
-    own = (red - green > 8) | (film[:, *_CLOTH].max(axis=-1) < 70) | ((blue - green > 12) & (red > green))
+    own = (
+        (red - green > 8)
+        | (film[:, *_CLOTH].max(axis=-1) < 70)
+        | ((blue - green > 12) & (red > green))
+    )
     found = np.zeros(film.shape[:3], bool)
     for place, one in zip(found, own, strict=True):
         clean = cv2.morphologyEx(one.astype(np.uint8), cv2.MORPH_OPEN, np.ones((2, 2)))
@@ -116,7 +123,14 @@ def tree(film: Film) -> Film:
     shown = np.repeat(film[:1], COUNT, axis=0)
     shown[:, 118:165, 124:134] = (70, 50, 35)
     rows, columns = np.mgrid[:HEIGHT, :WIDTH]
-    spots = [(130, 72, 52), (96, 92, 34), (160, 92, 36), (130, 50, 40), (104, 54, 32), (160, 54, 34)]
+    spots = [
+        (130, 72, 52),
+        (96, 92, 34),
+        (160, 92, 36),
+        (130, 50, 40),
+        (104, 54, 32),
+        (160, 54, 34),
+    ]
     crown = np.any([np.hypot(columns - x, rows - y) < r for x, y, r in spots], axis=0)
     for frame in shown:
         light = rng.random((HEIGHT, WIDTH)) > 0.5
@@ -143,8 +157,12 @@ def water(film: Film) -> Film:
     waves = [rng.uniform((0.05, -0.3, 3, 0), (0.25, 0.3, 9, 6)) for _ in range(8)]
     shown = np.repeat(film[:1], COUNT, axis=0)
     for k, frame in enumerate(shown):
-        height = sum(np.sin(a * columns + b * rows - w * k / RATE + phase) for a, b, w, phase in waves)
-        frame[bed] = np.clip(np.array([70, 105, 125]) + 13 * np.asarray(height)[bed][:, None], 0, 255)
+        height = sum(
+            np.sin(a * columns + b * rows - w * k / RATE + phase) for a, b, w, phase in waves
+        )
+        frame[bed] = np.clip(
+            np.array([70, 105, 125]) + 13 * np.asarray(height)[bed][:, None], 0, 255
+        )
     return _noisy(shown)
 
 
@@ -162,7 +180,9 @@ def upside_down(film: Film) -> Film:
     for k, (one, own) in enumerate(zip(film, _cloth(film), strict=True)):
         slope = 0.25 + 0.1 * np.sin(5 * k / RATE)
         shear = np.array([[1.0, 0, 0], [-slope, 1, slope * _POLE[0, 0]]])
-        moved, at = (cv2.warpAffine(part, shear, (WIDTH, HEIGHT)) for part in (one, own.astype(np.uint8)))
+        moved, at = (
+            cv2.warpAffine(part, shear, (WIDTH, HEIGHT)) for part in (one, own.astype(np.uint8))
+        )
         shown.append(np.where(at[..., None] > 0, moved, behind))
     return _noisy(np.stack(shown)[:, ::-1, ::-1])
 
@@ -197,7 +217,12 @@ def moving_camera(film: Film) -> Film:
     across, down = 18 * np.sin(2.6 * time), 12 * np.cos(2 * time)
     even = np.where(_cloth(film)[..., None], film, _SKY)
     moved = [
-        cv2.warpAffine(one, np.array([[1.0, 0, x], [0, 1, y]]), (WIDTH, HEIGHT), borderMode=cv2.BORDER_REPLICATE)
+        cv2.warpAffine(
+            one,
+            np.array([[1.0, 0, x], [0, 1, y]]),
+            (WIDTH, HEIGHT),
+            borderMode=cv2.BORDER_REPLICATE,
+        )
         for one, x, y in zip(even, across, down, strict=True)
     ]
     return _noisy(np.stack(moved))
@@ -266,14 +291,17 @@ def looked_at(reason: str) -> ConditionedFilm:
     """The same, read to its end as `flagdata measure` reads it."""
     shown = images(reason)
     fault = FAULTS[reason]
-    film = ConditionedFilm(Frames(images=shown, time=np.arange(len(shown)) / fault.rate), aspect=fault.aspect)
+    film = ConditionedFilm(
+        Frames(images=shown, time=np.arange(len(shown)) / fault.rate), aspect=fault.aspect
+    )
     for _ in film.frames(0.0, film.duration):
         pass
     return film
 
 
 def found(film: ConditionedFilm) -> tuple[str, str]:
-    """The kind of what the program says of it first, and its sentence; of several flags its warning.
+    """The kind of what the program says of it first, and its sentence; of several flags its
+    warning.
 
     Raises:
         LookupError: it finds nothing wrong.
@@ -290,7 +318,8 @@ def found(film: ConditionedFilm) -> tuple[str, str]:
 
 
 def picture(reason: str, film: ConditionedFilm) -> Image.Image:
-    """One frame, or two beside each other with their instants; of several flags the picture of the program's page."""
+    """One frame, or two beside each other with their instants; of several flags the picture of the
+    program's page."""
     if reason == "several-flags":
         url = steps(film)
         if url is None:
@@ -307,7 +336,9 @@ def picture(reason: str, film: ConditionedFilm) -> Image.Image:
         left = place * (wide + _GAP)
         whole.paste(Image.fromarray(frame).resize((wide, high), how), (left, 0))
         if len(frames) > 1:
-            ImageDraw.Draw(whole).text((left + 4, 3), label, fill="white", stroke_width=2, stroke_fill="black")
+            ImageDraw.Draw(whole).text(
+                (left + 4, 3), label, fill="white", stroke_width=2, stroke_fill="black"
+            )
     return whole
 
 

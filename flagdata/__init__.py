@@ -1,13 +1,14 @@
-"""flagdata: the physics of cloth in the wind from films, logs and simulation, over a lake that keeps them.
+"""flagdata: the physics of cloth in the wind from films, logs and simulation, over a lake that
+keeps them.
 
     import flagdata
 
     found = flagdata.measure("example:flag")
     found.wind.value, found.wind.interval
 
-The calls below are the public interface; each is imported when it is first used. `flagdata.dataset` has the types of
-training data, `flagdata.errors` what is raised, `flagdata.extend` what a package that adds to flagdata imports, and
-`flagdata.__version__` the version.
+The calls below are the public interface; each is imported when it is first used. `flagdata.dataset`
+has the types of training data, `flagdata.errors` what is raised, `flagdata.extend` what a package
+that adds to flagdata imports, and `flagdata.__version__` the version.
 """
 
 from __future__ import annotations

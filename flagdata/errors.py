@@ -1,8 +1,8 @@
 """Errors that say what, where and the fix, each with a stable kind.
 
-Every error a user can cause is a `FlagdataError`. The command line prints it as three lines and exits with `exit_code`;
-`--json` prints `as_dict()`. Programs match on `kind`, an `ErrorKind` that never changes once released, not on the
-wording.
+Every error a user can cause is a `FlagdataError`. The command line prints it as three lines and
+exits with `exit_code`; `--json` prints `as_dict()`. Programs match on `kind`, an `ErrorKind` that
+never changes once released, not on the wording.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ from typing import ClassVar
 
 
 class ErrorKind(StrEnum):
-    """Names every kind of error, one for each class below `FlagdataError`; the texts are those of `--json`."""
+    """Names every kind of error, one for each class below `FlagdataError`; the texts are those of
+    `--json`."""
 
     FAILED = "failed"
     BAD_INPUT = "bad-input"
@@ -81,7 +82,8 @@ class InputError(FlagdataError):
 
 
 class LimitError(FlagdataError):
-    """Input beyond a stated limit (size, frame count, expansion ratio), refused before it is read whole."""
+    """Input beyond a stated limit (size, frame count, expansion ratio), refused before it is read
+    whole."""
 
     kind = ErrorKind.LIMIT
 
@@ -99,7 +101,8 @@ class NothingMeasuredError(InputError):
 
 
 class ZoneMissingError(TimeError):
-    """Stamps of a wall clock whose zone nobody named: a question to the user, with the exit code of a refusal."""
+    """Stamps of a wall clock whose zone nobody named: a question to the user, with the exit code of
+    a refusal."""
 
     kind = ErrorKind.ZONE_MISSING
     exit_code = 3
@@ -155,7 +158,9 @@ class UnknownNameError(UsageError):
     kind = ErrorKind.UNKNOWN_NAME
 
     @classmethod
-    def of(cls, noun: str, name: str, choices: Iterable[str], *, where: str | None = None) -> UnknownNameError:
+    def of(
+        cls, noun: str, name: str, choices: Iterable[str], *, where: str | None = None
+    ) -> UnknownNameError:
         """Build the error for `name`, suggesting the closest of `choices`."""
         names = sorted(choices)
         close = difflib.get_close_matches(name, names, n=1)

@@ -1,8 +1,9 @@
 """What packages that add to flagdata import: `from flagdata.extend import ForceEffect, strength`.
 
-Effects, log formats, data sets, networks and renderers are added by entry points; docs/extending.md shows one of each.
-The names below are public: they are the same in a checkout and in an installation, where the packages `sim` and
-`models` have other names. Each is imported when it is first used.
+Effects, log formats, data sets, networks and renderers are added by entry points; docs/extending.md
+shows one of each.
+The names below are public: they are the same in a checkout and in an installation, where the
+packages `sim` and `models` have other names. Each is imported when it is first used.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""The address that `Frames` had in the last version; it is in `flagdata.ingest.films.film_array` now."""
+"""The address that `Frames` had in the last version; it is in `flagdata.ingest.films.film_array`
+now."""
 
 from __future__ import annotations
 

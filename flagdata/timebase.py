@@ -1,9 +1,10 @@
 """Instants: UTC nanoseconds since 1970 as int64, and their text forms.
 
-A wall-clock time becomes an instant only with an explicit zone. Where daylight saving makes a wall time ambiguous or
-impossible, the functions say so; they never pick silently.
+A wall-clock time becomes an instant only with an explicit zone. Where daylight saving makes a wall
+time ambiguous or impossible, the functions say so; they never pick silently.
 
-Abbreviations of time zones: what each may mean. None is the name of a zone, and many are of several.
+Abbreviations of time zones: what each may mean. None is the name of a zone, and many are of
+several.
 """
 
 from __future__ import annotations
@@ -92,15 +93,16 @@ _ELSEWHERE: Mapping[str, Mapping[str, str]] = {
 
 
 def meanings(abbreviation: str) -> dict[str, str]:
-    """Maps the offsets from UTC ("+02:00") that an abbreviation may mean to a place whose clocks are called so; empty
-    for no abbreviation."""
+    """Maps the offsets from UTC ("+02:00") that an abbreviation may mean to a place whose clocks
+    are called so; empty for no abbreviation."""
     name = abbreviation.strip().upper()
     return {**_names_of_clocks().get(name, {}), **_ELSEWHERE.get(name, {})}
 
 
 @cache
 def _names_of_clocks() -> dict[str, dict[str, str]]:
-    """Maps what clocks of this year are called to their offset and the first place, by the tz database."""
+    """Maps what clocks of this year are called to their offset and the first place, by the tz
+    database."""
     clocks: dict[str, dict[str, str]] = {}
     middle = datetime.now(UTC).replace(day=15)
     for zone_name in (*_PLACES, *sorted(name for name in available_timezones() if "/" in name)):
@@ -108,7 +110,9 @@ def _names_of_clocks() -> dict[str, dict[str, str]]:
             clock = middle.replace(month=month).astimezone(ZoneInfo(zone_name))
             name = (clock.tzname() or "").upper()
             if name.isalpha() and name not in ("UTC", "GMT"):
-                clocks.setdefault(name, {}).setdefault(_written(clock.utcoffset() or timedelta()), zone_name)
+                clocks.setdefault(name, {}).setdefault(
+                    _written(clock.utcoffset() or timedelta()), zone_name
+                )
     return clocks
 
 
@@ -121,17 +125,19 @@ NANOSECONDS = 1_000_000_000
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _FIXED = re.compile(r"^(?:UTC|GMT)?([+-])(\d{1,2}):?([0-5]\d)?$")
 _ISO = re.compile(
-    r"^(\d{4})-(\d{2})-(\d{2})(?:[T ](\d{2}):(\d{2})(?::(\d{2})(?:[.,](\d{1,9}))?)?)?\s*(Z|[+-]\d{2}(?::?[0-5]\d)?)?$"
+    r"^(\d{4})-(\d{2})-(\d{2})(?:[T "
+    r"](\d{2}):(\d{2})(?::(\d{2})(?:[.,](\d{1,9}))?)?)?\s*(Z|[+-]\d{2}(?::?[0-5]\d)?)?$"
 )
 
 WallStatus = Literal["unique", "ambiguous", "nonexistent"]
 
 
 def zone(name: str, *, where: str | None = None) -> tzinfo:
-    """Returns the time zone called `name`: an IANA name ("Europe/Amsterdam"), "UTC", or a fixed offset ("+02:00").
+    """Returns the time zone called `name`: an IANA name ("Europe/Amsterdam"), "UTC", or a fixed
+    offset ("+02:00").
 
-    An abbreviation ("CET") is refused even where the tz database has a zone of that name: whether its clock is set in
-    summer is what the abbreviation leaves open.
+    An abbreviation ("CET") is refused even where the tz database has a zone of that name: whether
+    its clock is set in summer is what the abbreviation leaves open.
 
     Raises:
         UnknownNameError: with what an abbreviation may mean, or with the nearest IANA name.
@@ -144,48 +150,69 @@ def zone(name: str, *, where: str | None = None) -> tzinfo:
         sign = 1 if fixed[1] == "+" else -1
         offset = timedelta(hours=int(fixed[2]), minutes=int(fixed[3] or 0))
         if offset > timedelta(hours=14):
-            raise TimeError(f"the offset {text!r} is beyond ±14:00", where=where, fix="give an offset such as +02:00")
+            raise TimeError(
+                f"the offset {text!r} is beyond ±14:00",
+                where=where,
+                fix="give an offset such as +02:00",
+            )
         return timezone(sign * offset)
     if text.isalpha() and (clocks := meanings(text)):
         raise _abbreviation_error(text, clocks, where)
     try:
         return ZoneInfo(text)
     except (ZoneInfoNotFoundError, ValueError, OSError):
-        places = sorted(name for name in available_timezones() if "/" in name and not name.startswith("Etc/"))
+        places = sorted(
+            name for name in available_timezones() if "/" in name and not name.startswith("Etc/")
+        )
         close = difflib.get_close_matches(text, places, n=1)
         raise UnknownNameError(
             f"the time zone {name!r} is unknown",
             where=where,
-            fix=f"did you mean {close[0]!r}?" if close else "give a name such as Europe/Amsterdam, or +02:00, or UTC",
+            fix=f"did you mean {close[0]!r}?"
+            if close
+            else "give a name such as Europe/Amsterdam, or +02:00, or UTC",
         ) from None
 
 
-def _abbreviation_error(text: str, clocks: Mapping[str, str], where: str | None) -> UnknownNameError:
+def _abbreviation_error(
+    text: str, clocks: Mapping[str, str], where: str | None
+) -> UnknownNameError:
     """Returns the error for an abbreviation of these clocks, offset → place."""
-    meanings_found = " or ".join(f"{offset} (as in {where_used})" for offset, where_used in clocks.items())
+    meanings_found = " or ".join(
+        f"{offset} (as in {where_used})" for offset, where_used in clocks.items()
+    )
     offsets, places = (" or ".join(dict.fromkeys(names)) for names in (clocks, clocks.values()))
     return UnknownNameError(
         f"{text!r} is an abbreviation, no name of a time zone: it may mean {meanings_found}",
         where=where,
-        fix=f"give the offset that the clock kept, {offsets}; if it was set in summer and winter, give the place whose "
+        fix=f"give the offset that the clock kept, {offsets}; if it was set in summer and winter, "
+        "give the place whose "
         f"time it followed, {places}",
     )
 
 
 def from_datetime(moment: datetime, *, nanosecond: int = 0) -> int:
-    """Converts an aware `moment` (exact to the microsecond) plus `nanosecond` below the microsecond to UTC nanoseconds.
+    """Converts an aware `moment` (exact to the microsecond) plus `nanosecond` below the microsecond
+    to UTC nanoseconds.
 
     Raises:
         TimeError: when `moment` carries no zone.
     """
     if moment.tzinfo is None:
-        raise TimeError(f"the time {moment.isoformat()} has no zone", fix="name the zone it was written in")
+        raise TimeError(
+            f"the time {moment.isoformat()} has no zone", fix="name the zone it was written in"
+        )
     delta = moment - _EPOCH
-    return (delta.days * 86_400 + delta.seconds) * NANOSECONDS + delta.microseconds * 1_000 + nanosecond
+    return (
+        (delta.days * 86_400 + delta.seconds) * NANOSECONDS
+        + delta.microseconds * 1_000
+        + nanosecond
+    )
 
 
 def wall_status(wall: datetime, local_zone: tzinfo) -> WallStatus:
-    """Checks whether a naive wall-clock time occurs once, twice or never in `local_zone` (daylight-saving jumps)."""
+    """Checks whether a naive wall-clock time occurs once, twice or never in `local_zone`
+    (daylight-saving jumps)."""
     early = wall.replace(tzinfo=local_zone, fold=0)
     late = wall.replace(tzinfo=local_zone, fold=1)
     if early.utcoffset() == late.utcoffset():
@@ -194,7 +221,9 @@ def wall_status(wall: datetime, local_zone: tzinfo) -> WallStatus:
     return "ambiguous" if back == wall else "nonexistent"
 
 
-def from_wall(wall: datetime, local_zone: tzinfo, *, fold: int | None = None, where: str | None = None) -> int:
+def from_wall(
+    wall: datetime, local_zone: tzinfo, *, fold: int | None = None, where: str | None = None
+) -> int:
     """Converts a naive wall-clock time in a zone to UTC nanoseconds.
 
     Args:
@@ -206,13 +235,16 @@ def from_wall(wall: datetime, local_zone: tzinfo, *, fold: int | None = None, wh
     status = wall_status(wall, local_zone)
     if status == "nonexistent":
         raise TimeError(
-            f"{wall.isoformat(sep=' ')} does not exist in {local_zone}: the clocks were set forward over it",
+            f"{wall.isoformat(sep=' ')} does not exist in {local_zone}: the clocks were set "
+            "forward over it",
             where=where,
-            fix="give the zone the instrument's clock really ran on (many loggers stay on winter time, e.g. +01:00)",
+            fix="give the zone the instrument's clock really ran on (many loggers stay on winter "
+            "time, e.g. +01:00)",
         )
     if status == "ambiguous" and fold is None:
         raise TimeError(
-            f"{wall.isoformat(sep=' ')} occurs twice in {local_zone}: the clocks were set back over it",
+            f"{wall.isoformat(sep=' ')} occurs twice in {local_zone}: the clocks were set back "
+            "over it",
             where=where,
             fix="give a fixed offset such as +02:00 (before the change) or +01:00 (after it)",
         )
@@ -220,7 +252,8 @@ def from_wall(wall: datetime, local_zone: tzinfo, *, fold: int | None = None, wh
 
 
 def parse(text: str, *, default: tzinfo | None = None, where: str | None = None) -> int:
-    """Parses an ISO 8601 time such as "2026-05-01T12:00:00.25+02:00" to UTC nanoseconds, to the nanosecond.
+    """Parses an ISO 8601 time such as "2026-05-01T12:00:00.25+02:00" to UTC nanoseconds, to the
+    nanosecond.
 
     Args:
         default: the zone of a time that names none; with `None` such a time is refused.
@@ -230,11 +263,17 @@ def parse(text: str, *, default: tzinfo | None = None, where: str | None = None)
     """
     match = _ISO.match(text.strip())
     if not match:
-        raise TimeError(f"{text!r} is not an ISO 8601 time", where=where, fix="write it as 2026-05-01T12:00:00+02:00")
+        raise TimeError(
+            f"{text!r} is not an ISO 8601 time",
+            where=where,
+            fix="write it as 2026-05-01T12:00:00+02:00",
+        )
     year, month, day, hour, minute, second, fraction, offset = match.groups()
     try:
         # A wall-clock time: its zone is attached below.
-        wall = datetime(int(year), int(month), int(day), int(hour or 0), int(minute or 0), int(second or 0))  # noqa: DTZ001
+        wall = datetime(  # noqa: DTZ001
+            int(year), int(month), int(day), int(hour or 0), int(minute or 0), int(second or 0)
+        )
     except ValueError:
         message = f"{text!r} is no day or time of the calendar"
         raise TimeError(message, where=where, fix="correct the date") from None
@@ -242,7 +281,9 @@ def parse(text: str, *, default: tzinfo | None = None, where: str | None = None)
     local_zone = zone(offset, where=where) if offset else default
     if local_zone is None:
         raise TimeError(
-            f"the time {text!r} has no zone", where=where, fix="append one, e.g. +02:00 or Z, or name it by --zone"
+            f"the time {text!r} has no zone",
+            where=where,
+            fix="append one, e.g. +02:00 or Z, or name it by --zone",
         )
     return from_wall(wall, local_zone, where=where) + nanosecond
 
@@ -254,7 +295,8 @@ def names_zone(text: str) -> bool:
 
 
 def iso(instant: int) -> str:
-    """Writes UTC nanoseconds as ISO 8601, with as many decimals (0, 3, 6 or 9) as it takes to be exact."""
+    """Writes UTC nanoseconds as ISO 8601, with as many decimals (0, 3, 6 or 9) as it takes to be
+    exact."""
     seconds, nanosecond = divmod(int(instant), NANOSECONDS)
     text = (_EPOCH + timedelta(seconds=seconds)).strftime("%Y-%m-%dT%H:%M:%S")
     if nanosecond:

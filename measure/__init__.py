@@ -1,1 +1,2 @@
-"""From recordings to measurements: scores, similarity, refinement, residuals, and the effects a model lacks."""
+"""From recordings to measurements: scores, similarity, refinement, residuals, and the effects a
+model lacks."""

@@ -9,8 +9,8 @@ from scipy.stats import beta
 
 
 def clopper_pearson(hits: float, count: float, *, level: float) -> tuple[float, float]:
-    """Computes the interval of a share, each side (1 − level)/2: Clopper and Pearson, Biometrika 26:404 (1934). 0 to 1
-    of no cases.
+    """Computes the interval of a share, each side (1 − level)/2: Clopper and Pearson, Biometrika
+    26:404 (1934). 0 to 1 of no cases.
 
     Args:
         hits, count: in so many of so many; neither has to be a whole number.

@@ -1,4 +1,5 @@
-"""A film of a simulated flag as a camera writes it: colour, noise, H.264 with the time of its first frame."""
+"""A film of a simulated flag as a camera writes it: colour, noise, H.264 with the time of its first
+frame."""
 
 from __future__ import annotations
 
@@ -53,7 +54,9 @@ def write_film(
     """
     with av.open(str(path), "w") as container:
         container.metadata["creation_time"] = start.isoformat()
-        video = container.add_stream("libx264", rate=rate, options={"preset": "veryfast", "crf": str(RATE_FACTOR)})
+        video = container.add_stream(
+            "libx264", rate=rate, options={"preset": "veryfast", "crf": str(RATE_FACTOR)}
+        )
         video.width, video.height, video.pix_fmt = zeta.width, zeta.height, "yuv420p"
         video.codec_context.time_base = Fraction(1, rate)
         video.codec_context.thread_count = 1  # the same bytes on every machine
@@ -71,11 +74,18 @@ def write_film(
 
 
 def _render_pictures(
-    sequence: MeshSequence | RaggedMeshSequence, zeta: RenderParameters, assets: Assets, *, seed: int, workers: int
+    sequence: MeshSequence | RaggedMeshSequence,
+    zeta: RenderParameters,
+    assets: Assets,
+    *,
+    seed: int,
+    workers: int,
 ) -> Iterator[UInt8Array]:
     """Pictures (n, 1.5 height, width) in YUV 4:2:0 with noise, in order, a chunk at a time."""
     firsts = range(0, len(sequence), _CHUNK)
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=single_threaded) as pool:
+    with ProcessPoolExecutor(
+        workers, mp_context=get_context("spawn"), initializer=single_threaded
+    ) as pool:
         # No more than two a worker are waited for, so that finished chunks do not pile up.
         waiting: list[Future[UInt8Array]] = []
         for first in firsts:
@@ -87,15 +97,24 @@ def _render_pictures(
 
 
 def _chunk(
-    sequence: MeshSequence | RaggedMeshSequence, zeta: RenderParameters, assets: Assets, first: int, seed: int
+    sequence: MeshSequence | RaggedMeshSequence,
+    zeta: RenderParameters,
+    assets: Assets,
+    first: int,
+    seed: int,
 ) -> UInt8Array:
     meshes = Meshes.flag(sequence, heading=0.0)
-    pictures = Raster(assets=assets).part(meshes, zeta, first, min(first + _CHUNK, len(meshes))).numpy()
+    pictures = (
+        Raster(assets=assets).part(meshes, zeta, first, min(first + _CHUNK, len(meshes))).numpy()
+    )
     rng = stream(seed, "demo", "camera", first)
     out = []
     for picture in pictures:
         planes = (
-            VideoFrame.from_ndarray(picture, format="rgb24").reformat(format="yuv420p").to_ndarray().astype(np.uint8)
+            VideoFrame.from_ndarray(picture, format="rgb24")
+            .reformat(format="yuv420p")
+            .to_ndarray()
+            .astype(np.uint8)
         )
         planes[: zeta.height] = noisy(planes[: zeta.height], NOISE, rng)
         out.append(planes)

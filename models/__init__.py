@@ -1,1 +1,2 @@
-"""Embeddings and regressors of clips, their losses and training. Functions follow the device of their tensors."""
+"""Embeddings and regressors of clips, their losses and training. Functions follow the device of
+their tensors."""

@@ -1,7 +1,7 @@
 """Compiles kernels once for a machine and keeps them in the user's cache folder.
 
-A library is code that this process will run, so it is loaded only if nobody but the user (or root) could have written
-it, the folder it lies in, or a folder above that it could be replaced through.
+A library is code that this process will run, so it is loaded only if nobody but the user (or root)
+could have written it, the folder it lies in, or a folder above that it could be replaced through.
 """
 
 from __future__ import annotations
@@ -59,11 +59,14 @@ def compiler() -> str | None:
 @functools.cache
 def library() -> ctypes.CDLL | None:
     """Loads the simulator's compiled kernel; None, with one warning, where it cannot be built."""
-    return compile_library("sim.kernel", _SOURCES, without="the simulator runs as plain torch, many times slower")
+    return compile_library(
+        "sim.kernel", _SOURCES, without="the simulator runs as plain torch, many times slower"
+    )
 
 
 def compile_library(package: str, sources: tuple[str, ...], *, without: str) -> ctypes.CDLL | None:
-    """Compiles C++ sources of a package to a library; None, with one warning, where it cannot be built.
+    """Compiles C++ sources of a package to a library; None, with one warning, where it cannot be
+    built.
 
     Args:
         sources: file names; the first is compiled and includes the others.
@@ -77,7 +80,8 @@ def compile_library(package: str, sources: tuple[str, ...], *, without: str) -> 
 
 @functools.cache
 def of_effect(header: Path) -> ctypes.CDLL | None:
-    """Compiles the library of an effect's C++ (see effect.hpp); None, with one warning, where it cannot be built.
+    """Compiles the library of an effect's C++ (see effect.hpp); None, with one warning, where it
+    cannot be built.
 
     Args:
         header: whose name ends in .hpp; its content when it is first asked for counts.
@@ -85,7 +89,8 @@ def of_effect(header: Path) -> ctypes.CDLL | None:
     sources = {"acting.cpp": b'#include "given.hpp"\n', "given.hpp": header.read_bytes()}
     sources |= {name: (files("sim.kernel") / name).read_bytes() for name in _EFFECT}
     return _load_library(
-        sources, f"{header.name} is left aside and its effect runs as plain torch, several times slower"
+        sources,
+        f"{header.name} is left aside and its effect runs as plain torch, several times slower",
     )
 
 
@@ -105,7 +110,11 @@ def _load_library(sources: dict[str, bytes], without: str) -> ctypes.CDLL | None
 
 
 def _warn(reason: str, without: str) -> None:
-    warnings.warn(f"{without}: {reason}. Install g++ to have its kernel compiled.", RuntimeWarning, stacklevel=5)
+    warnings.warn(
+        f"{without}: {reason}. Install g++ to have its kernel compiled.",
+        RuntimeWarning,
+        stacklevel=5,
+    )
 
 
 def _built(path: str, sources: dict[str, bytes]) -> Path:
@@ -125,7 +134,9 @@ def _built(path: str, sources: dict[str, bytes]) -> Path:
         code, built = Path(scratch) / main, Path(scratch) / "made.so"
         for part, text in sources.items():
             (Path(scratch) / part).write_bytes(text)
-        subprocess.run([path, *_FLAGS, "-o", str(built), str(code)], capture_output=True, check=True, text=True)
+        subprocess.run(
+            [path, *_FLAGS, "-o", str(built), str(code)], capture_output=True, check=True, text=True
+        )
         built.replace(target)  # atomic: several processes may build at once
     return target
 
@@ -141,8 +152,8 @@ def check_owned(path: Path) -> None:
     """Checks that only this user and root could have written a library, or what lies in a folder.
 
     Raises:
-        UsageError: another user owns it or may write to it, or owns or may write to a folder above it; in folders
-            above, a sticky bit keeps others from replacing what is not theirs.
+        UsageError: another user owns it or may write to it, or owns or may write to a folder above
+            it; in folders above, a sticky bit keeps others from replacing what is not theirs.
     """
     resolved = path.resolve()
     for part in (resolved, *resolved.parents):
@@ -156,7 +167,8 @@ def check_owned(path: Path) -> None:
             raise UsageError(
                 f"another user could have written the compiled kernels in {str(user_cache())!r}",
                 where=str(part),
-                fix="set FLAGDATA_CACHE to a folder that only you can write (chmod go-w), on a path of such folders",
+                fix="set FLAGDATA_CACHE to a folder that only you can write (chmod go-w), on a "
+                "path of such folders",
             )
 
 
@@ -177,6 +189,10 @@ def _processor() -> bytes:
     info = Path("/proc/cpuinfo")
     if info.exists():
         lines = info.read_text(encoding="utf-8", errors="replace").splitlines()
-        relevant = {line for line in lines if line.startswith(("flags", "Features", "model name", "CPU part"))}
+        relevant = {
+            line
+            for line in lines
+            if line.startswith(("flags", "Features", "model name", "CPU part"))
+        }
         return "\n".join(sorted(relevant)).encode()
     return f"{platform.machine()} {platform.processor()}".encode()

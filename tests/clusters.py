@@ -18,7 +18,9 @@ class Cluster:
     def __init__(self, folder: Path, *, workers: int) -> None:
         self._folder = folder
         self._file = folder / "scheduler.json"
-        self.scheduler = self._start("scheduler", "--host", "127.0.0.1", "--port", "0", "--idle-timeout", "3600")
+        self.scheduler = self._start(
+            "scheduler", "--host", "127.0.0.1", "--port", "0", "--idle-timeout", "3600"
+        )
         self.workers: list[subprocess.Popen[bytes]] = []
         for _ in range(workers):
             self.add_worker()
@@ -26,11 +28,28 @@ class Cluster:
     def add_worker(self) -> None:
         place = str(self._folder / f"worker-{len(self.workers)}")
         # The last: nothing stays behind a test run that is killed.
-        options = ("--nthreads", "1", "--no-nanny", "--local-directory", place, "--death-timeout", "60")
+        options = (
+            "--nthreads",
+            "1",
+            "--no-nanny",
+            "--local-directory",
+            place,
+            "--death-timeout",
+            "60",
+        )
         self.workers.append(self._start("worker", *options))
 
     def _start(self, role: str, *options: str) -> subprocess.Popen[bytes]:
-        command = [sys.executable, "-m", "dask", role, "--scheduler-file", str(self._file), "--no-dashboard", *options]
+        command = [
+            sys.executable,
+            "-m",
+            "dask",
+            role,
+            "--scheduler-file",
+            str(self._file),
+            "--no-dashboard",
+            *options,
+        ]
         return subprocess.Popen(
             command,
             env={**pausing.finding_tests(), "OMP_NUM_THREADS": "1", "PYTHONWARNINGS": "ignore"},

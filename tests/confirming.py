@@ -1,4 +1,5 @@
-"""Confirms every draft of a log, as somebody does who compared its rows; for tests of what comes after."""
+"""Confirms every draft of a log, as somebody does who compared its rows; for tests of what comes
+after."""
 
 from __future__ import annotations
 

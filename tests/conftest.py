@@ -19,7 +19,8 @@ from sim.blender import environment
 from tests.evidence import REFERENCE
 from tests.s3 import BUCKET, SECRETS, moto
 
-# A busy machine is no defect: what may take how long is the claim of tests of its own (pytest-timeout ends a hang).
+# A busy machine is no defect: what may take how long is the claim of tests of its own
+# (pytest-timeout ends a hang).
 hypothesis.settings.register_profile("whatever-the-load", deadline=None)
 hypothesis.settings.load_profile("whatever-the-load")
 
@@ -48,15 +49,20 @@ LONGEST = (
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     place = {REPOSITORY / "tests" / name: number for number, name in enumerate(LONGEST)}
     if missing := [path for path in place if not path.is_file()]:
-        raise pytest.UsageError(f"LONGEST in tests/conftest.py names files that are not there: {missing}")
+        raise pytest.UsageError(
+            f"LONGEST in tests/conftest.py names files that are not there: {missing}"
+        )
     items.sort(key=lambda item: place.get(item.path, len(place)))
 
 
 def pytest_sessionfinish() -> None:
-    """Searches once for garbage, whose finalizers may fail; pytest would search five times, seconds each."""
+    """Searches once for garbage, whose finalizers may fail; pytest would search five times, seconds
+    each."""
     gc.collect()
     gc.freeze()
-    atexit.register(gc.unfreeze)  # what libraries of C hold is let go at the exit, or they report it as leaked
+    atexit.register(
+        gc.unfreeze
+    )  # what libraries of C hold is let go at the exit, or they report it as leaked
 
 
 @pytest.fixture(scope="session")
@@ -69,7 +75,8 @@ def reference_data() -> Path:
 
 @pytest.fixture(scope="session")
 def blender() -> Iterator[environment.Environment]:
-    """Blender's environment: FLAGDATA_BLENDER, `.venv-blender` as `make test` makes it, or the user's.
+    """Blender's environment: FLAGDATA_BLENDER, `.venv-blender` as `make test` makes it, or the
+    user's.
 
     One that is there and does not work is an error, not a reason to skip.
     """
@@ -106,7 +113,11 @@ def use_store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Calla
         forget()
         for variable in [name for name in os.environ if name.startswith("AWS_")]:
             monkeypatch.delenv(variable)
-        for name, value in (*SECRETS.items(), ("AWS_ENDPOINT_URL", address), ("AWS_REGION", "us-east-1")):
+        for name, value in (
+            *SECRETS.items(),
+            ("AWS_ENDPOINT_URL", address),
+            ("AWS_REGION", "us-east-1"),
+        ):
             monkeypatch.setenv(name, value)
         monkeypatch.setenv("AWS_CONFIG_FILE", str(tmp_path / "no-config"))
         monkeypatch.setenv("AWS_SHARED_CREDENTIALS_FILE", str(tmp_path / "no-credentials"))

@@ -1,4 +1,5 @@
-"""Damage for property-based tests: bytes that changed, parts that are missing or doubled, values no one meant."""
+"""Damage for property-based tests: bytes that changed, parts that are missing or doubled, values no
+one meant."""
 
 from __future__ import annotations
 
@@ -29,7 +30,8 @@ damages = st.lists(
     min_size=1,
     max_size=4,
 )
-"""What is done to a file's bytes, one after another: kind, place as a share of its length, and how much."""
+"""What is done to a file's bytes, one after another: kind, place as a share of its length, and how
+much."""
 
 
 def damaged(data: bytes, damage: list[tuple[str, float, int]]) -> bytes:
@@ -108,7 +110,9 @@ def paths(content: Any, before: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     items = content.items() if isinstance(content, Mapping) else enumerate(content)
     for key, value in items:
         found.append((*before, key))
-        if isinstance(value, Mapping) or (isinstance(value, list) and any(isinstance(v, Mapping) for v in value)):
+        if isinstance(value, Mapping) or (
+            isinstance(value, list) and any(isinstance(v, Mapping) for v in value)
+        ):
             found += paths(value, (*before, key))
     return found
 
@@ -123,11 +127,14 @@ def changed(content: Any, path: tuple[Any, ...], value: Any) -> Any:
 
 
 edits = st.lists(
-    st.tuples(st.sampled_from(("put", "item", "drop", "add", "rename", "wrap", "double")), places, wild),
+    st.tuples(
+        st.sampled_from(("put", "item", "drop", "add", "rename", "wrap", "double")), places, wild
+    ),
     min_size=1,
     max_size=3,
 )
-"""What is done to nested tables and lists, one after another: kind, which of their values, and another value."""
+"""What is done to nested tables and lists, one after another: kind, which of their values, and
+another value."""
 
 
 def edited(content: Any, edit: list[tuple[str, float, Any]]) -> Any:
@@ -152,7 +159,9 @@ def edited(content: Any, edit: list[tuple[str, float, Any]]) -> Any:
         elif kind == "double":
             holder[key] = [old, copy.deepcopy(old)]
         elif kind in ("add", "rename") and isinstance(holder, dict):
-            holder['e\u0301 "x" = 1' if place < 0.5 else "name"] = value if kind == "add" else holder.pop(key)
+            holder['e\u0301 "x" = 1' if place < 0.5 else "name"] = (
+                value if kind == "add" else holder.pop(key)
+            )
         else:
             holder[key] = value
     return content
@@ -165,7 +174,11 @@ def as_toml(content: Mapping[str, Any]) -> str:
 
 def _in_line(value: Any) -> str:
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{json.dumps(key)} = {_in_line(inner)}" for key, inner in value.items()) + "}"
+        return (
+            "{"
+            + ", ".join(f"{json.dumps(key)} = {_in_line(inner)}" for key, inner in value.items())
+            + "}"
+        )
     if isinstance(value, list):
         return "[" + ", ".join(_in_line(inner) for inner in value) + "]"
     if isinstance(value, float):

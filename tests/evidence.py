@@ -1,4 +1,5 @@
-"""Results worth keeping: what was measured, on what hardware, with which versions, commit and seed."""
+"""Results worth keeping: what was measured, on what hardware, with which versions, commit and
+seed."""
 
 from __future__ import annotations
 
@@ -14,8 +15,11 @@ from typing import Any
 from flagdata.core.provenance import code_version
 from flagdata.timebase import NANOSECONDS, iso
 
-REFERENCE = Path(os.environ.get("FLAGDATA_REFERENCE", Path(__file__).resolve().parents[2] / "shared" / "data"))
-"""The folder of real recordings and of others' results, which may be absent; it is not part of the project."""
+REFERENCE = Path(
+    os.environ.get("FLAGDATA_REFERENCE", Path(__file__).resolve().parents[2] / "shared" / "data")
+)
+"""The folder of real recordings and of others' results, which may be absent; it is not part of the
+project."""
 ABSENT = {"left_out": "no reference data; set FLAGDATA_REFERENCE to their folder"}
 """Result of what needs it."""
 _VERSIONS = ("numpy", "scipy", "torch", "pyarrow", "deltalake", "zarr", "mcap", "av", "duckdb")

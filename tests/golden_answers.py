@@ -1,9 +1,9 @@
-"""What questions with fixed inputs were answered, beside what they are answered now: words and places may move, figures
-not.
+"""What questions with fixed inputs were answered, beside what they are answered now: words and
+places may move, figures not.
 
-The tests of each question compare its document, number by number, with the one that was kept; keys may have another
-name since. Simulations are known functions there, so that no figure hangs on a processor's rounding of a flag in
-turbulent air.
+The tests of each question compare its document, number by number, with the one that was kept; keys
+may have another name since. Simulations are known functions there, so that no figure hangs on a
+processor's rounding of a flag in turbulent air.
 """
 
 from __future__ import annotations
@@ -18,9 +18,11 @@ from typing import Any
 
 KEPT = Path(__file__).parent / "golden"
 WRITING = bool(os.environ.get("FLAGDATA_WRITE_GOLDEN"))
-"""Whether documents are written anew instead of compared: `FLAGDATA_WRITE_GOLDEN=1 pytest FILES`."""
+"""Whether documents are written anew instead of compared: `FLAGDATA_WRITE_GOLDEN=1 pytest
+FILES`."""
 RENAMED = {r"((?:cloth|place)\.\w+)\.determined$": r"\1.constrained"}
-"""Pattern of a path in a kept document → its path today. Items of a list are numbered: `windows.0.wind`."""
+"""Pattern of a path in a kept document → its path today. Items of a list are numbered:
+`windows.0.wind`."""
 NEW = (r"(?:cloth|place)\.\w+\.given$",)
 """Patterns of paths that kept documents lack."""
 _OF_A_RUN = {"seconds", "code", "code_version", "created", "version", "milliseconds"}
@@ -48,7 +50,8 @@ def today(path: str) -> str:
 
 
 def changes(name: str, document: Any, *, relative: float) -> list[str]:
-    """Lists what a document says otherwise than the kept one of that name; writes it instead if that is asked for.
+    """Lists what a document says otherwise than the kept one of that name; writes it instead if
+    that is asked for.
 
     Args:
         relative: by how much numbers may differ, of their size.
@@ -59,10 +62,14 @@ def changes(name: str, document: Any, *, relative: float) -> list[str]:
         file.parent.mkdir(exist_ok=True)
         file.write_text(json.dumps(found, indent=0, ensure_ascii=False) + "\n", encoding="utf-8")
         return []
-    kept = {today(path): value for path, value in json.loads(file.read_text(encoding="utf-8")).items()}
+    kept = {
+        today(path): value for path, value in json.loads(file.read_text(encoding="utf-8")).items()
+    }
     missing = [f"{path} is gone" for path in kept.keys() - found.keys()]
     added = [
-        f"{path} is new" for path in found.keys() - kept.keys() if not any(re.search(pattern, path) for pattern in NEW)
+        f"{path} is new"
+        for path in found.keys() - kept.keys()
+        if not any(re.search(pattern, path) for pattern in NEW)
     ]
     changed = [
         f"{path} was {kept[path]!r}, and is {found[path]!r}"

@@ -1,7 +1,8 @@
 """Processes that wait at a known place of their work until they are killed or let go on.
 
-A test that kills a process after some time, or once something is there, kills it where the load of the machine decides,
-and on a busy machine after its end. The process says where it is instead, and waits.
+A test that kills a process after some time, or once something is there, kills it where the load of
+the machine decides, and on a busy machine after its end. The process says where it is instead, and
+waits.
 """
 
 from __future__ import annotations

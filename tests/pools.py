@@ -8,7 +8,8 @@ from typing import Any
 
 
 class Here:
-    """In the place of a `ProcessPoolExecutor` where a test is of what is computed; a start costs seconds of imports."""
+    """In the place of a `ProcessPoolExecutor` where a test is of what is computed; a start costs
+    seconds of imports."""
 
     def __init__(self, *_: object, **__: object) -> None:
         pass

@@ -17,9 +17,10 @@ def unrefused(
 ) -> list[str]:
     """What is wrong with the cases, a line each; none where all are refused as they state.
 
-    A case is the arguments of `use`, then the class of the error unless it is given for all, then, unless `match` is
-    given for all, what its text matches: as many of these as the case has besides the arguments. `where` is what the
-    place matches that the error of flagdata names; nothing where it names none.
+    A case is the arguments of `use`, then the class of the error unless it is given for all, then,
+    unless `match` is
+    given for all, what its text matches: as many of these as the case has besides the arguments.
+    `where` is what the place matches that the error of flagdata names; nothing where it names none.
     """
     wrong = []
     for case in cases:
@@ -29,9 +30,14 @@ def unrefused(
         except wanted as refusal:
             place = getattr(refusal, "where", None) or ""
             if not re.search(words, str(refusal)) or not re.search(where, place):
-                wrong.append(f"{arguments!r}: {str(refusal)!r} at {place!r} does not match {words!r} at {where!r}")
+                wrong.append(
+                    f"{arguments!r}: {str(refusal)!r} at {place!r} does not match {words!r} at "
+                    f"{where!r}"
+                )
         except Exception as other:  # noqa: BLE001 — it belongs in the list
-            wrong.append(f"{arguments!r}: {type(other).__name__} instead of {wanted.__name__}: {other}")
+            wrong.append(
+                f"{arguments!r}: {type(other).__name__} instead of {wanted.__name__}: {other}"
+            )
         else:
             wrong.append(f"{arguments!r}: not refused, but {found!r}")
     return wrong

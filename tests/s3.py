@@ -1,4 +1,5 @@
-"""Servers of object storage on loopback: moto's, which keeps what it promises, and one that does not."""
+"""Servers of object storage on loopback: moto's, which keeps what it promises, and one that does
+not."""
 
 from __future__ import annotations
 
@@ -48,8 +49,8 @@ SECRETS = {
 
 @contextmanager
 def moto() -> Iterator[str]:
-    """The address of moto's server, with an empty bucket; in a process of its own, since the Delta library keeps
-    Python's lock while it waits for an answer."""
+    """The address of moto's server, with an empty bucket; in a process of its own, since the Delta
+    library keeps Python's lock while it waits for an answer."""
     with process(_SERVER) as address:
         urlopen(Request(f"{address}/{BUCKET}", method="PUT")).close()
         yield address
@@ -57,7 +58,8 @@ def moto() -> Iterator[str]:
 
 @contextmanager
 def read_only(store: str) -> Iterator[str]:
-    """The address of a server that passes reads on to another one; in a process of its own, as moto's."""
+    """The address of a server that passes reads on to another one; in a process of its own, as
+    moto's."""
     with process(_READ_ONLY, store.removeprefix("http://")) as address:
         yield address
 
@@ -66,7 +68,9 @@ def read_only(store: str) -> Iterator[str]:
 def process(program: str, *arguments: str) -> Iterator[str]:
     """The address that a server in a process of its own prints."""
     command = [sys.executable, "-c", program, *arguments]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, cwd=Path(__file__).parents[1]) as process:
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, cwd=Path(__file__).parents[1]
+    ) as process:
         assert process.stdout is not None
         try:
             yield process.stdout.readline().decode().strip()
@@ -87,7 +91,9 @@ class Careless(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         if "list-type" in self.path:
-            self._answer(200, b"<ListBucketResult><IsTruncated>false</IsTruncated></ListBucketResult>")
+            self._answer(
+                200, b"<ListBucketResult><IsTruncated>false</IsTruncated></ListBucketResult>"
+            )
         elif self.path in self.objects:
             self._answer(200, self.objects[self.path])
         else:
@@ -98,7 +104,11 @@ class Careless(BaseHTTPRequestHandler):
     def do_POST(self) -> None:
         asked = self.rfile.read(int(self.headers["Content-Length"]))
         keys = re.findall(rb"<Key>.*?</Key>", asked)
-        self._answer(200, b"<DeleteResult><Deleted>%s</Deleted></DeleteResult>" % b"</Deleted><Deleted>".join(keys))
+        self._answer(
+            200,
+            b"<DeleteResult><Deleted>%s</Deleted></DeleteResult>"
+            % b"</Deleted><Deleted>".join(keys),
+        )
 
     def _answer(self, status: int, content: bytes) -> None:
         self.send_response(status)
@@ -120,7 +130,8 @@ class Denying(Careless):
         sent = self.headers.get("Authorization", "") + self.headers.get("x-amz-security-token", "")
         self._answer(
             403,
-            f"<Error><Code>SignatureDoesNotMatch</Code><Message>The signature of {sent} does not match</Message>"
+            f"<Error><Code>SignatureDoesNotMatch</Code><Message>The signature of {sent} does not "
+            "match</Message>"
             f"<AWSAccessKeyId>{sent}</AWSAccessKeyId></Error>".encode(),
         )
 
@@ -247,7 +258,9 @@ class Scripted(BaseHTTPRequestHandler):
         pass
 
 
-def refusing(status: int, code: str, message: str = "no", *, rest: str = "") -> tuple[int, dict[str, str], bytes]:
+def refusing(
+    status: int, code: str, message: str = "no", *, rest: str = ""
+) -> tuple[int, dict[str, str], bytes]:
     """An answer of S3 that refuses a request."""
     text = f"<Error><Code>{code}</Code><Message>{message}</Message>{rest}</Error>"
     return status, {"Content-Type": "application/xml"}, text.encode()

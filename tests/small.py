@@ -1,4 +1,5 @@
-"""Texts of small recipes, each a second's work: what tests of several parts read, change and damage."""
+"""Texts of small recipes, each a second's work: what tests of several parts read, change and
+damage."""
 
 SCENE = """
 seed = 3

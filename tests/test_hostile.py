@@ -1,4 +1,5 @@
-"""Hostile recipes, models, inputs and lakes, drawn from one seed, are read or refused in bounded time and memory."""
+"""Hostile recipes, models, inputs and lakes, drawn from one seed, are read or refused in bounded
+time and memory."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""The README does what it says: every command in it runs, in order, on what the demonstration makes."""
+"""The README does what it says: every command in it runs, in order, on what the demonstration
+makes."""
 
 from __future__ import annotations
 
@@ -38,11 +39,17 @@ def blocks(language: str) -> list[str]:
 
 
 def commands() -> list[str]:
-    return [line[2:] for block in blocks("console") for line in block.splitlines() if line.startswith("$ ")]
+    return [
+        line[2:]
+        for block in blocks("console")
+        for line in block.splitlines()
+        if line.startswith("$ ")
+    ]
 
 
 def started(command: list[str], *, cwd: Path, **_: object) -> subprocess.CompletedProcess[str]:
-    """A command that the demonstration types, run by this process: a start takes longer than its work."""
+    """A command that the demonstration types, run by this process: a start takes longer than its
+    work."""
     assert command[1:3] == ["-m", "flagdata.cli"]
     with contextlib.chdir(cwd):
         ended = invoke(*command[3:])
@@ -54,10 +61,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The shortest demonstration, on a coarse mesh, in small pictures."""
     out = tmp_path_factory.mktemp("readme") / "out" / "demo"
     with pytest.MonkeyPatch.context() as patch:
-        small = partial(RecordingRecipe, rate=25, columns=8, step=8e-3, width=240, rows=180, samples=1)
+        small = partial(
+            RecordingRecipe, rate=25, columns=8, step=8e-3, width=240, rows=180, samples=1
+        )
         patch.setattr("measure.demo.story.RecordingRecipe", small)
         patch.setattr("measure.simulated_camera.ProcessPoolExecutor", Here)
-        patch.setattr("measure.demo.transcript.subprocess", SimpleNamespace(run=started, PIPE=subprocess.PIPE))
+        patch.setattr(
+            "measure.demo.transcript.subprocess", SimpleNamespace(run=started, PIPE=subprocess.PIPE)
+        )
         Shell(patch=patch).run(f"flagdata demo --out {out}")
     return out
 
@@ -66,7 +77,9 @@ def test_the_readme_shows_the_two_commands_that_set_everything_up() -> None:
     assert {"make demo", "make test"} <= set(commands())
 
 
-@pytest.mark.parametrize("target", sorted({c.split()[1] for c in commands() if c.startswith("make ")}))
+@pytest.mark.parametrize(
+    "target", sorted({c.split()[1] for c in commands() if c.startswith("make ")})
+)
 def test_every_make_target_of_the_readme_exists(target: str) -> None:
     subprocess.run(["make", "--dry-run", target], cwd=ROOT, check=True, capture_output=True)
 
@@ -81,13 +94,18 @@ def test_the_demonstration_ends_in_pages_that_need_no_other_folder(folder: Path)
         page = (folder / name).read_text(encoding="utf-8")
         assert not re.findall(r"(?:src|href)=\"(?!data:|#)", page)
         assert ".partial" not in page
-    assert (folder / "recording.html").read_text(encoding="utf-8").count("data:image/webp;base64,") == 6
+    assert (folder / "recording.html").read_text(encoding="utf-8").count(
+        "data:image/webp;base64,"
+    ) == 6
 
 
 def test_the_demonstration_recovers_the_offset_it_hid(folder: Path) -> None:
-    """Beside its step and in the last table, inferred or given, with an interval of 90 % that contains the truth."""
+    """Beside its step and in the last table, inferred or given, with an interval of 90 % that
+    contains the truth."""
     index = (folder / "index.html").read_text(encoding="utf-8")
-    row, again = re.findall(r"<tr><td>the log&#39;s clock minus the camera&#39;s</td>.*</tr>", index)
+    row, again = re.findall(
+        r"<tr><td>the log&#39;s clock minus the camera&#39;s</td>.*</tr>", index
+    )
     assert row == again
     true, found, low, high = (float(number) for number in re.findall(r"[+-]\d+\.\d+", row))
     assert abs(found - true) < 1.0
@@ -96,8 +114,11 @@ def test_the_demonstration_recovers_the_offset_it_hid(folder: Path) -> None:
 
 
 def test_every_command_of_the_readme_runs(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Bash takes them as they are. They run in this process: a start of the program takes longer than its work."""
-    given = [command for command in commands() if not command.startswith("make ") and command != MEASURED]
+    """Bash takes them as they are. They run in this process: a start of the program takes longer
+    than its work."""
+    given = [
+        command for command in commands() if not command.startswith("make ") and command != MEASURED
+    ]
     subprocess.run(["bash", "-n", "-c", "\n".join(given)], check=True)
     monkeypatch.chdir(folder.parents[1])
     shell = Shell(patch=monkeypatch)
@@ -107,7 +128,8 @@ def test_every_command_of_the_readme_runs(folder: Path, monkeypatch: pytest.Monk
 
 
 def test_a_user_who_followed_the_readme_can_run_the_demonstration_again(folder: Path) -> None:
-    """After the commands: none of them has left anything in its folder, which may therefore be replaced."""
+    """After the commands: none of them has left anything in its folder, which may therefore be
+    replaced."""
     check_folder(folder, schema=SCHEMA)
 
 
@@ -117,7 +139,9 @@ def test_the_first_minute_prints_what_is_shown(capsys: pytest.CaptureFixture[str
     shown, printed = blocks("text")
     done = CliRunner().invoke(measure, MEASURED.split()[2:])
     assert done.exit_code == 0
-    without_bar = re.sub(r"\rmeasure:[^\r]*?window\]", "", done.output)  # which a slow machine shows
+    without_bar = re.sub(
+        r"\rmeasure:[^\r]*?window\]", "", done.output
+    )  # which a slow machine shows
     assert [line for line in without_bar.splitlines() if line] == shown.splitlines()
     (program,) = blocks("python")
     exec(compile(program, "README.md", "exec"), {})
@@ -130,16 +154,21 @@ def test_the_start_shows_the_same_answer() -> None:
 
 
 def sheet(name: str) -> Mapping[str, Any]:
-    return json.loads((ROOT / "docs" / "results" / f"{name}.json").read_text(encoding="utf-8"))["result"]
+    return json.loads((ROOT / "docs" / "results" / f"{name}.json").read_text(encoding="utf-8"))[
+        "result"
+    ]
 
 
 def rows() -> dict[str, tuple[str, str]]:
-    """What was measured → what it was tested on and what was found, of the table of the first screen."""
+    """What was measured → what it was tested on and what was found, of the table of the first
+    screen."""
     table = re.findall(r"^\| ([^|]+) \| ([^|]+) \| ([^|]+) \|$", README, flags=re.MULTILINE)
     return {what: (tested, found) for what, tested, found in table}
 
 
-@pytest.mark.parametrize(("what", "weight"), [("wind from a film", "open"), ("the same, area weight given", "stated")])
+@pytest.mark.parametrize(
+    ("what", "weight"), [("wind from a film", "open"), ("the same, area weight given", "stated")]
+)
 def test_the_accuracy_on_films_is_that_of_the_sheet(what: str, weight: str) -> None:
     result = sheet("validate-films")
     films = [film for film in result["films"] if film["part"] == "coverage"]
@@ -160,7 +189,10 @@ def test_the_accuracy_on_films_is_that_of_the_sheet(what: str, weight: str) -> N
 
 def test_the_accuracy_of_a_calibrated_flag_is_that_of_the_sheet() -> None:
     first = sheet("validate-anemometer")["networks"]["flow-outdoor"]["films"][0]
-    assert rows()["wind from a calibrated flag"][1] == f"RMSE {first['read']['cup']['rmse']:.2f} m/s against the cup"
+    assert (
+        rows()["wind from a calibrated flag"][1]
+        == f"RMSE {first['read']['cup']['rmse']:.2f} m/s against the cup"
+    )
 
 
 def test_the_accuracy_of_a_weight_is_that_of_the_sheet() -> None:
@@ -169,11 +201,15 @@ def test_the_accuracy_of_a_weight_is_that_of_the_sheet() -> None:
     flags, codes = films["flags"], {flag["code"] for flag in films["flags"]}
     assert films["withheld"] == 0
     assert codes == {"kernel", "mujoco"}
-    assert sum(flag["value"] < flag["truth"] for flag in flags) > 0.8 * len(flags)  # "most estimates are too low"
+    assert sum(flag["value"] < flag["truth"] for flag in flags) > 0.8 * len(
+        flags
+    )  # "most estimates are too low"
     assert rows()["area weight, wind known"] == (
-        f"[{len(flags)} films](docs/results/validate-weighed.md) of {result['seconds']:g} s, two simulators",
+        f"[{len(flags)} films](docs/results/validate-weighed.md) of {result['seconds']:g} s, two "
+        "simulators",
         (
-            f"median error {100 * films['median_error']:.0f} %, {films['held']} of {len(flags)} in their intervals; "
+            f"median error {100 * films['median_error']:.0f} %, {films['held']} of {len(flags)} in "
+            "their intervals; "
             "most estimates are too low"
         ),
     )
@@ -187,7 +223,8 @@ def test_the_refusals_counted_are_those_of_the_sheet() -> None:
     assert tested.startswith(f"[{refused['count']} films]")
     assert tested.endswith(f"{len({film['kind'] for film in result['films']})} kinds")
     assert found == (
-        f"{refused['hits']} of {refused['count']} refused, {right['hits']} of them with the true reason first"
+        f"{refused['hits']} of {refused['count']} refused, {right['hits']} of them with the true "
+        "reason first"
     )
 
 
@@ -195,11 +232,18 @@ def test_the_films_in_gusts_counted_are_those_of_the_sheets() -> None:
     sheets = [sheet(f"validate-wind-series{seed}") for seed in ("", "-seed-3", "-seed-4")]
     films = sum(one["films"] for one in sheets)
     opened, stated = (
-        round(sum(one["films"] * one["results"][f"{weight}, series"]["mean_covered"] for one in sheets))
+        round(
+            sum(
+                one["films"] * one["results"][f"{weight}, series"]["mean_covered"] for one in sheets
+            )
+        )
         for weight in ("open", "stated")
     )
     said = " ".join(README.split())
-    assert f"the film's mean in {opened} of {films} films, with the area weight given in {stated}" in said
+    assert (
+        f"the film's mean in {opened} of {films} films, with the area weight given in {stated}"
+        in said
+    )
 
 
 def test_the_films_without_a_flag_counted_are_those_of_the_sheet() -> None:
@@ -210,7 +254,9 @@ def test_the_films_without_a_flag_counted_are_those_of_the_sheet() -> None:
 
 
 def test_the_overlapping_flags_counted_are_those_of_the_decision() -> None:
-    page = (ROOT / "docs" / "decisions" / "081-a-second-pole-and-turned-films.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "decisions" / "081-a-second-pole-and-turned-films.md").read_text(
+        encoding="utf-8"
+    )
     (row,) = re.findall(r"^\| two flags \|.*\|$", page, flags=re.MULTILINE)
     refused, pairs = row.split("|")[4].split(" of ")
     said = " ".join(README.split())
@@ -218,30 +264,45 @@ def test_the_overlapping_flags_counted_are_those_of_the_decision() -> None:
 
 
 def test_the_forces_counted_are_those_of_the_sheet() -> None:
-    score = (ROOT / "docs" / "results" / "challenge-registered" / "challenge-score.md").read_text(encoding="utf-8")
+    score = (ROOT / "docs" / "results" / "challenge-registered" / "challenge-score.md").read_text(
+        encoding="utf-8"
+    )
     share = dict(re.findall(r"^\| ([^|]+) \| (\d+/\d+) \|", score, flags=re.MULTILINE))
     (nulls, of_nulls), (found, single), (named, _) = (
         share[name].split("/")
         for name in ("false positives on nulls", "detected: one effect", "top-1, all of one effect")
     )
     wrong, claims = share["false discoveries among claims"].split("/")
-    assert f"{wrong} of {claims} claims named a force that had not acted" in " ".join(README.split())
+    assert f"{wrong} of {claims} claims named a force that had not acted" in " ".join(
+        README.split()
+    )
     tested, stated = rows()["forces missing from the cloth model"]
     (sets,) = re.findall(r"^(\d+) sets:", score, flags=re.MULTILINE)
     assert tested.startswith(f"[{sets} sealed sets]")
     assert stated == (
-        f"{nulls} false alarm in {of_nulls}; of {single} hidden forces {found} detected, {named} named correctly"
+        f"{nulls} false alarm in {of_nulls}; of {single} hidden forces {found} detected, {named} "
+        "named correctly"
     )
 
 
 @pytest.mark.parametrize(
     ("row", "page", "tested"),
     [
-        ("the same, from films", "docs/results/challenge-films-3/challenge-score", "three films of 25 s"),
-        ("the same, from films of three minutes", "docs/results/challenge-films-long/challenge-score", "three films"),
+        (
+            "the same, from films",
+            "docs/results/challenge-films-3/challenge-score",
+            "three films of 25 s",
+        ),
+        (
+            "the same, from films of three minutes",
+            "docs/results/challenge-films-long/challenge-score",
+            "three films",
+        ),
     ],
 )
-def test_the_forces_counted_on_films_are_those_of_the_newest_sheets(row: str, page: str, tested: str) -> None:
+def test_the_forces_counted_on_films_are_those_of_the_newest_sheets(
+    row: str, page: str, tested: str
+) -> None:
     score = json.loads((ROOT / f"{page}.json").read_text(encoding="utf-8"))
     verdicts = [(outcome["key"], outcome) for outcome in score["outcomes"]]
     stated_of, stated = rows()[row]
@@ -252,7 +313,9 @@ def test_the_forces_counted_on_films_are_those_of_the_newest_sheets(row: str, pa
     alarms = sum(conclusion not in quiet for conclusion in nulls)
     detected = [conclusion for conclusion in single if conclusion not in quiet]
     named = re.search(
-        r"^\| true effect among those named \| (\d+)/", (ROOT / f"{page}.md").read_text(encoding="utf-8"), re.MULTILINE
+        r"^\| true effect among those named \| (\d+)/",
+        (ROOT / f"{page}.md").read_text(encoding="utf-8"),
+        re.MULTILINE,
     )
     assert named is not None
     assert detected.count("one of") == int(named[1])
@@ -265,15 +328,21 @@ def test_the_forces_counted_on_films_are_those_of_the_newest_sheets(row: str, pa
 
 def test_what_it_takes_is_what_the_pages_and_the_program_state() -> None:
     install = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
-    (light,) = re.findall(r"^\| `pip install flagdata` .* \| ([\d.]+ GB) \|$", install, flags=re.MULTILINE)
-    (full,) = re.findall(r"^\| `pip install 'flagdata\[physics\]'` .* \| ([\d.]+ GB) \|$", install, flags=re.MULTILINE)
+    (light,) = re.findall(
+        r"^\| `pip install flagdata` .* \| ([\d.]+ GB) \|$", install, flags=re.MULTILINE
+    )
+    (full,) = re.findall(
+        r"^\| `pip install 'flagdata\[physics\]'` .* \| ([\d.]+ GB) \|$",
+        install,
+        flags=re.MULTILINE,
+    )
     said = " ".join(README.split())
     assert f"{full} of disk and no graphics card; {light} without the physics" in said
     start = (ROOT / "docs" / "start.md").read_text(encoding="utf-8")
     assert f"in up to {MINUTES[Story.SHORT]} minutes on two idle cores" in start
     assert (
-        f"takes up to {MINUTES[Story.FULL]} minutes on two idle cores, its short form up to {MINUTES[Story.SHORT]}"
-        in said
+        f"takes up to {MINUTES[Story.FULL]} minutes on two idle cores, its short form up to "
+        f"{MINUTES[Story.SHORT]}" in said
     )
 
 
@@ -282,11 +351,14 @@ def test_packages_and_disk_are_those_of_a_newcomers_run() -> None:
     if not kept.exists():
         pytest.skip("not measured yet: python -m tests.studies newcomer --out docs/results")
     install = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
-    stated = re.findall(r"^\| `pip install .*? \| (\d+) \| ([\d.]+) GB \|$", install, flags=re.MULTILINE)
+    stated = re.findall(
+        r"^\| `pip install .*? \| (\d+) \| ([\d.]+) GB \|$", install, flags=re.MULTILINE
+    )
     result = sheet("bench-newcomer")["python3.11"]
     assert all(result[kind]["right"] for kind in ("light", "physics"))
     assert [(int(packages), float(disk)) for packages, disk in stated] == [
-        (result[kind]["packages"], round(result[kind]["megabytes_on_disk"] / 1e3, 2)) for kind in ("light", "physics")
+        (result[kind]["packages"], round(result[kind]["megabytes_on_disk"] / 1e3, 2))
+        for kind in ("light", "physics")
     ]
 
 

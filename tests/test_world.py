@@ -1,4 +1,5 @@
-"""The data sets of the looks and fabrics of the world, from their recipes to what a network learns from."""
+"""The data sets of the looks and fabrics of the world, from their recipes to what a network learns
+from."""
 
 from __future__ import annotations
 
@@ -35,7 +36,8 @@ def changed(text: str, **values: object) -> str:
 
 @pytest.fixture(scope="module")
 def lake(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Both data sets with a sequence a side, of coarse flags that settle briefly, in small pictures."""
+    """Both data sets with a sequence a side, of coarse flags that settle briefly, in small
+    pictures."""
     folder = tmp_path_factory.mktemp("world")
     for name in ("world", "world-damped"):
         scene = SCENES.named(f"flag-{name}").text
@@ -43,7 +45,14 @@ def lake(tmp_path_factory: pytest.TempPathFactory) -> Path:
         text = changed(DATASETS.named(name).text, scene='"scene.toml"', sequences=1, renders=1)
         small = f"[render]\nwidth = {SIDE}\nheight = {SIDE}"
         (folder / f"{name}.toml").write_text(text.replace("[render]", small), encoding="utf-8")
-        arguments = ["build", str(folder / f"{name}.toml"), "--lake", str(folder / "lake"), "--workers", "1"]
+        arguments = [
+            "build",
+            str(folder / f"{name}.toml"),
+            "--lake",
+            str(folder / "lake"),
+            "--workers",
+            "1",
+        ]
         done = CliRunner().invoke(root, arguments, catch_exceptions=False)
         assert done.exit_code == 0, done.output
     return folder / "lake"

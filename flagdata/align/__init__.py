@@ -1,4 +1,5 @@
-"""Clocks of different devices brought onto one: models with their uncertainty, and the ways to come by them."""
+"""Clocks of different devices brought onto one: models with their uncertainty, and the ways to come
+by them."""
 
 from __future__ import annotations
 

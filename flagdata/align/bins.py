@@ -25,16 +25,18 @@ _COVERED = 0.5  # of the frames a bin should hold
 class LagBins:
     """Normal scores of wind and motion, arranged for trial offsets.
 
-    With `m` trial offsets, wind bin k at trial offset i belongs to motion sample `STEPS · k + (m − 1 − i)`.
+    With `m` trial offsets, wind bin k at trial offset i belongs to motion sample `STEPS · k + (m −
+    1 − i)`.
 
     Attributes:
         offsets: (m,) trial offsets, to be added to the camera's clock [s].
         wind: (n,) normal scores of the binned wind speed, NaN in gaps.
-        motion: (STEPS · (n − 1) + m,) normal scores of the motion, averaged over a bin that ends at each step; NaN
-            where too few frames cover it.
+        motion: (STEPS · (n − 1) + m,) normal scores of the motion, averaged over a bin that ends at
+            each step; NaN where too few frames cover it.
         first: instant of motion sample 0 on the camera's clock [UTC ns].
         period: length of a bin [s].
-        gustiness: standard deviation over mean of the wind speed, over the bins that the recording can touch.
+        gustiness: standard deviation over mean of the wind speed, over the bins that the recording
+            can touch.
     """
 
     offsets: Series
@@ -45,22 +47,27 @@ class LagBins:
     gustiness: float
 
     @classmethod
-    def of(cls, motion: MotionSeries, wind: WindAverage, *, centre: float, window: float) -> LagBins:
+    def of(
+        cls, motion: MotionSeries, wind: WindAverage, *, centre: float, window: float
+    ) -> LagBins:
         """Bins `motion` like `wind`, for offsets from centre − window to centre + window [s].
 
         Raises:
-            InputError: nothing to bin, wind bins that are not on one grid, or fewer than two motion values a bin.
+            InputError: nothing to bin, wind bins that are not on one grid, or fewer than two motion
+                values a bin.
         """
         period = round(wind.period * NANOSECONDS)
         step = round(period / STEPS)
         if len(wind.time) == 0 or np.count_nonzero(np.isfinite(motion.energy)) < 2:
             raise InputError(
-                "there are no wind bins or no motion to compare", fix="check both inputs; see their reports"
+                "there are no wind bins or no motion to compare",
+                fix="check both inputs; see their reports",
             )
         spacing = float(np.median(np.diff(motion.time)))
         if spacing * 2 > period:
             raise InputError(
-                f"motion comes every {spacing / NANOSECONDS:g} s, which is too slow for wind bins of {wind.period:g} s",
+                f"motion comes every {spacing / NANOSECONDS:g} s, which is too slow for wind bins "
+                f"of {wind.period:g} s",
                 fix="average the wind over longer bins",
             )
         lowest = round((centre - window) * NANOSECONDS / step)
@@ -77,7 +84,9 @@ class LagBins:
         time, speed = wind.time[in_reach], wind.speed[in_reach]
         index = np.rint((time - time[0]) / period).astype(np.int64)
         if np.any(np.abs(time - time[0] - index * period) > _OFF_GRID * period):
-            raise InputError("the wind bins are not on one regular grid", fix="average the wind series anew")
+            raise InputError(
+                "the wind bins are not on one regular grid", fix="average the wind series anew"
+            )
         if np.any(np.diff(index) < 1):
             raise InputError("two wind bins are at one time", fix="average the wind series anew")
         scores = np.full(int(index[-1]) + 1, np.nan)
@@ -87,7 +96,9 @@ class LagBins:
         finite = speed[np.isfinite(speed)]
         mean = float(np.mean(finite)) if len(finite) else 0.0
         return cls(
-            offsets=np.asarray((lowest + np.arange(count)) * (step / NANOSECONDS), dtype=np.float64),
+            offsets=np.asarray(
+                (lowest + np.arange(count)) * (step / NANOSECONDS), dtype=np.float64
+            ),
             wind=scores,
             motion=normal_scores(_means(motion, ends, period, period / spacing)),
             first=first,
@@ -96,26 +107,34 @@ class LagBins:
         )
 
     def index(self, trial: int) -> slice:
-        """Selects the motion samples that belong to the wind bins at trial offset number `trial`."""
+        """Selects the motion samples that belong to the wind bins at trial offset number
+        `trial`."""
         start = len(self.offsets) - 1 - trial
         return slice(start, start + STEPS * (len(self.wind) - 1) + 1, STEPS)
 
     def middle(self, trial: int) -> int:
-        """Computes the middle of what both cover at a trial offset, on the camera's clock [UTC ns]."""
-        compared = np.flatnonzero(np.isfinite(self.wind) & np.isfinite(self.motion[self.index(trial)]))
-        centre = float(compared[0] + compared[-1]) / 2 if len(compared) else (len(self.wind) - 1) / 2
+        """Computes the middle of what both cover at a trial offset, on the camera's clock [UTC
+        ns]."""
+        compared = np.flatnonzero(
+            np.isfinite(self.wind) & np.isfinite(self.motion[self.index(trial)])
+        )
+        centre = (
+            float(compared[0] + compared[-1]) / 2 if len(compared) else (len(self.wind) - 1) / 2
+        )
         step = self.period * NANOSECONDS / STEPS
         return self.first + round((self.index(trial).start + STEPS * centre - STEPS / 2) * step)
 
     def windows(self, samples: FloatArray, trials: slice) -> FloatArray:
         """Views `samples` (as long as `motion`) as (trials, n): the row of each trial offset."""
-        rows = np.lib.stride_tricks.sliding_window_view(samples, STEPS * (len(self.wind) - 1) + 1)[:, ::STEPS]
+        rows = np.lib.stride_tricks.sliding_window_view(samples, STEPS * (len(self.wind) - 1) + 1)[
+            :, ::STEPS
+        ]
         return rows[::-1][trials]
 
 
 def normal_scores(values: Series) -> Series:
-    """Computes Φ⁻¹((rank − ½) / n) of the finite values, ties sharing their mean rank; NaN stays NaN (van der Waerden,
-    1952)."""
+    """Computes Φ⁻¹((rank − ½) / n) of the finite values, ties sharing their mean rank; NaN stays
+    NaN (van der Waerden, 1952)."""
     scores = np.full(values.shape, np.nan)
     finite = np.isfinite(values)
     count = int(np.count_nonzero(finite))
@@ -127,10 +146,12 @@ def normal_scores(values: Series) -> Series:
 
 
 def _means(motion: MotionSeries, ends: Instants, period: int, expected: float) -> Series:
-    """Computes the mean energy over a triangle of width 2 bins about the middle of the bin that ends at each instant.
+    """Computes the mean energy over a triangle of width 2 bins about the middle of the bin that
+    ends at each instant.
 
-    NaN where under half of the frames expected in the bin itself are. The triangle, a box drawn over a box, keeps what
-    moves faster than the bins from folding down into them: it would ripple the score with the period of a bin.
+    NaN where under half of the frames expected in the bin itself are. The triangle, a box drawn
+    over a box, keeps what moves faster than the bins from folding down into them: it would ripple
+    the score with the period of a bin.
     """
     finite = np.isfinite(motion.energy)
     time = motion.time[finite]

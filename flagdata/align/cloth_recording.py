@@ -1,7 +1,9 @@
-"""A film of a cloth whose material was measured by itself: a recording whose clips know the cloth, and maybe the wind.
+"""A film of a cloth whose material was measured by itself: a recording whose clips know the cloth,
+and maybe the wind.
 
-Where a steady wind is known to an uncertainty it is declared, as `flagdata.align.constant` has it. Where nobody knows
-it the recording has frames alone, on the camera's clock, and its clips bear the quality flag "wind-missing".
+Where a steady wind is known to an uncertainty it is declared, as `flagdata.align.constant` has it.
+Where nobody knows it the recording has frames alone, on the camera's clock, and its clips bear the
+quality flag "wind-missing".
 """
 
 from __future__ import annotations
@@ -13,7 +15,12 @@ from pathlib import Path
 from typing import Any
 
 from flagdata.align.constant import ConstantWind, declared_recording
-from flagdata.align.film_recording import RecordingResult, copy_frames, data_set_of, recording_result
+from flagdata.align.film_recording import (
+    RecordingResult,
+    copy_frames,
+    data_set_of,
+    recording_result,
+)
 from flagdata.align.present import find_made, provenance
 from flagdata.core.findings import Finding, quality_flags
 from flagdata.core.provenance import canonical
@@ -63,9 +70,15 @@ class ClothFilm:
 
 
 def cloth_recording(
-    lake: Lake, camera: Artifact, cloth: ClothFilm, *, branch: str = "main", progress: Progress | None = None
+    lake: Lake,
+    camera: Artifact,
+    cloth: ClothFilm,
+    *,
+    branch: str = "main",
+    progress: Progress | None = None,
 ) -> RecordingResult:
-    """Makes the recording of a film of a measured cloth and its clips; returns what is there where it is there.
+    """Makes the recording of a film of a measured cloth and its clips; returns what is there where
+    it is there.
 
     Args:
         camera: the film, ingested.
@@ -84,7 +97,8 @@ def cloth_recording(
         )
     declaration = Finding.of(
         "cloth-declared",
-        f"the cloth is {cloth.fabric}, of {cloth.area_weight:g} kg/m²: measured by itself, as the table says",
+        f"the cloth is {cloth.fabric}, of {cloth.area_weight:g} kg/m²: measured by itself, as the "
+        "table says",
         value=cloth.area_weight,
     )
     if cloth.wind is None:
@@ -110,15 +124,32 @@ def _recipe(cloth: ClothFilm) -> dict[str, Any]:
 
 
 def _without_wind(
-    lake: Lake, camera: Artifact, cloth: ClothFilm, declaration: Finding, *, branch: str, progress: Progress | None
+    lake: Lake,
+    camera: Artifact,
+    cloth: ClothFilm,
+    declaration: Finding,
+    *,
+    branch: str,
+    progress: Progress | None,
 ) -> RecordingResult:
     recipe, parents = _recipe(cloth), {"camera": camera}
     present = find_made(
-        lake, Kind.RECORDING, parents, recipe, noun="recording", name=camera.name, session=cloth.fabric, branch=branch
+        lake,
+        Kind.RECORDING,
+        parents,
+        recipe,
+        noun="recording",
+        name=camera.name,
+        session=cloth.fabric,
+        branch=branch,
     )
     if present.whole is not None:
-        rows = lake.rows({"kind": Kind.CLIP, "recording": present.whole.id}, at=branch, columns=["artifact"])
-        return RecordingResult(recording=present.whole, clips=tuple(rows["artifact"].to_pylist()), created=False)
+        rows = lake.rows(
+            {"kind": Kind.CLIP, "recording": present.whole.id}, at=branch, columns=["artifact"]
+        )
+        return RecordingResult(
+            recording=present.whole, clips=tuple(rows["artifact"].to_pylist()), created=False
+        )
     source = open_parent(lake, str(camera.object))
     times = source.device_frame_times
     start, end = int(times[0]), int(times[-1])
@@ -155,6 +186,8 @@ def _without_wind(
             report=json.dumps(report, allow_nan=False, ensure_ascii=False),
         )
         transaction.add(recording)
-        for clip in clip_rows(Record.open(lake.record_place(str(recording.object))), recording, window=TRUTH_WINDOW):
+        for clip in clip_rows(
+            Record.open(lake.record_place(str(recording.object))), recording, window=TRUTH_WINDOW
+        ):
             transaction.add(clip)
     return recording_result(transaction, recording)

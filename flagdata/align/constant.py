@@ -1,8 +1,10 @@
-"""A wind that somebody states instead of measuring it: a tunnel's constant speed, known to a σ, all along a film.
+"""A wind that somebody states instead of measuring it: a tunnel's constant speed, known to a σ, all
+along a film.
 
-It becomes a wind artifact on the film's own clock, so that everything behind it (recordings, clips, their σ) goes as
-with a log: a sample a second of the stated speed, of an instrument whose accuracy is the stated σ. The quality flag
-"wind-declared" goes with it into the recording and its clips.
+It becomes a wind artifact on the film's own clock, so that everything behind it (recordings, clips,
+their σ) goes as
+with a log: a sample a second of the stated speed, of an instrument whose accuracy is the stated σ.
+The quality flag "wind-declared" goes with it into the recording and its clips.
 """
 
 from __future__ import annotations
@@ -41,7 +43,8 @@ from flagdata.timebase import NANOSECONDS, iso
 REPORT_SCHEMA = "flagdata.declared-wind-report/1"
 DECLARED = "wind-declared"
 SAME_CLOCK = 1e-3
-"""σ of a film's clock on a declared wind's [s]: they are one clock, and the model asks for a σ above 0."""
+"""σ of a film's clock on a declared wind's [s]: they are one clock, and the model asks for a σ
+above 0."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,12 +78,20 @@ class ConstantWind:
 
     def series(self, start: int, end: int) -> WindSeries:
         """Samples on whole seconds from `start` to `end` and beyond [UTC ns]."""
-        time = np.arange(start // NANOSECONDS, -(-end // NANOSECONDS) + 1, dtype=np.int64) * NANOSECONDS
+        time = (
+            np.arange(start // NANOSECONDS, -(-end // NANOSECONDS) + 1, dtype=np.int64)
+            * NANOSECONDS
+        )
         return WindSeries(
             time=time,
             channels={"wind_speed": np.full(len(time), self.speed)},
             flags=np.zeros(len(time), dtype=np.uint16),
-            sensor=Sensor(name="declared constant wind", averaging=0.0, distance_constant=0.0, accuracy=self.sigma),
+            sensor=Sensor(
+                name="declared constant wind",
+                averaging=0.0,
+                distance_constant=0.0,
+                accuracy=self.sigma,
+            ),
         )
 
 
@@ -97,8 +108,8 @@ def declared_recording(
     branch: str = "main",
     progress: Progress | None = None,
 ) -> tuple[Artifact, RecordingResult]:
-    """Makes the wind artifact and the recording of a film in a declared wind, in one commit; returns what is there
-    where it is there.
+    """Makes the wind artifact and the recording of a film in a declared wind, in one commit;
+    returns what is there where it is there.
 
     Args:
         recipe: what else the recording's identity depends on.
@@ -130,16 +141,31 @@ def declared_recording(
         )
 
     present = find_made(
-        lake, Kind.WIND, {"camera": camera}, wind.recipe(), noun="declared wind", name=None, session=None, branch=branch
+        lake,
+        Kind.WIND,
+        {"camera": camera},
+        wind.recipe(),
+        noun="declared wind",
+        name=None,
+        session=None,
+        branch=branch,
     )
     if present.whole is not None:
         pair = Pair.opened(lake, camera, present.whole)
         result = make_recording(
-            lake, pair, alignment(pair), name=name, session=session, branch=branch, progress=progress
+            lake,
+            pair,
+            alignment(pair),
+            name=name,
+            session=session,
+            branch=branch,
+            progress=progress,
         )
         return present.whole, result
     with lake.transaction(f"declare the wind of {camera.name}", branch=branch) as transaction:
-        wind_artifact = _add_wind(transaction, camera, wind, session=session or camera.session, code=present.code)
+        wind_artifact = _add_wind(
+            transaction, camera, wind, session=session or camera.session, code=present.code
+        )
         pair = Pair.opened(lake, camera, wind_artifact)
         recording = add_recording(
             lake,
@@ -155,7 +181,12 @@ def declared_recording(
 
 
 def _add_wind(
-    transaction: Transaction, camera: Artifact, wind: ConstantWind, *, session: str | None, code: str
+    transaction: Transaction,
+    camera: Artifact,
+    wind: ConstantWind,
+    *,
+    session: str | None,
+    code: str,
 ) -> Artifact:
     """Write the wind artifact of a film in a declared wind for a transaction."""
     recipe = wind.recipe()
@@ -165,7 +196,8 @@ def _add_wind(
         kind=DECLARED,
         severity=Severity.WARNING,
         value=wind.speed,
-        what=f"the wind was not measured, but declared to be {wind.speed:g} ± {wind.sigma:g} m/s all along",
+        what=f"the wind was not measured, but declared to be {wind.speed:g} ± {wind.sigma:g} m/s "
+        "all along",
     )
     start, end = int(series.time[0]), int(series.time[-1])
     report = {
@@ -178,7 +210,9 @@ def _add_wind(
         "findings": [finding.as_dict()],
     }
     staged = transaction.staging(".mcap")
-    with RecordWriter(staged, metadata={PROVENANCE: provenance({"camera": camera}, recipe, code=code)}) as record:
+    with RecordWriter(
+        staged, metadata={PROVENANCE: provenance({"camera": camera}, recipe, code=code)}
+    ) as record:
         record.wind(series)
     artifact = Artifact(
         kind=Kind.WIND,

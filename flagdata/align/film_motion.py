@@ -1,13 +1,15 @@
-"""How much a flag moves, frame by frame: one number that rises with the wind, for finding the lag between two clocks.
+"""How much a flag moves, frame by frame: one number that rises with the wind, for finding the lag
+between two clocks.
 
-Successive frames are compared after what concerns the whole picture has been taken out. With I the newer and J the
-older frame, both averaged over square blocks,
+Successive frames are compared after what concerns the whole picture has been taken out. With I the
+newer and J the older frame, both averaged over square blocks,
 
     I ≈ a + g J + s_x ∂J/∂x + s_y ∂J/∂y + motion,
 
-where a and g are flicker, exposure and gain, and (s_x, s_y) a small shift of the camera (the linearised brightness
-constancy of Lucas and Kanade, 1981). The four numbers are fitted by least squares and refitted without the blocks that
-move. The energy is what the residual holds above the noise of the same pair of frames,
+where a and g are flicker, exposure and gain, and (s_x, s_y) a small shift of the camera (the
+linearised brightness constancy of Lucas and Kanade, 1981). The four numbers are fitted by least
+squares and refitted without the blocks that move. The energy is what the residual holds above the
+noise of the same pair of frames,
 
     E = mean(max(|residual| − 3 σ, 0)) / Δt,
 
@@ -41,8 +43,10 @@ class MotionSeries:
     """Motion energy on the camera's own clock.
 
     Attributes:
-        time: (n,) midway between the two frames compared, UTC nanoseconds on the camera's clock, strictly increasing.
-        energy: (n,) mean brightness change above noise [gray levels/s], NaN where two frames were too far apart.
+        time: (n,) midway between the two frames compared, UTC nanoseconds on the camera's clock,
+            strictly increasing.
+        energy: (n,) mean brightness change above noise [gray levels/s], NaN where two frames were
+            too far apart.
         findings: what was noticed about the picture (camera shake, flicker, no motion).
 
     Raises:
@@ -56,12 +60,18 @@ class MotionSeries:
     def __post_init__(self) -> None:
         if self.time.ndim != 1 or self.time.shape != self.energy.shape:
             raise InputError(
-                f"motion with {self.time.shape} times and {self.energy.shape} energies", fix="give one energy a time"
+                f"motion with {self.time.shape} times and {self.energy.shape} energies",
+                fix="give one energy a time",
             )
         if len(self.time) > 1 and not bool(np.all(np.diff(self.time) > 0)):
-            raise InputError("the times of the motion do not increase", fix="give the frames in order of time")
+            raise InputError(
+                "the times of the motion do not increase", fix="give the frames in order of time"
+            )
         if bool(np.any(self.energy < 0)):
-            raise InputError("a motion energy is negative", fix="give mean absolute differences or another energy ≥ 0")
+            raise InputError(
+                "a motion energy is negative",
+                fix="give mean absolute differences or another energy ≥ 0",
+            )
 
     def __len__(self) -> int:
         return len(self.time)
@@ -71,7 +81,8 @@ def motion_energy(frames: Iterable[tuple[int, UInt8Array]]) -> MotionSeries:
     """Computes the motion energy of a film, in one pass, holding two reduced frames at a time.
 
     Args:
-        frames: (instant [UTC ns on the camera's clock], (height, width) uint8 gray), in order of time; all of one size.
+        frames: (instant [UTC ns on the camera's clock], (height, width) uint8 gray), in order of
+            time; all of one size.
 
     Raises:
         InputError: fewer than two frames, frames of different sizes, or times that do not increase.
@@ -90,7 +101,8 @@ def motion_energy(frames: Iterable[tuple[int, UInt8Array]]) -> MotionSeries:
             before_shape = image.shape
         if image.shape != before_shape:
             raise InputError(
-                f"a frame has shape {image.shape} after frames of {before_shape}", fix="crop all frames to one size"
+                f"a frame has shape {image.shape} after frames of {before_shape}",
+                fix="crop all frames to one size",
             )
         reduced = _reduce(image, block)
         if before is not None:
@@ -112,27 +124,38 @@ def motion_energy(frames: Iterable[tuple[int, UInt8Array]]) -> MotionSeries:
     if not times:
         raise InputError("motion needs two frames at least", fix="give a longer film")
     return MotionSeries(
-        time=np.array(times, dtype=np.int64), energy=np.array(energies), findings=_findings(energies, shifts, gains)
+        time=np.array(times, dtype=np.int64),
+        energy=np.array(energies),
+        findings=_findings(energies, shifts, gains),
     )
 
 
 def _reduce(image: UInt8Array, block: int) -> Float32Array:
-    """Means over `block` × `block` pixels; rows and columns that do not fill a block are left out."""
+    """Means over `block` × `block` pixels; rows and columns that do not fill a block are left
+    out."""
     height, width = image.shape[0] // block, image.shape[1] // block
     blocks = image[: height * block, : width * block]
     return blocks.reshape(height, block, width, block).mean(axis=(1, 3), dtype=np.float32)
 
 
 def _change(before: Float32Array, after: Float32Array, block: int) -> tuple[float, float, float]:
-    """Computes the mean change above noise [gray levels], the gain, and the shift [blocks] between two reduced
-    frames."""
-    grad_y, grad_x = np.gradient(before) if min(before.shape) > 1 else (np.zeros_like(before), np.zeros_like(before))
+    """Computes the mean change above noise [gray levels], the gain, and the shift [blocks] between
+    two reduced frames."""
+    grad_y, grad_x = (
+        np.gradient(before)
+        if min(before.shape) > 1
+        else (np.zeros_like(before), np.zeros_like(before))
+    )
     centre = float(before.mean())
     columns = np.stack(
-        [np.ones(before.size), (before - centre).ravel(), grad_x.ravel(), grad_y.ravel()], axis=1, dtype=np.float64
+        [np.ones(before.size), (before - centre).ravel(), grad_x.ravel(), grad_y.ravel()],
+        axis=1,
+        dtype=np.float64,
     )  # (blocks, 4)
     target = after.ravel().astype(np.float64) - centre
-    least = 1.0 / block  # a gray level a pixel: rounding and JPEG leave as much, in steps that hide σ
+    least = (
+        1.0 / block
+    )  # a gray level a pixel: rounding and JPEG leave as much, in steps that hide σ
     still = target - columns[:, 1]
     starts = (_quiet(np.abs(still - np.median(still)), least)[0], np.ones(before.size, dtype=bool))
     residual, sigma, parameters = min(
@@ -145,10 +168,11 @@ def _change(before: Float32Array, after: Float32Array, block: int) -> tuple[floa
 def _fit_blocks(
     columns: FloatArray, target: FloatArray, keep: BoolArray, least: float
 ) -> tuple[FloatArray, float, FloatArray]:
-    """Computes |residual| and its σ after least squares on the blocks to keep, twice; and the four parameters.
+    """Computes |residual| and its σ after least squares on the blocks to keep, twice; and the four
+    parameters.
 
-    Two starts are compared, since either can go astray: all blocks, where the flag fills little of the picture, and
-    those that hardly changed, where the camera stands still.
+    Two starts are compared, since either can go astray: all blocks, where the flag fills little of
+    the picture, and those that hardly changed, where the camera stands still.
     """
     parameters = np.array([0.0, 1.0, 0.0, 0.0])
     residual, sigma = np.abs(target - columns @ parameters), math.inf
@@ -156,7 +180,8 @@ def _fit_blocks(
         if np.count_nonzero(keep) < max(8, _FEWEST_STILL * len(target)):
             break
         columns_used = columns[keep]
-        # As by the pseudo-inverse, which leaves alone what a flat picture does not determine (gain, shift).
+        # As by the pseudo-inverse, which leaves alone what a flat picture does not determine (gain,
+        # shift).
         values, vectors = np.linalg.eigh(columns_used.T @ columns_used)
         inverse = np.divide(1.0, values, out=np.zeros(4), where=values > 1e-9 * values[-1])
         parameters = vectors @ (inverse * (vectors.T @ (columns_used.T @ target[keep])))
@@ -166,7 +191,8 @@ def _fit_blocks(
 
 
 def _quiet(residual: FloatArray, least: float) -> tuple[BoolArray, float]:
-    """Finds which blocks are within 3 σ, σ being that of a normal distribution with the residual's lowest fifth."""
+    """Finds which blocks are within 3 σ, σ being that of a normal distribution with the residual's
+    lowest fifth."""
     # np.quantile, which takes ten times as long on so few numbers.
     below, share = divmod(_LOW_QUANTILE * (len(residual) - 1), 1)
     places = (int(below), min(int(below) + 1, len(residual) - 1))
@@ -175,14 +201,17 @@ def _quiet(residual: FloatArray, least: float) -> tuple[BoolArray, float]:
     return residual < 3 * sigma, sigma
 
 
-def _findings(energies: list[float], shifts: list[float], gains: list[float]) -> tuple[Finding, ...]:
+def _findings(
+    energies: list[float], shifts: list[float], gains: list[float]
+) -> tuple[Finding, ...]:
     findings: list[Finding] = []
     shake = math.sqrt(float(np.mean(np.square(shifts)))) if shifts else 0.0
     if shake > _SHAKE:
         findings.append(
             Finding.of(
                 "camera-shake",
-                f"the whole picture moves by {shake:.1f} pixels a frame (rms); taken out to first order",
+                f"the whole picture moves by {shake:.1f} pixels a frame (rms); taken out to first "
+                "order",
                 value=shake,
             )
         )
@@ -191,7 +220,8 @@ def _findings(energies: list[float], shifts: list[float], gains: list[float]) ->
         findings.append(
             Finding.of(
                 "brightness-flicker",
-                f"the brightness of the whole picture varies by {100 * flicker:.1f} % a frame; taken out",
+                f"the brightness of the whole picture varies by {100 * flicker:.1f} % a frame; "
+                "taken out",
                 value=flicker,
             )
         )

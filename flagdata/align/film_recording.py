@@ -1,8 +1,9 @@
-"""A camera and an anemometer made one recording: one record on the wind's clock, its clips, one commit.
+"""A camera and an anemometer made one recording: one record on the wind's clock, its clips, one
+commit.
 
-Frames are copied as the JPEG bytes they are; those of an H.264 archive are decoded and become JPEGs. The instant of a
-frame in the record is its instant on the camera's clock taken to the wind's by the clock model, which goes into the
-record's metadata and into the catalog with its σ.
+Frames are copied as the JPEG bytes they are; those of an H.264 archive are decoded and become
+JPEGs. The instant of a frame in the record is its instant on the camera's clock taken to the wind's
+by the clock model, which goes into the record's metadata and into the catalog with its σ.
 """
 
 from __future__ import annotations
@@ -38,7 +39,9 @@ from flagdata.timebase import NANOSECONDS, iso
 Progress = Callable[[int], object]
 REPORT_SCHEMA = "flagdata.align-report/1"
 CURVE = "alignment.json"
-MARGIN_BEFORE = 600.0  # s of wind kept before the first frame, or the ground truth's window: it looks back
+MARGIN_BEFORE = (
+    600.0  # s of wind kept before the first frame, or the ground truth's window: it looks back
+)
 MARGIN_AFTER = 60.0  # s
 LONGEST_WINDOW = 86_400.0  # s, of the ground truth
 _FRAMES_AT_ONCE = 64
@@ -53,9 +56,10 @@ class Alignment:
         recipe: the options that led to it; with the parents, the recording's identity.
         findings: what the catalog should know of it.
         details: numbers for the report (offset, interval, confidence, …), JSON.
-        curve: the search that led to it, a JSON document attached to the record; `None` where nothing was searched.
-        parameters: known properties of the cloth, by the names that simulated recordings have, SI; the recipe has it
-            too.
+        curve: the search that led to it, a JSON document attached to the record; `None` where
+            nothing was searched.
+        parameters: known properties of the cloth, by the names that simulated recordings have, SI;
+            the recipe has it too.
     """
 
     clock: ClockModel
@@ -90,14 +94,16 @@ class Pair:
                 raise UsageError(
                     f"{artifact.name!r} is a {artifact.kind}, not a {kind}",
                     where=artifact.id,
-                    fix="flagdata align CAMERA WIND takes a camera artifact, then a wind artifact; see flagdata ls",
+                    fix="flagdata align CAMERA WIND takes a camera artifact, then a wind artifact; "
+                    "see flagdata ls",
                 )
             artifacts.append(artifact)
         return cls.opened(lake, *artifacts)
 
     @classmethod
     def opened(cls, lake: Lake, camera: Artifact, wind: Artifact) -> Pair:
-        """Opens a camera and a wind whose objects are in the lake, whether or not they are committed."""
+        """Opens a camera and a wind whose objects are in the lake, whether or not they are
+        committed."""
         records = [open_parent(lake, str(artifact.object)) for artifact in (camera, wind)]
         return cls(camera=camera, wind=wind, camera_record=records[0], wind_record=records[1])
 
@@ -120,7 +126,9 @@ class Pair:
         """
         series = self.wind_record.wind()
         if series is None or not len(series):
-            raise InputError("the wind artifact holds no samples", where=self.wind.id, fix="ingest the log anew")
+            raise InputError(
+                "the wind artifact holds no samples", where=self.wind.id, fix="ingest the log anew"
+            )
         return series
 
     def motion(self, *, progress: Progress | None = None) -> MotionSeries:
@@ -136,7 +144,9 @@ class Pair:
         times = record.device_frame_times
         for first in range(0, len(times), _FRAMES_AT_ONCE):
             count = min(_FRAMES_AT_ONCE, len(times) - first)
-            yield from zip(times[first : first + count].tolist(), record.frames(first, count), strict=True)
+            yield from zip(
+                times[first : first + count].tolist(), record.frames(first, count), strict=True
+            )
             if progress:
                 progress(count)
 
@@ -173,7 +183,8 @@ class RecordingResult:
 
 
 def truth_recipe(window: float) -> dict[str, Any]:
-    """Returns what the window of the ground truth [s] adds to a recording's recipe: nothing where it is the usual one.
+    """Returns what the window of the ground truth [s] adds to a recording's recipe: nothing where
+    it is the usual one.
 
     Raises:
         UsageError: no length of time, or one beyond a day.
@@ -193,13 +204,14 @@ def truth_window(recipe: Mapping[str, Any]) -> float:
 
 
 def data_set_of(camera: Artifact) -> dict[str, Any]:
-    """Returns what a recording has of the data set that its film came in with: its side, and the simulation's seed."""
+    """Returns what a recording has of the data set that its film came in with: its side, and the
+    simulation's seed."""
     return {"dataset": camera.dataset, "side": camera.side, "seed": camera.seed}
 
 
 def session_of(pair: Pair, *, session_given: str | None) -> str | None:
-    """Returns the session of a recording: the one given, else the one its parents agree on; `None` where neither has
-    one.
+    """Returns the session of a recording: the one given, else the one its parents agree on; `None`
+    where neither has one.
 
     Raises:
         UsageError: the parents name different ones.
@@ -217,9 +229,16 @@ def session_of(pair: Pair, *, session_given: str | None) -> str | None:
 
 
 def find_recording(
-    lake: Lake, pair: Pair, recipe: Mapping[str, Any], *, name: str | None, session: str | None, branch: str
+    lake: Lake,
+    pair: Pair,
+    recipe: Mapping[str, Any],
+    *,
+    name: str | None,
+    session: str | None,
+    branch: str,
 ) -> RecordingResult | None:
-    """Finds the recording that these parents and options make, if it is on the branch and its object is sound.
+    """Finds the recording that these parents and options make, if it is on the branch and its
+    object is sound.
 
     Raises:
         ConflictError: it is, under another name or session than the one asked for.
@@ -227,14 +246,29 @@ def find_recording(
     artifact = _present(lake, pair, recipe, name=name, session=session, branch=branch).whole
     if artifact is None:
         return None
-    return RecordingResult(recording=artifact, clips=_clips_of(lake, artifact, branch), created=False)
+    return RecordingResult(
+        recording=artifact, clips=_clips_of(lake, artifact, branch), created=False
+    )
 
 
 def _present(
-    lake: Lake, pair: Pair, recipe: Mapping[str, Any], *, name: str | None, session: str | None, branch: str
+    lake: Lake,
+    pair: Pair,
+    recipe: Mapping[str, Any],
+    *,
+    name: str | None,
+    session: str | None,
+    branch: str,
 ) -> Present:
     return find_made(
-        lake, Kind.RECORDING, pair.parents, recipe, noun="recording", name=name, session=session, branch=branch
+        lake,
+        Kind.RECORDING,
+        pair.parents,
+        recipe,
+        noun="recording",
+        name=name,
+        session=session,
+        branch=branch,
     )
 
 
@@ -258,12 +292,17 @@ def make_recording(
     Raises:
         UsageError: the parents are of different sessions and `session` is `None`.
         ConflictError: it is there already under another name or session.
-        InputError: the clock model folds frames back over a jump, or the wind log has no sample near the film.
+        InputError: the clock model folds frames back over a jump, or the wind log has no sample
+            near the film.
     """
-    present = find_recording(lake, pair, alignment.recipe, name=name, session=session, branch=branch)
+    present = find_recording(
+        lake, pair, alignment.recipe, name=name, session=session, branch=branch
+    )
     if present is not None:
         return present
-    with lake.transaction(f"align {pair.camera.name} with {pair.wind.name}", branch=branch) as transaction:
+    with lake.transaction(
+        f"align {pair.camera.name} with {pair.wind.name}", branch=branch
+    ) as transaction:
         recording = add_recording(
             lake,
             transaction,
@@ -271,7 +310,9 @@ def make_recording(
             alignment,
             name=name,
             session=session_of(pair, session_given=session),
-            code=_present(lake, pair, alignment.recipe, name=name, session=session, branch=branch).code,
+            code=_present(
+                lake, pair, alignment.recipe, name=name, session=session, branch=branch
+            ).code,
             progress=progress,
         )
     return recording_result(transaction, recording)
@@ -297,12 +338,18 @@ def add_recording(
     frames = clock.to_common(pair.camera_record.device_frame_times)
     window = truth_window(alignment.recipe)
     before = max(MARGIN_BEFORE, window)
-    wind = _around_film(pair.series(), int(frames[0]), int(frames[-1]), before=before, where=pair.wind.id)
+    wind = _around_film(
+        pair.series(), int(frames[0]), int(frames[-1]), before=before, where=pair.wind.id
+    )
     staged = transaction.staging(".mcap")
     _write(staged, pair, alignment, wind, first=int(frames[0]), code=code, progress=progress)
-    recording = _artifact(pair, alignment, frames, stored=transaction.put(staged), name=name, session=session)
+    recording = _artifact(
+        pair, alignment, frames, stored=transaction.put(staged), name=name, session=session
+    )
     transaction.add(recording)
-    for clip in clip_rows(Record.open(lake.record_place(str(recording.object))), recording, window=window):
+    for clip in clip_rows(
+        Record.open(lake.record_place(str(recording.object))), recording, window=window
+    ):
         transaction.add(clip)
     return recording
 
@@ -314,17 +361,24 @@ def recording_result(transaction: Transaction, recording: Artifact) -> Recording
         recording=result.artifacts[recording.id],
         created=recording.id in result.added,
         healed=result.healed.get(recording.id),
-        clips=tuple(artifact.id for artifact in result.artifacts.values() if artifact.recording == recording.id),
+        clips=tuple(
+            artifact.id
+            for artifact in result.artifacts.values()
+            if artifact.recording == recording.id
+        ),
     )
 
 
-def _around_film(series: WindSeries, start: int, end: int, *, before: float, where: str) -> WindSeries:
+def _around_film(
+    series: WindSeries, start: int, end: int, *, before: float, where: str
+) -> WindSeries:
     """Selects the samples from `before` [s] before the film to `MARGIN_AFTER` after it."""
     low, high = start - round(before * NANOSECONDS), end + round(MARGIN_AFTER * NANOSECONDS)
     is_near = (series.time >= low) & (series.time <= high)
     if not np.any(is_near):
         raise InputError(
-            f"no wind sample from {iso(low)} to {iso(high)}, when the film was taken by this clock model:"
+            f"no wind sample from {iso(low)} to {iso(high)}, when the film was taken by this clock "
+            "model:"
             f" the log runs from {iso(int(series.time[0]))} to {iso(int(series.time[-1]))}",
             where=where,
             fix="check the start times and zones of both, or the offset",
@@ -362,11 +416,20 @@ def _write(
             record.attach(CURVE, alignment.curve, media_type="application/json", log_time=first)
         for name in pair.wind_record.attachments:
             media_type = mimetypes.guess_type(name)[0] or "application/octet-stream"
-            record.attach(name, pair.wind_record.attachment(name), media_type=media_type, log_time=int(wind.time[0]))
+            record.attach(
+                name,
+                pair.wind_record.attachment(name),
+                media_type=media_type,
+                log_time=int(wind.time[0]),
+            )
 
 
 def copy_frames(
-    record: RecordWriter, source: Record, clock: ClockModel | None, *, progress: Progress | None = None
+    record: RecordWriter,
+    source: Record,
+    clock: ClockModel | None,
+    *,
+    progress: Progress | None = None,
 ) -> None:
     """Copy all frames of a camera's record as JPEGs, their instants taken to the common clock.
 
@@ -393,14 +456,21 @@ def copy_frames(
 
 
 def _artifact(
-    pair: Pair, alignment: Alignment, frames: IntArray, *, stored: str, name: str | None, session: str | None
+    pair: Pair,
+    alignment: Alignment,
+    frames: IntArray,
+    *,
+    stored: str,
+    name: str | None,
+    session: str | None,
 ) -> Artifact:
     clock = alignment.clock
     device = pair.camera_record.device_frame_times
     middle = int(device[0] + (device[-1] - device[0]) // 2)
     start, end = int(frames[0]), int(frames[-1])
     hours_warning = by_offset(
-        float(clock.to_common(middle) - middle) / NANOSECONDS, names=(pair.camera.name, pair.wind.name)
+        float(clock.to_common(middle) - middle) / NANOSECONDS,
+        names=(pair.camera.name, pair.wind.name),
     )
     findings = (*alignment.findings, *((hours_warning,) if hours_warning is not None else ()))
     new_flags = quality_flags(findings)
@@ -438,11 +508,15 @@ def _artifact(
 
 
 def _clips_of(lake: Lake, recording: Artifact, branch: str) -> tuple[str, ...]:
-    rows = lake.rows({"kind": Kind.CLIP, "recording": recording.id}, at=branch, columns=["artifact"])
+    rows = lake.rows(
+        {"kind": Kind.CLIP, "recording": recording.id}, at=branch, columns=["artifact"]
+    )
     return tuple(rows["artifact"].to_pylist())
 
 
-def parents_of(lake: Lake, recording: str, *, at: str | None = None) -> tuple[Artifact, Sequence[str]]:
+def parents_of(
+    lake: Lake, recording: str, *, at: str | None = None
+) -> tuple[Artifact, Sequence[str]]:
     """Finds a recording by id or name, and its camera's and wind's ids.
 
     Raises:
@@ -451,7 +525,8 @@ def parents_of(lake: Lake, recording: str, *, at: str | None = None) -> tuple[Ar
     artifact = lake.artifact(recording, at=at, kinds=(Kind.RECORDING,))
     if artifact.kind is not Kind.RECORDING or len(artifact.parents) < 2:
         raise UsageError(
-            f"{artifact.name!r} is a {artifact.kind} with {len(artifact.parents)} parents, not an aligned recording",
+            f"{artifact.name!r} is a {artifact.kind} with {len(artifact.parents)} parents, not an "
+            "aligned recording",
             where=artifact.id,
             fix="name a recording that flagdata align made; see flagdata ls --kind recording",
         )

@@ -1,27 +1,28 @@
 """The offset between a camera's and an anemometer's clock, from the flag itself.
 
-A flag moves more when the wind is stronger, a fraction of a second later. Neither the relation's shape nor its noise is
-known, so the estimator uses only that it rises:
+A flag moves more when the wind is stronger, a fraction of a second later. Neither the relation's
+shape nor its noise is known, so the estimator uses only that it rises:
 
-1. Wind x_k is the mean over bins of length P. Motion energy is averaged alike, at every P/10, so that a shift by any
-   multiple of P/10 is a choice of samples, not an interpolation.
-2. Both become normal scores, Φ⁻¹(rank): any monotone relation between Gaussian gusts and motion is then linear, and
-   outliers weigh no more than their rank (van der Waerden, 1952).
-3. The motion is modelled as y(t) = Σ a_w (G_w * x)(t + o) + e(t): Gaussians G_w of several widths with a_w ≥ 0, since
-   the quick gusts at the sensor are not those at the flag (Davenport, 1961: coherence exp(−c n d / U)), and e
-   autoregressive, φ(B) e = ε (Cochrane and Orcutt, 1949). Both are filtered by φ. Frequencies so count by their
-   signal-to-noise ratio: the time-domain form of the maximum-likelihood weighting of Knapp and Carter, IEEE Trans. ASSP
-   24 (1976) 320.
-4. r(o) is the correlation of the two at offset o over the n(o) bins that both cover, z = atanh(r) √(n − 3) its score.
-   The estimate is where z is greatest, refined by a parabola.
+1. Wind x_k is the mean over bins of length P. Motion energy is averaged alike, at every P/10, so
+   that a shift by any multiple of P/10 is a choice of samples, not an interpolation.
+2. Both become normal scores, Φ⁻¹(rank): any monotone relation between Gaussian gusts and motion is
+   then linear, and outliers weigh no more than their rank (van der Waerden, 1952).
+3. The motion is modelled as y(t) = Σ a_w (G_w * x)(t + o) + e(t): Gaussians G_w of several widths
+   with a_w ≥ 0, since the quick gusts at the sensor are not those at the flag (Davenport, 1961:
+   coherence exp(−c n d / U)), and e autoregressive, φ(B) e = ε (Cochrane and Orcutt, 1949). Both
+   are filtered by φ. Frequencies so count by their signal-to-noise ratio: the time-domain form of
+   the maximum-likelihood weighting of Knapp and Carter, IEEE Trans. ASSP 24 (1976) 320.
+4. r(o) is the correlation of the two at offset o over the n(o) bins that both cover, z = atanh(r)
+   √(n − 3) its score. The estimate is where z is greatest, refined by a parabola.
 5. σ is that of the regression y = g x(t + o) + ε in o, with dependent scores ψ_k = (y_k − g x_k) dx_k/dt:
    σ² = Λ / (n (g var(dx/dt))²), Λ the long-run variance of ψ (Newey and West, 1987). Where exp(z²/2), the likelihood
    over all of the peak, is wider than that, its standard deviation counts. The uncertainty of the flag's response and
    of the stamps is added in quadrature.
-6. Chance is measured, not assumed: winds with the same spectrum and random phases (Theiler et al., 1992) go through
-   step 4, and a Gumbel distribution fitted to their greatest scores gives the probability of a score as high by
-   accident. A periodic wind stays periodic under this, and so fails by itself. Here both are filtered by the motion's
-   own autoregression (Box and Jenkins, 1970), behind which accidents are rarest.
+6. Chance is measured, not assumed: winds with the same spectrum and random phases (Theiler et al.,
+   1992) go through step 4, and a Gumbel distribution fitted to their greatest scores gives the
+   probability of a score as high by accident. A periodic wind stays periodic under this, and so
+   fails by itself. Here both are filtered by the motion's own autoregression (Box and Jenkins,
+   1970), behind which accidents are rarest.
 
 Everything here is a function of its arguments: no files, no clocks, no random generator of its own.
 """
@@ -52,22 +53,27 @@ class LagSearch:
 
     Attributes:
         centre: offset around which to search [s]: what the stamps say, 0 if they are believed.
-        window: the search goes from centre − window to centre + window [s]. Raise it where the clocks may be further
-            apart; a wider search takes longer and meets more accidents, so that peaks must be higher.
-        response: time by which the flag's motion follows the wind that the bins report [s]: about L/U for a flag of
-            length L, and d/U where the sensor stands d upwind of it. The sensor's own lag is not part of it: see
-            `flagdata.align.windbins`.
-        response_sigma: its standard uncertainty [s]. It bounds from below what this method can know.
-        stamp_sigma: standard uncertainty of the wind's stamps as a whole [s]; 0.29 for stamps cut to whole seconds.
-        overlap: least time both must cover [s]; and never fewer than 30 bins. Lowered, it allows offsets at which
-            little is compared, where high correlations are common.
-        gustiness: least standard deviation over mean of the binned wind. Below it the wind says nothing about time.
-        chance: greatest probability of such a peak by accident. Raised, it accepts more wrong offsets; lowered, it
-            refuses more right ones.
-        rival: a second peak at this share of the greatest score makes the estimate ambiguous. Raised, it accepts an
-            offset though another one agrees nearly as well.
+        window: the search goes from centre − window to centre + window [s]. Raise it where the
+            clocks may be further apart; a wider search takes longer and meets more accidents, so
+            that peaks must be higher.
+        response: time by which the flag's motion follows the wind that the bins report [s]: about
+            L/U for a flag of length L, and d/U where the sensor stands d upwind of it. The sensor's
+            own lag is not part of it: see `flagdata.align.windbins`.
+        response_sigma: its standard uncertainty [s]. It bounds from below what this method can
+            know.
+        stamp_sigma: standard uncertainty of the wind's stamps as a whole [s]; 0.29 for stamps cut
+            to whole seconds.
+        overlap: least time both must cover [s]; and never fewer than 30 bins. Lowered, it allows
+            offsets at which little is compared, where high correlations are common.
+        gustiness: least standard deviation over mean of the binned wind. Below it the wind says
+            nothing about time.
+        chance: greatest probability of such a peak by accident. Raised, it accepts more wrong
+            offsets; lowered, it refuses more right ones.
+        rival: a second peak at this share of the greatest score makes the estimate ambiguous.
+            Raised, it accepts an offset though another one agrees nearly as well.
         sigma: greatest standard uncertainty that is still an answer [s].
-        surrogates: how many winds of random phase measure chance. More make the chance less noisy, and take longer.
+        surrogates: how many winds of random phase measure chance. More make the chance less noisy,
+            and take longer.
     """
 
     centre: float = 0.0
@@ -83,9 +89,19 @@ class LagSearch:
     surrogates: int = 200
 
     def __post_init__(self) -> None:
-        numbers = (self.centre, self.window, self.response, self.overlap, self.gustiness, self.chance, self.sigma)
+        numbers = (
+            self.centre,
+            self.window,
+            self.response,
+            self.overlap,
+            self.gustiness,
+            self.chance,
+            self.sigma,
+        )
         if not all(math.isfinite(number) for number in numbers):
-            raise InputError("a lag search with numbers that are not finite", fix="give finite numbers")
+            raise InputError(
+                "a lag search with numbers that are not finite", fix="give finite numbers"
+            )
         if self.window <= 0 or self.overlap <= 0 or self.sigma <= 0:
             raise InputError("window, overlap and sigma must be positive", fix="give seconds > 0")
         if self.window > _WIDEST:
@@ -94,11 +110,15 @@ class LagSearch:
                 fix=f"search ±{_WIDEST:g} s at most, around a centre that is known better",
             )
         if self.response_sigma < 0 or self.stamp_sigma < 0 or self.gustiness < 0:
-            raise InputError("uncertainties and gustiness must not be negative", fix="give numbers ≥ 0")
+            raise InputError(
+                "uncertainties and gustiness must not be negative", fix="give numbers ≥ 0"
+            )
         if not (0 < self.chance < 1 and 0 < self.rival < 1):
             raise InputError("chance and rival are shares", fix="give numbers between 0 and 1")
         if self.surrogates < 50:
-            raise InputError(f"{self.surrogates} surrogates cannot measure chance", fix="use 50 at least")
+            raise InputError(
+                f"{self.surrogates} surrogates cannot measure chance", fix="use 50 at least"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,8 +130,8 @@ class LagCurve:
         score: (m,) z; NaN where the overlap is too short.
         overlap: (m,) time covered by both [s].
         evidence: (m,) the score of step 6, of white motion; NaN likewise.
-        chance_score: the evidence that accidents exceed with the probability `LagSearch.chance`; NaN where nothing was
-            searched.
+        chance_score: the evidence that accidents exceed with the probability `LagSearch.chance`;
+            NaN where nothing was searched.
     """
 
     offset: Series
@@ -131,7 +151,8 @@ class LagEstimate:
         sigma_statistical: the part that a longer recording would shrink [s].
         interval: 90 % [s].
         at: instant on the camera's clock at which it holds, mid-overlap [UTC ns].
-        confidence: probability that the peak is neither an accident nor a rival's; the interval is given that.
+        confidence: probability that the peak is neither an accident nor a rival's; the interval is
+            given that.
         correlation: of filtered normal scores at the peak.
         chance: probability of a score as high by accident.
         bins: how many wind bins were compared at the peak.
@@ -158,14 +179,16 @@ class LagEstimate:
     @property
     def reasons(self) -> tuple[str, ...]:
         """Why it was refused; empty when accepted."""
-        return tuple(finding.what for finding in self.findings if finding.severity is Severity.ERROR)
+        return tuple(
+            finding.what for finding in self.findings if finding.severity is Severity.ERROR
+        )
 
 
 def estimate_offset(
     motion: MotionSeries, wind: WindAverage, *, search: LagSearch, generator: np.random.Generator
 ) -> LagEstimate:
-    """Estimates the offset of the camera's clock from the wind's by the lag of the flag's motion (see the module's
-    text).
+    """Estimates the offset of the camera's clock from the wind's by the lag of the flag's motion
+    (see the module's text).
 
     Args:
         motion: energy on the camera's clock; several values a wind bin.
@@ -217,12 +240,15 @@ def estimate_offset(
             chance_score=accidents.score(search.chance),
         ),
     )
-    return replace(estimate, findings=(*motion.findings, *_judge(estimate, search, best=best, rival=rival)))
+    return replace(
+        estimate, findings=(*motion.findings, *_judge(estimate, search, best=best, rival=rival))
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Accidents:
-    """Gumbel distribution of the greatest score that winds of the same spectrum and random phases reach."""
+    """Gumbel distribution of the greatest score that winds of the same spectrum and random phases
+    reach."""
 
     location: float
     scale: float
@@ -252,10 +278,11 @@ class _Accidents:
 
 
 def _lobe(offsets: Series, score: Series, best: int) -> tuple[int | None, float, float]:
-    """Finds the greatest score outside the peak's lobe, and the share and standard deviation [s] of exp(z²/2) inside
-    it.
+    """Finds the greatest score outside the peak's lobe, and the share and standard deviation [s] of
+    exp(z²/2) inside it.
 
-    The lobe reaches to where the score first falls below half of its greatest, and two bins at least.
+    The lobe reaches to where the score first falls below half of its greatest, and two bins at
+    least.
     """
     low = high = best
     half = score[best] / 2
@@ -276,7 +303,9 @@ def _lobe(offsets: Series, score: Series, best: int) -> tuple[int | None, float,
     return (rival if np.isfinite(outside[rival]) else None), mass, spread
 
 
-def _judge(estimate: LagEstimate, search: LagSearch, *, best: int, rival: int | None) -> list[Finding]:
+def _judge(
+    estimate: LagEstimate, search: LagSearch, *, best: int, rival: int | None
+) -> list[Finding]:
     """Lists what speaks against an estimate, and what the user should know of it."""
     curve = estimate.curve
     score = curve.score
@@ -285,7 +314,8 @@ def _judge(estimate: LagEstimate, search: LagSearch, *, best: int, rival: int | 
         findings.append(
             _error(
                 "accidental-peak",
-                f"unrelated winds reach such a peak with probability {estimate.chance:.2g} (limit {search.chance:g})",
+                f"unrelated winds reach such a peak with probability {estimate.chance:.2g} (limit "
+                f"{search.chance:g})",
                 estimate.chance,
             )
         )
@@ -293,7 +323,8 @@ def _judge(estimate: LagEstimate, search: LagSearch, *, best: int, rival: int | 
         findings.append(
             _error(
                 "ambiguous-offset",
-                f"{curve.offset[rival]:+.1f} s fits {100 * score[rival] / score[best]:.0f} % as well as"
+                f"{curve.offset[rival]:+.1f} s fits {100 * score[rival] / score[best]:.0f} % as "
+                "well as"
                 f" {curve.offset[best]:+.1f} s",
                 float(curve.offset[rival]),
             )
@@ -322,7 +353,8 @@ def _judge(estimate: LagEstimate, search: LagSearch, *, best: int, rival: int | 
 def _no_gusts(bins: LagBins, search: LagSearch) -> Finding:
     return _error(
         "steady-wind",
-        f"the wind varies by {100 * bins.gustiness:.1f} % of its mean only (limit {100 * search.gustiness:g} %):"
+        f"the wind varies by {100 * bins.gustiness:.1f} % of its mean only (limit "
+        f"{100 * search.gustiness:g} %):"
         " without gusts nothing ties the film to it",
         bins.gustiness,
     )
@@ -341,7 +373,8 @@ def _unfit(bins: LagBins, search: LagSearch) -> Finding:
 def _short_overlap(longest: float, least: float) -> Finding:
     return _error(
         "short-overlap",
-        f"film and wind log share {longest:.0f} s at most at any offset searched (limit {least:g} s)",
+        f"film and wind log share {longest:.0f} s at most at any offset searched (limit {least:g} "
+        "s)",
         longest,
     )
 

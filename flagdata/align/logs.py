@@ -1,14 +1,18 @@
-"""Two anemometers' logs of one wind on one clock: offset, drift and gain of a sensor against a reference.
+"""Two anemometers' logs of one wind on one clock: offset, drift and gain of a sensor against a
+reference.
 
-The offset is found as that between a film and a log is (`lag`), with the faster log in the place of the motion: first
-over the hour in which the slower log varies most, then over parts of ten minutes all along, through which a weighted
-line gives offset and drift (`drift`). A sensor that follows the wind late would shift the offset, and, since it is
-later in light wind, the drift too; where its distance constant is stated, the other log is passed through the same lag,
-so that both follow alike.
+The offset is found as that between a film and a log is (`lag`), with the faster log in the place of
+the motion: first over the hour in which the slower log varies most, then over parts of ten minutes
+all along, through which a weighted line gives offset and drift (`drift`). A sensor that follows the
+wind late would shift the offset, and, since it is later in light wind, the drift too; where its
+distance constant is stated, the other log is passed through the same lag, so that both follow
+alike.
 
-The gain is the slope of the sensor's minute means on the reference's, on the common clock, by least squares about their
-means: a minute's noise and resolution vanish beside what the wind varies by from minute to minute, and what each sensor
-misses of a gust does too. Its σ holds for residuals that stay alike over minutes (Newey and West, 1987).
+The gain is the slope of the sensor's minute means on the reference's, on the common clock, by least
+squares about their
+means: a minute's noise and resolution vanish beside what the wind varies by from minute to minute,
+and what each sensor misses of a gust does too. Its σ holds for residuals that stay alike over
+minutes (Newey and West, 1987).
 
 Functions of their arguments: no files, no clocks, no random generator of their own.
 """
@@ -40,8 +44,11 @@ GAIN_PERIOD = 60.0  # s
 _REACH = 30.0  # s searched either side of the first offset, at least
 _FASTEST = 3e-4  # s/s, beyond which no logger's clock parts from another
 _PART_SIGMA = 1.0  # s; a part known worse than this says nothing
-_PART_SURROGATES = 50  # the first offset is known by then; those of a part keep out what agrees by accident
-_TRIES = 3  # hours looked at before the logs are taken for unrelated; more take longer and refuse fewer pairs
+_PART_SURROGATES = (
+    50  # the first offset is known by then; those of a part keep out what agrees by accident
+)
+# hours looked at before the logs are taken for unrelated; more take longer and refuse fewer pairs
+_TRIES = 3
 
 Progress = Callable[[int], object]
 
@@ -93,8 +100,8 @@ def log_clock(
 
     Args:
         names: of the reference and the sensor, for the model and messages.
-        search: around which offset, added to the sensor's stamps, and how far; its response is that of a flag and has
-            no part here.
+        search: around which offset, added to the sensor's stamps, and how far; its response is that
+            of a flag and has no part here.
         progress: called with 1 for each part compared.
 
     Raises:
@@ -116,8 +123,9 @@ def clock_between(
     generator: np.random.Generator,
     progress: Progress | None = None,
 ) -> tuple[ClockModel, ClockLine, LagEstimate]:
-    """Estimates offset and drift of `sensor` against `reference`, with the line and the first hour that they are from;
-    parameters and refusals as for `log_clock`. The sensor may be anything that follows the wind.
+    """Estimates offset and drift of `sensor` against `reference`, with the line and the first hour
+    that they are from; parameters and refusals as for `log_clock`. The sensor may be anything that
+    follows the wind.
     """
     slow_is_sensor = _spacing(sensor) >= _spacing(reference)
     slow, fast = (sensor, reference) if slow_is_sensor else (reference, sensor)
@@ -134,15 +142,22 @@ def clock_between(
         stamp_sigma=math.hypot(search.stamp_sigma, stamps),
     )
     overall = _overall(motion, bins.average, search=search_used, generator=generator, names=names)
-    line = _line(motion, bins.average, overall, search=search_used, generator=generator, progress=progress)
+    line = _line(
+        motion, bins.average, overall, search=search_used, generator=generator, progress=progress
+    )
     crooked = [finding.what for finding in line.findings]
     if crooked:
         raise _refused_error(names, crooked)
-    return _model(line, sensor, names=names, confidence=overall.confidence, turned=slow_is_sensor), line, overall
+    return (
+        _model(line, sensor, names=names, confidence=overall.confidence, turned=slow_is_sensor),
+        line,
+        overall,
+    )
 
 
 def gain_of(reference: WindSeries, sensor: WindSeries, model: ClockModel) -> Gain:
-    """Compares the sensor's minute means with the reference's, the sensor's stamps taken to the reference's clock.
+    """Compares the sensor's minute means with the reference's, the sensor's stamps taken to the
+    reference's clock.
 
     Raises:
         InputError: fewer than ten minutes that both cover, or a reference that does not vary.
@@ -165,7 +180,13 @@ def gain_of(reference: WindSeries, sensor: WindSeries, model: ClockModel) -> Gai
     sigma = math.sqrt(max(long_run_variance(rest * away, n), 0.0) * n) / square
     level = math.sqrt(max(long_run_variance(rest, n), 0.0) / n)
     zero = float(y.mean()) - gain * float(x.mean())
-    return Gain(gain=gain, sigma=sigma, zero=zero, sigma_zero=math.hypot(level, sigma * float(x.mean())), count=n)
+    return Gain(
+        gain=gain,
+        sigma=sigma,
+        zero=zero,
+        sigma_zero=math.hypot(level, sigma * float(x.mean())),
+        count=n,
+    )
 
 
 def half_full(means: WindAverage) -> np.ndarray:
@@ -183,7 +204,10 @@ def _usable(series: WindSeries) -> tuple[Instants, Series]:
     speed = series.channels["wind_speed"]
     good = ((series.flags & UNUSABLE) == 0) & np.isfinite(speed)
     if np.count_nonzero(good) < 2:
-        raise InputError(f"{np.count_nonzero(good)} usable samples of {series.sensor.name}", fix="give another log")
+        raise InputError(
+            f"{np.count_nonzero(good)} usable samples of {series.sensor.name}",
+            fix="give another log",
+        )
     return series.time[good], speed[good]
 
 
@@ -194,20 +218,27 @@ def _spacing(series: WindSeries) -> float:
 
 
 def _with_equal_lag(slow: WindSeries, fast: WindSeries) -> tuple[WindSeries, WindSeries]:
-    """Delays both logs by the slower one's lag, where it is stated and the faster has none, so that none is left to
-    allow for; else as they are."""
+    """Delays both logs by the slower one's lag, where it is stated and the faster has none, so that
+    none is left to allow for; else as they are."""
     lags = [series.sensor.distance_constant for series in (slow, fast)]
     if any(lag is None for lag in lags) or _spacing(fast) > SHORTEST / 2:
         return slow, fast
     if (lags[1] or 0.0) > 0:
-        return slow, fast  # a slow log cannot be passed through a lag between its samples: `lead` allows for both
+        return (
+            slow,
+            fast,
+        )  # a slow log cannot be passed through a lag between its samples: `lead` allows for both
     late = _lag_as_rotor(fast, lags[0]) if lags[0] else fast
-    at_once = [replace(series, sensor=replace(series.sensor, distance_constant=0.0)) for series in (slow, late)]
+    at_once = [
+        replace(series, sensor=replace(series.sensor, distance_constant=0.0))
+        for series in (slow, late)
+    ]
     return at_once[0], at_once[1]
 
 
 def _lag_as_rotor(series: WindSeries, distance: float) -> WindSeries:
-    """Filters a log as a rotor of distance constant `distance` [m] would have given it: dy/dt = (u − y) u / ℓ.
+    """Filters a log as a rotor of distance constant `distance` [m] would have given it: dy/dt = (u
+    − y) u / ℓ.
 
     After a gap of ten of its lags the rotor is taken to have followed.
     """
@@ -216,25 +247,33 @@ def _lag_as_rotor(series: WindSeries, distance: float) -> WindSeries:
     share = 1 - np.exp(-step * np.abs(speed[1:]) / distance)
     out = np.empty(len(speed))
     level = out[0] = float(speed[0])
-    for index, (value, part) in enumerate(zip(speed[1:].tolist(), share.tolist(), strict=True), start=1):
+    for index, (value, part) in enumerate(
+        zip(speed[1:].tolist(), share.tolist(), strict=True), start=1
+    ):
         level += part * (value - level)
         out[index] = level
     return WindSeries(
-        time=time, channels={"wind_speed": out}, flags=np.zeros(len(time), dtype=np.uint16), sensor=series.sensor
+        time=time,
+        channels={"wind_speed": out},
+        flags=np.zeros(len(time), dtype=np.uint16),
+        sensor=series.sensor,
     )
 
 
 def _as_motion(series: WindSeries) -> tuple[MotionSeries, float]:
     """Returns the faster log at the instants of its air, and the standard uncertainty of those [s].
 
-    Each sample stands twice, a quarter of its spacing before and after: one that falls on the edge of a bin then counts
-    by half on either side, where as a whole it would shift the bin by half a spacing.
+    Each sample stands twice, a quarter of its spacing before and after: one that falls on the edge
+    of a bin then counts by half on either side, where as a whole it would shift the bin by half a
+    spacing.
     """
     time, speed = _usable(series)
     early, sigma = lead(series.sensor, _spacing(series), float(np.mean(speed)))
     usual = round(_spacing(series) * NANOSECONDS)
     step = np.minimum(np.diff(time), usual) // 4
-    pairs = np.stack([time - np.append(usual // 4, step), time + np.append(step, usual // 4)], axis=1)
+    pairs = np.stack(
+        [time - np.append(usual // 4, step), time + np.append(step, usual // 4)], axis=1
+    )
     speeds = np.repeat(np.maximum(speed, 0.0), 2)
     return MotionSeries(time=pairs.reshape(-1) - round(early * NANOSECONDS), energy=speeds), sigma
 
@@ -261,10 +300,16 @@ def _between(wind: WindAverage, low: int, high: int) -> WindAverage | None:
 
 
 def _part(
-    motion: MotionSeries, wind: WindAverage, low: int, high: int, *, search: LagSearch, generator: np.random.Generator
+    motion: MotionSeries,
+    wind: WindAverage,
+    low: int,
+    high: int,
+    *,
+    search: LagSearch,
+    generator: np.random.Generator,
 ) -> LagEstimate | None:
-    """Estimates the offset of the faster log from `low` to `high` on its own clock [ns]; `None` where one of them is
-    silent."""
+    """Estimates the offset of the faster log from `low` to `high` on its own clock [ns]; `None`
+    where one of them is silent."""
     chunk = _cut(motion, low, high)
     margin = round(search.window * NANOSECONDS)
     centre = round(search.centre * NANOSECONDS)
@@ -291,18 +336,24 @@ def _overall(
     low, high = int(wind.time[0]) - centre, int(wind.time[-1]) - centre
     low, high = max(low, int(motion.time[0])), min(high, int(motion.time[-1]))
     if high <= low:
-        raise _refused_error(names, ["by their stamps and the centre of the search the logs do not overlap"])
+        raise _refused_error(
+            names, ["by their stamps and the centre of the search the logs do not overlap"]
+        )
     count = max(1, int((high - low) / NANOSECONDS / WHOLE))
     edges = np.linspace(low, high + 1, count + 1).astype(np.int64)
     spread = []
     for first, last in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
         wind_in_hour = _between(wind, first + centre, last + centre)
         spread.append(
-            0.0 if wind_in_hour is None else float(np.std(wind_in_hour.speed)) * math.sqrt(len(wind_in_hour.time))
+            0.0
+            if wind_in_hour is None
+            else float(np.std(wind_in_hour.speed)) * math.sqrt(len(wind_in_hour.time))
         )
     reasons: list[str] = []
     for hour in np.argsort(spread)[::-1][:_TRIES].tolist():
-        estimate = _part(motion, wind, int(edges[hour]), int(edges[hour + 1]), search=search, generator=generator)
+        estimate = _part(
+            motion, wind, int(edges[hour]), int(edges[hour + 1]), search=search, generator=generator
+        )
         if estimate is not None and estimate.is_accepted:
             return estimate
         if estimate is not None and not reasons:
@@ -319,26 +370,48 @@ def _line(
     generator: np.random.Generator,
     progress: Progress | None,
 ) -> ClockLine:
-    """Fits the line through the offsets of the parts; without three of them the first offset and a prior drift."""
+    """Fits the line through the offsets of the parts; without three of them the first offset and a
+    prior drift."""
     duration = float(motion.time[-1] - motion.time[0]) / NANOSECONDS
     reach = max(_REACH, 4 * overall.sigma + _FASTEST * duration)
-    search_nearby = replace(search, centre=overall.offset, window=min(reach, search.window), sigma=_PART_SIGMA)
     search_nearby = replace(
-        search_nearby, sigma=math.hypot(_PART_SIGMA, search_nearby.stamp_sigma), surrogates=_PART_SURROGATES
+        search, centre=overall.offset, window=min(reach, search.window), sigma=_PART_SIGMA
+    )
+    search_nearby = replace(
+        search_nearby,
+        sigma=math.hypot(_PART_SIGMA, search_nearby.stamp_sigma),
+        surrogates=_PART_SURROGATES,
     )
     count = int(duration / PART)
-    edges = np.linspace(float(motion.time[0]), float(motion.time[-1]) + 1, count + 1).astype(np.int64)
-    chosen = np.unique(np.linspace(0, count - 1, min(count, MOST_PARTS)).round().astype(np.int64)) if count else []
+    edges = np.linspace(float(motion.time[0]), float(motion.time[-1]) + 1, count + 1).astype(
+        np.int64
+    )
+    chosen = (
+        np.unique(np.linspace(0, count - 1, min(count, MOST_PARTS)).round().astype(np.int64))
+        if count
+        else []
+    )
     parts: list[LagEstimate] = []
     for index in chosen:
-        part = _part(motion, wind, int(edges[index]), int(edges[index + 1]), search=search_nearby, generator=generator)
+        part = _part(
+            motion,
+            wind,
+            int(edges[index]),
+            int(edges[index + 1]),
+            search=search_nearby,
+            generator=generator,
+        )
         if part is not None and part.is_accepted:
             parts.append(part)
         if progress:
             progress(1)
     if len(parts) < FEWEST_PARTS:
         return ClockLine(
-            origin=overall.at, offset=overall.offset, drift=0.0, sigma_offset=overall.sigma, sigma_drift=QUARTZ
+            origin=overall.at,
+            offset=overall.offset,
+            drift=0.0,
+            sigma_offset=overall.sigma,
+            sigma_drift=QUARTZ,
         )
     return line_through(tuple(parts), overall)
 
@@ -346,8 +419,8 @@ def _line(
 def _model(
     line: ClockLine, sensor: WindSeries, *, names: tuple[str, str], confidence: float, turned: bool
 ) -> ClockModel:
-    """Builds the sensor's clock on the reference's; `turned` where the line is of the reference's clock on the
-    sensor's."""
+    """Builds the sensor's clock on the reference's; `turned` where the line is of the reference's
+    clock on the sensor's."""
     origin, offset, drift = line.origin, line.offset, line.drift
     if turned:
         origin, offset, drift = origin + round(offset * NANOSECONDS), -offset, -drift / (1 + drift)
@@ -361,7 +434,11 @@ def _model(
         sigma_drift=line.sigma_drift,
     )
     return ClockModel(
-        device=names[1], reference=names[0], method="estimated", confidence=confidence, segments=(segment,)
+        device=names[1],
+        reference=names[0],
+        method="estimated",
+        confidence=confidence,
+        segments=(segment,),
     )
 
 
@@ -369,6 +446,7 @@ def _refused_error(names: tuple[str, str], reasons: list[str]) -> RefusedError:
     return RefusedError(
         f"no offset can be estimated: {'; '.join(reasons)}",
         where=f"{names[0]} and {names[1]}",
-        fix="check that both logs are of one wind, and their zones; search around another offset: --centre, --search;"
+        fix="check that both logs are of one wind, and their zones; search around another offset: "
+        "--centre, --search;"
         " or compare logs that last longer",
     )

@@ -1,4 +1,5 @@
-"""The three ways to a clock model, and what each needs: by stamps, given, estimated from the flag's motion."""
+"""The three ways to a clock model, and what each needs: by stamps, given, estimated from the flag's
+motion."""
 
 from __future__ import annotations
 
@@ -45,14 +46,15 @@ class ClockOptions:
     Attributes:
         by: the method.
         offset: added to the camera's clock to reach the wind's [s]; for `GIVEN` only.
-        offset_sigma: its standard uncertainty [s]; for `GIVEN`, and for `STAMPS`, where it is how well the two clocks
-            are known to agree.
+        offset_sigma: its standard uncertainty [s]; for `GIVEN`, and for `STAMPS`, where it is how
+            well the two clocks are known to agree.
         search: for `ESTIMATE`; its response counts where the two below are stated.
-        response, response_sigma: by how much the flag's motion follows the wind [s], and its standard uncertainty, as
-            stated; None for what `responding` says of the logged wind.
+        response, response_sigma: by how much the flag's motion follows the wind [s], and its
+            standard uncertainty, as stated; None for what `responding` says of the logged wind.
 
     Raises:
-        UsageError: what the method needs is missing, something it has no use for was given, or numbers make no sense.
+        UsageError: what the method needs is missing, something it has no use for was given, or
+            numbers make no sense.
     """
 
     by: Method = Method.ESTIMATE
@@ -69,37 +71,54 @@ class ClockOptions:
                 where="--clock-offset",
                 fix="give a finite number of seconds",
             )
-        if self.offset_sigma is not None and not (math.isfinite(self.offset_sigma) and self.offset_sigma > 0):
+        if self.offset_sigma is not None and not (
+            math.isfinite(self.offset_sigma) and self.offset_sigma > 0
+        ):
             raise UsageError(
-                f"the uncertainty {self.offset_sigma} s of the clock offset is not a positive number",
+                f"the uncertainty {self.offset_sigma} s of the clock offset is not a positive "
+                "number",
                 where="--offset-sigma",
                 fix="give seconds > 0",
             )
         if (self.offset is not None) != (self.by is Method.GIVEN):
             number = "an" if self.by is Method.GIVEN else "no"
-            raise UsageError(f"alignment by {self.by} needs {number} offset", where="--clock-offset", fix=_GIVEN)
+            raise UsageError(
+                f"alignment by {self.by} needs {number} offset", where="--clock-offset", fix=_GIVEN
+            )
         if (self.offset_sigma is not None) == (self.by is Method.ESTIMATE):
             if self.by is Method.ESTIMATE:
                 raise UsageError(
-                    "the σ of an estimate is estimated", where="--offset-sigma", fix="leave it out, or use --by given"
+                    "the σ of an estimate is estimated",
+                    where="--offset-sigma",
+                    fix="leave it out, or use --by given",
                 )
             raise UsageError(
                 f"alignment by {self.by} needs the uncertainty of the clock offset",
                 where="--offset-sigma",
-                fix="state how well the clocks are known to agree, in seconds (one standard deviation)",
+                fix="state how well the clocks are known to agree, in seconds (one standard "
+                "deviation)",
             )
         searching = (self.search, self.response, self.response_sigma)
         if self.by is not Method.ESTIMATE and any(option is not None for option in searching):
             raise UsageError(
-                f"alignment by {self.by} searches nothing", where="--search", fix="leave the search's options out"
+                f"alignment by {self.by} searches nothing",
+                where="--search",
+                fix="leave the search's options out",
             )
 
     def recipe(self) -> dict[str, Any]:
         """Returns what the recording's identity depends on."""
         if self.by is Method.ESTIMATE:
             search = {**vars(self.search or LagSearch()), "response": self.response}
-            return {"align": {"by": self.by.value, "search": {**search, "response_sigma": self.response_sigma}}}
-        return {"align": {"by": self.by.value, "offset": self.offset, "offset_sigma": self.offset_sigma}}
+            return {
+                "align": {
+                    "by": self.by.value,
+                    "search": {**search, "response_sigma": self.response_sigma},
+                }
+            }
+        return {
+            "align": {"by": self.by.value, "offset": self.offset, "offset_sigma": self.offset_sigma}
+        }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,7 +127,8 @@ class Evidence:
 
     Attributes:
         motion: on the camera's clock.
-        wind: bins whose instants were corrected for the instrument's averaging, on the wind's clock.
+        wind: bins whose instants were corrected for the instrument's averaging, on the wind's
+            clock.
         estimate: accepted or not.
         line: offset and drift over the whole recording; `None` where the estimate was refused.
         response: by how much motion was taken to follow the wind [s].
@@ -127,8 +147,8 @@ class Evidence:
         return (*self.estimate.reasons, *(f.what for f in crooked if f.severity is Severity.ERROR))
 
     def as_json(self) -> bytes:
-        """Writes the search for the record: offsets [s], scores, evidence, and the evidence that accidents seldom
-        reach."""
+        """Writes the search for the record: offsets [s], scores, evidence, and the evidence that
+        accidents seldom reach."""
         curve = self.estimate.curve
         score, evidence = (
             [None if math.isnan(value) else round(value, 4) for value in values.tolist()]
@@ -153,7 +173,8 @@ class Outcome:
 
 
 def declared_clock(pair: Pair, options: ClockOptions, *, recipe: Mapping[str, Any]) -> Outcome:
-    """Builds a clock model by stamps or by a given offset. The stamps' own resolution is added to a σ by stamps.
+    """Builds a clock model by stamps or by a given offset. The stamps' own resolution is added to a
+    σ by stamps.
 
     Raises:
         UsageError: `options.by` is neither, or a σ that is no uncertainty.
@@ -163,22 +184,38 @@ def declared_clock(pair: Pair, options: ClockOptions, *, recipe: Mapping[str, An
     start, end = pair.span
     names = (pair.camera.name, pair.wind.name)
     if options.offset is not None:
-        clock = given(*names, start=start, end=end, offset=options.offset, sigma=options.offset_sigma)
+        clock = given(
+            *names, start=start, end=end, offset=options.offset, sigma=options.offset_sigma
+        )
     else:
         resolution = math.hypot(_start_sigma(pair), stamp_sigma(pair.series().time))
-        clock = by_stamps(*names, start=start, end=end, sigma=math.hypot(options.offset_sigma, resolution))
+        clock = by_stamps(
+            *names, start=start, end=end, sigma=math.hypot(options.offset_sigma, resolution)
+        )
     segment = clock.segments[0]
-    details = {"method": clock.method, "offset": segment.offset, "sigma": segment.sigma_offset, "confidence": 1.0}
+    details = {
+        "method": clock.method,
+        "offset": segment.offset,
+        "sigma": segment.sigma_offset,
+        "confidence": 1.0,
+    }
     return Outcome(
-        alignment=Alignment(clock=clock, recipe=recipe, details=details, findings=_too_good(pair, segment.sigma_offset))
+        alignment=Alignment(
+            clock=clock,
+            recipe=recipe,
+            details=details,
+            findings=_too_good(pair, segment.sigma_offset),
+        )
     )
 
 
 def responding(wind: float) -> tuple[float, float]:
-    """Computes by how much a flag's motion follows a mean wind [m/s], and the standard uncertainty of that [s].
+    """Computes by how much a flag's motion follows a mean wind [m/s], and the standard uncertainty
+    of that [s].
 
-    A flag follows when the air has passed it twice, and one that hangs in light wind later still: motion of simulated
-    flags of 1.5 m by 1 m lags by 1.0 to 1.6 s in winds of 3 m/s. From 10 m/s on it is 0.3 ± 0.15 s.
+    A flag follows when the air has passed it twice, and one that hangs in light wind later still:
+    motion of simulated flags of 1.5 m by 1 m lags by 1.0 to 1.6 s in winds of 3 m/s. From 10 m/s on
+    it is 0.3 ± 0.15 s.
     """
     response = min(max(_PASSED / max(wind, 1e-3), _QUICKEST), _SLOWEST)
     return response, min(response / 2, _UNCERTAIN)
@@ -212,16 +249,22 @@ def evidence(pair: Pair, options: ClockOptions, *, progress: Progress | None = N
     line = None
     if estimate.is_accepted:
         line = clock_line(motion, bins.average, estimate, search=search, generator=generator)
-    return Evidence(motion=motion, wind=bins.average, estimate=estimate, line=line, response=search.response)
+    return Evidence(
+        motion=motion, wind=bins.average, estimate=estimate, line=line, response=search.response
+    )
 
 
 def _check_lengths(pair: Pair, wind: WindAverage, search: LagSearch) -> None:
     """Refuse a film or log that is shorter than what both must cover, before a frame is read."""
     start, end = pair.span
-    film, log = (end - start) / NANOSECONDS, float(wind.time[-1] - wind.time[0]) / NANOSECONDS + wind.period
+    film, log = (
+        (end - start) / NANOSECONDS,
+        float(wind.time[-1] - wind.time[0]) / NANOSECONDS + wind.period,
+    )
     if min(film, log) < search.overlap - wind.period:
         raise RefusedError(
-            f"{film:.0f} s of film beside {log:.0f} s of log: an offset is estimated from {search.overlap:g} s or more "
+            f"{film:.0f} s of film beside {log:.0f} s of log: an offset is estimated from "
+            f"{search.overlap:g} s or more "
             "that both cover",
             where=f"{pair.camera.name} and {pair.wind.name}",
             fix=f"give a longer film and log, or state the offset: {_GIVEN}",
@@ -269,8 +312,8 @@ def estimated_clock(pair: Pair, evidence: Evidence, *, recipe: Mapping[str, Any]
 
 
 def summary(estimate: LagEstimate, line: ClockLine) -> dict[str, Any]:
-    """Returns the numbers of a clock model that was estimated, for JSON; `drift_parts` is 0 where the drift is a
-    prior's."""
+    """Returns the numbers of a clock model that was estimated, for JSON; `drift_parts` is 0 where
+    the drift is a prior's."""
     half = NINETY * line.sigma_offset
     return {
         "offset": line.offset,
@@ -296,7 +339,8 @@ def _too_good(pair: Pair, sigma: float) -> tuple[Finding, ...]:
     return (
         Finding.of(
             "sigma-below-frame",
-            f"the offset's σ of {sigma:.2g} s is below the {period:.2g} s between frames: implausibly small",
+            f"the offset's σ of {sigma:.2g} s is below the {period:.2g} s between frames: "
+            "implausibly small",
             value=sigma,
             fix="give the σ with which the two clocks were really compared",
         ),
@@ -304,7 +348,8 @@ def _too_good(pair: Pair, sigma: float) -> tuple[Finding, ...]:
 
 
 def _start_sigma(pair: Pair) -> float:
-    """Computes the standard uncertainty of reading the film's start off its file [s]; 0 where the user gave it."""
+    """Computes the standard uncertainty of reading the film's start off its file [s]; 0 where the
+    user gave it."""
     text = pair.camera_record.metadata.get(CAMERA, {}).get("start_sigma")
     if text is None:
         return 0.0
@@ -312,5 +357,7 @@ def _start_sigma(pair: Pair) -> float:
         return float(text)
     except ValueError:
         raise CorruptError(
-            f"the camera's start_sigma is {text!r}", where=pair.camera.id, fix="ingest the camera file anew"
+            f"the camera's start_sigma is {text!r}",
+            where=pair.camera.id,
+            fix="ingest the camera file anew",
         ) from None

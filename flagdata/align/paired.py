@@ -1,11 +1,13 @@
-"""Two clocks that stamped the same samples: a device's own, and that of the computer which received them.
+"""Two clocks that stamped the same samples: a device's own, and that of the computer which received
+them.
 
-A sample stamped t by the device reaches the computer late, never early: host = device + offset(t) + delay, delay ≥ 0,
-and the delays come in bursts (buffers of serial ports and USB, a busy computer). So the offset is the lower envelope of
-host − device, not its mean (Moon, Skelly and Towsley, INFOCOM 1999), here by the least of each of many short blocks and
-a line through those that no single wrong stamp can turn (Theil 1950, Sen 1968). Where the envelope steps, one of the
-clocks was set: the model gets another segment, and nothing is fitted across (as pyxdf does). Stamps are never evened
-out.
+A sample stamped t by the device reaches the computer late, never early: host = device + offset(t) +
+delay, delay ≥ 0, and the delays come in bursts (buffers of serial ports and USB, a busy computer).
+So the offset is the lower envelope of host − device, not its mean (Moon, Skelly and Towsley,
+INFOCOM 1999), here by the least of each of many short blocks and a line through those that no
+single wrong stamp can turn (Theil 1950, Sen 1968). Where the envelope steps, one of the
+clocks was set: the model gets another segment, and nothing is fitted across (as pyxdf does). Stamps
+are never evened out.
 """
 
 from __future__ import annotations
@@ -39,7 +41,8 @@ class PairedClocks:
     """A device's clock on a computer's.
 
     Attributes:
-        model: offset, drift and σ by segments; offsets are of the fastest samples, `least_delay` taken off.
+        model: offset, drift and σ by segments; offsets are of the fastest samples, `least_delay`
+            taken off.
         delay: median delay above the fastest [s].
         worst_delay: the longest [s].
         findings: jumps, long delays.
@@ -66,12 +69,12 @@ def pair_clocks(
         device_time: (n,) the device's stamps, strictly increasing [UTC ns].
         host_time: (n,) the computer's stamps of the same samples [UTC ns].
         least_delay: of the fastest sample on its way [s]; the stamps do not show it.
-        least_delay_sigma: its standard uncertainty [s]; with `None`, the median delay above the fastest, since what
-            cannot be seen is likely of the size of what can.
+        least_delay_sigma: its standard uncertainty [s]; with `None`, the median delay above the
+            fastest, since what cannot be seen is likely of the size of what can.
 
     Raises:
-        InputError: fewer than two samples, shapes that disagree, device stamps that do not increase, or a step so
-            large that the two cannot be clocks of the same samples' time.
+        InputError: fewer than two samples, shapes that disagree, device stamps that do not
+            increase, or a step so large that the two cannot be clocks of the same samples' time.
     """
     if device_time.ndim != 1 or device_time.shape != host_time.shape:
         raise InputError(
@@ -81,22 +84,29 @@ def pair_clocks(
     if len(device_time) < 2:
         raise InputError("a clock cannot be modelled from one sample", fix="give a longer log")
     if not bool(np.all(np.diff(device_time) > 0)):
-        raise InputError("device stamps that do not increase", fix="sort and report the disorder first")
+        raise InputError(
+            "device stamps that do not increase", fix="sort and report the disorder first"
+        )
     time = (device_time - device_time[0]) / NANOSECONDS
-    # Offsets may be decades (a device without a set clock): kept exact as integers, fitted about the first one.
+    # Offsets may be decades (a device without a set clock): kept exact as integers, fitted about
+    # the first one.
     base = int(host_time[0] - device_time[0])
     late = ((host_time - device_time) - base) / NANOSECONDS
     quantum = math.hypot(stamp_sigma(device_time), stamp_sigma(host_time))
     edges = [0, *_jumps(time, late), len(time)]
     pieces = [slice(low, high) for low, high in itertools.pairwise(edges)]
     fits = [_line(time[piece], late[piece], quantum) for piece in pieces]
-    delays = np.concatenate([late[p] - fit.at(time[p]) for p, fit in zip(pieces, fits, strict=True)])
+    delays = np.concatenate(
+        [late[p] - fit.at(time[p]) for p, fit in zip(pieces, fits, strict=True)]
+    )
     delay = float(np.median(np.maximum(delays, 0.0)))
     unseen = delay if least_delay_sigma is None else least_delay_sigma
     segments = tuple(
         Segment(
             start=int(device_time[piece.start]),
-            end=int(device_time[piece.stop]) if piece.stop < len(time) else int(device_time[-1]) + 1,
+            end=int(device_time[piece.stop])
+            if piece.stop < len(time)
+            else int(device_time[-1]) + 1,
             origin=int(device_time[0]) + round(fit.origin * NANOSECONDS),
             offset=base / NANOSECONDS + fit.offset - least_delay,
             drift=fit.drift,
@@ -105,9 +115,13 @@ def pair_clocks(
         )
         for piece, fit in zip(pieces, fits, strict=True)
     )
-    model = ClockModel(device=device, reference=reference, method="paired", confidence=1.0, segments=segments)
+    model = ClockModel(
+        device=device, reference=reference, method="paired", confidence=1.0, segments=segments
+    )
     worst = float(delays.max())
-    return PairedClocks(model=model, delay=delay, worst_delay=worst, findings=_findings(model, delay, worst))
+    return PairedClocks(
+        model=model, delay=delay, worst_delay=worst, findings=_findings(model, delay, worst)
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,19 +151,26 @@ def _least(time: Series, late: Series) -> tuple[Series, Series, IntArray]:
     """Finds time and value of the least of each block, and the blocks' first indices."""
     starts = _blocks(time)
     ends = np.append(starts[1:], len(time))
-    index = np.array([low + int(np.argmin(late[low:high])) for low, high in zip(starts, ends, strict=True)])
+    index = np.array(
+        [low + int(np.argmin(late[low:high])) for low, high in zip(starts, ends, strict=True)]
+    )
     return time[index], late[index], starts
 
 
 def _line(time: Series, late: Series, quantum: float) -> _Line:
-    """Fits the lower envelope of one segment; `quantum` is the σ that the resolution of the stamps leaves them [s]."""
+    """Fits the lower envelope of one segment; `quantum` is the σ that the resolution of the stamps
+    leaves them [s]."""
     when, least, _ = _least(time, late)
     origin = float(np.mean(when))
     drift, sigma_drift = 0.0, PRIOR_DRIFT
     if len(when) > 2 * _SIDE:
-        from scipy.stats import theilslopes  # only now: it takes longer to load than most logs to read
+        from scipy.stats import (
+            theilslopes,
+        )  # only now: it takes longer to load than most logs to read
 
-        slope, _, low, high = np.asarray(theilslopes(least, when, 0.6827), dtype=np.float64).tolist()
+        slope, _, low, high = np.asarray(
+            theilslopes(least, when, 0.6827), dtype=np.float64
+        ).tolist()
         rounding = quantum / math.sqrt(len(when)) / float(np.std(when))
         measured = math.hypot((high - low) / 2, rounding)
         if measured < PRIOR_DRIFT:
@@ -158,7 +179,9 @@ def _line(time: Series, late: Series, quantum: float) -> _Line:
     offset = float(np.quantile(rest, 0.1)) if len(rest) >= 10 else float(rest.min())
     spread = _NORMAL * float(np.median(np.abs(rest - np.median(rest))))
     sigma = max(_MEDIAN_LOSS * spread / math.sqrt(len(rest)), abs(float(np.median(rest)) - offset))
-    return _Line(origin=origin, offset=offset, drift=drift, sigma_offset=sigma, sigma_drift=sigma_drift)
+    return _Line(
+        origin=origin, offset=offset, drift=drift, sigma_offset=sigma, sigma_drift=sigma_drift
+    )
 
 
 def _jumps(time: Series, late: Series) -> list[int]:
@@ -173,12 +196,15 @@ def _jumps(time: Series, late: Series) -> list[int]:
             continue
         side = min(_SIDE, len(part) // 2)
         splits = np.arange(side, len(part) - side + 1)
-        steps = np.array([np.median(part[i : i + side]) - np.median(part[i - side : i]) for i in splits])
+        steps = np.array(
+            [np.median(part[i : i + side]) - np.median(part[i - side : i]) for i in splits]
+        )
         noise = _NORMAL * float(np.median(np.abs(np.diff(part))))
         limit = max(LEAST_JUMP, 8 * noise)
         if np.abs(steps).max() <= limit:
             continue
-        # Within the blocks beside the largest step, the change between neighbours is greatest at the jump itself.
+        # Within the blocks beside the largest step, the change between neighbours is greatest at
+        # the jump itself.
         centre = int(splits[int(np.argmax(np.abs(steps)))])
         around = np.arange(max(1, centre - side), min(len(part), centre + side))
         split = int(around[int(np.argmax(np.abs(np.diff(part))[around - 1]))])
@@ -207,8 +233,10 @@ def _findings(model: ClockModel, delay: float, worst: float) -> tuple[Finding, .
     findings = [
         Finding.of(
             "clocks-paired",
-            f"{model.device} clock {first.offset:+.4f} s [{first.offset - half:.4f}, {first.offset + half:.4f}]"
-            f" 90 % to {model.reference}, drift {1e6 * first.drift:+.1f} ± {1e6 * first.sigma_drift:.1f} ppm;"
+            f"{model.device} clock {first.offset:+.4f} s [{first.offset - half:.4f}, "
+            f"{first.offset + half:.4f}]"
+            f" 90 % to {model.reference}, drift {1e6 * first.drift:+.1f} ± "
+            f"{1e6 * first.sigma_drift:.1f} ppm;"
             f" delays {1e3 * delay:.1f} ms (median), {1e3 * worst:.0f} ms (longest)",
             value=first.offset,
         )
@@ -229,7 +257,8 @@ def _findings(model: ClockModel, delay: float, worst: float) -> tuple[Finding, .
 
 
 def host_clock(series: WindSeries) -> PairedClocks | None:
-    """Puts a logged device's clock on the computer's; `None` where the log has one kind of stamp only, or one sample.
+    """Puts a logged device's clock on the computer's; `None` where the log has one kind of stamp
+    only, or one sample.
 
     Raises:
         InputError: see `pair_clocks`.

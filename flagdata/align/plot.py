@@ -1,4 +1,5 @@
-"""A picture of an estimated alignment: motion and wind on one clock, and the search that found it."""
+"""A picture of an estimated alignment: motion and wind on one clock, and the search that found
+it."""
 
 from __future__ import annotations
 
@@ -39,7 +40,9 @@ def check(path: Path) -> None:
     formats = FigureCanvasAgg.get_supported_filetypes()
     if path.suffix.lower().removeprefix(".") not in formats:
         raise InputError(
-            f"no picture of format {path.suffix or path.name!r} is drawn", where=str(path), fix="name a .png file"
+            f"no picture of format {path.suffix or path.name!r} is drawn",
+            where=str(path),
+            fix="name a .png file",
         )
     check_file(path, command=_COMMAND)
 
@@ -47,10 +50,11 @@ def check(path: Path) -> None:
 def draw(evidence: Evidence, path: Path, *, title: str) -> None:
     """Write the picture; its format is that of the file's suffix (.png, .svg, .pdf).
 
-    Above: motion energy, in bins like the wind's and shifted by the estimate, and the wind, both as normal scores.
-    Below left: the evidence at every offset tried, and the band that unrelated winds seldom leave. Below right: the
-    score around the peak, and the 90 % interval. At the bottom, where the drift was measured: the offsets of the parts
-    with their 90 % intervals, and the line through them.
+    Above: motion energy, in bins like the wind's and shifted by the estimate, and the wind, both as
+    normal scores.
+    Below left: the evidence at every offset tried, and the band that unrelated winds seldom leave.
+    Below right: the score around the peak, and the 90 % interval. At the bottom, where the drift
+    was measured: the offsets of the parts with their 90 % intervals, and the line through them.
 
     Raises:
         InputError, ConflictError: as `check`.
@@ -81,7 +85,9 @@ def _draw_series(axes: Axes, evidence: Evidence) -> None:
     origin = int(wind.time[0]) // NANOSECONDS * NANOSECONDS
     wind_time = (wind.time - origin) / NANOSECONDS - wind.period / 2
     shift = offset - evidence.response if math.isfinite(offset) else 0.0
-    middles, energy = _bin_values((motion.time - origin) / NANOSECONDS + shift, motion.energy, wind.period)
+    middles, energy = _bin_values(
+        (motion.time - origin) / NANOSECONDS + shift, motion.energy, wind.period
+    )
     if len(middles):
         in_view = (wind_time >= middles[0] - _MARGIN) & (wind_time <= middles[-1] + _MARGIN)
         x, y = _broken(wind_time[in_view], normal_scores(wind.speed[in_view]), wind.period)
@@ -97,7 +103,9 @@ def _draw_search(axes: Axes, estimate: LagEstimate) -> None:
     if math.isfinite(curve.chance_score):
         axes.axhline(curve.chance_score, color=_MARK, ls=":", lw=1)
         axes.axhspan(-curve.chance_score, curve.chance_score, color=_MARK, alpha=0.07, lw=0)
-    axes.set_title("all offsets tried; unrelated winds stay within the gray", loc="left", fontsize=9)
+    axes.set_title(
+        "all offsets tried; unrelated winds stay within the gray", loc="left", fontsize=9
+    )
 
 
 def _draw_peak(axes: Axes, estimate: LagEstimate) -> None:
@@ -106,14 +114,18 @@ def _draw_peak(axes: Axes, estimate: LagEstimate) -> None:
         half = max(10.0, 6 * min(estimate.sigma, 5.0))
         low, high = estimate.interval
         axes.set_xlim(estimate.offset - half, estimate.offset + half)
-        axes.set_title(f"{estimate.offset:+.2f} s [{low:.2f}, {high:.2f}] 90 %", loc="left", fontsize=9)
+        axes.set_title(
+            f"{estimate.offset:+.2f} s [{low:.2f}, {high:.2f}] 90 %", loc="left", fontsize=9
+        )
 
 
 def _draw_curve(axes: Axes, estimate: LagEstimate, values: Series, *, label: str) -> None:
     axes.set(xlabel="offset added to the camera's clock [s]", ylabel=label)
     if not np.any(np.isfinite(values)):
         axes.set(xticks=[], yticks=[])
-        axes.text(0.5, 0.5, "nothing was searched", ha="center", va="center", transform=axes.transAxes)
+        axes.text(
+            0.5, 0.5, "nothing was searched", ha="center", va="center", transform=axes.transAxes
+        )
         return
     axes.plot(estimate.curve.offset, values, color=_MARK, lw=1)
     if math.isfinite(estimate.offset):
@@ -129,8 +141,13 @@ def _draw_parts(axes: Axes, line: ClockLine) -> None:
     axes.errorbar(at, offset, yerr=half, fmt="o", color=_MOTION, lw=1, ms=4)
     ends = np.array([at.min(), at.max()])
     axes.plot(ends, line.offset + line.drift * 60 * ends, color=_MARK, lw=1)
-    axes.set(xlabel=f"time on the camera's clock [min from {iso(line.origin)[:19]}Z]", ylabel="offset [s]")
-    axes.set_title(f"drift {1e6 * line.drift:+.0f} ± {1e6 * line.sigma_drift:.0f} ppm", loc="left", fontsize=9)
+    axes.set(
+        xlabel=f"time on the camera's clock [min from {iso(line.origin)[:19]}Z]",
+        ylabel="offset [s]",
+    )
+    axes.set_title(
+        f"drift {1e6 * line.drift:+.0f} ± {1e6 * line.sigma_drift:.0f} ppm", loc="left", fontsize=9
+    )
 
 
 def _bin_values(time: Series, values: Series, period: float) -> tuple[Series, Series]:
@@ -141,7 +158,9 @@ def _bin_values(time: Series, values: Series, period: float) -> tuple[Series, Se
     count = np.bincount(index - first)
     total = np.bincount(index - first, weights=values[finite])
     filled = np.flatnonzero(count)
-    return np.asarray((filled + first + 0.5) * period, dtype=np.float64), total[filled] / count[filled]
+    return np.asarray((filled + first + 0.5) * period, dtype=np.float64), total[filled] / count[
+        filled
+    ]
 
 
 def _broken(time: Series, values: Series, period: float) -> tuple[Series, Series]:

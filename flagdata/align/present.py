@@ -1,4 +1,5 @@
-"""What an alignment of two artifacts is known by: its parents and its recipe, in the catalog and in its record."""
+"""What an alignment of two artifacts is known by: its parents and its recipe, in the catalog and in
+its record."""
 
 from __future__ import annotations
 
@@ -39,7 +40,10 @@ def find_made(
         if list(row["parents"]) != wanted:
             continue
         artifact = Artifact.from_row(row)
-        for label, asked, value in (("name", name, artifact.name), ("session", session, artifact.session)):
+        for label, asked, value in (
+            ("name", name, artifact.name),
+            ("session", session, artifact.session),
+        ):
             if asked is not None and asked != value:
                 raise ConflictError(
                     f"the {noun} is there already with the {label} {value!r}",
@@ -50,7 +54,9 @@ def find_made(
     return ABSENT
 
 
-def provenance(parents: Mapping[str, Artifact], recipe: Mapping[str, Any], *, code: str) -> dict[str, str]:
+def provenance(
+    parents: Mapping[str, Artifact], recipe: Mapping[str, Any], *, code: str
+) -> dict[str, str]:
     """Returns what a record says of where it comes from.
 
     Args:

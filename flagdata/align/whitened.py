@@ -1,4 +1,5 @@
-"""Wind and motion behind one autoregressive filter: their scores at all trial offsets, and the peak's uncertainty."""
+"""Wind and motion behind one autoregressive filter: their scores at all trial offsets, and the
+peak's uncertainty."""
 
 from __future__ import annotations
 
@@ -39,20 +40,23 @@ class Whitened:
 
     @classmethod
     def by(cls, filters: Series, wind: Series, bins: LagBins) -> Whitened:
-        return cls(bins=bins, wind=_filter(wind, filters, 1), motion=_filter(bins.motion, filters, STEPS))
+        return cls(
+            bins=bins, wind=_filter(wind, filters, 1), motion=_filter(bins.motion, filters, STEPS)
+        )
 
     def search(self, *, overlap: float) -> tuple[Series, Series, int]:
-        """Computes this pair's scores z (m,), the bins compared (m,), and the trial where z is greatest; −1 where none
-        is."""
+        """Computes this pair's scores z (m,), the bins compared (m,), and the trial where z is
+        greatest; −1 where none is."""
         scores, counts = self.scores(self.wind[:, None], overlap=overlap)
         score = scores[:, 0]
         return score, counts, int(np.nanargmax(score)) if np.any(np.isfinite(score)) else -1
 
     def scores(self, winds: FloatArray, *, overlap: float) -> tuple[FloatArray, Series]:
-        """Computes scores z = atanh(r) √(n − 3), (m, s), of winds (n, s), and how many bins each trial offset compares,
-        (m,).
+        """Computes scores z = atanh(r) √(n − 3), (m, s), of winds (n, s), and how many bins each
+        trial offset compares, (m,).
 
-        All winds count as missing where the filtered wind is. Trials that cover less than `overlap` [s] get NaN.
+        All winds count as missing where the filtered wind is. Trials that cover less than `overlap`
+        [s] get NaN.
         """
         present = np.isfinite(self.wind)
         weight = present.astype(np.float64)
@@ -76,14 +80,22 @@ class Whitened:
             variance = (mean_xx - mean_x**2) * (mean_yy - mean_y**2)
             usable = (n[:, None] >= enough) & (variance > _VANISHING)
             r = covariance / np.sqrt(np.where(usable, variance, 1.0))
-            z = np.arctanh(np.clip(r, -_PERFECT, _PERFECT)) * np.sqrt(np.maximum(n - 3, 0.0))[:, None]
+            z = (
+                np.arctanh(np.clip(r, -_PERFECT, _PERFECT))
+                * np.sqrt(np.maximum(n - 3, 0.0))[:, None]
+            )
             scores[part] = np.where(usable, z, np.nan)
             counts[part] = n
         return scores, counts
 
     def peak(self, score: Series, best: int) -> Peak:
-        """Refines the peak at trial `best` of this pair's own scores, with its uncertainty (see `lag`)."""
-        x, y, dx = self.wind, self.motion[self.bins.index(best)], _slope(self.wind) / self.bins.period
+        """Refines the peak at trial `best` of this pair's own scores, with its uncertainty (see
+        `lag`)."""
+        x, y, dx = (
+            self.wind,
+            self.motion[self.bins.index(best)],
+            _slope(self.wind) / self.bins.period,
+        )
         valid = np.isfinite(x) & np.isfinite(y) & np.isfinite(dx)
         n = int(np.count_nonzero(valid))
         centred_x, centred_y = x - np.mean(x[valid]), y - np.mean(y[valid])
@@ -106,12 +118,17 @@ class Whitened:
             return centre
         away = self.bins.offsets[around_peak] - centre
         square, line, _ = np.polyfit(away, score[around_peak], 2)
-        return centre + float(np.clip(-line / (2 * square), away[0], away[-1])) if square < 0 else centre
+        return (
+            centre + float(np.clip(-line / (2 * square), away[0], away[-1]))
+            if square < 0
+            else centre
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Peak:
-    """A refined peak: offset and its statistical standard uncertainty [s], correlation, and bins compared."""
+    """A refined peak: offset and its statistical standard uncertainty [s], correlation, and bins
+    compared."""
 
     offset: float
     sigma: float
@@ -121,12 +138,14 @@ class Peak:
 
 @dataclass(frozen=True, kw_only=True)
 class Fit:
-    """Two views of one model: `best` for the offset, `whitest` for the test whether there is any relation.
+    """Two views of one model: `best` for the offset, `whitest` for the test whether there is any
+    relation.
 
     Attributes:
-        best: filtered by what the wind leaves unexplained of the motion; most certain if the two are related.
-        whitest: filtered by the motion's own autoregression (Box and Jenkins, 1970); least chance for accidents, since
-            the motion is then white whether or not it follows the wind.
+        best: filtered by what the wind leaves unexplained of the motion; most certain if the two
+            are related.
+        whitest: filtered by the motion's own autoregression (Box and Jenkins, 1970); least chance
+            for accidents, since the motion is then white whether or not it follows the wind.
     """
 
     best: Whitened
@@ -134,17 +153,22 @@ class Fit:
 
 
 def fit(bins: LagBins, *, overlap: float) -> Fit | None:
-    """Fits the filter φ(B) and the smooth, symmetric response to the wind that suit a pair best, found in turn.
+    """Fits the filter φ(B) and the smooth, symmetric response to the wind that suit a pair best,
+    found in turn.
 
-    The response is a sum of Gaussians of several widths with coefficients ≥ 0, by non-negative least squares on the
-    filtered series at the best offset: the wind's quick changes, which the flag elsewhere does not see and which the
-    sensor's noise drowns, count by what they explain. Being symmetric in time it moves no peak. The filter is fitted to
-    the residual.
+    The response is a sum of Gaussians of several widths with coefficients ≥ 0, by non-negative
+    least squares on the
+    filtered series at the best offset: the wind's quick changes, which the flag elsewhere does not
+    see and which the sensor's noise drowns, count by what they explain. Being symmetric in time it
+    moves no peak. The filter is fitted to the residual.
 
     Returns:
-        `None` where no trial offset covers `overlap` [s], or the motion rises with the wind at none.
+        `None` where no trial offset covers `overlap` [s], or the motion rises with the wind at
+            none.
     """
-    smooth = np.stack([_smooth_samples(bins.wind, width) for width in _WIDTHS], axis=1)  # (n, widths)
+    smooth = np.stack(
+        [_smooth_samples(bins.wind, width) for width in _WIDTHS], axis=1
+    )  # (n, widths)
     motion_filter = filters = autoregression(bins.motion, stride=STEPS)
     best, highest = -1, -math.inf
     for column in smooth.T:
@@ -170,8 +194,8 @@ def fit(bins: LagBins, *, overlap: float) -> Fit | None:
 
 
 def longest_compared(bins: LagBins) -> float:
-    """Computes the longest time that a pair can be compared over at any trial offset [s]: the filter takes some bins at
-    the start and after each gap."""
+    """Computes the longest time that a pair can be compared over at any trial offset [s]: the
+    filter takes some bins at the start and after each gap."""
     pair = Whitened.by(autoregression(bins.motion, stride=STEPS), bins.wind, bins)
     _, counts, _ = pair.search(overlap=0.0)
     return bins.period * float(counts.max())
@@ -188,24 +212,34 @@ def _response(smooth: FloatArray, motion: Series, filters: Series) -> Series:
 
 
 def _smooth_samples(samples: Series, width: float) -> Series:
-    """Averages what is there over a Gaussian of standard deviation `width` [bins]; NaN stays NaN."""
+    """Averages what is there over a Gaussian of standard deviation `width` [bins]; NaN stays
+    NaN."""
     reach = math.ceil(3 * width)
     kernel = np.exp(-0.5 * np.square(np.arange(-reach, reach + 1) / width))
     is_finite = np.isfinite(samples)
-    total = np.convolve(np.where(is_finite, samples, 0.0), kernel, mode="full")[reach : reach + len(samples)]
-    weight = np.convolve(is_finite.astype(np.float64), kernel, mode="full")[reach : reach + len(samples)]
+    total = np.convolve(np.where(is_finite, samples, 0.0), kernel, mode="full")[
+        reach : reach + len(samples)
+    ]
+    weight = np.convolve(is_finite.astype(np.float64), kernel, mode="full")[
+        reach : reach + len(samples)
+    ]
     return np.where(is_finite, total / np.maximum(weight, 1e-300), np.nan)
 
 
 def autoregression(samples: Series, *, stride: int) -> Series:
-    """Fits (4,) coefficients φ of samples a `stride` apart, by Yule and Walker; missing samples count as the mean.
+    """Fits (4,) coefficients φ of samples a `stride` apart, by Yule and Walker; missing samples
+    count as the mean.
 
-    Autocovariances are biased (divided by the number of samples, not of pairs), which keeps the filter stable.
+    Autocovariances are biased (divided by the number of samples, not of pairs), which keeps the
+    filter stable.
     """
     present = np.isfinite(samples)
     centred = np.where(present, samples - np.mean(samples[present]), 0.0)
     covariance = np.array(
-        [float(centred[: len(centred) - k * stride] @ centred[k * stride :]) for k in range(_ORDER + 1)]
+        [
+            float(centred[: len(centred) - k * stride] @ centred[k * stride :])
+            for k in range(_ORDER + 1)
+        ]
     )
     if covariance[0] <= 0:
         return np.zeros(_ORDER)
@@ -225,7 +259,8 @@ def _filter(samples: Series, filters: Series, stride: int) -> Series:
 
 
 def _slope(samples: Series) -> Series:
-    """Computes the derivative per sample by the central difference of fourth order; NaN at the ends and beside gaps."""
+    """Computes the derivative per sample by the central difference of fourth order; NaN at the ends
+    and beside gaps."""
     out = np.full(samples.shape, np.nan)
     if len(samples) > 4:
         out[2:-2] = (8 * (samples[3:-1] - samples[1:-3]) - (samples[4:] - samples[:-4])) / 12
@@ -233,8 +268,8 @@ def _slope(samples: Series) -> Series:
 
 
 def long_run_variance(psi: Series, count: int) -> float:
-    """Computes the long-run variance of Newey and West (1987): Σ over lags of the autocovariances of `count` samples
-    with Bartlett's weights."""
+    """Computes the long-run variance of Newey and West (1987): Σ over lags of the autocovariances
+    of `count` samples with Bartlett's weights."""
     reach = math.ceil(count ** (1 / 3))
     total = float(psi @ psi)
     for lag in range(1, reach + 1):

@@ -1,9 +1,10 @@
-"""An anemometer's samples as equal bins whose instants are those of the air they report, for the search of a lag.
+"""An anemometer's samples as equal bins whose instants are those of the air they report, for the
+search of a lag.
 
-A bin's stamp is easily half a sample off: a reading stamped t may be of that instant or the mean of the time since the
-reading before. For clips that is nothing; for a clock offset it is the error. So each bin's instant is set by its
-samples' own stamps, by how long the instrument averages and by how late it follows; the uncertainty of these goes
-into σ.
+A bin's stamp is easily half a sample off: a reading stamped t may be of that instant or the mean of
+the time since the reading before. For clips that is nothing; for a clock offset it is the error. So
+each bin's instant is set by its samples' own stamps, by how long the instrument averages and by how
+late it follows; the uncertainty of these goes into σ.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ _SLOWEST = 0.5  # m/s, below which rotating sensors hardly turn
 
 @dataclass(frozen=True, kw_only=True)
 class WindBins:
-    """Bins on one regular grid; `average.time` minus half a period is the middle of the air each reports.
+    """Bins on one regular grid; `average.time` minus half a period is the middle of the air each
+    reports.
 
     Attributes:
         average: the bins.
@@ -44,13 +46,15 @@ class WindBins:
 def wind_bins(series: WindSeries, *, shortest: float = SHORTEST) -> WindBins:
     """Bins of `shortest` [s], or of the time between samples where that is longer.
 
-    A sample's air precedes its stamp by the sum of two times. Half the sensor's averaging, where its recipe states it;
-    else anything from 0 (a reading of the instant) to half the time between samples. And ℓ/U, the lag of a rotating
-    sensor of distance constant ℓ in a mean wind U (Kristensen, 1998); where the recipe states no ℓ, anything from 0 (a
-    sonic) to 3 m (a heavy cup). A range counts as its middle ± 1/√12 of its width; a stated ℓ is trusted to 20 %.
+    A sample's air precedes its stamp by the sum of two times. Half the sensor's averaging, where
+    its recipe states it; else anything from 0 (a reading of the instant) to half the time between
+    samples. And ℓ/U, the lag of a rotating sensor of distance constant ℓ in a mean wind U
+    (Kristensen, 1998); where the recipe states no ℓ, anything from 0 (a sonic) to 3 m (a heavy
+    cup). A range counts as its middle ± 1/√12 of its width; a stated ℓ is trusted to 20 %.
 
     Raises:
-        InputError: no wind speed, fewer than two usable samples, or samples more than a minute apart.
+        InputError: no wind speed, fewer than two usable samples, or samples more than a minute
+            apart.
     """
     if "wind_speed" not in series.channels:
         raise InputError(
@@ -61,8 +65,11 @@ def wind_bins(series: WindSeries, *, shortest: float = SHORTEST) -> WindBins:
     usable = ((series.flags & UNUSABLE) == 0) & np.isfinite(series.channels["wind_speed"])
     time = series.time[usable]
     if len(time) < 2:
-        raise InputError(f"{len(time)} usable wind samples", fix="check the log's report; give another log")
-    # Over several samples at a time, so that jitter averages out; their median, so that gaps do not count.
+        raise InputError(
+            f"{len(time)} usable wind samples", fix="check the log's report; give another log"
+        )
+    # Over several samples at a time, so that jitter averages out; their median, so that gaps do not
+    # count.
     reach = min(_REACH, len(time) - 1)
     spacing = float(np.median(time[reach:] - time[:-reach])) / reach / NANOSECONDS
     if spacing > _LONGEST:
@@ -81,7 +88,9 @@ def wind_bins(series: WindSeries, *, shortest: float = SHORTEST) -> WindBins:
     origin = int(shifted[0])
     stamps = np.add.reduceat((shifted - origin).astype(np.float64), starts) / counts
     middles = (means.time - origin).astype(np.float64) - length / 2
-    early, sigma = lead(series.sensor, spacing, float(np.mean(series.channels["wind_speed"][usable])))
+    early, sigma = lead(
+        series.sensor, spacing, float(np.mean(series.channels["wind_speed"][usable]))
+    )
     move = float(np.median(stamps - middles)) - early * NANOSECONDS
     return WindBins(average=replace(means, time=means.time + shift + round(move)), sigma=sigma)
 
@@ -103,8 +112,8 @@ def lead(sensor: Sensor, spacing: float, speed: float) -> tuple[float, float]:
 
 
 def _mid_bin_shift(time: np.ndarray, length: int) -> int:
-    """Computes the time to take off slow samples so that they fall mid-bin, where jitter cannot move them across
-    [ns]."""
+    """Computes the time to take off slow samples so that they fall mid-bin, where jitter cannot
+    move them across [ns]."""
     angle = 2 * np.pi * ((time % length) / length)
     phase = float(np.angle(np.mean(np.exp(1j * angle)))) / (2 * np.pi) * length
     return round(phase - length / 2)

@@ -1,7 +1,9 @@
-"""Two wind artifacts of one wind made one clock: the sensor's log written anew on the reference's clock, in one commit.
+"""Two wind artifacts of one wind made one clock: the sensor's log written anew on the reference's
+clock, in one commit.
 
-The new artifact is a wind artifact like any other, whose parents are the reference and the sensor. Its record holds the
-sensor's samples with the reference's instants as log times and its own stamps as publish times. Values stay as the
+The new artifact is a wind artifact like any other, whose parents are the reference and the sensor.
+Its record holds the sensor's samples with the reference's instants as log times and its own stamps
+as publish times. Values stay as the
 sensor gave them: the gain is reported, not applied. The vendor's file stays attached to the parent.
 """
 
@@ -44,7 +46,9 @@ class WindPair:
             UsageError: artifacts of other kinds, or one artifact twice.
             InputError: one holds no samples.
         """
-        artifacts = [lake.artifact(identity, at=at, kinds=(Kind.WIND,)) for identity in (reference, sensor)]
+        artifacts = [
+            lake.artifact(identity, at=at, kinds=(Kind.WIND,)) for identity in (reference, sensor)
+        ]
         for artifact in artifacts:
             if artifact.kind is not Kind.WIND or artifact.object is None:
                 raise UsageError(
@@ -54,15 +58,26 @@ class WindPair:
                 )
         if artifacts[0].id == artifacts[1].id:
             raise UsageError(
-                "both names are of the same wind artifact", where=artifacts[0].id, fix="name two wind artifacts"
+                "both names are of the same wind artifact",
+                where=artifacts[0].id,
+                fix="name two wind artifacts",
             )
         series = []
         for artifact in artifacts:
             samples = Record.open(lake.record_place(str(artifact.object))).wind()
             if samples is None or not len(samples):
-                raise InputError("the wind artifact holds no samples", where=artifact.id, fix="ingest the log anew")
+                raise InputError(
+                    "the wind artifact holds no samples",
+                    where=artifact.id,
+                    fix="ingest the log anew",
+                )
             series.append(samples)
-        return cls(reference=artifacts[0], sensor=artifacts[1], reference_series=series[0], sensor_series=series[1])
+        return cls(
+            reference=artifacts[0],
+            sensor=artifacts[1],
+            reference_series=series[0],
+            sensor_series=series[1],
+        )
 
     @property
     def parents(self) -> dict[str, Artifact]:
@@ -75,7 +90,13 @@ class WindPair:
 
 
 def find_aligned(
-    lake: Lake, pair: WindPair, recipe: Mapping[str, Any], *, name: str | None, session: str | None, branch: str
+    lake: Lake,
+    pair: WindPair,
+    recipe: Mapping[str, Any],
+    *,
+    name: str | None,
+    session: str | None,
+    branch: str,
 ) -> Present:
     """Finds what the branch has of the artifact that these parents and options make.
 
@@ -83,7 +104,14 @@ def find_aligned(
         ConflictError: it is, under another name or session than the one asked for.
     """
     return find_made(
-        lake, Kind.WIND, pair.parents, recipe, noun="aligned log", name=name, session=session, branch=branch
+        lake,
+        Kind.WIND,
+        pair.parents,
+        recipe,
+        noun="aligned log",
+        name=name,
+        session=session,
+        branch=branch,
     )
 
 
@@ -110,7 +138,9 @@ def make_aligned(
     """
     clock, sensor_time = log_clock.model, pair.sensor_series.time
     metadata = {PROVENANCE: provenance(pair.parents, recipe, code=code)}
-    with lake.transaction(f"align {pair.sensor.name} with {pair.reference.name}", branch=branch) as transaction:
+    with lake.transaction(
+        f"align {pair.sensor.name} with {pair.reference.name}", branch=branch
+    ) as transaction:
         staged = transaction.staging(".mcap")
         with RecordWriter(staged, metadata=metadata) as record:
             record.wind(pair.sensor_series, clock=clock)
@@ -149,8 +179,8 @@ def make_aligned(
 
 
 def summary(log_clock: LogClock) -> dict[str, Any]:
-    """Returns the numbers for JSON: of the sensor's clock on the reference's, and of its gain; `drift_parts` is 0 where
-    the drift is a prior's."""
+    """Returns the numbers for JSON: of the sensor's clock on the reference's, and of its gain;
+    `drift_parts` is 0 where the drift is a prior's."""
     (segment,) = log_clock.model.segments
     half = NINETY * segment.sigma_offset
     gain = log_clock.gain

@@ -1,4 +1,5 @@
-"""What every question is answered by: quantities with their intervals, the same in terminal, Python and JSON."""
+"""What every question is answered by: quantities with their intervals, the same in terminal, Python
+and JSON."""
 
 from __future__ import annotations
 

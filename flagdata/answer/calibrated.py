@@ -1,4 +1,5 @@
-"""What `flagdata.calibrate` returns: the cloth of a flag as its posterior, or why no weight is given."""
+"""What `flagdata.calibrate` returns: the cloth of a flag as its posterior, or why no weight is
+given."""
 
 from __future__ import annotations
 
@@ -22,9 +23,10 @@ class Calibrated:
         level: of the intervals.
         quantities: "area_weight", "bending", "damping" as far as they are known.
         draws: name → (n,) draws of their joint posterior.
-        withheld: why no weight is given, where no simulated flag looks like a recording; None where one does.
-        stated: the area weight as `flagdata.measure(area_weight=…)` takes it; None where it is not determined, or only
-            bounded.
+        withheld: why no weight is given, where no simulated flag looks like a recording; None where
+            one does.
+        stated: the area weight as `flagdata.measure(area_weight=…)` takes it; None where it is not
+            determined, or only bounded.
         findings: what a reader has to know.
         document: everything, as `flagdata calibrate --json` writes it.
     """
@@ -58,5 +60,9 @@ class Calibrated:
         rows = {name.replace("_", " "): quantity.text for name, quantity in self.quantities.items()}
         return table(
             self.sentence,
-            rows | {f"{finding.severity.value} {finding.kind}": finding.what for finding in self.findings},
+            rows
+            | {
+                f"{finding.severity.value} {finding.kind}": finding.what
+                for finding in self.findings
+            },
         )

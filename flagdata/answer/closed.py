@@ -16,8 +16,8 @@ class Closed:
     """A verdict.
 
     Attributes:
-        conclusion: "no effect needed", "not decided", "effect", "one of", "partly explained", "none of the library" or
-            "cannot test".
+        conclusion: "no effect needed", "not decided", "effect", "one of", "partly explained", "none
+            of the library" or "cannot test".
         named: the effect, or the effects that fit equally well; empty for none.
         sentence: the verdict in one line.
         words: the verdict as `flagdata close-loop` prints it.
@@ -57,5 +57,6 @@ class Closed:
             for name, strength in self.strengths.items()
         }
         return html.table(
-            self.sentence, {"p of the base model": f"{self.p_value:.3g}", **effects, "verdict": self.words}
+            self.sentence,
+            {"p of the base model": f"{self.p_value:.3g}", **effects, "verdict": self.words},
         )

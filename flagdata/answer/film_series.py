@@ -21,9 +21,11 @@ class Wind:
     Attributes:
         name: of the log.
         time: (n,) since the first sample, ascending [s].
-        start: instant of the first sample, on the log's own clock, or of a recording on the common one [UTC ns].
+        start: instant of the first sample, on the log's own clock, or of a recording on the common
+            one [UTC ns].
         speed: (n,) of the air over ground [m/s]; NaN where it is missing.
-        direction: (n,) blowing from, clockwise from north [rad]; NaN where it is missing or was not logged.
+        direction: (n,) blowing from, clockwise from north [rad]; NaN where it is missing or was not
+            logged.
         channels: name → (n,) of everything that was logged, SI.
         sensor: the instrument.
         findings: what was noticed in the log.
@@ -43,13 +45,20 @@ class Wind:
 
     def _rows(self) -> dict[str, str]:
         finite = self.speed[np.isfinite(self.speed)]
-        course = f"{finite.mean():.2f} m/s, {finite.min():.2f} to {finite.max():.2f} m/s" if len(finite) else "none"
+        course = (
+            f"{finite.mean():.2f} m/s, {finite.min():.2f} to {finite.max():.2f} m/s"
+            if len(finite)
+            else "none"
+        )
         last = self.time[-1] if len(self) else 0.0
         return {
             "samples": f"{len(self)} in {last:.1f} s from {iso(self.start)}",
             "speed": course,
             "sensor": self.sensor.name,
-            **{f"{finding.severity.value} {finding.kind}": finding.what for finding in self.findings},
+            **{
+                f"{finding.severity.value} {finding.kind}": finding.what
+                for finding in self.findings
+            },
         }
 
     def __repr__(self) -> str:
@@ -69,7 +78,8 @@ class Motion:
         name: of the film.
         time: (n,) midway between the two frames compared, since the first frame [s].
         start: instant of the first frame [UTC ns]; None where nobody said.
-        energy: (n,) mean change of brightness above noise [gray levels/s]; NaN where frames are too far apart.
+        energy: (n,) mean change of brightness above noise [gray levels/s]; NaN where frames are too
+            far apart.
         findings: what was noticed about the picture: camera shake, flicker, no motion.
     """
 
@@ -84,11 +94,18 @@ class Motion:
 
     def _rows(self) -> dict[str, str]:
         finite = self.energy[np.isfinite(self.energy)]
-        course = f"{finite.mean():.2f}, {finite.min():.2f} to {finite.max():.2f}" if len(finite) else "none"
+        course = (
+            f"{finite.mean():.2f}, {finite.min():.2f} to {finite.max():.2f}"
+            if len(finite)
+            else "none"
+        )
         return {
             "pairs of frames": f"{len(self)}, to {self.time[-1] if len(self) else 0.0:.2f} s",
             "energy [gray levels/s]": course,
-            **{f"{finding.severity.value} {finding.kind}": finding.what for finding in self.findings},
+            **{
+                f"{finding.severity.value} {finding.kind}": finding.what
+                for finding in self.findings
+            },
         }
 
     def __repr__(self) -> str:

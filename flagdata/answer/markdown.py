@@ -1,14 +1,18 @@
-"""Names that come from outside, as text in Markdown: no HTML, no mark-up, no link, no second column. Tables."""
+"""Names that come from outside, as text in Markdown: no HTML, no mark-up, no link, no second
+column. Tables."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-_ESCAPED = str.maketrans({sign: f"&#{ord(sign)};" for sign in "|`*\\"} | {"&": "&amp;", "<": "&lt;", ">": "&gt;"})
+_ESCAPED = str.maketrans(
+    {sign: f"&#{ord(sign)};" for sign in "|`*\\"} | {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
+)
 
 
 def plain(text: str) -> str:
-    """Puts a text on one line, with whatever Markdown would read as more than text written as an HTML entity.
+    """Puts a text on one line, with whatever Markdown would read as more than text written as an
+    HTML entity.
 
     Entities, unlike backslashes, are text in every dialect, inside a table and outside.
     """

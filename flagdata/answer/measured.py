@@ -1,4 +1,5 @@
-"""What `flagdata.measure` returns: the posterior of a film as arrays, or why the film was refused."""
+"""What `flagdata.measure` returns: the posterior of a film as arrays, or why the film was
+refused."""
 
 from __future__ import annotations
 
@@ -39,11 +40,12 @@ class Answer:
 
     Attributes:
         sentence: in one line, as `flagdata measure` prints it.
-        quantities: name → quantity: "wind_speed", "area_weight" (area weight) and what else the network estimates.
+        quantities: name → quantity: "wind_speed", "area_weight" (area weight) and what else the
+            network estimates.
         draws: name → (n,) draws of the joint posterior, in the same order for all names.
         windows: each by itself.
-        gusts: intensity of the gusts, standard deviation over mean wind [1]; None where the windows are not taken as
-            one series, as of a film of one window.
+        gusts: intensity of the gusts, standard deviation over mean wind [1]; None where the windows
+            are not taken as one series, as of a film of one window.
     """
 
     sentence: str
@@ -63,13 +65,15 @@ class Measured:
         network: that measured it.
         refused: whether the gate refused it.
         verdict: of the gate, in one sentence.
-        reasons: why the film is refused, the weightiest first; `value` is the figure of a counted fault, or the p of a
-            window that is unlike the training clips.
+        reasons: why the film is refused, the weightiest first; `value` is the figure of a counted
+            fault, or the p of a window that is unlike the training clips.
         findings: on film, size, weight and windows.
-        figures: of how the film was made fit: camera, flags, crop; as in `--json` under "conditioning". None of a film
-            that is too short for that.
-        given: the answer; None where it is not shown: of a refused film, unless it was asked for `anyway`.
-        elsewhere: how the wind differs from one that was stated as `wind`; None where none was, or no answer is shown.
+        figures: of how the film was made fit: camera, flags, crop; as in `--json` under
+            "conditioning". None of a film that is too short for that.
+        given: the answer; None where it is not shown: of a refused film, unless it was asked for
+            `anyway`.
+        elsewhere: how the wind differs from one that was stated as `wind`; None where none was, or
+            no answer is shown.
     """
 
     film: str
@@ -89,7 +93,8 @@ class Measured:
         """What the film says.
 
         Raises:
-            RefusedError: the film was refused, and was not measured `anyway`; or there is nothing to measure in it.
+            RefusedError: the film was refused, and was not measured `anyway`; or there is nothing
+                to measure in it.
         """
         if self.given is None:
             raise RefusedError(
@@ -126,7 +131,8 @@ class Measured:
 
     @property
     def gusts(self) -> Quantity | None:
-        """How strong the gusts are; None of a film whose windows are not taken as one series. Raises as `answer`."""
+        """How strong the gusts are; None of a film whose windows are not taken as one series.
+        Raises as `answer`."""
         return self.answer.gusts
 
     def __repr__(self) -> str:
@@ -139,9 +145,17 @@ class Measured:
         rows = (
             {}
             if self.given is None
-            else {name.replace("_", " "): quantity.text for name, quantity in self.given.quantities.items()}
+            else {
+                name.replace("_", " "): quantity.text
+                for name, quantity in self.given.quantities.items()
+            }
         )
         rows |= {"film": f"{self.duration:.2f} s at {self.rate:.4g} Hz", "gate": self.verdict}
         return table(
-            repr(self), rows | {f"{finding.severity.value} {finding.kind}": finding.what for finding in self.findings}
+            repr(self),
+            rows
+            | {
+                f"{finding.severity.value} {finding.kind}": finding.what
+                for finding in self.findings
+            },
         )

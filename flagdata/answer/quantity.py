@@ -57,7 +57,8 @@ class Span:
         return f"{self.level * 100:.3g} %"
 
     def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values: the interval, whose end is null where nothing bounds it, its level, and its bound."""
+        """Returns JSON values: the interval, whose end is null where nothing bounds it, its level,
+        and its bound."""
         return {
             "interval": self.ends(),
             "level": self.level,
@@ -79,7 +80,8 @@ class Quantity:
         value: the posterior's mean or median; None where only a bound is known, or nothing.
         sigma: its standard deviation, likewise.
         span: its interval, or the bound.
-        assumed: what was assumed of it, or given, before the recording; None where nothing had to be.
+        assumed: what was assumed of it, or given, before the recording; None where nothing had to
+            be.
         constrained: whether the recording adds anything to that.
         given: whether it was given.
         information: what the recording adds [nat]; None where that is not counted.
@@ -122,17 +124,23 @@ class Quantity:
 
     @property
     def text(self) -> str:
-        """Value and interval, or the bound with its level; what was given or assumed where the recording adds nothing
-        to it.
+        """Value and interval, or the bound with its level; what was given or assumed where the
+        recording adds nothing to it.
         """
         if not self.constrained and self.assumed is not None:
             low, high = (f"{end:.4g}" for end in self.assumed)
             stated = low if low == high else f"{low} to {high}"
-            return f"{stated}{self.suffix}, as given" if self.given else self._open(f"{stated}{self.suffix}")
+            return (
+                f"{stated}{self.suffix}, as given"
+                if self.given
+                else self._open(f"{stated}{self.suffix}")
+            )
         if self.is_bound:
             return f"{self.span.word(lambda end: f'{end:.4g}', self.suffix)}, {self.span.percent}"
         if self.value is None:
-            return self._open("nothing" if self.assumed is None else "{:.4g} to {:.4g}".format(*self.assumed))
+            return self._open(
+                "nothing" if self.assumed is None else "{:.4g} to {:.4g}".format(*self.assumed)
+            )
         return f"{self.value:.4g} [{self.span.low:.4g}, {self.span.high:.4g}]{self.suffix}"
 
     @staticmethod

@@ -17,12 +17,14 @@ from flagdata.timebase import NANOSECONDS
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Simulated:
-    """The members of a recipe that were simulated to the end, on one mesh but where the recipe remeshes them.
+    """The members of a recipe that were simulated to the end, on one mesh but where the recipe
+    remeshes them.
 
     Attributes:
         name: of the recipe.
         members: each as a mesh sequence, which `flagdata.render` films.
-        parameters: name → (member,) what each drew or was given, SI: "wind_speed", "area_weight", "damping", …
+        parameters: name → (member,) what each drew or was given, SI: "wind_speed", "area_weight",
+            "damping", …
         wind: (member, frame, 3) where the undisturbed air goes to [m/s], at each frame.
         failed: why a member is not there: its number → the reason.
     """
@@ -83,13 +85,23 @@ class Simulated:
         first = self.members[0]
         frames, vertices = len(first), len(first.frame(0).rest)
         wind = self.parameters["wind_speed"]
-        blown = f"{wind[0]:g} m/s" if len(self) == 1 else f"{wind.min():.2f} to {wind.max():.2f} m/s"
-        rows = {"cloths": str(len(self)), "wind": blown, "frames": f"{frames} in {self.time[-1]:.2f} s"}
+        blown = (
+            f"{wind[0]:g} m/s" if len(self) == 1 else f"{wind.min():.2f} to {wind.max():.2f} m/s"
+        )
+        rows = {
+            "cloths": str(len(self)),
+            "wind": blown,
+            "frames": f"{frames} in {self.time[-1]:.2f} s",
+        }
         failed = {f"member {index}": f"failed: {why}" for index, why in self.failed.items()}
         return {**rows, "vertices": str(vertices), **failed}
 
     def __repr__(self) -> str:
-        return f"Simulated({self.name}: " + ", ".join(f"{name} {value}" for name, value in self._rows().items()) + ")"
+        return (
+            f"Simulated({self.name}: "
+            + ", ".join(f"{name} {value}" for name, value in self._rows().items())
+            + ")"
+        )
 
     def _repr_html_(self) -> str:
         return table(f"Simulated {self.name}", self._rows())

@@ -1,1 +1,2 @@
-"""The calls of `flagdata`, each a door to what the command of its name does; `flagdata` exports them lazily."""
+"""The calls of `flagdata`, each a door to what the command of its name does; `flagdata` exports
+them lazily."""

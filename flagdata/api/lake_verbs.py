@@ -1,4 +1,5 @@
-"""What is done with a lake as a whole, in Python: its catalog asked, its versions tagged, selections exported.
+"""What is done with a lake as a whole, in Python: its catalog asked, its versions tagged,
+selections exported.
 
 The options of each call are stated in a class, from which the command of the same name inherits.
 """
@@ -31,18 +32,25 @@ class Querying(AtVersion, OnLake):
 
     lake: AnyLake = option(LAKE, default=".", kw_only=False, envvar="FLAGDATA_LAKE", metavar="DIR")
     where: str | Mapping[str, Any] | None = option(
-        "SQL condition, e.g. \"kind = 'clip' and wind between 3 and 6\"; in Python also values that columns must have.",
+        "SQL condition, e.g. \"kind = 'clip' and wind between 3 and 6\"; in Python also values "
+        "that columns must have.",
         default=None,
         kw_only=False,
         metavar="EXPR",
     )
     sql: str | None = option(
-        "One whole SELECT over the table catalog, instead of --where.", default=None, metavar="SELECT"
+        "One whole SELECT over the table catalog, instead of --where.",
+        default=None,
+        metavar="SELECT",
     )
-    columns: Sequence[str] | None = option("Columns wanted, in order.", default=None, type=LISTED, metavar="A,B")
+    columns: Sequence[str] | None = option(
+        "Columns wanted, in order.", default=None, type=LISTED, metavar="A,B"
+    )
     order: str | None = option('SQL order, e.g. "wind desc, start".', default=None, metavar="TERMS")
     limit: int | None = option(
-        "Rows at most; 20 in the table for people, else all.", default=None, type=click.IntRange(min=0)
+        "Rows at most; 20 in the table for people, else all.",
+        default=None,
+        type=click.IntRange(min=0),
     )
 
 
@@ -65,7 +73,12 @@ def query(chosen: Querying) -> Rows:
     """
     from flagdata.dataset.lake_source import open_source
 
-    own = {"sql": chosen.sql, "columns": chosen.columns, "order": chosen.order, "limit": chosen.limit}
+    own = {
+        "sql": chosen.sql,
+        "columns": chosen.columns,
+        "order": chosen.order,
+        "limit": chosen.limit,
+    }
     return open_source(chosen.lake).query(chosen.where, at=chosen.at, **own)
 
 
@@ -73,10 +86,15 @@ def query(chosen: Querying) -> Rows:
 class Naming(AtVersion, OnLake):
     """Which tag or branch is made, listed or deleted."""
 
-    name: str | None = argument("Of the tag or branch; without one all are listed.", "[NAME]", default=None)
-    delete: bool = option("Delete NAME; the log notes what it showed.", "-d", "--delete", default=False)
+    name: str | None = argument(
+        "Of the tag or branch; without one all are listed.", "[NAME]", default=None
+    )
+    delete: bool = option(
+        "Delete NAME; the log notes what it showed.", "-d", "--delete", default=False
+    )
     discard: bool = option(
-        "--delete: even if no other tag or branch shows its artifacts, which gc then deletes.", default=False
+        "--delete: even if no other tag or branch shows its artifacts, which gc then deletes.",
+        default=False,
     )
     message: str | None = option("--delete: why.", "-m", "--message", default=None)
 
@@ -86,8 +104,16 @@ class Naming(AtVersion, OnLake):
             raise UsageError("--delete needs a NAME", fix="give the NAME of what is to be deleted")
         for key in ("at", "discard", "message"):
             if getattr(self, key) and key not in allowed:
-                what = "without a NAME" if self.name is None else "with --delete" if self.delete else "without --delete"
-                raise UsageError(f"--{key} cannot be given {what}", fix="leave it out, or see --help")
+                what = (
+                    "without a NAME"
+                    if self.name is None
+                    else "with --delete"
+                    if self.delete
+                    else "without --delete"
+                )
+                raise UsageError(
+                    f"--{key} cannot be given {what}", fix="leave it out, or see --help"
+                )
 
 
 @make_call(Naming)
@@ -117,7 +143,8 @@ def tag(chosen: Naming) -> tuple[Ref, ...]:
 
 @make_call(Naming)
 def branch(chosen: Naming) -> tuple[Ref, ...]:
-    """Begins a line of work in a lake, as `flagdata branch` does; without a name, lists the branches.
+    """Begins a line of work in a lake, as `flagdata branch` does; without a name, lists the
+    branches.
 
     ```python
     (thursday,) = flagdata.branch("thursday", lake="field.lake", at="v1")
@@ -137,7 +164,11 @@ def branch(chosen: Naming) -> tuple[Ref, ...]:
 
 
 def _names_of_kind(
-    chosen: Naming, listed: Callable[[], Mapping[str, Ref]], *, put: Callable[..., Ref], delete: Callable[..., object]
+    chosen: Naming,
+    listed: Callable[[], Mapping[str, Ref]],
+    *,
+    put: Callable[..., Ref],
+    delete: Callable[..., object],
 ) -> tuple[Ref, ...]:
     """Lists the names of a kind, or puts or deletes one."""
     if chosen.name is None:
@@ -153,30 +184,48 @@ class Exporting(AtVersion, OnLake):
     """What of a lake is exported, in which form."""
 
     format: str = argument(
-        "webdataset, parquet, lerobot, zarr, mp4, mcap, csv for every sample of an anemometer or, for mesh sequences, "
+        "webdataset, parquet, lerobot, zarr, mp4, mcap, csv for every sample of an anemometer or, "
+        "for mesh sequences, "
         "obj.",
         "FORMAT",
     )
     to: Path | str = option("New folder to write.", type=LocalPath(), metavar="PATH")
-    where: str | None = option("SQL condition as in flagdata query; all rows by default.", default=None, metavar="EXPR")
+    where: str | None = option(
+        "SQL condition as in flagdata query; all rows by default.", default=None, metavar="EXPR"
+    )
     split: str | None = option(
-        "Only this side: train, validation or test, as data sets state it; of other clips by a hash without leaks.",
+        "Only this side: train, validation or test, as data sets state it; of other clips by a "
+        "hash without leaks.",
         default=None,
         metavar="SIDE",
     )
-    salt: str = option("Another text gives another split by the hash.", default="", metavar="TEXT", show_default=False)
+    salt: str = option(
+        "Another text gives another split by the hash.",
+        default="",
+        metavar="TEXT",
+        show_default=False,
+    )
     frames: str | None = option(
-        "webdataset: jpg (default) or npy; parquet: none (default) or jpg; lerobot: av1 (default) or png.",
+        "webdataset: jpg (default) or npy; parquet: none (default) or jpg; lerobot: av1 (default) "
+        "or png.",
         default=None,
         metavar="FORM",
     )
-    shard_bytes: int | None = option("webdataset, parquet: size of a file at most.", default=None, type=POSITIVE)
-    shuffle: int | None = option("webdataset: order the samples at random.", default=None, metavar="SEED")
-    crf: int | None = option("mp4: constant rate factor, 0 (lossless) to 51; 18 by default.", default=None)
+    shard_bytes: int | None = option(
+        "webdataset, parquet: size of a file at most.", default=None, type=POSITIVE
+    )
+    shuffle: int | None = option(
+        "webdataset: order the samples at random.", default=None, metavar="SEED"
+    )
+    crf: int | None = option(
+        "mp4: constant rate factor, 0 (lossless) to 51; 18 by default.", default=None
+    )
 
     def __post_init__(self) -> None:
         if self.salt and self.split is None:
-            raise UsageError("--salt needs --split", fix="name the side by --split, or leave out --salt")
+            raise UsageError(
+                "--salt needs --split", fix="name the side by --split, or leave out --salt"
+            )
 
 
 @make_call(Exporting)

@@ -51,7 +51,8 @@ def pairs(
     seed: int = 0,
     cache: DecodedCache | None = None,
 ) -> Pairs:
-    """Clips of a lake with their ground truth, for training: typed, split without leaks, the same at the same tag.
+    """Clips of a lake with their ground truth, for training: typed, split without leaks, the same
+    at the same tag.
 
     ```python
     for batch in flagdata.pairs("field.lake", at="v1", split="train").loader(32, workers=2):
@@ -65,10 +66,18 @@ def pairs(
     Raises:
         MissingExtraError: torch is not installed.
         NotFoundError: no such lake or version, or no clip matches.
-        RefusedError: the split, see `Source.pairs`; the side is empty, or no pair is within the tolerance.
+        RefusedError: the split, see `Source.pairs`; the side is empty, or no pair is within the
+            tolerance.
         UnknownNameError: no such column or side.
         UsageError: a filter that is not SQL, or a window that is no length of time.
     """
     return open_source(lake).pairs(
-        where, at=at, split=split, split_by=split_by, window=window, tolerance=tolerance, seed=seed, cache=cache
+        where,
+        at=at,
+        split=split,
+        split_by=split_by,
+        window=window,
+        tolerance=tolerance,
+        seed=seed,
+        cache=cache,
     )

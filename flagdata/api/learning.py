@@ -1,6 +1,7 @@
 """Data sets built and networks trained on them, in Python.
 
-The options of each call are stated in a class, from which the command of the same name is made, too. The packages
+The options of each call are stated in a class, from which the command of the same name is made,
+too. The packages
 behind the calls are named by strings: flagdata imports none of those that rest on it.
 """
 
@@ -34,7 +35,10 @@ class Building(Computed, OnBranch, OnLake):
     recipe: Path | str = argument("A TOML file, or the name of a recipe of the catalog.", "RECIPE")
     plan: bool = option("Print counts, bytes and hours, and make nothing.", default=False)
     sequences: int | None = option(
-        "Simulated sequences of all sides together, instead of the recipe's.", default=None, type=POSITIVE, metavar="N"
+        "Simulated sequences of all sides together, instead of the recipe's.",
+        default=None,
+        type=POSITIVE,
+        metavar="N",
     )
     films: int | None = option(
         "Films of all sides together; by default as many a sequence as the recipe has.",
@@ -43,12 +47,18 @@ class Building(Computed, OnBranch, OnLake):
         metavar="N",
     )
     shard: str | None = option(
-        "Make one part of N, for builds on several machines, each on a branch of its own.", default=None, metavar="I/N"
+        "Make one part of N, for builds on several machines, each on a branch of its own.",
+        default=None,
+        metavar="I/N",
     )
     scheduler: str | None = option(
-        "A Dask scheduler, tcp://HOST:PORT; without it, this machine.", default=None, metavar="ADDRESS"
+        "A Dask scheduler, tcp://HOST:PORT; without it, this machine.",
+        default=None,
+        metavar="ADDRESS",
     )
-    renderer: str | None = option("raster, cycles or workbench, instead of the recipe's.", default=None, metavar="NAME")
+    renderer: str | None = option(
+        "raster, cycles or workbench, instead of the recipe's.", default=None, metavar="NAME"
+    )
     card: Path | None = option(
         "Where the card goes; by default cards/.", default=None, type=LocalPath(), metavar="FILE"
     )
@@ -56,7 +66,8 @@ class Building(Computed, OnBranch, OnLake):
 
 @make_call(Building)
 def build(chosen: Building) -> Mapping[str, Any]:
-    """Builds a data set in a lake, as `flagdata build` does: its sequences, films, ground truth and card.
+    """Builds a data set in a lake, as `flagdata build` does: its sequences, films, ground truth and
+    card.
 
     ```python
     planned = flagdata.build("flagsim-small", lake="lake", plan=True)
@@ -98,10 +109,15 @@ class Training(OfInputs, Computed, OnBranch):
 
     recipe: Path | str = argument("A TOML file, or the name of a recipe of the catalog.", "RECIPE")
     seed: int | None = option(
-        "Seed of weights, crops and orders, instead of the recipe's.", default=None, type=click.IntRange(min=0)
+        "Seed of weights, crops and orders, instead of the recipe's.",
+        default=None,
+        type=click.IntRange(min=0),
     )
     sequences: int | None = option(
-        "Simulations to learn from, instead of all.", default=None, type=click.IntRange(min=2), metavar="N"
+        "Simulations to learn from, instead of all.",
+        default=None,
+        type=click.IntRange(min=2),
+        metavar="N",
     )
     run: Path | None = option(
         "Where the checkpoint is kept while it trains; by default in the cache.",
@@ -113,7 +129,8 @@ class Training(OfInputs, Computed, OnBranch):
 
 @make_call(Training)
 def train(chosen: Training) -> Mapping[str, Any]:
-    """Trains a network on the clips of a lake and commits it as an artifact, as `flagdata train` does.
+    """Trains a network on the clips of a lake and commits it as an artifact, as `flagdata train`
+    does.
 
     ```python
     trained = flagdata.train("flow", lake="lake", at="v1")
@@ -141,12 +158,20 @@ class Evaluating(OfInputs, Shared):
     models: Sequence[str] = argument(
         "Networks of the lake by name or id, shipped, or shipped/NAME.", "MODEL...", nargs=-1
     )
-    dataset: str = option("Data set whose clips are judged.", default="flagsim-wide", section=JUDGED)
+    dataset: str = option(
+        "Data set whose clips are judged.", default="flagsim-wide", section=JUDGED
+    )
     side: str = option(
-        "Side of the data set.", default="test", section=JUDGED, type=click.Choice(("train", "validation", "test"))
+        "Side of the data set.",
+        default="test",
+        section=JUDGED,
+        type=click.Choice(("train", "validation", "test")),
     )
     reference: str | None = option(
-        "Model that the others are compared with; by default the best.", default=None, section=JUDGED, metavar="LABEL"
+        "Model that the others are compared with; by default the best.",
+        default=None,
+        section=JUDGED,
+        metavar="LABEL",
     )
     area_weight: float | tuple[float, float] | str | Stated | None = option(
         "Area weight of all clips, if it is known [kg/m²]: 0.284, 0.284±0.01 or 0.10:0.17.",
@@ -155,9 +180,12 @@ class Evaluating(OfInputs, Shared):
         type=STATED,
         metavar="VALUE",
     )
-    handmade: bool = option("Add ridge and gradient boosting on hand-made features.", default=False, section=MORE)
+    handmade: bool = option(
+        "Add ridge and gradient boosting on hand-made features.", default=False, section=MORE
+    )
     frames: tuple[int, ...] = option(
-        "Also report triplet accuracy for clips of N frames (networks on maps only); may be repeated.",
+        "Also report triplet accuracy for clips of N frames (networks on maps only); may be "
+        "repeated.",
         default=(),
         section=MORE,
         type=click.IntRange(min=4),
@@ -168,7 +196,9 @@ class Evaluating(OfInputs, Shared):
         default=False,
         section=MORE,
     )
-    tsne: str | None = option("Model whose embedding is drawn by t-SNE.", default=None, section=MORE, metavar="LABEL")
+    tsne: str | None = option(
+        "Model whose embedding is drawn by t-SNE.", default=None, section=MORE, metavar="LABEL"
+    )
     out: Path | str = option(
         "Where the page, the table in Markdown and the JSON go.",
         default=Path("evaluation"),
@@ -176,12 +206,15 @@ class Evaluating(OfInputs, Shared):
         metavar="DIR",
     )
     name: str = option("Name of the files, without their endings.", default="evaluation")
-    seed: int = option("Seed of the draws and of the bootstrap.", default=0, type=click.IntRange(min=0))
+    seed: int = option(
+        "Seed of the draws and of the bootstrap.", default=0, type=click.IntRange(min=0)
+    )
 
 
 @make_call(Evaluating)
 def evaluate(chosen: Evaluating) -> Mapping[str, Any]:
-    """Judges trained networks on one side of a data set and writes the table, as `flagdata evaluate` does.
+    """Judges trained networks on one side of a data set and writes the table, as `flagdata
+    evaluate` does.
 
     ```python
     judged = flagdata.evaluate(["flow", "sdn"], lake="lake", at="v1", out="evaluation")

@@ -1,6 +1,8 @@
-"""The physics from recordings, in Python: a film measured or observed, a cloth weighed, its model judged.
+"""The physics from recordings, in Python: a film measured or observed, a cloth weighed, its model
+judged.
 
-The options of each call are stated in a class, from which the command of the same name inherits. The packages behind
+The options of each call are stated in a class, from which the command of the same name inherits.
+The packages behind
 the calls are named by strings: flagdata imports none of those that rest on it.
 """
 
@@ -52,7 +54,8 @@ class Measuring(OfFilm, Drawn, BesideLake):
     """How a film is measured."""
 
     source: Path | str | Frames = argument(
-        "A video file, a folder of images, `example:NAME`, frames as `frames` and `render` return them, or a "
+        "A video file, a folder of images, `example:NAME`, frames as `frames` and `render` return "
+        "them, or a "
         "recording, clip or camera of the lake by its name or id.",
         "SOURCE",
     )
@@ -70,14 +73,16 @@ class Measuring(OfFilm, Drawn, BesideLake):
         metavar="VALUE",
     )
     material: str | None = option(
-        "Cloth whose area weight is taken, a material of the catalog or a fabric that films of the lake declare; "
+        "Cloth whose area weight is taken, a material of the catalog or a fabric that films of the "
+        "lake declare; "
         "nothing else of it is used.",
         default=None,
         section=OF_FLAG,
         metavar="NAME",
     )
     wind: float | tuple[float, float] | str | Stated | None = option(
-        "A wind from elsewhere [m/s], of a station or an app, as in 3±1: the answer is compared with it, and not "
+        "A wind from elsewhere [m/s], of a station or an app, as in 3±1: the answer is compared "
+        "with it, and not "
         "changed by it.",
         default=None,
         section=HOW,
@@ -85,7 +90,8 @@ class Measuring(OfFilm, Drawn, BesideLake):
         metavar="M/S",
     )
     windows: float | None = option(
-        "A wind series, one window every so often [s], as in 1.2s; by default windows follow each other.",
+        "A wind series, one window every so often [s], as in 1.2s; by default windows follow each "
+        "other.",
         default=None,
         section=HOW,
         was=("--window", "--step"),
@@ -93,7 +99,8 @@ class Measuring(OfFilm, Drawn, BesideLake):
         metavar="TIME",
     )
     model: str | None = option(
-        "Network that measures, or reading model of flagdata calibrate; by default flow-outdoor, of flags.",
+        "Network that measures, or reading model of flagdata calibrate; by default flow-outdoor, "
+        "of flags.",
         default=None,
         section=HOW,
         metavar="NAME|FOLDER|ID",
@@ -102,7 +109,8 @@ class Measuring(OfFilm, Drawn, BesideLake):
         "Share of familiar films that the gate may refuse.", default=0.05, section=HOW, type=SHARE
     )
     anyway: bool = option(
-        "Show, marked, what the model says of a film that the gate refuses, if anything moves in it.",
+        "Show, marked, what the model says of a film that the gate refuses, if anything moves in "
+        "it.",
         default=False,
         section=HOW,
     )
@@ -110,22 +118,23 @@ class Measuring(OfFilm, Drawn, BesideLake):
 
 @make_call(Measuring)
 def measure(chosen: Measuring) -> Measured:
-    """Wind and area weight of a film of a flag, as `flagdata measure` gives them; nothing is written.
+    """Wind and area weight of a film of a flag, as `flagdata measure` gives them; nothing is
+    written.
 
     ```python
     found = flagdata.measure("flag.mp4", flag_size=(1.5, 1.0), area_weight="0.19±0.01")
     found.wind.value, found.wind.interval  # m/s
     ```
 
-    A film unlike those the network was trained on is refused: it is returned with `refused` and the reasons, and asking
-    it for values raises `RefusedError`.
+    A film unlike those the network was trained on is refused: it is returned with `refused` and the
+    reasons, and asking it for values raises `RefusedError`.
 
     Raises:
         MissingExtraError: torch is not installed.
         UsageError: options that contradict each other, or values that no flag has.
         NotFoundError: no such film, lake or network.
-        RefusedError: a film that is too slow, or whose frames repeat too often, so that no window of it can be looked
-            at and there is nothing to return.
+        RefusedError: a film that is too slow, or whose frames repeat too often, so that no window
+            of it can be looked at and there is nothing to return.
         InputError: a file that is no film, or a film that is too short.
     """
     return call("measure.commands.measure_film:measure_one", chosen)
@@ -136,27 +145,31 @@ class Observing(OfFilm, BesideLake):
     """What is observed of a film."""
 
     source: Path | str = argument(
-        "A video file, a folder of images, `example:NAME`, or a recording, clip or camera of the lake by its name or "
+        "A video file, a folder of images, `example:NAME`, or a recording, clip or camera of the "
+        "lake by its name or "
         "id.",
         "SOURCE",
     )
     flag_size: tuple[float, float] | str = option(
         f"{LENGTHS}; the height gives the scale.", section=FILM, metavar="LxH"
     )
-    window: float = option("Length of a window [s].", default=2.5, section=FILM, type=DURATION, metavar="TIME")
+    window: float = option(
+        "Length of a window [s].", default=2.5, section=FILM, type=DURATION, metavar="TIME"
+    )
 
 
 @make_call(Observing)
 def observe(chosen: Observing) -> Rows:
-    """Droop, extension, speeds and frequencies of a filmed flag, window by window, as `flagdata observe` reads them.
+    """Droop, extension, speeds and frequencies of a filmed flag, window by window, as `flagdata
+    observe` reads them.
 
     ```python
     seen = flagdata.observe("flag.mp4", flag_size=(1.5, 1.0))
     seen["time"], seen["droop"]  # (n,) s, (n,) rad, NaN where a window does not show it
     ```
 
-    Nothing is written. `docs/method/films.md` defines each observable; what it is off by is in the column NAME-sigma,
-    why a window shows none in NAME-reason.
+    Nothing is written. `docs/method/films.md` defines each observable; what it is off by is in the
+    column NAME-sigma, why a window shows none in NAME-reason.
 
     Raises:
         MissingExtraError: torch is not installed.
@@ -172,7 +185,8 @@ class OfFlag(OfCloth, FlagAndCamera):
     """What is stated of a filmed flag and of the log beside it."""
 
     material: str | None = option(
-        "What the flag is made of, as in woven-polyester, knit or camel-ponte-roma; by default any fabric.",
+        "What the flag is made of, as in woven-polyester, knit or camel-ponte-roma; by default any "
+        "fabric.",
         default=None,
         section=FLAG,
         metavar="NAME",
@@ -184,17 +198,23 @@ class OfFlag(OfCloth, FlagAndCamera):
         metavar="ARTIFACT",
     )
     clock_offset: float | tuple[float, float] | str | Stated | None = option(
-        "Seconds added to the tables' clock to reach the log's, as in 0.3±0.1; by default estimated.",
+        "Seconds added to the tables' clock to reach the log's, as in 0.3±0.1; by default "
+        "estimated.",
         default=None,
         section=BESIDE,
         type=STATED,
         metavar="S±SIGMA",
     )
     end: float | None = option(
-        "Where to end [s]; two minutes are used at most.", default=None, section=FILM, type=DURATION, metavar="TIME"
+        "Where to end [s]; two minutes are used at most.",
+        default=None,
+        section=FILM,
+        type=DURATION,
+        metavar="TIME",
     )
     cache: Path | str | None = option(
-        "Where simulations are kept, so that an interrupted run goes on; by default the user's cache folder.",
+        "Where simulations are kept, so that an interrupted run goes on; by default the user's "
+        "cache folder.",
         default=None,
         section=HOW,
         type=LocalPath(),
@@ -206,10 +226,15 @@ class OfFlag(OfCloth, FlagAndCamera):
 class Calibrating(OfFlag, Drawn, BesideLake):
     """How the cloth of a flag is weighed."""
 
-    recordings: Mapping[str, ArrayLike] | Path | str | Sequence[Mapping[str, ArrayLike] | Path | str] = argument(
-        "One or several of one flag, each a table of observables as arrays of one length, in the units that "
-        "`docs/weighing.md` lists (`time` [s], `wind` [m/s], `droop` [rad], …); the path of such a table; or a "
-        "recording of the lake by its name or id. Or a folder of drapes (OBJ), or two, one for each face.",
+    recordings: (
+        Mapping[str, ArrayLike] | Path | str | Sequence[Mapping[str, ArrayLike] | Path | str]
+    ) = argument(
+        "One or several of one flag, each a table of observables as arrays of one length, in the "
+        "units that "
+        "`docs/weighing.md` lists (`time` [s], `wind` [m/s], `droop` [rad], …); the path of such a "
+        "table; or a "
+        "recording of the lake by its name or id. Or a folder of drapes (OBJ), or two, one for "
+        "each face.",
         "RECORDING...",
     )
     flag_size: tuple[float, float] | str | None = option(
@@ -225,12 +250,15 @@ class Calibrating(OfFlag, Drawn, BesideLake):
     simulations: int = option(
         "Simulated flags for each recording.", default=128, section=HOW, type=click.IntRange(min=64)
     )
-    workers: int = option("Number of processes that simulate.", default=1, section=HOW, type=POSITIVE)
+    workers: int = option(
+        "Number of processes that simulate.", default=1, section=HOW, type=POSITIVE
+    )
 
 
 @make_call(Calibrating)
 def calibrate(chosen: Calibrating) -> Calibrated:
-    """The cloth of a flag from its motion and the wind beside it, as `flagdata calibrate` weighs it.
+    """The cloth of a flag from its motion and the wind beside it, as `flagdata calibrate` weighs
+    it.
 
     ```python
     table = {"time": time, "wind": wind, "droop": droop, "extension": extension, "frequency": frequency}
@@ -238,12 +266,13 @@ def calibrate(chosen: Calibrating) -> Calibrated:
     found.quantities["area_weight"].interval  # kg/m²
     ```
 
-    It simulates flags for each recording, which takes minutes; they are kept for the next call. Of folders of drapes,
-    with `area_weight=`, it finds the bending (see `docs/cases/drapes.md`).
+    It simulates flags for each recording, which takes minutes; they are kept for the next call. Of
+    folders of drapes, with `area_weight=`, it finds the bending (see `docs/cases/drapes.md`).
 
     Raises:
         MissingExtraError: torch is not installed.
-        InputError: a table that cannot be used, or a log that does not cover it; scans that are no drapes.
+        InputError: a table that cannot be used, or a log that does not cover it; scans that are no
+            drapes.
         NotFoundError: no such recording or lake.
         RefusedError: no flag is found in a film; no simulated cloth drapes as scans do.
         UnknownNameError: a material like which no cloth was measured.
@@ -259,21 +288,26 @@ class Closing:
     """How the model of a tracked cloth is judged."""
 
     recordings: ArrayLike | MeshSequence | Sequence[ArrayLike | MeshSequence] = argument(
-        "Of one cloth, each positions of its markers (frame, marker, 3) [m], z up, NaN where a marker was not tracked; "
-        "or a mesh sequence, which knows its rest coordinates and rate. One array of four axes is several.",
+        "Of one cloth, each positions of its markers (frame, marker, 3) [m], z up, NaN where a "
+        "marker was not tracked; "
+        "or a mesh sequence, which knows its rest coordinates and rate. One array of four axes is "
+        "several.",
         "SOURCE...",
     )
     wind: float | tuple[float, float, float] | tuple[ArrayLike, ArrayLike] | Sequence[Any] = option(
-        "One for all, or a list with one for each: a speed along +x [m/s], a velocity (x, y, z) [m/s], or a pair of "
+        "One for all, or a list with one for each: a speed along +x [m/s], a velocity (x, y, z) "
+        "[m/s], or a pair of "
         "times (n,) [s] since the first frame and velocities (n, 3) [m/s].",
     )
     rest: ArrayLike | None = option(
-        "Places of the markers on the flat cloth (marker, 2) [m], u from the hoist, v upwards.", default=None
+        "Places of the markers on the flat cloth (marker, 2) [m], u from the hoist, v upwards.",
+        default=None,
     )
     rate: float | None = option("Frames a second [Hz].", default=None)
     material: str = option("Nominal material, of catalogs/materials.", default="camel-ponte-roma")
     attachment: str | Sequence[tuple[float, float]] = option(
-        "How it is held: corners (of the hoist), top-corners, hoist, or places (u, v) on the flat cloth [m].",
+        "How it is held: corners (of the hoist), top-corners, hoist, or places (u, v) on the flat "
+        "cloth [m].",
         default="corners",
         was=("--pins",),
     )
@@ -283,15 +317,24 @@ class Closing:
         was=("--size",),
     )
     area_weight: tuple[float, float] | str | Stated | None = option(
-        "Of a cloth that was weighed [kg/m²], as in '0.155±0.005'; by default that of the material, to 30 %.",
+        "Of a cloth that was weighed [kg/m²], as in '0.155±0.005'; by default that of the "
+        "material, to 30 %.",
         default=None,
     )
     density_uncertainty: float | None = option(
-        "Relative standard uncertainty of the material's area weight.", default=None, now=BOTH_STATED
+        "Relative standard uncertainty of the material's area weight.",
+        default=None,
+        now=BOTH_STATED,
     )
-    noise: float | None = option("Standard deviation of a coordinate [m]; by default it is estimated.", default=None)
-    level: float | None = option("Significance level of the test of the base model; 0.05 by default.", default=None)
-    nulls: int | None = option("Null recordings to simulate; by default as many as the test needs.", default=None)
+    noise: float | None = option(
+        "Standard deviation of a coordinate [m]; by default it is estimated.", default=None
+    )
+    level: float | None = option(
+        "Significance level of the test of the base model; 0.05 by default.", default=None
+    )
+    nulls: int | None = option(
+        "Null recordings to simulate; by default as many as the test needs.", default=None
+    )
     seed: int = option("Seed of the simulated nulls.", default=0)
     workers: int = option("Number of processes that simulate.", default=1)
 
@@ -314,7 +357,9 @@ def close_loop(chosen: Closing) -> Closed:
         UsageError: winds that do not fit the recordings, or nulls that cannot test the level.
     """
     if (chosen.rest is None) != (chosen.rate is None):
-        raise UsageError("rest= and rate= must be given together", where="recordings", fix="give both")
+        raise UsageError(
+            "rest= and rate= must be given together", where="recordings", fix="give both"
+        )
     return call("measure.closing.close_loop_call:close_on_arrays", chosen)
 
 
@@ -324,7 +369,9 @@ class Proposing(ByNulls, NamedLake):
 
     recipe: Path | str = argument("The recipe of the experiment.", "RECIPE.toml", type=LocalPath())
     effect: str | None = option(
-        "Test this effect on the recordings and seek no other.", default=None, metavar="FILE.py:Class"
+        "Test this effect on the recordings and seek no other.",
+        default=None,
+        metavar="FILE.py:Class",
     )
     known: tuple[str, ...] = option(
         "Effect that the model has already; may be repeated.", default=(), metavar="EFFECT.STRENGTH"
@@ -345,7 +392,8 @@ def propose(chosen: Proposing) -> Mapping[str, Any]:
     tried["decision"], tried["reason"], tried["effect"]  # "kept", why, the effect's file and class
     ```
 
-    It simulates null experiments, which takes minutes, and adds what it tried to `proposals.json` in the folder `out`.
+    It simulates null experiments, which takes minutes, and adds what it tried to `proposals.json`
+    in the folder `out`.
 
     Returns:
         What `flagdata propose --json` prints.

@@ -1,7 +1,7 @@
 """The physics from Python: cloth simulated and filmed.
 
-Each call's options are a class here. The work is done in sim, which flagdata must not import: it is called by its name,
-"module:attribute".
+Each call's options are a class here. The work is done in sim, which flagdata must not import: it is
+called by its name, "module:attribute".
 """
 
 from __future__ import annotations
@@ -20,17 +20,34 @@ if TYPE_CHECKING:
     from flagdata.ingest.films.film_array import Frames
     from flagdata.lake.mesh_sequences import MeshSequence, RaggedMeshSequence
 
-_TABLES = ("scene", "material", "wind", "contact", "limits", "remeshing", "integrator", "time", "effects")
-_TABLE = "Entries of the recipe's table [{}], SI and radians; each replaces the recipe's entry of the same key."
+_TABLES = (
+    "scene",
+    "material",
+    "wind",
+    "contact",
+    "limits",
+    "remeshing",
+    "integrator",
+    "time",
+    "effects",
+)
+_TABLE = (
+    "Entries of the recipe's table [{}], SI and radians; each replaces the recipe's entry of the "
+    "same key."
+)
 
 
 @options
 class Members:
-    """How many members of a recipe are simulated: a member is one simulation, with values drawn from the recipe's
-    ranges."""
+    """How many members of a recipe are simulated: a member is one simulation, with values drawn
+    from the recipe's ranges."""
 
-    count: int | None = option("How many members, instead of the recipe's.", default=None, type=POSITIVE, metavar="N")
-    batch: int | None = option("How many at a time, instead of the recipe's.", default=None, type=POSITIVE, metavar="N")
+    count: int | None = option(
+        "How many members, instead of the recipe's.", default=None, type=POSITIVE, metavar="N"
+    )
+    batch: int | None = option(
+        "How many at a time, instead of the recipe's.", default=None, type=POSITIVE, metavar="N"
+    )
 
 
 @options
@@ -38,15 +55,18 @@ class Simulating(Members, Computed):
     """What is simulated."""
 
     recipe: str | Path | Mapping[str, Any] | None = argument(
-        "Name of a recipe of the catalog, path of a TOML file, or its content as a dict; None for what is given beside "
-        'it alone, and defaults: a flag of 1.5 m × 1 m on two corners, of the knit "camel-ponte-roma".',
+        "Name of a recipe of the catalog, path of a TOML file, or its content as a dict; None for "
+        "what is given beside "
+        "it alone, and defaults: a flag of 1.5 m × 1 m on two corners, of the knit "
+        '"camel-ponte-roma".',
         "RECIPE",
         default=None,
     )
     scene: Mapping[str, Any] | None = option(_TABLE.format("scene"), default=None)
     material: Mapping[str, Any] | None = option(_TABLE.format("material"), default=None)
     wind: Mapping[str, Any] | None = option(
-        f"{_TABLE.format('wind')} As in every table, a value may be a range that each member draws from, "
+        f"{_TABLE.format('wind')} As in every table, a value may be a range that each member draws "
+        "from, "
         '{"low": 2.0, "high": 8.0}; `docs/simulator.md` lists the keys.',
         default=None,
     )
@@ -65,7 +85,8 @@ class Simulating(Members, Computed):
 
 @make_call(Simulating)
 def simulate(chosen: Simulating) -> Simulated:
-    """Cloth in the wind as arrays; nothing is written. `flagdata simulate` keeps the same members in a lake.
+    """Cloth in the wind as arrays; nothing is written. `flagdata simulate` keeps the same members
+    in a lake.
 
     ```python
     flags = flagdata.simulate(wind={"speed": 5.0}, time={"frames": 50}, effects={"lift": {"coefficient": 1.0}})
@@ -82,7 +103,13 @@ def simulate(chosen: Simulating) -> Simulated:
     given = {name: value for name in names if (value := getattr(chosen, name)) is not None}
     source = str(chosen.recipe) if isinstance(chosen.recipe, Path) else chosen.recipe
     workers = chosen.processes if chosen.workers is None else chosen.workers
-    return call("sim.run.simulate_call:simulate_members", source, given, device=chosen.device, workers=workers)
+    return call(
+        "sim.run.simulate_call:simulate_members",
+        source,
+        given,
+        device=chosen.device,
+        workers=workers,
+    )
 
 
 @options
@@ -93,20 +120,26 @@ class Rendering:
         "A member of what `simulate` returns, or what `meshes` does.", "SEQUENCE"
     )
     look: str = option(
-        "What light, camera, texture and background are drawn from: a name of catalogs/renders.", default="outdoor"
+        "What light, camera, texture and background are drawn from: a name of catalogs/renders.",
+        default="outdoor",
     )
     seed: int = option("Seed of these draws.", default=0)
     width: int = option("Width of the picture [px].", default=300)
     height: int = option("Height of the picture [px].", default=300)
     parameters: Mapping[str, float] | None = option(
-        'Render parameters in place of those drawn, by name, SI and radians: `{"camera_radius": 8.0}`.', default=None
+        'Render parameters in place of those drawn, by name, SI and radians: `{"camera_radius": '
+        "8.0}`.",
+        default=None,
     )
     cloth: str = option("flag, or hanging-cloth.", default="flag")
     heading: float | None = option(
-        "Where the air goes to, counter-clockwise from +x [rad]; None for what the sequence states, else 0.",
+        "Where the air goes to, counter-clockwise from +x [rad]; None for what the sequence "
+        "states, else 0.",
         default=None,
     )
-    renderer: str = option("raster; cycles or workbench where `flagdata blender-setup` was run.", default="raster")
+    renderer: str = option(
+        "raster; cycles or workbench where `flagdata blender-setup` was run.", default="raster"
+    )
     photos: Path | str | None = option("Folder of photographs as backgrounds.", default=None)
 
 

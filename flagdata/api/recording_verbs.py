@@ -48,13 +48,20 @@ class ByClock(NamedRecording, Rehearsed, OnBranch, OnLake):
         metavar="S",
     )
     centre: float | None = option(
-        "Offset around which to search [s]; 0 if the stamps are near.", default=None, section=CLOCK, metavar="S"
+        "Offset around which to search [s]; 0 if the stamps are near.",
+        default=None,
+        section=CLOCK,
+        metavar="S",
     )
     search: float | None = option(
-        "Search this far either side of it [s]; 120 by default.", default=None, section=CLOCK, metavar="S"
+        "Search this far either side of it [s]; 120 by default.",
+        default=None,
+        section=CLOCK,
+        metavar="S",
     )
     response: float | None = option(
-        "By how much the flag's motion follows the wind at the anemometer [s]; by default 3 m over the mean wind, "
+        "By how much the flag's motion follows the wind at the anemometer [s]; by default 3 m over "
+        "the mean wind, "
         "0.3 to 1 s.",
         default=None,
         section=CLOCK,
@@ -73,7 +80,8 @@ class ByClock(NamedRecording, Rehearsed, OnBranch, OnLake):
         metavar="S",
     )
     window: float | None = option(
-        "Average the wind over this long before a clip's end for its ground truth [s], e.g. 10s or 2min; 60s by "
+        "Average the wind over this long before a clip's end for its ground truth [s], e.g. 10s or "
+        "2min; 60s by "
         "default.",
         default=None,
         section=RECORDING,
@@ -111,14 +119,16 @@ class Aligning(ByClock):
     """Which camera and wind, or which two logs, are put on one clock."""
 
     first: str = argument(
-        "A camera of the lake by its name or id, or the wind on whose clock both are put.", "CAMERA|REFERENCE"
+        "A camera of the lake by its name or id, or the wind on whose clock both are put.",
+        "CAMERA|REFERENCE",
     )
     second: str = argument("A wind of the lake by its name or id.", "WIND|SENSOR")
 
 
 @make_call(Aligning)
 def align(chosen: Aligning) -> Mapping[str, Any]:
-    """Puts a camera and an anemometer of a lake, or two anemometers, on one clock, as `flagdata align` does.
+    """Puts a camera and an anemometer of a lake, or two anemometers, on one clock, as `flagdata
+    align` does.
 
     ```python
     aligned = flagdata.align("flag", "anemometer", lake="field.lake", by="given", clock_offset=-0.4, offset_sigma=0.1)
@@ -126,7 +136,8 @@ def align(chosen: Aligning) -> Mapping[str, Any]:
     ```
 
     Returns:
-        What `flagdata align --json` prints: of a film `recording`, `clips`, `created` and `clock`, of two logs `wind`
+        What `flagdata align --json` prints: of a film `recording`, `clips`, `created` and `clock`,
+            of two logs `wind`
         in place of the former two.
 
     Raises:
@@ -148,7 +159,8 @@ class Realigning(ByClock):
 
 @make_call(Realigning)
 def realign(chosen: Realigning) -> Mapping[str, Any]:
-    """Writes a recording anew with another clock model, from the same artifacts, as `flagdata realign` does.
+    """Writes a recording anew with another clock model, from the same artifacts, as `flagdata
+    realign` does.
 
     ```python
     flagdata.realign("flag", lake="field.lake", by="given", clock_offset=-0.35, offset_sigma=0.05)
@@ -174,7 +186,8 @@ class Recorded(OnBranch, OnLake):
     """What is brought into a lake, and what it is called."""
 
     sources: Path | str | Sequence[Path | str] = argument(
-        "Files or folders, one or several: a camera's, an anemometer's, meshes, markers, or records of flagdata.",
+        "Files or folders, one or several: a camera's, an anemometer's, meshes, markers, or "
+        "records of flagdata.",
         "SOURCE...",
     )
     session: str | None = option(
@@ -199,7 +212,8 @@ class Clocked(Recorded):
         metavar="NAME",
     )
     start: str | None = option(
-        "Camera: instant of the first frame, ISO 8601. Wind: of the first row, where stamps count from a start.",
+        "Camera: instant of the first frame, ISO 8601. Wind: of the first row, where stamps count "
+        "from a start.",
         default=None,
         section=SOURCE,
         metavar="TIME",
@@ -211,8 +225,10 @@ class Clocked(Recorded):
         metavar="ZONE",
     )
     rate: str | None = option(
-        "Camera: frames per second to keep, 25 by default; native keeps all. Meshes, markers: frames per second of a "
-        "source that does not state them. Wind: readings per second of a log without timestamps, counted from --start. "
+        "Camera: frames per second to keep, 25 by default; native keeps all. Meshes, markers: "
+        "frames per second of a "
+        "source that does not state them. Wind: readings per second of a log without timestamps, "
+        "counted from --start. "
         "Also the time from one to the next, as in 10min.",
         default=None,
         section=SOURCE,
@@ -225,10 +241,16 @@ class FromCamera(Clocked):
     """How a camera's file is read."""
 
     episode: int | None = option(
-        "LeRobot: the episode to read.", default=None, section=CAMERA, type=click.IntRange(min=0), metavar="N"
+        "LeRobot: the episode to read.",
+        default=None,
+        section=CAMERA,
+        type=click.IntRange(min=0),
+        metavar="N",
     )
     join: bool = option(
-        "The SOURCEs are the chapters of one recording, which become one artifact.", default=False, section=CAMERA
+        "The SOURCEs are the chapters of one recording, which become one artifact.",
+        default=False,
+        section=CAMERA,
     )
     stream: int | None = option(
         "Number of the video stream in its file; the first by default.",
@@ -238,10 +260,16 @@ class FromCamera(Clocked):
         metavar="N",
     )
     true_fps: float | None = option(
-        "Rate at which a high-speed camera really ran [Hz].", default=None, section=CAMERA, metavar="HZ"
+        "Rate at which a high-speed camera really ran [Hz].",
+        default=None,
+        section=CAMERA,
+        metavar="HZ",
     )
     sequence_fps: float | None = option(
-        "Rate of pictures that carry no time stamps [Hz].", default=None, section=CAMERA, metavar="HZ"
+        "Rate of pictures that carry no time stamps [Hz].",
+        default=None,
+        section=CAMERA,
+        metavar="HZ",
     )
     crop: str = option(
         "x,y,width,height in px of the upright image; whole, square, or auto (where the motion is).",
@@ -272,7 +300,8 @@ class Scaled(Recorded):
     """What a log, meshes and markers do not say of their numbers."""
 
     unit: str | None = option(
-        "Wind: unit of a speed whose heading has none (m/s, km/h, mph, kn). Meshes, markers: of positions, else m.",
+        "Wind: unit of a speed whose heading has none (m/s, km/h, mph, kn). Meshes, markers: of "
+        "positions, else m.",
         default=None,
         section=SOURCE,
         metavar="UNIT",
@@ -293,10 +322,14 @@ class FromAnemometer(Clocked, Scaled):
     )
     columns: str | None = option(
         "What the columns of a table are, in their order or by heading or number, such as "
-        "'date,time,wind_speed[km/h],,wind_direction[deg]' or '1=time,7=wind_speed[kn]'. Names: time, date, year, "
-        "month, day, day_of_year, hour, minute, second, wind_speed, wind_direction, wind_direction_to, wind_x, wind_y, "
-        "wind_z, apparent_wind_speed, apparent_wind_direction, air_temperature, relative_humidity, air_pressure, site. "
-        "What is measured has its unit in brackets. A name that is not known is refused with the list of all.",
+        "'date,time,wind_speed[km/h],,wind_direction[deg]' or '1=time,7=wind_speed[kn]'. Names: "
+        "time, date, year, "
+        "month, day, day_of_year, hour, minute, second, wind_speed, wind_direction, "
+        "wind_direction_to, wind_x, wind_y, "
+        "wind_z, apparent_wind_speed, apparent_wind_direction, air_temperature, relative_humidity, "
+        "air_pressure, site. "
+        "What is measured has its unit in brackets. A name that is not known is refused with the "
+        "list of all.",
         default=None,
         section=ANEMOMETER,
         metavar="LIST",
@@ -308,7 +341,10 @@ class FromAnemometer(Clocked, Scaled):
         metavar="LABEL",
     )
     missing: tuple[str, ...] = option(
-        "A cell that means no value, such as -99.9; repeatable.", default=(), section=ANEMOMETER, metavar="TEXT"
+        "A cell that means no value, such as -99.9; repeatable.",
+        default=(),
+        section=ANEMOMETER,
+        metavar="TEXT",
     )
     date: str | None = option(
         "Day of the first sample, where the log has times of day only.",
@@ -323,13 +359,17 @@ class FromAnemometer(Clocked, Scaled):
         type=click.Choice(["dmy", "mdy", "ymd"]),
     )
     platform: str | None = option(
-        "fixed, as on a mast; moving, as on a boat; corrected, if a moving one logs the wind over ground.",
+        "fixed, as on a mast; moving, as on a boat; corrected, if a moving one logs the wind over "
+        "ground.",
         default=None,
         section=ANEMOMETER,
         type=click.Choice(["fixed", "moving", "corrected"]),
     )
     talker: str | None = option(
-        "NMEA 0183 talker to read, where several share a stream.", default=None, section=ANEMOMETER, metavar="ID"
+        "NMEA 0183 talker to read, where several share a stream.",
+        default=None,
+        section=ANEMOMETER,
+        metavar="ID",
     )
     azimuth: float | None = option(
         "Bearing of the sensor's north or bow, clockwise from north [°].",
@@ -338,7 +378,8 @@ class FromAnemometer(Clocked, Scaled):
         metavar="DEG",
     )
     clock: str | None = option(
-        "The clock was changed during the log: first = the time before the change is right, last = the time after it; "
+        "The clock was changed during the log: first = the time before the change is right, last = "
+        "the time after it; "
         "sort = the clock is right, only sort the rows.",
         default=None,
         section=ANEMOMETER,
@@ -351,16 +392,21 @@ class FromAnemometer(Clocked, Scaled):
         metavar="M/S",
     )
     encoding: str | None = option(
-        "Encoding of the text, where the file does not show it.", default=None, section=ANEMOMETER, metavar="CODEC"
+        "Encoding of the text, where the file does not show it.",
+        default=None,
+        section=ANEMOMETER,
+        metavar="CODEC",
     )
     expect: tuple[str, ...] = option(
-        "A check of a draft that you have answered with yes, by the key that the refusal names; repeatable.",
+        "A check of a draft that you have answered with yes, by the key that the refusal names; "
+        "repeatable.",
         default=(),
         section=ANEMOMETER,
         metavar="KEY",
     )
     accept: str | None = option(
-        "Confirms what was drafted from a table that no recipe describes, by the hash that the refusal shows.",
+        "Confirms what was drafted from a table that no recipe describes, by the hash that the "
+        "refusal shows.",
         default=None,
         section=ANEMOMETER,
         metavar="HASH",
@@ -372,7 +418,8 @@ class FromFrames(Scaled):
     """How meshes and tables of markers are read."""
 
     rate: str | None = option(
-        "Frames per second of a source that does not state them, or the time from one to the next, as in 40ms.",
+        "Frames per second of a source that does not state them, or the time from one to the next, "
+        "as in 40ms.",
         default=None,
         section=SOURCE,
         metavar="HZ|STEP",
@@ -395,7 +442,8 @@ class Ingesting(FromCamera, FromAnemometer):
 
 @make_call(Ingesting)
 def ingest(chosen: Ingesting) -> tuple[IngestResult, ...]:
-    """Brings camera files, anemometer logs, mesh sequences and marker tables into a lake, as `flagdata ingest` does.
+    """Brings camera files, anemometer logs, mesh sequences and marker tables into a lake, as
+    `flagdata ingest` does.
 
     ```python
     film, wind = flagdata.ingest(["flag.mp4", "anemometer.csv"], lake="field.lake", session="monday")
@@ -403,7 +451,8 @@ def ingest(chosen: Ingesting) -> tuple[IngestResult, ...]:
     ```
 
     Returns:
-        For each artifact what it is, whether it was new, and the report. A source that fails ends it; those before it
+        For each artifact what it is, whether it was new, and the report. A source that fails ends
+            it; those before it
         are in the lake.
 
     Raises:

@@ -1,4 +1,5 @@
-"""A recording from Python: its wind, its frames, how much they move, and simulated or tracked meshes."""
+"""A recording from Python: its wind, its frames, how much they move, and simulated or tracked
+meshes."""
 
 from __future__ import annotations
 
@@ -46,11 +47,12 @@ def wind(
     ```
 
     Args:
-        source: an anemometer's file of any format that `flagdata ingest` reads, `example:NAME`, or a recording or log
-            of the lake by its name or id.
+        source: an anemometer's file of any format that `flagdata ingest` reads, `example:NAME`, or
+            a recording or log of the lake by its name or id.
         lake: in which the recording is; None for a file.
         at: tag, branch or version of the lake.
-        sensor: of a file, a recipe of the catalog by name, or the path of a TOML file, that says how it is read.
+        sensor: of a file, a recipe of the catalog by name, or the path of a TOML file, that says
+            how it is read.
         zone: of a file's wall-clock stamps, as "+02:00" or "Europe/Berlin".
         accept: hash that confirms how a file without a recipe is read, as the refusal states it.
 
@@ -73,10 +75,18 @@ def wind(
         confirm_readings(path, file_hash(path), [(log, options)], Accepting(accept=accept))
         return _wind(log.series, name=path.name, findings=log.findings)
     held = _lake(source, lake)
-    artifact = find_artifact(held, str(source), at, kinds=_BLOWN, noun="file, recording or log of the lake")
-    series = None if artifact.object is None else Record.open(held.record_place(artifact.object)).wind()
+    artifact = find_artifact(
+        held, str(source), at, kinds=_BLOWN, noun="file, recording or log of the lake"
+    )
+    series = (
+        None if artifact.object is None else Record.open(held.record_place(artifact.object)).wind()
+    )
     if series is None:
-        raise InputError(f"the {artifact.kind} holds no wind", where=artifact.name, fix="name a recording or a log")
+        raise InputError(
+            f"the {artifact.kind} holds no wind",
+            where=artifact.name,
+            fix="name a recording or a log",
+        )
     return _wind(series, name=artifact.name)
 
 
@@ -99,7 +109,8 @@ def frames(
     ```
 
     Args:
-        source: a video file, a folder of images, `example:NAME`, or a recording, clip or camera of the lake.
+        source: a video file, a folder of images, `example:NAME`, or a recording, clip or camera of
+            the lake.
         start, end: part of the film [s]; None is its end.
         lake: in which the recording is; None for a file.
         at: tag, branch or version of the lake.
@@ -124,7 +135,8 @@ def motion(
     lake: AnyLake | None = None,
     at: str | None = None,
 ) -> Motion:
-    """How much a film moves, frame by frame: one number that rises with the wind. Frames are read one at a time.
+    """How much a film moves, frame by frame: one number that rises with the wind. Frames are read
+    one at a time.
 
     ```python
     moving = flagdata.motion("flag.mp4")
@@ -151,13 +163,21 @@ def motion(
 
     found = motion_energy(timed_pictures())
     return Motion(
-        name=film.name, time=found.time / NANOSECONDS, start=film.start, energy=found.energy, findings=found.findings
+        name=film.name,
+        time=found.time / NANOSECONDS,
+        start=film.start,
+        energy=found.energy,
+        findings=found.findings,
     )
 
 
 @check_arguments
 def meshes(
-    source: Path | str, *, lake: AnyLake | None = None, at: str | None = None, rate: float | None = None
+    source: Path | str,
+    *,
+    lake: AnyLake | None = None,
+    at: str | None = None,
+    rate: float | None = None,
 ) -> MeshSequence | RaggedMeshSequence:
     """A moving mesh as arrays, of a lake or of a folder of OBJ files.
 
@@ -167,7 +187,8 @@ def meshes(
     ```
 
     Args:
-        source: a mesh sequence of the lake by its name or id, or a folder as ArcSim or `flagdata export` writes it.
+        source: a mesh sequence of the lake by its name or id, or a folder as ArcSim or `flagdata
+            export` writes it.
         lake: in which it is; None for a folder.
         at: tag, branch or version of the lake.
         rate: of a folder that does not state its own [Hz].
@@ -183,7 +204,9 @@ def meshes(
 
         return read_folder(path, rate=rate)
     held = _lake(source, lake)
-    artifact = find_artifact(held, str(source), at, kinds=(Kind.MESHES,), noun="mesh sequence of the lake")
+    artifact = find_artifact(
+        held, str(source), at, kinds=(Kind.MESHES,), noun="mesh sequence of the lake"
+    )
     return read_meshes(held.whole_object(str(artifact.object)))
 
 
@@ -203,7 +226,8 @@ def _film(
 def _lake(source: Path | str, lake: AnyLake | None) -> Lake:
     if lake is None:
         raise NotFoundError(
-            f"there is no file {str(source)!r}, and no lake was named", fix="correct the path, or give lake="
+            f"there is no file {str(source)!r}, and no lake was named",
+            fix="correct the path, or give lake=",
         )
     return open_source(lake).lake
 

@@ -1,4 +1,5 @@
-"""`flagdata align` and `flagdata realign`: a camera and an anemometer, or two anemometers, on one clock."""
+"""`flagdata align` and `flagdata realign`: a camera and an anemometer, or two anemometers, on one
+clock."""
 
 from __future__ import annotations
 
@@ -73,8 +74,9 @@ class RealignCommand(Plotting, Realigning):
 def align(chosen: AlignCommand) -> None:
     """Put the artifacts CAMERA and WIND on one clock: a recording and its clips, in one commit.
 
-    Of two wind artifacts, REFERENCE and SENSOR, the second is written anew on the first one's clock; offset, drift and
-    gain are reported. An estimate that is not certain is refused (exit 3) and nothing is committed.
+    Of two wind artifacts, REFERENCE and SENSOR, the second is written anew on the first one's
+    clock; offset, drift and gain are reported. An estimate that is not certain is refused (exit 3)
+    and nothing is committed.
     """
     align_pair(chosen, plot=chosen.plot).shown(as_json=chosen.as_json)
 
@@ -83,8 +85,9 @@ def align(chosen: AlignCommand) -> None:
 def realign(chosen: RealignCommand) -> None:
     """Write RECORDING anew with another clock model, from the same camera and wind artifacts.
 
-    The window of the ground truth stays what it was unless --window says otherwise. The old recording and its clips
-    stay until `flagdata withdraw` takes them off the branch; tags keep them.
+    The window of the ground truth stays what it was unless --window says otherwise. The old
+    recording and its clips stay until `flagdata withdraw` takes them off the branch; tags keep
+    them.
     """
     report = realign_recording(chosen, plot=chosen.plot)
     report.shown(as_json=chosen.as_json)
@@ -128,7 +131,10 @@ def align_pair(chosen: Aligning, *, plot: Path | None = None) -> Report:
 
     lake, clock = _open_lake(chosen, plot)
     devices = (Kind.CAMERA, Kind.WIND)
-    kinds = {lake.artifact(one, at=chosen.branch, kinds=devices).kind for one in (chosen.first, chosen.second)}
+    kinds = {
+        lake.artifact(one, at=chosen.branch, kinds=devices).kind
+        for one in (chosen.first, chosen.second)
+    }
     if kinds == {Kind.WIND}:
         unused = {
             "--window": chosen.window,
@@ -136,15 +142,27 @@ def align_pair(chosen: Aligning, *, plot: Path | None = None) -> Report:
             "--response-sigma": chosen.response_sigma,
             "--plot": plot,
         }
-        return _of_logs(chosen, lake, clock, unused=tuple(o for o, value in unused.items() if value is not None))
+        return _of_logs(
+            chosen, lake, clock, unused=tuple(o for o, value in unused.items() if value is not None)
+        )
     pair = Pair.of(lake, chosen.first, chosen.second, at=chosen.branch)
     window = TRUTH_WINDOW if chosen.window is None else chosen.window
     recipe = {**clock.recipe(), **truth_recipe(window)}
-    return _of_film(chosen, lake, pair, clock, recipe=recipe, plot=plot, name=chosen.name, session=chosen.session)
+    return _of_film(
+        chosen,
+        lake,
+        pair,
+        clock,
+        recipe=recipe,
+        plot=plot,
+        name=chosen.name,
+        session=chosen.session,
+    )
 
 
 def _open_lake(chosen: ByClock, plot: Path | None) -> tuple[Lake, ClockOptions]:
-    """Opens the lake, which can be written unless nothing is to be; with how to come by the clock model."""
+    """Opens the lake, which can be written unless nothing is to be; with how to come by the clock
+    model."""
     clock = chosen.clock()
     _check_plot(plot, clock)
     lake = chosen.opened()
@@ -153,7 +171,9 @@ def _open_lake(chosen: ByClock, plot: Path | None) -> tuple[Lake, ClockOptions]:
     return lake, clock
 
 
-def _of_logs(chosen: Aligning, lake: Lake, clock: ClockOptions, *, unused: tuple[str, ...]) -> Report:
+def _of_logs(
+    chosen: Aligning, lake: Lake, clock: ClockOptions, *, unused: tuple[str, ...]
+) -> Report:
     """Estimates the sensor's clock and gain, and writes its log on the reference's clock.
 
     Args:
@@ -173,12 +193,21 @@ def _of_logs(chosen: Aligning, lake: Lake, clock: ClockOptions, *, unused: tuple
     from flagdata.lake.remaking import ABSENT
 
     if clock.by is not Method.ESTIMATE:
-        raise UsageError(f"two logs aligned by {clock.by}", where="--by", fix="leave --by out: they are compared")
+        raise UsageError(
+            f"two logs aligned by {clock.by}", where="--by", fix="leave --by out: they are compared"
+        )
     if unused:
-        raise UsageError(f"two logs have no use for {', '.join(unused)}", where=unused[0], fix="leave it out")
+        raise UsageError(
+            f"two logs have no use for {', '.join(unused)}", where=unused[0], fix="leave it out"
+        )
     search = clock.search or LagSearch()
     recipe: dict[str, Any] = {
-        "align": {"by": "logs", "centre": search.centre, "window": search.window, "sigma": search.sigma}
+        "align": {
+            "by": "logs",
+            "centre": search.centre,
+            "window": search.window,
+            "sigma": search.sigma,
+        }
     }
     names = {"name": chosen.name, "session": chosen.session, "branch": chosen.branch}
     pair = WindPair.of(lake, chosen.first, chosen.second, at=chosen.branch)
@@ -210,7 +239,9 @@ def _of_logs(chosen: Aligning, lake: Lake, clock: ClockOptions, *, unused: tuple
     return _logs_report(made, found, created=there.artifact is None, healed=healed)
 
 
-def _logs_report(made: Artifact | None, found: LogClock | None, *, created: bool, healed: Remade | None) -> Report:
+def _logs_report(
+    made: Artifact | None, found: LogClock | None, *, created: bool, healed: Remade | None
+) -> Report:
     from flagdata.align.windpair import summary
     from flagdata.lake.remaking import said
 
@@ -240,7 +271,8 @@ def sentence(found: LogClock) -> str:
         f"offset {segment.offset:+.{digits}f} s [{low:.{digits}f}, {high:.{digits}f}] 90 %"
         f", drift {1e6 * segment.drift:+.2f} ± {1e6 * segment.sigma_drift:.2f} ppm"
         f"{f', n = {parts} parts of ten minutes' if parts else ' (not measured: too few parts)'}; "
-        f"gain {gain.gain:.4f} ± {gain.sigma:.4f}, zero {gain.zero:+.3f} ± {gain.sigma_zero:.3f} m/s, "
+        f"gain {gain.gain:.4f} ± {gain.sigma:.4f}, zero {gain.zero:+.3f} ± {gain.sigma_zero:.3f} "
+        "m/s, "
         f"n = {gain.count} minutes"
     )
 
@@ -253,7 +285,9 @@ def _check_plot(plot: Path | None, options: ClockOptions) -> None:
     if plot is None:
         return
     if options.by is not Method.ESTIMATE:
-        raise UsageError(f"alignment by {options.by} has no search to draw", where="--plot", fix="leave it out")
+        raise UsageError(
+            f"alignment by {options.by} has no search to draw", where="--plot", fix="leave it out"
+        )
     from flagdata.align.plot import check
 
     check(plot)
@@ -298,13 +332,17 @@ def _warn_of_clocks(pair: Pair, options: ClockOptions) -> None:
     shift = round((options.offset or centre) * NANOSECONDS)
     start, end = pair.span
     found = by_spans(
-        (start + shift, end + shift), (pair.wind.start, pair.wind.end), names=(pair.camera.name, pair.wind.name)
+        (start + shift, end + shift),
+        (pair.wind.start, pair.wind.end),
+        names=(pair.camera.name, pair.wind.name),
     )
     if found is not None:
         say_finding(found)
 
 
-def _outcome(pair: Pair, options: ClockOptions, *, recipe: dict[str, Any], plot: Path | None) -> Outcome:
+def _outcome(
+    pair: Pair, options: ClockOptions, *, recipe: dict[str, Any], plot: Path | None
+) -> Outcome:
     from flagdata.align.methods import Method, declared_clock, estimated_clock, evidence
 
     if options.by is not Method.ESTIMATE:
@@ -345,7 +383,13 @@ def _sentence(outcome: Outcome) -> str:
     if outcome.evidence is None or outcome.evidence.line is None:
         return f"{text}, {outcome.alignment.clock.method}"
     estimate, line = outcome.evidence.estimate, outcome.evidence.line
-    text += f", confidence {estimate.confidence:.2f}, n = {estimate.bins} bins of {outcome.evidence.wind.period:g} s"
+    text += (
+        f", confidence {estimate.confidence:.2f}, n = {estimate.bins} bins of "
+        f"{outcome.evidence.wind.period:g} s"
+    )
     if line.parts:
-        text += f"; drift {1e6 * line.drift:+.0f} ± {1e6 * line.sigma_drift:.0f} ppm, n = {len(line.parts)} parts"
+        text += (
+            f"; drift {1e6 * line.drift:+.0f} ± {1e6 * line.sigma_drift:.0f} ppm, n = "
+            f"{len(line.parts)} parts"
+        )
     return text

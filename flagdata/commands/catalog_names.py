@@ -30,10 +30,12 @@ class Named:
 
 @verb(Named, example='flagdata.catalog("effects")["kinds"]')
 def catalog(chosen: Named) -> Iterator[Result]:
-    """List the names that come with flagdata: scenes, materials, effects, sensors, data sets, models and more.
+    """List the names that come with flagdata: scenes, materials, effects, sensors, data sets,
+    models and more.
 
-    With KIND that kind alone, a line on each name. With NAME its recipe, as TOML to copy and change: of scenes, data
-    sets, trainings, materials and sensors. What a lake holds is listed by `flagdata ls`.
+    With KIND that kind alone, a line on each name. With NAME its recipe, as TOML to copy and
+    change: of scenes, data sets, trainings, materials and sensors. What a lake holds is listed by
+    `flagdata ls`.
 
     \b
       flagdata catalog datasets flagsim-small > mine.toml
@@ -58,7 +60,9 @@ def catalog(chosen: Named) -> Iterator[Result]:
             if kind is not None:
                 raise
             say(f"{name} are left out: {error.what}; {error.fix}", mark="note")
-    listed = [{"kind": name, "taken_by": kinds[name][1], "names": names} for name, names in found.items()]
+    listed = [
+        {"kind": name, "taken_by": kinds[name][1], "names": names} for name, names in found.items()
+    ]
     yield Result("catalog", {"kinds": listed})
     if kind is not None:
         table((kind, "what it is"), found[kind].items())
@@ -67,7 +71,11 @@ def catalog(chosen: Named) -> Iterator[Result]:
             echo(f"{name} ({kinds[name][1]})")
             echo_lines(
                 textwrap.fill(
-                    ", ".join(names), initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False, width=80
+                    ", ".join(names),
+                    initial_indent="  ",
+                    subsequent_indent="  ",
+                    break_on_hyphens=False,
+                    width=80,
                 )
             )
 
@@ -101,7 +109,10 @@ def titles(target: str) -> Mapping[str, str]:
     module, _, attribute = target.partition(":")
     held = getattr(import_module(module), attribute)
     if isinstance(held, Path):
-        cards = {path.parent.name: json.loads(path.read_text(encoding="utf-8")) for path in held.glob("*/card.json")}
+        cards = {
+            path.parent.name: json.loads(path.read_text(encoding="utf-8"))
+            for path in held.glob("*/card.json")
+        }
         return {name: str(cards[name]["title"]) for name in sorted(cards)}
     registry = held.registry if isinstance(held, Shelf) else held
     found: dict[str, str] = {}
@@ -113,7 +124,9 @@ def titles(target: str) -> Mapping[str, str]:
             if package is None:
                 raise
             what = (
-                error.what if isinstance(error, PlugInError) else f"{name!r} of {package} cannot be described: {error}"
+                error.what
+                if isinstance(error, PlugInError)
+                else f"{name!r} of {package} cannot be described: {error}"
             )
             say(f"left out: {what}", mark="warning")
     return found
@@ -123,7 +136,9 @@ def _line(entry: object) -> str:
     """What an entry of a registry says of itself, or the first line of its module or of itself."""
     if isinstance(entry, partial):
         entry = entry()
-    module = sys.modules.get(entry.__module__ if isinstance(entry, type) else type(entry).__module__)
+    module = sys.modules.get(
+        entry.__module__ if isinstance(entry, type) else type(entry).__module__
+    )
     texts = (getattr(entry, "about", None), getattr(module, "__doc__", None), entry.__doc__)
     lines = [line for text in texts if text for line in str(text).strip().splitlines()[:1]]
     return lines[0].rstrip(".") if lines else "says nothing of itself"

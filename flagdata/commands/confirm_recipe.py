@@ -1,4 +1,5 @@
-"""How a drafted reading is completed and confirmed on the command line: by its hash, or by answers at a terminal."""
+"""How a drafted reading is completed and confirmed on the command line: by its hash, or by answers
+at a terminal."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class OnCommandLine:
-    """Shows drafted readings; at a terminal it asks whether they are right, else it takes the hash that was given.
+    """Shows drafted readings; at a terminal it asks whether they are right, else it takes the hash
+    that was given.
 
     Attributes:
         accept: the value of --accept.
@@ -44,7 +46,10 @@ class OnCommandLine:
         if not self.quiet:
             say(drafted.preview())
         if self.accept is not None:
-            say(f"{command_line('--accept', self.accept)} was given for another file, another draft or other answers")
+            say(
+                f"{command_line('--accept', self.accept)} was given for another file, another "
+                "draft or other answers"
+            )
         if not self.asks or self.accept is not None:
             raise UnconfirmedError.of(drafted)
         for sentence in drafted.sentences():
@@ -64,7 +69,8 @@ def at_terminal() -> bool:
 
 
 def with_answers(read: Callable[[Answers], T], *, asks: bool) -> T:
-    """What `read` gives; the questions that it lacks answers to are asked at a terminal, until none is left.
+    """What `read` gives; the questions that it lacks answers to are asked at a terminal, until none
+    is left.
 
     Args:
         read: called with the answers so far.
@@ -91,7 +97,13 @@ def with_answers(read: Callable[[Answers], T], *, asks: bool) -> T:
         for question in questions:
             name, answer = _answer(question)
             before = answers.get(name)
-            answers[name] = (*before, answer) if isinstance(before, tuple) else (answer,) if name in _LISTS else answer
+            answers[name] = (
+                (*before, answer)
+                if isinstance(before, tuple)
+                else (answer,)
+                if name in _LISTS
+                else answer
+            )
 
 
 _DOUBT = "(yes; no; or a number that means no value)"
@@ -110,8 +122,12 @@ def _answer(question: Open) -> tuple[str, object]:
         "unit": lambda text: canonical(text, where="unit"),
         "start": lambda text: timebase.parse(text, where="start"),
         "date": _date,
-        "date_order": lambda text: text if text in ("dmy", "mdy", "ymd") else _wrong(text, "dmy, mdy or ymd"),
-        "platform": lambda text: text if text in ("fixed", "moving", "corrected") else _wrong(text, "one of the three"),
+        "date_order": lambda text: (
+            text if text in ("dmy", "mdy", "ymd") else _wrong(text, "dmy, mdy or ymd")
+        ),
+        "platform": lambda text: (
+            text if text in ("fixed", "moving", "corrected") else _wrong(text, "one of the three")
+        ),
     }
     asked = f"{question.question} {_DOUBT}" if question.key == "expect" else question.question
     while True:
@@ -127,7 +143,8 @@ def _answer(question: Open) -> tuple[str, object]:
 
 
 def _answers_to_check(question: Open, text: str) -> tuple[str, object]:
-    """The answers to a check: "yes" where the numbers are right, a number that means no value, or a recipe."""
+    """The answers to a check: "yes" where the numbers are right, a number that means no value, or a
+    recipe."""
     if text.lower() == "yes":
         return "expect", question.example
     if text.replace(",", ".").lstrip("+-").replace(".", "", 1).isdigit():

@@ -18,12 +18,17 @@ class Declaring(NamedRecording, OnBranch, OnLake):
     sigma: float = option("Its standard uncertainty [m/s].", section=RECORDING, metavar="M/S")
 
 
-@verb(Declaring, example='flagdata.declare("tunnel", speed=6.0, sigma=0.1, lake="field.lake")["recording"]')
+@verb(
+    Declaring,
+    example='flagdata.declare("tunnel", speed=6.0, sigma=0.1, lake="field.lake")["recording"]',
+)
 def declare(chosen: Declaring) -> Iterator[Result]:
-    """State that the wind of the artifact CAMERA was constant, as in a wind tunnel: a recording and its clips.
+    """State that the wind of the artifact CAMERA was constant, as in a wind tunnel: a recording and
+    its clips.
 
-    When it was filmed does not matter then: ingest a film whose start nobody knows by --start unknown. The declared
-    wind becomes a wind artifact of its own, and recording and clips bear the quality flag wind-declared.
+    When it was filmed does not matter then: ingest a film whose start nobody knows by --start
+    unknown. The declared wind becomes a wind artifact of its own, and recording and clips bear the
+    quality flag wind-declared.
     """
     from flagdata.align.constant import ConstantWind, declared_recording
     from flagdata.core.schema import Kind
@@ -34,7 +39,13 @@ def declare(chosen: Declaring) -> Iterator[Result]:
     film = lake.artifact(chosen.camera, at=chosen.branch, kinds=(Kind.CAMERA,))
     with progress(film.frame_count, label="copying", unit="frame") as advance:
         stated, made = declared_recording(
-            lake, film, wind, name=chosen.name, session=chosen.session, branch=chosen.branch, progress=advance
+            lake,
+            film,
+            wind,
+            name=chosen.name,
+            session=chosen.session,
+            branch=chosen.branch,
+            progress=advance,
         )
     yield Result("declare", {"wind": stated.id, **made.as_dict()})
     echo(f"wind {wind.speed:g} ± {wind.sigma:g} m/s declared: {stated.id}")

@@ -23,14 +23,19 @@ class DeclaringCloths(OnBranch, OnLake):
     )
 
 
-@verb(DeclaringCloths, example='flagdata.declare_cloths("fabrics.csv", lake="field.lake")["recordings"]')
+@verb(
+    DeclaringCloths,
+    example='flagdata.declare_cloths("fabrics.csv", lake="field.lake")["recordings"]',
+)
 def declare_cloths(chosen: DeclaringCloths) -> Iterator[Result]:
-    """Ingest the films that TABLE names, with the area weight and stiffness that were measured of their cloths.
+    """Ingest the films that TABLE names, with the area weight and stiffness that were measured of
+    their cloths.
 
-    TABLE is a CSV file, one row a film: film (a path from the table's folder on), fabric, area_weight [kg/m²], and as
-    far as they are known bending_stiffness [N·m], wind_level, wind_speed and wind_sigma [m/s]. The whole table is
-    checked before the first film is read. Clips know their cloth as simulated ones do, as parameters of the catalog;
-    where no wind is stated they have none. Films of one fabric are one session.
+    TABLE is a CSV file, one row a film: film (a path from the table's folder on), fabric,
+    area_weight [kg/m²], and as far as they are known bending_stiffness [N·m], wind_level,
+    wind_speed and wind_sigma [m/s]. The whole table is checked before the first film is read. Clips
+    know their cloth as simulated ones do, as parameters of the catalog; where no wind is stated
+    they have none. Films of one fabric are one session.
 
     \b
       flagdata declare-cloths fabrics.csv --lake lake
@@ -48,14 +53,24 @@ def declare_cloths(chosen: DeclaringCloths) -> Iterator[Result]:
     lake.check_writable()
     cloths = read_cloths(local_path(chosen.table))
     made = []
-    with in_steps(added_since(lake, branch)), progress(len(cloths), label="films", unit="film") as advance:
+    with (
+        in_steps(added_since(lake, branch)),
+        progress(len(cloths), label="films", unit="film") as advance,
+    ):
         for cloth in cloths:
             options = CameraIngest(camera=CameraOptions(start=UNKNOWN, crop=box))
-            film = ingest_camera(lake, cloth.film, options, labels=Labels(session=cloth.fabric), branch=branch)
+            film = ingest_camera(
+                lake, cloth.film, options, labels=Labels(session=cloth.fabric), branch=branch
+            )
             made.append((cloth, cloth_recording(lake, film.artifact, cloth, branch=branch)))
             advance(1)
-    recordings = [{**one.as_dict(), "parameters": cloth.parameters, "wind": cloth.wind} for cloth, one in made]
+    recordings = [
+        {**one.as_dict(), "parameters": cloth.parameters, "wind": cloth.wind} for cloth, one in made
+    ]
     yield Result("declare-cloths", {"recordings": recordings})
     for cloth, one in made:
         healed = "" if one.healed is None else f"; {one.healed.sentence}"
-        echo(f"{one.recording.id}  {cloth.fabric}, {cloth.area_weight:g} kg/m², {len(one.clips)} clips{healed}")
+        echo(
+            f"{one.recording.id}  {cloth.fabric}, {cloth.area_weight:g} kg/m², {len(one.clips)} "
+            f"clips{healed}"
+        )

@@ -18,11 +18,12 @@ class ExportCommand(AsJson, Exporting):
 
 @command(ExportCommand)
 def export(chosen: ExportCommand) -> None:
-    """Write a selection as WebDataset, Parquet, LeRobot, Zarr, MP4 + CSV, MCAP, CSV of the wind or OBJ folders.
+    """Write a selection as WebDataset, Parquet, LeRobot, Zarr, MP4 + CSV, MCAP, CSV of the wind or
+    OBJ folders.
 
-    FORMAT is webdataset, parquet, lerobot, zarr, mp4, mcap, csv for every sample of an anemometer or, for mesh
-    sequences, obj. The folder appears whole or not at all, and its manifest.json names the version, the filter and the
-    hash of every file:
+    FORMAT is webdataset, parquet, lerobot, zarr, mp4, mcap, csv for every sample of an anemometer
+    or, for mesh sequences, obj. The folder appears whole or not at all, and its manifest.json names
+    the version, the filter and the hash of every file:
 
     \b
       flagdata export webdataset --where "kind = 'clip'" --at v1 --split train --to shards/train
@@ -39,7 +40,10 @@ def export(chosen: ExportCommand) -> None:
     size = sum(file["bytes"] for file in files)
     left_out = len(manifest["superseded"])
     if left_out:
-        say(f"left out: {_count(left_out, 'recording')} that a later alignment of the same files replaces")
+        say(
+            f"left out: {_count(left_out, 'recording')} that a later alignment of the same files "
+            "replaces"
+        )
     artifacts = _count(manifest["artifacts"], "artifact")
     say(f"{artifacts} of version {manifest['version']} in {_count(len(files), 'file')}, {size:,} B")
     echo(chosen.to)

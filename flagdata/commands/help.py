@@ -27,7 +27,11 @@ def help_(chosen: Helping) -> None:
     shown, verb = click.get_current_context().find_root(), chosen.verb
     if verb is not None:
         known = shown.command.list_commands(shown) if isinstance(shown.command, click.Group) else []
-        found = shown.command.get_command(shown, verb) if isinstance(shown.command, click.Group) else None
+        found = (
+            shown.command.get_command(shown, verb)
+            if isinstance(shown.command, click.Group)
+            else None
+        )
         if found is None:
             raise UnknownNameError.of("command", verb, known, where=shown.command_path)
         shown = click.Context(found, info_name=verb, parent=shown)

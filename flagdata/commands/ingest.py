@@ -1,4 +1,5 @@
-"""`flagdata ingest`: camera files, anemometer logs, meshes and markers into the lake, or a look at what a file is."""
+"""`flagdata ingest`: camera files, anemometer logs, meshes and markers into the lake, or a look at
+what a file is."""
 
 from __future__ import annotations
 
@@ -39,7 +40,9 @@ class IngestCommand(Sources, Ingesting):
     """The same on the command line, or a look at what a source is."""
 
     sniff: bool = option(
-        "Only say what each source seems to be, and why; the lake is not touched.", default=False, section=SOURCE
+        "Only say what each source seems to be, and why; the lake is not touched.",
+        default=False,
+        section=SOURCE,
     )
 
 
@@ -61,13 +64,18 @@ class WindCommand(Sources, FromAnemometer):
     HELP: ClassVar[Mapping[str, str]] = {
         "topic": "MCAP of other programs: the topic of the readings.",
         "start": "Instant of the first row, ISO 8601, where stamps count from a start.",
-        "rate": "Readings per second of a log without timestamps, counted from --start; or the time from one to the "
+        "rate": "Readings per second of a log without timestamps, counted from --start; or the "
+        "time from one to the "
         "next, as in 10min.",
         "unit": "Unit of a speed whose heading has none: m/s, km/h, mph, kn.",
     }
 
     format: str | None = option(
-        "An anemometer format; by content if not given.", "--as", default=None, section=SOURCE, metavar="FORMAT"
+        "An anemometer format; by content if not given.",
+        "--as",
+        default=None,
+        section=SOURCE,
+        metavar="FORMAT",
     )
 
 
@@ -113,8 +121,8 @@ def _sources_follow(below: LongCommand, words: list[str]) -> bool:
 
 
 class Kinds(LongCommand):
-    """A command that does what one of others does where its first word names that. A word that is also a file, after
-    which no source follows, is that file.
+    """A command that does what one of others does where its first word names that. A word that is
+    also a file, after which no source follows, is that file.
 
     Attributes:
         commands: the others, by their names.
@@ -123,36 +131,41 @@ class Kinds(LongCommand):
     commands = {str(one.name): one for one in (film, wind, meshes, markers)}  # noqa: RUF012  of a class, not changed
 
     def make_context(
-        self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: Any
+        self,
+        info_name: str | None,
+        args: list[str],
+        parent: click.Context | None = None,
+        **extra: Any,
     ) -> click.Context:
         below = self.commands.get(args[0]) if args else None
         if below is None or (Path(args[0]).exists() and not _sources_follow(below, args[1:])):
             return super().make_context(info_name, args, parent, **extra)
         defaults = None if parent is None else parent.lookup_default(str(info_name))
-        return below.make_context(f"{info_name} {args[0]}", args[1:], parent, default_map=defaults, **extra)
+        return below.make_context(
+            f"{info_name} {args[0]}", args[1:], parent, default_map=defaults, **extra
+        )
 
 
 @command(IngestCommand, cls=Kinds)
 def ingest(chosen: IngestCommand) -> None:
     """Bring camera files, anemometer logs, mesh sequences and marker tables in.
 
-    Whether a SOURCE is a camera's, an anemometer's, a folder of meshes, a table of markers or a record that flagdata
-    exported is decided by its content, and an option goes to the sources of its kind. Each is one commit: what fails
-    leaves the lake as it was, and the others go on. How a table without a recipe is to be read is drafted from its own
-    text; such a draft is shown, and enters only when it is confirmed at the terminal or by --accept.
+    Whether a SOURCE is a camera's, an anemometer's, a folder of meshes, a table of markers or a
+    record that flagdata exported is decided by its content, and an option goes to the sources of
+    its kind. Each is one commit: what fails leaves the lake as it was, and the others go on. How a
+    table without a recipe is to be read is drafted from its own text; such a draft is shown, and
+    enters only when it is confirmed at the terminal or by --accept.
 
-    \b
-      flagdata ingest --sniff DSC_0001.MP4 TOA5_1234.dat
-      flagdata ingest DSC_0001.MP4 --start 2026-05-01T12:00:00+02:00 --crop auto --crop-picture crop.png
-      flagdata ingest GH010042.MP4 GH020042.MP4 --join
-      flagdata ingest mast.csv --sensor generic-csv --zone +01:00 --session field-1
-      flagdata ingest station.csv --unit km/h --zone Europe/Amsterdam
-      flagdata ingest arcsim-output --name reference-4ms
-      flagdata ingest drive.mcap --topic /camera/front
-      flagdata ingest pusht --episode 3 --start 2026-05-01T12:00:00Z
-      flagdata ingest drive.mcap --topic /mast --columns 'time=time,speed=wind_speed[m/s]'
+    \b flagdata ingest --sniff DSC_0001.MP4 TOA5_1234.dat flagdata ingest DSC_0001.MP4 --start
+      2026-05-01T12:00:00+02:00 --crop auto --crop-picture crop.png flagdata ingest GH010042.MP4
+      GH020042.MP4 --join flagdata ingest mast.csv --sensor generic-csv --zone +01:00 --session
+      field-1 flagdata ingest station.csv --unit km/h --zone Europe/Amsterdam flagdata ingest
+      arcsim-output --name reference-4ms flagdata ingest drive.mcap --topic /camera/front flagdata
+      ingest pusht --episode 3 --start 2026-05-01T12:00:00Z flagdata ingest drive.mcap --topic /mast
+      --columns 'time=time,speed=wind_speed[m/s]'
 
-    `flagdata ingest film | wind | meshes | markers SOURCE...` takes sources of that kind and its options alone.
+    `flagdata ingest film | wind | meshes | markers SOURCE...` takes sources of that kind and its
+    options alone.
     """
     if not chosen.sniff:
         _ingest(chosen)
@@ -164,9 +177,13 @@ def ingest(chosen: IngestCommand) -> None:
     sniff_sources(given, as_json=chosen.as_json)
 
 
-def _ingest(chosen: IngestCommand | FilmCommand | WindCommand | FramesCommand, *, kind: str | None = None) -> None:
+def _ingest(
+    chosen: IngestCommand | FilmCommand | WindCommand | FramesCommand, *, kind: str | None = None
+) -> None:
     accept = chosen.accept if isinstance(chosen, FromAnemometer) else None
-    given = IngestRequest.of(chosen, kind=kind, confirm=on_command_line(accept, as_json=chosen.as_json))
+    given = IngestRequest.of(
+        chosen, kind=kind, confirm=on_command_line(accept, as_json=chosen.as_json)
+    )
     lake = chosen.opened()
     lake.check_writable()
     ingest_sources(lake, given, as_json=chosen.as_json)

@@ -1,4 +1,5 @@
-"""What the user gives `flagdata ingest`: the options of each kind of source, and which mean nothing for a source."""
+"""What the user gives `flagdata ingest`: the options of each kind of source, and which mean nothing
+for a source."""
 
 from __future__ import annotations
 
@@ -8,7 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flagdata.api.recording_verbs import Clocked, FromAnemometer, FromCamera, FromFrames, Recorded, Scaled
+from flagdata.api.recording_verbs import (
+    Clocked,
+    FromAnemometer,
+    FromCamera,
+    FromFrames,
+    Recorded,
+    Scaled,
+)
 from flagdata.errors import TimeError, UsageError
 from flagdata.verbs.option_types import written_seconds
 from flagdata.verbs.verb_options import described_fields, typed_names
@@ -109,7 +117,9 @@ class IngestRequest:
             sources=sources,
             format=getattr(chosen, "format", kind),
             kind=kind,
-            camera=camera_options(chosen, chapters) if isinstance(chosen, FromCamera) else CameraIngest(),
+            camera=camera_options(chosen, chapters)
+            if isinstance(chosen, FromCamera)
+            else CameraIngest(),
             wind=wind_options(chosen) if isinstance(chosen, FromAnemometer) else WindIngest(),
             meshes=MeshIngest(rate=frame_rate(rate), unit=_length_unit(unit)),
             markers=MarkerOptions(rate=frame_rate(rate), unit=_length_unit(unit)),
@@ -124,7 +134,11 @@ def _check_picture(chosen: FromCamera) -> None:
     if chosen.crop_picture is None:
         return
     if chosen.crop.strip().lower() != "auto":
-        raise UsageError("--crop-picture needs --crop auto", where=str(chosen.crop_picture), fix="add --crop auto")
+        raise UsageError(
+            "--crop-picture needs --crop auto",
+            where=str(chosen.crop_picture),
+            fix="add --crop auto",
+        )
     check_file(Path(chosen.crop_picture), command="ingest")
 
 
@@ -154,7 +168,9 @@ def camera_options(chosen: FromCamera, chapters: tuple[Path, ...] = ()) -> Camer
         zone=None if start is not None and timebase.names_zone(start) else zone,
         true_fps=chosen.true_fps,
         sequence_fps=chosen.sequence_fps,
-        rate="native" if rate.strip().lower() == "native" else _rate(rate, "frames a second, or native"),
+        rate="native"
+        if rate.strip().lower() == "native"
+        else _rate(rate, "frames a second, or native"),
         crop=parse_crop(chosen.crop),
         exposure=chosen.exposure,
         topic=chosen.topic,
@@ -166,7 +182,8 @@ def camera_options(chosen: FromCamera, chapters: tuple[Path, ...] = ()) -> Camer
 
 
 def _unknown(start: str | None) -> bool:
-    """Whether a film's start is stated not to be known; what a log's stamps then count from is not stated either."""
+    """Whether a film's start is stated not to be known; what a log's stamps then count from is not
+    stated either."""
     return start is not None and start.strip().lower() == "unknown"
 
 
@@ -177,7 +194,8 @@ def _instant(start: str | None, place: tzinfo | None) -> int | None:
 
 
 def wind_options(chosen: FromAnemometer) -> WindIngest:
-    """Returns how an anemometer's log is read. A unit is heeded where it is one of speed, since meshes have units, too.
+    """Returns how an anemometer's log is read. A unit is heeded where it is one of speed, since
+    meshes have units, too.
 
     Raises:
         UsageError: a date, start or zero offset that cannot be read.
@@ -198,7 +216,9 @@ def wind_options(chosen: FromAnemometer) -> WindIngest:
     try:
         day = dt.date.fromisoformat(date) if date is not None else None
     except ValueError:
-        raise UsageError(f"{date!r} is not a date", where="--date", fix="write it as 2026-05-01") from None
+        raise UsageError(
+            f"{date!r} is not a date", where="--date", fix="write it as 2026-05-01"
+        ) from None
     offset: Any = chosen.zero_offset
     if offset is not None and offset not in ("report", "estimate"):
         offset = _number(offset, "--zero-offset", "a speed in m/s, report or estimate")
@@ -209,11 +229,15 @@ def wind_options(chosen: FromAnemometer) -> WindIngest:
             format=None if name in ("camera", "meshes", "markers") else name,
             recipe=chosen.sensor,
             date=day,
-            azimuth=float(unit_of("deg").to_si(chosen.azimuth)) if chosen.azimuth is not None else None,
+            azimuth=float(unit_of("deg").to_si(chosen.azimuth))
+            if chosen.azimuth is not None
+            else None,
             zero_offset=offset,
             unit=unit if unit is not None and unit_of(unit, where="--unit").si == "m/s" else None,
             start=instant,
-            rate=None if rate in (None, "native") else _rate(rate, "readings a second, or the time between two: 10min"),
+            rate=None
+            if rate in (None, "native")
+            else _rate(rate, "readings a second, or the time between two: 10min"),
             **words,
         )
     )
@@ -243,11 +267,14 @@ def frame_rate(rate: str | None) -> float | None:
 
 
 def _rate(text: str, wanted: str) -> float:
-    """A rate [Hz] from a number, with Hz behind it or not, or from the time between two: 10min is 1/600 Hz."""
+    """A rate [Hz] from a number, with Hz behind it or not, or from the time between two: 10min is
+    1/600 Hz."""
     if (step := written_seconds(text)) is not None:
         if step <= 0:
             raise UsageError(
-                f"the time between two must be above 0, not {text!r}", where="--rate", fix=f"give {wanted}"
+                f"the time between two must be above 0, not {text!r}",
+                where="--rate",
+                fix=f"give {wanted}",
             )
         return 1 / step
     return _number(re.sub(r"(?i)\s*hz$", "", text.strip()), "--rate", wanted)
@@ -261,7 +288,8 @@ def _number(text: str, option: str, wanted: str) -> float:
 
 
 def _check_unit(kinds: Sequence[str | None], name: str | None) -> None:
-    """Refuse a unit that is one of no source's: of speed for a log, of length for meshes and markers."""
+    """Refuse a unit that is one of no source's: of speed for a log, of length for meshes and
+    markers."""
     from flagdata.core.units import unit
 
     wanted = {"anemometer": "m/s", "meshes": "m", "markers": "m"}
@@ -269,19 +297,25 @@ def _check_unit(kinds: Sequence[str | None], name: str | None) -> None:
     if name is None or not needed or unit(name, where="--unit").si in needed:
         return
     if "m" in needed:
-        raise UsageError(f"{name!r} is no unit of length", where="--unit", fix="give mm, cm, m or ft")
-    raise UsageError(f"{name!r} is no unit of speed", where="--unit", fix="give m/s, km/h, mph, kn or ft/s")
+        raise UsageError(
+            f"{name!r} is no unit of length", where="--unit", fix="give mm, cm, m or ft"
+        )
+    raise UsageError(
+        f"{name!r} is no unit of speed", where="--unit", fix="give m/s, km/h, mph, kn or ft/s"
+    )
 
 
 def _length_unit(name: str | None) -> str:
-    """Returns the unit of positions: metres where none is given, or one of speed for a log beside."""
+    """Returns the unit of positions: metres where none is given, or one of speed for a log
+    beside."""
     from flagdata.core.units import unit
 
     return "m" if name is None or unit(name, where="--unit").si == "m/s" else name
 
 
 def check_applies(kinds: Sequence[str | None], given: IngestRequest) -> None:
-    """Refuses options that mean nothing for any source, or that time or name more than one, before anything is written.
+    """Refuses options that mean nothing for any source, or that time or name more than one, before
+    anything is written.
 
     Args:
         kinds: of the sources; one that is not recognised may be any.
@@ -290,7 +324,9 @@ def check_applies(kinds: Sequence[str | None], given: IngestRequest) -> None:
 
     chosen = given.chosen
     names, rows = typed_names(chosen), described_fields(type(chosen))
-    ignored = {kind: names - _OF_ALL - described_fields(form).keys() for kind, (_, form) in KINDS.items()}
+    ignored = {
+        kind: names - _OF_ALL - described_fields(form).keys() for kind, (_, form) in KINDS.items()
+    }
     called = {kind: name for kind, (name, _) in KINDS.items()}
     if isinstance(chosen, FromCamera) and chosen.start is not None and names_zone(chosen.start):
         called["camera"] += " whose --start names its zone"
@@ -309,5 +345,6 @@ def check_applies(kinds: Sequence[str | None], given: IngestRequest) -> None:
             raise UsageError(f"{spelled} means nothing for {whose}", fix="leave it out")
         if name in ONE_SOURCE and foreign.count(False) > 1:
             raise UsageError(
-                f"{spelled} with {foreign.count(False)} sources", fix="ingest the source it belongs to by itself"
+                f"{spelled} with {foreign.count(False)} sources",
+                fix="ingest the source it belongs to by itself",
             )

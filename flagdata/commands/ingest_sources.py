@@ -37,13 +37,17 @@ def print_results(results: Sequence[IngestResult]) -> None:
 
 
 def _print_result(result: IngestResult, printed: set[tuple[str, str]]) -> None:
-    """One artifact; reasons and notes that were printed of another of the same source are left out."""
+    """One artifact; reasons and notes that were printed of another of the same source are left
+    out."""
     artifact, report = result.artifact, result.report
     if result.healed is not None:
         echo(f"{artifact.id}  {artifact.kind} {artifact.name}: {result.healed.sentence}")
         return
     if not result.created:
-        echo(f"already in the lake: {artifact.id}  {artifact.kind} {artifact.name} (from {artifact.source_name})")
+        echo(
+            f"already in the lake: {artifact.id}  {artifact.kind} {artifact.name} (from "
+            f"{artifact.source_name})"
+        )
         return
     echo(f"{artifact.id}  {artifact.kind} {artifact.name} (from {artifact.source_name})")
     again = 0
@@ -78,9 +82,14 @@ def _lines(report: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 def _mesh_lines(report: Mapping[str, Any]) -> list[tuple[str, str]]:
     rate = "–" if report["rate"] is None else f"{report['rate']:.6g} Hz"
-    vertices, faces = ("–".join(map(str, sorted(set(report[what])))) for what in ("vertices", "faces"))
+    vertices, faces = (
+        "–".join(map(str, sorted(set(report[what])))) for what in ("vertices", "faces")
+    )
     return [
-        ("time", f"{report['first']:.3f} to {report['first'] + report['span']:.3f} s of the simulation"),
+        (
+            "time",
+            f"{report['first']:.3f} to {report['first'] + report['span']:.3f} s of the simulation",
+        ),
         ("frames", f"{report['frames']} at {rate}"),
         ("mesh", f"{vertices} vertices, {faces} faces, {report['topology']} topology"),
     ]
@@ -111,11 +120,16 @@ def _device_lines(report: Mapping[str, Any]) -> list[tuple[str, str]]:
         x, y, width, height = camera["crop"]
         lines.append(("start", f"{camera['start']}, from {camera['start_from']}"))
         lines.append(
-            ("frames", f"{report['frames']} at {rate}, worst stamp error {report['worst_stamp_error'] * 1e3:.3f} ms")
+            (
+                "frames",
+                f"{report['frames']} at {rate}, worst stamp error "
+                f"{report['worst_stamp_error'] * 1e3:.3f} ms",
+            )
         )
         source = (
             f"{camera['width']}×{camera['height']}, container {camera['container_rate']:.6g} Hz, "
-            f"true {camera['true_rate']:.6g} Hz, {'variable' if camera['variable_rate'] else 'constant'} rate; "
+            f"true {camera['true_rate']:.6g} Hz, "
+            f"{'variable' if camera['variable_rate'] else 'constant'} rate; "
             f"crop {width}×{height} at {x},{y}"
         )
         lines.append(("source", source))
@@ -146,7 +160,11 @@ def print_sniffed(entry: Mapping[str, Any]) -> None:
         for note in guess["notes"]:
             echo(f"    not taken or odd: {note}")
         if len(guess["winds"]) > 1:
-            how = "" if guess is entry["guesses"][0] else f" with {command_line('--as', guess['format'])}"
+            how = (
+                ""
+                if guess is entry["guesses"][0]
+                else f" with {command_line('--as', guess['format'])}"
+            )
             winds = ", ".join(guess["winds"])
             echo(f"    {len(guess['winds'])} anemometers, each becomes an artifact{how}: {winds}")
         for doubt in guess["doubts"]:
@@ -161,8 +179,10 @@ def print_sniffed(entry: Mapping[str, Any]) -> None:
     if "camera" in entry:
         seen = entry["camera"]
         echo(
-            f"  {seen['container']} / {seen['codec']}, {seen['width']}×{seen['height']}, {seen['frames']} frames "
-            f"at {seen['rate']:.6g} Hz{' (variable)' if seen['variable_rate'] else ''}, {seen['duration']:.3f} s"
+            f"  {seen['container']} / {seen['codec']}, {seen['width']}×{seen['height']}, "
+            f"{seen['frames']} frames "
+            f"at {seen['rate']:.6g} Hz{' (variable)' if seen['variable_rate'] else ''}, "
+            f"{seen['duration']:.3f} s"
         )
         echo(f"  start: {seen['start'] or 'unknown, give --start'}")
     if "crop" in entry:
@@ -182,7 +202,11 @@ def ingest_sources(lake: Lake, given: IngestRequest, *, as_json: bool) -> None:
     """
     kinds, given = _kinds(given)
     results, failures = _each(
-        given.sources, kinds, lambda source, kind: _one(lake, source, kind, given), print_results, as_json=as_json
+        given.sources,
+        kinds,
+        lambda source, kind: _one(lake, source, kind, given),
+        print_results,
+        as_json=as_json,
     )
     if as_json:
         document(
@@ -217,10 +241,12 @@ def ingest_from_python(chosen: Ingesting) -> tuple[IngestResult, ...]:
 
 
 def _kinds(given: IngestRequest) -> tuple[list[Guess | FlagdataError], IngestRequest]:
-    """Returns what each source is, or why it is not recognised; with the options as they are then read.
+    """Returns what each source is, or why it is not recognised; with the options as they are then
+    read.
 
     Raises:
-        FlagdataError: an option that means nothing for any source, or a source of another kind than all are to be.
+        FlagdataError: an option that means nothing for any source, or a source of another kind than
+            all are to be.
     """
     from flagdata.ingest.classification import classify
 
@@ -264,13 +290,18 @@ def _check_joined(paths: Sequence[Path], kind_of: Callable[[Path], Guess]) -> No
         kind = kind_of(path).kind
         if kind != "camera":
             raise UsageError(
-                f"{_NOT_JOINED.get(kind, 'what is no film')} cannot be joined with others, only video files can",
+                f"{_NOT_JOINED.get(kind, 'what is no film')} cannot be joined with others, only "
+                "video files can",
                 where=str(path),
                 fix=f"ingest each by itself: {command_line('flagdata', 'ingest', *paths)}",
             )
 
 
-_NOT_JOINED = {"anemometer": "a wind log", "meshes": "a folder of meshes", "markers": "a table of markers"}
+_NOT_JOINED = {
+    "anemometer": "a wind log",
+    "meshes": "a folder of meshes",
+    "markers": "a table of markers",
+}
 
 
 def sniff_sources(given: IngestRequest, *, as_json: bool) -> None:
@@ -283,18 +314,29 @@ def sniff_sources(given: IngestRequest, *, as_json: bool) -> None:
 
     topic, encoding = given.wind.wind.topic, given.wind.wind.encoding
     ranked = _recognise_sources(
-        given.sources, lambda source: _complete_guesses(source, guesses(source, topic=topic, encoding=encoding), given)
+        given.sources,
+        lambda source: _complete_guesses(
+            source, guesses(source, topic=topic, encoding=encoding), given
+        ),
     )
-    check_applies([None if isinstance(one, FlagdataError) else one[0].kind for one in ranked], given)
+    check_applies(
+        [None if isinstance(one, FlagdataError) else one[0].kind for one in ranked], given
+    )
     entries, failures = _each(
-        given.sources, ranked, lambda source, found: _look(source, found, given), print_sniffed, as_json=as_json
+        given.sources,
+        ranked,
+        lambda source, found: _look(source, found, given),
+        print_sniffed,
+        as_json=as_json,
     )
     if as_json:
         document("sniff", {"sources": entries, "failures": _failures(failures)})
     _exit_on(failures, given.sources)
 
 
-def _complete_guesses(source: Path, ranked: tuple[Guess, ...], given: IngestRequest) -> tuple[Guess, ...]:
+def _complete_guesses(
+    source: Path, ranked: tuple[Guess, ...], given: IngestRequest
+) -> tuple[Guess, ...]:
     """The guesses, a draft among them completed by the options beside --sniff."""
     from flagdata.ingest.anemometer import complete_guess
 
@@ -308,7 +350,8 @@ def _complete_guesses(source: Path, ranked: tuple[Guess, ...], given: IngestRequ
 
 
 def _look(source: Path, ranked: Sequence[Guess], given: IngestRequest) -> dict[str, Any]:
-    """Guesses at a source; of a camera file, what its headers say and the crop if one was asked for."""
+    """Guesses at a source; of a camera file, what its headers say and the crop if one was asked
+    for."""
     from flagdata.ingest.camera import probe, propose_crop
 
     entry: dict[str, Any] = {"source": str(source), "guesses": [_guess(guess) for guess in ranked]}
@@ -364,7 +407,8 @@ def _each(
     *,
     as_json: bool,
 ) -> tuple[list[Done], list[tuple[Path, FlagdataError]]]:
-    """Act on every source in turn and show it; one that fails leaves the others to go on, unless it is the only one."""
+    """Act on every source in turn and show it; one that fails leaves the others to go on, unless it
+    is the only one."""
     results: list[Done] = []
     failures: list[tuple[Path, FlagdataError]] = []
     for source, found in zip(sources, recognised, strict=True):
@@ -390,9 +434,13 @@ def _failures(failures: Sequence[tuple[Path, FlagdataError]]) -> list[dict[str, 
 
 
 def _exit_on(failures: Sequence[tuple[Path, FlagdataError]], sources: Sequence[Path]) -> None:
-    """Exit naming what failed, if anything did: with the code of the failures where they agree, else with 1."""
+    """Exit naming what failed, if anything did: with the code of the failures where they agree,
+    else with 1."""
     if failures:
-        say(f"flagdata: {len(failures)} of {len(sources)} sources failed: {', '.join(str(s) for s, _ in failures)}")
+        say(
+            f"flagdata: {len(failures)} of {len(sources)} sources failed: "
+            f"{', '.join(str(s) for s, _ in failures)}"
+        )
         codes = {error.exit_code for _, error in failures}
         sys.exit(codes.pop() if len(codes) == 1 else 1)
 
@@ -407,13 +455,21 @@ def _one(lake: Lake, source: Path, kind: Guess, given: IngestRequest) -> tuple[I
         return (ingest_record(lake, source, labels=given.labels, branch=given.chosen.branch),)
     if kind.kind == "markers":
         return ingest_markers(
-            lake, source, given.markers, labels=given.labels, branch=given.chosen.branch, reasons=kind.reasons
+            lake,
+            source,
+            given.markers,
+            labels=given.labels,
+            branch=given.chosen.branch,
+            reasons=kind.reasons,
         )
     if kind.kind == "meshes":
         return (_meshes(lake, source, kind, given),)
     if kind.kind != "camera":
         return given.confirm.answered(lambda answers: _winds(lake, source, _with(given, answers)))
-    with progress(None, label=source.name, unit="frame") as advance, _CropPicture(_picture(given)) as picture:
+    with (
+        progress(None, label=source.name, unit="frame") as advance,
+        _CropPicture(_picture(given)) as picture,
+    ):
         result = ingest_camera(
             lake,
             source,
@@ -438,9 +494,11 @@ def _with(given: IngestRequest, answers: Answers) -> IngestRequest:
 
 
 def _winds(lake: Lake, source: Path, given: IngestRequest) -> tuple[IngestResult, ...]:
-    """The artifact of a log; of a table that holds several anemometers one of each, named by its label.
+    """The artifact of a log; of a table that holds several anemometers one of each, named by its
+    label.
 
-    An anemometer none of whose values can be used is left out, and the report of the first of the others says so.
+    An anemometer none of whose values can be used is left out, and the report of the first of the
+    others says so.
 
     Raises:
         NothingMeasuredError: no value of any of them can be used.
@@ -455,7 +513,14 @@ def _winds(lake: Lake, source: Path, given: IngestRequest) -> tuple[IngestResult
         if one is not None and len(anemometers(source, replace(given.wind.wind, wind=None))) > 1:
             labels = replace(labels, name=f"{stem}:{one}")
         return (
-            ingest_wind(lake, source, given.wind, labels=labels, branch=given.chosen.branch, confirm=given.confirm),
+            ingest_wind(
+                lake,
+                source,
+                given.wind,
+                labels=labels,
+                branch=given.chosen.branch,
+                confirm=given.confirm,
+            ),
         )
     each = [
         (
@@ -466,12 +531,19 @@ def _winds(lake: Lake, source: Path, given: IngestRequest) -> tuple[IngestResult
     ]
     done = ingest_winds(lake, source, each, branch=given.chosen.branch, confirm=given.confirm)
     results = [one for one in done if isinstance(one, IngestResult)]
-    dead = [(label, one) for label, one in zip(found, done, strict=True) if not isinstance(one, IngestResult)]
+    dead = [
+        (label, one)
+        for label, one in zip(found, done, strict=True)
+        if not isinstance(one, IngestResult)
+    ]
     if not results:
         raise dead[0][1]
     left_out = [
         Finding.of(
-            "anemometer-left-out", f"the anemometer {label!r}: {error.what}", where=error.where, fix=error.fix
+            "anemometer-left-out",
+            f"the anemometer {label!r}: {error.what}",
+            where=error.where,
+            fix=error.fix,
         ).as_dict()
         for label, error in dead
     ]
@@ -510,7 +582,10 @@ class _CropPicture:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         if kind is not None and self._written and self._path is not None:
             self._path.unlink(missing_ok=True)

@@ -16,15 +16,19 @@ class Labelling(Reasoned, OnBranch, OnLake):
     """Which artifacts get which labels."""
 
     words: Sequence[str] = argument(
-        "Names or ids of artifacts, and labels as NAME=VALUE.", "ARTIFACT... NAME=VALUE...", nargs=-1
+        "Names or ids of artifacts, and labels as NAME=VALUE.",
+        "ARTIFACT... NAME=VALUE...",
+        nargs=-1,
     )
 
 
 @verb(Labelling, example='flagdata.label(["flag", "usable=true"], lake="field.lake")')
 def label(chosen: Labelling) -> Iterator[Result]:
-    """Put columns of your own on artifacts: NAME=VALUE is a number, true or false, or a text; NAME= takes one off.
+    """Put columns of your own on artifacts: NAME=VALUE is a number, true or false, or a text; NAME=
+    takes one off.
 
-    Queries, exports and pairs have each as the column label_NAME. A recording's labels are its clips', too.
+    Queries, exports and pairs have each as the column label_NAME. A recording's labels are its
+    clips', too.
 
     \b
       flagdata label flag-monday colour=red rating=4 usable=true
@@ -36,7 +40,9 @@ def label(chosen: Labelling) -> Iterator[Result]:
     values = dict(given(word) for word in chosen.words if "=" in word)
     named = [lake.identity(word, at=chosen.branch) for word in chosen.words if "=" not in word]
     if not values or not named:
-        raise UsageError("the artifact or the label is missing", fix="flagdata label ARTIFACT NAME=VALUE")
+        raise UsageError(
+            "the artifact or the label is missing", fix="flagdata label ARTIFACT NAME=VALUE"
+        )
     reason = chosen.message or f"label {', '.join(values)}"
     version, labelled = lake.label(named, values, reason, branch=chosen.branch)
     yield Result("label", {"version": version, "artifacts": sorted(labelled), "labels": values})

@@ -14,7 +14,16 @@ from flagdata.core.printable import SHORT, count_of
 from flagdata.errors import UsageError
 from flagdata.verbs.option_types import POSITIVE
 from flagdata.verbs.shared_options import OnBranch, OnLake, Reasoned
-from flagdata.verbs.verb_options import AsJson, Result, argument, command, option, options, typed_names, verb
+from flagdata.verbs.verb_options import (
+    AsJson,
+    Result,
+    argument,
+    command,
+    option,
+    options,
+    typed_names,
+    verb,
+)
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
@@ -37,7 +46,9 @@ def init(chosen: Making) -> Iterator[Result]:
     from flagdata.lake import Lake
 
     if chosen.folder is not None and "lake" in typed_names(chosen):
-        raise UsageError("two folders are given for one lake", fix="give FOLDER or --lake, not both")
+        raise UsageError(
+            "two folders are given for one lake", fix="give FOLDER or --lake, not both"
+        )
     lake = Lake.create(str(chosen.lake) if chosen.folder is None else chosen.folder)
     yield Result("init", {"lake": str(lake.path), "format_version": FORMAT_VERSION})
     echo(lake.path)
@@ -57,7 +68,9 @@ def log(chosen: Logging) -> Iterator[Result]:
         {
             "version": entry["version"],
             "commit": entry.get("commit"),
-            "time": datetime.fromtimestamp(entry["timestamp"] / 1000, UTC).isoformat(timespec="seconds"),
+            "time": datetime.fromtimestamp(entry["timestamp"] / 1000, UTC).isoformat(
+                timespec="seconds"
+            ),
             "branch": entry.get("branch"),
             "added": int(entry.get("rows", 0)),
             "withdrawn": int(entry.get("withdrawn", 0)),
@@ -80,8 +93,8 @@ class NamingCommand(AsJson, Naming):
 def tag(chosen: NamingCommand) -> None:
     """Name what REF shows, for good; without NAME, list the tags.
 
-    The name of a tag that was deleted never shows anything else. A tag keeps how the clips of its version are divided;
-    --json shows it.
+    The name of a tag that was deleted never shows anything else. A tag keeps how the clips of its
+    version are divided; --json shows it.
     """
     from flagdata.dataset import tagged
 
@@ -90,7 +103,11 @@ def tag(chosen: NamingCommand) -> None:
         version = lake.delete_tag(chosen.name, chosen.message, discard=chosen.discard)
         _report_deletion("tag", chosen.name, version, as_json=chosen.as_json)
         return
-    refs = lake.refs.tags().values() if chosen.name is None else [tagged.tag(lake, chosen.name, at=chosen.at)]
+    refs = (
+        lake.refs.tags().values()
+        if chosen.name is None
+        else [tagged.tag(lake, chosen.name, at=chosen.at)]
+    )
     _print_refs("tags", refs, as_json=chosen.as_json)
 
 
@@ -98,7 +115,8 @@ def tag(chosen: NamingCommand) -> None:
 def branch(chosen: NamingCommand) -> None:
     """Begin a line of work NAME from what REF shows; without NAME, list the branches.
 
-    A branch that is deleted leaves its commits to the log, to its tags and to branches made from it.
+    A branch that is deleted leaves its commits to the log, to its tags and to branches made from
+    it.
     """
     from flagdata.lake.refs import ERASED
 
@@ -126,23 +144,32 @@ class Merging(Reasoned, OnLake):
 
 @verb(Merging, example='flagdata.merge("trial", lake="field.lake")["added"]')
 def merge(chosen: Merging) -> Iterator[Result]:
-    """Commit on main what BRANCH changed since the two were last the same: what it added, and what it withdrew.
+    """Commit on main what BRANCH changed since the two were last the same: what it added, and what
+    it withdrew.
 
     What main withdrew meanwhile stays withdrawn, and is listed where the branch still has it.
     """
     from dataclasses import asdict
 
-    result = chosen.opened().merge(chosen.branch, chosen.message or f"merge {chosen.branch}", into=chosen.into)
+    result = chosen.opened().merge(
+        chosen.branch, chosen.message or f"merge {chosen.branch}", into=chosen.into
+    )
     yield Result("merge", asdict(result))
     for artifact, version in result.left_out.items():
         say(f"stays withdrawn from {chosen.into}: {artifact[:SHORT]}, since version {version}")
     for artifact, version in result.brought_back.items():
-        say(f"comes back to {chosen.into}: {artifact[:SHORT]}, which version {version} had withdrawn")
+        say(
+            f"comes back to {chosen.into}: {artifact[:SHORT]}, which version {version} had "
+            "withdrawn"
+        )
     if result.commit is None:
         echo(f"nothing new on {chosen.branch}")
         return
     withdrawn = f", {len(result.withdrawn)} withdrawn" if result.withdrawn else ""
-    echo(f"version {result.version}: {len(result.added)} added, {len(result.existing)} were there{withdrawn}")
+    echo(
+        f"version {result.version}: {len(result.added)} added, {len(result.existing)} were "
+        f"there{withdrawn}"
+    )
 
 
 @options
@@ -165,9 +192,15 @@ def diff(chosen: Comparing) -> Iterator[Result]:
     added = [relative(row) for row in found.added.to_pylist()]
     removed = [relative(row) for row in found.removed.to_pylist()]
     content = {"before": chosen.before, "after": chosen.after, "added": added, "removed": removed}
-    changed = {"objects_added": list(found.objects_added), "objects_removed": list(found.objects_removed)}
+    changed = {
+        "objects_added": list(found.objects_added),
+        "objects_removed": list(found.objects_removed),
+    }
     yield Result("diff", {**content, **changed})
-    for sign, rows, objects in (("+", added, found.objects_added), ("-", removed, found.objects_removed)):
+    for sign, rows, objects in (
+        ("+", added, found.objects_added),
+        ("-", removed, found.objects_removed),
+    ):
         for row in rows:
             echo(f"{sign} {row['kind']:<11} {row['artifact'][:SHORT]} {row['name']}")
         for name in objects:
@@ -181,24 +214,32 @@ class Withdrawing(OnBranch, OnLake):
 
     artifacts: Sequence[str] = argument("Names or ids.", "ARTIFACTS...", nargs=-1)
     message: str = option("Why.", "--message", "-m")
-    with_descendants: bool = option("Hide all that was made from them as well, directly or not.", default=False)
+    with_descendants: bool = option(
+        "Hide all that was made from them as well, directly or not.", default=False
+    )
     everywhere: bool = option(
-        "Off every branch, and delete their data at once, also where tags and older versions show them.", default=False
+        "Off every branch, and delete their data at once, also where tags and older versions show "
+        "them.",
+        default=False,
     )
 
 
-@verb(Withdrawing, example='flagdata.withdraw(["tunnel"], message="out of focus", lake="field.lake")')
+@verb(
+    Withdrawing, example='flagdata.withdraw(["tunnel"], message="out of focus", lake="field.lake")'
+)
 def withdraw(chosen: Withdrawing) -> Iterator[Result]:
     """Hide artifacts from a branch, a recording with its clips.
 
-    Tags, and the branch that this one began from, keep showing them; gc frees what no ref shows any more. With
-    --everywhere the data are erased, and the rows that tags and older versions keep say by which version.
+    Tags, and the branch that this one began from, keep showing them; gc frees what no ref shows any
+    more. With --everywhere the data are erased, and the rows that tags and older versions keep say
+    by which version.
     """
     lake, branch = chosen.opened(), chosen.branch
     if chosen.everywhere:
         if "branch" in typed_names(chosen):
             raise UsageError(
-                "--everywhere cannot be combined with --branch", fix="leave out --branch: every branch is meant"
+                "--everywhere cannot be combined with --branch",
+                fix="leave out --branch: every branch is meant",
             )
         yield from _erasing(lake, chosen)
         return
@@ -227,7 +268,10 @@ def _erasing(lake: Lake, chosen: Withdrawing) -> Iterator[Result]:
         say(f"its bytes stay: {name}: {why}")
     say(f"not reached from here: {'; '.join(BEYOND)}")
     tags = f"; listed without data by {', '.join(done.tags)}" if done.tags else ""
-    what = f"{count_of(len(done.artifacts), 'artifact')} erased, {count_of(len(done.objects), 'object')} deleted"
+    what = (
+        f"{count_of(len(done.artifacts), 'artifact')} erased, "
+        f"{count_of(len(done.objects), 'object')} deleted"
+    )
     echo(f"version {done.version}: {what}{tags}")
 
 
@@ -275,7 +319,10 @@ def _print_refs(noun: str, refs: Collection[Ref], *, as_json: bool) -> None:
     elif entries:
         table(
             ("name", "created", "shows" if noun == "tags" else "begins at"),
-            [[ref.name, ref.created, " + ".join(f"{p.branch}@{p.version}" for p in ref.view)] for ref in refs],
+            [
+                [ref.name, ref.created, " + ".join(f"{p.branch}@{p.version}" for p in ref.view)]
+                for ref in refs
+            ],
         )
     else:
         say(f"no {noun}")

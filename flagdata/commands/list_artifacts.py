@@ -26,12 +26,15 @@ _INNER = ("recipe", "parameters", "clock_model", "recipe_hash")
 class Listing(AtVersion, OnLake):
     """Which artifacts are listed."""
 
-    kind: str | None = option("Only this kind: camera, wind, recording, clip, meshes, …", default=None, metavar="KIND")
+    kind: str | None = option(
+        "Only this kind: camera, wind, recording, clip, meshes, …", default=None, metavar="KIND"
+    )
 
 
 @verb(Listing, example='flagdata.ls(lake="field.lake", kind="wind")["artifacts"]')
 def ls(chosen: Listing) -> Iterator[Result]:
-    """List artifacts, clips counted only (--kind clip lists them); filters and SQL are `flagdata query`'s."""
+    """List artifacts, clips counted only (--kind clip lists them); filters and SQL are `flagdata
+    query`'s."""
     from flagdata.core.schema import Kind
     from flagdata.errors import UnknownNameError
     from flagdata.lake.matching import matching
@@ -58,7 +61,10 @@ def ls(chosen: Listing) -> Iterator[Result]:
     yield Result("ls", {"at": at, "artifacts": listed, "clips_not_listed": clips})
     header = ("artifact", "kind", "name", "start", "frames", "wind [m/s]", "size", "quality")
     if rows:
-        lines = [_line(row, lost=row["object"] in gone, superseded=row["artifact"] in older) for row in rows]
+        lines = [
+            _line(row, lost=row["object"] in gone, superseded=row["artifact"] in older)
+            for row in rows
+        ]
         table(header, lines)
     more = f" and {count_of(clips, 'clip')} (--kind clip lists them)" if clips else ""
     say(f"{count_of(len(rows), 'artifact')}{more}" if found.num_rows else "no artifacts")
@@ -78,8 +84,8 @@ class Showing(InFull, AtVersion, OnLake):
 def show(chosen: Showing) -> Iterator[Result]:
     """Show one artifact: what it says, what it was made from and what was made from it.
 
-    ARTIFACT is an id or its beginning, a name, the file it came from, or NAME@TAG. Of a verdict or a measurement its
-    sentence comes first, of a network its card.
+    ARTIFACT is an id or its beginning, a name, the file it came from, or NAME@TAG. Of a verdict or
+    a measurement its sentence comes first, of a network its card.
     """
     from flagdata.ingest.before import unconfirmed_findings
     from flagdata.lake.catalog_cells import said
@@ -137,12 +143,16 @@ def show(chosen: Showing) -> Iterator[Result]:
             kinds = Counter(one["kind"] for one in relatives[_MOST:])
             more = ", ".join(count_of(count, kind) for kind, count in sorted(kinds.items()))
             echo(f"{label:<15} … and {more} more (--all lists them)")
-    for finding in (*(row["report"] or {}).get("findings", []), *(finding.as_dict() for finding in doubts)):
+    for finding in (
+        *(row["report"] or {}).get("findings", []),
+        *(finding.as_dict() for finding in doubts),
+    ):
         echo(f"{finding.get('severity', 'note'):<15} {finding.get('kind')}: {finding.get('what')}")
 
 
 def _gist(lake: Lake, row: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """What matters of an artifact of its kind: a sentence of its report, what a model adds, a network's card."""
+    """What matters of an artifact of its kind: a sentence of its report, what a model adds, a
+    network's card."""
     from flagdata.core.schema import Kind
 
     report = row["report"] or {}
@@ -151,7 +161,9 @@ def _gist(lake: Lake, row: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if row["kind"] == Kind.MODEL and row["parameters"]:
         yield "adds", ", ".join(row["parameters"].get("effects", {})) or "nothing to the base model"
     if row["kind"] == Kind.NETWORK and row["object"]:
-        card = json.loads((lake.object_path(row["object"]) / "card.json").read_text(encoding="utf-8"))
+        card = json.loads(
+            (lake.object_path(row["object"]) / "card.json").read_text(encoding="utf-8")
+        )
         size = f"{card['parameters']:,} parameters, {card['epochs']} epochs, seed {card['seed']}"
         yield "card", f"{card['title']}; {size}"
 
@@ -163,9 +175,9 @@ def _line(row: Mapping[str, Any], *, lost: bool, superseded: bool) -> list[objec
 
     wind = "" if row["wind"] is None else f"{row['wind']:.2f}"
     if row["kind"] == Kind.WIND:  # a log's mean, over all of it
-        mean = (column_json(row["report"], "report", artifact=row["artifact"]) if row["report"] else {}).get(
-            "mean_speed"
-        )
+        mean = (
+            column_json(row["report"], "report", artifact=row["artifact"]) if row["report"] else {}
+        ).get("mean_speed")
         wind = "" if mean is None else f"{mean:.2f}"
     if row["wind"] is not None and row["wind_sigma"] is not None:
         wind += f" ± {row['wind_sigma']:.2f}"
@@ -188,4 +200,7 @@ def relative(row: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _plain(row: Mapping[str, Any]) -> dict[str, Any]:
-    return {column: value.isoformat() if isinstance(value, datetime) else value for column, value in row.items()}
+    return {
+        column: value.isoformat() if isinstance(value, datetime) else value
+        for column, value in row.items()
+    }

@@ -30,7 +30,10 @@ class Tracing(InFull, AtVersion, OnLake):
     artifact: str = argument("Its id, name or file.", "ARTIFACT")
     details: bool = option("With recipe hash, code version and seed.", default=False)
     picture: Path | None = option(
-        "Write the lineage as a picture, too: .svg or .png.", default=None, type=LocalPath(), metavar="FILE"
+        "Write the lineage as a picture, too: .svg or .png.",
+        default=None,
+        type=LocalPath(),
+        metavar="FILE",
     )
 
 
@@ -46,7 +49,11 @@ def lineage(chosen: Tracing) -> Iterator[Result]:
     kind = "" if picture is None else picture.suffix.lower()
     if picture is not None:
         if kind not in (".svg", ".png"):
-            raise UsageError("a lineage is drawn as SVG or PNG", where=str(picture), fix="name a .svg or .png file")
+            raise UsageError(
+                "a lineage is drawn as SVG or PNG",
+                where=str(picture),
+                fix="name a .svg or .png file",
+            )
         check_file(picture)
     lake, at = chosen.opened(), chosen.at
     found = ancestry(lake.table(lake.view(at)), lake.identity(chosen.artifact, at=at))
@@ -59,7 +66,10 @@ def lineage(chosen: Tracing) -> Iterator[Result]:
         else:
             write_file(picture, drawn(found, details=details, most=most))
     relatives = [asdict(relative) for relative in found.relatives.values()]
-    yield Result("lineage", {"at": at, "artifact": found.artifact, "relatives": relatives, "edges": found.edges})
+    yield Result(
+        "lineage",
+        {"at": at, "artifact": found.artifact, "relatives": relatives, "edges": found.edges},
+    )
     for text in _lines(found, details=details, most=most):
         echo(text)
 
@@ -103,17 +113,23 @@ class Weighing(OfGarbage, AtVersion, OnLake):
 def du(chosen: Weighing) -> Iterator[Result]:
     """Show what takes space: by kind, by branch and tag, shared or own, and what gc would free.
 
-    With --at the kinds are those of that version alone. A version's own bytes are those that no other branch or tag
-    shows.
+    With --at the kinds are those of that version alone. A version's own bytes are those that no
+    other branch or tag shows.
     """
     from flagdata.lake.collection import usage
 
     found = usage(chosen.opened(), at=chosen.at, grace=timedelta(seconds=chosen.grace))
-    versions = [{**asdict(version), "shared": version.share.size - version.own} for version in found.versions]
+    versions = [
+        {**asdict(version), "shared": version.share.size - version.own}
+        for version in found.versions
+    ]
     shares = {name: asdict(share) for name, share in found.kinds.items()}
     sums = {"total": found.total, "kinds": shares, "versions": versions, "gc_frees": found.freed}
     yield Result("du", {"at": chosen.at, **sums})
-    kinds = [(name, one.artifacts or "", one.objects or "", size_text(one.size)) for name, one in found.kinds.items()]
+    kinds = [
+        (name, one.artifacts or "", one.objects or "", size_text(one.size))
+        for name, one in found.kinds.items()
+    ]
     whole = sum(one.size for one in found.kinds.values())
     table(("kind", "artifacts", "objects", "size"), [*kinds, ("total", "", "", size_text(whole))])
     echo()
@@ -132,7 +148,10 @@ def du(chosen: Weighing) -> Iterator[Result]:
             for version in found.versions
         ],
     )
-    say(f"{size_text(found.total)} in all; gc would free {size_text(found.freed)} (flagdata gc --dry-run lists it)")
+    say(
+        f"{size_text(found.total)} in all; gc would free {size_text(found.freed)} (flagdata gc "
+        "--dry-run lists it)"
+    )
 
 
 @options
@@ -140,17 +159,22 @@ class Viewing(AsJson, OnLake):
     """How a lake is served."""
 
     port: int = option(
-        "On loopback; a free one where none is given.", default=0, type=click.IntRange(0, 65535), show_default=False
+        "On loopback; a free one where none is given.",
+        default=0,
+        type=click.IntRange(0, 65535),
+        show_default=False,
     )
     opens: bool = option("Open the page in the browser.", "--open", default=False)
 
 
 @command(Viewing)
 def view(chosen: Viewing) -> None:
-    """Look at a lake in the browser: artifacts, films beside their winds, alignments, lineages, SQL.
+    """Look at a lake in the browser: artifacts, films beside their winds, alignments, lineages,
+    SQL.
 
-    Prints the address of a page that only this machine can open, and only by the whole address; Ctrl-C ends it. The
-    page changes nothing, loads nothing from elsewhere, and shows what other processes commit when it is reloaded.
+    Prints the address of a page that only this machine can open, and only by the whole address;
+    Ctrl-C ends it. The page changes nothing, loads nothing from elsewhere, and shows what other
+    processes commit when it is reloaded.
     """
     from flagdata.view.server import Server
 

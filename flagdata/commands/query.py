@@ -70,7 +70,9 @@ class QueryCommand(AsJson, Querying):
     """The same on the command line, how long it may take, and what is written."""
 
     where: str | None = option(
-        "SQL condition, e.g. \"kind = 'clip' and wind between 3 and 6\".", default=None, metavar="EXPR"
+        "SQL condition, e.g. \"kind = 'clip' and wind between 3 and 6\".",
+        default=None,
+        metavar="EXPR",
     )
     time_limit: float = option(
         "What the query may take, before it is stopped.",
@@ -78,7 +80,9 @@ class QueryCommand(AsJson, Querying):
         type=click.FloatRange(min=0, min_open=True),
         metavar="SECONDS",
     )
-    arrow: Path | None = option("Write an Arrow IPC file.", default=None, type=LocalPath(), metavar="FILE")
+    arrow: Path | None = option(
+        "Write an Arrow IPC file.", default=None, type=LocalPath(), metavar="FILE"
+    )
     as_csv: bool = option("Comma-separated values on stdout.", "--csv", default=False)
     describe: bool = option("List the columns with their units.", default=False)
 
@@ -87,15 +91,17 @@ class QueryCommand(AsJson, Querying):
 def query(chosen: QueryCommand) -> None:
     """Select rows of the catalog by filter or SQL.
 
-    The SQL is DuckDB's, over one read-only table, catalog. Times are compared through start_time and end_time:
+    The SQL is DuckDB's, over one read-only table, catalog. Times are compared through start_time
+    and end_time:
 
-    \b
-      flagdata query --where "kind = 'clip' and wind between 3 and 6" --order "wind desc"
-      flagdata query --where "start_time >= '2026-05-01 12:00+02:00'" --columns name,wind,wind_sigma
-      flagdata query --sql "select session, count(*) n, avg(wind) wind from catalog group by session" --json
+    \b flagdata query --where "kind = 'clip' and wind between 3 and 6" --order "wind desc" flagdata
+      query --where "start_time >= '2026-05-01 12:00+02:00'" --columns name,wind,wind_sigma flagdata
+      query --sql "select session, count(*) n, avg(wind) wind from catalog group by session" --json
     """
     if sum((chosen.as_json, chosen.as_csv, chosen.arrow is not None)) > 1:
-        raise UsageError("more than one form of output is given", fix="choose one of --json, --csv and --arrow")
+        raise UsageError(
+            "more than one form of output is given", fix="choose one of --json, --csv and --arrow"
+        )
     if chosen.describe:
         _describe(as_json=chosen.as_json)
         return
@@ -130,7 +136,8 @@ def query(chosen: QueryCommand) -> None:
 
 
 def write_arrow(selection: Selection, path: Path) -> int:
-    """Stream a selection into a new Arrow IPC file; the file appears whole or not at all. Returns the rows written.
+    """Stream a selection into a new Arrow IPC file; the file appears whole or not at all. Returns
+    the rows written.
 
     Raises:
         ConflictError: the file is there already.
@@ -158,7 +165,11 @@ def as_document(selection: Selection, *, at: str | None, version: int) -> dict[s
     """
     result = selection.table()
     fields = [
-        {"name": f.name, "type": str(f.type), "unit": (f.metadata or {}).get(b"unit", b"").decode() or None}
+        {
+            "name": f.name,
+            "type": str(f.type),
+            "unit": (f.metadata or {}).get(b"unit", b"").decode() or None,
+        }
         for f in result.schema
     ]
     names = [field["name"] for field in fields]
@@ -205,7 +216,12 @@ def _print_table(catalog: pa.Table | Scan, request: Request) -> None:
     from flagdata.lake.selection import Request, Selection
 
     if request.sql is None and request.columns is None:
-        kinds = Selection(catalog, replace(request, columns=("kind",), limit=None)).table()["kind"].unique().to_pylist()
+        kinds = (
+            Selection(catalog, replace(request, columns=("kind",), limit=None))
+            .table()["kind"]
+            .unique()
+            .to_pylist()
+        )
         shown = replace(request, columns=VIEWS[kinds[0] if len(kinds) == 1 else None])
         short = True
     else:
@@ -217,10 +233,18 @@ def _print_table(catalog: pa.Table | Scan, request: Request) -> None:
     if not total:
         say(f"no rows of {Selection(catalog, Request()).total():,} match")
         return
-    header = [f"{f.name} [{unit}]" if (unit := _unit(f)) and not _is_instant(f) else f.name for f in result.schema]
+    header = [
+        f"{f.name} [{unit}]" if (unit := _unit(f)) and not _is_instant(f) else f.name
+        for f in result.schema
+    ]
     columns = [
-        [iso(value) if _is_instant(f) and value is not None else _cell(value, short=short) for value in column]
-        for f, column in zip(result.schema, (column.to_pylist() for column in result.columns), strict=True)
+        [
+            iso(value) if _is_instant(f) and value is not None else _cell(value, short=short)
+            for value in column
+        ]
+        for f, column in zip(
+            result.schema, (column.to_pylist() for column in result.columns), strict=True
+        )
     ]
     table(header, zip(*columns, strict=True))
     if result.num_rows < total:
@@ -238,7 +262,8 @@ def _is_instant(field: pa.Field) -> bool:
 
 
 def _cell(value: Any, *, short: bool) -> str | None:
-    """A cell for people: floats to 4 digits, times to milliseconds, lists by commas, identities cut if `short`."""
+    """A cell for people: floats to 4 digits, times to milliseconds, lists by commas, identities cut
+    if `short`."""
     if isinstance(value, datetime):
         return value.isoformat(timespec="milliseconds").replace("+00:00", "Z")
     value = plain(value)
@@ -246,7 +271,12 @@ def _cell(value: Any, *, short: bool) -> str | None:
         return f"{value:.4g}"
     if isinstance(value, list):
         return ",".join(str(item) for item in value)
-    if short and isinstance(value, str) and len(value) == 32 and not value.strip("0123456789abcdef"):
+    if (
+        short
+        and isinstance(value, str)
+        and len(value) == 32
+        and not value.strip("0123456789abcdef")
+    ):
         return value[:SHORT]
     return None if value is None else str(value)
 
@@ -256,9 +286,12 @@ def _describe(*, as_json: bool) -> None:
 
     if as_json:
         columns = [
-            {"name": name, "type": str(f.type), "unit": f.unit or None, "about": f.about} for name, f in COLUMNS.items()
+            {"name": name, "type": str(f.type), "unit": f.unit or None, "about": f.about}
+            for name, f in COLUMNS.items()
         ]
         document("columns", {"columns": columns})
         return
-    rows: Iterable[Sequence[object]] = [(name, str(f.type), f.unit, f.about) for name, f in COLUMNS.items()]
+    rows: Iterable[Sequence[object]] = [
+        (name, str(f.type), f.unit, f.about) for name, f in COLUMNS.items()
+    ]
     table(("column", "type", "unit", "about"), rows)

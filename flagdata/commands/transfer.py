@@ -41,7 +41,8 @@ class Cloning:
 def push(chosen: Pushing) -> Iterator[Result]:
     """Move the versions that TARGET lacks to it, with their tags, branches and data.
 
-    TARGET is a folder or s3://bucket/prefix with a clone of this lake, or the lake that this one is a clone of. Data
+    TARGET is a folder or s3://bucket/prefix with a clone of this lake, or the lake that this one is
+    a clone of. Data
     are found by their hash: what is there is not moved again, and a push that was stopped goes on.
     """
     from flagdata.lake import Lake
@@ -53,21 +54,25 @@ def push(chosen: Pushing) -> Iterator[Result]:
 
 @verb(Pulling, example='flagdata.pull("s3://bucket/field", lake="field.lake")["versions"]')
 def pull(chosen: Pulling) -> Iterator[Result]:
-    """Bring the versions of SOURCE that this lake lacks in, with their tags, branches and data; push's opposite.
+    """Bring the versions of SOURCE that this lake lacks in, with their tags, branches and data;
+    push's opposite.
 
-    Where SOURCE is behind, as a backup of this lake is, it has nothing new. What this lake lost, or what verify found
-    damaged, is taken from it; flagdata heal compares all data before.
+    Where SOURCE is behind, as a backup of this lake is, it has nothing new. What this lake lost, or
+    what verify found damaged, is taken from it; flagdata heal compares all data before.
     """
     from flagdata.lake import Lake
     from flagdata.lake.copying import pull as pulled
 
     lake = chosen.opened()
-    yield from _reporting("pull", str(lake.path), pulled(Lake.open(chosen.source), lake, bars=progress))
+    yield from _reporting(
+        "pull", str(lake.path), pulled(Lake.open(chosen.source), lake, bars=progress)
+    )
 
 
 @verb(Cloning, example='flagdata.clone("s3://bucket/field", "field.lake")["head"]')
 def clone(chosen: Cloning) -> Iterator[Result]:
-    """Make a lake at TARGET with all versions, tags and branches of SOURCE; each a folder or s3://bucket/prefix.
+    """Make a lake at TARGET with all versions, tags and branches of SOURCE; each a folder or
+    s3://bucket/prefix.
 
     Where it was stopped, flagdata push TARGET --lake SOURCE goes on with it.
     """
@@ -97,5 +102,8 @@ def _reporting(tag: str, address: str, done: Transfer) -> Iterator[Result]:
     for taken in done.healed:
         say(f"{taken.kind} {taken.name}: {taken.why}")
     refs = f", {count_of(len(done.refs), 'ref')} ({', '.join(done.refs)})" if done.refs else ""
-    say(f"{count_of(done.versions, 'version')}, {count_of(len(done.objects), 'object')}, {size_text(done.size)}{refs}")
+    say(
+        f"{count_of(done.versions, 'version')}, {count_of(len(done.objects), 'object')}, "
+        f"{size_text(done.size)}{refs}"
+    )
     echo(f"{address} is at version {done.head}")

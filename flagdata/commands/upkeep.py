@@ -24,12 +24,15 @@ _GATE_NOT_MET = 3
 class Verifying(OnLake):
     """How much of a lake is re-hashed."""
 
-    sample: int | None = option("So many objects drawn at random, instead of all.", default=None, type=POSITIVE)
+    sample: int | None = option(
+        "So many objects drawn at random, instead of all.", default=None, type=POSITIVE
+    )
 
 
 @verb(Verifying, example='flagdata.verify(lake="field.lake")["healthy"]')
 def verify(chosen: Verifying) -> Iterator[Result]:
-    """Re-hash the catalog's files and every object; exits with 3 when one is missing or has changed."""
+    """Re-hash the catalog's files and every object; exits with 3 when one is missing or has
+    changed."""
     from flagdata.lake.health import object_names, read_refs, sample_names, verify_catalog
     from flagdata.lake.health import verify as verified
 
@@ -41,7 +44,9 @@ def verify(chosen: Verifying) -> Iterator[Result]:
     with progress(len(drawn), label="verify", unit="object") as advance:
         findings += verified(lake, drawn, refs, advance=advance)
     hashed = len(drawn) - sum(finding.kind == "object-missing" for finding in findings)
-    yield from _concluding("verify", findings, f"{hashed} of {count_of(len(names), 'object')} re-hashed")
+    yield from _concluding(
+        "verify", findings, f"{hashed} of {count_of(len(names), 'object')} re-hashed"
+    )
 
 
 @options
@@ -49,7 +54,10 @@ class Examining(OfGarbage, OnLake):
     """What is examined, and how thoroughly."""
 
     source: Path | str | None = argument(
-        "An MCAP file or a LeRobot data set, instead of a lake.", "[SOURCE]", default=None, type=LocalPath()
+        "An MCAP file or a LeRobot data set, instead of a lake.",
+        "[SOURCE]",
+        default=None,
+        type=LocalPath(),
     )
     deep: bool = option("Re-hash the catalog's files and every object, too.", default=False)
 
@@ -58,12 +66,15 @@ class Examining(OfGarbage, OnLake):
 def doctor(chosen: Examining) -> Iterator[Result]:
     """Find and explain what is wrong with a lake; exits with 3 when there is something to act on.
 
-    With SOURCE, an MCAP file or a LeRobot data set of another program, that is examined instead: stamps in order,
-    rates, gaps, and what an ingest would leave out.
+    With SOURCE, an MCAP file or a LeRobot data set of another program, that is examined instead:
+    stamps in order, rates, gaps, and what an ingest would leave out.
     """
     if chosen.source is not None:
         if chosen.deep:
-            raise UsageError("--deep cannot be combined with a SOURCE", fix="leave it out: stamps are all that is read")
+            raise UsageError(
+                "--deep cannot be combined with a SOURCE",
+                fix="leave it out: stamps are all that is read",
+            )
         yield from _examining(local_path(chosen.source))
         return
     from flagdata.core.schema import Kind
@@ -80,7 +91,9 @@ def doctor(chosen: Examining) -> Iterator[Result]:
         findings += unconfirmed_findings(Artifact.from_row(row) for row in winds)
     checked = "structure checked, contents not (flagdata verify)"
     if chosen.deep:
-        findings += tuple(f for f in catalog_files(lake) if f.kind not in {found.kind for found in findings})
+        findings += tuple(
+            f for f in catalog_files(lake) if f.kind not in {found.kind for found in findings}
+        )
         names = [stored.name for stored in lake.objects]
         with progress(len(names), label="re-hash", unit="object") as advance:
             known = {(f.kind, f.where) for f in findings}
@@ -118,16 +131,20 @@ def _examining(source: Path) -> Iterator[Result]:
 class Healing(OnLake):
     """Where what a lake lost is taken from."""
 
-    source: str = argument("A clone or a backup of this lake: a folder, or s3://bucket/prefix.", "FROM")
+    source: str = argument(
+        "A clone or a backup of this lake: a folder, or s3://bucket/prefix.", "FROM"
+    )
 
 
 @verb(Healing, example='flagdata.heal("backup.lake", lake="field.lake")["left"]')
 def heal(chosen: Healing) -> Iterator[Result]:
     """Take what is damaged or missing in this lake from FROM; exits with 3 when something is left.
 
-    FROM is a clone or a backup of this lake, older or newer, or the lake that this one is a clone of. It may be damaged
-    itself: what is right by its hash is taken. What is whole here stays, and nothing newer comes in. All data of this
-    lake are compared with their hashes. A heal that was stopped goes on when it is given again.
+    FROM is a clone or a backup of this lake, older or newer, or the lake that this one is a clone
+    of. It may be damaged
+    itself: what is right by its hash is taken. What is whole here stays, and nothing newer comes
+    in. All data of this lake are compared with their hashes. A heal that was stopped goes on when
+    it is given again.
     """
     from dataclasses import asdict
 
@@ -146,7 +163,10 @@ def heal(chosen: Healing) -> Iterator[Result]:
         echo(f"{taken.kind} {taken.name}: {taken.why}")
     _print(done.left)
     size = size_text(sum(taken.size for taken in done.taken))
-    say(f"{count_of(len(done.taken), 'item')} taken, {size}; {len(done.left) or 'nothing'} still damaged")
+    say(
+        f"{count_of(len(done.taken), 'item')} taken, {size}; {len(done.left) or 'nothing'} still "
+        "damaged"
+    )
 
 
 @options
@@ -174,12 +194,20 @@ def gc(chosen: Collecting) -> Iterator[Result]:
     for name in (*found.objects, *map(str, found.leftovers), *map(str, found.uploads)):
         echo(name)
     verb = "would be deleted" if dry_run else "deleted"
-    what = f"{count_of(len(found.objects), 'object')} and {count_of(len(found.leftovers), 'leftover')}"
+    what = (
+        f"{count_of(len(found.objects), 'object')} and {count_of(len(found.leftovers), 'leftover')}"
+    )
     say(f"{what}, {size_text(found.size)}, {verb}")
     if found.uploads:
-        say(f"{count_of(len(found.uploads), 'unfinished upload')} {'would be aborted' if dry_run else 'aborted'}")
+        say(
+            f"{count_of(len(found.uploads), 'unfinished upload')} "
+            f"{'would be aborted' if dry_run else 'aborted'}"
+        )
     if found.unlisted is not None:
-        say(f"the store does not say which uploads are unfinished: {found.unlisted.strerror}", mark="note")
+        say(
+            f"the store does not say which uploads are unfinished: {found.unlisted.strerror}",
+            mark="note",
+        )
 
 
 @options
@@ -187,17 +215,22 @@ class Expiring(Reasoned, Rehearsed, OnLake):
     """Which versions expire."""
 
     older_than: float | None = option(
-        "Versions that another replaced so long ago [s]: 30d.", default=None, type=DURATION, metavar="AGE"
+        "Versions that another replaced so long ago [s]: 30d.",
+        default=None,
+        type=DURATION,
+        metavar="AGE",
     )
-    keep: int | None = option("All but the newest N versions.", default=None, type=POSITIVE, metavar="N")
+    keep: int | None = option(
+        "All but the newest N versions.", default=None, type=POSITIVE, metavar="N"
+    )
 
 
 @verb(Expiring, example='flagdata.expire(lake="field.lake", keep=20)["objects"]')
 def expire(chosen: Expiring) -> Iterator[Result]:
     """Let old versions expire: delete the data that no other version, branch or tag shows, at once.
 
-    The log keeps which versions expired, why, and what went; ls, export and doctor say so. With both options the
-    versions expire that both name. Catalog rows stay readable.
+    The log keeps which versions expired, why, and what went; ls, export and doctor say so. With
+    both options the versions expire that both name. Catalog rows stay readable.
     """
     from dataclasses import asdict
 
@@ -205,7 +238,9 @@ def expire(chosen: Expiring) -> Iterator[Result]:
     from flagdata.lake.removal import last_version
 
     if chosen.older_than is None and chosen.keep is None:
-        raise UsageError("which versions expire is not given", fix="give --older-than AGE, --keep N, or both")
+        raise UsageError(
+            "which versions expire is not given", fix="give --older-than AGE, --keep N, or both"
+        )
     lake, dry_run = chosen.opened(), chosen.dry_run
     older_than = None if chosen.older_than is None else timedelta(seconds=chosen.older_than)
     last = last_version(lake, older_than=older_than, keep=chosen.keep)
@@ -233,14 +268,17 @@ class Recovering(OnLake):
 def recover(chosen: Recovering) -> Iterator[Result]:
     """Salvage what a cut-off or damaged record still holds.
 
-    SOURCE is an .mcap file or an object of the lake (mcap/…); all that can be read goes to the new file TARGET.
+    SOURCE is an .mcap file or an object of the lake (mcap/…); all that can be read goes to the new
+    file TARGET.
     """
     from flagdata.core.files.outputs import fresh_file
     from flagdata.lake.artifact import OBJECT_NAME
     from flagdata.record import salvage
 
     source, target = str(chosen.source), local_path(chosen.target)
-    path = chosen.opened().object_path(source) if OBJECT_NAME.fullmatch(source) else local_path(source)
+    path = (
+        chosen.opened().object_path(source) if OBJECT_NAME.fullmatch(source) else local_path(source)
+    )
     check_input(path, noun="record")
     with fresh_file(target) as scratch:
         findings = salvage(path, scratch)
@@ -254,7 +292,11 @@ def _concluding(tag: str, findings: Sequence[Finding], checked: str) -> Iterator
     from flagdata.lake.health import is_healthy
 
     healthy = is_healthy(findings)
-    content = {"healthy": healthy, "checked": checked, "findings": [finding.as_dict() for finding in findings]}
+    content = {
+        "healthy": healthy,
+        "checked": checked,
+        "findings": [finding.as_dict() for finding in findings],
+    }
     yield Result(tag, content, 0 if healthy else _GATE_NOT_MET)
     _print_health(findings, checked)
 

@@ -1,8 +1,10 @@
-"""Arguments of public calls: numbers and paths of other libraries become Python's own, or are refused in a sentence.
+"""Arguments of public calls: numbers and paths of other libraries become Python's own, or are
+refused in a sentence.
 
-NumPy's `int64(3)`, torch's `tensor(3)` and pandas' values compare equal to 3, and yet hash, print and serialise as
-something else: a seed of that kind gave another order. `check_arguments` reads the annotations of a call, so that every
-parameter that says `int` takes every whole number, and means the same by it.
+NumPy's `int64(3)`, torch's `tensor(3)` and pandas' values compare equal to 3, and yet hash, print
+and serialise as
+something else: a seed of that kind gave another order. `check_arguments` reads the annotations of a
+call, so that every parameter that says `int` takes every whole number, and means the same by it.
 """
 
 from __future__ import annotations
@@ -37,14 +39,16 @@ def whole(value: object, name: str) -> int:
         name: of the argument, for the error message.
 
     Raises:
-        UsageError: a truth value, a text, a number with a point, a length of time, or several numbers.
+        UsageError: a truth value, a text, a number with a point, a length of time, or several
+            numbers.
     """
     with _refusing(value, name, "whole number", "give one such as 3, without a point or quotes"):
         return operator.index(value)  # type: ignore[arg-type]
 
 
 def real(value: object, name: str) -> float:
-    """Converts a number of Python, Numpy, torch or pandas to Python's own; whole numbers stay whole.
+    """Converts a number of Python, Numpy, torch or pandas to Python's own; whole numbers stay
+    whole.
 
     Raises:
         UsageError: a truth value, a text, a time, or several numbers.
@@ -69,9 +73,11 @@ def _refusing(value: object, name: str, noun: str, fix: str) -> Iterator[None]:
 
 
 def plain(value: Any) -> Any:
-    """Converts a value whose numbers, alone or within tables and lists, become Python's own; arrays stay what they are.
+    """Converts a value whose numbers, alone or within tables and lists, become Python's own; arrays
+    stay what they are.
 
-    A number of 32 bits or fewer is the one that it prints: `float32(0.2)` is 0.2, not 0.20000000298.
+    A number of 32 bits or fewer is the one that it prints: `float32(0.2)` is 0.2, not
+    0.20000000298.
     """
     if isinstance(value, Mapping):
         return {key: plain(item) for key, item in value.items()}
@@ -86,15 +92,17 @@ def plain(value: Any) -> Any:
 def check_arguments(call: Callable[P, R]) -> Callable[P, R]:
     """Wraps a public call so that its arguments are made plain, each by its annotation.
 
-    `int` and `float` take the numbers of other libraries, `tuple[int, int]` as many of them, `Path` whatever names a
-    path, `str` texts alone, and tables keep no number of another library.
+    `int` and `float` take the numbers of other libraries, `tuple[int, int]` as many of them, `Path`
+    whatever names a path, `str` texts alone, and tables keep no number of another library.
 
     Raises:
         UsageError: when the call is made with a value that is none of its kind.
     """
     signature = inspect.signature(call)
     kinds = {name: str(parameter.annotation) for name, parameter in signature.parameters.items()}
-    converts = {name: convert for name, kind in kinds.items() if (convert := converter(kind)) is not None}
+    converts = {
+        name: convert for name, kind in kinds.items() if (convert := converter(kind)) is not None
+    }
 
     @functools.wraps(call)
     def door(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -118,7 +126,10 @@ def converter(annotation: str) -> Convert | None:
     elif kinds and set(kinds[1:]) <= {"str"} and (numbers := _TUPLE.fullmatch(kinds[0])):
         convert_number = whole if numbers["kind"] == "int" else real
         convert = functools.partial(
-            _several, convert_number=convert_number, count=1 + numbers["more"].count(","), text="str" in kinds
+            _several,
+            convert_number=convert_number,
+            count=1 + numbers["more"].count(","),
+            text="str" in kinds,
         )
     elif kinds == ["str"]:
         convert = _text
@@ -144,7 +155,12 @@ def _plain(value: object, name: str) -> Any:
 
 
 def _several(
-    values: object, name: str, *, convert_number: Callable[[object, str], Any], count: int, text: bool = False
+    values: object,
+    name: str,
+    *,
+    convert_number: Callable[[object, str], Any],
+    count: int,
+    text: bool = False,
 ) -> Any:
     if text and isinstance(values, str):
         return str(values)

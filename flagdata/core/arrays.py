@@ -1,5 +1,5 @@
-"""Types of arrays by their elements, and NumPy's archives of arrays (.npz), read where they unpack to what can be held
-in memory."""
+"""Types of arrays by their elements, and NumPy's archives of arrays (.npz), read where they unpack
+to what can be held in memory."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ AnyArray: TypeAlias = NDArray[Any]
 HELD = 256 << 20
 """Most bytes that an archive may unpack to."""
 EXPANSION = 20
-"""Most times its own size that a larger archive may unpack to: numbers that were measured or simulated take 1 to 3."""
+"""Most times its own size that a larger archive may unpack to: numbers that were measured or
+simulated take 1 to 3."""
 
 
 def read_arrays(path: Path, *, what: str, fix: str) -> dict[str, AnyArray]:
@@ -43,7 +44,11 @@ def read_arrays(path: Path, *, what: str, fix: str) -> dict[str, AnyArray]:
                 size = sum(entry.file_size for entry in archive.infolist())
             most = max(HELD, EXPANSION * path.stat().st_size)
             if size > most:
-                raise LimitError(f"{what} unpacks to {size} bytes", where=where, fix=f"at most {most} are read: {fix}")
+                raise LimitError(
+                    f"{what} unpacks to {size} bytes",
+                    where=where,
+                    fix=f"at most {most} are read: {fix}",
+                )
             stream.seek(0)
             with np.load(stream, allow_pickle=False) as content:
                 return {name: np.asarray(content[name]) for name in content.files}

@@ -1,14 +1,33 @@
-"""Points of the compass as logs write them: letters and words of several languages, in degrees clockwise from north.
+"""Points of the compass as logs write them: letters and words of several languages, in degrees
+clockwise from north.
 
-A letter may be the west of one language and the east of another: O is Ost in German and Oeste in Spanish. So each
-language is a table of its own, and a column of points has the table's name as its unit.
+A letter may be the west of one language and the east of another: O is Ost in German and Oeste in
+Spanish. So each language is a table of its own, and a column of points has the table's name as its
+unit.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-_ROSE = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW")
+_ROSE = (
+    "N",
+    "NNE",
+    "NE",
+    "ENE",
+    "E",
+    "ESE",
+    "SE",
+    "SSE",
+    "S",
+    "SSW",
+    "SW",
+    "WSW",
+    "W",
+    "WNW",
+    "NW",
+    "NNW",
+)
 _POINT = 22.5
 _DEGREES = {name: number * _POINT for number, name in enumerate(_ROSE)}
 _WORDS: dict[str, tuple[str, str, str, str]] = {
@@ -38,7 +57,8 @@ _JOINED = {
 
 
 def _spell_points(words: Sequence[str]) -> dict[str, float]:
-    """Spells every point in the words for north, east, south and west, joined by nothing, a blank or a hyphen."""
+    """Spells every point in the words for north, east, south and west, joined by nothing, a blank
+    or a hyphen."""
     of = dict(zip("NESW", words, strict=True))
     points: dict[str, float] = {}
     for point, degrees in _DEGREES.items():
@@ -52,7 +72,12 @@ def _spell_points(words: Sequence[str]) -> dict[str, float]:
 def _iberian() -> dict[str, float]:
     """Spells NORESTE, SUROESTE, NORDESTE, ESTENORESTE and the like."""
     ends = {"E": "ESTE", "W": "OESTE"}
-    between = {start + ends[east]: side + east for start, side in _JOINED.items() if side in "NS" for east in ends}
+    between = {
+        start + ends[east]: side + east
+        for start, side in _JOINED.items()
+        if side in "NS"
+        for east in ends
+    }
     points = {name: _DEGREES[point] for name, point in between.items()}
     for name, point in between.items():
         for start, side in _JOINED.items():
@@ -63,8 +88,8 @@ def _iberian() -> dict[str, float]:
 
 
 def _russian() -> dict[str, float]:
-    """Spells СЕВЕРО-ВОСТОК, of the wind СЕВЕРО-ВОСТОКА, as the weather pages rp5 say "Ветер, дующий с
-    северо-востока"."""
+    """Spells СЕВЕРО-ВОСТОК, of the wind СЕВЕРО-ВОСТОКА, as the weather pages rp5 say "Ветер, дующий
+    с северо-востока"."""
     of = {"N": "СЕВЕР", "E": "ВОСТОК", "S": "ЮГ", "W": "ЗАПАД"}
     points: dict[str, float] = {}
     for point, degrees in _DEGREES.items():
@@ -74,7 +99,8 @@ def _russian() -> dict[str, float]:
 
 
 def _blowing() -> dict[str, float]:
-    """Spells WIND BLOWING FROM THE SOUTH-SOUTHWEST or NORTH-EAST, as the weather pages rp5 say in English."""
+    """Spells WIND BLOWING FROM THE SOUTH-SOUTHWEST or NORTH-EAST, as the weather pages rp5 say in
+    English."""
     of = dict(zip("NESW", _WORDS["en"], strict=True))
     points: dict[str, float] = {}
     for point, degrees in _DEGREES.items():
@@ -85,12 +111,14 @@ def _blowing() -> dict[str, float]:
 
 
 def _polish() -> dict[str, float]:
-    """Spells PN., PN.-ZACH. and ZACH.PN.-ZACH., as Polish shortens północ, południe, wschód and zachód; the dots may
-    lack."""
+    """Spells PN., PN.-ZACH. and ZACH.PN.-ZACH., as Polish shortens północ, południe, wschód and
+    zachód; the dots may lack."""
     of = {"N": "PN.", "E": "WSCH.", "S": "PD.", "W": "ZACH."}
     points: dict[str, float] = {}
     for point, degrees in _DEGREES.items():
-        name = "".join(of[letter] for letter in point[:-2]) + "-".join(of[letter] for letter in point[-2:])
+        name = "".join(of[letter] for letter in point[:-2]) + "-".join(
+            of[letter] for letter in point[-2:]
+        )
         points |= dict.fromkeys((name, name.replace(".", "")), degrees)
     return points
 
@@ -114,7 +142,9 @@ _NAMES: dict[str, float] = (
     | _blowing()
     | _polish()
 )
-_COMMON = _NAMES | _FAR_EAST | {name.replace("東", "东"): degrees for name, degrees in _FAR_EAST.items()}
+_COMMON = (
+    _NAMES | _FAR_EAST | {name.replace("東", "东"): degrees for name, degrees in _FAR_EAST.items()}
+)
 
 POINTS: Mapping[str, float] = _COMMON | _DEGREES
 """English letters, and the words of all languages: "points"."""
@@ -186,7 +216,8 @@ CALM = STILL | {
 
 
 def table_of(cells: Sequence[str], *, heading: str, share: float) -> str | None:
-    """Names the unit of a column of points of the compass; `None` where it holds something else, or two may be meant.
+    """Names the unit of a column of points of the compass; `None` where it holds something else, or
+    two may be meant.
 
     Args:
         cells: trimmed, without those that are missing.
@@ -197,12 +228,18 @@ def table_of(cells: Sequence[str], *, heading: str, share: float) -> str | None:
     if not filled:
         return None
     fitting = [
-        unit for unit, points in BY_UNIT.items() if sum(cell in points for cell in filled) >= share * len(filled)
+        unit
+        for unit, points in BY_UNIT.items()
+        if sum(cell in points for cell in filled) >= share * len(filled)
     ]
     if not fitting:
         return None
     kinds = {cell for cell in filled if any(cell in BY_UNIT[unit] for unit in fitting)}
-    if "points" in fitting or all(len({BY_UNIT[unit].get(cell) for unit in fitting}) == 1 for cell in kinds):
+    if "points" in fitting or all(
+        len({BY_UNIT[unit].get(cell) for unit in fitting}) == 1 for cell in kinds
+    ):
         return fitting[0]
-    named_by_heading = [unit for unit in fitting if any(word in heading.lower() for word in _HEADINGS.get(unit, ()))]
+    named_by_heading = [
+        unit for unit in fitting if any(word in heading.lower() for word in _HEADINGS.get(unit, ()))
+    ]
     return named_by_heading[0] if named_by_heading else None

@@ -1,8 +1,10 @@
-"""The command line's manners: results on stdout, all else on stderr, JSON with a schema tag, exit codes.
+"""The command line's manners: results on stdout, all else on stderr, JSON with a schema tag, exit
+codes.
 
-All that a terminal is given goes through this module. Files and lakes of other users name things, and a name may hold
-what a terminal obeys: control characters, marks of direction, line ends that would forge a line. They are escaped here,
-so that no command has to think of it.
+All that a terminal is given goes through this module. Files and lakes of other users name things,
+and a name may hold
+what a terminal obeys: control characters, marks of direction, line ends that would forge a line.
+They are escaped here, so that no command has to think of it.
 """
 
 from __future__ import annotations
@@ -29,10 +31,15 @@ from flagdata.storage import Place, StoreError
 
 
 class LocalPath(click.Path):
-    """A path on the command line, a `Path` afterwards; the address of a storage or stream is refused as what it is."""
+    """A path on the command line, a `Path` afterwards; the address of a storage or stream is
+    refused as what it is."""
 
-    def __init__(self, *, exists: bool = False, file_okay: bool = True, dir_okay: bool = True) -> None:
-        super().__init__(exists=exists, file_okay=file_okay, dir_okay=dir_okay, readable=False, path_type=Path)
+    def __init__(
+        self, *, exists: bool = False, file_okay: bool = True, dir_okay: bool = True
+    ) -> None:
+        super().__init__(
+            exists=exists, file_okay=file_okay, dir_okay=dir_okay, readable=False, path_type=Path
+        )
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         path = local_path(value)
@@ -47,7 +54,9 @@ class LakePlace(click.ParamType):
 
     name = "lake"
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Place:
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Place:
         return lake_place(value)
 
 
@@ -75,10 +84,13 @@ def echo_lines(text: str, *, aside: bool = False) -> None:
 
 
 def csv_rows(rows: Iterable[Sequence[object]]) -> None:
-    """Writes a result as CSV: to a file or another program as it is, to a terminal as other text."""
+    """Writes a result as CSV: to a file or another program as it is, to a terminal as other
+    text."""
     writer = csv.writer(sys.stdout, lineterminator="\n")
     if sys.stdout.isatty():
-        rows = ([printable(cell) if isinstance(cell, str) else cell for cell in row] for row in rows)
+        rows = (
+            [printable(cell) if isinstance(cell, str) else cell for cell in row] for row in rows
+        )
     writer.writerows(rows)
 
 
@@ -91,16 +103,20 @@ _COLOURS = {"warning": "yellow", "error": "red", "flagdata": "red"}
 
 
 def say(text: str, *, mark: str | None = None) -> None:
-    """Writes a text for people to stderr, further lines indented, so that none is taken for a message of its own.
+    """Writes a text for people to stderr, further lines indented, so that none is taken for a
+    message of its own.
 
     Args:
-        mark: "note", "warning" or "error" before it, or "flagdata" before the error that ends a command: in colour on a
-            terminal, unless the environment variable NO_COLOR is set.
+        mark: "note", "warning" or "error" before it, or "flagdata" before the error that ends a
+            command: in colour on a terminal, unless the environment variable NO_COLOR is set.
     """
     message = _indent_lines(text)
     if mark is not None:
         coloured = mark in _COLOURS and not os.environ.get("NO_COLOR")
-        message = f"{click.style(f'{mark}:', fg=_COLOURS[mark], bold=True) if coloured else f'{mark}:'} {message}"
+        message = (
+            f"{click.style(f'{mark}:', fg=_COLOURS[mark], bold=True) if coloured else f'{mark}:'} "
+            f"{message}"
+        )
     click.echo(message, err=True)  # which takes the colour out where stderr is no terminal
 
 
@@ -132,9 +148,13 @@ def table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
     body = [["" if cell is None else printable(str(cell)) for cell in row] for row in rows]
     header = list(map(printable, header))
     widths = [max(len(r[i]) for r in [header, *body]) for i in range(len(header))]
-    numeric = [all(_is_number(r[i]) for r in body if r[i]) and bool(body) for i in range(len(header))]
+    numeric = [
+        all(_is_number(r[i]) for r in body if r[i]) and bool(body) for i in range(len(header))
+    ]
     for row in [header, *body]:
-        cells = [c.rjust(w) if n else c.ljust(w) for c, w, n in zip(row, widths, numeric, strict=True)]
+        cells = [
+            c.rjust(w) if n else c.ljust(w) for c, w, n in zip(row, widths, numeric, strict=True)
+        ]
         click.echo("  ".join(cells).rstrip())
 
 
@@ -148,12 +168,21 @@ def _is_number(text: str) -> bool:
 
 @contextmanager
 def progress(total: int | None, label: str, unit: str) -> Iterator[Callable[[int], None]]:
-    """Shows a bar on stderr for anything that takes longer than two seconds; yields a function that advances it."""
+    """Shows a bar on stderr for anything that takes longer than two seconds; yields a function that
+    advances it."""
     from tqdm import tqdm
 
-    interval = 0.2 if sys.stderr.isatty() else 10.0  # a log file gets a line now and then, not an animation
+    interval = (
+        0.2 if sys.stderr.isatty() else 10.0
+    )  # a log file gets a line now and then, not an animation
     with tqdm(
-        total=total, desc=printable(label), unit=unit, delay=2, mininterval=interval, file=sys.stderr, ncols=100
+        total=total,
+        desc=printable(label),
+        unit=unit,
+        delay=2,
+        mininterval=interval,
+        file=sys.stderr,
+        ncols=100,
     ) as bar:
 
         def advance(count: int = 1) -> None:
@@ -169,7 +198,9 @@ def foreseen(error: Exception) -> FlagdataError:
     if isinstance(error, ImportError) and (lacking := missing(error)) is not None:
         return lacking
     if isinstance(error, OSError):
-        message = " ".join((error.strerror or str(error)).split())  # without strerror where a library of C++ raised it
+        message = " ".join(
+            (error.strerror or str(error)).split()
+        )  # without strerror where a library of C++ raised it
         return FlagdataError(
             f"the system refused: {message}",
             where=None if error.filename is None else str(error.filename),
@@ -178,14 +209,18 @@ def foreseen(error: Exception) -> FlagdataError:
             else "check that the file is there, its permissions and the space on the disk",
         )
     if isinstance(error, MemoryError):
-        return LimitError("there is not enough memory for this", fix="ask for less at a time, or use a larger machine")
+        return LimitError(
+            "there is not enough memory for this",
+            fix="ask for less at a time, or use a larger machine",
+        )
     frames = traceback.extract_tb(error.__traceback__)
     places = [location for frame in frames if (location := _own_place(frame)) is not None]
     message = " ".join(f"{type(error).__name__}: {error}".split())
     return UnforeseenError(
         f"an unforeseen error occurred: {message[:300]}",
         where=places[-1] if places else None,
-        fix="this is a defect of flagdata: please report it, with what --debug before the command's name says",
+        fix="this is a defect of flagdata: please report it, with what --debug before the "
+        "command's name says",
     )
 
 
@@ -202,8 +237,8 @@ def _own_place(frame: traceback.FrameSummary) -> str | None:
 
 @contextmanager
 def following(published: str, doing: str) -> Iterator[None]:
-    """Runs work that follows the publication of `published`: an error in it becomes a warning, since that stays
-    published.
+    """Runs work that follows the publication of `published`: an error in it becomes a warning,
+    since that stays published.
 
     Args:
         published: what was published, e.g. "the data set in lake".
@@ -213,12 +248,17 @@ def following(published: str, doing: str) -> Iterator[None]:
         yield
     except Exception as error:  # noqa: BLE001  whatever it is, the command has done what cannot be undone
         reported = foreseen(error)
-        _report(f"{published} is published, but {doing} failed: {reported.what}", reported, mark="warning")
+        _report(
+            f"{published} is published, but {doing} failed: {reported.what}",
+            reported,
+            mark="warning",
+        )
 
 
 @contextmanager
 def in_steps(published: Callable[[], str]) -> Iterator[None]:
-    """Runs work that publishes one part after the other: an error in it says which parts are published and stay.
+    """Runs work that publishes one part after the other: an error in it says which parts are
+    published and stay.
 
     Args:
         published: what is published by now, e.g. "2 recordings on branch main"; "" if nothing is.
@@ -233,7 +273,9 @@ def in_steps(published: Callable[[], str]) -> Iterator[None]:
             done = "what was finished before (flagdata log lists it)"
         if not done:
             raise
-        fix = f"{reported.fix}. Published, and kept: {done}; give the same command again for the rest"
+        fix = (
+            f"{reported.fix}. Published, and kept: {done}; give the same command again for the rest"
+        )
         raise type(reported)(reported.what, where=reported.where, fix=fix) from error
 
 

@@ -1,4 +1,5 @@
-"""What a plain installation leaves out: the extra that brings each module, and the error of one that is missing."""
+"""What a plain installation leaves out: the extra that brings each module, and the error of one
+that is missing."""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ EXTRAS = {
     "xarray": "xarray",
     "warp": "gpu",
 }
-"""Module → extra of pyproject.toml. Excel sheets and object storage name theirs where they are opened."""
+"""Module → extra of pyproject.toml. Excel sheets and object storage name theirs where they are
+opened."""
 PURPOSES = {
     "physics": "measuring, simulating and training pairs need",
     "learn": "training and evaluating networks need",
@@ -34,11 +36,15 @@ PURPOSES = {
 _TORCH = "torch"
 _OF_TORCH = frozenset({"physics", "learn", "cluster"})
 """Extras that bring torch."""
-_CPU = "without an NVIDIA card first: pip install torch --index-url https://download.pytorch.org/whl/cpu; then: "
+_CPU = (
+    "without an NVIDIA card first: pip install torch --index-url "
+    "https://download.pytorch.org/whl/cpu; then: "
+)
 
 
 def missing(error: ImportError) -> MissingExtraError | None:
-    """Returns the error for the user of a module that is not installed; None where no extra brings it."""
+    """Returns the error for the user of a module that is not installed; None where no extra brings
+    it."""
     module = (error.name or "").partition(".")[0]
     if not isinstance(error, ModuleNotFoundError) or module not in EXTRAS:
         return None

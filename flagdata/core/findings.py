@@ -1,4 +1,5 @@
-"""What an ingest, an alignment or a check found: one type for all reports, for people and for programs."""
+"""What an ingest, an alignment or a check found: one type for all reports, for people and for
+programs."""
 
 from __future__ import annotations
 
@@ -21,8 +22,8 @@ class Finding:
     """One thing found.
 
     Attributes:
-        kind: stable machine-readable name in kebab-case ("stale-repeats"); also the quality flag in the catalog for
-            warnings and errors.
+        kind: stable machine-readable name in kebab-case ("stale-repeats"); also the quality flag in
+            the catalog for warnings and errors.
         what: a sentence for people, with the numbers in it.
         where: the first place it occurs ("line 812", "frame 31"), if it has one.
         count: how many rows, frames or seconds it concerns, 1 if it is about the whole.
@@ -50,7 +51,15 @@ class Finding:
         fix: str | None = None,
     ) -> Finding:
         """Makes a finding of a kind that always has the same severity, that of `SEVERITIES`."""
-        return cls(kind=kind, severity=SEVERITIES[kind], what=what, where=where, count=count, value=value, fix=fix)
+        return cls(
+            kind=kind,
+            severity=SEVERITIES[kind],
+            what=what,
+            where=where,
+            count=count,
+            value=value,
+            fix=fix,
+        )
 
     def as_dict(self) -> dict[str, Any]:
         return {

@@ -9,7 +9,8 @@ from html import escape
 def table(title: str, rows: Mapping[str, str]) -> str:
     """Writes a title above rows of a name and a value, all of them text."""
     cells = "".join(
-        f'<tr><th style="text-align:left">{escape(name)}</th><td style="text-align:left">{escape(value)}</td></tr>'
+        f'<tr><th style="text-align:left">{escape(name)}</th><td '
+        f'style="text-align:left">{escape(value)}</td></tr>'
         for name, value in rows.items()
     )
     return f"<div><b>{escape(title)}</b>" + (f"<table>{cells}</table>" if cells else "") + "</div>"
@@ -18,7 +19,9 @@ def table(title: str, rows: Mapping[str, str]) -> str:
 def grid(title: str, names: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Writes a title above a table with a heading, all cells text."""
     head = "".join(f"<th>{escape(name)}</th>" for name in names)
-    body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+    body = "".join(
+        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
+    )
     return f"<div><b>{escape(title)}</b><table><tr>{head}</tr>{body}</table></div>"
 
 

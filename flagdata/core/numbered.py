@@ -1,8 +1,9 @@
 """Numbers that names, headings and texts state, which may be of any size.
 
-`read_bounded` reads one up to a bound. An `Ordinal` has no bound: it sorts, and is shown, and it is no length. It has
-no `__index__`, so that neither `range` nor an array nor a list takes it for one. What is missing between ordinals is
-the difference of neighbours, see `gap`; nothing is counted up to one.
+`read_bounded` reads one up to a bound. An `Ordinal` has no bound: it sorts, and is shown, and it is
+no length. It has no `__index__`, so that neither `range` nor an array nor a list takes it for one.
+What is missing between ordinals is the difference of neighbours, see `gap`; nothing is counted up
+to one.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ _DIGITS = 4000
 
 
 def read_bounded(digits: str, *, most: int) -> int | None:
-    """Reads a number of decimal digits of any script; None of anything else, and of a number above `most`."""
+    """Reads a number of decimal digits of any script; None of anything else, and of a number above
+    `most`."""
     significant = digits.lstrip("0")
     if not digits.isdecimal() or len(significant) > len(str(most)):
         return None
@@ -76,7 +78,8 @@ def gap(numbers: Iterable[Ordinal]) -> Gap | None:
 
 
 def by_numbers(name: str) -> tuple[tuple[bool, int, str, str], ...]:
-    """Makes the key by which names sort by the numbers in them, of any size: part 10 comes after part 9."""
+    """Makes the key by which names sort by the numbers in them, of any size: part 10 comes after
+    part 9."""
     return tuple(map(_place, _PARTS.split(name)))
 
 

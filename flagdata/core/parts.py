@@ -1,4 +1,5 @@
-"""The packages that rest on flagdata, by name: it imports none of them, and asks for one when it is used."""
+"""The packages that rest on flagdata, by name: it imports none of them, and asks for one when it is
+used."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Text for people: counts, sizes, and names from files, which must move no cursor and turn no line of text round."""
+"""Text for people: counts, sizes, and names from files, which must move no cursor and turn no line
+of text round."""
 
 from __future__ import annotations
 
@@ -7,10 +8,14 @@ SHORT = 12
 
 
 def printable(text: str) -> str:
-    """Puts a text in one line; control characters, marks of direction and bytes that are not UTF-8 are escaped."""
+    """Puts a text in one line; control characters, marks of direction and bytes that are not UTF-8
+    are escaped."""
     if text.isprintable():
         return text
-    return "".join(letter if letter.isprintable() else letter.encode("unicode_escape").decode() for letter in text)
+    return "".join(
+        letter if letter.isprintable() else letter.encode("unicode_escape").decode()
+        for letter in text
+    )
 
 
 def printable_lines(text: str) -> str:

@@ -22,8 +22,11 @@ _CHUNK = 1 << 20
 
 
 def canonical(value: Mapping[str, Any]) -> str:
-    """Writes JSON with sorted keys and no blanks; NaN is refused (ValueError), since it has no JSON form."""
-    return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
+    """Writes JSON with sorted keys and no blanks; NaN is refused (ValueError), since it has no JSON
+    form."""
+    return json.dumps(
+        value, sort_keys=True, separators=(",", ":"), allow_nan=False, ensure_ascii=False
+    )
 
 
 def digest(text: str) -> str:
@@ -58,15 +61,16 @@ def file_hash(path: Place) -> str:
 
 @functools.cache
 def code_version() -> str:
-    """Returns package version, and the commit when run from a checkout: "0.1.0+3f2a9c1". With uncommitted changes it is
-    "0.1.0+3f2a9c1-dirty.5d41e0b", whose last part is a hash of them, files that git does not track aside."""
+    """Returns package version, and the commit when run from a checkout: "0.1.0+3f2a9c1". With
+    uncommitted changes it is "0.1.0+3f2a9c1-dirty.5d41e0b", whose last part is a hash of them,
+    files that git does not track aside."""
     release, commit = version("flagdata"), commit_of(Path(__file__).resolve().parents[2])
     return release if commit is None else f"{release}+{commit}"
 
 
 def commit_of(root: Path) -> str | None:
-    """Returns the commit of a checkout with a hash of what was changed since, as in `code_version`; `None` where it is
-    none."""
+    """Returns the commit of a checkout with a hash of what was changed since, as in `code_version`;
+    `None` where it is none."""
     if not (root / ".git").exists():
         return None
     described = _git(root, "describe", "--always", "--dirty", "--abbrev=7", "--exclude=*")
@@ -78,7 +82,10 @@ def commit_of(root: Path) -> str | None:
 
 
 def _git(root: Path, *arguments: str) -> bytes | None:
-    """Asks git about the checkout at `root` and no other: what git sets for its hooks names theirs."""
+    """Asks git about the checkout at `root` and no other: what git sets for its hooks names
+    theirs."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
-    done = subprocess.run(["git", *arguments], cwd=root, env=environment, capture_output=True, check=False)
+    done = subprocess.run(
+        ["git", *arguments], cwd=root, env=environment, capture_output=True, check=False
+    )
     return done.stdout if done.returncode == 0 else None

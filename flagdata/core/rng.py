@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 def stream(seed: int, *names: str | int) -> np.random.Generator:
     """Makes a generator that depends on `seed` and the path of `names` alone.
 
-    `stream(7, "sequence", 12, "wind")` is the same whatever other streams were drawn, and in what order. The names are
-    hashed (SHA-256) into a `SeedSequence`'s entropy; the bit generator is PCG64DXSM. A number of NumPy or torch is the
-    whole number that it equals.
+    `stream(7, "sequence", 12, "wind")` is the same whatever other streams were drawn, and in what
+    order. The names are hashed (SHA-256) into a `SeedSequence`'s entropy; the bit generator is
+    PCG64DXSM. A number of NumPy or torch is the whole number that it equals.
     """
     path = "\x1f".join(map(_typed_name, names))
     digest = hashlib.sha256(path.encode()).digest()
@@ -40,7 +40,9 @@ def child_seed(seed: int, *names: str | int) -> int:
     return int(stream(seed, *names).integers(0, 2**63 - 1))
 
 
-def torch_generator(seed: int, *names: str | int, device: torch.device | str = "cpu") -> torch.Generator:
+def torch_generator(
+    seed: int, *names: str | int, device: torch.device | str = "cpu"
+) -> torch.Generator:
     """Makes a generator of torch's on a device, for the named stream."""
     import torch
 
@@ -51,8 +53,8 @@ def torch_generator(seed: int, *names: str | int, device: torch.device | str = "
 
 @contextmanager
 def torch_draws(seed: int, *names: str | int) -> Iterator[None]:
-    """Lets what draws from torch's own generator of the CPU, as layers do for their weights, draw from the named
-    stream; that generator is afterwards as it was."""
+    """Lets what draws from torch's own generator of the CPU, as layers do for their weights, draw
+    from the named stream; that generator is afterwards as it was."""
     import torch
 
     with torch.random.fork_rng(devices=[]):

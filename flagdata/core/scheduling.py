@@ -14,8 +14,10 @@ _THREADS = Path("/proc/self/task")
 def kept_scheduling() -> Iterator[None]:
     """Puts all threads of this process back to how the calling one was scheduled.
 
-    SVT-AV1 gives its threads, and the one that opens it, real-time priority wherever it may, as root in a container
-    may: all that the process does from then on, and every process that it starts, would come before all others.
+    SVT-AV1 gives its threads, and the one that opens it, real-time priority wherever it may, as
+    root in a container
+    may: all that the process does from then on, and every process that it starts, would come before
+    all others.
     """
     policy, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
     try:

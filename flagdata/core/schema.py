@@ -1,8 +1,9 @@
-"""The one table of channels and the one schema of the catalog. Everything that names a column reads it here.
+"""The one table of channels and the one schema of the catalog. Everything that names a column reads
+it here.
 
-A channel is a measured or simulated quantity with one name and one unit. A catalog row is an artifact: an immutable
-object, or a slice of one (a clip of a recording). Changing this file changes `FORMAT_VERSION`; data written by older
-versions stays readable (tests/compat).
+A channel is a measured or simulated quantity with one name and one unit. A catalog row is an
+artifact: an immutable object, or a slice of one (a clip of a recording). Changing this file changes
+`FORMAT_VERSION`; data written by older versions stays readable (tests/compat).
 """
 
 from __future__ import annotations
@@ -27,18 +28,32 @@ class Channel:
 
 
 CHANNELS: dict[str, Channel] = {
-    "wind_speed": Channel(dims=("time",), unit="m/s", frame="horizontal", about="speed of the air over ground"),
+    "wind_speed": Channel(
+        dims=("time",), unit="m/s", frame="horizontal", about="speed of the air over ground"
+    ),
     "wind_direction": Channel(
-        dims=("time",), unit="rad", frame="from, clockwise from true north", about="where the wind blows from"
+        dims=("time",),
+        unit="rad",
+        frame="from, clockwise from true north",
+        about="where the wind blows from",
     ),
     "wind_direction_magnetic": Channel(
-        dims=("time",), unit="rad", frame="from, clockwise from magnetic north", about="where the wind blows from"
+        dims=("time",),
+        unit="rad",
+        frame="from, clockwise from magnetic north",
+        about="where the wind blows from",
     ),
     "apparent_wind_speed": Channel(
-        dims=("time",), unit="m/s", frame="moving platform", about="speed of the air past a moving platform"
+        dims=("time",),
+        unit="m/s",
+        frame="moving platform",
+        about="speed of the air past a moving platform",
     ),
     "apparent_wind_direction": Channel(
-        dims=("time",), unit="rad", frame="from, clockwise from the platform's bow", about="apparent wind angle"
+        dims=("time",),
+        unit="rad",
+        frame="from, clockwise from the platform's bow",
+        about="apparent wind angle",
     ),
     "theoretical_wind_speed": Channel(
         dims=("time",),
@@ -47,10 +62,17 @@ CHANNELS: dict[str, Channel] = {
         about="wind speed an instrument computed as if its moving platform stood still (NMEA MWV,T)",
     ),
     "theoretical_wind_direction": Channel(
-        dims=("time",), unit="rad", frame="from, clockwise from the platform's bow", about="its direction"
+        dims=("time",),
+        unit="rad",
+        frame="from, clockwise from the platform's bow",
+        about="its direction",
     ),
-    "wind_x": Channel(dims=("time",), unit="m/s", frame="sensor, towards +x", about="wind component of a sonic"),
-    "wind_y": Channel(dims=("time",), unit="m/s", frame="sensor, towards +y", about="wind component of a sonic"),
+    "wind_x": Channel(
+        dims=("time",), unit="m/s", frame="sensor, towards +x", about="wind component of a sonic"
+    ),
+    "wind_y": Channel(
+        dims=("time",), unit="m/s", frame="sensor, towards +y", about="wind component of a sonic"
+    ),
     "wind_z": Channel(dims=("time",), unit="m/s", frame="sensor, upwards", about="vertical wind"),
     "sonic_temperature": Channel(
         dims=("time",),
@@ -59,11 +81,20 @@ CHANNELS: dict[str, Channel] = {
         about="temperature from the speed of sound; above the air's where it is moist",
     ),
     "air_temperature": Channel(dims=("time",), unit="K", frame="", about="air temperature"),
-    "air_pressure": Channel(dims=("time",), unit="Pa", frame="station", about="static pressure at the sensor"),
-    "relative_humidity": Channel(dims=("time",), unit="1", frame="", about="relative humidity, 0 to 1"),
-    "platform_speed": Channel(dims=("time",), unit="m/s", frame="over ground", about="speed of a moving platform"),
+    "air_pressure": Channel(
+        dims=("time",), unit="Pa", frame="station", about="static pressure at the sensor"
+    ),
+    "relative_humidity": Channel(
+        dims=("time",), unit="1", frame="", about="relative humidity, 0 to 1"
+    ),
+    "platform_speed": Channel(
+        dims=("time",), unit="m/s", frame="over ground", about="speed of a moving platform"
+    ),
     "platform_heading": Channel(
-        dims=("time",), unit="rad", frame="clockwise from true north", about="heading of a moving platform"
+        dims=("time",),
+        unit="rad",
+        frame="clockwise from true north",
+        about="heading of a moving platform",
     ),
     "wind_speed_estimate": Channel(
         dims=("time",),
@@ -71,17 +102,39 @@ CHANNELS: dict[str, Channel] = {
         frame="horizontal",
         about="wind speed someone derived from a tracked flag: no reading",
     ),
-    "tracked_rms": Channel(dims=("time",), unit="px", frame="image", about="RMS displacement of tracked points"),
-    "tracked_points": Channel(dims=("time",), unit="1", frame="image", about="number of points tracked"),
-    "tracking_quality": Channel(dims=("time",), unit="1", frame="image", about="the tracker's own confidence, 0 to 1"),
+    "tracked_rms": Channel(
+        dims=("time",), unit="px", frame="image", about="RMS displacement of tracked points"
+    ),
+    "tracked_points": Channel(
+        dims=("time",), unit="1", frame="image", about="number of points tracked"
+    ),
+    "tracking_quality": Channel(
+        dims=("time",), unit="1", frame="image", about="the tracker's own confidence, 0 to 1"
+    ),
     "flutter_frequency": Channel(
         dims=("time",), unit="Hz", frame="", about="main frequency of a tracked flag's motion"
     ),
-    "deflection_angle": Channel(dims=("time",), unit="rad", frame="image", about="mean angle of a tracked flag"),
-    "image": Channel(dims=("time", "height", "width"), unit="1", frame="y down, x right", about="8-bit gray frames"),
-    "positions": Channel(dims=("time", "vertex", "xyz"), unit="m", frame="right-handed, z up", about="mesh vertices"),
-    "faces": Channel(dims=("face", "corner"), unit="1", frame="counter-clockwise front", about="vertex indices"),
-    "rest": Channel(dims=("vertex", "uv"), unit="m", frame="material", about="rest shape in material coordinates"),
+    "deflection_angle": Channel(
+        dims=("time",), unit="rad", frame="image", about="mean angle of a tracked flag"
+    ),
+    "image": Channel(
+        dims=("time", "height", "width"),
+        unit="1",
+        frame="y down, x right",
+        about="8-bit gray frames",
+    ),
+    "positions": Channel(
+        dims=("time", "vertex", "xyz"), unit="m", frame="right-handed, z up", about="mesh vertices"
+    ),
+    "faces": Channel(
+        dims=("face", "corner"), unit="1", frame="counter-clockwise front", about="vertex indices"
+    ),
+    "rest": Channel(
+        dims=("vertex", "uv"),
+        unit="m",
+        frame="material",
+        about="rest shape in material coordinates",
+    ),
 }
 
 # Instants are int64 UTC nanoseconds on the axis "time"; everywhere, without suffix.
@@ -92,7 +145,8 @@ TRUTH_WINDOW = 60.0  # s, the mean before a clip's end that is its ground truth
 
 
 class SampleFlag(IntFlag):
-    """What is known to be wrong with one wind sample. Flagged samples are kept; averages leave out `UNUSABLE`."""
+    """What is known to be wrong with one wind sample. Flagged samples are kept; averages leave out
+    `UNUSABLE`."""
 
     OK = 0
     STALE = 1
@@ -113,7 +167,8 @@ class SampleFlag(IntFlag):
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
         """Count as a plain integer beside an array, which then keeps its type of 16 bits.
 
-        NumPy 2 takes a subclass of int for a 64-bit value, and refuses to put the result back into the array.
+        NumPy 2 takes a subclass of int for a 64-bit value, and refuses to put the result back into
+        the array.
         """
         plain = [int(value) if isinstance(value, SampleFlag) else value for value in inputs]
         return getattr(ufunc, method)(*plain, **options)
@@ -130,9 +185,11 @@ class Kind(StrEnum):
     WIND = "wind"
     """One anemometer log on its own clock; an MCAP object."""
     RECORDING = "recording"
-    """Frames and wind on one clock; an MCAP object whose parents are a camera and a wind artifact."""
+    """Frames and wind on one clock; an MCAP object whose parents are a camera and a wind
+    artifact."""
     CLIP = "clip"
-    """Consecutive frames of a recording with their ground truth; a slice of the recording's object."""
+    """Consecutive frames of a recording with their ground truth; a slice of the recording's
+    object."""
     MESHES = "meshes"
     """A mesh sequence; a Zarr object."""
     MARKERS = "markers"
@@ -157,7 +214,11 @@ class Field:
 
 
 CATALOG: dict[str, Field] = {
-    "artifact": Field(type=pa.string(), nullable=False, about="identity: a hash of what went in, see lake.Artifact"),
+    "artifact": Field(
+        type=pa.string(),
+        nullable=False,
+        about="identity: a hash of what went in, see lake.Artifact",
+    ),
     "kind": Field(type=pa.string(), nullable=False, about="one of schema.Kind"),
     "name": Field(type=pa.string(), nullable=False, about="what people call it; not unique"),
     "branch": Field(type=pa.string(), nullable=False, about="the branch the row was committed on"),
@@ -165,34 +226,63 @@ CATALOG: dict[str, Field] = {
     "object_bytes": Field(type=pa.int64(), unit="B", about="size of the object"),
     "source_hash": Field(type=pa.string(), about="SHA-256 of the file that was ingested"),
     "source_name": Field(type=pa.string(), about="base name of the file that was ingested"),
-    "parents": Field(type=pa.list_(pa.string()), nullable=False, about="artifacts this one was made from"),
+    "parents": Field(
+        type=pa.list_(pa.string()), nullable=False, about="artifacts this one was made from"
+    ),
     "recipe": Field(type=pa.string(), about="all options that shaped it, canonical JSON"),
     "recipe_hash": Field(type=pa.string(), nullable=False, about="SHA-256 of the recipe"),
     "code_version": Field(type=pa.string(), nullable=False, about="package version and commit"),
     "format_version": Field(type=pa.int32(), nullable=False, about="FORMAT_VERSION at writing"),
     "seed": Field(type=pa.int64(), about="root seed of a simulated artifact"),
-    "created": Field(type=pa.timestamp("us", tz="UTC"), nullable=False, about="when it was committed"),
+    "created": Field(
+        type=pa.timestamp("us", tz="UTC"), nullable=False, about="when it was committed"
+    ),
     "recording": Field(type=pa.string(), about="artifact of the recording a clip belongs to"),
-    "session": Field(type=pa.string(), about="one set-up at one place; never on two sides of a split"),
-    "dataset": Field(type=pa.string(), since=3, about="data set that a film and its clips were built for"),
-    "side": Field(type=pa.string(), since=3, about="side of that data set: train, validation or test"),
-    "day": Field(type=pa.string(), about="calendar day (ISO, UTC) of the start; never on two sides of a split"),
+    "session": Field(
+        type=pa.string(), about="one set-up at one place; never on two sides of a split"
+    ),
+    "dataset": Field(
+        type=pa.string(), since=3, about="data set that a film and its clips were built for"
+    ),
+    "side": Field(
+        type=pa.string(), since=3, about="side of that data set: train, validation or test"
+    ),
+    "day": Field(
+        type=pa.string(),
+        about="calendar day (ISO, UTC) of the start; never on two sides of a split",
+    ),
     "start": Field(type=pa.int64(), unit="ns", about="first instant, UTC"),
     "end": Field(type=pa.int64(), unit="ns", about="last instant, UTC"),
     "frame_first": Field(type=pa.int64(), about="index of the first frame in the object"),
     "frame_count": Field(type=pa.int64(), about="number of frames"),
     "rate": Field(type=pa.float64(), unit="Hz", about="frame rate, or median sample rate"),
-    "wind": Field(type=pa.float64(), unit="m/s", about="mean wind speed over the minute before the end"),
+    "wind": Field(
+        type=pa.float64(), unit="m/s", about="mean wind speed over the minute before the end"
+    ),
     "wind_sigma": Field(type=pa.float64(), unit="m/s", about="standard uncertainty of that mean"),
-    "wind_coverage": Field(type=pa.float64(), unit="1", about="share of the minute that usable samples cover"),
-    "wind_staleness": Field(type=pa.float64(), unit="s", about="age of the newest usable sample at the end"),
+    "wind_coverage": Field(
+        type=pa.float64(), unit="1", about="share of the minute that usable samples cover"
+    ),
+    "wind_staleness": Field(
+        type=pa.float64(), unit="s", about="age of the newest usable sample at the end"
+    ),
     "clock_method": Field(type=pa.string(), about="stamps, given or estimated"),
-    "clock_offset": Field(type=pa.float64(), unit="s", about="added to the camera's clock to reach the wind's"),
+    "clock_offset": Field(
+        type=pa.float64(), unit="s", about="added to the camera's clock to reach the wind's"
+    ),
     "clock_drift": Field(type=pa.float64(), unit="s/s", about="rate difference of the two clocks"),
-    "clock_sigma": Field(type=pa.float64(), unit="s", about="standard uncertainty of the offset at mid-recording"),
+    "clock_sigma": Field(
+        type=pa.float64(), unit="s", about="standard uncertainty of the offset at mid-recording"
+    ),
     "clock_model": Field(type=pa.string(), about="the whole clock model, JSON"),
-    "parameters": Field(type=pa.string(), about="simulation or render parameters, canonical JSON object"),
-    "quality": Field(type=pa.list_(pa.string()), nullable=False, about="flags: machine-readable names of what is off"),
+    "parameters": Field(
+        type=pa.string(), about="simulation or render parameters, canonical JSON object"
+    ),
+    "quality": Field(
+        type=pa.list_(pa.string()),
+        nullable=False,
+        about="flags: machine-readable names of what is off",
+    ),
     "report": Field(type=pa.string(), about="what was found, a JSON object with a list 'findings'"),
 }
 

@@ -13,7 +13,10 @@ _NUMBER = r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
 _ALONE = re.compile(_NUMBER)
 _SIGMA = re.compile(rf"{_NUMBER}(?:±|\+-|\+/-){_NUMBER}")
 _RANGE = re.compile(rf"{_NUMBER}:{_NUMBER}")
-FORMS = "a number alone, as in 0.28, with its standard deviation, as in 0.28±0.01, or a range, as in 0.27:0.30"
+FORMS = (
+    "a number alone, as in 0.28, with its standard deviation, as in 0.28±0.01, or a range, as in "
+    "0.27:0.30"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,10 +25,12 @@ class Stated:
 
     Attributes:
         low, high: ends of the range in which it lies; equal where one value is stated.
-        sigma: standard deviation of the one value that is stated, of a normal distribution; 0 of an exact value.
+        sigma: standard deviation of the one value that is stated, of a normal distribution; 0 of an
+            exact value.
 
     Raises:
-        UsageError: ends that are not in order, a standard deviation below 0 or of a range, numbers that are not finite.
+        UsageError: ends that are not in order, a standard deviation below 0 or of a range, numbers
+            that are not finite.
     """
 
     low: float
@@ -37,12 +42,14 @@ class Stated:
             raise UsageError(f"{self.text} is not finite", fix=f"give {FORMS}")
         if self.low > self.high or self.sigma < 0 or (self.sigma > 0 and self.low < self.high):
             raise UsageError(
-                f"{self.text} is not a number that can be stated", fix=f"give {FORMS}, the lower end of a range first"
+                f"{self.text} is not a number that can be stated",
+                fix=f"give {FORMS}, the lower end of a range first",
             )
 
     @classmethod
     def of(cls, value: Stated | float | tuple[float, float] | str) -> Stated:
-        """Makes a statement from a number, a range (low, high), or a text of one of the three forms."""
+        """Makes a statement from a number, a range (low, high), or a text of one of the three
+        forms."""
         if isinstance(value, Stated):
             return value
         if isinstance(value, str):
@@ -88,5 +95,6 @@ def parse(text: str) -> Stated:
     if (match := _RANGE.fullmatch(text)) and float(match[1]) < float(match[2]):
         return Stated(low=float(match[1]), high=float(match[2]))
     raise UsageError(
-        f"{text!r} cannot be read as a number with its uncertainty", fix=f"give {FORMS}, the lower end of a range first"
+        f"{text!r} cannot be read as a number with its uncertainty",
+        fix=f"give {FORMS}, the lower end of a range first",
     )

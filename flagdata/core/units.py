@@ -1,7 +1,8 @@
 """Conversion of the units found in sensor files to SI, in one table.
 
-Inside the package every quantity is SI and angles are radians (no unit suffix on names). A file's unit enters here and
-nowhere else. Factors are exact by definition (BIPM SI Brochure, 9th ed.; international knot 1852 m/h, foot 0.3048 m).
+Inside the package every quantity is SI and angles are radians (no unit suffix on names). A file's
+unit enters here and nowhere else. Factors are exact by definition (BIPM SI Brochure, 9th ed.;
+international knot 1852 m/h, foot 0.3048 m).
 """
 
 from __future__ import annotations
@@ -45,7 +46,9 @@ class _Table(dict[str, Unit]):
         return Unit(si=self[rest].si, scale=float(factor) * self[rest].scale)
 
 
-_FACTOR = re.compile(r"(?P<factor>(?:0|[1-9]\d*)?\.?\d+(?:e-?\d+)?)\s*[*x]?\s*(?P<unit>[^\d\s*].*)", re.IGNORECASE)
+_FACTOR = re.compile(
+    r"(?P<factor>(?:0|[1-9]\d*)?\.?\d+(?:e-?\d+)?)\s*[*x]?\s*(?P<unit>[^\d\s*].*)", re.IGNORECASE
+)
 _POWERS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻−·⋅∙", "0123456789--...")
 """Powers, signs and products as they are set in print, and as they are typed."""
 _TENTHS = ("0.1", "0.01", "0.001")
@@ -90,8 +93,8 @@ UNITS: dict[str, Unit] = _Table(
     }
 )
 
-# Spellings seen in instrument exports, as `_key` reduces them, → the table's name. Beaufort is left out on purpose: it
-# is an interval scale of classes, not a unit.
+# Spellings seen in instrument exports, as `_key` reduces them, → the table's name. Beaufort is left
+# out on purpose: it is an interval scale of classes, not a unit.
 SPELLINGS: dict[str, str] = {
     "mps": "m/s",
     "ms-1": "m/s",
@@ -339,7 +342,8 @@ def canonical(text: str, *, where: str | None = None) -> str:
 
 
 def name_of_unit(text: str) -> str | None:
-    """Returns the table's own name of the unit that a file spells as `text`; `None` where it spells none."""
+    """Returns the table's own name of the unit that a file spells as `text`; `None` where it spells
+    none."""
     stripped = text.strip()
     if stripped in UNITS:
         return stripped
@@ -348,27 +352,37 @@ def name_of_unit(text: str) -> str | None:
     if unit_name is not None:
         return unit_name
     name = _factored_unit(stripped)
-    unit_name = name is not None and name.partition(" ")[0] in _TENTHS and UNITS[name].si in ("m/s", "rad")
+    unit_name = (
+        name is not None and name.partition(" ")[0] in _TENTHS and UNITS[name].si in ("m/s", "rad")
+    )
     return name if unit_name else None
 
 
 def _factored_unit(text: str) -> str | None:
-    """Returns the name of a unit with a factor before it, as "0.765 m/s" of what one turn of a cup is; `None` for no
-    such."""
+    """Returns the name of a unit with a factor before it, as "0.765 m/s" of what one turn of a cup
+    is; `None` for no such."""
     match = _FACTOR.fullmatch(text.strip().replace(",", "."))
     name = None if match is None else name_of_unit(match["unit"])
-    if match is None or name is None or UNITS[name].offset or " " in name or float(match["factor"]) == 0:
+    if (
+        match is None
+        or name is None
+        or UNITS[name].offset
+        or " " in name
+        or float(match["factor"]) == 0
+    ):
         return None
     return f"{float(match['factor']):g} {name}"
 
 
 def plain_powers(text: str) -> str:
-    """Writes a unit with powers as digits and a point for products: W/m² and W/m**2 as W/m2, m·s⁻¹ as m.s-1."""
+    """Writes a unit with powers as digits and a point for products: W/m² and W/m**2 as W/m2, m·s⁻¹
+    as m.s-1."""
     return re.sub(r"(?<=\w)\s*\*\s*(?=\w)", ".", re.sub(r"\*\*|\^", "", text.translate(_POWERS)))
 
 
 def _key(text: str) -> str:
-    """Writes a unit in lower case, without blanks, and with one way to write degrees, powers, products and "per"."""
+    """Writes a unit in lower case, without blanks, and with one way to write degrees, powers,
+    products and "per"."""
     key = plain_powers(text.lower().replace("º", "°")).replace("-per-", "/").replace("(-1)", "-1")
     for per in (" per ", " pro ", " por ", " par ", " al "):
         key = key.replace(per, "/")

@@ -1,4 +1,5 @@
-"""How long a command's work will take, stated before it begins, and how many processors and threads it takes."""
+"""How long a command's work will take, stated before it begins, and how many processors and threads
+it takes."""
 
 from __future__ import annotations
 
@@ -10,7 +11,10 @@ from pathlib import Path
 _SHORT = 90.0  # s
 _GROUPS = Path("/proc/self/cgroup")
 _MOUNT = Path("/sys/fs/cgroup")
-_OF_PROCESSORS = {"", "cpu"}  # the one hierarchy of cgroup 2, and that of cgroup 1 which limits processors
+_OF_PROCESSORS = {
+    "",
+    "cpu",
+}  # the one hierarchy of cgroup 2, and that of cgroup 1 which limits processors
 
 
 def announce_work(what: str, seconds: float, *, workers: int = 1, kept: str | None = None) -> str:
@@ -23,13 +27,17 @@ def announce_work(what: str, seconds: float, *, workers: int = 1, kept: str | No
         kept: what of it is done already, or is kept where it is interrupted.
     """
     cores = "one idle core" if workers == 1 else f"{workers} idle cores"
-    return f"{what} takes {_length(seconds / workers)} on {cores}{'' if kept is None else f'; {kept}'}"
+    return (
+        f"{what} takes {_length(seconds / workers)} on {cores}{'' if kept is None else f'; {kept}'}"
+    )
 
 
 def cores() -> int:
-    """Counts the processors that the process may use: those that it may run on, and what its group's quota is worth, as
-    in a container."""
-    there = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    """Counts the processors that the process may use: those that it may run on, and what its
+    group's quota is worth, as in a container."""
+    there = (
+        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    )
     return max(1, min([there, *map(int, _quotas())]))
 
 
@@ -37,9 +45,10 @@ def cores() -> int:
 def one_thread() -> Iterator[None]:
     """Limits torch to the calling thread during the block.
 
-    What works on one small window after another gains nothing by several threads, and they wait for each other by
-    spinning: beside other processes that takes many times the work. The order of sums, and so their last bits, depends
-    on their number, too.
+    What works on one small window after another gains nothing by several threads, and they wait for
+    each other by
+    spinning: beside other processes that takes many times the work. The order of sums, and so their
+    last bits, depends on their number, too.
     """
     import torch
 
@@ -52,7 +61,8 @@ def one_thread() -> Iterator[None]:
 
 
 def _quotas() -> Iterator[float]:
-    """Yields the processors that each control group above this process grants it, where the kernel states any."""
+    """Yields the processors that each control group above this process grants it, where the kernel
+    states any."""
     lines: list[str] = []
     with suppress(OSError):
         lines = _GROUPS.read_text(encoding="ascii", errors="replace").splitlines()
@@ -75,7 +85,11 @@ def _quota(folder: Path) -> float:
     """
     limit = folder / "cpu.max"
     names = ("cpu.cfs_quota_us", "cpu.cfs_period_us")
-    stated = limit.read_text().split() if limit.exists() else [(folder / name).read_text() for name in names]
+    stated = (
+        limit.read_text().split()
+        if limit.exists()
+        else [(folder / name).read_text() for name in names]
+    )
     quota, period = map(int, stated)
     if quota <= 0:  # cgroup 1 writes -1
         raise ValueError("no quota")

@@ -1,7 +1,9 @@
-"""Decoded clips on disk, so that an epoch after the first does not decode JPEG. Optional, outside the lake, disposable.
+"""Decoded clips on disk, so that an epoch after the first does not decode JPEG. Optional, outside
+the lake, disposable.
 
-One file a clip: a header line of JSON (what it holds, its shape and checksum) and the raw frames. Files are written
-beside and renamed, so that any number of processes share a cache; one that finds a clip missing decodes it.
+One file a clip: a header line of JSON (what it holds, its shape and checksum) and the raw frames.
+Files are written beside and renamed, so that any number of processes share a cache; one that finds
+a clip missing decodes it.
 """
 
 from __future__ import annotations
@@ -33,7 +35,9 @@ _NAME = re.compile(r"[0-9a-f]{64}" + re.escape(_SUFFIX))  # of a clip
 _WRITING = "writing.part"  # the one file being written; only under the lock
 _TALLY = "tally"  # the lock, and in it the bytes of all clips
 _MAX_HEADER = 4096  # B
-_ROOM = 0.9  # eviction goes down to this share of the limit, so that it is not needed at every write
+_ROOM = (
+    0.9  # eviction goes down to this share of the limit, so that it is not needed at every write
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,9 +51,9 @@ class _Entry:
 class DecodedCache:
     """A folder of decoded clips, at most `limit` bytes.
 
-    A clip is found by its object's content hash and its frames, so a cached clip never goes stale. Its checksum is
-    compared the first time a process reads it; a damaged or foreign file is deleted and the clip decoded anew. When the
-    folder is full, the clips that were read least recently go.
+    A clip is found by its object's content hash and its frames, so a cached clip never goes stale.
+    Its checksum is compared the first time a process reads it; a damaged or foreign file is deleted
+    and the clip decoded anew. When the folder is full, the clips that were read least recently go.
 
     Args:
         path: the folder, for the cache alone; made if it is not there. Not inside a lake.
@@ -64,7 +68,9 @@ class DecodedCache:
         self.path = local_path(path).absolute()
         self.limit = limit
         if limit < 1:
-            raise UsageError(f"the limit of the cache is {limit} bytes", fix="give a limit above zero")
+            raise UsageError(
+                f"the limit of the cache is {limit} bytes", fix="give a limit above zero"
+            )
         for folder in (self.path, *self.path.parents):
             if (folder / "lake.json").exists():
                 raise UsageError(
@@ -88,8 +94,11 @@ class DecodedCache:
         return {**self.__dict__, "_verified": set()}
 
     @check_arguments
-    def frames(self, object_name: str, first: int, count: int, *, decode: Callable[[], UInt8Array]) -> UInt8Array:
-        """Frames (count, height, width) of an object, from the cache or else by `decode`, which fills it."""
+    def frames(
+        self, object_name: str, first: int, count: int, *, decode: Callable[[], UInt8Array]
+    ) -> UInt8Array:
+        """Frames (count, height, width) of an object, from the cache or else by `decode`, which
+        fills it."""
         name = hashlib.sha256(f"{object_name}\n{first}\n{count}".encode()).hexdigest() + _SUFFIX
         identity = {"format": _FORMAT, "object": object_name, "first": first, "count": count}
         frames = self._read(name, identity)
@@ -110,7 +119,9 @@ class DecodedCache:
                 header = from_json(line)
                 shape = tuple(header["shape"])
                 data = np.fromfile(stream, dtype=np.uint8)
-                with contextlib.suppress(PermissionError):  # a cache that may be read only keeps its order of eviction
+                with contextlib.suppress(
+                    PermissionError
+                ):  # a cache that may be read only keeps its order of eviction
                     os.utime(stream.fileno())
             sound = {key: header[key] for key in identity} == identity
             if sound and name not in self._verified:
@@ -129,7 +140,12 @@ class DecodedCache:
 
     def _write(self, name: str, identity: dict[str, Any], frames: UInt8Array) -> None:
         pixels = np.ascontiguousarray(frames).data
-        line = json.dumps({**identity, "shape": list(frames.shape), "crc32": zlib.crc32(pixels)}).encode() + b"\n"
+        line = (
+            json.dumps(
+                {**identity, "shape": list(frames.shape), "crc32": zlib.crc32(pixels)}
+            ).encode()
+            + b"\n"
+        )
         size = len(line) + frames.nbytes
         if size > self.limit:
             return
@@ -145,12 +161,14 @@ class DecodedCache:
             raise FlagdataError(
                 f"writing the decoded cache failed: {error.strerror or error}",
                 where=str(error.filename or self.path),
-                fix="free some space, give a lower limit or another folder, or load pairs without a cache",
+                fix="free some space, give a lower limit or another folder, or load pairs without "
+                "a cache",
             ) from error
 
     def _take_room(self, tally: BinaryIO, size: int) -> None:
-        """Add `size` to the tally of bytes, evicting when it would exceed the limit. Counted before the file is there,
-        so that a crash leaves the tally too high at worst; it is counted anew before anything is evicted."""
+        """Add `size` to the tally of bytes, evicting when it would exceed the limit. Counted before
+        the file is there, so that a crash leaves the tally too high at worst; it is counted anew
+        before anything is evicted."""
         text = tally.read()
         entries: list[_Entry] | None = None if text.isdigit() else self._entries()
         total = int(text) if entries is None else sum(entry.size for entry in entries)
@@ -174,13 +192,17 @@ class DecodedCache:
                 if _NAME.fullmatch(entry.name):
                     with contextlib.suppress(FileNotFoundError):
                         status = entry.stat()
-                        entries.append(_Entry(path=Path(entry.path), size=status.st_size, read=status.st_mtime_ns))
+                        entries.append(
+                            _Entry(
+                                path=Path(entry.path), size=status.st_size, read=status.st_mtime_ns
+                            )
+                        )
         return entries
 
     @contextlib.contextmanager
     def _hold_lock(self) -> Iterator[BinaryIO]:
-        """Lets one writer work at a time, across processes; the lock dies with its holder. Yields the tally, at its
-        start."""
+        """Lets one writer work at a time, across processes; the lock dies with its holder. Yields
+        the tally, at its start."""
         with (self.path / _TALLY).open("a+b") as tally:
             fcntl.flock(tally, fcntl.LOCK_EX)
             tally.seek(0)

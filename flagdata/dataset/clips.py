@@ -1,4 +1,5 @@
-"""Clips: a recording cut into runs of consecutive frames, each a catalog row with its ground truth."""
+"""Clips: a recording cut into runs of consecutive frames, each a catalog row with its ground
+truth."""
 
 from __future__ import annotations
 
@@ -22,7 +23,9 @@ from flagdata.record.signals import Instants
 from flagdata.timebase import NANOSECONDS
 
 FRAME_GAP = 1.5  # frame periods; a clip never spans a longer step
-TRUTH_SPEED = "wind_speed"  # the truth parameter of a simulated record that is its ground truth [m/s]
+TRUTH_SPEED = (
+    "wind_speed"  # the truth parameter of a simulated record that is its ground truth [m/s]
+)
 
 
 def runs(times: Instants, frames: int) -> Iterator[int]:
@@ -30,8 +33,8 @@ def runs(times: Instants, frames: int) -> Iterator[int]:
 
     Args:
         times: (n,) instants of the frames [UTC ns], increasing.
-        frames: length of a clip. A step above 1.5 frame periods (median steps) ends a run, and its last frames, those
-            that do not fill a clip, are left out.
+        frames: length of a clip. A step above 1.5 frame periods (median steps) ends a run, and its
+            last frames, those that do not fill a clip, are left out.
 
     Raises:
         UsageError: fewer than one frame a clip.
@@ -42,7 +45,9 @@ def runs(times: Instants, frames: int) -> Iterator[int]:
     steps = np.diff(times)
     if np.any(steps <= 0):
         where = f"frame {int(np.argmax(steps <= 0)) + 1}"
-        raise InputError("frame times do not increase", where=where, fix="ingest the camera file anew")
+        raise InputError(
+            "frame times do not increase", where=where, fix="ingest the camera file anew"
+        )
     breaks = np.nonzero(steps > FRAME_GAP * np.median(steps))[0] + 1 if len(steps) else steps
     bounds = [0, *breaks.tolist(), len(times)]
     for first, last in itertools.pairwise(bounds):
@@ -53,14 +58,17 @@ def runs(times: Instants, frames: int) -> Iterator[int]:
 def clip_rows(
     record: Record, recording: Artifact, *, frames: int = CLIP_FRAMES, window: float = TRUTH_WINDOW
 ) -> list[Artifact]:
-    """Cuts a recording into clips, in order, with the mean wind over the window before each one's end.
+    """Cuts a recording into clips, in order, with the mean wind over the window before each one's
+    end.
 
-    A clip whose window is thin, stale or empty is kept as a row: its numbers say so, and `pairs` refuses it by its
-    tolerance. A simulated record states its wind as the truth parameter "wind_speed" [m/s]; that is then exact.
+    A clip whose window is thin, stale or empty is kept as a row: its numbers say so, and `pairs`
+    refuses it by its tolerance. A simulated record states its wind as the truth parameter
+    "wind_speed" [m/s]; that is then exact.
 
     Args:
         record: frames, wind and truth on the common clock.
-        recording: the artifact of the record; its identity, session, seed, clock model and object are passed on.
+        recording: the artifact of the record; its identity, session, seed, clock model and object
+            are passed on.
         window: of the ground truth [s]; it stands in each clip's recipe.
 
     Raises:
@@ -70,15 +78,25 @@ def clip_rows(
     series = truth_series(record)
     clock = ClockModel.from_json(recording.clock_model) if recording.clock_model else None
     truth_values = record.truth or {}
-    parameters = recording.parameters or (provenance.canonical(truth_values) if truth_values else None)
+    parameters = recording.parameters or (
+        provenance.canonical(truth_values) if truth_values else None
+    )
     rows: list[Artifact] = []
     for first in runs(times, frames):
         last = first + frames - 1
         end = int(times[last])
-        sigma = float(clock.sigma(record.device_frame_times[last])) if clock else recording.clock_sigma
+        sigma = (
+            float(clock.sigma(record.device_frame_times[last])) if clock else recording.clock_sigma
+        )
         if sigma is None and recording.seed is not None:
             sigma = 0.0  # a simulation has one clock
-        truth = clip_truth(series, end, stated_speed=truth_values.get(TRUTH_SPEED), clock_sigma=sigma, window=window)
+        truth = clip_truth(
+            series,
+            end,
+            stated_speed=truth_values.get(TRUTH_SPEED),
+            clock_sigma=sigma,
+            window=window,
+        )
         start = int(times[first])
         rows.append(
             _row(
@@ -97,16 +115,24 @@ def clip_rows(
 
 
 def truth_series(record: Record) -> TruthSeries | None:
-    """Reads the record's wind over ground; `None` where it has none, such as the log of a moving platform."""
+    """Reads the record's wind over ground; `None` where it has none, such as the log of a moving
+    platform."""
     series = record.wind()
-    return TruthSeries.of(series) if series is not None and over_ground(series) is not None else None
+    return (
+        TruthSeries.of(series) if series is not None and over_ground(series) is not None else None
+    )
 
 
 def clip_truth(
-    series: TruthSeries | None, end: int, *, stated_speed: float | None, clock_sigma: float | None, window: float
+    series: TruthSeries | None,
+    end: int,
+    *,
+    stated_speed: float | None,
+    clock_sigma: float | None,
+    window: float,
 ) -> WindTruth:
-    """Computes the ground truth at a clip's end: `stated_speed` exactly where a simulation states it, else the mean of
-    the series.
+    """Computes the ground truth at a clip's end: `stated_speed` exactly where a simulation states
+    it, else the mean of the series.
 
     Args:
         clock_sigma: [s]; `None` where nobody knows, and the ground truth's σ is then unknown too.
@@ -117,7 +143,9 @@ def clip_truth(
         return WindTruth.missing(staleness=math.inf)
     if clock_sigma is None:
         truth = series.before(end, window=window)
-        return replace(truth, sigma=math.nan, sigma_clock=math.nan, flags=(*truth.flags, "clock-sigma-unknown"))
+        return replace(
+            truth, sigma=math.nan, sigma_clock=math.nan, flags=(*truth.flags, "clock-sigma-unknown")
+        )
     return series.before(end, window=window, clock_sigma=clock_sigma)
 
 

@@ -55,7 +55,9 @@ class Source:
         """Rows of the catalog; arguments and errors as of `flagdata.query`."""
         from flagdata.lake.selection import select
 
-        return Rows(select(self.lake, where, at=at, columns=columns, order=order, sql=sql, limit=limit))
+        return Rows(
+            select(self.lake, where, at=at, columns=columns, order=order, sql=sql, limit=limit)
+        )
 
     @check_arguments
     def pairs(
@@ -70,18 +72,21 @@ class Source:
         seed: int = 0,
         cache: DecodedCache | None = None,
     ) -> Pairs:
-        """Clips with their ground truth, resolved now and for good: later commits change nothing in them.
+        """Clips with their ground truth, resolved now and for good: later commits change nothing in
+        them.
 
         Args:
-            where: a filter over the catalog's columns, as in `flagdata query --where`, or values that columns must
-                have; `None` is every clip.
+            where: a filter over the catalog's columns, as in `flagdata query --where`, or values
+                that columns must have; `None` is every clip.
             at: tag, branch, version number or commit; `None` is the head of main.
-            split: side of the split; `None` is all sides. The side that a data set states for a clip is its side.
-            split_by: how clips that state no side are divided; `None` is `HashedSplit()`. Sides are decided over all
-                clips of the version, before `where`, so that two filters never put one session, day or seed on two
-                sides.
-            window: length of the mean that is the ground truth [s]; other than the catalog's it is computed anew from
-                the records' wind. `None` is the catalog's, which must then be one for all clips.
+            split: side of the split; `None` is all sides. The side that a data set states for a
+                clip is its side.
+            split_by: how clips that state no side are divided; `None` is `HashedSplit()`. Sides are
+                decided over all clips of the version, before `where`, so that two filters never put
+                one session, day or seed on two sides.
+            window: length of the mean that is the ground truth [s]; other than the catalog's it is
+                computed anew from the records' wind. `None` is the catalog's, which must then be
+                one for all clips.
             tolerance: bounds beyond which a pair is refused; `None` is `Tolerance()`.
             seed: of the shuffled order.
             cache: where decoded clips are kept; `None` decodes each time.
@@ -89,11 +94,12 @@ class Source:
         Raises:
             MissingExtraError: torch is not installed.
             NotFoundError: no such ref, or no clip matches.
-            RefusedError: relatives are on two sides, some clips state a side and others none, `split_by` takes clips to
-                another side than they state, the side is empty, or no pair is within the tolerance.
+            RefusedError: relatives are on two sides, some clips state a side and others none,
+                `split_by` takes clips to another side than they state, the side is empty, or no
+                pair is within the tolerance.
             UnknownNameError: no such column or side.
-            UsageError: a filter that is not SQL, a window that is no length of time, clips of several windows where
-                none is named, or a seed that is no whole number.
+            UsageError: a filter that is not SQL, a window that is no length of time, clips of
+                several windows where none is named, or a seed that is no whole number.
         """
         with explaining_missing():
             from flagdata.dataset.pairs import Pairs
@@ -129,10 +135,11 @@ class Source:
         at: str | None = None,
         split_by: HashedSplit | ExplicitSplit | None = None,
     ) -> dict[str, SideSize]:
-        """Counts the clips, recordings and independent groups of each side of a split, before any tolerance.
+        """Counts the clips, recordings and independent groups of each side of a split, before any
+        tolerance.
 
-        Whole groups go to one side, so that with few of them the shares can be far from the fractions asked for: look
-        here before training.
+        Whole groups go to one side, so that with few of them the shares can be far from the
+        fractions asked for: look here before training.
 
         Args:
             where, at, split_by: as in `pairs`.
@@ -152,7 +159,9 @@ class Source:
         return f"Lake({self.lake.path}: {contents})"
 
     def _repr_html_(self) -> str:
-        return table(f"Lake {self.lake.path}", {kind: str(count) for kind, count in self._counts().items()})
+        return table(
+            f"Lake {self.lake.path}", {kind: str(count) for kind, count in self._counts().items()}
+        )
 
     def _counts(self) -> dict[str, int]:
         """Counts the artifacts on main by name of their kind."""

@@ -1,4 +1,5 @@
-"""Batches in an order that depends on (data, seed, epoch) alone, with a cursor that can be saved and restored."""
+"""Batches in an order that depends on (data, seed, epoch) alone, with a cursor that can be saved
+and restored."""
 
 from __future__ import annotations
 
@@ -28,7 +29,13 @@ RunIn: TypeAlias = Literal["threads", "fork", "spawn", "forkserver"]
 State: TypeAlias = dict[str, str | int | None]
 
 _AHEAD = 2  # batches that each thread reads ahead, as many as torch's worker processes do
-_MOVING = ("epoch", "before", "cursor", "share", "at")  # parts of a state that may differ from the loader that goes on
+_MOVING = (
+    "epoch",
+    "before",
+    "cursor",
+    "share",
+    "at",
+)  # parts of a state that may differ from the loader that goes on
 _SHARE = re.compile(r"([0-9]{1,9}) of ([1-9][0-9]{0,8})")
 
 
@@ -53,30 +60,35 @@ class Batchable(Dataset[Sample], ABC):
 class PairLoader:
     """Iterates over the batches of one epoch; a new iteration after the end begins the next epoch.
 
-    The order of an epoch depends on the pairs, the seed and the epoch's number, never on the number of workers or
-    shares; `order_hash` is a hash of it. An iteration that was left early is taken up where it stopped, in this process
-    or, through `state_dict`, in others: with as many shares each goes on with its own batches; with another number they
-    divide anew what the epoch has left, once all shares had handed out equally many.
+    The order of an epoch depends on the pairs, the seed and the epoch's number, never on the number
+    of workers or shares; `order_hash` is a hash of it. An iteration that was left early is taken up
+    where it stopped, in this process
+    or, through `state_dict`, in others: with as many shares each goes on with its own batches; with
+    another number they divide anew what the epoch has left, once all shares had handed out equally
+    many.
 
     Args:
         pairs: the dataset.
         batch_size: pairs a batch.
         workers: threads or processes that read and decode ahead; 0 reads when a batch is asked for.
-        run_in: what the workers are. "threads" share memory with the caller, so a batch costs no copy between
-            processes; reading and JPEG decoding leave Python's lock. Processes, started by "fork", "spawn" or
-            "forkserver", are for callers that hold that lock themselves most of the time.
+        run_in: what the workers are. "threads" share memory with the caller, so a batch costs no
+            copy between processes; reading and JPEG decoding leave Python's lock. Processes,
+            started by "fork", "spawn" or "forkserver", are for callers that hold that lock
+            themselves most of the time.
         order: "shuffled" anew each epoch, or as "stored": by recording and frame.
         last: whether to "keep" or "drop" the last batch when it is not full.
         memory: "pinned" copies batches to page-locked memory for transfer to an accelerator.
-        share: (index, count) of this process among those that train together; each takes every `count`-th batch of one
-            common order, all equally many, so that up to `count` - 1 batches of an epoch are in no share.
+        share: (index, count) of this process among those that train together; each takes every
+            `count`-th batch of one common order, all equally many, so that up to `count` - 1
+            batches of an epoch are in no share.
 
     Attributes:
         epoch: number of the epoch that the next batch belongs to, from 0.
         cursor: batches of it that were handed out by this share.
 
     Raises:
-        UsageError: sizes that cannot be, an unknown option, or pinned memory where there is no accelerator.
+        UsageError: sizes that cannot be, an unknown option, or pinned memory where there is no
+            accelerator.
     """
 
     @check_arguments
@@ -93,10 +105,13 @@ class PairLoader:
         share: tuple[int, int] = (0, 1),
     ) -> None:
         if batch_size < 1 or workers < 0:
-            raise UsageError(f"batches of {batch_size} with {workers} workers", fix="give at least 1 and 0")
+            raise UsageError(
+                f"batches of {batch_size} with {workers} workers", fix="give at least 1 and 0"
+            )
         if not 0 <= share[0] < share[1]:
             raise UsageError(
-                f"there is no share {share[0]} of {share[1]}", fix="give (index, count) with 0 <= index < count"
+                f"there is no share {share[0]} of {share[1]}",
+                fix="give (index, count) with 0 <= index < count",
             )
         for option, value, choices in (
             ("order", order, ("shuffled", "stored")),
@@ -105,9 +120,13 @@ class PairLoader:
             ("run_in", run_in, ("threads", "fork", "spawn", "forkserver")),
         ):
             if value not in choices:
-                raise UsageError(f"{option} cannot be {value!r}", fix=f"give {' or '.join(map(repr, choices))}")
+                raise UsageError(
+                    f"{option} cannot be {value!r}", fix=f"give {' or '.join(map(repr, choices))}"
+                )
         if memory == "pinned" and not torch.accelerator.is_available():
-            raise UsageError("pinned memory without an accelerator", fix="leave memory at 'pageable'")
+            raise UsageError(
+                "pinned memory without an accelerator", fix="leave memory at 'pageable'"
+            )
         self.pairs = pairs
         self.epoch = 0
         self.cursor = 0
@@ -118,7 +137,8 @@ class PairLoader:
         self._share = share
         if not len(self):
             raise UsageError(
-                f"{len(pairs)} pairs do not make a batch of {batch_size} for each of {share[1]} shares",
+                f"{len(pairs)} pairs do not make a batch of {batch_size} for each of {share[1]} "
+                "shares",
                 fix="give a smaller batch, fewer shares, or last='keep'",
             )
         self._memory: Memory = memory
@@ -135,7 +155,8 @@ class PairLoader:
                 pin_memory=memory == "pinned",
                 persistent_workers=True,
                 multiprocessing_context=run_in,
-                generator=torch.Generator(),  # its own, so that loading draws nothing from the global stream
+                # its own, so that loading draws nothing from the global stream
+                generator=torch.Generator(),
             )
 
     def __len__(self) -> int:
@@ -153,7 +174,8 @@ class PairLoader:
         return self._from(epoch, 0)
 
     def _from(self, epoch: int, first: int) -> list[list[int]]:
-        """Batches of this share in an epoch of which all shares together handed out `first` before."""
+        """Batches of this share in an epoch of which all shares together handed out `first`
+        before."""
         size, order = self._batch_size, self._order_of_epoch(epoch)
         index, count = self._share
         end = first + (self._total() - first) // count * count
@@ -167,8 +189,8 @@ class PairLoader:
 
     @check_arguments
     def order_hash(self, epoch: int) -> str:
-        """Computes the SHA-256 of the samples and their order in an epoch, in hexadecimal: equal for any workers and
-        shares."""
+        """Computes the SHA-256 of the samples and their order in an epoch, in hexadecimal: equal
+        for any workers and shares."""
         order = self._order_of_epoch(epoch).astype("<i8").tobytes()
         return hashlib.sha256(
             f"{self.pairs.fingerprint} {self._batch_size} {self._last}\n".encode() + order
@@ -191,7 +213,10 @@ class PairLoader:
             return
         for batch in self._in_this_process() if self._processes is None else self._processes:
             if iteration != self._iteration:
-                raise UsageError("another iteration of this loader has begun", fix="use one loader for each iteration")
+                raise UsageError(
+                    "another iteration of this loader has begun",
+                    fix="use one loader for each iteration",
+                )
             self.cursor += 1
             if self.cursor == len(batches):
                 self.epoch, self.cursor, self._before = self.epoch + 1, 0, 0
@@ -204,7 +229,9 @@ class PairLoader:
             return
         pool = ThreadPoolExecutor(self._threads, thread_name_prefix="pairs")
         try:
-            ahead = deque(pool.submit(self._batch, batch) for batch in islice(todo, _AHEAD * self._threads))
+            ahead = deque(
+                pool.submit(self._batch, batch) for batch in islice(todo, _AHEAD * self._threads)
+            )
             while ahead:
                 batch = ahead.popleft().result()
                 ahead.extend(pool.submit(self._batch, indices) for indices in islice(todo, 1))
@@ -217,7 +244,8 @@ class PairLoader:
         return batch.pin_memory() if self._memory == "pinned" else batch
 
     def state_dict(self) -> State:
-        """Returns everything that determines the batches still to come; put it into the checkpoint beside the model."""
+        """Returns everything that determines the batches still to come; put it into the checkpoint
+        beside the model."""
         return {
             "at": self.pairs.at,
             "fingerprint": self.pairs.fingerprint,
@@ -232,8 +260,8 @@ class PairLoader:
         }
 
     def load_state_dict(self, state: Mapping[str, str | int | None]) -> None:
-        """Goes to where `state` was taken: the next iteration gives the same batches, bit for bit. Taken with another
-        number of shares, it is that of any of them after equally many batches.
+        """Goes to where `state` was taken: the next iteration gives the same batches, bit for bit.
+        Taken with another number of shares, it is that of any of them after equally many batches.
 
         Raises:
             RefusedError: it was taken of other data, another seed, or other batches.
@@ -243,16 +271,26 @@ class PairLoader:
         state = {"before": 0, **state}  # which states of older versions lack
         share = _SHARE.fullmatch(str(state.get("share")))
         if set(state) != set(present_state) or share is None:
-            raise UsageError("this is not a state of a loader of pairs", fix="give what state_dict returned")
-        different = [name for name in present_state if name not in _MOVING and state[name] != present_state[name]]
+            raise UsageError(
+                "this is not a state of a loader of pairs", fix="give what state_dict returned"
+            )
+        different = [
+            name
+            for name in present_state
+            if name not in _MOVING and state[name] != present_state[name]
+        ]
         if different:
-            differences = "; ".join(f"{name} was {state[name]!r}, is {present_state[name]!r}" for name in different)
+            differences = "; ".join(
+                f"{name} was {state[name]!r}, is {present_state[name]!r}" for name in different
+            )
             raise RefusedError(
                 f"the saved state belongs to other batches: {differences}",
                 where=f"data at {state['at'] or 'the head of main'}",
                 fix="resolve the query at the same tag, with the same options",
             )
-        numbers = [whole(state[name], f"{name} of the state") for name in ("epoch", "before", "cursor")]
+        numbers = [
+            whole(state[name], f"{name} of the state") for name in ("epoch", "before", "cursor")
+        ]
         count, total = int(share[2]), self._total()
         if min(numbers) < 0 or numbers[1] + numbers[2] * count >= total:
             raise UsageError(
@@ -269,8 +307,8 @@ class PairLoader:
 class _Todo:
     """The batch sampler that the `DataLoader` asks for the lists of indices left in the epoch.
 
-    It does not know its loader: a reference cycle would leave the end of the workers to the garbage collector, which
-    takes their queues apart first, and each worker then costs five seconds.
+    It does not know its loader: a reference cycle would leave the end of the workers to the garbage
+    collector, which takes their queues apart first, and each worker then costs five seconds.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,5 @@
-"""What a resolved query hands to loader workers: flat numpy arrays, one entry a pair; no catalog, no connection."""
+"""What a resolved query hands to loader workers: flat numpy arrays, one entry a pair; no catalog,
+no connection."""
 
 from __future__ import annotations
 
@@ -83,25 +84,35 @@ class PairTable:
 
     @classmethod
     def of(cls, rows: pa.Table, *, labels: Mapping[str, Mapping[str, Any]] | None = None) -> Self:
-        """Builds the table of catalog rows (with at least `COLUMNS`), in the order of recording, frame and identity.
+        """Builds the table of catalog rows (with at least `COLUMNS`), in the order of recording,
+        frame and identity.
 
         Args:
-            labels: artifact → the user's own values; those that are numbers or truth values become the parameters
-                "label.<name>".
+            labels: artifact → the user's own values; those that are numbers or truth values become
+                the parameters "label.<name>".
 
         Raises:
             CorruptError: a clip without its object or frames.
         """
-        rows = rows.sort_by([("recording", "ascending"), ("frame_first", "ascending"), ("artifact", "ascending")])
+        rows = rows.sort_by(
+            [("recording", "ascending"), ("frame_first", "ascending"), ("artifact", "ascending")]
+        )
         for column in ("object", "frame_first", "frame_count", "start", "end"):
             if rows[column].null_count:
                 artifact = rows.filter(rows[column].is_null())["artifact"][0].as_py()
-                raise CorruptError(f"a clip has no {column}", where=f"artifact {artifact}", fix="run flagdata doctor")
+                raise CorruptError(
+                    f"a clip has no {column}",
+                    where=f"artifact {artifact}",
+                    fix="run flagdata doctor",
+                )
         objects, index = _encode_column(rows, "object")
         ids = rows["artifact"].to_pylist()
         texts = rows["parameters"].to_pylist()
         if labels:
-            texts = [_add_labels(text, labels.get(i), artifact=i) for text, i in zip(texts, ids, strict=True)]
+            texts = [
+                _add_labels(text, labels.get(i), artifact=i)
+                for text, i in zip(texts, ids, strict=True)
+            ]
         parameters, names = _parameters(texts, ids)
         return cls(
             artifact=_text(rows, "artifact"),
@@ -126,7 +137,8 @@ class PairTable:
         )
 
     def take(self, index: IntArray | BoolArray) -> Self:
-        """Selects the pairs at `index`, in its order, with the objects and parameter names that they use."""
+        """Selects the pairs at `index`, in its order, with the objects and parameter names that
+        they use."""
         shared = ("objects", "names")
         taken = {f.name: getattr(self, f.name)[index] for f in fields(self) if f.name not in shared}
         used, taken["object"] = np.unique(taken["object"], return_inverse=True)
@@ -134,8 +146,11 @@ class PairTable:
         taken["parameters"] = taken["parameters"][:, has_values]
         return replace(self, **taken, objects=self.objects[used], names=self.names[has_values])
 
-    def parameter_columns(self, rows: IntArray | Sequence[int] | slice = slice(None)) -> dict[str, FloatArray]:
-        """Name → (n,) values of some pairs, by default of all; NaN where a clip has no such parameter."""
+    def parameter_columns(
+        self, rows: IntArray | Sequence[int] | slice = slice(None)
+    ) -> dict[str, FloatArray]:
+        """Name → (n,) values of some pairs, by default of all; NaN where a clip has no such
+        parameter."""
         chosen = self.parameters[rows]
         return {str(name): chosen[:, k] for k, name in enumerate(self.names)}
 
@@ -145,14 +160,18 @@ class PairTable:
         return {str(self.names[k]): float(values[k]) for k in np.nonzero(~np.isnan(values))[0]}
 
     def fingerprint(self) -> str:
-        """Computes the SHA-256 of every pair's identity, place and ground truth, in order: equal means the same data,
-        by whatever query it was found."""
+        """Computes the SHA-256 of every pair's identity, place and ground truth, in order: equal
+        means the same data, by whatever query it was found."""
         digest = hashlib.sha256()
         for field in fields(self):
             values: AnyArray = getattr(self, field.name)
             digest.update(f"{field.name} {values.shape}\n".encode())
             text = values.dtype.kind == "U"
-            digest.update("\n".join(values.tolist()).encode() if text else np.ascontiguousarray(values).tobytes())
+            digest.update(
+                "\n".join(values.tolist()).encode()
+                if text
+                else np.ascontiguousarray(values).tobytes()
+            )
         return digest.hexdigest()
 
 
@@ -161,10 +180,12 @@ def _text(rows: pa.Table, column: str) -> NDArray[np.str_]:
 
 
 def _encode_column(rows: pa.Table, column: str) -> tuple[NDArray[np.str_], IntArray]:
-    """Encodes a column: its different texts, sorted, and of each row which it has; as `np.unique`, without sorting
-    all."""
+    """Encodes a column: its different texts, sorted, and of each row which it has; as `np.unique`,
+    without sorting all."""
     coded = rows[column].combine_chunks().dictionary_encode()
-    texts, places = np.unique(np.array(coded.dictionary.to_pylist(), dtype=np.str_), return_inverse=True)
+    texts, places = np.unique(
+        np.array(coded.dictionary.to_pylist(), dtype=np.str_), return_inverse=True
+    )
     return texts, places[coded.indices.to_numpy()].astype(np.int64)
 
 
@@ -172,11 +193,15 @@ def _number(rows: pa.Table, column: str, *, null: float) -> FloatArray:
     return rows[column].fill_null(null).to_numpy().astype(np.float64)
 
 
-def _parameters(texts: Sequence[str | None], artifacts: Sequence[str]) -> tuple[FloatArray, NDArray[np.str_]]:
-    """Numbers of JSON objects as columns. Texts and lists among the parameters stay in the catalog only."""
+def _parameters(
+    texts: Sequence[str | None], artifacts: Sequence[str]
+) -> tuple[FloatArray, NDArray[np.str_]]:
+    """Numbers of JSON objects as columns. Texts and lists among the parameters stay in the catalog
+    only."""
     owners = {text: artifact for text, artifact in zip(texts, artifacts, strict=True) if text}
     parsed = {
-        text: dict(_numbers(column_json(text, "parameters", artifact=artifact))) for text, artifact in owners.items()
+        text: dict(_numbers(column_json(text, "parameters", artifact=artifact)))
+        for text, artifact in owners.items()
     }
     names = sorted({name for values in parsed.values() for name in values})
     column = {name: k for k, name in enumerate(names)}

@@ -27,7 +27,8 @@ OPEN_RECORDS = 64  # record files that a thread keeps open
 
 
 class _OpenRecords(threading.local):
-    """The records that this thread has open, the least recently used first; each thread has its own."""
+    """The records that this thread has open, the least recently used first; each thread has its
+    own."""
 
     def __init__(self) -> None:
         self.records: OrderedDict[int, Record] = OrderedDict()
@@ -36,15 +37,17 @@ class _OpenRecords(threading.local):
 class Pairs(Batchable):
     """Pairs of a query, a map-style dataset. Made by `Source.pairs`.
 
-    Workers, forked or spawned, get flat arrays and paths; they never touch the catalog. Each opens a record when it
-    first needs it; of a lake in a bucket it fetches what is needed then, which forked workers cannot. A
-    `torch.utils.data.DataLoader` of your own gives batches as `loader` does, in an order of its own.
+    Workers, forked or spawned, get flat arrays and paths; they never touch the catalog. Each opens
+    a record when it first needs it; of a lake in a bucket it fetches what is needed then, which
+    forked workers cannot. A `torch.utils.data.DataLoader` of your own gives batches as `loader`
+    does, in an order of its own.
 
     Attributes:
         table: the pairs' numbers, as arrays.
         refused: the pairs outside the tolerance, each with its reasons.
         split: side that all pairs are on; `None` where none was asked for.
-        split_by: the rule by which sides were decided, and their sizes, as JSON; `None` where no side was asked for.
+        split_by: the rule by which sides were decided, and their sizes, as JSON; `None` where no
+            side was asked for.
         at: the ref the query was resolved at, as it was given.
         seed: of the shuffled orders.
         fingerprint: hash of the pairs and their ground truth, in order; equal means the same data.
@@ -106,7 +109,8 @@ class Pairs(Batchable):
 
     @check_arguments
     def film(self, index: int) -> UInt8Array:
-        """Reads all frames of the recording that the pair at `index` is of: (frames, height, width) gray.
+        """Reads all frames of the recording that the pair at `index` is of: (frames, height, width)
+        gray.
 
         Raises:
             IndexError: beyond the last pair.
@@ -138,14 +142,21 @@ class Pairs(Batchable):
 
     def __repr__(self) -> str:
         at = self.at or "the head of main"
-        return f"Pairs({len(self)} pairs at {at}, {len(self.refused)} refused, fingerprint {self.fingerprint[:12]})"
+        return (
+            f"Pairs({len(self)} pairs at {at}, {len(self.refused)} refused, fingerprint "
+            f"{self.fingerprint[:12]})"
+        )
 
     def _repr_html_(self) -> str:
         refused = {
-            f"refused {refusal.artifact[:SHORT]}": "; ".join(refusal.reasons) for refusal in self.refused[:_SHOWN]
+            f"refused {refusal.artifact[:SHORT]}": "; ".join(refusal.reasons)
+            for refusal in self.refused[:_SHOWN]
         }
         wind = self.table.wind
-        rows = {"version": self.at or "the head of main", "wind": f"{wind.min():.2f} to {wind.max():.2f} m/s"}
+        rows = {
+            "version": self.at or "the head of main",
+            "wind": f"{wind.min():.2f} to {wind.max():.2f} m/s",
+        }
         return table(f"{len(self)} pairs, {len(self.refused)} refused", rows | refused)
 
     @check_arguments
@@ -160,7 +171,8 @@ class Pairs(Batchable):
         memory: Memory = "pageable",
         share: tuple[int, int] = (0, 1),
     ) -> PairLoader:
-        """Batches in a deterministic order that can be saved and taken up again; see `PairLoader`."""
+        """Batches in a deterministic order that can be saved and taken up again; see
+        `PairLoader`."""
         return PairLoader(
             self,
             batch_size=batch_size,
@@ -182,7 +194,9 @@ class Pairs(Batchable):
         if self._cache is None:
             frames = decode()
         else:
-            frames = self._cache.frames(str(self.table.objects[number]), first, count, decode=decode)
+            frames = self._cache.frames(
+                str(self.table.objects[number]), first, count, decode=decode
+            )
         return torch.from_numpy(frames).unsqueeze(0)
 
     def _record(self, number: int) -> Record:

@@ -1,4 +1,5 @@
-"""A query becomes pairs, in the parent process: rows, side of the split, ground truth of the window, tolerance."""
+"""A query becomes pairs, in the parent process: rows, side of the split, ground truth of the
+window, tolerance."""
 
 from __future__ import annotations
 
@@ -41,7 +42,9 @@ class Resolved:
     split_by: Mapping[str, Any] | None
 
 
-def side_sizes(lake: Lake, *, where: Where | None, at: str | None, split_by: SplitBy | None) -> Mapping[str, SideSize]:
+def side_sizes(
+    lake: Lake, *, where: Where | None, at: str | None, split_by: SplitBy | None
+) -> Mapping[str, SideSize]:
     """Sizes of all sides; arguments as in `Source.sides`, which see for what it raises."""
     catalog = lake.scan(lake.view(at))
     return divide(catalog, clips_of(catalog, where), split_by, hashed=hashed_split(lake, at)).sizes
@@ -57,9 +60,12 @@ def resolve(
     window: float | None,
     tolerance: Tolerance,
 ) -> Resolved:
-    """Pairs of `lake` at one version; arguments as in `Source.pairs`, which see for what it raises."""
+    """Pairs of `lake` at one version; arguments as in `Source.pairs`, which see for what it
+    raises."""
     if window is not None and not (math.isfinite(window) and window > 0):
-        raise UsageError(f"the window of {window} s is not a positive length", fix="give a length above zero")
+        raise UsageError(
+            f"the window of {window} s is not a positive length", fix="give a length above zero"
+        )
     catalog = lake.scan(lake.view(at))
     clips = clips_of(catalog, where, (*COLUMNS, "kind", "dataset", "side"))
     if not clips.num_rows:
@@ -86,17 +92,22 @@ def resolve(
     windows = _windows(clips, table)
     table = _with_window(lake, table, windows, _common(windows) if window is None else window)
     refused = judge(
-        table, tolerance, superseded=superseded_recordings(lineage_of(catalog), set(table.recording.tolist()))
+        table,
+        tolerance,
+        superseded=superseded_recordings(lineage_of(catalog), set(table.recording.tolist())),
     )
     is_usable = np.array([k not in refused for k in range(len(table))], dtype=np.bool_)
     if not is_usable.any():
         first = next(iter(refused.values()))
         raise RefusedError(
-            f"all {len(table)} pairs are outside the tolerance; the first: {'; '.join(first.reasons)}",
+            f"all {len(table)} pairs are outside the tolerance; the first: "
+            f"{'; '.join(first.reasons)}",
             where=f"clip {first.artifact}",
             fix="give a wider Tolerance, or improve the recording's wind log or clock",
         )
-    return Resolved(table=table.take(is_usable), refused=tuple(refused.values()), split_by=statement)
+    return Resolved(
+        table=table.take(is_usable), refused=tuple(refused.values()), split_by=statement
+    )
 
 
 def _words(where: Where | None) -> str | None:
@@ -105,15 +116,24 @@ def _words(where: Where | None) -> str | None:
 
 
 def _windows(clips: pa.Table, table: PairTable) -> FloatArray:
-    """Reads the window (n,) of the catalog's ground truth of each pair [s], NaN where its recipe has none."""
+    """Reads the window (n,) of the catalog's ground truth of each pair [s], NaN where its recipe
+    has none."""
     recipe = clips["recipe"].combine_chunks().dictionary_encode()
-    first = np.unique(recipe.indices.fill_null(-1).to_numpy(zero_copy_only=False), return_index=True)
-    owner = {int(number): clips["artifact"][int(row)].as_py() for number, row in zip(*first, strict=True)}
+    first = np.unique(
+        recipe.indices.fill_null(-1).to_numpy(zero_copy_only=False), return_index=True
+    )
+    owner = {
+        int(number): clips["artifact"][int(row)].as_py() for number, row in zip(*first, strict=True)
+    }
     windows_of_recipes = [
-        column_json(text, "recipe", artifact=owner[number]).get("window", math.nan) if text else math.nan
+        column_json(text, "recipe", artifact=owner[number]).get("window", math.nan)
+        if text
+        else math.nan
         for number, text in enumerate(recipe.dictionary.to_pylist())
     ]
-    windows = np.array([*windows_of_recipes, math.nan], dtype=np.float64)[recipe.indices.fill_null(-1).to_numpy()]
+    windows = np.array([*windows_of_recipes, math.nan], dtype=np.float64)[
+        recipe.indices.fill_null(-1).to_numpy()
+    ]
     row_of_pair = pc.index_in(pa.array(table.artifact), value_set=clips["artifact"])  # type: ignore[attr-defined]
     return windows[row_of_pair.to_numpy()]
 
@@ -135,8 +155,8 @@ def _common(windows: FloatArray) -> float:
 
 
 def _with_window(lake: Lake, table: PairTable, windows: FloatArray, window: float) -> PairTable:
-    """Returns the table with ground truths over `window`; those of another window are computed anew from the record's
-    wind."""
+    """Returns the table with ground truths over `window`; those of another window are computed anew
+    from the record's wind."""
     to_compute = np.nonzero(windows != window)[0]
     if not len(to_compute):
         return table
@@ -156,5 +176,10 @@ def _with_window(lake: Lake, table: PairTable, windows: FloatArray, window: floa
                 clock_sigma=None if math.isnan(clock) else clock,
                 window=window,
             )
-            wind[k], sigma[k], coverage[k], staleness[k] = truth.wind, truth.sigma, truth.coverage, truth.staleness
+            wind[k], sigma[k], coverage[k], staleness[k] = (
+                truth.wind,
+                truth.sigma,
+                truth.coverage,
+                truth.staleness,
+            )
     return replace(table, wind=wind, wind_sigma=sigma, coverage=coverage, staleness=staleness)

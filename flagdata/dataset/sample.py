@@ -1,4 +1,5 @@
-"""A clip with its ground truth, one type for real and simulated clips, and how samples become a batch."""
+"""A clip with its ground truth, one type for real and simulated clips, and how samples become a
+batch."""
 
 from __future__ import annotations
 
@@ -26,7 +27,8 @@ class Sample:
         wind_sigma: standard uncertainty of `wind` [m/s].
         staleness: age of the newest wind sample at the clip's end [s].
         coverage: share of the window that wind samples speak for, 0 to 1.
-        clock_sigma: standard uncertainty of the camera's clock on the wind's [s]; 0 for a simulated clip.
+        clock_sigma: standard uncertainty of the camera's clock on the wind's [s]; 0 for a simulated
+            clip.
         parameters: simulation and render parameters by name, SI; empty for a real clip.
         artifact: catalog identity of the clip.
         recording: catalog identity of the recording it belongs to.
@@ -57,7 +59,8 @@ class Sample:
     def __post_init__(self) -> None:
         if self.clip.ndim != 4 or self.clip.dtype != torch.uint8:
             raise InputError(
-                f"a clip cannot have the shape {tuple(self.clip.shape)} and the type {self.clip.dtype}",
+                f"a clip cannot have the shape {tuple(self.clip.shape)} and the type "
+                f"{self.clip.dtype}",
                 where=self.artifact,
                 fix="give uint8 of shape (channel, time, height, width)",
             )
@@ -72,13 +75,15 @@ class Sample:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Batch:
-    """Samples stacked along a first axis of length n; the attributes mean what they mean in `Sample`.
+    """Samples stacked along a first axis of length n; the attributes mean what they mean in
+    `Sample`.
 
     Attributes:
         clip: (n, channel, time, height, width) uint8.
         wind, wind_sigma, staleness, coverage, clock_sigma: (n,) float32.
-        parameters: name → (n,) float32, for every name that any sample knows; NaN where that sample does not (a batch
-            of real and simulated clips, or of different simulators). The only NaN in a batch.
+        parameters: name → (n,) float32, for every name that any sample knows; NaN where that sample
+            does not (a batch of real and simulated clips, or of different simulators). The only NaN
+            in a batch.
         start, end: (n,) int64.
         artifact, recording, session, day, seed: n-tuples; they stay on the host.
     """
@@ -102,7 +107,8 @@ class Batch:
         return len(self.artifact)
 
     def to(self, device: torch.device | str) -> Self:
-        """Moves the batch's tensors to `device`; copies from pinned memory overlap with computation."""
+        """Moves the batch's tensors to `device`; copies from pinned memory overlap with
+        computation."""
         return self._map_arrays(lambda tensor: tensor.to(device, non_blocking=tensor.is_pinned()))
 
     def pin_memory(self) -> Self:
@@ -148,7 +154,10 @@ def collate(samples: Sequence[Sample]) -> Batch:
         staleness=_column([sample.staleness for sample in samples]),
         coverage=_column([sample.coverage for sample in samples]),
         clock_sigma=_column([sample.clock_sigma for sample in samples]),
-        parameters={name: _column([sample.parameters.get(name, math.nan) for sample in samples]) for name in names},
+        parameters={
+            name: _column([sample.parameters.get(name, math.nan) for sample in samples])
+            for name in names
+        },
         start=torch.tensor([sample.start for sample in samples], dtype=torch.int64),
         end=torch.tensor([sample.end for sample in samples], dtype=torch.int64),
         artifact=tuple(sample.artifact for sample in samples),

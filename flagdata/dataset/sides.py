@@ -1,8 +1,9 @@
-"""On which side of a split each clip is. Every door that takes a split asks `divide`; nothing else decides.
+"""On which side of a split each clip is. Every door that takes a split asks `divide`; nothing else
+decides.
 
-A data set states its sides in the catalog's columns `dataset` and `side`: the side that a row states is its side. Rows
-that state none are divided by a `HashedSplit`, or by the filters of an `ExplicitSplit`. A selection of both kinds is
-refused, and so are relatives on two sides.
+A data set states its sides in the catalog's columns `dataset` and `side`: the side that a row
+states is its side. Rows that state none are divided by a `HashedSplit`, or by the filters of an
+`ExplicitSplit`. A selection of both kinds is refused, and so are relatives on two sides.
 """
 
 from __future__ import annotations
@@ -17,7 +18,14 @@ import pyarrow.compute as pc
 
 from flagdata.core.schema import Kind
 from flagdata.dataset.clip_lineage import origins_of
-from flagdata.dataset.splits import DEFAULT_FRACTIONS, ExplicitSplit, HashedSplit, Origin, groups, refuse_leaks
+from flagdata.dataset.splits import (
+    DEFAULT_FRACTIONS,
+    ExplicitSplit,
+    HashedSplit,
+    Origin,
+    groups,
+    refuse_leaks,
+)
 from flagdata.errors import RefusedError, UnknownNameError
 from flagdata.lake.matching import Where, condition
 from flagdata.lake.rowfiles import Scan
@@ -37,7 +45,8 @@ SplitBy: TypeAlias = HashedSplit | ExplicitSplit
 
 @dataclass(frozen=True, kw_only=True)
 class SideSize:
-    """How much one side of a split holds: clips, recordings, and independent groups of recordings."""
+    """How much one side of a split holds: clips, recordings, and independent groups of
+    recordings."""
 
     clips: int
     recordings: int
@@ -54,7 +63,8 @@ class Division:
         artifacts: side → identities of the rows on it.
         sizes: side → how much of the selection it holds.
         grouping: what there is to divide, in words.
-        is_whole: whether all clips of the catalog belong together, so that a hash gives one side all of them.
+        is_whole: whether all clips of the catalog belong together, so that a hash gives one side
+            all of them.
     """
 
     rule: Literal["stated", "hashed", "explicit"]
@@ -81,23 +91,30 @@ class Division:
 
     def as_dict(self) -> dict[str, Any]:
         """Returns what manifests, cards and tags state of a split, as JSON."""
-        return {"rule": self.rule, **self.about, "sides": {side: asdict(size) for side, size in self.sizes.items()}}
+        return {
+            "rule": self.rule,
+            **self.about,
+            "sides": {side: asdict(size) for side, size in self.sizes.items()},
+        }
 
 
-def divide(catalog: Catalog, rows: pa.Table, split_by: SplitBy | None = None, *, hashed: HashedSplit) -> Division:
+def divide(
+    catalog: Catalog, rows: pa.Table, split_by: SplitBy | None = None, *, hashed: HashedSplit
+) -> Division:
     """Decides on which side each row of a selection is.
 
-    All clips of the catalog, or of the data sets that the selection is of, take part, so that two filters never put
-    relatives on two sides.
+    All clips of the catalog, or of the data sets that the selection is of, take part, so that two
+    filters never put relatives on two sides.
 
     Args:
         rows: of the selection: clips, or what `select_columns` returns.
-        split_by: the split that the user gives; `None` is the one that data sets state, else `hashed`.
+        split_by: the split that the user gives; `None` is the one that data sets state, else
+            `hashed`.
         hashed: the hashed split of this version, see `flagdata.dataset.tagged.hashed_split`.
 
     Raises:
-        RefusedError: relatives are on two sides; some of the rows state a side and others none; or `split_by` takes
-            rows to another side than they state.
+        RefusedError: relatives are on two sides; some of the rows state a side and others none; or
+            `split_by` takes rows to another side than they state.
     """
     if isinstance(split_by, ExplicitSplit):
         return _explicit(catalog, rows, split_by)
@@ -109,13 +126,16 @@ def divide(catalog: Catalog, rows: pa.Table, split_by: SplitBy | None = None, *,
     datasets = _texts(stating, "dataset")
     if stating.num_rows < rows.num_rows:
         raise RefusedError(
-            f"{stating.num_rows} of {rows.num_rows} rows state a side, of {_listed_names(datasets)}, and the others none",
+            f"{stating.num_rows} of {rows.num_rows} rows state a side, of "
+            f"{_listed_names(datasets)}, and the others none",
             where=f"artifact {rows.filter(~_STATES)['artifact'][0].as_py()}",
-            fix="add side is not null to the filter for those of data sets, or side is null for the others",
+            fix="add side is not null to the filter for those of data sets, or side is null for "
+            "the others",
         )
     if split_by is not None:
         raise RefusedError(
-            f"{_listed_names(datasets)} {_state(datasets)} the side of each row, and a hashed split is given beside it",
+            f"{_listed_names(datasets)} {_state(datasets)} the side of each row, and a hashed "
+            "split is given beside it",
             where=f"salt {split_by.salt!r}, fractions {dict(split_by.fractions)}",
             fix="leave out --salt and split_by: the side that a row states is its side",
         )
@@ -125,13 +145,19 @@ def divide(catalog: Catalog, rows: pa.Table, split_by: SplitBy | None = None, *,
 
 
 def stated_sides(catalog: Catalog, rows: pa.Table) -> Division | None:
-    """Describes the sides that rows state, whether or not relatives are on two of them; None where none states one."""
+    """Describes the sides that rows state, whether or not relatives are on two of them; None where
+    none states one."""
     stating = rows.filter(_STATES & condition({"kind": _DIVIDED}))
-    return _stated_division(stating, _stated_origins(catalog, _texts(stating, "dataset"))) if stating.num_rows else None
+    return (
+        _stated_division(stating, _stated_origins(catalog, _texts(stating, "dataset")))
+        if stating.num_rows
+        else None
+    )
 
 
 def hashed_sides(catalog: Catalog, rows: pa.Table, split_by: HashedSplit) -> Division:
-    """Describes the sides that a hash gives rows that state none, whether or not relatives of theirs state others."""
+    """Describes the sides that a hash gives rows that state none, whether or not relatives of
+    theirs state others."""
     return _Hashed.of(catalog, split_by).division(rows)
 
 
@@ -160,10 +186,12 @@ def lineage_of(catalog: Catalog) -> pa.Table:
 
 
 def explicit_sides(catalog: Catalog, split_by: ExplicitSplit) -> dict[str, pa.Table]:
-    """Maps each side to its clips, `COLUMNS` of them. All sides are resolved and compared, whichever is wanted.
+    """Maps each side to its clips, `COLUMNS` of them. All sides are resolved and compared,
+    whichever is wanted.
 
     Raises:
-        RefusedError: two of them share a recording, a film, a mesh sequence, a seed, a session or a day.
+        RefusedError: two of them share a recording, a film, a mesh sequence, a seed, a session or a
+            day.
     """
     taken = {side: clips_of(catalog, where) for side, where in split_by.where.items()}
     lineage = lineage_of(catalog)
@@ -178,15 +206,19 @@ def _explicit(catalog: Catalog, rows: pa.Table, split_by: ExplicitSplit) -> Divi
         if others.num_rows:
             first = others.slice(0, 1).to_pylist()[0]
             raise RefusedError(
-                f"the explicit split takes {others.num_rows} clips to {side!r} that state another side",
-                where=f"artifact {first['artifact']}, side {first['side']!r} of {first['dataset']!r}",
-                fix="select the clips of a side by the side that they state: side = 'train' in its filter",
+                f"the explicit split takes {others.num_rows} clips to {side!r} that state another "
+                "side",
+                where=f"artifact {first['artifact']}, side {first['side']!r} of "
+                f"{first['dataset']!r}",
+                fix="select the clips of a side by the side that they state: side = 'train' in its "
+                "filter",
             )
     of_selection = condition({"artifact": rows["artifact"].to_pylist()})
     by_side = {side: clips.filter(of_selection) for side, clips in taken.items()}
     origins = origins_of(lineage_of(catalog), clips_of(catalog, None))
     where = {
-        side: filter_ if isinstance(filter_, str) else _as_json(filter_) for side, filter_ in split_by.where.items()
+        side: filter_ if isinstance(filter_, str) else _as_json(filter_)
+        for side, filter_ in split_by.where.items()
     }
     return Division(
         rule="explicit",
@@ -199,7 +231,8 @@ def _explicit(catalog: Catalog, rows: pa.Table, split_by: ExplicitSplit) -> Divi
 
 def _as_json(values: Mapping[str, Any]) -> dict[str, Any]:
     return {
-        name: list(value) if isinstance(value, tuple | set | frozenset) else value for name, value in values.items()
+        name: list(value) if isinstance(value, tuple | set | frozenset) else value
+        for name, value in values.items()
     }
 
 
@@ -233,7 +266,8 @@ def _stated_origins(catalog: Catalog, datasets: Sequence[str]) -> dict[str, list
 
 @dataclass(frozen=True, kw_only=True)
 class _Hashed:
-    """What a hash decides. Every clip of the catalog takes part, so that two filters never disagree about a group.
+    """What a hash decides. Every clip of the catalog takes part, so that two filters never disagree
+    about a group.
 
     Attributes:
         clips: all clips of the catalog.
@@ -250,20 +284,25 @@ class _Hashed:
     def of(cls, catalog: Catalog, split_by: HashedSplit) -> _Hashed:
         clips = clips_of(catalog, None)
         origins = origins_of(lineage_of(catalog), clips)
-        sides = dict(zip([origin.recording for origin in origins], split_by.assign(origins), strict=True))
+        sides = dict(
+            zip([origin.recording for origin in origins], split_by.assign(origins), strict=True)
+        )
         return cls(split_by=split_by, clips=clips, origins=origins, sides=sides)
 
     def division(self, rows: pa.Table) -> Division:
         """Divides rows that state no side."""
         by_side = {
-            side: rows.filter(condition({"recording": [name for name, own in self.sides.items() if own == side]}))
+            side: rows.filter(
+                condition({"recording": [name for name, own in self.sides.items() if own == side]})
+            )
             for side in self.split_by.sides
         }
         count = len(set(groups(self.origins).tolist()))
         grouping = f"the catalog has {count} independent groups"
         if count == 1:
             grouping = (
-                f"all {self.clips.num_rows} clips belong together ({_shared_origins(self.origins)}), and are on the side "
+                f"all {self.clips.num_rows} clips belong together "
+                f"({_shared_origins(self.origins)}), and are on the side "
                 f"{next(iter(self.sides.values()))!r}"
             )
         return Division(
@@ -284,7 +323,9 @@ class _Hashed:
         stating = self.clips.filter(_STATES)
         if not stating.num_rows:
             return
-        stated = dict(zip(stating["recording"].to_pylist(), stating["side"].to_pylist(), strict=True))
+        stated = dict(
+            zip(stating["recording"].to_pylist(), stating["side"].to_pylist(), strict=True)
+        )
         chosen = set(rows["recording"].to_pylist())
         by_group: dict[int, list[Origin]] = {}
         for label, origin in zip(groups(self.origins).tolist(), self.origins, strict=True):
@@ -296,7 +337,10 @@ class _Hashed:
                 for origin in group:
                     side = stated.get(origin.recording, self.sides[origin.recording])
                     compared.setdefault(side, []).append(origin)
-        refuse_leaks(compared, fix="leave those that share it out by the filter, or take them off by flagdata withdraw")
+        refuse_leaks(
+            compared,
+            fix="leave those that share it out by the filter, or take them off by flagdata withdraw",
+        )
 
 
 def _artifacts(by_side: Mapping[str, pa.Table]) -> dict[str, frozenset[str]]:
@@ -305,7 +349,9 @@ def _artifacts(by_side: Mapping[str, pa.Table]) -> dict[str, frozenset[str]]:
 
 def _sizes(by_side: Mapping[str, pa.Table], origins: Sequence[Origin]) -> dict[str, SideSize]:
     """Counts what each side holds, and the groups of all `origins` that its recordings are in."""
-    labels = dict(zip([origin.recording for origin in origins], groups(origins).tolist(), strict=True))
+    labels = dict(
+        zip([origin.recording for origin in origins], groups(origins).tolist(), strict=True)
+    )
     sizes: dict[str, SideSize] = {}
     for side, rows in by_side.items():
         recordings = set(rows["recording"].to_pylist())
@@ -321,7 +367,10 @@ def _shared_origins(origins: Sequence[Origin]) -> str:
     """Says what connects recordings, in words."""
     common = set.intersection(*(set(origin.ties) for origin in origins))
     words = ("session", "day", "seed")
-    named = sorted((tie for tie in common if tie.startswith(words)), key=lambda tie: words.index(tie.partition(" ")[0]))
+    named = sorted(
+        (tie for tie in common if tie.startswith(words)),
+        key=lambda tie: words.index(tie.partition(" ")[0]),
+    )
     return named[0] if named else "by session, day or source"
 
 

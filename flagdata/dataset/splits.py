@@ -1,9 +1,10 @@
 """Splits without leaks, for rows that state no side: by simulation seed, recording session and day.
 
-Two recordings that share a session, a day, a seed, a camera file or a mesh sequence are connected, and what is
-connected, through however many recordings, stays on one side. (An anemometer log alone does not connect: two clips an
-hour apart share no pixel and no minute of it.) A simulated recording has no day: its start is a matter of convention.
-It should not be given a session either, unless all that share one are meant to stay together.
+Two recordings that share a session, a day, a seed, a camera file or a mesh sequence are connected,
+and what is connected, through however many recordings, stays on one side. (An anemometer log alone
+does not connect: two clips an hour apart share no pixel and no minute of it.) A simulated recording
+has no day: its start is a matter of convention. It should not be given a session either, unless all
+that share one are meant to stay together.
 """
 
 from __future__ import annotations
@@ -23,7 +24,9 @@ from flagdata.lake.matching import Where
 
 DEFAULT_FRACTIONS: Mapping[str, float] = {"train": 0.7, "validation": 0.15, "test": 0.15}
 _LISTED = 3  # leaks named in an error
-_WHOLE = "split by whole sessions, days and seeds, or use the hashed split, which keeps them together"
+_WHOLE = (
+    "split by whole sessions, days and seeds, or use the hashed split, which keeps them together"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,8 +38,8 @@ class Origin:
         session: one set-up at one place; `None` where none was named.
         days: calendar days (ISO, UTC) of its clips; left out of account when there is a seed.
         seed: root seed of a simulation; `None` for a real recording.
-        sources: what else must stay together, in words: the camera files and mesh sequences it was made from, the
-            objects that hold them and the film, and the sessions that they are of.
+        sources: what else must stay together, in words: the camera files and mesh sequences it was
+            made from, the objects that hold them and the film, and the sessions that they are of.
     """
 
     recording: str
@@ -59,7 +62,8 @@ class Origin:
 
     @property
     def key(self) -> tuple[int, str | int]:
-        """Orders the recordings of a group; the least one names it: the earliest day, else the smallest seed."""
+        """Orders the recordings of a group; the least one names it: the earliest day, else the
+        smallest seed."""
         if self.seed is not None:
             return (1, self.seed)
         return (0, min(self.days)) if self.days else (2, self.recording)
@@ -70,7 +74,11 @@ def groups(origins: Sequence[Origin]) -> IntArray:
     if not origins:
         return np.empty(0, dtype=np.int64)
     index: dict[str, int] = {}
-    pairs = [(i, index.setdefault(tie, len(index))) for i, origin in enumerate(origins) for tie in origin.ties]
+    pairs = [
+        (i, index.setdefault(tie, len(index)))
+        for i, origin in enumerate(origins)
+        for tie in origin.ties
+    ]
     rows, columns = np.array(pairs, dtype=np.int64).T
     n = len(origins)
     size = n + len(index)
@@ -81,12 +89,14 @@ def groups(origins: Sequence[Origin]) -> IntArray:
 
 @dataclass(frozen=True, kw_only=True)
 class HashedSplit:
-    """Each group goes to a side by a hash of its name, so that a side is a matter of content, not of order or luck.
+    """Each group goes to a side by a hash of its name, so that a side is a matter of content, not
+    of order or luck.
 
-    A group is named by the earliest of its days, or the smallest of its seeds. Adding recordings of other days and
-    seeds therefore moves nothing. What can move: the groups that a new recording joins together (all but the one that
-    names the whole), and a group that a new recording extends to an earlier day or a smaller seed. The shares are those
-    of groups in the long run; a handful of groups can be far from them.
+    A group is named by the earliest of its days, or the smallest of its seeds. Adding recordings of
+    other days and seeds therefore moves nothing. What can move: the groups that a new recording
+    joins together (all but the one that names the whole), and a group that a new recording extends
+    to an earlier day or a smaller seed. The shares are those of groups in the long run; a handful
+    of groups can be far from them.
 
     Attributes:
         fractions: side → share of the groups, adding up to 1.
@@ -101,8 +111,15 @@ class HashedSplit:
 
     def __post_init__(self) -> None:
         shares = list(self.fractions.values())
-        if not shares or not all(share >= 0 for share in shares) or not math.isclose(sum(shares), 1, abs_tol=1e-9):
-            raise UsageError(f"split fractions {dict(self.fractions)}", fix="give shares of 0 or more that add up to 1")
+        if (
+            not shares
+            or not all(share >= 0 for share in shares)
+            or not math.isclose(sum(shares), 1, abs_tol=1e-9)
+        ):
+            raise UsageError(
+                f"split fractions {dict(self.fractions)}",
+                fix="give shares of 0 or more that add up to 1",
+            )
 
     @property
     def sides(self) -> tuple[str, ...]:
@@ -132,9 +149,10 @@ class ExplicitSplit:
     """Sides chosen by the user, each by a filter over the catalog; refused where they leak.
 
     Attributes:
-        where: side → what selects its clips: the values that columns must have, e.g. {"train": {"dataset":
-            "flagsim-small", "side": "train"}, …}, or an SQL boolean expression over catalog columns, e.g. {"train":
-            "day < '2026-06-01'", …}. Clips that no side takes are in none.
+        where: side → what selects its clips: the values that columns must have, e.g. {"train":
+            {"dataset": "flagsim-small", "side": "train"}, …}, or an SQL boolean expression over
+            catalog columns, e.g. {"train": "day < '2026-06-01'", …}. Clips that no side takes are
+            in none.
 
     Raises:
         UsageError: no side.
@@ -144,7 +162,9 @@ class ExplicitSplit:
 
     def __post_init__(self) -> None:
         if not self.where:
-            raise UsageError("the explicit split has no sides", fix="name at least one side and its filter")
+            raise UsageError(
+                "the explicit split has no sides", fix="name at least one side and its filter"
+            )
 
     @property
     def sides(self) -> tuple[str, ...]:
@@ -167,7 +187,9 @@ def refuse_leaks(sides: Mapping[str, Iterable[Origin]], *, fix: str = _WHOLE) ->
             holders.setdefault(tie, []).append(side)
     leaks = sorted(tie for tie, names in holders.items() if len(names) > 1)
     if leaks:
-        listed = "; ".join(f"{tie} is in {' and in '.join(holders[tie])}" for tie in leaks[:_LISTED])
+        listed = "; ".join(
+            f"{tie} is in {' and in '.join(holders[tie])}" for tie in leaks[:_LISTED]
+        )
         further = f"; and {len(leaks) - _LISTED} more" if len(leaks) > _LISTED else ""
         raise RefusedError(
             f"the split leaks: {listed}{further}",

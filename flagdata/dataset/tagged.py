@@ -1,4 +1,5 @@
-"""A tag keeps how the clips of its version are divided, so that a side of it is the same for good."""
+"""A tag keeps how the clips of its version are divided, so that a side of it is the same for
+good."""
 
 from __future__ import annotations
 
@@ -15,22 +16,25 @@ from flagdata.lake.refs import Ref
 from flagdata.recipes.documents import from_json
 
 NOTE = "split"
-"""Note of a tag that states how clips are divided, JSON: "stated" by data sets, and "hashed" where they state nothing;
-each as in `Division.as_dict`."""
+"""Note of a tag that states how clips are divided, JSON: "stated" by data sets, and "hashed" where
+they state nothing; each as in `Division.as_dict`."""
 
 
 def tag(lake: Lake, name: str, *, at: str | None = None) -> Ref:
-    """Names what `at` shows, for good, and notes how its clips are divided; raises as `Lake.tag`."""
+    """Names what `at` shows, for good, and notes how its clips are divided; raises as
+    `Lake.tag`."""
     if at is None:
         at = str(lake.resolve(None))  # what is described is what is named
     divided = describe(lake.scan(lake.view(at)))
     # In their order: a hash takes its sides one after another.
-    return lake.tag(name, at=at, notes={NOTE: json.dumps(divided, ensure_ascii=False)} if divided else {})
+    return lake.tag(
+        name, at=at, notes={NOTE: json.dumps(divided, ensure_ascii=False)} if divided else {}
+    )
 
 
 def describe(catalog: Catalog) -> dict[str, Any]:
-    """Describes how all clips of a version are divided. Relatives on two sides are refused where a side is asked for,
-    not here."""
+    """Describes how all clips of a version are divided. Relatives on two sides are refused where a
+    side is asked for, not here."""
     clips = clips_of(catalog, None)
     stated = stated_sides(catalog, clips)
     others = clips.filter(pc.field("side").is_null())
@@ -41,7 +45,8 @@ def describe(catalog: Catalog) -> dict[str, Any]:
 
 
 def hashed_split(lake: Lake, at: str | None) -> HashedSplit:
-    """Returns the hashed split that the tag `at` keeps; the usual one where it keeps none, or is no tag.
+    """Returns the hashed split that the tag `at` keeps; the usual one where it keeps none, or is no
+    tag.
 
     Raises:
         CorruptError: what it keeps is no split.

@@ -32,7 +32,8 @@ class Tolerance:
     def __post_init__(self) -> None:
         if not (self.clock_sigma >= 0 and self.staleness >= 0 and 0 <= self.coverage <= 1):
             raise UsageError(
-                f"{self} is out of bounds", fix="give σ and staleness of 0 s or more, and a coverage between 0 and 1"
+                f"{self} is out of bounds",
+                fix="give σ and staleness of 0 s or more, and a coverage between 0 and 1",
             )
 
 
@@ -45,7 +46,9 @@ class Refusal:
     reasons: tuple[str, ...]
 
 
-def judge(table: PairTable, tolerance: Tolerance, *, superseded: Mapping[str, str]) -> dict[int, Refusal]:
+def judge(
+    table: PairTable, tolerance: Tolerance, *, superseded: Mapping[str, str]
+) -> dict[int, Refusal]:
     """Refusals by the pair's index.
 
     Args:
@@ -54,28 +57,39 @@ def judge(table: PairTable, tolerance: Tolerance, *, superseded: Mapping[str, st
     checks = (
         (
             np.isin(table.recording, np.array(sorted(superseded), dtype=np.str_)),
-            lambda k: f"recording {superseded[str(table.recording[k])]} aligned the same camera and wind later",
+            lambda k: (
+                f"recording {superseded[str(table.recording[k])]} aligned the same camera and wind "
+                "later"
+            ),
         ),
         (np.isnan(table.wind), lambda k: "no usable wind sample in the window"),
         (
             table.coverage < tolerance.coverage,
-            lambda k: f"wind samples cover {table.coverage[k]:.2f} of the window, less than {tolerance.coverage:g}",
+            lambda k: (
+                f"wind samples cover {table.coverage[k]:.2f} of the window, less than "
+                f"{tolerance.coverage:g}"
+            ),
         ),
         (
             table.staleness > tolerance.staleness,
-            lambda k: f"the newest wind sample is {table.staleness[k]:.3g} s old, above {tolerance.staleness:g} s",
+            lambda k: (
+                f"the newest wind sample is {table.staleness[k]:.3g} s old, above "
+                f"{tolerance.staleness:g} s"
+            ),
         ),
         (np.isnan(table.clock_sigma), lambda k: "the uncertainty of the camera's clock is unknown"),
         (
             table.clock_sigma > tolerance.clock_sigma,
             lambda k: (
-                f"the camera's clock is known to ±{table.clock_sigma[k]:.3g} s, above {tolerance.clock_sigma:g} s"
+                f"the camera's clock is known to ±{table.clock_sigma[k]:.3g} s, above "
+                f"{tolerance.clock_sigma:g} s"
             ),
         ),
         (
             np.isnan(table.wind_sigma) & ~np.isnan(table.wind) & ~np.isnan(table.clock_sigma),
             lambda k: (
-                "the uncertainty of the mean wind is unknown: too few wind samples, or a sensor of unknown accuracy "
+                "the uncertainty of the mean wind is unknown: too few wind samples, or a sensor of "
+                "unknown accuracy "
                 "that always reads the same"
             ),
         ),

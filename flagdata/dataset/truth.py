@@ -1,14 +1,17 @@
-"""Ground truth of a clip: the mean wind speed over a window that ends with it, and how well that mean is known.
+"""Ground truth of a clip: the mean wind speed over a window that ends with it, and how well that
+mean is known.
 
-The window is (end - window, end]: a sample stamped exactly at the clip's end counts, one stamped exactly a window
-earlier does not, and nothing after the end does. A sample speaks for the time since the row before it, so that an
-irregular logger is not biased towards the moments when it was busy; after a gap it speaks for one sampling period only.
+The window is (end - window, end]: a sample stamped exactly at the clip's end counts, one stamped
+exactly a window earlier does not, and nothing after the end does. A sample speaks for the time
+since the row before it, so that an irregular logger is not biased towards the moments when it was
+busy; after a gap it speaks for one sampling period only.
 
-The uncertainty is that of the mean wind of such minutes, of which the window is one draw: the standard error of a
-correlated series, the instrument and the clock, all independent. For an instrument of unknown accuracy and resolution
-the step between its readings is a lower bound; where there is no step, since every reading is
-the same, the uncertainty is unknown and never 0. Not included: the response time of the sensor, its
-distance from the flag, and what it missed while it gave no sample; coverage and staleness give these.
+The uncertainty is that of the mean wind of such minutes, of which the window is one draw: the
+standard error of a correlated series, the instrument and the clock, all independent. For an
+instrument of unknown accuracy and resolution the step between its readings is a lower bound; where
+there is no step, since every reading is the same, the uncertainty is unknown and never 0. Not
+included: the response time of the sensor, its distance from the flag, and what it missed while it
+gave no sample; coverage and staleness give these.
 """
 
 from __future__ import annotations
@@ -26,7 +29,8 @@ from flagdata.record.signals import Instants, Sensor, Series, WindSeries
 from flagdata.timebase import NANOSECONDS
 
 BLOCK = 1.0  # s, length of the block means whose correlation gives the standard error
-HISTORY = 600.0  # s up to the clip's end over which the correlation time is estimated, or the window, if longer
+# s up to the clip's end over which the correlation time is estimated, or the window, if longer
+HISTORY = 600.0
 GAP = 1.5  # sampling periods; a longer silence, if it is longer than a block too, is a gap
 LOW_COVERAGE = 0.8  # of the window; less is flagged, and refused by default
 STALE = 5.0  # s; an older newest sample is flagged, and refused by default
@@ -38,13 +42,16 @@ class WindTruth:
 
     Attributes:
         wind: mean speed over the window [m/s], NaN when no usable sample is in it.
-        sigma: standard uncertainty [m/s], the root sum of squares of the parts below; NaN when a part cannot be known.
-        sigma_mean: standard error of the mean of a correlated series [m/s]; NaN with fewer than two blocks.
-        sigma_sensor: accuracy of the instrument, its resolution and its dead zone; does not shrink by averaging [m/s];
-            NaN where they are unknown and the readings show no step.
+        sigma: standard uncertainty [m/s], the root sum of squares of the parts below; NaN when a
+            part cannot be known.
+        sigma_mean: standard error of the mean of a correlated series [m/s]; NaN with fewer than two
+            blocks.
+        sigma_sensor: accuracy of the instrument, its resolution and its dead zone; does not shrink
+            by averaging [m/s]; NaN where they are unknown and the readings show no step.
         sigma_clock: what the uncertainty of the common clock does to the mean [m/s].
         coverage: share of the window that usable samples speak for, 0 to 1.
-        staleness: age of the newest usable sample at the end [s]; infinite when there is none before the end.
+        staleness: age of the newest usable sample at the end [s]; infinite when there is none
+            before the end.
         count: usable samples in the window.
         flags: machine-readable names of what is off, sorted.
     """
@@ -75,7 +82,8 @@ class WindTruth:
 
     @classmethod
     def missing(cls, *, staleness: float) -> WindTruth:
-        """Returns a truth without a usable sample in the window; the newest before its end is `staleness` old [s]."""
+        """Returns a truth without a usable sample in the window; the newest before its end is
+        `staleness` old [s]."""
         nan = math.nan
         return cls(
             wind=nan,
@@ -91,11 +99,12 @@ class WindTruth:
 
 
 def over_ground(series: WindSeries) -> Series | None:
-    """Computes the speed of the air over ground (n,) [m/s]: the channel itself, or from the horizontal components of a
-    sonic.
+    """Computes the speed of the air over ground (n,) [m/s]: the channel itself, or from the
+    horizontal components of a sonic.
 
-    `None` when the series has neither. The wind that a moving platform feels, or that its instrument computes as if the
-    platform were at rest, is not the wind at a flag; nor are the components that apparent wind was made of.
+    `None` when the series has neither. The wind that a moving platform feels, or that its
+    instrument computes as if the platform were at rest, is not the wind at a flag; nor are the
+    components that apparent wind was made of.
     """
     channels = series.channels
     if "wind_speed" in channels:
@@ -129,7 +138,8 @@ class TruthSeries:
     def of(cls, series: WindSeries) -> TruthSeries:
         """Prepares `series`, whose times must be on the clock of the clips.
 
-        Rows that hold other channels only (the sentences of one stream) are as if they were not there.
+        Rows that hold other channels only (the sentences of one stream) are as if they were not
+        there.
 
         Raises:
             InputError: no wind over ground.
@@ -137,9 +147,11 @@ class TruthSeries:
         speed = over_ground(series)
         if speed is None:
             raise InputError(
-                "there is no wind over ground among the channels " + ", ".join(sorted(series.channels)),
+                "there is no wind over ground among the channels "
+                + ", ".join(sorted(series.channels)),
                 where=series.sensor.name,
-                fix="give a log with wind_speed, or wind_x and wind_y; apparent wind is not ground truth",
+                fix="give a log with wind_speed, or wind_x and wind_y; apparent wind is not ground "
+                "truth",
             )
         present = np.isfinite(speed) | ((series.flags & int(SampleFlag.MISSING)) != 0)
         time, speed, flags = series.time[present], speed[present], series.flags[present]
@@ -159,7 +171,9 @@ class TruthSeries:
         )
 
     @check_arguments
-    def before(self, end: int, *, window: float = TRUTH_WINDOW, clock_sigma: float = 0.0) -> WindTruth:
+    def before(
+        self, end: int, *, window: float = TRUTH_WINDOW, clock_sigma: float = 0.0
+    ) -> WindTruth:
         """Averages over (end - window, end].
 
         Args:
@@ -171,10 +185,13 @@ class TruthSeries:
             UsageError: a window or σ that is not a length of time.
         """
         if not (math.isfinite(window) and window > 0):
-            raise UsageError(f"the window of {window} s is not a positive length", fix="give a length above zero")
+            raise UsageError(
+                f"the window of {window} s is not a positive length", fix="give a length above zero"
+            )
         if not (math.isfinite(clock_sigma) and clock_sigma >= 0):
             raise UsageError(
-                f"the clock uncertainty {clock_sigma} s is negative or not a number", fix="give a σ of zero or more"
+                f"the clock uncertainty {clock_sigma} s is negative or not a number",
+                fix="give a σ of zero or more",
             )
         begin = end - round(window * NANOSECONDS)
         first, last = np.searchsorted(self.time, [begin, end], side="right").tolist()
@@ -184,7 +201,11 @@ class TruthSeries:
         speed, hold_times = self.speed[first:last], self.held[first:last]
         wind = float(np.average(speed, weights=hold_times))
         inside = np.minimum(hold_times, (self.time[first:last] - begin) / NANOSECONDS)
-        past = int(np.searchsorted(self.time, end - round(max(HISTORY, window) * NANOSECONDS), side="right"))
+        past = int(
+            np.searchsorted(
+                self.time, end - round(max(HISTORY, window) * NANOSECONDS), side="right"
+            )
+        )
         correlation = _correlation_time(self._blocks(past, last, begin))
         sigma_mean = _standard_error(self._blocks(first, last, begin), correlation)
         dead = float(np.average(self.dead[first:last], weights=hold_times))
@@ -194,7 +215,8 @@ class TruthSeries:
         flags = {
             "wind-coverage-low": coverage < LOW_COVERAGE,
             "wind-stale": staleness > STALE,
-            "sensor-accuracy-unknown": self.sensor.accuracy is None and self.sensor.accuracy_relative is None,
+            "sensor-accuracy-unknown": self.sensor.accuracy is None
+            and self.sensor.accuracy_relative is None,
             "wind-dead-zone": dead > 0,
             "wind-sigma-unknown": math.isnan(sigma_mean) or math.isnan(sigma_sensor),
         }
@@ -211,37 +233,50 @@ class TruthSeries:
         )
 
     def _completed_sensor(self, first: int, last: int, past: int) -> Sensor:
-        """Returns the instrument, with the step of its readings as resolution where its errors are unknown.
+        """Returns the instrument, with the step of its readings as resolution where its errors are
+        unknown.
 
-        The step is that of the window, or, where nothing changes in it, of the history from `past` on.
+        The step is that of the window, or, where nothing changes in it, of the history from `past`
+        on.
         """
         sensor = self.sensor
-        if not (sensor.accuracy is None and sensor.accuracy_relative is None and sensor.resolution is None):
+        if not (
+            sensor.accuracy is None
+            and sensor.accuracy_relative is None
+            and sensor.resolution is None
+        ):
             return sensor
         step = _smallest_step(self.speed[first:last]) or _smallest_step(self.speed[past:last])
         return replace(sensor, resolution=step or None)
 
     def _blocks(self, first: int, last: int, begin: int) -> Series:
-        """Means over blocks of a second (or of the sampling period, if longer) from `begin`; empty ones are absent."""
+        """Means over blocks of a second (or of the sampling period, if longer) from `begin`; empty
+        ones are absent."""
         width = round(max(BLOCK, self.period) * NANOSECONDS)
         # A stamp closes its block, as it closes the window.
         block = (self.time[first:last] - begin - 1) // width
         starts = np.concatenate([[0], np.nonzero(np.diff(block))[0] + 1])
         hold_times = self.held[first:last]
-        return np.add.reduceat(self.speed[first:last] * hold_times, starts) / np.add.reduceat(hold_times, starts)
+        return np.add.reduceat(self.speed[first:last] * hold_times, starts) / np.add.reduceat(
+            hold_times, starts
+        )
 
     def _slope(self, first: int, last: int, begin: int, end: int, clock_sigma: float) -> float:
-        """Computes the size of the derivative of the window's mean with respect to its position [m/s²].
+        """Computes the size of the derivative of the window's mean with respect to its position
+        [m/s²].
 
-        Moving the window by δ gains δ · v(end) and loses δ · v(begin): the derivative is (v(end) - v(begin)) / window.
-        Both speeds are means over ±σ (at least a block) about the edges. Where an edge has no samples the scatter
+        Moving the window by δ gains δ · v(end) and loses δ · v(begin): the derivative is (v(end) -
+        v(begin)) / window. Both speeds are means over ±σ (at least a block) about the edges. Where
+        an edge has no samples the scatter
         within the window stands in: two independent draws differ by √2 of it.
         """
         window = (end - begin) / NANOSECONDS
         reach = round(max(clock_sigma, BLOCK, self.period) * NANOSECONDS)
         edges = []
         for edge in (begin, end):
-            low, high = np.searchsorted(self.time, [edge - reach, edge + reach + 1], side="left").tolist()
+            low, high = np.searchsorted(
+                self.time, [edge - reach, edge + reach + 1], side="left"
+            ).tolist()
             if low == high:
                 return math.sqrt(2) * float(np.std(self.speed[first:last])) / window
             edges.append(float(np.mean(self.speed[low:high])))
@@ -249,8 +284,8 @@ class TruthSeries:
 
 
 def _sensor_sigma(sensor: Sensor, wind: float, dead: float) -> float:
-    """Combines accuracy, a rectangular resolution step, and for the share `dead` a rectangular true speed in [0,
-    threshold].
+    """Combines accuracy, a rectangular resolution step, and for the share `dead` a rectangular true
+    speed in [0, threshold].
 
     NaN where neither accuracy nor resolution is known.
     """
@@ -263,16 +298,18 @@ def _sensor_sigma(sensor: Sensor, wind: float, dead: float) -> float:
 
 
 def _smallest_step(speed: Series) -> float:
-    """Finds the smallest difference between readings (n,) that occur [m/s], to a nanometre a second; 0 when all are
-    equal."""
+    """Finds the smallest difference between readings (n,) that occur [m/s], to a nanometre a
+    second; 0 when all are equal."""
     levels = np.unique(np.round(speed, 9))
     return float(np.diff(levels).min()) if len(levels) > 1 else 0.0
 
 
 def _correlation_time(values: Series) -> float:
-    """Estimates the integrated autocorrelation time of a series (n,), in steps: 1 for uncorrelated values.
+    """Estimates the integrated autocorrelation time of a series (n,), in steps: 1 for uncorrelated
+    values.
 
-    Geyer's initial monotone sequence (Practical Markov chain Monte Carlo, Statist. Sci. 7, 1992, section 3.3), and at
+    Geyer's initial monotone sequence (Practical Markov chain Monte Carlo, Statist. Sci. 7, 1992,
+    section 3.3), and at
     least 1: no credit for anti-correlation.
     """
     n = len(values)
@@ -288,15 +325,16 @@ def _correlation_time(values: Series) -> float:
 
 
 def _standard_error(values: Series, correlation: float) -> float:
-    """Computes the standard error of the mean of a series (n,) with a correlation time τ in steps; NaN for n < 2.
+    """Computes the standard error of the mean of a series (n,) with a correlation time τ in steps;
+    NaN for n < 2.
 
-    var(mean) = s² τ / (n - τ), with s² = mean((x - x̄)²): the divisor undoes the loss of variance that removing the
-    sample's own mean causes. τ is held at n/2 at most, where the error is the scatter itself: the window then saw no
-    two independent winds.
+    var(mean) = s² τ / (n - τ), with s² = mean((x - x̄)²): the divisor undoes the loss of variance
+    that removing the sample's own mean causes. τ is held at n/2 at most, where the error is the
+    scatter itself: the window then saw no two independent winds.
 
-    For a minute at 1 Hz of an AR(1) process, mean ± 2 standard errors holds the true mean in 96, 96, 95 and 92 % of
-    cases at correlation times of 1, 6, 19 and 39 s when the log goes back ten minutes; when it begins with the window,
-    in 96, 89, 75 and 65 %.
+    For a minute at 1 Hz of an AR(1) process, mean ± 2 standard errors holds the true mean in 96,
+    96, 95 and 92 % of cases at correlation times of 1, 6, 19 and 39 s when the log goes back ten
+    minutes; when it begins with the window, in 96, 89, 75 and 65 %.
     """
     n = len(values)
     if n < 2:

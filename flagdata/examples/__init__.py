@@ -1,7 +1,8 @@
-"""Films of simulated flags and the logs beside them, which come with the package, with the truth of each.
+"""Films of simulated flags and the logs beside them, which come with the package, with the truth of
+each.
 
-A folder each, with a film, a log, and `example.toml`, which states the flag, the clocks and what was simulated.
-`python -m tests.studies example` makes them from their seeds.
+A folder each, with a film, a log, and `example.toml`, which states the flag, the clocks and what
+was simulated. `python -m tests.studies example` makes them from their seeds.
 """
 
 from __future__ import annotations
@@ -33,8 +34,8 @@ class Example:
         log: of the anemometer, on a clock of its own.
         flag_size: length and height of the flag [m].
         clock_offset: what must be added to the film's clock to reach the log's [s].
-        truth: what was simulated, by name, SI: "wind_speed" is the mean of the wind at the flag over the film [m/s],
-            "area_weight" the cloth's area weight [kg/m²].
+        truth: what was simulated, by name, SI: "wind_speed" is the mean of the wind at the flag
+            over the film [m/s], "area_weight" the cloth's area weight [kg/m²].
     """
 
     name: str
@@ -61,7 +62,11 @@ class Example:
         }
 
     def __repr__(self) -> str:
-        return f"Example({self.title}; " + "; ".join(f"{name} {value}" for name, value in self._rows().items()) + ")"
+        return (
+            f"Example({self.title}; "
+            + "; ".join(f"{name} {value}" for name, value in self._rows().items())
+            + ")"
+        )
 
     def _repr_html_(self) -> str:
         return table(self.title, self._rows())
@@ -74,7 +79,8 @@ def names() -> tuple[str, ...]:
 
 @check_arguments
 def example(name: str = "flag") -> Example:
-    """Returns an example that comes with the package: a film of a simulated flag, the log beside it, and the truth.
+    """Returns an example that comes with the package: a film of a simulated flag, the log beside
+    it, and the truth.
 
     ```python
     flag = flagdata.example("flag")
@@ -115,7 +121,8 @@ def example_of(source: Path | str) -> Example | None:
 
 
 def path_of(source: Path | str) -> Path:
-    """Returns the path that a source names: the film of an example, or a file or folder, which need not exist.
+    """Returns the path that a source names: the film of an example, or a file or folder, which need
+    not exist.
 
     Raises:
         UnknownNameError: no example of that name.

@@ -1,4 +1,5 @@
-"""Copies of a selection for other ecosystems. A format is a module here and one line in `FORMATS`."""
+"""Copies of a selection for other ecosystems. A format is a module here and one line in
+`FORMATS`."""
 
 import sys
 

@@ -1,8 +1,10 @@
-"""croissant.json: what an export holds, as Croissant metadata that data-set hubs and `mlcroissant` read.
+"""croissant.json: what an export holds, as Croissant metadata that data-set hubs and `mlcroissant`
+read.
 
-Source: MLCommons, Croissant Format Specification 1.0 (http://mlcommons.org/croissant/1.0). Every file is a file object
-with its size and SHA-256. Tables (Parquet, CSV) are record sets, whose fields have the units that the manifest states.
-The samples within the shards of WebDataset are a file set: `mlcroissant` 1.1 cannot read JSON out of an archive.
+Source: MLCommons, Croissant Format Specification 1.0 (http://mlcommons.org/croissant/1.0). Every
+file is a file object with its size and SHA-256. Tables (Parquet, CSV) are record sets, whose fields
+have the units that the manifest states. The samples within the shards of WebDataset are a file set:
+`mlcroissant` 1.1 cannot read JSON out of an archive.
 """
 
 from __future__ import annotations
@@ -93,7 +95,8 @@ def write_croissant(folder: Path, manifest: Mapping[str, Any]) -> Path:
 def croissant(folder: Path, manifest: Mapping[str, Any]) -> dict[str, Any]:
     """Describes an export as a Croissant data set (JSON-LD).
 
-    Licence, creator and address of a data set are its publisher's to state; they are not made up here.
+    Licence, creator and address of a data set are its publisher's to state; they are not made up
+    here.
 
     Args:
         folder: the export.
@@ -122,8 +125,10 @@ def _description(manifest: Mapping[str, Any]) -> str:
     selected = "" if manifest["where"] is None else f" where {manifest['where']}"
     side = "" if manifest["split"] is None else f", side {manifest['split']} of the split"
     return (
-        "Films of cloth in the wind with measured or simulated ground truth, exported by flagdata as "
-        f"{manifest['format']}: {kinds}{selected}{side}, version {manifest['version']} of the lake. "
+        "Films of cloth in the wind with measured or simulated ground truth, exported by flagdata "
+        "as "
+        f"{manifest['format']}: {kinds}{selected}{side}, version {manifest['version']} of the "
+        "lake. "
         f"{_sides(manifest['split_by'])}manifest.json has the recipe."
     )
 
@@ -132,7 +137,11 @@ def _sides(split_by: Mapping[str, Any] | None) -> str:
     """Says who decided the sides, and what they hold; nothing where there are none."""
     if split_by is None:
         return ""
-    rule = f"stated by {', '.join(split_by['datasets'])}" if split_by["rule"] == "stated" else split_by["rule"]
+    rule = (
+        f"stated by {', '.join(split_by['datasets'])}"
+        if split_by["rule"] == "stated"
+        else split_by["rule"]
+    )
     sizes = ", ".join(f"{side} {size['clips']} clips" for side, size in split_by["sides"].items())
     return f"Sides, {rule}: {sizes}. "
 
@@ -146,7 +155,9 @@ def _file_object(entry: Mapping[str, Any]) -> dict[str, Any]:
         "name": path,
         "contentUrl": path,
         "contentSize": f"{entry['bytes']} B",
-        "encodingFormat": _MEDIA_TYPES.get(Path(path).suffix) or mimetypes.guess_type(path)[0] or _OTHER_MEDIA_TYPE,
+        "encodingFormat": _MEDIA_TYPES.get(Path(path).suffix)
+        or mimetypes.guess_type(path)[0]
+        or _OTHER_MEDIA_TYPE,
         "sha256": entry["sha256"],
     }
 

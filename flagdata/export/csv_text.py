@@ -23,7 +23,8 @@ def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]
 
 
 def cell(value: Any) -> Any:
-    """Writes a cell: floats so that they read back exactly, unknown ones empty, lists by semicolons."""
+    """Writes a cell: floats so that they read back exactly, unknown ones empty, lists by
+    semicolons."""
     if isinstance(value, float):
         return repr(value) if np.isfinite(value) else ""
     return ";".join(map(str, value)) if isinstance(value, list) else value

@@ -1,6 +1,8 @@
-"""One export: rows chosen at a pinned version, one format's files, a manifest, and a folder that appears whole.
+"""One export: rows chosen at a pinned version, one format's files, a manifest, and a folder that
+appears whole.
 
-Which of the rows that a filter finds are exported: one side of a split, one alignment of a pair of files.
+Which of the rows that a filter finds are exported: one side of a split, one alignment of a pair of
+files.
 """
 
 from __future__ import annotations
@@ -37,8 +39,9 @@ from flagdata.recipes.registry import Registry
 def on_side(
     catalog: pa.Table, rows: pa.Table, split: str, *, salt: str, hashed: HashedSplit
 ) -> tuple[pa.Table, Division]:
-    """Selects the rows on one side: clips, and recordings, which go with their clips unless they state a side. Two
-    exports of one version never put a session, day, seed or camera file on two sides.
+    """Selects the rows on one side: clips, and recordings, which go with their clips unless they
+    state a side. Two exports of one version never put a session, day, seed or camera file on two
+    sides.
 
     Raises:
         RefusedError: see `flagdata.dataset.sides.divide`.
@@ -46,19 +49,26 @@ def on_side(
         UsageError: rows of another kind, which are on no side.
     """
     check_kinds(rows, "a split", frozenset({Kind.CLIP, Kind.RECORDING}))
-    division = divide(catalog, select_columns(rows), HashedSplit(salt=salt) if salt else None, hashed=hashed)
+    division = divide(
+        catalog, select_columns(rows), HashedSplit(salt=salt) if salt else None, hashed=hashed
+    )
     return rows.filter(_is_one_of(set(division.on(split)))), division
 
 
 def current(catalog: pa.Table, rows: pa.Table) -> tuple[pa.Table, dict[str, str]]:
-    """Drops recordings that another among the rows replaces, and the clips of those: two alignments of one camera and
-    wind log would hold every picture twice. Also returns: recording left out → the later one."""
+    """Drops recordings that another among the rows replaces, and the clips of those: two alignments
+    of one camera and wind log would hold every picture twice. Also returns: recording left out →
+    the later one."""
     recordings = rows.filter(pc.field("kind") == Kind.RECORDING.value)["artifact"].to_pylist()
-    replaced = superseded_recordings(catalog, {*recordings, *rows["recording"].drop_null().to_pylist()})
+    replaced = superseded_recordings(
+        catalog, {*recordings, *rows["recording"].drop_null().to_pylist()}
+    )
     if not replaced:
         return rows, {}
     old = set(replaced)
-    stays = ~_is_one_of(old) & (pc.field("recording").is_null() | ~_is_one_of(old, column="recording"))
+    stays = ~_is_one_of(old) & (
+        pc.field("recording").is_null() | ~_is_one_of(old, column="recording")
+    )
     return rows.filter(stays), dict(sorted(replaced.items()))
 
 
@@ -101,8 +111,11 @@ class Exporter(Protocol):
         """The kinds of rows that it can write with these options."""
         ...
 
-    def write(self, source: ExportRows, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
-        """Write `source` into the empty `folder`, the same bytes for the same rows; call `advance` by rows done.
+    def write(
+        self, source: ExportRows, folder: Path, advance: Callable[[int], None]
+    ) -> Mapping[str, Any]:
+        """Write `source` into the empty `folder`, the same bytes for the same rows; call `advance`
+        by rows done.
 
         Returns:
             what the manifest says about the content: counts, units, conventions.
@@ -118,8 +131,9 @@ class Export:
         format: a name of `FORMATS`.
         where: filter as in `flagdata.lake.selection`; `None` is every row.
         at: ref; `None` is the head of main.
-        split: side of the split: only its clips, and the recordings they are of; `None` is everything. Data sets state
-            their sides; the others are hashed, see `flagdata.dataset.sides.divide`.
+        split: side of the split: only its clips, and the recordings they are of; `None` is
+            everything. Data sets state their sides; the others are hashed, see
+            `flagdata.dataset.sides.divide`.
         salt: of the hashed split, see `flagdata.dataset.splits.HashedSplit`.
         options: of the format, by name; what is not named keeps its default.
     """
@@ -144,7 +158,9 @@ class Export:
             if name not in names:
                 takes = ", ".join(names) or "none"
                 raise UsageError(
-                    f"{self.format} takes no option {name!r}", where="export", fix=f"its options are: {takes}"
+                    f"{self.format} takes no option {name!r}",
+                    where="export",
+                    fix=f"its options are: {takes}",
                 )
         return form(**self.options)
 
@@ -176,7 +192,9 @@ class Prepared:
     def __len__(self) -> int:
         return len(self.source)
 
-    def write(self, target: Path, *, advance: Callable[[int], None] = lambda count: None) -> ExportResult:
+    def write(
+        self, target: Path, *, advance: Callable[[int], None] = lambda count: None
+    ) -> ExportResult:
         """Write it into the new folder `target`; `advance` is called with the number of rows done.
 
         Raises:
@@ -222,7 +240,8 @@ def prepare(lake: Lake, request: Export) -> Prepared:
         NotFoundError: no rows.
         RefusedError: the split, see `flagdata.dataset.sides.divide`.
         UnknownNameError: no such format, ref or side.
-        UsageError: rows of a kind that the format cannot write; options it does not take; SQL that cannot be run.
+        UsageError: rows of a kind that the format cannot write; options it does not take; SQL that
+            cannot be run.
     """
     exporter = request.exporter()
     view = lake.view(request.at)
@@ -238,7 +257,8 @@ def prepare(lake: Lake, request: Export) -> Prepared:
             division.warn_whole()
         if not rows.num_rows:
             raise NotFoundError(
-                f"none of the {matching} rows that match is on the side {request.split}; {division.grouping}",
+                f"none of the {matching} rows that match is on the side {request.split}; "
+                f"{division.grouping}",
                 where=f"filter {request.where}, version {version}",
                 fix="choose another side by --split, or leave it out",
             )
@@ -246,7 +266,9 @@ def prepare(lake: Lake, request: Export) -> Prepared:
     check_kinds(rows, request.format, exporter.kinds)
     if not rows.num_rows:
         chosen_by = {"filter": request.where, "version": str(version)}
-        where = ", ".join(f"{name} {value}" for name, value in chosen_by.items() if value is not None)
+        where = ", ".join(
+            f"{name} {value}" for name, value in chosen_by.items() if value is not None
+        )
         raise NotFoundError("no rows match", where=where, fix="try the filter with flagdata query")
     labels = labels_of(catalog)
     for name, values in columns(with_labels(rows, labels)).items():
@@ -259,11 +281,18 @@ def prepare(lake: Lake, request: Export) -> Prepared:
         side=request.split,
         split_by=None if division is None else division.as_dict(),
     )
-    return Prepared(request=request, exporter=exporter, version=version, source=source, superseded=replaced)
+    return Prepared(
+        request=request, exporter=exporter, version=version, source=source, superseded=replaced
+    )
 
 
 def export(
-    lake: Lake, request: Export, target: Path, *, advance: Callable[[int], None] = lambda count: None
+    lake: Lake,
+    request: Export,
+    target: Path,
+    *,
+    advance: Callable[[int], None] = lambda count: None,
 ) -> ExportResult:
-    """Write a selection of a lake into the new folder `target`; raises as `prepare` and `Prepared.write` do."""
+    """Write a selection of a lake into the new folder `target`; raises as `prepare` and
+    `Prepared.write` do."""
     return prepare(lake, request).write(target, advance=advance)

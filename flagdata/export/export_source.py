@@ -24,7 +24,8 @@ from flagdata.timebase import NANOSECONDS, iso
 
 FILMED = frozenset({Kind.CLIP, Kind.RECORDING, Kind.CAMERA})
 """Kinds of rows that have frames."""
-# Columns that say what a sample is and where it comes from; written beside the data by every format.
+# Columns that say what a sample is and where it comes from; written beside the data by every
+# format.
 IDENTITY = (
     "artifact",
     "kind",
@@ -96,8 +97,8 @@ class Entry:
 
     @property
     def wind_span(self) -> tuple[int, int]:
-        """First and last instant [UTC ns] of the wind that belongs to it: from a truth window before the first frame
-        to the last frame; everything where there are no frames."""
+        """First and last instant [UTC ns] of the wind that belongs to it: from a truth window
+        before the first frame to the last frame; everything where there are no frames."""
         if not self.count:
             return -(2**63), 2**63 - 1
         times = self.frame_times
@@ -111,8 +112,8 @@ class Entry:
             yield self.record.frames(self.first + begin, min(size, self.count - begin))
 
     def jpegs(self) -> Iterator[bytes]:
-        """Yields the frames as JPEG, in order: the stored bytes, or decoded and encoded anew where the record is
-        H.264."""
+        """Yields the frames as JPEG, in order: the stored bytes, or decoded and encoded anew where
+        the record is H.264."""
         if self.count and self.record.coding is Coding.H264:
             for images in self.images():
                 yield from map(encode_jpeg, images)
@@ -128,7 +129,8 @@ class Entry:
         return column_json(self.row[column], column, artifact=self.row["artifact"])
 
     def label(self) -> dict[str, Any]:
-        """Returns identity, ground truth with σ, times and parameters as strict JSON; unknown numbers are null."""
+        """Returns identity, ground truth with σ, times and parameters as strict JSON; unknown
+        numbers are null."""
         row = self.row
         times = self.frame_times
         return {
@@ -146,7 +148,11 @@ class Entry:
 
 def label_units() -> dict[str, str]:
     """Units of the numbers in `Entry.label`, for the manifest."""
-    units = {name: CATALOG[name].unit for name in (*IDENTITY, *TRUTH, "start", "end") if CATALOG[name].unit}
+    units = {
+        name: CATALOG[name].unit
+        for name in (*IDENTITY, *TRUTH, "start", "end")
+        if CATALOG[name].unit
+    }
     return {**units, "frame_times": "ns"}
 
 
@@ -160,16 +166,16 @@ def _strict(value: Any) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class ExportRows:
-    """The rows of one export, in their order. Their identities name files: each is one that an artifact can have, and
-    is there once.
+    """The rows of one export, in their order. Their identities name files: each is one that an
+    artifact can have, and is there once.
 
     Attributes:
         lake: that they are in.
         rows: with all columns of `schema.CATALOG`.
         labels: artifact → the user's own values.
         side: that all rows are on; `None` where none was asked for.
-        split_by: the rule by which sides were decided, and their sizes, as JSON; `None` where no side was asked for and
-            no row states one.
+        split_by: the rule by which sides were decided, and their sizes, as JSON; `None` where no
+            side was asked for and no row states one.
     """
 
     lake: Lake
@@ -182,17 +188,21 @@ class ExportRows:
         """Checks the identities.
 
         Raises:
-            CorruptError: one could name a file elsewhere, as a path does; or is there twice, so that a sample would
-                be written twice, or one in place of the other.
+            CorruptError: one could name a file elsewhere, as a path does; or is there twice, so
+                that a sample would be written twice, or one in place of the other.
         """
         where, fix = str(self.lake.path), "run flagdata doctor"
         identities = self.rows["artifact"].to_pylist()
         for identity in identities:
             if identity is None or not ARTIFACT_ID.fullmatch(identity):
-                raise CorruptError(f"{identity!r} is not the id of an artifact", where=where, fix=fix)
+                raise CorruptError(
+                    f"{identity!r} is not the id of an artifact", where=where, fix=fix
+                )
         if twice := [identity for identity, count in Counter(identities).items() if count > 1]:
             more = f", and {len(twice) - 1} more," if len(twice) > 1 else ""
-            raise CorruptError(f"two rows have the identity {twice[0]}{more} in the catalog", where=where, fix=fix)
+            raise CorruptError(
+                f"two rows have the identity {twice[0]}{more} in the catalog", where=where, fix=fix
+            )
 
     def __len__(self) -> int:
         return self.rows.num_rows
@@ -202,20 +212,23 @@ class ExportRows:
         return row["side"] if self.side is None else self.side
 
     def by_side(self) -> np.ndarray:
-        """Orders the rows (n,) so that those of a side follow one another, in their order; those of none come last."""
+        """Orders the rows (n,) so that those of a side follow one another, in their order; those of
+        none come last."""
         sides = self.rows["side"].to_pylist()
         order = [] if self.split_by is None else list(self.split_by["sides"])
         places = [order.index(side) if side in order else len(order) for side in sides]
         return np.argsort(np.array(places), kind="stable")
 
     def entries(self, order: np.ndarray | None = None) -> Iterator[Entry]:
-        """Yields the rows with their records, in order or in the order of the indices given. One record is open at a
-        time.
+        """Yields the rows with their records, in order or in the order of the indices given. One
+        record is open at a time.
 
-        Each object is hashed before the first of its frames leaves the lake: what is exported is what was committed.
+        Each object is hashed before the first of its frames leaves the lake: what is exported is
+        what was committed.
 
         Raises:
-            CorruptError: an object that has changed, a row without one, or a row that reaches beyond its record.
+            CorruptError: an object that has changed, a row without one, or a row that reaches
+                beyond its record.
         """
         table = self.rows if order is None else self.rows.take(pa.array(order))
         opened: tuple[str, Record] | None = None
@@ -224,7 +237,9 @@ class ExportRows:
             for row in batch.to_pylist():
                 name = row["object"]
                 if name is None:
-                    raise CorruptError("a row has no object", where=row["artifact"], fix="run flagdata doctor")
+                    raise CorruptError(
+                        "a row has no object", where=row["artifact"], fix="run flagdata doctor"
+                    )
                 if name not in checked:
                     self.lake.whole_object(name)
                     checked.add(name)
@@ -233,7 +248,9 @@ class ExportRows:
                 yield entry_of(row, opened[1], labels=self.labels.get(row["artifact"], {}))
 
 
-def entry_of(row: Mapping[str, Any], record: Record, *, labels: Mapping[str, Any] | None = None) -> Entry:
+def entry_of(
+    row: Mapping[str, Any], record: Record, *, labels: Mapping[str, Any] | None = None
+) -> Entry:
     """Joins a row of the catalog with the part of its record that it describes.
 
     Raises:

@@ -1,9 +1,11 @@
-"""LeRobot data sets, version 3.0: an episode a row of the catalog, read by LeRobot's own reader and tools.
+"""LeRobot data sets, version 3.0: an episode a row of the catalog, read by LeRobot's own reader and
+tools.
 
-LeRobot has one frame rate a data set and takes frame k of an episode to be shown at k / rate. The exact instants stand
-beside it as the feature `flagdata.time`, and a film whose instants differ from k / rate by half a period or more is
-refused. Wind is what the anemometer's newest mean over 1 s said at that instant, with its σ and its age; ground truth,
-clock model and identity stand in the table of episodes.
+LeRobot has one frame rate a data set and takes frame k of an episode to be shown at k / rate. The
+exact instants stand beside it as the feature `flagdata.time`, and a film whose instants differ from
+k / rate by half a period or more is refused. Wind is what the anemometer's newest mean over 1 s
+said at that instant, with its σ and its age; ground truth, clock model and identity stand in the
+table of episodes.
 
 Episodes of one side follow one another, and the description states which these are.
 
@@ -39,7 +41,10 @@ VERSION = "v3.0"
 CAMERA = "observation.images.camera"
 TASK = "cloth in the wind"
 FILE = "chunk-{chunk_index:03d}/file-{file_index:03d}"
-_VIDEO_BYTES, _DATA_BYTES = 200 << 20, 100 << 20  # a file is closed when it is larger; LeRobot's own defaults
+_VIDEO_BYTES, _DATA_BYTES = (
+    200 << 20,
+    100 << 20,
+)  # a file is closed when it is larger; LeRobot's own defaults
 _CHUNK = 1000  # files a folder
 _NEAR_WHOLE = 1e-3  # relative; a rate this near to a whole number is that number
 _NUMBERS: dict[str, tuple[str, str]] = {
@@ -50,9 +55,15 @@ _NUMBERS: dict[str, tuple[str, str]] = {
     "task_index": ("int64", ""),
     "flagdata.time": ("int64", "instant of the frame on the common clock, UTC ns"),
     "flagdata.device_time": ("int64", "instant of the frame on the camera's own clock, UTC ns"),
-    "observation.wind_speed": ("float32", "newest mean over 1 s of the wind speed, m/s; NaN where there is none"),
+    "observation.wind_speed": (
+        "float32",
+        "newest mean over 1 s of the wind speed, m/s; NaN where there is none",
+    ),
     "observation.wind_sigma": ("float32", "standard uncertainty of that mean, m/s"),
-    "observation.wind_direction": ("float32", "its direction, rad, from, clockwise from true north"),
+    "observation.wind_direction": (
+        "float32",
+        "its direction, rad, from, clockwise from true north",
+    ),
     "observation.wind_age": ("float32", "age of that mean at the frame, s"),
 }
 """Feature → type and meaning."""
@@ -72,9 +83,13 @@ class LeRobot:
 
     def __post_init__(self) -> None:
         if self.frames not in ("av1", "png"):
-            raise UsageError(f"frames {self.frames!r} in LeRobot", where="--frames", fix="choose av1 or png")
+            raise UsageError(
+                f"frames {self.frames!r} in LeRobot", where="--frames", fix="choose av1 or png"
+            )
 
-    def write(self, source: ExportRows, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
+    def write(
+        self, source: ExportRows, folder: Path, advance: Callable[[int], None]
+    ) -> Mapping[str, Any]:
         rate = common_rate([row for row in source.rows["rate"].to_pylist() if row is not None])
         with ExitStack() as stack:
             data = stack.enter_context(_Data(folder, self.frames))
@@ -83,7 +98,9 @@ class LeRobot:
             for entry in source.entries(source.by_side()):
                 if not entry.count:
                     raise InputError(
-                        "a record without frames makes no episode", where=entry.key, fix="leave it out by --where"
+                        "a record without frames makes no episode",
+                        where=entry.key,
+                        fix="leave it out by --where",
                     )
                 data_set.add(entry, source.side_of(entry.row), data, film)
                 advance(1)
@@ -105,7 +122,11 @@ def common_rate(rates: Sequence[float]) -> Fraction:
         InputError: there is none.
     """
     if not rates:
-        raise InputError("no film states a frame rate", where="--where", fix="select films of two frames and more")
+        raise InputError(
+            "no film states a frame rate",
+            where="--where",
+            fix="select films of two frames and more",
+        )
     middle = float(np.median(rates))
     nearest = round(middle)
     is_whole = nearest > 0 and abs(middle - nearest) <= _NEAR_WHOLE * middle
@@ -151,7 +172,9 @@ class _Made:
             file_columns = film.episode(self._pictures_of_entry(entry, pictures))
             where = data.episode(columns, None)
         else:
-            where = data.episode(columns, [_png(image) for image in self._pictures_of_entry(entry, pictures)])
+            where = data.episode(
+                columns, [_png(image) for image in self._pictures_of_entry(entry, pictures)]
+            )
         tallies = {name: _FeatureSums.of(columns[name]) for name in _NUMBERS} | {CAMERA: pictures}
         for name, tally in tallies.items():
             self.tallies.setdefault(name, []).append(tally)
@@ -172,8 +195,14 @@ class _Made:
                 "flagdata/wind": label["wind"],
                 "flagdata/wind_sigma": label["wind_sigma"],
                 "flagdata/clock_sigma": label["clock_sigma"],
-                LEROBOT_LABEL: json.dumps(label, sort_keys=True, allow_nan=False, ensure_ascii=False),
-                **{f"stats/{n}/{k}": v for n, tally in tallies.items() for k, v in tally.stats(n == CAMERA).items()},
+                LEROBOT_LABEL: json.dumps(
+                    label, sort_keys=True, allow_nan=False, ensure_ascii=False
+                ),
+                **{
+                    f"stats/{n}/{k}": v
+                    for n, tally in tallies.items()
+                    for k, v in tally.stats(n == CAMERA).items()
+                },
             }
         )
         self.total += count
@@ -188,10 +217,12 @@ class _Made:
         farthest = float(np.abs(times - np.arange(len(times)) / float(self.rate)).max())
         if farthest >= 0.5 / float(self.rate):
             raise InputError(
-                f"frames lie up to {farthest:.3f} s from a steady {float(self.rate):g} Hz, which LeRobot takes them to "
+                f"frames lie up to {farthest:.3f} s from a steady {float(self.rate):g} Hz, which "
+                "LeRobot takes them to "
                 "have",
                 where=entry.key,
-                fix="export films of one rate without gaps (clips have none), or to mcap, which keeps each instant",
+                fix="export films of one rate without gaps (clips have none), or to mcap, which "
+                "keeps each instant",
             )
         return farthest
 
@@ -205,7 +236,8 @@ class _Made:
             self.size = self.size or images.shape[1:]
             if images.shape[1:] != self.size:
                 raise InputError(
-                    f"frames of {images.shape[2]} × {images.shape[1]} px beside {self.size[1]} × {self.size[0]}",
+                    f"frames of {images.shape[2]} × {images.shape[1]} px beside {self.size[1]} × "
+                    f"{self.size[0]}",
                     where=entry.key,
                     fix="a data set of LeRobot has one size: select films of one by --where",
                 )
@@ -213,7 +245,8 @@ class _Made:
             yield from images
 
     def _splits(self) -> dict[str, str]:
-        """Returns the episodes of each side, "first:end"; where none is on a side, all as "train", as LeRobot does."""
+        """Returns the episodes of each side, "first:end"; where none is on a side, all as "train",
+        as LeRobot does."""
         ends = {side: end for end, side in enumerate(self.sides, start=1) if side is not None}
         if not ends:
             return {"train": f"0:{len(self.sides)}"}
@@ -224,9 +257,14 @@ class _Made:
         meta = folder / "meta"
         (meta / "episodes" / "chunk-000").mkdir(parents=True)
         table = pa.Table.from_pylist(self.episodes)
-        pq.write_table(table, meta / "episodes" / "chunk-000" / "file-000.parquet", compression="snappy")
+        pq.write_table(
+            table, meta / "episodes" / "chunk-000" / "file-000.parquet", compression="snappy"
+        )
         pq.write_table(_tasks(), meta / "tasks.parquet")
-        stats = {name: _FeatureSums.joined(parts).stats(name == CAMERA) for name, parts in self.tallies.items()}
+        stats = {
+            name: _FeatureSums.joined(parts).stats(name == CAMERA)
+            for name, parts in self.tallies.items()
+        }
         _json(meta / "stats.json", stats)
         height, width = self.size or (0, 0)
         features: dict[str, Any] = {
@@ -236,7 +274,12 @@ class _Made:
                 "names": ["height", "width", "channels"],
             },
             **{
-                name: {"dtype": kind, "shape": [1], "names": None, **({"info": {"about": about}} if about else {})}
+                name: {
+                    "dtype": kind,
+                    "shape": [1],
+                    "names": None,
+                    **({"info": {"about": about}} if about else {}),
+                }
                 for name, (kind, about) in _NUMBERS.items()
             },
         }
@@ -306,12 +349,16 @@ class _FeatureSums:
     def take(self, values: FloatArray) -> None:
         if values.size:
             self.count += values.size
-            self.low, self.high = min(self.low, float(values.min())), max(self.high, float(values.max()))
+            self.low, self.high = (
+                min(self.low, float(values.min())),
+                max(self.high, float(values.max())),
+            )
             self.total += float(values.sum())
             self.squares += float((values**2).sum())
 
     def stats(self, pictures: bool) -> dict[str, Any]:
-        """As LeRobot has them: of pictures (3, 1, 1); a feature without a number has a count of 0."""
+        """As LeRobot has them: of pictures (3, 1, 1); a feature without a number has a count of
+        0."""
         count = max(self.count, 1)
         mean = self.total / count
         deviation = max(self.squares / count - mean**2, 0.0) ** 0.5
@@ -332,7 +379,9 @@ class _Data:
         self._written = 0
         fields = [pa.field(name, pa.type_for_alias(kind)) for name, (kind, _) in _NUMBERS.items()]
         if frames == "png":
-            fields.insert(0, pa.field(CAMERA, pa.struct([("bytes", pa.binary()), ("path", pa.string())])))
+            fields.insert(
+                0, pa.field(CAMERA, pa.struct([("bytes", pa.binary()), ("path", pa.string())]))
+            )
         self._schema = pa.schema(fields)
 
     def __enter__(self) -> _Data:
@@ -341,21 +390,31 @@ class _Data:
     def __exit__(self, *error: object) -> None:
         self._open.close()
 
-    def episode(self, columns: Mapping[str, AnyArray], pictures: Sequence[bytes] | None) -> dict[str, int]:
+    def episode(
+        self, columns: Mapping[str, AnyArray], pictures: Sequence[bytes] | None
+    ) -> dict[str, int]:
         """Appends an episode, and says in which file it is."""
         if self._writer is None or self._written >= _DATA_BYTES:
             self._open.close()
             self._number += 1
             self._written = 0
             path = _path(self._folder, self._number, "parquet")
-            self._writer = self._open.enter_context(pq.ParquetWriter(path, self._schema, compression="snappy"))
+            self._writer = self._open.enter_context(
+                pq.ParquetWriter(path, self._schema, compression="snappy")
+            )
         values: dict[str, Any] = {name: columns[name] for name in _NUMBERS}
         if pictures is not None:
             values[CAMERA] = [{"bytes": picture, "path": None} for picture in pictures]
-        table = pa.table([pa.array(values[field.name], field.type) for field in self._schema], schema=self._schema)
+        table = pa.table(
+            [pa.array(values[field.name], field.type) for field in self._schema],
+            schema=self._schema,
+        )
         self._writer.write_table(table, row_group_size=table.num_rows)
         self._written += table.nbytes
-        return {"data/chunk_index": self._number // _CHUNK, "data/file_index": self._number % _CHUNK}
+        return {
+            "data/chunk_index": self._number // _CHUNK,
+            "data/file_index": self._number % _CHUNK,
+        }
 
 
 class _Films:
@@ -384,7 +443,9 @@ class _Films:
         for image in images:
             container, stream = self._writing = self._writing or self._next(image)
             begin = self._frames if begin is None else begin
-            frame = av.VideoFrame.from_ndarray(np.repeat(image[..., None], 3, axis=2), format="rgb24")
+            frame = av.VideoFrame.from_ndarray(
+                np.repeat(image[..., None], 3, axis=2), format="rgb24"
+            )
             frame = frame.reformat(format="yuv420p")
             frame.pts, frame.time_base = self._frames, 1 / self._rate
             with kept_scheduling():
@@ -408,12 +469,16 @@ class _Films:
         height, width = image.shape
         if height % 2 or width % 2:
             raise InputError(
-                f"AV1 cannot hold pictures of {width} × {height} px", where="--frames", fix="export with --frames png"
+                f"AV1 cannot hold pictures of {width} × {height} px",
+                where="--frames",
+                fix="export with --frames png",
             )
         self._number += 1
         self._frames = 0
         self._size = 0
-        container = self._open.enter_context(av.open(str(_path(self._folder, self._number, "mp4")), "w"))
+        container = self._open.enter_context(
+            av.open(str(_path(self._folder, self._number, "mp4")), "w")
+        )
         options = {"crf": "30", "g": "2", "preset": "8", "svtav1-params": "lp=1"}
         stream: Any = container.add_stream("libsvtav1", rate=self._rate, options=options)
         stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
@@ -430,7 +495,9 @@ class _Films:
 
 
 def _path(folder: Path, number: int, suffix: str) -> Path:
-    path = folder / f"{FILE.format(chunk_index=number // _CHUNK, file_index=number % _CHUNK)}.{suffix}"
+    path = (
+        folder / f"{FILE.format(chunk_index=number // _CHUNK, file_index=number % _CHUNK)}.{suffix}"
+    )
     path.parent.mkdir(parents=True, exist_ok=True)
     return path
 
@@ -440,12 +507,17 @@ def _wind(entry: Entry) -> dict[str, Float32Array]:
     means, times = entry.record.wind_1hz(), entry.frame_times
     names = ("speed", "sigma", "direction")
     if means is None:
-        return {f"observation.wind_{name}": np.full(len(times), np.nan, np.float32) for name in (*names, "age")}
+        return {
+            f"observation.wind_{name}": np.full(len(times), np.nan, np.float32)
+            for name in (*names, "age")
+        }
     newest = np.searchsorted(means.time, times, side="right") - 1
     is_known = newest >= 0
     columns = {name: np.where(is_known, getattr(means, name)[newest], np.nan) for name in names}
     columns["age"] = np.where(is_known, (times - means.time[newest]) / NANOSECONDS, np.nan)
-    return {f"observation.wind_{name}": values.astype(np.float32) for name, values in columns.items()}
+    return {
+        f"observation.wind_{name}": values.astype(np.float32) for name, values in columns.items()
+    }
 
 
 def _png(image: UInt8Array) -> bytes:
@@ -457,13 +529,28 @@ def _png(image: UInt8Array) -> bytes:
 def _tasks() -> pa.Table:
     """Builds the table of tasks, whose index is the text of a task, as pandas stores it."""
     columns = [
-        {"name": name, "field_name": name, "pandas_type": kind, "numpy_type": store, "metadata": None}
+        {
+            "name": name,
+            "field_name": name,
+            "pandas_type": kind,
+            "numpy_type": store,
+            "metadata": None,
+        }
         for name, kind, store in (("task_index", "int64", "int64"), ("task", "unicode", "object"))
     ]
-    stored = {"index_columns": ["task"], "column_indexes": [], "columns": columns, "pandas_version": "2.0.0"}
-    schema = pa.schema([("task_index", pa.int64()), ("task", pa.string())], metadata={"pandas": json.dumps(stored)})
+    stored = {
+        "index_columns": ["task"],
+        "column_indexes": [],
+        "columns": columns,
+        "pandas_version": "2.0.0",
+    }
+    schema = pa.schema(
+        [("task_index", pa.int64()), ("task", pa.string())], metadata={"pandas": json.dumps(stored)}
+    )
     return pa.table([[0], [TASK]], schema=schema)
 
 
 def _json(path: Path, content: Any) -> None:
-    path.write_text(json.dumps(content, indent=4, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+    path.write_text(
+        json.dumps(content, indent=4, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8"
+    )

@@ -1,9 +1,9 @@
 """MCAP subsets: each artifact as a record of its own, message by message as it was recorded.
 
-A clip keeps its frames and the ten minutes of wind up to its end that its ground truth and its σ were worked out from,
-so that both can be worked out again from the subset alone. Messages, schemas and metadata are copied byte for byte;
-whole records as files. H.264 can be decoded from a key frame only: a clip of it begins with the frames since that one,
-and says how many they are.
+A clip keeps its frames and the ten minutes of wind up to its end that its ground truth and its σ
+were worked out from, so that both can be worked out again from the subset alone. Messages, schemas
+and metadata are copied byte for byte; whole records as files. H.264 can be decoded from a key frame
+only: a clip of it begins with the frames since that one, and says how many they are.
 """
 
 from __future__ import annotations
@@ -26,7 +26,13 @@ from flagdata.errors import CorruptError
 from flagdata.export.export_source import FILMED, Entry, ExportRows, label_units
 from flagdata.record import Coding, messages
 from flagdata.record.key_frames import is_key
-from flagdata.record.mcap_container import Messages, check_parts, read_exact, read_messages, read_summary
+from flagdata.record.mcap_container import (
+    Messages,
+    check_parts,
+    read_exact,
+    read_messages,
+    read_summary,
+)
 from flagdata.record.metadata import ROWS, SAMPLE
 from flagdata.record.record_bytes import open_bytes
 from flagdata.record.record_checksums import ChecksummedFile
@@ -42,7 +48,9 @@ class Mcap:
 
     kinds: ClassVar[frozenset[Kind]] = FILMED | {Kind.WIND}
 
-    def write(self, source: ExportRows, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
+    def write(
+        self, source: ExportRows, folder: Path, advance: Callable[[int], None]
+    ) -> Mapping[str, Any]:
         frames = 0
         pq.write_table(source.rows, folder / ROWS, compression="zstd")
         with ExitStack() as stack:
@@ -83,7 +91,10 @@ class _Original:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         self._file.close()
 
@@ -97,7 +108,11 @@ class _Original:
         for index in range(frame, -1, -1):
             if is_key(messages.payload(memoryview(self.data(TOPIC_IMAGE, index)), field=field)):
                 return index
-        raise CorruptError(f"there is no key frame up to frame {frame}", where=self._where, fix="run flagdata verify")
+        raise CorruptError(
+            f"there is no key frame up to frame {frame}",
+            where=self._where,
+            fix="run flagdata verify",
+        )
 
     def data(self, topic: str, index: int) -> bytes:
         """Reads the payload of one message.
@@ -112,11 +127,15 @@ class _Original:
 
     def _read(self, topic: str, index: int) -> bytes:
         table = self.messages[topic]
-        return read_exact(self._file, int(table.length[index]), int(table.offset[index]), where=self._where)
+        return read_exact(
+            self._file, int(table.length[index]), int(table.offset[index]), where=self._where
+        )
 
 
 def _cut(entry: Entry, original: _Original, target: Path) -> None:
-    first = original.decodable_from(entry.first) if entry.record.coding is Coding.H264 else entry.first
+    first = (
+        original.decodable_from(entry.first) if entry.record.coding is Coding.H264 else entry.first
+    )
     with target.open("xb") as sink:
         library = f"flagdata format {entry.row['format_version']}"
         writer = ChecksummedFile(sink, chunk_size=CHUNK_BYTES, profile=PROFILE, library=library)
@@ -139,7 +158,8 @@ def _cut(entry: Entry, original: _Original, target: Path) -> None:
 
 
 def _order(entry: Entry, original: _Original, first_frame: int) -> Iterator[tuple[str, int]]:
-    """Yields topic and index of the messages of a clip: the parameters, then all others in order of log time."""
+    """Yields topic and index of the messages of a clip: the parameters, then all others in order of
+    log time."""
     begin, end = entry.wind_span
     begin = min(begin, end - round(HISTORY * NANOSECONDS))
     topics, indices, times = [], [], []
@@ -163,10 +183,15 @@ def _register(writer: ChecksummedFile, original: _Original, topic: str) -> int:
     channel = original.summary.channels[topic]
     schema = original.summary.schemas.get(channel.schema_id)
     schema_id = (
-        0 if schema is None else writer.register_schema(name=schema.name, encoding=schema.encoding, data=schema.data)
+        0
+        if schema is None
+        else writer.register_schema(name=schema.name, encoding=schema.encoding, data=schema.data)
     )
     return writer.register_channel(
-        topic=topic, message_encoding=channel.message_encoding, schema_id=schema_id, metadata=channel.metadata
+        topic=topic,
+        message_encoding=channel.message_encoding,
+        schema_id=schema_id,
+        metadata=channel.metadata,
     )
 
 

@@ -1,7 +1,9 @@
-"""MP4 + CSV: H.264 with the frames' own times, and the wind beside it, for people and for any video tool.
+"""MP4 + CSV: H.264 with the frames' own times, and the wind beside it, for people and for any video
+tool.
 
-Frame times become presentation times in whole microseconds after the first frame (an MP4 track counts its steps in 32
-bits, so nanoseconds would overflow at a gap of 4.3 s); <artifact>.frames.csv has them exactly.
+Frame times become presentation times in whole microseconds after the first frame (an MP4 track
+counts its steps in 32 bits, so nanoseconds would overflow at a gap of 4.3 s); <artifact>.frames.csv
+has them exactly.
 """
 
 from __future__ import annotations
@@ -33,7 +35,8 @@ INDEX_COLUMNS = (*(name for name in IDENTITY if name != "parents"), "start", "en
 
 @dataclass(frozen=True, kw_only=True)
 class Mp4:
-    """Files <artifact>.mp4, <artifact>.frames.csv, <artifact>.wind.csv (where there is wind), and index.csv.
+    """Files <artifact>.mp4, <artifact>.frames.csv, <artifact>.wind.csv (where there is wind), and
+    index.csv.
 
     Attributes:
         crf: constant rate factor of x264: 0 is lossless, 51 is worst.
@@ -45,15 +48,23 @@ class Mp4:
 
     def __post_init__(self) -> None:
         if not 0 <= self.crf <= 51:
-            raise UsageError(f"H.264 has no rate factor of {self.crf}", where="--crf", fix="give 0 (lossless) to 51")
+            raise UsageError(
+                f"H.264 has no rate factor of {self.crf}",
+                where="--crf",
+                fix="give 0 (lossless) to 51",
+            )
 
-    def write(self, source: ExportRows, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
+    def write(
+        self, source: ExportRows, folder: Path, advance: Callable[[int], None]
+    ) -> Mapping[str, Any]:
         frames = 0
         index: list[list[Any]] = []
         for entry in source.entries():
             if not entry.count:
                 raise InputError(
-                    "a record without frames makes no video", where=entry.key, fix="leave it out by --where"
+                    "a record without frames makes no video",
+                    where=entry.key,
+                    fix="leave it out by --where",
                 )
             name = f"{entry.key}.mp4"
             _encode(entry, folder / name, self.crf)
@@ -64,7 +75,10 @@ class Mp4:
             index.append([name, *(cell(entry.row[column]) for column in INDEX_COLUMNS)])
             frames += entry.count
             advance(1)
-        header = ["file", *(f"{c} [{CATALOG[c].unit}]" if CATALOG[c].unit else c for c in INDEX_COLUMNS)]
+        header = [
+            "file",
+            *(f"{c} [{CATALOG[c].unit}]" if CATALOG[c].unit else c for c in INDEX_COLUMNS),
+        ]
         write_csv(folder / "index.csv", header, index)
         return {
             "videos": len(source),
@@ -82,7 +96,9 @@ def presentation_times(times: IntArray) -> IntArray:
     """
     pts = (times - times[0] + 500) // 1000
     if np.any(np.diff(pts) <= 0):
-        raise InputError("frames closer than a microsecond", fix="export to MCAP, which keeps nanoseconds")
+        raise InputError(
+            "frames closer than a microsecond", fix="export to MCAP, which keeps nanoseconds"
+        )
     return pts
 
 
@@ -90,7 +106,11 @@ def _encode(entry: Entry, path: Path, crf: int) -> None:
     pts = presentation_times(entry.frame_times)
     steps = np.diff(pts)
     # Nominal, for the encoder's own planning; the frames' times are `pts`.
-    rate = Fraction(MICROSECOND.denominator, round(float(np.median(steps)))) if len(steps) else Fraction(FRAME_RATE)
+    rate = (
+        Fraction(MICROSECOND.denominator, round(float(np.median(steps))))
+        if len(steps)
+        else Fraction(FRAME_RATE)
+    )
     options = {"movflags": "+faststart", "video_track_timescale": str(MICROSECOND.denominator)}
     with av.open(str(path), "w", format="mp4", options=options) as container:
         container.metadata["creation_time"] = iso(int(entry.frame_times[0]))
@@ -112,12 +132,17 @@ def _encode(entry: Entry, path: Path, crf: int) -> None:
 def _configure(stream: VideoStream, shape: Sequence[int], crf: int, *, where: str) -> None:
     height, width = shape
     if height % 2 or width % 2:
-        raise InputError(f"frames of {width}×{height}", where=where, fix="H.264 needs even sizes; ingest with one")
+        raise InputError(
+            f"frames of {width}×{height}",
+            where=where,
+            fix="H.264 needs even sizes; ingest with one",
+        )
     context: VideoCodecContext = stream.codec_context
     context.width, context.height, context.pix_fmt = width, height, "yuv420p"
     context.time_base = MICROSECOND
     context.color_range = ColorRange.JPEG
-    # One thread: the bytes then do not depend on the machine. No B-frames: packets are in order of presentation.
+    # One thread: the bytes then do not depend on the machine. No B-frames: packets are in order of
+    # presentation.
     context.options = {"crf": str(crf), "preset": "veryfast", "bf": "0", "threads": "1"}
 
 
@@ -135,7 +160,9 @@ def _luma_frame(image: UInt8Array) -> av.VideoFrame:
 def _frame_rows(entry: Entry) -> Iterable[Sequence[object]]:
     times, device = entry.frame_times, entry.device_frame_times
     pts = presentation_times(times)
-    for index, (at, time, device_time) in enumerate(zip(pts.tolist(), times.tolist(), device.tolist(), strict=True)):
+    for index, (at, time, device_time) in enumerate(
+        zip(pts.tolist(), times.tolist(), device.tolist(), strict=True)
+    ):
         yield index, at, iso(time), iso(device_time)
 
 
@@ -146,6 +173,10 @@ def _wind_rows(entry: Entry) -> list[tuple[object, ...]] | None:
     begin, end = entry.wind_span
     inside = np.nonzero((wind.time >= begin) & (wind.time <= end))[0]
     return [
-        (iso(int(wind.time[i])), *(cell(float(v[i])) for v in (wind.speed, wind.sigma, wind.direction)), wind.count[i])
+        (
+            iso(int(wind.time[i])),
+            *(cell(float(v[i])) for v in (wind.speed, wind.sigma, wind.direction)),
+            wind.count[i],
+        )
         for i in inside.tolist()
     ]

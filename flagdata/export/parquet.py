@@ -1,4 +1,5 @@
-"""Parquet: the catalog rows with ground truth, units in the field metadata, and the frames as JPEG where wanted."""
+"""Parquet: the catalog rows with ground truth, units in the field metadata, and the frames as JPEG
+where wanted."""
 
 from __future__ import annotations
 
@@ -17,7 +18,9 @@ from flagdata.export.export_source import FILMED, ExportRows
 
 FRAME_COLUMNS = (
     pa.field(
-        "frames", pa.list_(pa.binary()), metadata={"unit": "", "about": "frames as stored: gray JPEG, in order of time"}
+        "frames",
+        pa.list_(pa.binary()),
+        metadata={"unit": "", "about": "frames as stored: gray JPEG, in order of time"},
     ),
     pa.field(
         "frame_times",
@@ -32,11 +35,13 @@ _ROW_GROUP_ROWS = 65_536
 
 @dataclass(frozen=True, kw_only=True)
 class Parquet:
-    """Files rows/part-00000.parquet, …: a folder of their own, since readers of a folder take every file for a part.
+    """Files rows/part-00000.parquet, …: a folder of their own, since readers of a folder take every
+    file for a part.
 
     Attributes:
         frames: "none" for the catalog alone, "jpg" for a list column of the stored JPEGs beside it.
-        shard_bytes: a part is closed when its frames reach this size [B]; the catalog alone is one part.
+        shard_bytes: a part is closed when its frames reach this size [B]; the catalog alone is one
+            part.
     """
 
     frames: Literal["none", "jpg"] = "none"
@@ -44,19 +49,27 @@ class Parquet:
 
     def __post_init__(self) -> None:
         if self.frames not in ("none", "jpg"):
-            raise UsageError(f"frames {self.frames!r} in Parquet", where="--frames", fix="choose none or jpg")
+            raise UsageError(
+                f"frames {self.frames!r} in Parquet", where="--frames", fix="choose none or jpg"
+            )
         if self.shard_bytes < 1:
-            raise UsageError(f"shards of {self.shard_bytes} bytes", where="--shard-bytes", fix="give at least 1")
+            raise UsageError(
+                f"shards of {self.shard_bytes} bytes", where="--shard-bytes", fix="give at least 1"
+            )
 
     @property
     def kinds(self) -> frozenset[Kind]:
         return frozenset(Kind) if self.frames == "none" else FILMED
 
-    def write(self, source: ExportRows, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
+    def write(
+        self, source: ExportRows, folder: Path, advance: Callable[[int], None]
+    ) -> Mapping[str, Any]:
         (folder / ROWS).mkdir()
         units = {name: f.unit for name, f in CATALOG.items() if f.unit}
         if self.frames == "none":
-            with pq.ParquetWriter(folder / part_name(0), source.rows.schema, compression="zstd") as writer:
+            with pq.ParquetWriter(
+                folder / part_name(0), source.rows.schema, compression="zstd"
+            ) as writer:
                 writer.write_table(source.rows, row_group_size=_ROW_GROUP_ROWS)
             advance(len(source))
             return {"rows": len(source), "units": units}
@@ -67,7 +80,9 @@ class Parquet:
             for rows, size, frames in self._groups(source):
                 if writer is None or written + size > self.shard_bytes:
                     stack.close()
-                    writer = stack.enter_context(_part(folder / part_name(parts), source.rows.schema))
+                    writer = stack.enter_context(
+                        _part(folder / part_name(parts), source.rows.schema)
+                    )
                     parts, written = parts + 1, 0
                 writer.write_table(pa.Table.from_pylist(rows, schema=writer.schema))
                 written, total = written + size, total + frames
@@ -85,7 +100,9 @@ class Parquet:
             if rows and size + added > limit:
                 yield rows, size, frames
                 rows, size, frames = [], 0, 0
-            rows.append({**entry.row, "frames": pictures, "frame_times": entry.frame_times.tolist()})
+            rows.append(
+                {**entry.row, "frames": pictures, "frame_times": entry.frame_times.tolist()}
+            )
             size, frames = size + added, frames + len(pictures)
         if rows:
             yield rows, size, frames

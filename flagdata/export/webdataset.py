@@ -1,7 +1,8 @@
 """WebDataset: tar shards of samples, read in sequence by `webdataset` and anything that reads tar.
 
-A sample is one artifact. Its key is the artifact's identity; its members are `<key>.json` (identity, ground truth with
-σ, frame times) and either `<key>.<frame>.jpg`, the frames as stored, or `<key>.npy`, uint8 (time, height, width).
+A sample is one artifact. Its key is the artifact's identity; its members are `<key>.json`
+(identity, ground truth with σ, frame times) and either `<key>.<frame>.jpg`, the frames as stored,
+or `<key>.npy`, uint8 (time, height, width).
 Source: the WebDataset format, https://github.com/webdataset/webdataset ("the WebDataset format").
 """
 
@@ -34,8 +35,9 @@ class WebDataset:
     Attributes:
         frames: "jpg" for the stored JPEGs, one member a frame; "npy" for one decoded array.
         shard_bytes: a shard is no larger than this [B].
-        shuffle: seed of the order of the samples; `None` keeps the order of the rows. Sequential readers shuffle in a
-            buffer only, so neighbours in a recording stay neighbours in training unless they are shuffled here.
+        shuffle: seed of the order of the samples; `None` keeps the order of the rows. Sequential
+            readers shuffle in a buffer only, so neighbours in a recording stay neighbours in
+            training unless they are shuffled here.
     """
 
     kinds: ClassVar[frozenset[Kind]] = FILMED
@@ -46,13 +48,19 @@ class WebDataset:
 
     def __post_init__(self) -> None:
         if self.frames not in ("jpg", "npy"):
-            raise UsageError(f"frames {self.frames!r} in WebDataset", where="--frames", fix="choose jpg or npy")
+            raise UsageError(
+                f"frames {self.frames!r} in WebDataset", where="--frames", fix="choose jpg or npy"
+            )
         if self.shard_bytes < _RECORD:
             raise UsageError(
-                f"shards of {self.shard_bytes} bytes", where="--shard-bytes", fix=f"give at least {_RECORD}"
+                f"shards of {self.shard_bytes} bytes",
+                where="--shard-bytes",
+                fix=f"give at least {_RECORD}",
             )
 
-    def write(self, source: ExportRows, folder: Path, advance: Callable[[int], None]) -> Mapping[str, Any]:
+    def write(
+        self, source: ExportRows, folder: Path, advance: Callable[[int], None]
+    ) -> Mapping[str, Any]:
         order = None
         if self.shuffle is not None:
             order = stream(self.shuffle, "export", "webdataset").permutation(len(source))
@@ -62,7 +70,12 @@ class WebDataset:
                 shards.add(entry.key, list(self._members(entry)))
                 frames += entry.count
                 advance(1)
-        return {"samples": len(source), "frames": frames, "shards": shards.written, "units": label_units()}
+        return {
+            "samples": len(source),
+            "frames": frames,
+            "shards": shards.written,
+            "units": label_units(),
+        }
 
     def _members(self, entry: Entry) -> Iterator[tuple[str, bytes]]:
         text = json.dumps(entry.label(), sort_keys=True, allow_nan=False, ensure_ascii=False)
@@ -119,7 +132,9 @@ class _Shards:
         name = shard_name(len(self.written))
         self.written.append({"path": name, "samples": 0})
         self._size = 0
-        return self._open.enter_context(tarfile.open(self._folder / name, "x", format=tarfile.USTAR_FORMAT))
+        return self._open.enter_context(
+            tarfile.open(self._folder / name, "x", format=tarfile.USTAR_FORMAT)
+        )
 
 
 def shard_name(number: int) -> str:
@@ -138,5 +153,6 @@ def _padded_size(size: int) -> int:
 
 
 def _file_size(members: int) -> int:
-    """Computes the size of a tar file of `members` bytes: two zero blocks at the end, padded to a whole record."""
+    """Computes the size of a tar file of `members` bytes: two zero blocks at the end, padded to a
+    whole record."""
     return -(-(members + 2 * _BLOCK) // _RECORD) * _RECORD

@@ -1,4 +1,5 @@
-"""Vendor files to typed signals: one package or module a family of source formats; units, frame and time fixed once."""
+"""Vendor files to typed signals: one package or module a family of source formats; units, frame and
+time fixed once."""
 
 from __future__ import annotations
 
@@ -16,7 +17,12 @@ if TYPE_CHECKING:
     from flagdata.ingest.anemometer.formats.nmea_sentences import checksum
     from flagdata.ingest.anemometer.identify import anemometers, sniff
     from flagdata.ingest.anemometer.instants.log_clock import ClockChoice
-    from flagdata.ingest.anemometer.log_confirmation import UNASKED, Accepting, Drafted, UnconfirmedError
+    from flagdata.ingest.anemometer.log_confirmation import (
+        UNASKED,
+        Accepting,
+        Drafted,
+        UnconfirmedError,
+    )
     from flagdata.ingest.anemometer.log_reading import Reading
     from flagdata.ingest.anemometer.samples.rules import gaps
     from flagdata.ingest.anemometer.sensor_recipe import FileLayout, QualityRules
@@ -33,7 +39,12 @@ if TYPE_CHECKING:
     from flagdata.ingest.markers.marker_table import MarkerOptions, is_marker_table, read_table
     from flagdata.ingest.mcap.topics import messages, topics
     from flagdata.ingest.meshes.folder import frame_files, read_folder, read_json, write_folder
-    from flagdata.ingest.meshes.mesh_artifacts import MeshIngest, findings, ingest_meshes, scene_wind
+    from flagdata.ingest.meshes.mesh_artifacts import (
+        MeshIngest,
+        findings,
+        ingest_meshes,
+        scene_wind,
+    )
     from flagdata.ingest.meshes.wavefront import Obj, obj_text, read_obj, write_obj
     from flagdata.ingest.records import ingest_record
     from flagdata.ingest.source_artifacts import (

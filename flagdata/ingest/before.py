@@ -1,8 +1,9 @@
-"""Artifacts that were made before from the bytes of a log: read alike, read otherwise, or never confirmed.
+"""Artifacts that were made before from the bytes of a log: read alike, read otherwise, or never
+confirmed.
 
-The identity of a log's artifact holds the options that shaped it and what was understood of its file, so that a file
-that was ingested in a wrong zone and then in the right one is in the lake twice, and the wrong one would go on being
-taken for the truth unless somebody says so.
+The identity of a log's artifact holds the options that shaped it and what was understood of its
+file, so that a file that was ingested in a wrong zone and then in the right one is in the lake
+twice, and the wrong one would go on being taken for the truth unless somebody says so.
 """
 
 from __future__ import annotations
@@ -23,10 +24,13 @@ from flagdata.record import Record
 from flagdata.record.signals import WindSeries
 
 _CHOOSES = ("wind", "talker", "session")
-"""What makes another log of the same file and no other reading of it: one of several anemometers, a second session."""
+"""What makes another log of the same file and no other reading of it: one of several anemometers, a
+second session."""
 
 
-def other_readings(artifacts: Sequence[Artifact], source_hash: str, recipe: Mapping[str, Any]) -> tuple[Finding, ...]:
+def other_readings(
+    artifacts: Sequence[Artifact], source_hash: str, recipe: Mapping[str, Any]
+) -> tuple[Finding, ...]:
     """Notes each of some artifacts that was read from the same bytes otherwise.
 
     Args:
@@ -38,16 +42,26 @@ def other_readings(artifacts: Sequence[Artifact], source_hash: str, recipe: Mapp
     findings: list[Finding] = []
     for artifact in artifacts:
         before = _options(artifact.recipe)
-        if artifact.source_hash != source_hash or any(before.get(name) != now.get(name) for name in _CHOOSES):
+        if artifact.source_hash != source_hash or any(
+            before.get(name) != now.get(name) for name in _CHOOSES
+        ):
             continue
-        names = sorted(name for name in before.keys() | now.keys() if before.get(name) != now.get(name))
+        names = sorted(
+            name for name in before.keys() | now.keys() if before.get(name) != now.get(name)
+        )
         changed = ", ".join(f"{name} {before.get(name)!s}, now {now.get(name)!s}" for name in names)
         if changed:
-            message = f"the same file is in the lake by other options as {artifact.id[:SHORT]} ({changed}); both stay"
+            message = (
+                f"the same file is in the lake by other options as {artifact.id[:SHORT]} "
+                f"({changed}); both stay"
+            )
         elif artifact.recipe.get("plan") != recipe.get("plan"):
             mean = json.loads(artifact.report or "{}").get("mean_speed")
             mean_speed = "" if mean is None else f", mean speed {mean:.4g} m/s"
-            message = f"the same file was understood otherwise before, as {artifact.id[:SHORT]}{mean_speed}; both stay"
+            message = (
+                "the same file was understood otherwise before, as "
+                f"{artifact.id[:SHORT]}{mean_speed}; both stay"
+            )
         else:
             continue
         withdraw = command_line("flagdata", "withdraw", artifact.id[:SHORT], "-m", "read otherwise")
@@ -57,10 +71,14 @@ def other_readings(artifacts: Sequence[Artifact], source_hash: str, recipe: Mapp
 
 
 def earlier(
-    lake: Lake, artifacts: Sequence[Artifact], source_hash: str, recipe: Mapping[str, Any], series: WindSeries
+    lake: Lake,
+    artifacts: Sequence[Artifact],
+    source_hash: str,
+    recipe: Mapping[str, Any],
+    series: WindSeries,
 ) -> Artifact | None:
-    """Finds the artifact that an older version made of the same bytes and options, and whose wind is the same to the
-    bit.
+    """Finds the artifact that an older version made of the same bytes and options, and whose wind
+    is the same to the bit.
 
     Args:
         lake: that holds the artifacts.
@@ -74,14 +92,16 @@ def earlier(
             try:
                 before = Record.open(lake.record_place(str(artifact.object))).wind()
             except FlagdataError:
-                continue  # damage of another artifact is found by verify; it does not keep this log out
+                # damage of another artifact is found by verify; it does not keep this log out
+                continue
             if before is not None and _same(before, series):
                 return artifact
     return None
 
 
 def unconfirmed_findings(artifacts: Iterable[Artifact]) -> tuple[Finding, ...]:
-    """Warns of each artifact of a log that an older version read by a draft of its own, which nobody confirmed."""
+    """Warns of each artifact of a log that an older version read by a draft of its own, which
+    nobody confirmed."""
     return tuple(
         Finding.of(
             "draft-unconfirmed",
@@ -95,11 +115,15 @@ def unconfirmed_findings(artifacts: Iterable[Artifact]) -> tuple[Finding, ...]:
 
 
 def _was_drafted(artifact: Artifact) -> bool:
-    """Checks whether a table was read by no recipe of the user's, before plans were a part of the identity."""
+    """Checks whether a table was read by no recipe of the user's, before plans were a part of the
+    identity."""
     wind = artifact.recipe.get("wind")
     if artifact.kind is not Kind.WIND or not isinstance(wind, Mapping) or "plan" in artifact.recipe:
         return False
-    return wind.get("recipe") is None and json.loads(artifact.report or "{}").get("format") == "delimited"
+    return (
+        wind.get("recipe") is None
+        and json.loads(artifact.report or "{}").get("format") == "delimited"
+    )
 
 
 def _same(first: WindSeries, second: WindSeries) -> bool:
@@ -108,13 +132,16 @@ def _same(first: WindSeries, second: WindSeries) -> bool:
         names == second.channels.keys()
         and np.array_equal(first.time, second.time)
         and np.array_equal(first.flags, second.flags)
-        and all(np.array_equal(first.channels[name], second.channels[name], equal_nan=True) for name in names)
+        and all(
+            np.array_equal(first.channels[name], second.channels[name], equal_nan=True)
+            for name in names
+        )
     )
 
 
 def _options(recipe: Mapping[str, Any]) -> dict[str, Any]:
-    """Selects the options of a recipe, those of the anemometer's own among them; what was understood of the file is
-    none."""
+    """Selects the options of a recipe, those of the anemometer's own among them; what was
+    understood of the file is none."""
     flat: dict[str, Any] = {}
     for name, value in recipe.items():
         if name != "plan":

@@ -1,4 +1,5 @@
-"""Whether a source is a camera's, an anemometer's, a mesh sequence or a table of markers, by its content."""
+"""Whether a source is a camera's, an anemometer's, a mesh sequence or a table of markers, by its
+content."""
 
 from __future__ import annotations
 
@@ -20,8 +21,11 @@ MESHES = "meshes"
 MARKERS = "markers"
 
 
-def guesses(path: Path, *, topic: str | None = None, encoding: str | None = None) -> tuple[Guess, ...]:
-    """Lists what a source may be, the likeliest first; never empty. A file of no known signature is tried as a video.
+def guesses(
+    path: Path, *, topic: str | None = None, encoding: str | None = None
+) -> tuple[Guess, ...]:
+    """Lists what a source may be, the likeliest first; never empty. A file of no known signature is
+    tried as a video.
 
     Args:
         topic: of an MCAP file, for which it is judged.
@@ -40,7 +44,11 @@ def guesses(path: Path, *, topic: str | None = None, encoding: str | None = None
         return _of_mcap(path, topic)
     bag = other_bag(path)
     if bag is not None:
-        return (Guess(format="bag", score=0.99, reasons=(f"this is {bag[0]}",), kind="other", fix=bag[1]),)
+        return (
+            Guess(
+                format="bag", score=0.99, reasons=(f"this is {bag[0]}",), kind="other", fix=bag[1]
+            ),
+        )
     if is_lerobot(path):
         reason = f"it has LeRobot's {LEROBOT_INFO}"
         return (Guess(format="LeRobot", score=0.99, reasons=(reason,), kind="camera"),)
@@ -63,13 +71,14 @@ def classify(
     topic: str | None = None,
     encoding: str | None = None,
 ) -> Guess:
-    """Classifies what a source is to be ingested as: a guess of kind "camera", "anemometer", "meshes", "markers" or
-    "record".
+    """Classifies what a source is to be ingested as: a guess of kind "camera", "anemometer",
+    "meshes", "markers" or "record".
 
     Args:
-        format_name: what the user says it is: "camera", "meshes", "markers" or an anemometer format; goes before the
-            content.
-        recipe: a sensor recipe the user named, for any source that is no camera's, meshes or markers by its content.
+        format_name: what the user says it is: "camera", "meshes", "markers" or an anemometer
+            format; goes before the content.
+        recipe: a sensor recipe the user named, for any source that is no camera's, meshes or
+            markers by its content.
         columns: what the columns of a table are, by the user's word; likewise.
         topic: of an MCAP file.
         encoding: of a text, by the user's word.
@@ -86,29 +95,41 @@ def classify(
     if format_name == MESHES:
         return Guess(format="mesh folder", score=1.0, reasons=("given as meshes",), kind="meshes")
     if format_name == MARKERS:
-        return Guess(format="marker table", score=1.0, reasons=("given as markers",), kind="markers")
+        return Guess(
+            format="marker table", score=1.0, reasons=("given as markers",), kind="markers"
+        )
     if format_name is not None:
         if format_name not in FORMATS:
-            raise UnknownNameError.of("format", format_name, [CAMERA, MESHES, MARKERS, *FORMATS], where="--as")
-        return Guess(format=format_name, score=1.0, reasons=(f"the format {format_name} was named",))
+            raise UnknownNameError.of(
+                "format", format_name, [CAMERA, MESHES, MARKERS, *FORMATS], where="--as"
+            )
+        return Guess(
+            format=format_name, score=1.0, reasons=(f"the format {format_name} was named",)
+        )
     best = guesses(path, topic=topic, encoding=encoding)[0]
     by_content = best.kind in (CAMERA, MARKERS, "record") or (best.kind == MESHES and path.is_dir())
     if recipe is not None and not by_content:
-        return Guess(format="delimited", score=1.0, reasons=(f"the recipe {recipe} was named",), recipe=recipe)
+        return Guess(
+            format="delimited",
+            score=1.0,
+            reasons=(f"the recipe {recipe} was named",),
+            recipe=recipe,
+        )
     if columns is not None and not by_content:
         return Guess(format="delimited", score=1.0, reasons=("its columns were named",))
     if by_content or best.kind == "anemometer":
         return best
     raise InputError(
-        f"this is no video, wind log, folder of meshes or table of markers: {'; '.join(best.reasons)}",
+        "this is no video, wind log, folder of meshes or table of markers: "
+        f"{'; '.join(best.reasons)}",
         where=str(path),
         fix=best.fix or "see flagdata ingest --sniff",
     )
 
 
 def _of_mcap(path: Path, topic: str | None) -> tuple[Guess, ...]:
-    """Recognises a record of flagdata's, or of another program's file the topic that was named: pictures before
-    numbers."""
+    """Recognises a record of flagdata's, or of another program's file the topic that was named:
+    pictures before numbers."""
     from flagdata.ingest.anemometer.containers.mcap_topic import of_numbers
     from flagdata.ingest.mcap.bags import parts_of
     from flagdata.ingest.mcap.mcap_pictures import of_pictures
@@ -116,17 +137,36 @@ def _of_mcap(path: Path, topic: str | None) -> tuple[Guess, ...]:
     from flagdata.ingest.records import is_ours
     from flagdata.record.writer import PROFILE
 
-    ours = topic is None and any(profile(part) == PROFILE and is_ours(part) for part in parts_of(path))
+    ours = topic is None and any(
+        profile(part) == PROFILE and is_ours(part) for part in parts_of(path)
+    )
     if ours and path.is_file():
-        return (Guess(format="record", score=1.0, reasons=("its header says that flagdata wrote it",), kind="record"),)
+        return (
+            Guess(
+                format="record",
+                score=1.0,
+                reasons=("its header says that flagdata wrote it",),
+                kind="record",
+            ),
+        )
     if ours:  # each is a recording of its own
-        reason, fix = "a folder of records that flagdata wrote", f"give the files in it: {path / '*.mcap'}"
+        reason, fix = (
+            "a folder of records that flagdata wrote",
+            f"give the files in it: {path / '*.mcap'}",
+        )
         return (Guess(format="records", score=0.0, reasons=(reason,), kind="other", fix=fix),)
     present = [
-        present_topic for present_topic in topics(path) if topic in (None, present_topic.name, present_topic.plain)
+        present_topic
+        for present_topic in topics(path)
+        if topic in (None, present_topic.name, present_topic.plain)
     ]
     candidates = [
-        Guess(format="MCAP", score=0.9, reasons=(f"the topic {picture_topic} holds pictures",), kind="camera")
+        Guess(
+            format="MCAP",
+            score=0.9,
+            reasons=(f"the topic {picture_topic} holds pictures",),
+            kind="camera",
+        )
         for picture_topic in of_pictures(present)
     ]
     candidates += [
@@ -137,10 +177,23 @@ def _of_mcap(path: Path, topic: str | None) -> tuple[Guess, ...]:
         return tuple(candidates)
     if topic is not None:
         raise UnknownNameError.of(
-            "topic of pictures or numbers", topic, [present_topic.name for present_topic in topics(path)]
+            "topic of pictures or numbers",
+            topic,
+            [present_topic.name for present_topic in topics(path)],
         )
-    reason = f"its topics hold neither pictures nor numbers: {', '.join(map(str, present)) or 'there are none'}"
-    return (Guess(format="MCAP", score=0.0, reasons=(reason,), kind="other", fix="give a file that has such a topic"),)
+    reason = (
+        "its topics hold neither pictures nor numbers: "
+        f"{', '.join(map(str, present)) or 'there are none'}"
+    )
+    return (
+        Guess(
+            format="MCAP",
+            score=0.0,
+            reasons=(reason,),
+            kind="other",
+            fix="give a file that has such a topic",
+        ),
+    )
 
 
 def _first_picture(path: Path) -> Pictured | None:

@@ -1,13 +1,14 @@
 """Tables of films of hanging cloth whose material was measured: one row a film.
 
-The recordings of Bouman, Xiao, Battaglia and Freeman (Estimating the material properties of fabric from video, ICCV
-2013) are of this kind: thirty fabrics that hang from a rod, each filmed in three strengths of a fan's wind, with area
-weight and bending stiffness measured by themselves. How the published files are named is not relied on; the table says
-which film shows what.
+The recordings of Bouman, Xiao, Battaglia and Freeman (Estimating the material properties of fabric
+from video, ICCV 2013) are of this kind: thirty fabrics that hang from a rod, each filmed in three
+strengths of a fan's wind, with area weight and bending stiffness measured by themselves. How the
+published files are named is not relied on; the table says which film shows what.
 
-Columns: `film` (a path, relative to the table's folder), `fabric` (its name), `area_weight` [kg/m²]; and, where they
-are known, `bending_stiffness` [N·m], `wind_level` (a fan's setting, as text), `wind_speed` and `wind_sigma` [m/s] (a
-steady wind and its standard uncertainty, both or neither). Other columns are refused: a misspelt one would be missed.
+Columns: `film` (a path, relative to the table's folder), `fabric` (its name), `area_weight`
+[kg/m²]; and, where they are known, `bending_stiffness` [N·m], `wind_level` (a fan's setting, as
+text), `wind_speed` and `wind_sigma` [m/s] (a steady wind and its standard uncertainty, both or
+neither). Other columns are refused: a misspelt one would be missed.
 """
 
 from __future__ import annotations
@@ -33,31 +34,42 @@ _WEIGHTS = (0.005, 5.0)  # kg/m²; silk organza has 0.02, heavy canvas 1
 
 
 def read_cloths(path: Path) -> tuple[ClothFilm, ...]:
-    """Reads the films of a table, CSV (comma, semicolon or tab; a decimal comma beside the latter two), in its order.
+    """Reads the films of a table, CSV (comma, semicolon or tab; a decimal comma beside the latter
+    two), in its order.
 
     Raises:
         NotFoundError: no such table, or a film that it names is not there.
         LimitError: a table too large to be read.
         UnknownNameError: a column that is none of these.
-        InputError: columns or values that are missing, doubled or malformed; a film that is named twice; a fabric with
-            two area weights or stiffnesses.
+        InputError: columns or values that are missing, doubled or malformed; a film that is named
+            twice; a fabric with two area weights or stiffnesses.
     """
     check_input(path, noun="table", limit=SIZE_LIMIT)
-    table = small_table(plain_text(path.read_bytes(), noun="table", where=str(path)), where=str(path))
+    table = small_table(
+        plain_text(path.read_bytes(), noun="table", where=str(path)), where=str(path)
+    )
     names = table.names
     if not table.rows:
         raise InputError(
-            "there are no rows", where=str(path), fix=f"give a heading with {', '.join(COLUMNS)}, and a row a film"
+            "there are no rows",
+            where=str(path),
+            fix=f"give a heading with {', '.join(COLUMNS)}, and a row a film",
         )
     check_columns(
-        names, needed=COLUMNS, optional=OPTIONAL, where=str(path), fix=f"give {', '.join(COLUMNS)}, each once"
+        names,
+        needed=COLUMNS,
+        optional=OPTIONAL,
+        where=str(path),
+        fix=f"give {', '.join(COLUMNS)}, each once",
     )
     films: list[ClothFilm] = []
     for line, cells in table.rows:
         where = f"{path}, line {line}"
         if len(cells) != len(names):
             raise InputError(
-                f"{len(cells)} cells, the heading has {len(names)}", where=where, fix="mind the delimiters"
+                f"{len(cells)} cells, the heading has {len(names)}",
+                where=where,
+                fix="mind the delimiters",
             )
         cell = dict(zip(names, cells, strict=True))
         numbers = {name: table.number(cell[name]) for name in names if name in _NUMBERS}
@@ -69,7 +81,11 @@ def read_cloths(path: Path) -> tuple[ClothFilm, ...]:
 def _film(row: Mapping[str, str], folder: Path, where: str) -> ClothFilm:
     for name in COLUMNS:
         if not row[name]:
-            raise InputError(f"the cell of {name} is empty", where=where, fix="fill the cell, or leave the row out")
+            raise InputError(
+                f"the cell of {name} is empty",
+                where=where,
+                fix="fill the cell, or leave the row out",
+            )
     film = folder / local_path(row["film"])
     if not is_folder(film):
         try:
@@ -82,7 +98,8 @@ def _film(row: Mapping[str, str], folder: Path, where: str) -> ClothFilm:
         raise InputError(
             f"the area weight is {row['area_weight']} kg/m²",
             where=where,
-            fix=f"give kg/m², {_WEIGHTS[0]:g} to {_WEIGHTS[1]:g}; 1 oz/yd² is 0.0339 kg/m², 100 g/m² is 0.1",
+            fix=f"give kg/m², {_WEIGHTS[0]:g} to {_WEIGHTS[1]:g}; 1 oz/yd² is 0.0339 kg/m², 100 "
+            "g/m² is 0.1",
         )
     speed, sigma = (_number(row, name, where, unit="m/s") for name in ("wind_speed", "wind_sigma"))
     if (speed is None) != (sigma is None) or sigma == 0:
@@ -111,7 +128,11 @@ def _number(row: Mapping[str, str], name: str, where: str, *, unit: str) -> floa
     except ValueError:
         value = math.nan
     if not (math.isfinite(value) and value >= 0):
-        raise InputError(f"{name} is {text!r}", where=where, fix=f"give a number of 0 or more in {unit}, or nothing")
+        raise InputError(
+            f"{name} is {text!r}",
+            where=where,
+            fix=f"give a number of 0 or more in {unit}, or nothing",
+        )
     return value
 
 
@@ -120,8 +141,13 @@ def _check_alike(films: list[ClothFilm], where: str) -> None:
     newest = films[-1]
     for film in films[:-1]:
         if film.film == newest.film:
-            raise InputError(f"{newest.film.name} is named twice", where=where, fix="keep one of the rows")
-        same = (film.area_weight, film.bending_stiffness) == (newest.area_weight, newest.bending_stiffness)
+            raise InputError(
+                f"{newest.film.name} is named twice", where=where, fix="keep one of the rows"
+            )
+        same = (film.area_weight, film.bending_stiffness) == (
+            newest.area_weight,
+            newest.bending_stiffness,
+        )
         if film.fabric == newest.fabric and not same:
             raise InputError(
                 f"{newest.fabric} has another area weight or stiffness than before",

@@ -1,7 +1,8 @@
-"""A doctor for other programs' data sets, before they come in: stamps in order, rates, gaps, and what would be lost.
+"""A doctor for other programs' data sets, before they come in: stamps in order, rates, gaps, and
+what would be lost.
 
-MCAP files are examined topic by topic, LeRobot data sets episode by episode. Nothing is decoded but stamps and the
-first message of a topic.
+MCAP files are examined topic by topic, LeRobot data sets episode by episode. Nothing is decoded but
+stamps and the first message of a topic.
 """
 
 from __future__ import annotations
@@ -105,11 +106,20 @@ def _mcap(path: Path) -> Examination:
     streams: list[Stream] = []
     findings: list[Finding] = []
     for topic in present:
-        holds = "pictures" if topic in pictures else "numbers" if topic in numbers else topic.schema or topic.encoding
+        holds = (
+            "pictures"
+            if topic in pictures
+            else "numbers"
+            if topic in numbers
+            else topic.schema or topic.encoding
+        )
         try:
             read = index(path, topic.name, sort=False)
             if not len(read.stamps):
-                raise CorruptError(f"{topic.count} messages are stated and none is there", fix="copy the file again")
+                raise CorruptError(
+                    f"{topic.count} messages are stated and none is there",
+                    fix="copy the file again",
+                )
         except FlagdataError as error:
             findings.append(_unread(topic.name, error))
             continue
@@ -120,12 +130,21 @@ def _mcap(path: Path) -> Examination:
     findings += _lost_pictures([stream for stream in streams if stream.holds == "pictures"])
     rest = [topic.name for topic in present if topic not in (*pictures, *numbers)]
     if rest:
-        findings.append(_lost("topics", f"topics that hold neither pictures nor numbers: {', '.join(rest)}"))
+        findings.append(
+            _lost("topics", f"topics that hold neither pictures nor numbers: {', '.join(rest)}")
+        )
     return Examination(format="MCAP", streams=tuple(streams), findings=tuple(findings))
 
 
 def _lerobot(folder: Path) -> Examination:
-    from flagdata.ingest.camera.lerobot_camera import TIME, cameras, description_of, read, stamps_of, tables
+    from flagdata.ingest.camera.lerobot_camera import (
+        TIME,
+        cameras,
+        description_of,
+        read,
+        stamps_of,
+        tables,
+    )
 
     info = description_of(folder)
     fps = float(info["fps"])
@@ -134,20 +153,27 @@ def _lerobot(folder: Path) -> Examination:
     streams: list[Stream] = []
     findings: list[Finding] = []
     for path in tables(folder / "data"):
-        table = read(path, ["episode_index", "frame_index", "timestamp", *([TIME] if timed else [])])
+        table = read(
+            path, ["episode_index", "frame_index", "timestamp", *([TIME] if timed else [])]
+        )
         for episode in pc.unique(table["episode_index"]).to_pylist():  # pyright: ignore[reportAttributeAccessIssue]
             rows = table.filter(pc.field("episode_index") == episode)
             stamps = stamps_of(rows, str(path))
             seconds = stamps_of(rows.select(["timestamp"]), str(path)) / NANOSECONDS
             stream = Stream.of(f"episode {episode}", "frames", stamps)
             streams.append(stream)
-            findings += [finding for finding in _stream_findings(stream) if timed or finding.kind != "not-a-date"]
+            findings += [
+                finding
+                for finding in _stream_findings(stream)
+                if timed or finding.kind != "not-a-date"
+            ]
             steady = np.abs(seconds - rows["frame_index"].to_numpy() / fps).max()
             if steady > _STEADY:
                 findings.append(
                     Finding.of(
                         "timing-uneven",
-                        f"its stamps lie up to {steady:.3f} s from frame / fps, where LeRobot looks for its films",
+                        f"its stamps lie up to {steady:.3f} s from frame / fps, where LeRobot "
+                        "looks for its films",
                         where=stream.name,
                         value=float(steady),
                         fix="check it with LeRobot's own reader",
@@ -155,20 +181,41 @@ def _lerobot(folder: Path) -> Examination:
                 )
     findings += _lost_pictures(streams if pictures else [])
     if not timed:
-        message = "no instants: LeRobot counts frame / fps, so gaps, jitter and the date of the camera are not in it"
+        message = (
+            "no instants: LeRobot counts frame / fps, so gaps, jitter and the date of the camera "
+            "are not in it"
+        )
         findings.append(_lost("instants", message))
-    own_features = {TIME, "timestamp", "frame_index", "episode_index", "index", "task_index", *pictures}
+    own_features = {
+        TIME,
+        "timestamp",
+        "frame_index",
+        "episode_index",
+        "index",
+        "task_index",
+        *pictures,
+    }
     other_features = sorted(set(info["features"]) - own_features)
     if other_features:
-        findings.append(_lost("features", f"features that are no pictures: {', '.join(other_features)}"))
-    missing = [name for name in ("tasks.parquet", "stats.json") if not (folder / "meta" / name).is_file()]
+        findings.append(
+            _lost("features", f"features that are no pictures: {', '.join(other_features)}")
+        )
+    missing = [
+        name for name in ("tasks.parquet", "stats.json") if not (folder / "meta" / name).is_file()
+    ]
     if missing:
         message = f"meta/ lacks {', '.join(missing)}"
         findings.append(Finding.of("files-missing", message, fix="copy it again"))
     if len(streams) != info.get("total_episodes", len(streams)):
-        message = f"{len(streams)} episodes are there, its description states {info['total_episodes']}"
+        message = (
+            f"{len(streams)} episodes are there, its description states {info['total_episodes']}"
+        )
         findings.append(Finding.of("episodes-missing", message, fix="copy it again"))
-    return Examination(format=f"LeRobot {info['codebase_version']}", streams=tuple(streams), findings=tuple(findings))
+    return Examination(
+        format=f"LeRobot {info['codebase_version']}",
+        streams=tuple(streams),
+        findings=tuple(findings),
+    )
 
 
 def _stream_findings(stream: Stream) -> Iterator[Finding]:
@@ -178,12 +225,14 @@ def _stream_findings(stream: Stream) -> Iterator[Finding]:
             f"{stream.backward} of {stream.count} stamps are not after the one before",
             where=stream.name,
             count=stream.backward,
-            fix="an ingest leaves such frames out, and sorts or asks about rows; mend the recorder's clock",
+            fix="an ingest leaves such frames out, and sorts or asks about rows; mend the "
+            "recorder's clock",
         )
     if stream.gaps:
         yield Finding.of(
             "gaps",
-            f"{stream.gaps} gaps, the longest of {stream.longest:.3f} s, at a usual {stream.rate or 0:.4g} Hz",
+            f"{stream.gaps} gaps, the longest of {stream.longest:.3f} s, at a usual "
+            f"{stream.rate or 0:.4g} Hz",
             where=stream.name,
             count=stream.gaps,
             value=stream.longest,
@@ -192,7 +241,8 @@ def _stream_findings(stream: Stream) -> Iterator[Finding]:
     if stream.start < _EARLIEST:
         yield Finding.of(
             "not-a-date",
-            f"its stamps begin at {iso(stream.start)}: they count from a start, or the clock was not set",
+            f"its stamps begin at {iso(stream.start)}: they count from a start, or the clock was "
+            "not set",
             where=stream.name,
             fix="give --start when you ingest a film",
         )
@@ -200,11 +250,19 @@ def _stream_findings(stream: Stream) -> Iterator[Finding]:
 
 def _lost_pictures(streams: Sequence[Stream]) -> Iterator[Finding]:
     if streams:
-        yield _lost("colour", f"colour and size: films become gray squares of {FRAME_SIZE} px; --crop chooses the part")
-    fast = [stream for stream in streams if stream.rate is not None and stream.rate > FRAME_RATE * 1.01]
+        yield _lost(
+            "colour",
+            f"colour and size: films become gray squares of {FRAME_SIZE} px; --crop chooses the "
+            "part",
+        )
+    fast = [
+        stream for stream in streams if stream.rate is not None and stream.rate > FRAME_RATE * 1.01
+    ]
     if fast:
         names = ", ".join(f"{stream.name} ({stream.rate:.4g} Hz)" for stream in fast[:5])
-        yield _lost("frames", f"frames beyond {FRAME_RATE:g} Hz of {names}; --rate native keeps them")
+        yield _lost(
+            "frames", f"frames beyond {FRAME_RATE:g} Hz of {names}; --rate native keeps them"
+        )
 
 
 def _lost(lost: str, text: str) -> Finding:
@@ -213,7 +271,9 @@ def _lost(lost: str, text: str) -> Finding:
 
 def _unread(name: str, error: FlagdataError) -> Finding:
     severity = Severity.ERROR if isinstance(error, CorruptError) else Severity.NOTE
-    return Finding(kind="topic-unread", severity=severity, where=name, what=error.what, fix=error.fix)
+    return Finding(
+        kind="topic-unread", severity=severity, where=name, what=error.what, fix=error.fix
+    )
 
 
 def as_dict(examination: Examination) -> dict[str, Any]:
@@ -221,7 +281,8 @@ def as_dict(examination: Examination) -> dict[str, Any]:
     return {
         "format": examination.format,
         "streams": [
-            {**vars(stream), "start": iso(stream.start), "end": iso(stream.end)} for stream in examination.streams
+            {**vars(stream), "start": iso(stream.start), "end": iso(stream.end)}
+            for stream in examination.streams
         ],
         "findings": [finding.as_dict() for finding in examination.findings],
     }

@@ -1,4 +1,5 @@
-"""What an ingest reports of a camera or a log, as JSON values: stored with the artifact and printed by `--json`."""
+"""What an ingest reports of a camera or a log, as JSON values: stored with the artifact and printed
+by `--json`."""
 
 from __future__ import annotations
 
@@ -62,7 +63,9 @@ def camera_report(
     }
 
 
-def wind_report(log: WindLog, findings: Iterable[Finding], *, recipe_file: str | None) -> dict[str, Any]:
+def wind_report(
+    log: WindLog, findings: Iterable[Finding], *, recipe_file: str | None
+) -> dict[str, Any]:
     """Reports a log; of a recipe file that was named, only its base name stays."""
     series = log.series
     time = series.time
@@ -75,7 +78,10 @@ def wind_report(log: WindLog, findings: Iterable[Finding], *, recipe_file: str |
         "schema": REPORT_SCHEMA,
         "kind": Kind.WIND.value,
         "format": log.format,
-        "reasons": [r.replace(recipe_file, Path(recipe_file).name) if recipe_file else r for r in log.reasons],
+        "reasons": [
+            r.replace(recipe_file, Path(recipe_file).name) if recipe_file else r
+            for r in log.reasons
+        ],
         **_span(int(time[0]), int(time[-1])),
         "samples": len(series),
         "rate": float(NANOSECONDS / np.median(steps)) if len(steps) else None,
@@ -84,7 +90,9 @@ def wind_report(log: WindLog, findings: Iterable[Finding], *, recipe_file: str |
             name: {"unit": CHANNELS[name].unit, "values": int(np.isfinite(values).sum())}
             for name, values in series.channels.items()
         },
-        "mean_speed": float(np.nanmean(speed)) if speed is not None and np.isfinite(speed).any() else None,
+        "mean_speed": float(np.nanmean(speed))
+        if speed is not None and np.isfinite(speed).any()
+        else None,
         "sensor": sensor,
         "findings": [finding.as_dict() for finding in findings],
     }

@@ -1,4 +1,5 @@
-"""Small tables with columns of our own names: how their text is cut, and whether all columns are there."""
+"""Small tables with columns of our own names: how their text is cut, and whether all columns are
+there."""
 
 from __future__ import annotations
 
@@ -13,7 +14,10 @@ from flagdata.errors import InputError, UnknownNameError
 
 DELIMITERS = (",", ";", "\t")
 _SEP = "sep="
-_COMMA, _POINT = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?"), re.compile(r"[-+]?\d*\.\d+([eE][-+]?\d+)?")
+_COMMA, _POINT = (
+    re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?"),
+    re.compile(r"[-+]?\d*\.\d+([eE][-+]?\d+)?"),
+)
 _HEAD = 1 << 16
 """Bytes of a table that a look at it takes."""
 
@@ -41,9 +45,14 @@ class SmallTable:
 
     @property
     def decimal_commas(self) -> bool:
-        """Whether its numbers have decimal commas, as those of a spreadsheet that writes ";"; none has a point."""
+        """Whether its numbers have decimal commas, as those of a spreadsheet that writes ";"; none
+        has a point."""
         cells = [cell for _, row in self.rows for cell in row]
-        return self.delimiter != "," and any(map(_COMMA.fullmatch, cells)) and not any(map(_POINT.fullmatch, cells))
+        return (
+            self.delimiter != ","
+            and any(map(_COMMA.fullmatch, cells))
+            and not any(map(_POINT.fullmatch, cells))
+        )
 
     def number(self, cell: str) -> str:
         """Writes a cell with the decimal point of programs."""
@@ -51,7 +60,8 @@ class SmallTable:
 
 
 def small_table(text: str, *, where: str) -> SmallTable:
-    """Reads the table in a text: CSV with commas, semicolons or tabs, which a first line "sep=;" may name.
+    """Reads the table in a text: CSV with commas, semicolons or tabs, which a first line "sep=;"
+    may name.
 
     Raises:
         InputError: quotes that do not close, and the like.
@@ -60,14 +70,23 @@ def small_table(text: str, *, where: str) -> SmallTable:
 
 
 def _cut(lines: Sequence[str], where: str, *, strict: bool) -> SmallTable:
-    names_delimiter = int(bool(lines) and len(lines[0]) == len(_SEP) + 1 and lines[0].lower().startswith(_SEP))
-    delimiter = lines[0][len(_SEP) :] if names_delimiter else delimiter_of(lines[0] if lines else "")
+    names_delimiter = int(
+        bool(lines) and len(lines[0]) == len(_SEP) + 1 and lines[0].lower().startswith(_SEP)
+    )
+    delimiter = (
+        lines[0][len(_SEP) :] if names_delimiter else delimiter_of(lines[0] if lines else "")
+    )
     reader = csv.reader(lines[names_delimiter:], delimiter=delimiter, strict=strict)
     try:
-        rows = [(reader.line_num + names_delimiter, tuple(cell.strip() for cell in row)) for row in reader]
+        rows = [
+            (reader.line_num + names_delimiter, tuple(cell.strip() for cell in row))
+            for row in reader
+        ]
     except csv.Error as error:
         line = f"{where}, line {reader.line_num + names_delimiter}"
-        raise InputError(f"this is not a table: {error}", where=line, fix="export it anew") from None
+        raise InputError(
+            f"this is not a table: {error}", where=line, fix="export it anew"
+        ) from None
     (line, names), *rows = rows or [(1, ())]
     while names and not names[-1]:
         names = names[:-1]
@@ -76,14 +95,17 @@ def _cut(lines: Sequence[str], where: str, *, strict: bool) -> SmallTable:
 
 
 def small_table_head(path: Path) -> SmallTable:
-    """Reads the heading and first rows of a table of any length, for a look at it: what is damaged is replaced.
+    """Reads the heading and first rows of a table of any length, for a look at it: what is damaged
+    is replaced.
 
     Raises:
         InputError: it is no text.
     """
     with path.open("rb") as stream:
         head = stream.read(_HEAD)
-    text = head.decode(encoding_of(head), errors="replace").replace("\r\n", "\n").replace("\r", "\n")
+    text = (
+        head.decode(encoding_of(head), errors="replace").replace("\r\n", "\n").replace("\r", "\n")
+    )
     whole_lines = text if len(head) < _HEAD else text[: text.rfind("\n") + 1]
     return _cut(whole_lines.splitlines(), str(path), strict=False)
 

@@ -1,10 +1,11 @@
 """Records that flagdata wrote come back: an exported record becomes the artifact that it was.
 
-`flagdata export mcap` writes the rows of what it exports beside the records (`ROWS`). With its row, and with the
-artifacts that it was made from on the branch, a record is restored with its identity, name and report, a recording with
-its clips. Without its row, what the record itself states is taken. Where what it was made from is absent, a recording
-comes in without parents; the part of one that a clip covers is a recording of its own. Both keep to a session, that of
-the original or one named after what they came from, so that no split puts their frames on two sides.
+`flagdata export mcap` writes the rows of what it exports beside the records (`ROWS`). With its row,
+and with the artifacts that it was made from on the branch, a record is restored with its identity,
+name and report, a recording with its clips. Without its row, what the record itself states is
+taken. Where what it was made from is absent, a recording comes in without parents; the part of one
+that a clip covers is a recording of its own. Both keep to a session, that of the original or one
+named after what they came from, so that no split puts their frames on two sides.
 """
 
 from __future__ import annotations
@@ -62,7 +63,9 @@ def is_ours(path: Path) -> bool:
     return PROVENANCE in Record.open(path).metadata
 
 
-def ingest_record(lake: Lake, path: Path, *, labels: Labels | None = None, branch: str = "main") -> IngestResult:
+def ingest_record(
+    lake: Lake, path: Path, *, labels: Labels | None = None, branch: str = "main"
+) -> IngestResult:
     """Brings in a record that `flagdata export mcap` wrote, or that was copied out of a lake.
 
     Raises:
@@ -76,7 +79,10 @@ def ingest_record(lake: Lake, path: Path, *, labels: Labels | None = None, branc
     _check(record)
     row = _row_beside(path, source.hash)
     artifact, findings = _artifact(record, row, source, labels)
-    absent = sorted(set(artifact.parents) - set(lake.rows(at=branch, columns=["artifact"])["artifact"].to_pylist()))
+    absent = sorted(
+        set(artifact.parents)
+        - set(lake.rows(at=branch, columns=["artifact"])["artifact"].to_pylist())
+    )
     if absent:
         artifact = _alone(artifact, source)
         findings = (*findings, _without(absent))
@@ -112,8 +118,8 @@ def _check(record: Record) -> None:
 
 
 def _row_beside(path: Path, sha256: str) -> dict[str, Any] | None:
-    """Reads the row of a record in the table beside it; `None` where there is no table, or it does not have this
-    record."""
+    """Reads the row of a record in the table beside it; `None` where there is no table, or it does
+    not have this record."""
     rows = path.parent / ROWS
     if not rows.is_file():
         return None
@@ -127,7 +133,8 @@ def _row_beside(path: Path, sha256: str) -> dict[str, Any] | None:
         raise CorruptError(
             f"the table of rows beside the record cannot be read: {error}",
             where=str(rows),
-            fix="export again, or move the record to a folder of its own to ingest it without its row",
+            fix="export again, or move the record to a folder of its own to ingest it without its "
+            "row",
         ) from None
     is_whole = rows_of_record and rows_of_record[0]["frame_first"] is None
     if not rows_of_record or (is_whole and rows_of_record[0]["object"] != f"mcap/{sha256}"):
@@ -138,7 +145,8 @@ def _row_beside(path: Path, sha256: str) -> dict[str, Any] | None:
 def _artifact(
     record: Record, row: Mapping[str, Any] | None, source: Source, labels: Labels
 ) -> tuple[Artifact, tuple[Finding, ...]]:
-    """Builds what a record was, with its former parents; of a clip's part the recording that it is now."""
+    """Builds what a record was, with its former parents; of a clip's part the recording that it is
+    now."""
     if SAMPLE in record.metadata:
         return _of_sample(record, row, source), ()
     if row is not None:
@@ -152,10 +160,18 @@ def _of_sample(record: Record, row: Mapping[str, Any] | None, source: Source) ->
         label = from_json(record.metadata[SAMPLE]["label"])
         labels = {column: label[column] for column in _OF_A_SAMPLE}
         original, recording = label["artifact"], label["recording"]
-        parameters = None if label["parameters"] is None else json.dumps(label["parameters"], sort_keys=True)
+        parameters = (
+            None if label["parameters"] is None else json.dumps(label["parameters"], sort_keys=True)
+        )
     except (ValueError, KeyError, TypeError) as error:
-        raise CorruptError(f"the label of the sample is damaged: {error}", where=where, fix="export it again") from None
-    recipe = column_json(row["recipe"], "recipe", artifact=row["artifact"]) if row and row["recipe"] else {}
+        raise CorruptError(
+            f"the label of the sample is damaged: {error}", where=where, fix="export it again"
+        ) from None
+    recipe = (
+        column_json(row["recipe"], "recipe", artifact=row["artifact"])
+        if row and row["recipe"]
+        else {}
+    )
     window = {"truth": {"window": recipe["window"]}} if "window" in recipe else {}
     times = record.frame_times
     return Artifact(
@@ -173,21 +189,30 @@ def _of_sample(record: Record, row: Mapping[str, Any] | None, source: Source) ->
 
 
 def _of_metadata(record: Record, source: Source) -> Artifact:
-    """Builds an artifact from what a record says of itself; the name and the session are not in it."""
+    """Builds an artifact from what a record says of itself; the name and the session are not in
+    it."""
     where = str(record.path)
     provenance = dict(record.metadata[PROVENANCE])
     try:
         recipe = from_json(provenance["recipe"])
     except (ValueError, KeyError):
-        raise InputError("the record does not state its recipe", where=where, fix="export it again") from None
+        raise InputError(
+            "the record does not state its recipe", where=where, fix="export it again"
+        ) from None
     filmed, windy = TOPIC_IMAGE in record.topics, TOPIC_WIND in record.topics
     parents = [provenance[role] for role in ("camera", "wind", "sequence") if role in provenance]
     of_a_device = "source_hash" in provenance
     if not (filmed or windy) or (of_a_device and filmed and windy):
-        raise InputError("the record is of neither a device nor a recording", where=where, fix="see flagdata doctor")
+        raise InputError(
+            "the record is of neither a device nor a recording",
+            where=where,
+            fix="see flagdata doctor",
+        )
     kind = Kind.RECORDING if not of_a_device else Kind.CAMERA if filmed else Kind.WIND
     series = record.wind()
-    times = record.frame_times if filmed else series.time if series is not None else record.frame_times
+    times = (
+        record.frame_times if filmed else series.time if series is not None else record.frame_times
+    )
     clock, middle = _clock(record)
     model = ClockModel.from_json(clock) if clock is not None else None
     span = int(times[-1] - times[0])
@@ -205,15 +230,20 @@ def _of_metadata(record: Record, source: Source) -> Artifact:
         rate=(len(times) - 1) * NANOSECONDS / span if span else None,
         clock_model=clock,
         clock_method=model.method if model is not None else None,
-        clock_offset=float(model.to_common(middle) - middle) / NANOSECONDS if model is not None else None,
+        clock_offset=float(model.to_common(middle) - middle) / NANOSECONDS
+        if model is not None
+        else None,
         clock_drift=model.segments[0].drift if model is not None else None,
         clock_sigma=float(model.sigma(middle)) if model is not None else None,
     )
 
 
 def _clock(record: Record) -> tuple[str | None, int]:
-    """Reads the clock model of the camera in a record, as JSON, and the middle of the film on the camera's clock."""
-    models = [values["model"] for name, values in record.metadata.items() if name.startswith(f"{CLOCK}/")]
+    """Reads the clock model of the camera in a record, as JSON, and the middle of the film on the
+    camera's clock."""
+    models = [
+        values["model"] for name, values in record.metadata.items() if name.startswith(f"{CLOCK}/")
+    ]
     if len(models) != 1 or TOPIC_IMAGE not in record.topics:
         return None, 0
     device = record.device_frame_times
@@ -221,33 +251,49 @@ def _clock(record: Record) -> tuple[str | None, int]:
 
 
 def _alone(artifact: Artifact, source: Source) -> Artifact:
-    """Builds a recording without its parents: its recipe names what it was, its session holds together what came of
-    one."""
+    """Builds a recording without its parents: its recipe names what it was, its session holds
+    together what came of one."""
     recipe = {"ingest": "record", "artifact": artifact.id, **artifact.recipe}
     session = artifact.session or f"camera {artifact.parents[0][:SHORT]}"
     return replace(
-        artifact, parents=(), recipe=recipe, session=session, source_hash=source.hash, source_name=source.name
+        artifact,
+        parents=(),
+        recipe=recipe,
+        session=session,
+        source_hash=source.hash,
+        source_name=source.name,
     )
 
 
 def _without(absent: list[str]) -> Finding:
     return Finding.of(
         "parents-absent",
-        f"what it was made from is not on the branch ({', '.join(parent[:SHORT] for parent in absent)}): it came in as "
+        "what it was made from is not on the branch "
+        f"({', '.join(parent[:SHORT] for parent in absent)}): it came in as "
         "a recording without parents",
         count=len(absent),
-        fix="to restore it whole, export and ingest the camera and the wind first, then withdraw this one",
+        fix="to restore it whole, export and ingest the camera and the wind first, then withdraw "
+        "this one",
     )
 
 
 def _unreported_finding(labels: Labels) -> Finding:
-    unknown = [label for label, value in (("name", labels.name), ("session", labels.session)) if value is None]
-    fix = "take it off (flagdata withdraw), then ingest the file in the folder that flagdata export wrote"
+    unknown = [
+        label
+        for label, value in (("name", labels.name), ("session", labels.session))
+        if value is None
+    ]
+    fix = (
+        "take it off (flagdata withdraw), then ingest the file in the folder that flagdata export "
+        "wrote"
+    )
     return Finding.of(
         "report-absent",
-        f"there is no {ROWS} with its row beside the record: unknown are its {', '.join([*unknown, 'side'])} and "
+        f"there is no {ROWS} with its row beside the record: unknown are its "
+        f"{', '.join([*unknown, 'side'])} and "
         "quality flags",
-        fix=fix + (f", or give {' and '.join(f'--{label}' for label in unknown)}" if unknown else ""),
+        fix=fix
+        + (f", or give {' and '.join(f'--{label}' for label in unknown)}" if unknown else ""),
     )
 
 

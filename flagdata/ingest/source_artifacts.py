@@ -1,7 +1,9 @@
-"""From a vendor's file to an artifact of the lake: read, written as a record on the device's own clock, published.
+"""From a vendor's file to an artifact of the lake: read, written as a record on the device's own
+clock, published.
 
-The identity of an artifact is its source's bytes, the options that shaped it, and of a log what was understood of it,
-so that ingesting a file again finds it. Of a log that comes in for a second session, its session is a part, too. One
+The identity of an artifact is its source's bytes, the options that shaped it, and of a log what was
+understood of it, so that ingesting a file again finds it. Of a log that comes in for a second
+session, its session is a part, too. One
 source is one transaction: an error, Ctrl-C or a crash leaves the lake as it was.
 """
 
@@ -41,7 +43,8 @@ Progress = Callable[[int], object]
 NEIGHBOURS = 3
 """Logs of a session that a new one is compared with: those that share most of its time."""
 CROP_PICTURE = "crop.png"
-"""Attachment of a camera record whose crop was found from motion: the motion in red, the crop in yellow."""
+"""Attachment of a camera record whose crop was found from motion: the motion in red, the crop in
+yellow."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,12 +81,14 @@ class WindIngest:
     wind: WindOptions = field(default_factory=WindOptions)
 
     def recipe(self) -> dict[str, Any]:
-        """Returns the options; a sensor recipe by its name and content, since its file may change or lie elsewhere
-        tomorrow."""
+        """Returns the options; a sensor recipe by its name and content, since its file may change
+        or lie elsewhere tomorrow."""
         options = dict(self.wind.as_dict())
         if self.wind.recipe is not None:
             options["recipe"] = Path(self.wind.recipe).name
-            options["recipe_hash"] = digest(SENSORS.find(self.wind.recipe).data.decode(errors="replace"))
+            options["recipe_hash"] = digest(
+                SENSORS.find(self.wind.recipe).data.decode(errors="replace")
+            )
         return {"ingest": "wind", "wind": options}
 
 
@@ -137,14 +142,17 @@ def ingest_camera(
     Args:
         reasons: why the file is taken to be a camera's, for the report.
         progress: called with 1 for each frame written.
-        crop_picture: called with the picture (PNG) of a crop found from motion before a frame is read; what it raises
-            leaves the lake unchanged. For an artifact that is there already, it is called with the attachment.
+        crop_picture: called with the picture (PNG) of a crop found from motion before a frame is
+            read; what it raises leaves the lake unchanged. For an artifact that is there already,
+            it is called with the attachment.
 
     Raises:
         FlagdataError: as `open_camera`; the lake is unchanged.
         ConflictError: the file changed while it was read, or is in the lake under other labels.
     """
-    from flagdata.ingest.camera import open_camera  # decoders of video, which a wind's log needs none of
+    from flagdata.ingest.camera import (
+        open_camera,
+    )  # decoders of video, which a wind's log needs none of
     from flagdata.ingest.camera.chapters import chapter_of
 
     options, labels = options or CameraIngest(), labels or Labels()
@@ -152,31 +160,51 @@ def ingest_camera(
     recipe = options.recipe()
     chapter = chapter_of(path) if options.camera.start is None else None
     if chapter is not None and chapter.before:
-        recipe["chapter_before"] = chapter.before  # it comes from other files, and shapes the result
+        recipe["chapter_before"] = (
+            chapter.before
+        )  # it comes from other files, and shapes the result
     present = find(lake, Kind.CAMERA, source, recipe, labels, branch=branch)
     if present.whole is not None:
         if crop_picture is not None:
-            crop_picture(Record.open(lake.record_place(str(present.whole.object))).attachment(CROP_PICTURE))
+            crop_picture(
+                Record.open(lake.record_place(str(present.whole.object))).attachment(CROP_PICTURE)
+            )
         return kept(present.whole)
     with lake.transaction(f"ingest camera {source.name}", branch=branch) as transaction:
         staged = transaction.staging(".mcap")
         times = FrameTimes()
         with open_camera(path, options.camera) as stream:
-            metadata = {CAMERA: camera_metadata(stream.info), PROVENANCE: source.provenance(recipe, code=present.code)}
-            with RecordWriter(staged, metadata=metadata, coding=options.coding, quality=JPEG_QUALITY) as record:
+            metadata = {
+                CAMERA: camera_metadata(stream.info),
+                PROVENANCE: source.provenance(recipe, code=present.code),
+            }
+            with RecordWriter(
+                staged, metadata=metadata, coding=options.coding, quality=JPEG_QUALITY
+            ) as record:
                 if stream.proposal is not None:
                     if crop_picture is not None:
                         crop_picture(stream.proposal.picture)
                     record.attach(
-                        CROP_PICTURE, stream.proposal.picture, media_type="image/png", log_time=stream.info.start
+                        CROP_PICTURE,
+                        stream.proposal.picture,
+                        media_type="image/png",
+                        log_time=stream.info.start,
                     )
                 for frame in stream:
-                    record.frame(log_time=frame.time, publish_time=frame.time, timestamp=frame.time, image=frame.image)
+                    record.frame(
+                        log_time=frame.time,
+                        publish_time=frame.time,
+                        timestamp=frame.time,
+                        image=frame.image,
+                    )
                     times.add(frame.time, frame.stamp_error)
                     if progress:
                         progress(1)
             info, findings, data_set = stream.info, stream.findings, stream.data_set
-        findings = (*findings, *other_readings(_present(lake, Kind.CAMERA, branch), source.hash, recipe))
+        findings = (
+            *findings,
+            *other_readings(_present(lake, Kind.CAMERA, branch), source.hash, recipe),
+        )
         if not times.count:
             raise InputError("no frame could be read", where=str(path), fix="check the file")
         source.check_unchanged()
@@ -209,7 +237,8 @@ def ingest_wind(
     branch: str = "main",
     confirm: Confirm = UNASKED,
 ) -> IngestResult:
-    """Ingest an anemometer's log. The vendor's file, and the sensor recipe that was named, are attached.
+    """Ingest an anemometer's log. The vendor's file, and the sensor recipe that was named, are
+    attached.
 
     Args:
         confirm: asks whether a drafted reading is right; without it a draft is refused.
@@ -234,23 +263,30 @@ def ingest_winds(
     branch: str = "main",
     confirm: Confirm = UNASKED,
 ) -> tuple[IngestResult | NothingMeasuredError, ...]:
-    """Ingest the anemometers of one log, in one transaction: all that can be used, or none where one cannot be read.
+    """Ingest the anemometers of one log, in one transaction: all that can be used, or none where
+    one cannot be read.
 
     Args:
         readings: the options that read one of them, and its labels.
-        confirm: asks once whether the drafted ones among them are right; without it drafts are refused.
+        confirm: asks once whether the drafted ones among them are right; without it drafts are
+            refused.
 
     Returns:
         for each what became of it, or why none of its values can be used.
 
     Raises:
-        FlagdataError, UnconfirmedError, ConflictError: as `ingest_wind`, of any of them; the lake is unchanged.
+        FlagdataError, UnconfirmedError, ConflictError: as `ingest_wind`, of any of them; the lake
+            is unchanged.
     """
     source = Source.of(path)
-    read = [_read(lake, path, source, options, labels, branch=branch) for options, labels in readings]
+    read = [
+        _read(lake, path, source, options, labels, branch=branch) for options, labels in readings
+    ]
     new = [reading_of_log for reading_of_log in read if isinstance(reading_of_log, _Read)]
     if not new:
-        return tuple(reading_of_log for reading_of_log in read if not isinstance(reading_of_log, _Read))
+        return tuple(
+            reading_of_log for reading_of_log in read if not isinstance(reading_of_log, _Read)
+        )
     unseen = [
         (reading_of_log.log, reading_of_log.options.wind)
         for reading_of_log in new
@@ -258,14 +294,19 @@ def ingest_winds(
     ]
     how = confirm_readings(path, source.hash, unseen, confirm) if unseen else None
     with lake.transaction(f"ingest wind {source.name}", branch=branch) as transaction:
-        staged = [_stage_log(transaction, path, source, reading_of_log, how) for reading_of_log in new]
+        staged = [
+            _stage_log(transaction, path, source, reading_of_log, how) for reading_of_log in new
+        ]
         for artifact, _ in staged:
             transaction.add(artifact)
     done = (
         result_of(transaction, artifact, report, reading_of_log.labels)
         for reading_of_log, (artifact, report) in zip(new, staged, strict=True)
     )
-    return tuple(next(done) if isinstance(reading_of_log, _Read) else reading_of_log for reading_of_log in read)
+    return tuple(
+        next(done) if isinstance(reading_of_log, _Read) else reading_of_log
+        for reading_of_log in read
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -273,12 +314,14 @@ class _Read:
     """A log that was read, and is to be written.
 
     Attributes:
-        present: what the lake has of it: nothing, or an artifact whose object is damaged or missing.
+        present: what the lake has of it: nothing, or an artifact whose object is damaged or
+            missing.
         log: what was read.
         options, labels: of it.
         recipe: of its artifact.
         findings: of the log, of its clocks and of other logs beside it.
-        paired: the logging computer's clock against the instrument's; `None` where the log has one alone.
+        paired: the logging computer's clock against the instrument's; `None` where the log has one
+            alone.
     """
 
     log: WindLog
@@ -293,8 +336,8 @@ class _Read:
 def _read(
     lake: Lake, path: Path, source: Source, options: WindIngest, labels: Labels, *, branch: str
 ) -> _Read | IngestResult | NothingMeasuredError:
-    """Reads a log as it is to be written; or returns what is in the lake already, or why none of its values can be
-    used."""
+    """Reads a log as it is to be written; or returns what is in the lake already, or why none of
+    its values can be used."""
     try:
         log = read_log(path, options.wind)
     except NothingMeasuredError as error:
@@ -319,18 +362,28 @@ def _read(
     findings = (*findings, *_shifted_logs(lake, log.series, labels.session, artifacts))
     findings = (*findings, *other_readings(artifacts, source.hash, recipe))
     return _Read(
-        log=log, options=options, labels=labels, recipe=recipe, findings=findings, paired=paired, present=present
+        log=log,
+        options=options,
+        labels=labels,
+        recipe=recipe,
+        findings=findings,
+        paired=paired,
+        present=present,
     )
 
 
 def _is_of_another_session(
     lake: Lake, source: Source, recipe: Mapping[str, Any], labels: Labels, *, branch: str
 ) -> bool:
-    """Checks whether the branch has this log for a session, and it is ingested for another one: the same constant wind,
-    or counts of seconds from 0, may have been logged beside another film. It is another artifact, whose recipe names
-    its session."""
+    """Checks whether the branch has this log for a session, and it is ingested for another one: the
+    same constant wind, or counts of seconds from 0, may have been logged beside another film. It is
+    another artifact, whose recipe names its session."""
     rows = lake.rows(at=branch).filter(_same(Kind.WIND, source, recipe)).to_pylist()
-    return bool(rows) and None not in (labels.session, rows[0]["session"]) and rows[0]["session"] != labels.session
+    return (
+        bool(rows)
+        and None not in (labels.session, rows[0]["session"])
+        and rows[0]["session"] != labels.session
+    )
 
 
 def _present(lake: Lake, kind: Kind, branch: str) -> list[Artifact]:
@@ -366,14 +419,20 @@ def _stage_log(
         if reading_of_log.options.wind.recipe is not None:
             recipe_file = SENSORS.find(reading_of_log.options.wind.recipe)
             name = f"{recipe_file.name}.recipe.toml"
-            record.attach(name, recipe_file.data, media_type="application/toml", log_time=int(time[0]))
+            record.attach(
+                name, recipe_file.data, media_type="application/toml", log_time=int(time[0])
+            )
         elif log.drafted:
             drafted = log.drafted.encode()
-            record.attach("drafted.recipe.toml", drafted, media_type="application/toml", log_time=int(time[0]))
+            record.attach(
+                "drafted.recipe.toml", drafted, media_type="application/toml", log_time=int(time[0])
+            )
     source.check_unchanged()
     report = wind_report(log, findings, recipe_file=reading_of_log.options.wind.recipe)
     before = (
-        {} if reading_of_log.present.artifact is None else json.loads(reading_of_log.present.artifact.report or "{}")
+        {}
+        if reading_of_log.present.artifact is None
+        else json.loads(reading_of_log.present.artifact.report or "{}")
     )
     if (confirmed_by := before.get("confirmed", how)) is not None:
         report["confirmed"] = confirmed_by
@@ -415,19 +474,31 @@ def _shifted_logs(
             neighbour = Record.open(lake.record_place(str(artifact.object))).wind()
         except FlagdataError:
             continue  # damage of another artifact is found by verify; it does not keep this log out
-        finding = hours_off(series, neighbour, name=artifact.name) if neighbour is not None else None
+        finding = (
+            hours_off(series, neighbour, name=artifact.name) if neighbour is not None else None
+        )
         if finding is not None:
             findings.append(finding)
     return tuple(findings)
 
 
-def find(lake: Lake, kind: Kind, source: Source, recipe: Mapping[str, Any], labels: Labels, *, branch: str) -> Present:
+def find(
+    lake: Lake,
+    kind: Kind,
+    source: Source,
+    recipe: Mapping[str, Any],
+    labels: Labels,
+    *,
+    branch: str,
+) -> Present:
     """Finds what the branch has of the artifact that this ingest would make.
 
     Raises:
         ConflictError: it is there, under another name or session than the one asked for.
     """
-    return _presence(lake, lake.rows(at=branch).filter(_same(kind, source, recipe)).to_pylist(), labels)
+    return _presence(
+        lake, lake.rows(at=branch).filter(_same(kind, source, recipe)).to_pylist(), labels
+    )
 
 
 def _same(kind: Kind, source: Source, recipe: Mapping[str, Any]) -> pc.Expression:
@@ -450,7 +521,9 @@ def find_same(lake: Lake, artifact: str, labels: Labels, *, branch: str) -> Pres
 
 def kept(artifact: Artifact) -> IngestResult:
     """Returns the result of an ingest that found its artifact in the lake."""
-    return IngestResult(artifact=artifact, created=False, report=json.loads(artifact.report or "{}"))
+    return IngestResult(
+        artifact=artifact, created=False, report=json.loads(artifact.report or "{}")
+    )
 
 
 def _presence(lake: Lake, rows: Sequence[Mapping[str, Any]], labels: Labels) -> Present:
@@ -463,13 +536,18 @@ def _presence(lake: Lake, rows: Sequence[Mapping[str, Any]], labels: Labels) -> 
 
 def _check_labels(artifact: Artifact, labels: Labels) -> None:
     """Refuse labels that the artifact, which is there already, does not have."""
-    for label, asked, stored in (("name", labels.name, artifact.name), ("session", labels.session, artifact.session)):
+    for label, asked, stored in (
+        ("name", labels.name, artifact.name),
+        ("session", labels.session, artifact.session),
+    ):
         if asked is not None and asked != stored:
             raise ConflictError(
-                f"{artifact.source_name} is in the lake with {f'the {label} {stored!r}' if stored else f'no {label}'}, "
+                f"{artifact.source_name} is in the lake with "
+                f"{f'the {label} {stored!r}' if stored else f'no {label}'}, "
                 f"not {asked!r}",
                 where=artifact.id,
-                fix=f"leave out --{label}, or take the old one off with flagdata withdraw and ingest again",
+                fix=f"leave out --{label}, or take the old one off with flagdata withdraw and "
+                "ingest again",
             )
 
 
@@ -505,11 +583,14 @@ def _artifact(
     )
 
 
-def result_of(transaction: Transaction, artifact: Artifact, report: Mapping[str, Any], labels: Labels) -> IngestResult:
+def result_of(
+    transaction: Transaction, artifact: Artifact, report: Mapping[str, Any], labels: Labels
+) -> IngestResult:
     """Returns what an ingest did whose transaction has ended.
 
     Raises:
-        ConflictError: another process published it meanwhile, under another name or session than the one asked for.
+        ConflictError: another process published it meanwhile, under another name or session than
+            the one asked for.
     """
     artifact_in_lake = transaction.result.artifacts[artifact.id]
     if artifact.id in transaction.result.added:
@@ -531,6 +612,7 @@ def _not_attached(path: Path) -> Finding:
     return Finding(
         kind="log-not-attached",
         severity=Severity.WARNING,
-        what=f"the log of {path.stat().st_size} bytes is over the limit of {ATTACHMENT_LIMIT} and was not attached",
+        what=f"the log of {path.stat().st_size} bytes is over the limit of {ATTACHMENT_LIMIT} and "
+        "was not attached",
         fix="keep the original: the catalog has its hash",
     )

@@ -18,8 +18,8 @@ class Source:
     """A file, or a folder of files, as it was when its hash was taken.
 
     Attributes:
-        hash: SHA-256 of the file, or of the names and hashes of the folder's files; see `files.is_beside` for
-            those that do not count.
+        hash: SHA-256 of the file, or of the names and hashes of the folder's files; see
+            `files.is_beside` for those that do not count.
         state: name, size and time of change of each file.
         further: each further file of the source, with its state.
     """
@@ -46,7 +46,8 @@ class Source:
             with_files: that make one source with it, in order; they are hashed with it.
 
         Raises:
-            InputError: it cannot be read, or is empty, a pipe or a device; or two of several files are the same.
+            InputError: it cannot be read, or is empty, a pipe or a device; or two of several files
+                are the same.
         """
         for file in (path, *with_files):
             if with_files or not is_folder(file):
@@ -55,14 +56,18 @@ class Source:
         if with_files:
             parts = [file_hash(file) for file in (path, *with_files)]
             _check_distinct((path, *with_files), parts)
-            return cls(path=path, hash=digest("\n".join(parts)), state=before, further=_states(with_files))
+            return cls(
+                path=path, hash=digest("\n".join(parts)), state=before, further=_states(with_files)
+            )
         if path.is_dir():
             parts = [f"{os.fsencode(name).hex()} {file_hash(path / name)}" for name, _, _ in before]
             return cls(path=path, hash=digest("\n".join(parts)), state=before)
         try:
             return cls(path=path, hash=file_hash(path), state=before)
         except OSError as error:
-            raise InputError(f"cannot be read: {error.strerror}", where=str(path), fix="check the path") from None
+            raise InputError(
+                f"cannot be read: {error.strerror}", where=str(path), fix="check the path"
+            ) from None
 
     def check_unchanged(self) -> None:
         """Make sure that nothing was written to it since.
@@ -73,7 +78,9 @@ class Source:
         for path, state in ((self.path, self.state), *self.further):
             if _state(path) != state:
                 raise ConflictError(
-                    "the file changed while it was read", where=str(path), fix="ingest it when it is complete"
+                    "the file changed while it was read",
+                    where=str(path),
+                    fix="ingest it when it is complete",
                 )
 
     def provenance(self, recipe: Mapping[str, Any], *, code: str) -> dict[str, str]:
@@ -108,18 +115,24 @@ def _states(paths: Sequence[Path]) -> tuple[tuple[Path, tuple[tuple[str, int, in
 
 
 def _state(path: Path) -> tuple[tuple[str, int, int], ...]:
-    """Name, size and time of change of the file, or of each file in the folder that counts, see `files.is_beside`; of a
-    LeRobot data set, of each below it."""
+    """Name, size and time of change of the file, or of each file in the folder that counts, see
+    `files.is_beside`; of a LeRobot data set, of each below it."""
     try:
         if not is_folder(path):
             status = path.stat()
             return ((path.name, status.st_size, status.st_mtime_ns),)
         if is_lerobot(path):
-            files = [file for file in path.rglob("*") if file.is_file() and not is_beside(file.name)]
+            files = [
+                file for file in path.rglob("*") if file.is_file() and not is_beside(file.name)
+            ]
             states = [(str(file.relative_to(path)), file.stat()) for file in files]
         else:
             with os.scandir(path) as entries:
-                states = [(e.name, e.stat()) for e in entries if e.is_file() and not is_beside(e.name)]
+                states = [
+                    (e.name, e.stat()) for e in entries if e.is_file() and not is_beside(e.name)
+                ]
         return tuple(sorted((name, status.st_size, status.st_mtime_ns) for name, status in states))
     except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", where=str(path), fix="check the path") from None
+        raise InputError(
+            f"cannot be read: {error.strerror}", where=str(path), fix="check the path"
+        ) from None

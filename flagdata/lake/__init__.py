@@ -1,7 +1,8 @@
-"""The lake: immutable objects under their content hash, a Delta catalog whose one commit publishes them, and refs.
+"""The lake: immutable objects under their content hash, a Delta catalog whose one commit publishes
+them, and refs.
 
-A lake is a folder of a local disk or of a network file system that carries hard links and flock, or a prefix of a
-bucket, `s3://bucket/prefix` (see docs/decisions/040-object-storage.md). Its layout:
+A lake is a folder of a local disk or of a network file system that carries hard links and flock, or
+a prefix of a bucket, `s3://bucket/prefix` (see docs/decisions/040-object-storage.md). Its layout:
 
     lake.json            format version and identity of the lake
     catalog/             the Delta table; one row an artifact (schema.CATALOG)
@@ -30,7 +31,15 @@ if TYPE_CHECKING:
     from flagdata.lake.copying import clone, pull, transfer
     from flagdata.lake.delta_log import Log
     from flagdata.lake.deposit import Deposit
-    from flagdata.lake.health import doctor, is_healthy, object_names, read_refs, sample_names, verify, verify_catalog
+    from flagdata.lake.health import (
+        doctor,
+        is_healthy,
+        object_names,
+        read_refs,
+        sample_names,
+        verify,
+        verify_catalog,
+    )
     from flagdata.lake.label_columns import columns
     from flagdata.lake.labels import given
     from flagdata.lake.lake import Lake

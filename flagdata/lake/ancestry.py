@@ -1,4 +1,5 @@
-"""What an artifact was made from and what was made from it, over all generations, in the rows that a ref shows."""
+"""What an artifact was made from and what was made from it, over all generations, in the rows that
+a ref shows."""
 
 from __future__ import annotations
 
@@ -17,8 +18,8 @@ class Relative:
     """One artifact of a lineage.
 
     Attributes:
-        generation: 0 for the artifact asked for, −1 and less for what it was made from, 1 and more for what was made
-            from it: the number of steps of the longest way.
+        generation: 0 for the artifact asked for, −1 and less for what it was made from, 1 and more
+            for what was made from it: the number of steps of the longest way.
         kind, name, recipe_hash, code_version: of its row; `None` where the ref does not show it.
         seed: root seed of a simulated artifact.
     """
@@ -47,8 +48,8 @@ class Ancestry:
     edges: tuple[tuple[str, str], ...]
 
     def nearer(self, *, up: bool) -> dict[str, list[str]]:
-        """Maps each id to the ids it was made from (`up`), or of what was made from it, in the order of the
-        relatives."""
+        """Maps each id to the ids it was made from (`up`), or of what was made from it, in the
+        order of the relatives."""
         ids: dict[str, list[str]] = {}
         for parent, child in self.edges:
             ids.setdefault(child if up else parent, []).append(parent if up else child)
@@ -69,14 +70,21 @@ def ancestry(rows_of_ref: pa.Table, artifact: str) -> Ancestry:
     below = _reached_steps(pairs, artifact, along=("parent", "child"))
     generations = {relative: -steps for relative, steps in _steps(artifact, above).items()}
     generations |= {
-        relative: steps for relative, steps in _steps(artifact, below).items() if relative not in generations
+        relative: steps
+        for relative, steps in _steps(artifact, below).items()
+        if relative not in generations
     }
-    rows_by_id = {row["artifact"]: row for row in rows.filter(_among(rows["artifact"], generations)).to_pylist()}
+    rows_by_id = {
+        row["artifact"]: row
+        for row in rows.filter(_among(rows["artifact"], generations)).to_pylist()
+    }
     relatives = {
         relative: Relative(
             artifact=relative,
             generation=generation,
-            **{name: rows_by_id[relative][name] for name in _COLUMNS[1:-1]} if relative in rows_by_id else {},
+            **{name: rows_by_id[relative][name] for name in _COLUMNS[1:-1]}
+            if relative in rows_by_id
+            else {},
         )
         for relative, generation in sorted(generations.items(), key=lambda item: item[1])
     }
@@ -84,7 +92,9 @@ def ancestry(rows_of_ref: pa.Table, artifact: str) -> Ancestry:
     return Ancestry(artifact=artifact, relatives=relatives, edges=tuple(edges))
 
 
-def _reached_steps(pairs: pa.Table, artifact: str, *, along: tuple[str, str]) -> list[tuple[str, str]]:
+def _reached_steps(
+    pairs: pa.Table, artifact: str, *, along: tuple[str, str]
+) -> list[tuple[str, str]]:
     """Lists (from, to) of all steps that lead away from an artifact, each once."""
     reached, fresh, steps = {artifact}, {artifact}, []
     while fresh:
@@ -101,8 +111,8 @@ def _among(column: pa.ChunkedArray, wanted: Collection[str]) -> pa.ChunkedArray:
 
 
 def _steps(artifact: str, steps: Sequence[tuple[str, str]]) -> dict[str, int]:
-    """Computes id → length of the longest way to it. Of ids in a circle, which only a damaged catalog has, some
-    way's."""
+    """Computes id → length of the longest way to it. Of ids in a circle, which only a damaged
+    catalog has, some way's."""
     onwards: dict[str, list[str]] = {}
     awaited: dict[str, int] = {artifact: 0}
     for begin, end in dict.fromkeys(steps):
@@ -148,7 +158,10 @@ def tree(lineage: Ancestry, *, up: bool, most: int | None) -> Iterator[Line]:
         next_ones = dict.fromkeys(one for artifact in artifacts for one in nearer.get(artifact, ()))
         groups = group_relatives([lineage.relatives[one] for one in next_ones], most=most)
         last = len(groups) - 1
-        waiting.extend(((*ends, position == last), group) for position, group in reversed(list(enumerate(groups))))
+        waiting.extend(
+            ((*ends, position == last), group)
+            for position, group in reversed(list(enumerate(groups)))
+        )
 
     descend([lineage.artifact], ())
     while waiting:
@@ -161,8 +174,11 @@ def tree(lineage: Ancestry, *, up: bool, most: int | None) -> Iterator[Line]:
             descend(artifacts, ends)
 
 
-def group_relatives(relatives: Sequence[Relative], *, most: int | None) -> list[tuple[Relative, ...]]:
-    """Groups relatives one by one, but those of a kind of which there are more than `most` together."""
+def group_relatives(
+    relatives: Sequence[Relative], *, most: int | None
+) -> list[tuple[Relative, ...]]:
+    """Groups relatives one by one, but those of a kind of which there are more than `most`
+    together."""
     kinds: dict[str | None, list[Relative]] = {}
     for relative in relatives:
         kinds.setdefault(relative.kind, []).append(relative)
@@ -170,6 +186,8 @@ def group_relatives(relatives: Sequence[Relative], *, most: int | None) -> list[
         group
         for members in kinds.values()
         for group in (
-            [tuple(members)] if most is not None and len(members) > most else [(member,) for member in members]
+            [tuple(members)]
+            if most is not None and len(members) > most
+            else [(member,) for member in members]
         )
     ]

@@ -23,9 +23,13 @@ OBJECT_NAME = re.compile(r"(mcap|zarr|model)/[0-9a-f]{64}")
 ARTIFACT_ID = re.compile(r"[0-9a-f]{32}")
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 _DERIVED = ("artifact", "recipe", "recipe_hash", "format_version")
-_INTEGERS = [name for name, f in CATALOG.items() if pa.types.is_integer(f.type) and name not in _DERIVED]
+_INTEGERS = [
+    name for name, f in CATALOG.items() if pa.types.is_integer(f.type) and name not in _DERIVED
+]
 _NUMBERS = [name for name, f in CATALOG.items() if pa.types.is_floating(f.type)]
-_TEXTS = [name for name, f in CATALOG.items() if pa.types.is_string(f.type) and name not in _DERIVED]
+_TEXTS = [
+    name for name, f in CATALOG.items() if pa.types.is_string(f.type) and name not in _DERIVED
+]
 _JSON_COLUMNS = ("parameters", "clock_model", "report")
 
 
@@ -39,10 +43,12 @@ def _is_unicode(text: str) -> bool:
 
 @dataclass(frozen=True, kw_only=True)
 class Artifact:
-    """What a catalog row says; fields are the columns of `schema.CATALOG`, where units and meanings are.
+    """What a catalog row says; fields are the columns of `schema.CATALOG`, where units and meanings
+    are.
 
-    `recipe` is given as a mapping; `id` (column `artifact`) and `recipe_hash` are derived. `parameters`, `clock_model`
-    and `report` are JSON texts. `branch` and `created` are set by the transaction that publishes the row.
+    `recipe` is given as a mapping; `id` (column `artifact`) and `recipe_hash` are derived.
+    `parameters`, `clock_model` and `report` are JSON texts. `branch` and `created` are set by the
+    transaction that publishes the row.
 
     Raises:
         InputError: a value that is malformed, naming the column.
@@ -117,7 +123,8 @@ class Artifact:
                     raise self._bad(column, str(error), "JSON text") from None
 
     def _check_types(self) -> None:
-        """Numbers of other libraries become Python's; what the catalog's column cannot hold is refused."""
+        """Numbers of other libraries become Python's; what the catalog's column cannot hold is
+        refused."""
         for column in _INTEGERS:
             value = getattr(self, column)
             if value is not None:
@@ -127,7 +134,11 @@ class Artifact:
         for column in _NUMBERS:
             value = getattr(self, column)
             if value is not None:
-                if isinstance(value, str) or not hasattr(value, "__float__") or not math.isfinite(value):
+                if (
+                    isinstance(value, str)
+                    or not hasattr(value, "__float__")
+                    or not math.isfinite(value)
+                ):
                     raise self._bad(column, value, "a finite number, or None where it is not known")
                 object.__setattr__(self, column, float(value))
         for column in _TEXTS:
@@ -136,7 +147,9 @@ class Artifact:
                 raise self._bad(column, value, "text in Unicode")
 
     def _bad(self, column: str, value: object, wanted: str) -> InputError:
-        return InputError(f"{column} is {value!r}", where=f"artifact {self.name!r}", fix=f"give {wanted}")
+        return InputError(
+            f"{column} is {value!r}", where=f"artifact {self.name!r}", fix=f"give {wanted}"
+        )
 
     @cached_property
     def recipe_hash(self) -> str:
@@ -147,9 +160,9 @@ class Artifact:
     def id(self) -> str:
         """Identity: what went in and what it is a part of; 32 hexadecimal digits of a SHA-256.
 
-        Neither the object's bytes nor the code version take part: the same source under the same recipe is the same
-        artifact, so that ingesting it again finds it. A result that is revised states so in its recipe, see
-        `flagdata.lake.results`.
+        Neither the object's bytes nor the code version take part: the same source under the same
+        recipe is the same artifact, so that ingesting it again finds it. A result that is revised
+        states so in its recipe, see `flagdata.lake.results`.
         """
         identity = {
             "kind": self.kind.value,
@@ -182,7 +195,8 @@ class Artifact:
 
         Raises:
             InputError: a row whose values break the rules above.
-            CorruptError: a row whose identity is not that of its content, or that lacks what each row has.
+            CorruptError: a row whose identity is not that of its content, or that lacks what each
+                row has.
         """
         names = {f.name for f in dataclasses.fields(cls)}
         values = {column: value for column, value in row.items() if column in names}

@@ -37,7 +37,9 @@ def persist(attempt: Callable[[], T], *, where: Place) -> T:
         except Moved:
             if time.monotonic() > deadline and tries >= _LEAST_TRIES:
                 raise ConflictError(
-                    f"other processes kept committing for {_PATIENCE:.0f} s", where=str(where), fix="try again"
+                    f"other processes kept committing for {_PATIENCE:.0f} s",
+                    where=str(where),
+                    fix="try again",
                 ) from None
             time.sleep(random.uniform(0, wait))
             wait = min(2 * wait, _LONGEST_WAIT)

@@ -1,14 +1,17 @@
-"""The catalog: one Delta table, appended to under optimistic concurrency, every version readable for good.
+"""The catalog: one Delta table, appended to under optimistic concurrency, every version readable
+for good.
 
-Each append is one Parquet file and one log entry. The file is written and flushed to disk first; the log entry is put
-only if its version number is free, so of two writers at the same version one wins and the other gets `Moved` and
-looks again. The log is never expired: a tag must be readable for as long as the lake exists.
+Each append is one Parquet file and one log entry. The file is written and flushed to disk first;
+the log entry is put only if its version number is free, so of two writers at the same version one
+wins and the other gets `Moved` and looks again. The log is never expired: a tag must be readable
+for as long as the lake exists.
 
-After every `_TIDY_EVERY` versions the small files are merged, in a commit of its own that changes no row; a checkpoint
-is written, which bounds the log that must be replayed, and a summary of what the log states. The old files stay, since
-old versions are made of them. (Each file costs a fresh reader about 1 ms; tidying takes about 0.1 s, so some 3 ms a
-commit.) The library's own checkpoints are off: it does not flush them to the disk, so a power cut could leave one that
-is empty and a table that does not open.
+After every `_TIDY_EVERY` versions the small files are merged, in a commit of its own that changes
+no row; a checkpoint is written, which bounds the log that must be replayed, and a summary of what
+the log states. The old files stay, since old versions are made of them. (Each file costs a fresh
+reader about 1 ms; tidying takes about 0.1 s, so some 3 ms a commit.) The library's own checkpoints
+are off: it does not flush them to the disk, so a power cut could leave one that is empty and a
+table that does not open.
 
 Each commit notes the SHA-256 of its file, which is compared whenever the file is read.
 """
@@ -48,7 +51,16 @@ from flagdata.core.provenance import file_hash
 from flagdata.core.schema import CATALOG, FORMAT_VERSION, catalog_schema
 from flagdata.errors import ConflictError, CorruptError, FlagdataError
 from flagdata.lake.attempts import Moved
-from flagdata.lake.delta_log import CHECKPOINT, FILE_HASH, PREVIOUS_HASH, Entry, Log, Summaries, is_stated, names_in
+from flagdata.lake.delta_log import (
+    CHECKPOINT,
+    FILE_HASH,
+    PREVIOUS_HASH,
+    Entry,
+    Log,
+    Summaries,
+    is_stated,
+    names_in,
+)
 from flagdata.lake.rowfiles import RowFiles, Scan, changed_file, encode_rows
 from flagdata.storage import Place, RemotePath
 from flagdata.storage.connection import delta_options, plain
@@ -58,7 +70,8 @@ from flagdata.storage.refusals import refusal
 P = ParamSpec("P")
 T = TypeVar("T")
 
-_CONFIGURATION = {  # neither this package nor another's VACUUM may take what an old version is made of
+# neither this package nor another's VACUUM may take what an old version is made of
+_CONFIGURATION = {
     "delta.enableExpiredLogCleanup": "false",
     "delta.deletedFileRetentionDuration": "interval 36500 days",
     "delta.logRetentionDuration": "interval 36500 days",
@@ -67,11 +80,16 @@ _INFO_PREFIX = "flagdata."
 _TIDY_EVERY = 32
 _SMALL = 4 << 20  # B
 _LISTED = 8  # versions whose files are kept in mind
-_PROCESS = OneProcess("the catalog", fix="resolve the query in the parent, or start workers by spawn")
+_PROCESS = OneProcess(
+    "the catalog", fix="resolve the query in the parent, or start workers by spawn"
+)
 
 
-def _one_at_a_time(method: Callable[Concatenate[Catalog, P], T]) -> Callable[Concatenate[Catalog, P], T]:
-    """Keeps other threads out of the catalog, and the Delta library out of forked children, where it would hang."""
+def _one_at_a_time(
+    method: Callable[Concatenate[Catalog, P], T],
+) -> Callable[Concatenate[Catalog, P], T]:
+    """Keeps other threads out of the catalog, and the Delta library out of forked children, where
+    it would hang."""
 
     @wraps(method)
     def call_alone(self: Catalog, *args: P.args, **kwargs: P.kwargs) -> T:
@@ -83,7 +101,8 @@ def _one_at_a_time(method: Callable[Concatenate[Catalog, P], T]) -> Callable[Con
 
 
 class Catalog:
-    """The Delta table under `path`; holds no open files. Rows are ordered by commit, then start, then frame.
+    """The Delta table under `path`; holds no open files. Rows are ordered by commit, then start,
+    then frame.
 
     `marks` is the folder where the newest version is noted, see `flagdata.lake.delta_log`.
     """
@@ -113,7 +132,8 @@ class Catalog:
             ConflictError: there is one.
             OSError: what the disk refused.
         """
-        # In a scratch folder: the Delta library takes a put whose answer was lost for one that another made before it.
+        # In a scratch folder: the Delta library takes a put whose answer was lost for one that
+        # another made before it.
         with tempfile.TemporaryDirectory() as folder:
             try:
                 DeltaTable.create(
@@ -127,7 +147,9 @@ class Catalog:
                 raise self._refusal_of(error) from None
             entry = (Path(folder) / "_delta_log" / self._entries.path(0).name).read_bytes()
         if not self._entries.adopt(0, entry):
-            raise ConflictError("another process is making a lake there", where=str(self.path), fix="open that one")
+            raise ConflictError(
+                "another process is making a lake there", where=str(self.path), fix="open that one"
+            )
         self._flush_log(0)
 
     @_one_at_a_time
@@ -176,7 +198,8 @@ class Catalog:
 
     @_one_at_a_time
     def append(self, rows: pa.Table, *, base: int, info: Mapping[str, str]) -> int:
-        """Publish `rows`, if any, as version `base + 1`; durable when it returns, or a warning says that it may not be.
+        """Publish `rows`, if any, as version `base + 1`; durable when it returns, or a warning says
+        that it may not be.
 
         Raises:
             Moved: `base` is no longer the newest version; nothing was published.
@@ -186,8 +209,11 @@ class Catalog:
         return base + 1
 
     @_one_at_a_time
-    def drop(self, going: pc.Expression, *, fresh: pa.Table, base: int, info: Mapping[str, str]) -> int:
-        """Publish version `base + 1` without the rows that meet a condition on ids and branches, and with `fresh` ones.
+    def drop(
+        self, going: pc.Expression, *, fresh: pa.Table, base: int, info: Mapping[str, str]
+    ) -> int:
+        """Publish version `base + 1` without the rows that meet a condition on ids and branches,
+        and with `fresh` ones.
 
         The files that have such rows are written anew without them; earlier versions keep theirs.
 
@@ -197,7 +223,9 @@ class Catalog:
         table = self._writable(base)
         files = self._files.holding(self._names(base), going)
         staying = [self._files.read(name).filter(~going) for name in files]
-        self._commit(table, pa.concat_tables([*staying, fresh]), removed=files, rows_change=True, info=info)
+        self._commit(
+            table, pa.concat_tables([*staying, fresh]), removed=files, rows_change=True, info=info
+        )
         return base + 1
 
     def entry(self, version: int) -> tuple[bytes, dict[str, Place]]:
@@ -210,7 +238,8 @@ class Catalog:
         return entry, {name: self.path / name for name in files}
 
     def adopt(self, version: int, entry: bytes, files: Mapping[str, Place]) -> None:
-        """Publish a version of another lake, whose versions before are this one's; what is there stays.
+        """Publish a version of another lake, whose versions before are this one's; what is there
+        stays.
 
         Raises:
             ConflictError: another version of that number is there.
@@ -224,11 +253,14 @@ class Catalog:
             put_if_absent(self.path / name, content)
         if not self._entries.adopt(version, entry):
             raise ConflictError(
-                f"version {version} was committed here by another", where=str(self.path), fix="try again"
+                f"version {version} was committed here by another",
+                where=str(self.path),
+                fix="try again",
             )
 
     def written(self, version: int) -> float:
-        """Returns when a version's entry was put here, by the clock of the disk or store [s since 1970]."""
+        """Returns when a version's entry was put here, by the clock of the disk or store [s since
+        1970]."""
         return self._entries.path(version).stat().st_mtime
 
     def check_entries(self, first: int) -> None:
@@ -245,7 +277,8 @@ class Catalog:
         self._entries.acknowledge(version)
 
     def renew_mark(self) -> bool:
-        """Note the newest version as acknowledged where the note of it is lost; False where it is there.
+        """Note the newest version as acknowledged where the note of it is lost; False where it is
+        there.
 
         Raises:
             OSError: what the disk refused.
@@ -271,7 +304,9 @@ class Catalog:
         version = self.head()
         table = self._writable(version)
         self.summarise()
-        small = [name for name in self._names(version) if (self.path / name).stat().st_size < _SMALL]
+        small = [
+            name for name in self._names(version) if (self.path / name).stat().st_size < _SMALL
+        ]
         if len(small) > 1:
             rows = pa.concat_tables(self._files.read(name) for name in small)
             info = {"message": f"merge {len(small)} files of the catalog; no row changed"}
@@ -296,18 +331,26 @@ class Catalog:
         self._summaries.extend(self.history()[::-1], checkpoint=checkpoint_hash)
 
     def unpublished_files(self) -> Sequence[Place]:
-        """Lists what processes left that died before, or while, they put their log entry: no version refers to it.
+        """Lists what processes left that died before, or while, they put their log entry: no
+        version refers to it.
 
         Raises:
             CorruptError: a log entry that cannot be read.
         """
         tracked = self._entries.files()
-        rows = [path for path in self.path.glob("*.parquet") if path.name not in tracked and not is_beside(path.name)]
-        entries = self._log.glob("*#*")  # the Delta library's own name for an entry it has not linked yet
+        rows = [
+            path
+            for path in self.path.glob("*.parquet")
+            if path.name not in tracked and not is_beside(path.name)
+        ]
+        entries = self._log.glob(
+            "*#*"
+        )  # the Delta library's own name for an entry it has not linked yet
         return sorted([*rows, *entries])  # type: ignore[type-var]
 
     def file_hashes(self) -> dict[Place, str | None]:
-        """Maps each file that some version is made of to its SHA-256 when it was written, `None` if that was not noted.
+        """Maps each file that some version is made of to its SHA-256 when it was written, `None` if
+        that was not noted.
 
         Raises:
             CorruptError: a log entry that cannot be read.
@@ -315,7 +358,8 @@ class Catalog:
         return {self.path / name: digest for name, digest in self._entries.files().items()}
 
     def changed_entries(self) -> list[Place]:
-        """Entries of the log whose bytes are not those that were committed, as far as that was noted.
+        """Entries of the log whose bytes are not those that were committed, as far as that was
+        noted.
 
         Raises:
             CorruptError: a log entry that cannot be read.
@@ -324,13 +368,15 @@ class Catalog:
 
     @_one_at_a_time
     def history(self, limit: int | None = None) -> list[dict[str, Any]]:
-        """Lists one entry a version, newest first: version, timestamp (UTC ms), operation, what the writer said of it.
+        """Lists one entry a version, newest first: version, timestamp (UTC ms), operation, what the
+        writer said of it.
 
         Args:
             limit: the newest so many; all if `None`.
 
         Raises:
-            CorruptError: an entry of the log that cannot be read, or that no writer of a catalog writes.
+            CorruptError: an entry of the log that cannot be read, or that no writer of a catalog
+                writes.
         """
         head = self.head()
         cached = self._history
@@ -345,7 +391,11 @@ class Catalog:
 
     def _version_entry(self, version: int, entry: Entry) -> dict[str, Any]:
         """Returns what the log says of a version."""
-        info = {k.removeprefix(_INFO_PREFIX): v for k, v in entry.info.items() if k.startswith(_INFO_PREFIX)}
+        info = {
+            k.removeprefix(_INFO_PREFIX): v
+            for k, v in entry.info.items()
+            if k.startswith(_INFO_PREFIX)
+        }
         message = {key: entry.info.get(key) for key in ("timestamp", "operation")}
         version_facts = {"version": version, **message, **info, "files": list(entry.files)}
         if not is_stated(version_facts, version):
@@ -353,8 +403,8 @@ class Catalog:
         return version_facts
 
     def _noted_hashes(self, name: str) -> frozenset[str]:
-        """Returns the SHA-256 of a file as its commit noted it; nothing where it noted none. Of one whose commit is
-        known from a summary without names of files, those of all such commits."""
+        """Returns the SHA-256 of a file as its commit noted it; nothing where it noted none. Of one
+        whose commit is known from a summary without names of files, those of all such commits."""
         if name not in self._hashes:
             noted: dict[str, frozenset[str]] = {}
             unnamed: set[str] = set()
@@ -362,7 +412,9 @@ class Catalog:
             for version in self.history():
                 file_sha = version.get(_FILE_HASH)
                 if "files" in version:
-                    noted |= dict.fromkeys(version["files"], frozenset({file_sha} if file_sha else ()))
+                    noted |= dict.fromkeys(
+                        version["files"], frozenset({file_sha} if file_sha else ())
+                    )
                 elif file_sha:
                     unnamed.add(file_sha)
                 else:
@@ -371,11 +423,20 @@ class Catalog:
         return self._hashes[name]
 
     def _commit(
-        self, table: DeltaTable, rows: pa.Table, *, removed: Sequence[str], rows_change: bool, info: Mapping[str, str]
+        self,
+        table: DeltaTable,
+        rows: pa.Table,
+        *,
+        removed: Sequence[str],
+        rows_change: bool,
+        info: Mapping[str, str],
     ) -> None:
         version = table.version() + 1
         if (protocol := table.protocol()).min_writer_version > _WRITER:
-            raise newer(f"writing to it takes version {protocol.min_writer_version} of Delta's protocol", self.path)
+            raise newer(
+                f"writing to it takes version {protocol.min_writer_version} of Delta's protocol",
+                self.path,
+            )
         now = time.time_ns() // 1_000_000
         path = self.path / f"{uuid.uuid4().hex}.parquet"
         added, hashes = [], {}
@@ -384,7 +445,12 @@ class Catalog:
             write_durably(path, content)
             hashes = {FILE_HASH: hashlib.sha256(content).hexdigest()}
             stats = json.dumps({"numRecords": rows.num_rows})
-            facts = {"size": len(content), "modificationTime": now, "dataChange": rows_change, "stats": stats}
+            facts = {
+                "size": len(content),
+                "modificationTime": now,
+                "dataChange": rows_change,
+                "stats": stats,
+            }
             added = [{"add": {"path": path.name, "partitionValues": {}, **facts}}]
         written = {
             "timestamp": now,
@@ -395,8 +461,11 @@ class Catalog:
             **hashes,
             PREVIOUS_HASH: self._entries.hash(version - 1),
         }
-        dropped = [{"path": name, "dataChange": rows_change, "deletionTimestamp": now} for name in removed]
-        # Not by the Delta library, which reads the log again after it has put the entry, and may fail then.
+        dropped = [
+            {"path": name, "dataChange": rows_change, "deletionTimestamp": now} for name in removed
+        ]
+        # Not by the Delta library, which reads the log again after it has put the entry, and may
+        # fail then.
         actions = [{"commitInfo": written}, *added, *({"remove": action} for action in dropped)]
         if not self._entries.put(version, actions):
             path.unlink(missing_ok=True)
@@ -409,14 +478,17 @@ class Catalog:
         return delta_options() if isinstance(self.path, RemotePath) else None
 
     def _checkpoint(self) -> int:
-        """Finds the newest checkpoint's version, by file names: a process may die before `_last_checkpoint` is
-        written."""
+        """Finds the newest checkpoint's version, by file names: a process may die before
+        `_last_checkpoint` is written."""
         return max(self._entries.checkpoints(), default=0)
 
     def _check_read(self, version: int) -> None:
-        """Compares what the Delta library reads for a version with what was noted of it: the newest checkpoint up to
-        it, and the entries after that. Those that no summary covers were compared when the history was read."""
-        newest = max((number for number in self._entries.checkpoints() if number <= version), default=-1)
+        """Compares what the Delta library reads for a version with what was noted of it: the newest
+        checkpoint up to it, and the entries after that. Those that no summary covers were compared
+        when the history was read."""
+        newest = max(
+            (number for number in self._entries.checkpoints() if number <= version), default=-1
+        )
         checkpoint = self._log / f"{newest:020d}{CHECKPOINT}"
         for log_file in (self._log / HINT, checkpoint):
             if (
@@ -430,8 +502,12 @@ class Catalog:
             raise CorruptError(message, where=str(checkpoint), fix=_DELETE)
         if newest + 1 < self._summaries.covered:
             history = self.history()
-            *_, last = self._entries.entries(range(newest + 1, version + 1), head=history[0]["version"]) or [None]
-            following = history[-2 - version] if last is not None and version + 1 < len(history) else {}
+            *_, last = self._entries.entries(
+                range(newest + 1, version + 1), head=history[0]["version"]
+            ) or [None]
+            following = (
+                history[-2 - version] if last is not None and version + 1 < len(history) else {}
+            )
             if last is not None and following.get(_PREVIOUS_HASH, last.hash) != last.hash:
                 raise self._entries.disagreeing(version, self._entries.path(version + 1))
 
@@ -452,7 +528,8 @@ class Catalog:
 
     @contextmanager
     def _log_errors(self, version: int) -> Iterator[None]:
-        """Turns what the Delta library cannot read of the log into an error that names the entry to blame."""
+        """Turns what the Delta library cannot read of the log into an error that names the entry to
+        blame."""
         try:
             yield
         except (DeltaError, OSError) as error:
@@ -469,18 +546,22 @@ class Catalog:
                     where=str(self._log / odd),
                     fix="move it away: it is no part of the lake",
                 ) from None
-            first = str(error).splitlines()[0].removeprefix(_KERNEL)  # without the Delta library's stack
+            first = (
+                str(error).splitlines()[0].removeprefix(_KERNEL)
+            )  # without the Delta library's stack
             first = plain(first) if isinstance(self._log, RemotePath) else first
             blamed = self._first_unreadable(version)
             saving = blamed.name.endswith(CHECKPOINT)
             raise CorruptError(
-                f"{'a checkpoint' if saving else 'an entry'} of the catalog's log cannot be read: {first}",
+                f"{'a checkpoint' if saving else 'an entry'} of the catalog's log cannot be read: "
+                f"{first}",
                 where=str(blamed),
                 fix=f"{_DELETE}; if that does not help, {HEAL}" if saving else HEAL,
             ) from None
 
     def _first_unreadable(self, version: int) -> Place:
-        """Finds the entry, or checkpoint, with which the first version begins that the Delta library cannot open."""
+        """Finds the entry, or checkpoint, with which the first version begins that the Delta
+        library cannot open."""
         low, high = 0, version
         while low < high:
             middle = (low + high) // 2
@@ -504,7 +585,8 @@ class Catalog:
         return table
 
     def _repeat_reading(self, reading: Callable[[], T]) -> T:
-        """Repeats what the Delta library reads, which does not ask again where an answer of a store breaks off."""
+        """Repeats what the Delta library reads, which does not ask again where an answer of a store
+        breaks off."""
         for _ in range(_BROKEN):
             try:
                 return reading()
@@ -523,13 +605,17 @@ class Catalog:
         return OSError(str(error))
 
     def _unreachable(self, error: Exception, log: RemotePath) -> FlagdataError:
-        """Returns the error for a log in a bucket that the Delta library cannot read, without credentials."""
+        """Returns the error for a log in a bucket that the Delta library cannot read, without
+        credentials."""
         self._entries.files()  # raises, where an entry is to blame
         refused = refusal(error, bucket=log.bucket, where=str(log))
-        return FlagdataError(f"the catalog's log cannot be read: {refused.strerror}", where=str(log), fix=refused.fix)
+        return FlagdataError(
+            f"the catalog's log cannot be read: {refused.strerror}", where=str(log), fix=refused.fix
+        )
 
     def _names(self, version: int) -> list[str]:
-        """Lists the files of a version, which never change; those of the versions that were asked for last are kept."""
+        """Lists the files of a version, which never change; those of the versions that were asked
+        for last are kept."""
         if version not in self._listed:
             table = self._open(version)
             with self._log_errors(version):
@@ -538,7 +624,8 @@ class Catalog:
         return self._listed[version]
 
     def _writable(self, version: int) -> DeltaTable:
-        """Opens the table at `version`, if it has all columns of this format; else adds them and raises `Moved`."""
+        """Opens the table at `version`, if it has all columns of this format; else adds them and
+        raises `Moved`."""
         table = self._open(version)
         present = {field.name for field in table.schema().fields}
         missing = [name for name in CATALOG if name not in present]
@@ -549,11 +636,16 @@ class Catalog:
 
     def _evolve(self, table: DeltaTable, missing: Sequence[str]) -> None:
         schema = catalog_schema()
-        fields = [deltalake.Field.from_arrow(schema.field(name).with_nullable(True)) for name in missing]
+        fields = [
+            deltalake.Field.from_arrow(schema.field(name).with_nullable(True)) for name in missing
+        ]
         version = table.version() + 1
         try:
             table.alter.add_columns(
-                fields, commit_properties=_properties({"message": f"format {FORMAT_VERSION}: {', '.join(missing)}"})
+                fields,
+                commit_properties=_properties(
+                    {"message": f"format {FORMAT_VERSION}: {', '.join(missing)}"}
+                ),
             )
         except CommitFailedError:
             raise Moved from None
@@ -573,25 +665,31 @@ HINT = "_last_checkpoint"
 _DELETE = f"delete {HINT} and *{CHECKPOINT} there: they save time, the .json files hold all"
 _KERNEL = "Kernel error: "
 _SYSTEM_ERROR = "(os error "  # as the Delta library writes it
-_UNLISTED = re.compile("[\x00-\x1f\x7f\ud800-\udfff]")  # in names of files; the latter stand for what is no UTF-8
+_UNLISTED = re.compile(
+    "[\x00-\x1f\x7f\ud800-\udfff]"
+)  # in names of files; the latter stand for what is no UTF-8
 _NO_ANSWER = re.compile(r"Generic S3 error|Error performing [A-Z]+ ")
-"""What it writes where a store refused a request or did not answer; all else concerns what the store gave."""
+"""What it writes where a store refused a request or did not answer; all else concerns what the
+store gave."""
 _BROKEN = 4
 """How often it is asked again after an answer that broke off."""
 _WRITER = 2
-"""Version of Delta's protocol that tables of this package ask of writers; a later one has duties unknown here."""
+"""Version of Delta's protocol that tables of this package ask of writers; a later one has duties
+unknown here."""
 
 
 def _properties(info: Mapping[str, str]) -> CommitProperties:
     return CommitProperties(
-        custom_metadata={f"{_INFO_PREFIX}{key}": value for key, value in info.items()}, max_commit_retries=0
+        custom_metadata={f"{_INFO_PREFIX}{key}": value for key, value in info.items()},
+        max_commit_retries=0,
     )
 
 
 def newer(why: str, where: Place) -> ConflictError:
     """Returns the error for a lake of a later format."""
     return ConflictError(
-        f"the lake was written by a newer flagdata than this one, which reads formats up to {FORMAT_VERSION}: {why}",
+        "the lake was written by a newer flagdata than this one, which reads formats up to "
+        f"{FORMAT_VERSION}: {why}",
         where=str(where),
         fix="install the newer flagdata",
     )

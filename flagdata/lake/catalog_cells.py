@@ -13,7 +13,8 @@ from flagdata.timebase import iso
 
 
 def said(column: str, value: object) -> str:
-    """Writes a value for people: instants as times, numbers with their unit, mappings and lists as JSON."""
+    """Writes a value for people: instants as times, numbers with their unit, mappings and lists as
+    JSON."""
     unit = CATALOG[column].unit
     if unit == "ns" and isinstance(value, int):
         return iso(value)
@@ -41,5 +42,6 @@ def plain(value: Any) -> Any:
     if isinstance(value, dict):
         return {str(key): plain(item) for key, item in value.items()}
     raise UsageError(
-        f"a value of type {type(value).__name__} has no form in text", fix="cast it in the SQL, or write it by --arrow"
+        f"a value of type {type(value).__name__} has no form in text",
+        fix="cast it in the SQL, or write it by --arrow",
     )

@@ -18,7 +18,8 @@ class Rows:
     """Rows that a query selected.
 
     Attributes:
-        table: the rows, an Arrow table; the catalog's columns carry their unit in the metadata of their fields.
+        table: the rows, an Arrow table; the catalog's columns carry their unit in the metadata of
+            their fields.
     """
 
     def __init__(self, table: pa.Table) -> None:
@@ -36,7 +37,8 @@ class Rows:
         return iter(self.table.to_pylist())
 
     def __getitem__(self, column: str) -> np.ndarray:
-        """Returns the (n,) array of a column; numbers with gaps are float64 with NaN, texts with gaps hold None.
+        """Returns the (n,) array of a column; numbers with gaps are float64 with NaN, texts with
+        gaps hold None.
 
         Raises:
             KeyError: no such column.

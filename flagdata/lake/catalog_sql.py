@@ -1,9 +1,10 @@
-"""The process that runs SQL over the catalog, see `flagdata.core.files.bounded`: DuckDB, sealed off from everything
-else.
+"""The process that runs SQL over the catalog, see `flagdata.core.files.bounded`: DuckDB, sealed off
+from everything else.
 
-SQL sees one table, `catalog`: the columns of `schema.CATALOG`, the derived ones of `DERIVED`, and `label_<name>` for
-each label of the user's. It cannot read or write files (nor spill to them), load extensions, change settings or run
-more than one statement. What it gives is handed on in parts of at most `PART` bytes.
+SQL sees one table, `catalog`: the columns of `schema.CATALOG`, the derived ones of `DERIVED`, and
+`label_<name>` for each label of the user's. It cannot read or write files (nor spill to them), load
+extensions, change settings or run more than one statement. What it gives is handed on in parts of
+at most `PART` bytes.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ from flagdata.recipes.retired_names import present_sql
 if TYPE_CHECKING:
     import pyarrow.compute as pc
 
-# name → (what it is, SQL over the stored columns). `start` and `end` stay exact to the nanosecond beside them.
+# name → (what it is, SQL over the stored columns). `start` and `end` stay exact to the nanosecond
+# beside them.
 DERIVED: dict[str, tuple[Field, str]] = {
     "start_time": (
         Field(type=pa.timestamp("us", tz="UTC"), about="start as a time, cut to microseconds"),
@@ -56,7 +58,9 @@ _SEALED: dict[str, str | bool | int | float | list[str]] = {
     "temp_directory": "",
     "threads": min(8, cores()),  # each has a stack of some MB, which counts
 }
-_MISSING_COLUMN = re.compile(r'Referenced column "([^"]+)" (?:was )?not found|does not have a column named "([^"]+)"')
+_MISSING_COLUMN = re.compile(
+    r'Referenced column "([^"]+)" (?:was )?not found|does not have a column named "([^"]+)"'
+)
 _MISSING_TABLE = re.compile(r"Table with name (\S+) does not exist")
 _TEXT_AS_INSTANT = re.compile(r"Could not convert string '\d{4}-\d\d.*' to INT64")
 _RESERVED_END = re.compile(r'syntax error at or near "(?:end|END)"')
@@ -90,7 +94,8 @@ class Question:
 
 
 class Answers:
-    """Answers to questions, by the number of each; see `flagdata.lake.selection` for what is asked."""
+    """Answers to questions, by the number of each; see `flagdata.lake.selection` for what is
+    asked."""
 
     def __init__(self) -> None:
         sys.meta_path.insert(0, _WithoutPandas())
@@ -139,14 +144,19 @@ class Answers:
             return getattr(answer, verb)(*rest)
         except self._duckdb.OutOfMemoryException:
             raise MemoryError from None
-        except (self._duckdb.Error, pa.ArrowException, OSError) as error:  # the last two of a stream
+        except (
+            self._duckdb.Error,
+            pa.ArrowException,
+            OSError,
+        ) as error:  # the last two of a stream
             if isinstance(error, pa.ArrowMemoryError) or "Out of Memory Error" in str(error):
                 raise MemoryError from None
             return explain(error, where=where)
 
 
 class _WithoutPandas(MetaPathFinder):
-    """Keeps pyarrow from loading pandas where that is installed: nothing here uses it, and it takes a second."""
+    """Keeps pyarrow from loading pandas where that is installed: nothing here uses it, and it takes
+    a second."""
 
     def find_spec(self, name: str, path: object = None, target: object = None) -> None:
         if name == "pandas":
@@ -157,9 +167,13 @@ class _Answer:
     def __init__(self, duckdb: Any, question: Question) -> None:
         self.question = question
         self._duckdb = duckdb
-        self._connection = duckdb.connect(":memory:", config={**_SEALED, "memory_limit": f"{question.memory}B"})
+        self._connection = duckdb.connect(
+            ":memory:", config={**_SEALED, "memory_limit": f"{question.memory}B"}
+        )
         self._connection.register("stored", _answer_of(question))
-        self._connection.execute(f"CREATE VIEW catalog AS SELECT {_view_columns(question.labels)} FROM stored")
+        self._connection.execute(
+            f"CREATE VIEW catalog AS SELECT {_view_columns(question.labels)} FROM stored"
+        )
         self._connection.execute("SET TimeZone = 'UTC'")
         self._connection.execute("SET lock_configuration = true")
         self._relation = self._filtered_rows() if question.sql is None else self._sql(question.sql)
@@ -169,11 +183,15 @@ class _Answer:
         statements = self._connection.extract_statements(sql)
         if len(statements) != 1 or statements[0].type != self._duckdb.StatementType.SELECT:
             raise UsageError(
-                "the SQL is not one SELECT statement", where=sql, fix="the catalog is read-only: give a single SELECT"
+                "the SQL is not one SELECT statement",
+                where=sql,
+                fix="the catalog is read-only: give a single SELECT",
             )
         relation = self._connection.sql(sql)
         if relation is None:
-            raise UsageError("the SQL returns no rows to show", where=sql, fix="give a SELECT from catalog")
+            raise UsageError(
+                "the SQL returns no rows to show", where=sql, fix="give a SELECT from catalog"
+            )
         return relation
 
     def _filtered_rows(self) -> Any:
@@ -191,7 +209,9 @@ class _Answer:
     def stream(self, size: int) -> pa.Schema:
         """Begin with the rows, at most `size` at a time; their schema."""
         limit = self.question.limit
-        raw = (self._relation if limit is None else self._relation.limit(limit)).to_arrow_reader(_BLOCK)
+        raw = (self._relation if limit is None else self._relation.limit(limit)).to_arrow_reader(
+            _BLOCK
+        )
         self._parts = self._cut(raw, size)
         return raw.schema
 
@@ -228,7 +248,9 @@ class _Answer:
             yield from self._halve_block(block.slice(0, half), size)
             yield from self._halve_block(block.slice(half), size)
             return
-        if block.num_rows == 1 and (block.nbytes > ROW_BYTES or sum(map(_leaves, block.columns)) > ROW_LIMIT):
+        if block.num_rows == 1 and (
+            block.nbytes > ROW_BYTES or sum(map(_leaves, block.columns)) > ROW_LIMIT
+        ):
             raise LimitError(
                 f"one row of the result has more than {ROW_LIMIT:,} values or {ROW_BYTES >> 20} MiB",
                 where=self.question.shown,
@@ -245,11 +267,14 @@ def _answer_of(question: Question) -> Any:
 
 
 def dataset_of(contents: Sequence[pa.Buffer], condition: pc.Expression | None) -> Any:
-    """Rows of the catalog that lie in Parquet files of these contents, to be decoded as they are asked for."""
+    """Rows of the catalog that lie in Parquet files of these contents, to be decoded as they are
+    asked for."""
     import pyarrow.dataset as ds  # loads pandas where that is installed
 
     form = ds.ParquetFileFormat()
-    rows = ds.FileSystemDataset([form.make_fragment(content) for content in contents], catalog_schema(), form)
+    rows = ds.FileSystemDataset(
+        [form.make_fragment(content) for content in contents], catalog_schema(), form
+    )
     return rows if condition is None else rows.filter(condition)
 
 
@@ -270,8 +295,8 @@ def _leaves(values: pa.Array) -> int:
 
 
 def _view_columns(labels: Sequence[str]) -> str:
-    """Writes the catalog as SQL sees it. A NaN is an unknown value, but DuckDB sorts NaN above every number, so that
-    "wind > 3" would hold for it: it becomes NULL."""
+    """Writes the catalog as SQL sees it. A NaN is an unknown value, but DuckDB sorts NaN above
+    every number, so that "wind > 3" would hold for it: it becomes NULL."""
     stored = [
         f'CASE WHEN isnan("{name}") THEN NULL ELSE "{name}" END AS "{name}"'
         if pa.types.is_floating(field.type)
@@ -281,7 +306,9 @@ def _view_columns(labels: Sequence[str]) -> str:
         for name, field in CATALOG.items()
     ]
     label_columns = [f'"{name}"' for name in labels]
-    return ", ".join([*stored, *label_columns, *(f'{sql} AS "{name}"' for name, (_, sql) in DERIVED.items())])
+    return ", ".join(
+        [*stored, *label_columns, *(f'{sql} AS "{name}"' for name, (_, sql) in DERIVED.items())]
+    )
 
 
 def explain(error: Exception, *, where: str | None) -> UsageError:
@@ -299,21 +326,33 @@ def explain(error: Exception, *, where: str | None) -> UsageError:
         name = column[1] or column[2]
         if name in set(Kind):
             return UsageError(
-                f"{name} without quotes is a column to SQL", where=where, fix=f"write '{name}' in single quotes"
+                f"{name} without quotes is a column to SQL",
+                where=where,
+                fix=f"write '{name}' in single quotes",
             )
         return UnknownNameError.of("column", name, COLUMNS, where=where)
     table = _MISSING_TABLE.search(text)
     if table:
-        return UsageError(f"there is no table {table[1]!r}", where=where, fix="the one table is called catalog")
+        return UsageError(
+            f"there is no table {table[1]!r}", where=where, fix="the one table is called catalog"
+        )
     if isinstance(error, duckdb.PermissionException) or "Permission Error" in text:
         return UsageError(
-            "SQL on a lake reads its catalog and nothing else", where=where, fix="select from catalog; leave out files"
+            "SQL on a lake reads its catalog and nothing else",
+            where=where,
+            fix="select from catalog; leave out files",
         )
     if isinstance(error, duckdb.OutOfMemoryException) or "Out of Memory Error" in text:
-        return UsageError("it needs more memory than there is", where=where, fix="narrow it down, or aggregate in SQL")
+        return UsageError(
+            "it needs more memory than there is",
+            where=where,
+            fix="narrow it down, or aggregate in SQL",
+        )
     if _RESERVED_END.search(text):
         return UsageError(
-            "END is a word of SQL", where=where, fix='write the column in double quotes, "end", or use end_time'
+            "END is a word of SQL",
+            where=where,
+            fix='write the column in double quotes, "end", or use end_time',
         )
     if _TEXT_AS_INSTANT.search(text):
         return UsageError(

@@ -1,13 +1,13 @@
-"""Garbage collection (`collect`): deletes files that nothing refers to and no running transaction holds. Disk usage
-(`usage`): what a lake's files take.
+"""Garbage collection (`collect`): deletes files that nothing refers to and no running transaction
+holds. Disk usage (`usage`): what a lake's files take.
 
-- An object is kept if a branch or tag refers to it, if a row withdrawn less than the grace period ago points to it, or
-  if a running transaction has put it or looked it up.
+- An object is kept if a branch or tag refers to it, if a row withdrawn less than the grace period
+  ago points to it, or if a running transaction has put it or looked it up.
 - A file younger than the grace period, by the clock that gave it its time, is kept.
 - An unfinished upload in parts to a bucket goes by the same rules.
 - An object that the log says was erased, or expired, is deleted at any age: that was not finished.
-- A staging folder is deleted as soon as its owner is dead, which its lock proves; one without a lease, after the grace
-  period.
+- A staging folder is deleted as soon as its owner is dead, which its lock proves; one without a
+  lease, after the grace period.
 - A file of the catalog that some version is made of is kept.
 """
 
@@ -39,7 +39,8 @@ UNSHOWN = "shown by no branch or tag"
 CATALOG = "catalog and refs"
 OTHER = "other files"
 _ORDER = [*(kind for kind in Kind if kind is not Kind.CLIP), Kind.CLIP]
-"""A clip is a slice of its recording's object, so it comes last: what two kinds share counts for the first."""
+"""A clip is a slice of its recording's object, so it comes last: what two kinds share counts for
+the first."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +51,8 @@ class Garbage:
         objects: by name.
         leftovers: other paths: staging folders, unpublished files.
         size: of these and of the objects [B].
-        uploads: to a bucket that were begun and not finished; no listing states the size of their parts.
+        uploads: to a bucket that were begun and not finished; no listing states the size of their
+            parts.
         unlisted: why the store does not say which uploads there are; `None` where it does.
     """
 
@@ -74,11 +76,13 @@ def garbage(lake: Lake, *, grace: timedelta) -> Garbage:
 
 
 def collect(lake: Lake, *, grace: timedelta) -> Garbage:
-    """Deletes the garbage and says what it was. Transactions wait while it works; none loses anything.
+    """Deletes the garbage and says what it was. Transactions wait while it works; none loses
+    anything.
 
     Raises:
         LinkError: a folder of the lake is not its own; nothing was deleted.
-        CorruptError: a ref cannot be read or the catalog is damaged, so what it needs is unknown; nothing was deleted.
+        CorruptError: a ref cannot be read or the catalog is damaged, so what it needs is unknown;
+            nothing was deleted.
     """
     with lake.changing("collecting", alone=True) as check:
         deletable = _find(lake, grace)
@@ -87,7 +91,9 @@ def collect(lake: Lake, *, grace: timedelta) -> Garbage:
         for path in deletable.leftovers:
             check()
             Objects.remove(path)
-        for folder in sorted({path.parent for path in deletable.leftovers if isinstance(path, Path)}):
+        for folder in sorted(
+            {path.parent for path in deletable.leftovers if isinstance(path, Path)}
+        ):
             flush_folder(folder)
         for upload in deletable.uploads:
             check()
@@ -96,9 +102,12 @@ def collect(lake: Lake, *, grace: timedelta) -> Garbage:
 
 
 def _find(lake: Lake, grace: timedelta) -> Garbage:
-    states = leases(lake.staging)  # before the catalog: a lease that is gone by now has its rows committed
+    states = leases(
+        lake.staging
+    )  # before the catalog: a lease that is gone by now has its rows committed
     marked = mark(lake, grace=grace)
-    # Rows read from a changed file may name other objects than those they need, so files are re-hashed first.
+    # Rows read from a changed file may name other objects than those they need, so files are
+    # re-hashed first.
     marked.check(*catalog_files(lake))
     deletable = list_garbage(lake, marked, states, grace=grace)
     try:
@@ -117,7 +126,13 @@ def left_uploads(lake: Lake, states: Sequence[LeaseState]) -> tuple[Upload, ...]
     """
     if not isinstance(lake.path, RemotePath):
         return ()
-    held = {name for state in states if state.alive for name in state.objects if OBJECT_NAME.fullmatch(name)}
+    held = {
+        name
+        for state in states
+        if state.alive
+        for name in state.objects
+        if OBJECT_NAME.fullmatch(name)
+    }
     protected = {str(lake.path / path_in_lake(name)) for name in held}
     return tuple(
         upload
@@ -126,18 +141,25 @@ def left_uploads(lake: Lake, states: Sequence[LeaseState]) -> tuple[Upload, ...]
     )
 
 
-def list_garbage(lake: Lake, marked: Marked, states: Sequence[LeaseState], *, grace: timedelta) -> Garbage:
-    """Lists what neither a marked row nor a living transaction needs, and what is older than the grace period.
+def list_garbage(
+    lake: Lake, marked: Marked, states: Sequence[LeaseState], *, grace: timedelta
+) -> Garbage:
+    """Lists what neither a marked row nor a living transaction needs, and what is older than the
+    grace period.
 
     Args:
         marked: what is needed, read after `states`.
-        states: of all staging folders. Without the lock of `collecting`, what a transaction has put since, and which is
-            not younger than the grace period, may be among what is found.
+        states: of all staging folders. Without the lock of `collecting`, what a transaction has put
+            since, and which is not younger than the grace period, may be among what is found.
     """
     needed = marked.objects.union(*(state.objects for state in states if state.alive))
     limit = lake.now() - grace.total_seconds()
     given_up = {left.name for left in find_unfinished(lake, needed)}
-    objects = [o for o in lake.objects if o.name not in needed and (o.modified <= limit or o.name in given_up)]
+    objects = [
+        o
+        for o in lake.objects
+        if o.name not in needed and (o.modified <= limit or o.name in given_up)
+    ]
     leftovers: list[Place] = [state.folder for state in states if state.leased and not state.alive]
     leftovers += [path for path in unleased_entries(lake.staging) if last_written(path) <= limit]
     leftovers += [path for path in lake.unpublished_files() if path.lstat().st_mtime <= limit]
@@ -219,9 +241,17 @@ def usage(lake: Lake, *, at: str | None = None, grace: timedelta) -> Usage:
     if at is not None:
         tables.setdefault(at, lake.rows(at=at))
     branches, tags = lake.refs.branches(), lake.refs.tags()
-    nouns = dict.fromkeys(tables, "version") | dict.fromkeys(["main", *branches], "branch") | dict.fromkeys(tags, "tag")
-    objects_of_refs = {name: set(table["object"].drop_null().to_pylist()) for name, table in tables.items()}
-    counts = Counter(name for ref, objects in objects_of_refs.items() if ref in marked.refs for name in objects)
+    nouns = (
+        dict.fromkeys(tables, "version")
+        | dict.fromkeys(["main", *branches], "branch")
+        | dict.fromkeys(tags, "tag")
+    )
+    objects_of_refs = {
+        name: set(table["object"].drop_null().to_pylist()) for name, table in tables.items()
+    }
+    counts = Counter(
+        name for ref, objects in objects_of_refs.items() if ref in marked.refs for name in objects
+    )
     versions = tuple(
         Shown(
             name=ref,
@@ -238,7 +268,8 @@ def usage(lake: Lake, *, at: str | None = None, grace: timedelta) -> Usage:
 
 
 def files_of(root: Place) -> Iterator[tuple[str, int]]:
-    """Yields the files of a lake: the path from its root, with slashes, and the size [B]; a link counts for itself."""
+    """Yields the files of a lake: the path from its root, with slashes, and the size [B]; a link
+    counts for itself."""
     if isinstance(root, RemotePath):
         yield from ((key, status.st_size) for key, status in root.names())
         return
@@ -258,7 +289,9 @@ def _owner(key: str) -> str:
     return CATALOG if store in ("catalog", "refs", "lake.json") else OTHER
 
 
-def _kinds(tables: Mapping[str, pa.Table], sizes: Mapping[str, int], *, with_rest: bool) -> dict[str, Share]:
+def _kinds(
+    tables: Mapping[str, pa.Table], sizes: Mapping[str, int], *, with_rest: bool
+) -> dict[str, Share]:
     """Computes what each kind of rows takes.
 
     Args:
@@ -281,7 +314,10 @@ def _kinds(tables: Mapping[str, pa.Table], sizes: Mapping[str, int], *, with_res
     if with_rest:
         rest = {name for name in sizes if name not in counted and OBJECT_NAME.fullmatch(name)}
         shares[UNSHOWN] = _share(rest, sizes, artifacts=0)
-        shares |= {part: Share(artifacts=0, objects=0, size=sizes.get(part, 0)) for part in (CATALOG, OTHER)}
+        shares |= {
+            part: Share(artifacts=0, objects=0, size=sizes.get(part, 0))
+            for part in (CATALOG, OTHER)
+        }
     return shares
 
 

@@ -1,10 +1,11 @@
 """Moving versions between lakes of one history: `flagdata push`, `pull` and `clone`.
 
-A clone has the log of its source, entry by entry, so that versions, commits, tags and branches mean the same in both.
-Each entry states the hash of the one before it: where two lakes have the same entry, they have the same history up to
-it. Versions are only added, in order, each by the conditional put that publishes a commit, after the objects that refs
-need; what is there, of its size and not found damaged, is not moved again. So a transfer that was stopped goes on where
-it was, and of two at once one finds the work done, or is refused.
+A clone has the log of its source, entry by entry, so that versions, commits, tags and branches mean
+the same in both. Each entry states the hash of the one before it: where two lakes have the same
+entry, they have the same history up to it. Versions are only added, in order, each by the
+conditional put that publishes a commit, after the objects that refs need; what is there, of its
+size and not found damaged, is not moved again. So a transfer that was stopped goes on where it was,
+and of two at once one finds the work done, or is refused.
 """
 
 from __future__ import annotations
@@ -42,7 +43,8 @@ class Transfer:
         size: of these [B].
         refs: names of the tags and branches that it did not have, sorted.
         findings: what texts of the versions that came hold which a terminal would obey.
-        healed: what was damaged or missing in a target that is ahead of its source, and was taken from it.
+        healed: what was damaged or missing in a target that is ahead of its source, and was taken
+            from it.
     """
 
     versions: int
@@ -71,7 +73,8 @@ def clone(source: Lake, target: Place | str, *, bars: Bars) -> tuple[Lake, Trans
 
 
 def _with_push(error: ConflictError, source: Lake, target: Place | str) -> ConflictError:
-    """Returns the refusal to clone to where something is; how to go on, where that is a clone of the source."""
+    """Returns the refusal to clone to where something is; how to go on, where that is a clone of
+    the source."""
     try:
         lake = Lake.open(target)
         same = source.catalog.entry(0)[0] == lake.catalog.entry(0)[0]
@@ -82,7 +85,8 @@ def _with_push(error: ConflictError, source: Lake, target: Place | str) -> Confl
     return ConflictError(
         "there is a clone of this lake already",
         where=str(lake.path),
-        fix=f"{command_line('flagdata', 'push', lake.path, '--lake', source.path)} brings it up to date, also where a "
+        fix=f"{command_line('flagdata', 'push', lake.path, '--lake', source.path)} brings it up to "
+        "date, also where a "
         "clone was stopped",
     )
 
@@ -94,20 +98,27 @@ def transfer(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
         bars: makes a progress bar.
 
     Raises:
-        ConflictError: the target has versions, or a tag or branch of a name, that the source has otherwise.
+        ConflictError: the target has versions, or a tag or branch of a name, that the source has
+            otherwise.
         CorruptError: the source is damaged; nothing is published of it.
     """
     target.check_writable()
     marked = mark(source, grace=timedelta(0))
     if damage := [finding for finding in marked.findings if finding.severity is Severity.ERROR]:
-        raise CorruptError(damage[0].what, where=damage[0].where, fix=damage[0].fix or "run flagdata doctor")
+        raise CorruptError(
+            damage[0].what, where=damage[0].where, fix=damage[0].fix or "run flagdata doctor"
+        )
     head, target_head = source.catalog.head(), target.catalog.head()
     _check_history(source, target, head=head, target_head=target_head)
     source.catalog.check_entries(min(head, target_head))
     _check_refs(source, target)
     refs_before = target.refs.stored()
     sizes = marked.sizes
-    missing = [name for name in sorted(marked.objects) if not target.objects.is_there(name, sizes.get(name))]
+    missing = [
+        name
+        for name in sorted(marked.objects)
+        if not target.objects.is_there(name, sizes.get(name))
+    ]
     size = 0
     with (
         disk_errors("moving versions", target.path),
@@ -119,7 +130,9 @@ def transfer(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
         for name in missing:
             if transaction.put(source.objects.whole(name)) != name:
                 raise CorruptError(
-                    f"the bytes of {name} have changed", where=str(source.path), fix="run flagdata verify"
+                    f"the bytes of {name} have changed",
+                    where=str(source.path),
+                    fix="run flagdata verify",
                 )
             size += transaction.hold(name)
             advance(1)
@@ -130,17 +143,27 @@ def transfer(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
             target.refs.adopt(kind, name, refs[kind, name])
         with confirming("what the log says of tags and branches", target.refs.root):
             target.refs.write_files()
-        with suppress(OSError, FlagdataError), transaction.keeping_collectors_out():  # it saves time only
+        with (
+            suppress(OSError, FlagdataError),
+            transaction.keeping_collectors_out(),
+        ):  # it saves time only
             target.catalog.summarise()
     names = tuple(sorted(name for _, name in refs.keys() - refs_before.keys()))
     return Transfer(
-        versions=head - target_head, head=head, objects=tuple(missing), size=size, refs=names, findings=findings
+        versions=head - target_head,
+        head=head,
+        objects=tuple(missing),
+        size=size,
+        refs=names,
+        findings=findings,
     )
 
 
 def pull(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
-    """Brings a lake to the newest version of another one, as `transfer`. One that is behind, as a backup of this lake
-    is, has nothing new: what this one lost, or what was found damaged in it, is taken, see `flagdata.lake.restoring`.
+    """Brings a lake to the newest version of another one, as `transfer`. One that is behind, as a
+    backup of this lake
+    is, has nothing new: what this one lost, or what was found damaged in it, is taken, see
+    `flagdata.lake.restoring`.
 
     Raises:
         ConflictError, CorruptError: as `transfer`.
@@ -162,8 +185,9 @@ def pull(source: Lake, target: Lake, *, bars: Bars) -> Transfer:
 
 
 def _unprintable(source: Lake, marked: Marked, *, versions: int) -> Iterator[Finding]:
-    """Warns where rows, or messages of the newest versions, hold what a terminal would obey. They come as they are:
-    each version states the hash of the one before, so that a text that was cleaned would be another history."""
+    """Warns where rows, or messages of the newest versions, hold what a terminal would obey. They
+    come as they are: each version states the hash of the one before, so that a text that was
+    cleaned would be another history."""
     unprintable: Counter[str] = Counter()
     for entry in source.catalog.history(versions):
         unprintable["message"] += not str(entry.get("message", "")).isprintable()
@@ -175,15 +199,19 @@ def _unprintable(source: Lake, marked: Marked, *, versions: int) -> Iterator[Fin
     if columns:
         yield Finding.of(
             "control-characters",
-            f"{count_of(unprintable.total(), 'text')} of {', '.join(columns)} hold control characters or marks of "
+            f"{count_of(unprintable.total(), 'text')} of {', '.join(columns)} hold control "
+            "characters or marks of "
             "direction: they came as they are, and are shown escaped",
             count=unprintable.total(),
             where=str(source.path),
-            fix="none needed for flagdata; give other programs what flagdata prints, not the files of the catalog",
+            fix="none needed for flagdata; give other programs what flagdata prints, not the files "
+            "of the catalog",
         )
 
 
-def _adopt(source: Lake, target: Lake, transaction: Transaction, *, versions: range, bars: Bars) -> None:
+def _adopt(
+    source: Lake, target: Lake, transaction: Transaction, *, versions: range, bars: Bars
+) -> None:
     with bars(len(versions), "versions", "version") as advance:
         for version in versions:
             with transaction.keeping_collectors_out():
@@ -202,9 +230,11 @@ def _check_history(source: Lake, target: Lake, *, head: int, target_head: int) -
     _check_common(source, target, min(head, target_head))
     if target_head > head:
         raise ConflictError(
-            f"{target.path} is ahead: it has versions up to {target_head}, {source.path} up to {head}",
+            f"{target.path} is ahead: it has versions up to {target_head}, {source.path} up to "
+            f"{head}",
             where=str(target.path),
-            fix=f"{command_line('flagdata', 'pull', target.path, '--lake', source.path)} brings them here",
+            fix=f"{command_line('flagdata', 'pull', target.path, '--lake', source.path)} brings "
+            "them here",
         )
 
 
@@ -217,16 +247,19 @@ def _check_common(source: Lake, target: Lake, common: int) -> None:
     if source.catalog.entry(common)[0] != target.catalog.entry(common)[0]:
         same = source.catalog.entry(0)[0] == target.catalog.entry(0)[0]
         raise ConflictError(
-            "each of the two lakes has versions that the other lacks" if same else "the lakes share no history",
+            "each of the two lakes has versions that the other lacks"
+            if same
+            else "the lakes share no history",
             where=f"{source.path} and {target.path}",
-            fix=f"{command_line('flagdata', 'clone', target.path, 'NEW')}, and commit there what it lacks; or write to "
+            fix=f"{command_line('flagdata', 'clone', target.path, 'NEW')}, and commit there what "
+            "it lacks; or write to "
             f"it directly: {command_line('--lake', target.path)}",
         )
 
 
 def _check_refs(source: Lake, target: Lake) -> None:
-    """Checks whether the refs that the target has as files only, of an earlier version, are those of the source, or
-    refs that the source has deleted since, or that it does not know.
+    """Checks whether the refs that the target has as files only, of an earlier version, are those
+    of the source, or refs that the source has deleted since, or that it does not know.
 
     Raises:
         ConflictError: the source has another one of the same name.

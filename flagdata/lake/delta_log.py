@@ -1,21 +1,25 @@
-"""The Delta log's entries as files: that none is missing between the first and the newest one ever acknowledged.
+"""The Delta log's entries as files: that none is missing between the first and the newest one ever
+acknowledged.
 
-Entries are numbered from 0 without holes and never expire, so a hole is damage, and not noticed by a reader that takes
-what comes before it for all there is. The loss of the last entries leaves no hole; therefore each commit, once its
-entry is on the disk, also puts its number as a file name in the folder `refs/newest/`, outside the log, and takes lower
-ones away. The number to believe is the highest, so writers need no lock for it, and it never falls.
+Entries are numbered from 0 without holes and never expire, so a hole is damage, and not noticed by
+a reader that takes what comes before it for all there is. The loss of the last entries leaves no
+hole; therefore each commit, once its entry is on the disk, also puts its number as a file name in
+the folder `refs/newest/`, outside the log, and takes lower ones away. The number to believe is the
+highest, so writers need no lock for it, and it never falls.
 
-Each entry notes the SHA-256 of the one before it, and the mark that of the newest, so that a change in any is found
-when entries are read in a row, and by `verify`.
+Each entry notes the SHA-256 of the one before it, and the mark that of the newest, so that a change
+in any is found when entries are read in a row, and by `verify`.
 
-Summaries state what the log says of its versions in few files: a fresh process reads these instead of an entry a
-version. A summary covers consecutive versions. It names the SHA-256 of the entry before its first and of its last one,
-so that summaries form a chain as entries do, and the end of the chain is compared with the log itself: what was written
-of another course of the log, as one that was restored from a copy and went on, is not believed. Its own SHA-256 is in
-its name. Summaries save time only; the entries hold all. A summary also notes the SHA-256 of the checkpoints that the
-Delta library wrote of its versions.
+Summaries state what the log says of its versions in few files: a fresh process reads these instead
+of an entry a version. A summary covers consecutive versions. It names the SHA-256 of the entry
+before its first and of its last one, so that summaries form a chain as entries do, and the end of
+the chain is compared with the log itself: what was written of another course of the log, as one
+that was restored from a copy and went on, is not believed. Its own SHA-256 is in its name.
+Summaries save time only; the entries hold all. A summary also notes the SHA-256 of the checkpoints
+that the Delta library wrote of its versions.
 
-A number that a name states may be anything, in a damaged listing or a lake of other users. Nothing is counted up to it.
+A number that a name states may be anything, in a damaged listing or a lake of other users. Nothing
+is counted up to it.
 """
 
 from __future__ import annotations
@@ -47,7 +51,8 @@ PREVIOUS_HASH = "flagdata.previous_sha256"
 
 _ACTIONS = {"add", "remove", "metaData", "protocol", "commitInfo", "txn", "cdc", "domainMetadata"}
 _FILE = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]*")
-"""Names of files of rows: none leads out of the catalog's folder, also where a lake of somebody else is copied."""
+"""Names of files of rows: none leads out of the catalog's folder, also where a lake of somebody
+else is copied."""
 _NAME = "{:020d}.json"
 _ENTRY = re.compile(r"([0-9]{20})\.json").fullmatch
 CHECKPOINT = ".checkpoint.parquet"
@@ -85,13 +90,16 @@ class Entry:
 
 
 class Log:
-    """The entries in `folder` (`_delta_log`), and the marks of the newest acknowledged one in the folder `marks`."""
+    """The entries in `folder` (`_delta_log`), and the marks of the newest acknowledged one in the
+    folder `marks`."""
 
     def __init__(self, folder: Place, marks: Place) -> None:
         self.folder = folder
         self.marks = marks
         self._filled: set[int] = set()
-        self._numbers: dict[str, int] = {}  # name of what was in the folder → its version, -1 of no entry
+        self._numbers: dict[
+            str, int
+        ] = {}  # name of what was in the folder → its version, -1 of no entry
         self._put = (-1, "")
 
     def path(self, version: int) -> Place:
@@ -102,7 +110,8 @@ class Log:
         """Finds the newest version.
 
         Raises:
-            LogGapError: an entry before it, or one that was acknowledged after it, is missing, or there is none.
+            LogGapError: an entry before it, or one that was acknowledged after it, is missing, or
+                there is none.
             CorruptError: an entry is empty or cannot be read.
         """
         acknowledged = self.acknowledged()  # first: all entries up to it were on the disk before
@@ -129,11 +138,14 @@ class Log:
             return
         for before, after in pairwise([-1, *sorted(present), upto + 1]):
             for version in takewhile(after.__gt__, count(before + 1)):
-                if not self.path(version).exists():  # a listing may leave out an entry that came while it was made
+                if not self.path(
+                    version
+                ).exists():  # a listing may leave out an entry that came while it was made
                     yield version
 
     def files(self) -> dict[str, str | None]:
-        """Name of each file that some version is made of → the SHA-256 that its commit noted, `None` in older lakes.
+        """Name of each file that some version is made of → the SHA-256 that its commit noted,
+        `None` in older lakes.
 
         Raises:
             CorruptError: an entry that cannot be read, by its name.
@@ -146,7 +158,8 @@ class Log:
         return files
 
     def changed_entries(self) -> list[Place]:
-        """Entries that are not any more what the next entry, or the mark, says they were; of older lakes' none.
+        """Entries that are not any more what the next entry, or the mark, says they were; of older
+        lakes' none.
 
         Raises:
             CorruptError: an entry that cannot be read, by its name.
@@ -159,17 +172,24 @@ class Log:
             previous = self._content(version)[1].get(PREVIOUS_HASH)
             if previous is not None:
                 noted[version - 1] = previous
-        return [self.path(v) for v in sorted(present.keys() & noted.keys()) if file_hash(self.path(v)) != noted[v]]
+        return [
+            self.path(v)
+            for v in sorted(present.keys() & noted.keys())
+            if file_hash(self.path(v)) != noted[v]
+        ]
 
     def put(self, version: int, actions: Sequence[Mapping[str, Any]]) -> bool:
-        """Publish the entry of `version`, one action a line; False when another writer has published it.
+        """Publish the entry of `version`, one action a line; False when another writer has
+        published it.
 
         This is a commit's point of no return: one link, after the entry's bytes are on the disk.
 
         Raises:
             OSError: what the disk refused; there is no such entry.
         """
-        text = "\n".join(json.dumps(action, ensure_ascii=False, separators=(",", ":")) for action in actions)
+        text = "\n".join(
+            json.dumps(action, ensure_ascii=False, separators=(",", ":")) for action in actions
+        )
         if not put_if_absent(self.path(version), text.encode(), noun=f"version {version}"):
             return False
         self._put = (version, digest(text))
@@ -188,7 +208,8 @@ class Log:
         return self._text(version).encode(), self._content(version)[0]
 
     def entries(self, versions: Sequence[int], *, head: int) -> list[Entry]:
-        """Reads the entries of consecutive versions, each of which is what the next one, or the mark, says that it is.
+        """Reads the entries of consecutive versions, each of which is what the next one, or the
+        mark, says that it is.
 
         Args:
             head: the newest version of all.
@@ -201,10 +222,16 @@ class Log:
         else:
             with ThreadPoolExecutor(_AT_ONCE) as pool:
                 read_entries = list(pool.map(self._read, versions))
-        for version, entry, following in zip(versions, read_entries, read_entries[1:], strict=False):
+        for version, entry, following in zip(
+            versions, read_entries, read_entries[1:], strict=False
+        ):
             if following.info.get(PREVIOUS_HASH, entry.hash) != entry.hash:
                 raise self.disagreeing(version, self.path(version + 1))
-        if versions and versions[-1] == head and self.marked(head) not in (None, read_entries[-1].hash):
+        if (
+            versions
+            and versions[-1] == head
+            and self.marked(head) not in (None, read_entries[-1].hash)
+        ):
             raise self.disagreeing(head, self.marks / str(head))
         return read_entries
 
@@ -221,12 +248,14 @@ class Log:
             return None
 
     def disagreeing(self, version: int, noting: Place) -> CorruptError:
-        """Returns the error for an entry whose SHA-256 is not the one that the next entry, or its mark, notes."""
+        """Returns the error for an entry whose SHA-256 is not the one that the next entry, or its
+        mark, notes."""
         path = self.path(version)
         fix = f"{HEAL}; where nothing is taken, "
         fix += f"delete {noting}" if noting.parent == self.marks else "another one"
         return CorruptError(
-            f"the log entry {path.name} is not what {noting.name} says: one of the two has changed since it was "
+            f"the log entry {path.name} is not what {noting.name} says: one of the two has changed "
+            "since it was "
             "written",
             where=str(path),
             fix=fix,
@@ -241,7 +270,8 @@ class Log:
         return self._parse_entry(version, entry.decode(errors="replace"))[1].get(FILE_HASH)
 
     def adopt(self, version: int, entry: bytes) -> bool:
-        """Put an entry of another lake of the same history; False where there is another one of that version."""
+        """Put an entry of another lake of the same history; False where there is another one of
+        that version."""
         path = self.path(version)
         if put_if_absent(path, entry, noun=f"version {version}"):
             return True
@@ -266,7 +296,8 @@ class Log:
             raise self.damaged(version) from None
 
     def _text(self, version: int) -> str:
-        """Reads what an entry holds; the Delta library would take an empty one for a commit of nothing."""
+        """Reads what an entry holds; the Delta library would take an empty one for a commit of
+        nothing."""
         try:
             text = _content_of(self.path(version))
         except FileNotFoundError as error:  # a link that leads nowhere
@@ -279,7 +310,9 @@ class Log:
         """Returns the error of a reader to whom the entry of `version` makes no sense."""
         path = self.path(version)
         fix = HEAL
-        if version == max(self.present()) and version - 1 == self.acknowledged():  # as a power cut may leave it
+        if (
+            version == max(self.present()) and version - 1 == self.acknowledged()
+        ):  # as a power cut may leave it
             fix += ", or delete it: its commit was never acknowledged"
         return CorruptError(f"the log entry {path.name} is damaged", where=str(path), fix=fix)
 
@@ -292,13 +325,18 @@ class Log:
                 (self.marks / str(lower)).unlink(missing_ok=True)
 
     def acknowledged(self) -> int:
-        """Finds the newest version that was acknowledged; -1 in a lake that has had no commit since marks are made."""
+        """Finds the newest version that was acknowledged; -1 in a lake that has had no commit since
+        marks are made."""
         return max(self._marks(), default=-1)
 
     def checkpoints(self) -> list[int]:
         """Versions at which the Delta library finds all that is in the entries before."""
         matches = map(_CHECKPOINT, _sizes_in(self.folder))
-        return [version for match in matches if match and (version := read_bounded(match[1], most=_NEWEST)) is not None]
+        return [
+            version
+            for match in matches
+            if match and (version := read_bounded(match[1], most=_NEWEST)) is not None
+        ]
 
     def present(self) -> dict[int, int | None]:
         """Maps the version of each entry to its size, where a listing states it."""
@@ -307,38 +345,58 @@ class Log:
             match = _ENTRY(name)
             version = read_bounded(match[1], most=_NEWEST) if match else None
             self._numbers[name] = -1 if version is None else version
-        return {version: size for name, size in sizes.items() if (version := self._numbers[name]) >= 0}
+        return {
+            version: size for name, size in sizes.items() if (version := self._numbers[name]) >= 0
+        }
 
     def _marks(self) -> list[int]:
-        return [version for name in _sizes_in(self.marks) if (version := self._marked_by(name)) is not None]
+        return [
+            version
+            for name in _sizes_in(self.marks)
+            if (version := self._marked_by(name)) is not None
+        ]
 
     @staticmethod
     def _marked_by(name: str) -> int | None:
         return read_bounded(name, most=_NEWEST) if _MARK(name) else None
 
-    def _gap(self, missing: Sequence[int], present: Mapping[int, object], *, acknowledged: int) -> LogGapError:
+    def _gap(
+        self, missing: Sequence[int], present: Mapping[int, object], *, acknowledged: int
+    ) -> LogGapError:
         newest = max(present)
         names = ", ".join(self.path(version).name for version in missing)
         further = max(newest, acknowledged) + 1 - len(present) - len(missing)
-        message = f"an entry of the catalog's log is missing: {names}{f' and {further} more' if further > 0 else ''}"
+        message = (
+            "an entry of the catalog's log is missing: "
+            f"{names}{f' and {further} more' if further > 0 else ''}"
+        )
         fix = f"{HEAL}; run neither gc nor another program on the lake before"
         if missing[0] > newest:  # what is left is a whole, older catalog
-            mark = next(path for path in self.marks.iterdir() if self._marked_by(path.name) == acknowledged)
+            mark = next(
+                path for path in self.marks.iterdir() if self._marked_by(path.name) == acknowledged
+            )
             message += f"; {mark} says that version {acknowledged} was committed"
-            fix += f"; if it never was, or to give up what was committed after version {newest}, delete {mark}"
-        elif newest - missing[0] >= len(present):  # more of them than there are: rather is the last name wrong
+            fix += (
+                f"; if it never was, or to give up what was committed after version {newest}, "
+                f"delete {mark}"
+            )
+        elif newest - missing[0] >= len(
+            present
+        ):  # more of them than there are: rather is the last name wrong
             message += f", before {self.path(newest).name}"
             fix += f"; if this lake never had so many versions, move {self.path(newest)} away"
         return LogGapError(message, where=str(self.path(missing[0])), fix=fix)
 
 
 def is_stated(version: object, number: int) -> bool:
-    """Checks whether this is what `Catalog.history` says of the version of that number, as a file that states it may
-    not."""
+    """Checks whether this is what `Catalog.history` says of the version of that number, as a file
+    that states it may not."""
     if not isinstance(version, dict) or version.get("version") != number:
         return False
     when, files = version.get("timestamp"), version.get("files", [])
-    texts = [value for key, value in version.items() if key not in ("version", "timestamp", "files")]
+    texts = [
+        value for key, value in version.items() if key not in ("version", "timestamp", "files")
+    ]
     return (
         isinstance(when, int)
         and 0 <= when < _LATEST
@@ -356,7 +414,8 @@ def names_in(folder: Place) -> list[str]:
 
 
 def _sizes_in(folder: Place) -> dict[str, int | None]:
-    """Name of what is in a folder → its size where the listing states it; nothing if the folder is not there."""
+    """Name of what is in a folder → its size where the listing states it; nothing if the folder is
+    not there."""
     try:
         if isinstance(folder, Path):
             return dict.fromkeys(os.listdir(folder))  # noqa: PTH208 — a path for each name takes ten times as long
@@ -407,7 +466,8 @@ class Summary:
 
     Attributes:
         name: of its file.
-        before, end: SHA-256 of the log entry before the first version, "" where that is 0, and of the last one.
+        before, end: SHA-256 of the log entry before the first version, "" where that is 0, and of
+            the last one.
         checkpoints: version → SHA-256 of the file.
         versions: what the log states of each, oldest first.
     """
@@ -423,7 +483,8 @@ class Summaries:
     """The summaries of a log in a folder.
 
     Attributes:
-        checkpoints: version → SHA-256 of its checkpoint, as the summaries that were read last note it.
+        checkpoints: version → SHA-256 of its checkpoint, as the summaries that were read last note
+            it.
         covered: how many versions these cover.
     """
 
@@ -461,13 +522,17 @@ class Summaries:
         first = covered - sum(len(summary.versions) for summary in merged)
         if first < len(history):
             noted = {
-                number: checkpoint_hash for summary in merged for number, checkpoint_hash in summary.checkpoints.items()
+                number: checkpoint_hash
+                for summary in merged
+                for number, checkpoint_hash in summary.checkpoints.items()
             }
             self._put(history, first, {**noted, len(history) - 1: checkpoint})
         for summary in merged:
             (self._folder / summary.name).unlink(missing_ok=True)
 
-    def _put(self, history: Sequence[Mapping[str, Any]], first: int, checkpoints: Mapping[int, str]) -> None:
+    def _put(
+        self, history: Sequence[Mapping[str, Any]], first: int, checkpoints: Mapping[int, str]
+    ) -> None:
         last = len(history) - 1
         content = {
             "schema": _SCHEMA,
@@ -481,8 +546,8 @@ class Summaries:
         put_if_absent(self._folder / f"{first:020d}-{last:020d}-{digest(text)}.json", text.encode())
 
     def _chain(self, head: int) -> list[Summary]:
-        """Reads summaries of versions from 0 on, each of which goes on from the one before it, the last as the log
-        does."""
+        """Reads summaries of versions from 0 on, each of which goes on from the one before it, the
+        last as the log does."""
         names: dict[int, list[tuple[int, str]]] = {}
         for name in names_in(self._folder):
             covered = _covered_versions(name, head)
@@ -493,7 +558,8 @@ class Summaries:
         while following in names:
             read = (self._read(name) for _, name in sorted(names[following], reverse=True))
             summary_found = next(
-                (summary for summary in read if summary is not None and summary.before == before), None
+                (summary for summary in read if summary is not None and summary.before == before),
+                None,
             )
             if summary_found is None:
                 break
@@ -502,7 +568,9 @@ class Summaries:
         while chain and self._log.hash(following - 1) != chain[-1].end:
             following -= len(chain.pop().versions)
         self.covered = following
-        self.checkpoints = {number: noted for summary in chain for number, noted in summary.checkpoints.items()}
+        self.checkpoints = {
+            number: noted for summary in chain for number, noted in summary.checkpoints.items()
+        }
         return chain
 
     def _read(self, name: str) -> Summary | None:
@@ -520,10 +588,18 @@ class Summaries:
             if not all(map(is_stated, versions, count(covered[0]))):
                 raise ValueError("it states other versions than its name, or none")
             noted = content.get("checkpoints", {})
-            numbers = [version for number in noted if (version := read_bounded(number, most=_NEWEST)) is not None]
+            numbers = [
+                version
+                for number in noted
+                if (version := read_bounded(number, most=_NEWEST)) is not None
+            ]
             checkpoints = dict(zip(numbers, map(str, noted.values()), strict=True))
             return Summary(
-                name=name, before=content["before"], end=content["end"], checkpoints=checkpoints, versions=versions
+                name=name,
+                before=content["before"],
+                end=content["end"],
+                checkpoints=checkpoints,
+                versions=versions,
             )
         except FileNotFoundError:  # another process has just made one of several
             return None
@@ -541,7 +617,7 @@ def summaries_in(folder: Place) -> list[str]:
 
 
 def _covered_versions(name: str, head: int) -> tuple[int, int] | None:
-    """Reads the first and the last version of a summary of its file's name; None of others, and of later than
-    `head`."""
+    """Reads the first and the last version of a summary of its file's name; None of others, and of
+    later than `head`."""
     first, last = (read_bounded(number, most=head) for number in f"{name}-".split("-")[:2])
     return None if first is None or last is None else (first, last)

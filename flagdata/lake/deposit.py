@@ -1,4 +1,5 @@
-"""Objects that one process puts into the store for another, which commits the rows that refer to them."""
+"""Objects that one process puts into the store for another, which commits the rows that refer to
+them."""
 
 from __future__ import annotations
 
@@ -50,7 +51,8 @@ def deposit(lake: Store, suffix: str, write: Callable[[Path], object]) -> Deposi
 
 
 def copy_object(source: Path, target: Path) -> None:
-    """Copy the file or folder of an object, without modes: what is read-only could be neither moved nor collected.
+    """Copy the file or folder of an object, without modes: what is read-only could be neither moved
+    nor collected.
 
     Raises:
         InputError: there is none, or it holds a link.

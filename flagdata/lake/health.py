@@ -51,14 +51,18 @@ def made_again(artifact: Artifact) -> str:
     """Names what replaces the object of an artifact that is damaged or missing."""
     branch = () if artifact.branch == MAIN else ("--branch", artifact.branch)
     if artifact.kind in (Kind.MEASUREMENT, Kind.MODEL):
-        withdraw = command_line("flagdata", "withdraw", artifact.id[:SHORT], *branch, "-m", "its data are lost")
+        withdraw = command_line(
+            "flagdata", "withdraw", artifact.id[:SHORT], *branch, "-m", "its data are lost"
+        )
         return (
-            f"give the command that made it again by the same code ({artifact.code_version}), which replaces the "
+            f"give the command that made it again by the same code ({artifact.code_version}), "
+            "which replaces the "
             f"object; or {HEAL}; or {withdraw}"
         )
     if artifact.source_name is not None:
         how = (
-            f"{command_line('flagdata', 'ingest', artifact.source_name, *branch)} again, with the options of the first "
+            f"{command_line('flagdata', 'ingest', artifact.source_name, *branch)} again, with the "
+            "options of the first "
             "time"
         )
     else:
@@ -74,9 +78,10 @@ GRACE = timedelta(hours=24)
 def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
     """Finds all that is wrong with the lake's structure; contents are `verify`'s.
 
-    Errors are damage: rows without object or parent, objects of another size than recorded, refs that cannot be read,
-    links where the lake keeps files of its own, rows of a newer format. Warnings are what a crash leaves and `gc`
-    removes. Notes are younger than `grace`, and nothing to act on.
+    Errors are damage: rows without object or parent, objects of another size than recorded, refs
+    that cannot be read, links where the lake keeps files of its own, rows of a newer format.
+    Warnings are what a crash leaves and `gc` removes. Notes are younger than `grace`, and nothing
+    to act on.
     """
     foreign = _foreign(lake)
     stored = list(lake.objects)
@@ -88,12 +93,15 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
         with looking(lake.staging):
             states = leases(lake.staging)
             unowned = [(path, last_written(path)) for path in unleased_entries(lake.staging)]
-    # The catalog last: what was put by now is protected by a lease read above, or committed below, or left behind.
+    # The catalog last: what was put by now is protected by a lease read above, or committed below,
+    # or left behind.
     marked = mark(lake, grace=grace)
     limit = lake.now() - grace.total_seconds()
     findings = [*map(_linked_finding, foreign), *marked.findings, *_rows(lake, marked, foreign)]
     if LogGapError.kind in {finding.kind for finding in marked.findings}:
-        return tuple(findings)  # what follows would call the files of the missing entries' commits leftovers
+        return tuple(
+            findings
+        )  # what follows would call the files of the missing entries' commits leftovers
     if not marked.findings:
         in_use = {name for state in states if state.alive for name in state.objects}
         needed = marked.objects | in_use
@@ -122,10 +130,15 @@ def doctor(lake: Lake, *, grace: timedelta = GRACE) -> tuple[Finding, ...]:
 
 
 def verify(
-    lake: Lake, names: Sequence[str], marked: Marked | None = None, *, advance: Callable[[int], None] = lambda _: None
+    lake: Lake,
+    names: Sequence[str],
+    marked: Marked | None = None,
+    *,
+    advance: Callable[[int], None] = lambda _: None,
 ) -> tuple[Finding, ...]:
-    """Hashes the objects called `names` again; reports each that is missing or has changed. Damage is noted beside the
-    object, so that what makes it again replaces it without comparing all its bytes, see `Objects.note_damage`.
+    """Hashes the objects called `names` again; reports each that is missing or has changed. Damage
+    is noted beside the object, so that what makes it again replaces it without comparing all its
+    bytes, see `Objects.note_damage`.
 
     Args:
         marked: what every ref shows: of what they are, the findings say how it is made again.
@@ -141,7 +154,11 @@ def verify(
             if kind == "object-changed":
                 lake.objects.note_damage(name)
             fix = made_again(rows[name]) if name in rows else error.fix
-            findings.append(Finding(kind=kind, severity=Severity.ERROR, what=error.what, where=error.where, fix=fix))
+            findings.append(
+                Finding(
+                    kind=kind, severity=Severity.ERROR, what=error.what, where=error.where, fix=fix
+                )
+            )
         else:
             lake.objects.note_whole(name)
         advance(1)
@@ -153,34 +170,44 @@ def _by_object(marked: Marked) -> dict[str, Artifact]:
     artifacts: dict[str, Artifact] = {}
     for table in marked.refs.values():
         for row in table.to_pylist():
-            if row["object"] is not None and (row["object"] not in artifacts or row["kind"] != Kind.CLIP):
+            if row["object"] is not None and (
+                row["object"] not in artifacts or row["kind"] != Kind.CLIP
+            ):
                 with suppress(FlagdataError):  # of a malformed row doctor says more
                     artifacts[row["object"]] = Artifact.from_row(row)
     return artifacts
 
 
 def read_refs(lake: Lake) -> Marked:
-    """Reads what every ref shows, for `verify_catalog` and `object_names`, which read it themselves where it is not
-    given."""
+    """Reads what every ref shows, for `verify_catalog` and `object_names`, which read it themselves
+    where it is not given."""
     return mark(lake, grace=timedelta(0))
 
 
 def verify_catalog(lake: Lake, marked: Marked | None = None) -> tuple[Finding, ...]:
-    """Hashes the catalog's files again and reads every ref; reports what is missing, damaged, a link or unchecked."""
-    foreign = [path for path in _foreign(lake) if path.parent.name not in STORES]  # objects are `verify`'s
-    findings = (*map(_linked_finding, foreign), *(marked or read_refs(lake)).findings, *catalog_files(lake))
+    """Hashes the catalog's files again and reads every ref; reports what is missing, damaged, a
+    link or unchecked."""
+    foreign = [
+        path for path in _foreign(lake) if path.parent.name not in STORES
+    ]  # objects are `verify`'s
+    findings = (
+        *map(_linked_finding, foreign),
+        *(marked or read_refs(lake)).findings,
+        *catalog_files(lake),
+    )
     return tuple(dict.fromkeys(findings))  # an entry that cannot be read stops both
 
 
 def object_names(lake: Lake, marked: Marked | None = None) -> list[str]:
-    """Lists every object that is stored or that a readable ref needs, sorted; `verify_catalog` reports unreadable
-    refs."""
+    """Lists every object that is stored or that a readable ref needs, sorted; `verify_catalog`
+    reports unreadable refs."""
     needed = (marked or read_refs(lake)).objects
     return sorted(needed | {stored.name for stored in lake.objects})
 
 
 def sample_names(names: Sequence[str], count: int) -> list[str]:
-    """Draws `count` of them at random, others each time, so that repeated checks come round to all."""
+    """Draws `count` of them at random, others each time, so that repeated checks come round to
+    all."""
     return sorted(random.SystemRandom().sample(list(names), min(count, len(names))))
 
 
@@ -208,9 +235,11 @@ def _is_among(path: Place, foreign: Collection[Path]) -> bool:
 def _linked_finding(path: Path) -> Finding:
     return Finding.of(
         "link",
-        "a link or special file, or a folder that holds one: its content lies elsewhere, where it may change",
+        "a link or special file, or a folder that holds one: its content lies elsewhere, where it "
+        "may change",
         where=str(path),
-        fix="put in its place what the link leads to; commands that write refuse a lake whose folders are links",
+        fix="put in its place what the link leads to; commands that write refuse a lake whose "
+        "folders are links",
     )
 
 
@@ -230,7 +259,9 @@ def _rows(lake: Lake, marked: Marked, foreign: Collection[Path]) -> list[Finding
                     fix="this is a defect of the lake: keep a copy and report it",
                 )
             )
-        fresh = table.filter(pa.array([identity not in identities for identity in ids], type=pa.bool_()))
+        fresh = table.filter(
+            pa.array([identity not in identities for identity in ids], type=pa.bool_())
+        )
         identities |= identities_here
         for row in fresh.to_pylist():
             if row["object"] not in gone:
@@ -242,7 +273,11 @@ _ROW_FIX = "withdraw the artifact and ingest its source again"
 
 
 def _row(
-    lake: Lake, row: dict[str, object], identities_here: set[str], ref: str, foreign: Collection[Path]
+    lake: Lake,
+    row: dict[str, object],
+    identities_here: set[str],
+    ref: str,
+    foreign: Collection[Path],
 ) -> list[Finding]:
     where = f"{row['kind']} {row['name']!r}, artifact {row['artifact']}, ref {ref}"
 
@@ -250,7 +285,13 @@ def _row(
         return Finding(kind=kind, severity=Severity.ERROR, what=message, where=where, fix=fix)
 
     if int(str(row["format_version"])) > FORMAT_VERSION:
-        return [error("newer-format", f"written by format {row['format_version']}", "install the newer flagdata")]
+        return [
+            error(
+                "newer-format",
+                f"written by format {row['format_version']}",
+                "install the newer flagdata",
+            )
+        ]
     try:
         artifact = Artifact.from_row(row)
     except FlagdataError as problem:
@@ -261,21 +302,35 @@ def _row(
         if parent not in identities_here
     ]
     if artifact.recording is not None and artifact.recording not in identities_here:
-        findings.append(error("parent-missing", f"its recording {artifact.recording} is not there", "align it again"))
+        findings.append(
+            error(
+                "parent-missing",
+                f"its recording {artifact.recording} is not there",
+                "align it again",
+            )
+        )
     if artifact.object is None and artifact.source_name is not None:
         findings.append(error("row-malformed", "it names no object", _ROW_FIX))
     if artifact.object is not None:
         again = made_again(artifact)
         if not lake.objects.has(artifact.object):
-            findings.append(error("dangling-row", f"its object {artifact.object} is missing", again))
+            findings.append(
+                error("dangling-row", f"its object {artifact.object} is missing", again)
+            )
         elif (
             artifact.object_bytes is not None
-            and not _is_among(lake.objects.path(artifact.object), foreign)  # of which a finding says more
+            and not _is_among(
+                lake.objects.path(artifact.object), foreign
+            )  # of which a finding says more
             and (size := lake.objects.size(artifact.object)) != artifact.object_bytes
         ):
             message = f"its object has {size} bytes instead of {artifact.object_bytes}"
             findings.append(
-                error("object-size", message, f"{again}. flagdata recover saves what a cut-off record still has")
+                error(
+                    "object-size",
+                    message,
+                    f"{again}. flagdata recover saves what a cut-off record still has",
+                )
             )
     return findings
 
@@ -308,7 +363,8 @@ def _erased_findings(lake: Lake, marked: Marked) -> list[Finding]:
             findings.append(
                 Finding.of(
                     "erased",
-                    f"{len(names)} rows have no data any more: they were erased, the last by version {version} "
+                    f"{len(names)} rows have no data any more: they were erased, the last by "
+                    f"version {version} "
                     f"({message})",
                     count=len(names),
                     where=f"ref {ref}",
@@ -325,13 +381,16 @@ def _unfinished_finding(lake: Lake, left: Unfinished) -> Finding:
     if left.kind == "erasure":
         return Finding.of(
             "erasure-unfinished",
-            f"version {left.version} erased {rest}the erasure was interrupted, or the disk refused it",
+            f"version {left.version} erased {rest}the erasure was interrupted, or the disk refused "
+            "it",
             where=where,
-            fix="run flagdata gc, which deletes it at once; or the same flagdata withdraw --everywhere again",
+            fix="run flagdata gc, which deletes it at once; or the same flagdata withdraw "
+            "--everywhere again",
         )
     return Finding.of(
         "expiry-unfinished",
-        f"version {left.version} let expire {rest}the expiry was interrupted, or the disk refused it",
+        f"version {left.version} let expire {rest}the expiry was interrupted, or the disk refused "
+        "it",
         where=where,
         fix="run flagdata gc: what expired goes at once, whatever its age",
     )
@@ -342,11 +401,13 @@ def _expired_findings(lake: Lake, marked: Marked, stored: Collection[str]) -> li
     return [
         Finding.of(
             "expired",
-            f"{len(gone)} of the objects that these versions show went when they expired, by version "
+            f"{len(gone)} of the objects that these versions show went when they expired, by "
+            "version "
             f"{removal.version} ({removal.reason})",
             count=len(gone),
             where=f"versions up to {up_to}",
-            fix=f"none needed; all branches and tags, and versions from {removal.version} on, are whole without them",
+            fix=f"none needed; all branches and tags, and versions from {removal.version} on, are "
+            "whole without them",
         )
         for removal in removals(lake.catalog.history())
         for up_to, objects in (removal.expired,)
@@ -355,32 +416,49 @@ def _expired_findings(lake: Lake, marked: Marked, stored: Collection[str]) -> li
 
 
 def _collected_findings(lake: Lake, marked: Marked, stored: Collection[str]) -> list[Finding]:
-    """Notes where gc has deleted what was withdrawn, so that older versions show rows without data."""
+    """Notes where gc has deleted what was withdrawn, so that older versions show rows without
+    data."""
     try:
         gone = lake.catalog.objects() - _needed_objects(marked) - frozenset(stored)
         removed = removals(lake.catalog.history())
         gone -= {name for removal in removed for name in removal.expired[1]}
-        last = next((r for r in removed if not gone.isdisjoint(rows_left(lake, r).values())), None) if gone else None
+        last = (
+            next((r for r in removed if not gone.isdisjoint(rows_left(lake, r).values())), None)
+            if gone
+            else None
+        )
     except FlagdataError as error:  # a file of which older versions are made
         kind = "catalog-file-unreadable"
-        return [Finding(kind=kind, severity=Severity.ERROR, what=error.what, where=error.where, fix=error.fix)]
+        return [
+            Finding(
+                kind=kind,
+                severity=Severity.ERROR,
+                what=error.what,
+                where=error.where,
+                fix=error.fix,
+            )
+        ]
     if last is None:
         return []
     return [
         Finding.of(
             "withdrawn-collected",
-            f"gc deleted what was withdrawn: {len(gone)} of the objects that older versions show; the last were"
+            f"gc deleted what was withdrawn: {len(gone)} of the objects that older versions show; "
+            "the last were"
             f" withdrawn by version {last.version} ({last.reason})",
             where=f"versions before {last.version}",
             count=len(gone),
-            fix=f"none needed; all tags, and versions from {last.version} on, are whole without them",
+            fix=f"none needed; all tags, and versions from {last.version} on, are whole without "
+            "them",
         )
     ]
 
 
 def _needed_objects(marked: Marked) -> frozenset[str]:
     """Names of the objects that a branch or tag shows."""
-    return frozenset(name for table in marked.refs.values() for name in table["object"].drop_null().to_pylist())
+    return frozenset(
+        name for table in marked.refs.values() for name in table["object"].drop_null().to_pylist()
+    )
 
 
 def _orphan(stored: StoredObject, limit: float, grace: timedelta) -> Finding:
@@ -388,14 +466,17 @@ def _orphan(stored: StoredObject, limit: float, grace: timedelta) -> Finding:
     return Finding(
         kind="orphan",
         severity=Severity.WARNING if old else Severity.NOTE,
-        what=f"no row refers to {stored.name} ({stored.size} B): its ingest did not finish, or its rows were withdrawn",
+        what=f"no row refers to {stored.name} ({stored.size} B): its ingest did not finish, or its "
+        "rows were withdrawn",
         where=str(stored.path),
         value=float(stored.size),
         fix="run flagdata gc" if old else f"none needed; flagdata gc takes it, {_later(grace)}",
     )
 
 
-def _left_uploads(lake: Lake, states: Sequence[LeaseState], limit: float, grace: timedelta) -> list[Finding]:
+def _left_uploads(
+    lake: Lake, states: Sequence[LeaseState], limit: float, grace: timedelta
+) -> list[Finding]:
     """Reports each upload to a bucket that was begun and not finished."""
     try:
         return [_left_upload(upload, limit, grace) for upload in left_uploads(lake, states)]
@@ -403,9 +484,11 @@ def _left_uploads(lake: Lake, states: Sequence[LeaseState], limit: float, grace:
         return [
             Finding.of(
                 "uploads-unlisted",
-                f"the store does not say whether parts of unfinished uploads are left: {error.strerror}",
+                "the store does not say whether parts of unfinished uploads are left: "
+                f"{error.strerror}",
                 where=str(lake.path),
-                fix=f"{error.fix}; or give the bucket a lifecycle rule that aborts incomplete multipart uploads",
+                fix=f"{error.fix}; or give the bucket a lifecycle rule that aborts incomplete "
+                "multipart uploads",
             )
         ]
 
@@ -432,7 +515,8 @@ def _strays(lake: Lake, foreign: Collection[Path]) -> list[Finding]:
         path
         for store, suffix in STORES.items()
         for path in (lake.path / store).glob("*")
-        if path not in paths_known and not OBJECT_NAME.fullmatch(f"{store}/{path.name.removesuffix(suffix + DAMAGED)}")
+        if path not in paths_known
+        and not OBJECT_NAME.fullmatch(f"{store}/{path.name.removesuffix(suffix + DAMAGED)}")
     ]
     strays = [path for path in [*strays, *lake.refs.strays()] if not is_beside(path.name)]
     return [
@@ -440,7 +524,8 @@ def _strays(lake: Lake, foreign: Collection[Path]) -> list[Finding]:
             "stray-file",
             "neither an object nor a tag or branch: it has no name of theirs",
             where=str(path),
-            fix="flagdata did not put it there: move it out of the lake (and flagdata ingest it from there, if it is"
+            fix="flagdata did not put it there: move it out of the lake (and flagdata ingest it "
+            "from there, if it is"
             " a recording)",
         )
         for path in sorted(strays)  # type: ignore[type-var]
@@ -448,7 +533,8 @@ def _strays(lake: Lake, foreign: Collection[Path]) -> list[Finding]:
 
 
 def _label_clashes(lake: Lake, marked: Marked) -> list[Finding]:
-    """Warns of labels that are no columns together, which an earlier version let a merge bring together."""
+    """Warns of labels that are no columns together, which an earlier version let a merge bring
+    together."""
     if marked.findings:
         return []
     return [
@@ -465,8 +551,8 @@ def _label_clashes(lake: Lake, marked: Marked) -> list[Finding]:
 
 
 def _ref_files(lake: Lake) -> list[Finding]:
-    """Writes the files of refs anew that do not say what the log says, with the mark of the newest version where all of
-    `refs/` is lost, and notes which they were."""
+    """Writes the files of refs anew that do not say what the log says, with the mark of the newest
+    version where all of `refs/` is lost, and notes which they were."""
     try:
         stale = lake.refs.stale_files()
     except FlagdataError:  # of which the refs' own finding says more
@@ -479,13 +565,19 @@ def _ref_files(lake: Lake) -> list[Finding]:
         lake.catalog.renew_mark()
         done, fix = "written anew from the log", "none needed"
     except (OSError, FlagdataError):
-        done, fix = "the lake can only be read, so that they stay as they are", "none needed: the log says what counts"
-    message = f"{count_of(len(stale), 'file')} of tags and branches did not say what the log says: {done}"
+        done, fix = (
+            "the lake can only be read, so that they stay as they are",
+            "none needed: the log says what counts",
+        )
+    message = (
+        f"{count_of(len(stale), 'file')} of tags and branches did not say what the log says: {done}"
+    )
     return [Finding.of("ref-file-stale", message, where=str(stale[0]), count=len(stale), fix=fix)]
 
 
 def _system_files(lake: Lake) -> list[Finding]:
-    """Notes files of an operating system in the lake's folders; what lies in objects is passed over."""
+    """Notes files of an operating system in the lake's folders; what lies in objects is passed
+    over."""
     lock_names = {COLLECT, TURN}
     system_files = sorted(
         str(path)
@@ -495,12 +587,19 @@ def _system_files(lake: Lake) -> list[Finding]:
     )
     if not system_files:
         return []
-    message = f"{count_of(len(system_files), 'file')} of an operating system, as .DS_Store: passed over"
+    message = (
+        f"{count_of(len(system_files), 'file')} of an operating system, as .DS_Store: passed over"
+    )
     fix = "none needed; they may be deleted"
     note = Severity.NOTE
     return [
         Finding(
-            kind="files-beside", severity=note, what=message, where=system_files[0], count=len(system_files), fix=fix
+            kind="files-beside",
+            severity=note,
+            what=message,
+            where=system_files[0],
+            count=len(system_files),
+            fix=fix,
         )
     ]
 
@@ -509,7 +608,10 @@ def _abandoned_finding(state: LeaseState) -> Finding:
     records = sorted(state.folder.glob("*.mcap"))
     fix = "run flagdata gc"
     if records:
-        fix = f"run flagdata gc; to save its unfinished record first: {command_line('flagdata', 'recover', records[0])}"
+        fix = (
+            "run flagdata gc; to save its unfinished record first: "
+            f"{command_line('flagdata', 'recover', records[0])}"
+        )
     return Finding.of(
         "staging-left",
         f"a transaction ended without finishing ({state.owner})",

@@ -1,9 +1,10 @@
 """Labels as columns: which names and values go together, and the column that each name becomes.
 
-Queries see the label `note` as the column `label_note`. SQL takes capitals for small letters, and a column has one
-type; so no commit brings together two names that differ by capitals only, or values of two types under one name. Lakes
-of earlier versions may have such labels: then the second name has a number behind it, and values of several types are
-texts.
+Queries see the label `note` as the column `label_note`. SQL takes capitals for small letters, and a
+column has one type; so no commit brings together two names that differ by capitals only, or values
+of two types under one name. Lakes
+of earlier versions may have such labels: then the second name has a number behind it, and values of
+several types are texts.
 """
 
 from __future__ import annotations
@@ -34,7 +35,8 @@ class Clash:
     Attributes:
         names: that SQL takes for one, or the one name whose values are of two types; sorted.
         what: the clash, as a sentence.
-        ways: label → artifacts that it may be taken off, sorted, each of which ends the clash; the best first.
+        ways: label → artifacts that it may be taken off, sorted, each of which ends the clash; the
+            best first.
         advice: what is to be achieved.
     """
 
@@ -47,7 +49,8 @@ class Clash:
         """Explains how the label is taken off.
 
         Args:
-            homes: branch → the labels of its artifacts, in the order in which branches are to be changed.
+            homes: branch → the labels of its artifacts, in the order in which branches are to be
+                changed.
         """
         for name, holders in self.ways:
             commands, rest = [], [*holders]
@@ -56,8 +59,14 @@ class Clash:
                 rest = [artifact for artifact in rest if artifact not in here]
                 where = () if branch == MAIN else ("--branch", branch)
                 if here:
-                    commands.append(command_line("flagdata", "label", *here[:_NAMED], f"{name}=", *where))
-            more = f"; then repeat this, for the rest of the {len(holders)}" if len(holders) > _NAMED else ""
+                    commands.append(
+                        command_line("flagdata", "label", *here[:_NAMED], f"{name}=", *where)
+                    )
+            more = (
+                f"; then repeat this, for the rest of the {len(holders)}"
+                if len(holders) > _NAMED
+                else ""
+            )
             if commands:
                 return f"{self.advice}; {' and '.join(commands)} takes the other off{more}"
         return self.advice
@@ -76,7 +85,8 @@ def clashes(labels: Labels) -> Iterator[Clash]:
         for other in others:
             yield Clash(
                 names=(first, other),
-                what=f"the labels {other} and {first} are one column in SQL, which takes capitals for small letters",
+                what=f"the labels {other} and {first} are one column in SQL, which takes capitals "
+                "for small letters",
                 ways=tuple((name, tuple(sorted(holders[name]))) for name in (other, first)),
                 advice="keep one of the two names",
             )
@@ -85,11 +95,14 @@ def clashes(labels: Labels) -> Iterator[Clash]:
         for artifact in holders[name]:
             kinds.setdefault(kind(labels[artifact][name]), []).append(artifact)
         if len(kinds) > 1:
-            (one, ones), (other, others) = sorted(kinds.items(), key=lambda item: len(item[1]), reverse=True)[:2]
+            (one, ones), (other, others) = sorted(
+                kinds.items(), key=lambda item: len(item[1]), reverse=True
+            )[:2]
             first, second = (repr(labels[holding[0]][name]) for holding in (ones, others))
             yield Clash(
                 names=(name,),
-                what=f"{name} is a {one} on some artifacts, as {first}, and a {other} on others, as {second}",
+                what=f"{name} is a {one} on some artifacts, as {first}, and a {other} on others, "
+                f"as {second}",
                 ways=((name, tuple(sorted(others))), (name, tuple(sorted(ones)))),
                 advice="give all of them values of one type",
             )
@@ -112,13 +125,19 @@ def check_labels(before: Labels, after: Labels, *, homes: Mapping[str, Labels]) 
 
 def kind(value: Value) -> str:
     """Names the type of a label's value in words."""
-    return "truth value" if isinstance(value, bool) else "text" if isinstance(value, str) else "number"
+    return (
+        "truth value" if isinstance(value, bool) else "text" if isinstance(value, str) else "number"
+    )
 
 
 def shown_labels(catalog: pa.Table) -> dict[str, dict[str, Value]]:
     """Returns the labels of the artifacts that a table of rows has."""
     labels = labels_of(catalog)
-    return {artifact: labels[artifact] for artifact in catalog["artifact"].to_pylist() if artifact in labels}
+    return {
+        artifact: labels[artifact]
+        for artifact in catalog["artifact"].to_pylist()
+        if artifact in labels
+    }
 
 
 def columns(catalog: pa.Table) -> dict[str, pa.Array]:

@@ -1,5 +1,6 @@
-"""The three-way merge of labels, artifact by artifact and name by name: what one of two branches changed since the two
-last had the same counts. What both changed, to different values, is refused: nobody but the user knows which is right.
+"""The three-way merge of labels, artifact by artifact and name by name: what one of two branches
+changed since the two last had the same counts. What both changed, to different values, is refused:
+nobody but the user knows which is right.
 """
 
 from __future__ import annotations
@@ -39,12 +40,16 @@ def merge_labels(
         ConflictError: both changed a label of an artifact that both show, to different values.
     """
     lineage = lake.lineage()
-    before, own, other = ({} if part is None else lineage.labels(part) for part in (base, ours, theirs))
+    before, own, other = (
+        {} if part is None else lineage.labels(part) for part in (base, ours, theirs)
+    )
     merged: Merged = {}
     for artifact in sorted(own.keys() | other.keys()):
         mine, its = own.get(artifact, {}), other.get(artifact, {})
         if artifact in here and artifact in there:
-            values = _merge_labels(artifact, before.get(artifact, {}), mine, its, ours=ours, theirs=theirs)
+            values = _merge_labels(
+                artifact, before.get(artifact, {}), mine, its, ours=ours, theirs=theirs
+            )
         else:
             values = mine if artifact in here else its
         if values:
@@ -52,11 +57,14 @@ def merge_labels(
     return merged
 
 
-def amended_labels(read: Labels, wanted: Labels, shown: Collection[str]) -> dict[str, dict[str, Value | None]]:
+def amended_labels(
+    read: Labels, wanted: Labels, shown: Collection[str]
+) -> dict[str, dict[str, Value | None]]:
     """Returns what a merge has to note so that labels come out right.
 
     Args:
-        read: what readers take from the commits of both branches, the later one first where both put a label.
+        read: what readers take from the commits of both branches, the later one first where both
+            put a label.
         wanted: what `merge_labels` returned.
         shown: ids of the artifacts that are shown afterwards.
     """
@@ -87,7 +95,14 @@ def _merge_labels(
     for name in sorted(mine.keys() | its.keys()):
         was, own, other = (_typed_value(labels.get(name)) for labels in (before, mine, its))
         if own != other and was not in (own, other):
-            raise _both_changed(artifact, name, mine.get(name), its.get(name), ours=ours.branch, theirs=theirs.branch)
+            raise _both_changed(
+                artifact,
+                name,
+                mine.get(name),
+                its.get(name),
+                ours=ours.branch,
+                theirs=theirs.branch,
+            )
         value = its.get(name) if own == was else mine.get(name)
         if value is not None:
             values[name] = value
@@ -106,7 +121,8 @@ def _both_changed(
     given = f"{name}={'' if mine is None else json.dumps(mine, ensure_ascii=False)}"
     where = () if theirs == MAIN else ("--branch", theirs)
     return ConflictError(
-        f"both branches changed the label {name}: on {ours!r} it is {_shown(mine)}, on {theirs!r} {_shown(its)}",
+        f"both branches changed the label {name}: on {ours!r} it is {_shown(mine)}, on {theirs!r} "
+        f"{_shown(its)}",
         where=f"artifact {artifact}",
         fix=f"give both the value of {ours!r}, or another: "
         f"{command_line('flagdata', 'label', artifact, given, *where)}; then merge again",

@@ -1,8 +1,9 @@
-"""The user's own columns: values by name that are put on artifacts, typed, versioned with the branch they are put on.
+"""The user's own columns: values by name that are put on artifacts, typed, versioned with the
+branch they are put on.
 
-They are notes of commits, not columns of the stored catalog, so that programs that know nothing of them read the lake
-as before. `Store.table` hands them on in its schema's metadata; queries see each as a column, see
-`flagdata.lake.label_columns`.
+They are notes of commits, not columns of the stored catalog, so that programs that know nothing of
+them read the lake as before. `Store.table` hands them on in its schema's metadata; queries see each
+as a column, see `flagdata.lake.label_columns`.
 """
 
 from __future__ import annotations
@@ -25,11 +26,12 @@ _LONGEST = 1000  # characters of a text
 
 
 def given(text: str) -> tuple[str, Value | None]:
-    """Name and value of "name=value": true and false, a number, else a text; in double quotes always a text. Nothing
-    behind the sign takes the label off.
+    """Name and value of "name=value": true and false, a number, else a text; in double quotes
+    always a text. Nothing behind the sign takes the label off.
 
     Raises:
-        UsageError: no name and value, a name that cannot be a column, a number that is not finite, or a long text.
+        UsageError: no name and value, a name that cannot be a column, a number that is not finite,
+            or a long text.
     """
     name, sign, written = text.partition("=")
     if not sign:
@@ -50,19 +52,29 @@ def _check(name: str, value: Value | None) -> None:
     """Checks whether a name and value make a label.
 
     Raises:
-        UsageError: a name that cannot be a column, a number that is not finite or too large, or a long text.
+        UsageError: a name that cannot be a column, a number that is not finite or too large, or a
+            long text.
     """
     if not _NAME.fullmatch(name):
         fix = "a name is of letters, digits and underscores, a letter first"
         raise UsageError(f"{name!r} is no name of a label", fix=fix)
     if isinstance(value, int | float) and not abs(value) <= sys.float_info.max:  # a NaN neither
-        raise UsageError(f"{name} is no finite number", fix="leave the label out where nobody knows")
+        raise UsageError(
+            f"{name} is no finite number", fix="leave the label out where nobody knows"
+        )
     if isinstance(value, str) and (len(value) > _LONGEST or not value.isprintable()):
-        raise UsageError(f"the text of {name} is longer than {_LONGEST}, or not printable", fix="shorten it")
+        raise UsageError(
+            f"the text of {name} is longer than {_LONGEST}, or not printable", fix="shorten it"
+        )
 
 
 def put(
-    lake: Store, artifacts: Collection[str], values: Mapping[str, Value | None], message: str, *, branch: str
+    lake: Store,
+    artifacts: Collection[str],
+    values: Mapping[str, Value | None],
+    message: str,
+    *,
+    branch: str,
 ) -> tuple[int, frozenset[str]]:
     """Puts labels on artifacts, see `Lake.label`."""
 

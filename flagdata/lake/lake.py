@@ -38,24 +38,31 @@ from flagdata.storage import Place, RemotePath
 MARKER = "lake.json"
 """The file that says that a folder is a lake, and which."""
 _MARKER_SCHEMA = "flagdata.lake/1"
-_UNUSABLE = re.compile("[\\\\\ud800-\udfff]")  # the Delta library takes a backslash for a separator; no UTF-8
-_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")  # the Delta library leaves tabs and line breaks out of a path
+_UNUSABLE = re.compile(
+    "[\\\\\ud800-\udfff]"
+)  # the Delta library takes a backslash for a separator; no UTF-8
+_CONTROL = re.compile(
+    "[\x00-\x1f\x7f-\x9f\u2028\u2029]"
+)  # the Delta library leaves tabs and line breaks out of a path
 
 
 class Lake(Store):
     """A lake in a folder; make it by `create` or `open`. Cheap, picklable, keeps nothing open.
 
-    The catalog must not be used in a forked child of a process that used it (it says so); objects may be read anywhere.
+    The catalog must not be used in a forked child of a process that used it (it says so); objects
+    may be read anywhere.
     """
 
     @classmethod
     def create(cls, path: Place | str) -> Lake:
-        """Make an empty lake in the folder `path`, which may exist if it is empty, or at `s3://bucket/prefix`.
+        """Make an empty lake in the folder `path`, which may exist if it is empty, or at
+        `s3://bucket/prefix`.
 
         Raises:
             ConflictError: a lake, or anything else, is there.
             UsageError: any other address, or a path that the Delta library cannot work in.
-            RefusedError: a disk or store that lacks what every commit relies on, see `flagdata.lake.place_probing`.
+            RefusedError: a disk or store that lacks what every commit relies on, see
+                `flagdata.lake.place_probing`.
         """
         return cls._make(path, lambda lake: lake._fill())
 
@@ -66,7 +73,11 @@ class Lake(Store):
             if lake._is_occupied():
                 raise lake._taken()
             if not lake._claim():
-                raise ConflictError("another process is making a lake there", where=str(lake.path), fix="open that one")
+                raise ConflictError(
+                    "another process is making a lake there",
+                    where=str(lake.path),
+                    fix="open that one",
+                )
             try:
                 lake._clear()
                 probe(lake.staging)
@@ -86,19 +97,24 @@ class Lake(Store):
         """Returns the error for a lake that cannot be made since something is there."""
         where = str(self.path)
         if (self.path / MARKER).exists():
-            return ConflictError("there is a lake already", where=where, fix="choose an empty or new folder")
+            return ConflictError(
+                "there is a lake already", where=where, fix="choose an empty or new folder"
+            )
         inside = {path.name for path in self._entries()} if self.path.is_dir() else set()
         if STAGING in inside and inside <= {*FOLDERS, MARKER}:
             return ConflictError(
                 "a lake is being made there, or its making was stopped",
                 where=where,
-                fix="wait for it; where no process is making it, delete what is there and give the command again",
+                fix="wait for it; where no process is making it, delete what is there and give the "
+                "command again",
             )
-        return ConflictError("there is something else already", where=where, fix="choose an empty or new folder")
+        return ConflictError(
+            "there is something else already", where=where, fix="choose an empty or new folder"
+        )
 
     def _is_occupied(self) -> bool:
-        """Checks whether anything is there but, in a bucket, what a process left that was killed while it made a
-        lake."""
+        """Checks whether anything is there but, in a bucket, what a process left that was killed
+        while it made a lake."""
         if isinstance(self.staging, RemotePath):
             has_more = any(entry != self.staging for entry in self._entries())
             return has_more and not TimedLocks(self.staging).unfinished(done=self.path / MARKER)
@@ -113,7 +129,8 @@ class Lake(Store):
                     entry.unlink()
 
     def _claim(self) -> bool:
-        """Checks whether this process makes the lake: the one that succeeds in making its staging."""
+        """Checks whether this process makes the lake: the one that succeeds in making its
+        staging."""
         if isinstance(self.staging, RemotePath):
             self.check_writable()
             return TimedLocks(self.staging).is_claimed(done=self.path / MARKER)
@@ -126,7 +143,8 @@ class Lake(Store):
 
     @classmethod
     def adopt(cls, path: Place | str, source: Lake) -> Lake:
-        """Make a lake at `path` whose history begins as that of `source`: its first version, nothing in it yet.
+        """Make a lake at `path` whose history begins as that of `source`: its first version,
+        nothing in it yet.
 
         Raises:
             ConflictError, UsageError, RefusedError: as `create`.
@@ -153,17 +171,22 @@ class Lake(Store):
                 raise ValueError("it states no version of the format")
         except (FileNotFoundError, NotADirectoryError):
             raise NotFoundError(
-                "there is no lake here", where=str(lake.path), fix="make one with flagdata init, or name one by --lake"
+                "there is no lake here",
+                where=str(lake.path),
+                fix="make one with flagdata init, or name one by --lake",
             ) from None
         except (ValueError, KeyError, TypeError):
-            raise CorruptError("the lake's marker cannot be read", where=str(marker), fix=HEAL) from None
+            raise CorruptError(
+                "the lake's marker cannot be read", where=str(marker), fix=HEAL
+            ) from None
         if version > FORMAT_VERSION:
             raise newer(f"it has format {version}", lake.path)
         return lake
 
     @classmethod
     def found(cls, path: Place | str) -> Lake:
-        """Finds what there is of the lake at `path`, for what heals it: its marker, or its log, may be damaged or gone.
+        """Finds what there is of the lake at `path`, for what heals it: its marker, or its log, may
+        be damaged or gone.
 
         Raises:
             NotFoundError: no lake there.
@@ -173,7 +196,9 @@ class Lake(Store):
             return cls.open(path)
         except (CorruptError, NotFoundError):
             lake = cls(_usable(path))
-            if any(map(names_in, (lake.path / "catalog" / "_delta_log", lake.path / "refs" / "newest"))):
+            if any(
+                map(names_in, (lake.path / "catalog" / "_delta_log", lake.path / "refs" / "newest"))
+            ):
                 return lake
             if (lake.path / MARKER).exists():
                 return lake
@@ -186,7 +211,9 @@ class Lake(Store):
             put_if_absent(self.path / MARKER, stream.read())
 
     def _fill(self) -> None:
-        self.catalog.create({"message": "create the lake", "code_version": provenance.code_version()})
+        self.catalog.create(
+            {"message": "create the lake", "code_version": provenance.code_version()}
+        )
         marker = {
             "schema": _MARKER_SCHEMA,
             "format_version": FORMAT_VERSION,
@@ -196,8 +223,8 @@ class Lake(Store):
         put_if_absent(self.path / MARKER, (json.dumps(marker, indent=2) + "\n").encode())
 
     def transaction(self, message: str, *, branch: str = MAIN) -> Transaction:
-        """Opens a context manager that collects objects and rows, publishes all when its block ends, nothing when that
-        raises.
+        """Opens a context manager that collects objects and rows, publishes all when its block
+        ends, nothing when that raises.
 
         Raises:
             NotFoundError: no such branch.
@@ -219,8 +246,8 @@ class Lake(Store):
             raise explain_missing(self, object, error) from None
 
     def record_place(self, object: str) -> Place:  # noqa: A002 — the catalog's name for it
-        """Returns where `flagdata.record.Record.open` reads a record from: of a large one in a bucket the parts that
-        are used.
+        """Returns where `flagdata.record.Record.open` reads a record from: of a large one in a
+        bucket the parts that are used.
 
         Raises:
             InputError, NotFoundError: as `object_path`.
@@ -231,8 +258,8 @@ class Lake(Store):
             raise explain_missing(self, object, error) from None
 
     def openers(self, objects: Sequence[str]) -> tuple[Callable[[], Place], ...]:
-        """Returns for each record a function that gives its place as `record_place` does, when it is needed; workers
-        that read records take these with them.
+        """Returns for each record a function that gives its place as `record_place` does, when it
+        is needed; workers that read records take these with them.
 
         Raises:
             NotFoundError: as `object_path`.
@@ -264,7 +291,9 @@ class Lake(Store):
         """
         return self.view(at)[0].version
 
-    def tag(self, name: str, *, at: str | None = None, notes: Mapping[str, str] | None = None) -> Ref:
+    def tag(
+        self, name: str, *, at: str | None = None, notes: Mapping[str, str] | None = None
+    ) -> Ref:
         """Name what `at` shows, for good.
 
         Args:
@@ -272,17 +301,19 @@ class Lake(Store):
 
         Raises:
             UsageError: a name that cannot be one.
-            ConflictError: the name is taken, or was that of a tag that showed other artifacts; or some of the data
-                went, with versions that expired or collected by gc.
+            ConflictError: the name is taken, or was that of a tag that showed other artifacts; or
+                some of the data went, with versions that expired or collected by gc.
         """
         return make_ref(self, "tags", name, at=at, notes=notes or {})
 
     def branch(self, name: str, *, at: str | None = None) -> Ref:
-        """Begin a branch from what `at` shows, without what was erased since, which is on no branch.
+        """Begin a branch from what `at` shows, without what was erased since, which is on no
+        branch.
 
         Raises:
             UsageError: a name that cannot be one.
-            ConflictError: the name is taken; some of the data went, as for a tag, or were made from what was erased.
+            ConflictError: the name is taken; some of the data went, as for a tag, or were made from
+                what was erased.
         """
         return make_ref(self, "branches", name, at=at, notes={})
 
@@ -301,7 +332,8 @@ class Lake(Store):
         return delete_ref(self, "tags", name, message, discard=discard)
 
     def delete_branch(self, name: str, message: str | None = None, *, discard: bool = False) -> int:
-        """Delete a branch; the version that takes its rows off. Tags, commits and branches made from it stay.
+        """Delete a branch; the version that takes its rows off. Tags, commits and branches made
+        from it stay.
 
         Args:
             discard: also where it alone shows some rows.
@@ -314,35 +346,44 @@ class Lake(Store):
         return delete_ref(self, "branches", name, message, discard=discard)
 
     def merge(self, branch: str, message: str, *, into: str = MAIN) -> MergeResult:
-        """Commit on `into` what `branch` changed since the two last had the same: its new rows come, rows that it
-        withdrew go. Rows that `into` withdrew meanwhile stay withdrawn. See `flagdata.lake.merging`.
+        """Commit on `into` what `branch` changed since the two last had the same: its new rows
+        come, rows that it withdrew go. Rows that `into` withdrew meanwhile stay withdrawn. See
+        `flagdata.lake.merging`.
 
         Raises:
             NotFoundError: no such branch, or an object of a new row is missing.
-            ConflictError: a row would lack what it was made from, which was withdrawn on the other branch.
+            ConflictError: a row would lack what it was made from, which was withdrawn on the other
+                branch.
             UsageError: no message, or a branch into itself.
         """
         return merge(self, branch, message, into=into)
 
     def withdraw(self, artifacts: Sequence[str], message: str, *, branch: str = MAIN) -> Withdrawal:
-        """Take rows off a branch, in one commit; clips that are slices of a withdrawn recording go along with it.
+        """Take rows off a branch, in one commit; clips that are slices of a withdrawn recording go
+        along with it.
 
-        The branch that this one began from keeps showing its own; tags made before keep showing them. Their objects
-        stay for as long as a tag or another branch needs them, and then for the grace period of garbage collection.
+        The branch that this one began from keeps showing its own; tags made before keep showing
+        them. Their objects stay for as long as a tag or another branch needs them, and then for the
+        grace period of garbage collection.
 
         Args:
             artifacts: full ids.
 
         Raises:
             NotFoundError: one that the branch does not show.
-            ConflictError: a row that stays on the branch was made from one of them; see `descendants`.
+            ConflictError: a row that stays on the branch was made from one of them; see
+                `descendants`.
         """
         return withdraw(self, artifacts, message, branch=branch)
 
-    def erase(self, artifacts: Sequence[str], message: str, *, with_descendants: bool = False) -> Erasure:
-        """Take rows off every branch and delete their bytes at once, also where tags or older versions show them.
+    def erase(
+        self, artifacts: Sequence[str], message: str, *, with_descendants: bool = False
+    ) -> Erasure:
+        """Take rows off every branch and delete their bytes at once, also where tags or older
+        versions show them.
 
-        Their rows stay in tags and in older versions, which say that the data were erased, and by which version.
+        Their rows stay in tags and in older versions, which say that the data were erased, and by
+        which version.
 
         Args:
             artifacts: full ids.
@@ -351,14 +392,21 @@ class Lake(Store):
         Raises:
             NotFoundError: one that no ref shows.
             ConflictError: a row that stays was made from one of them.
-            CorruptError: a ref cannot be read, so that what other rows need is unknown; nothing was deleted.
+            CorruptError: a ref cannot be read, so that what other rows need is unknown; nothing was
+                deleted.
         """
         return erase(self, artifacts, message, with_descendants=with_descendants)
 
     def label(
-        self, artifacts: Sequence[str], values: Mapping[str, Value | None], message: str, *, branch: str = MAIN
+        self,
+        artifacts: Sequence[str],
+        values: Mapping[str, Value | None],
+        message: str,
+        *,
+        branch: str = MAIN,
     ) -> tuple[int, frozenset[str]]:
-        """Put the user's own values on artifacts, a recording's on its clips too: the version, and the ids of all.
+        """Put the user's own values on artifacts, a recording's on its clips too: the version, and
+        the ids of all.
 
         Args:
             artifacts: full ids.
@@ -371,11 +419,13 @@ class Lake(Store):
         return put(self, artifacts, values, message, branch=branch)
 
     def descendants(self, artifacts: Collection[str], *, at: str | None = None) -> frozenset[str]:
-        """Ids of all rows at a ref that were made from `artifacts` (full ids), directly or not; without these."""
+        """Ids of all rows at a ref that were made from `artifacts` (full ids), directly or not;
+        without these."""
         return descendants(self.columns(self.view(at), ["artifact", "parents"]), artifacts)
 
     def unpublished_files(self) -> list[Place]:
-        """Files that a process left which died while it wrote to the catalog or the refs, or made the lake."""
+        """Files that a process left which died while it wrote to the catalog or the refs, or made
+        the lake."""
         return [*self.catalog.unpublished_files(), *scratch_files(self.path)]
 
 
@@ -398,7 +448,9 @@ def _usable(path: Place | str) -> Place:
             return location
         absolute = location.resolve()
     except (OSError, RuntimeError, ValueError) as error:  # links in a circle, a null byte
-        raise UsageError(f"this is not a path: {error}", where=repr(str(path)), fix="name another folder") from None
+        raise UsageError(
+            f"this is not a path: {error}", where=repr(str(path)), fix="name another folder"
+        ) from None
     if _CONTROL.search(str(absolute)):
         raise UsageError(
             "the path of a lake cannot have a line break, a tab or another control character",
@@ -411,7 +463,9 @@ def _usable(path: Place | str) -> Place:
             where=str(absolute).encode(errors="backslashreplace").decode(),
             fix="rename the folder",
         )
-    if unquote(str(absolute)) != str(absolute):  # deltalake 1.6 decodes such a path twice, and looks elsewhere
+    if unquote(str(absolute)) != str(
+        absolute
+    ):  # deltalake 1.6 decodes such a path twice, and looks elsewhere
         raise UsageError(
             "the path of a lake cannot have a percent sign before two hexadecimal digits",
             where=str(absolute),

@@ -1,6 +1,8 @@
-"""The lake's own folders: none is a link, all can be written before work begins, and what in them is no plain file.
+"""The lake's own folders: none is a link, all can be written before work begins, and what in them
+is no plain file.
 
-Reading follows links, as a copy made of links needs. Whatever writes or deletes refuses a lake whose folders are not
+Reading follows links, as a copy made of links needs. Whatever writes or deletes refuses a lake
+whose folders are not
 its own: through a linked store it would change files of another lake.
 """
 
@@ -18,9 +20,18 @@ from flagdata.storage import Place, RemotePath
 
 STORES = {"mcap": ".mcap", "zarr": ".zarr", "model": ".model"}
 STAGING = "staging"
-_NOTES = ("catalog", "catalog/_delta_log", "refs", "refs/tags", "refs/branches", "refs/newest", "refs/history")
+_NOTES = (
+    "catalog",
+    "catalog/_delta_log",
+    "refs",
+    "refs/tags",
+    "refs/branches",
+    "refs/newest",
+    "refs/history",
+)
 FOLDERS = (*_NOTES, STAGING, *STORES)
-"""All folders of a lake, each after the one it is in; a store or mark that is missing is made when needed."""
+"""All folders of a lake, each after the one it is in; a store or mark that is missing is made when
+needed."""
 
 
 class LinkError(CorruptError):
@@ -30,7 +41,8 @@ class LinkError(CorruptError):
 
 
 def check_own(root: Place) -> None:
-    """Checks whether all folders of the lake at `root`, a path without links, are folders of the lake itself.
+    """Checks whether all folders of the lake at `root`, a path without links, are folders of the
+    lake itself.
 
     Raises:
         LinkError: one is a link, or no folder.
@@ -40,15 +52,16 @@ def check_own(root: Place) -> None:
     for path in (root / name for name in FOLDERS):
         if os.path.lexists(path) and not stat.S_ISDIR(path.lstat().st_mode):
             raise LinkError(
-                "a folder of this lake is a link, or no folder: writing would change what lies elsewhere",
+                "a folder of this lake is a link, or no folder: writing would change what lies "
+                "elsewhere",
                 where=str(path),
                 fix="put the folder itself in its place: move it here, or mount its disk here",
             )
 
 
 def check_writable(root: Place) -> None:
-    """Checks whether this process may write in the lake at `root`, as far as that can be said without writing:
-    `flagdata.lake.place_probing` says the rest.
+    """Checks whether this process may write in the lake at `root`, as far as that can be said
+    without writing: `flagdata.lake.place_probing` says the rest.
 
     Raises:
         LinkError: as `check_own`.
@@ -75,11 +88,14 @@ def scratch_files(root: Place) -> Sequence[Place]:
     if isinstance(root, RemotePath):
         return []
     folders = [root, *(root / name for name in _NOTES)]
-    return sorted(path for folder in folders for path in folder.glob(".*") if SCRATCH.fullmatch(path.name))
+    return sorted(
+        path for folder in folders for path in folder.glob(".*") if SCRATCH.fullmatch(path.name)
+    )
 
 
 def foreign_entries(root: Place) -> Iterator[Path]:
-    """Links and special files anywhere in the lake at `root`, but what lies in its staging; no link is followed."""
+    """Links and special files anywhere in the lake at `root`, but what lies in its staging; no link
+    is followed."""
     if isinstance(root, RemotePath):
         return
     inside = [root]

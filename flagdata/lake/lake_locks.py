@@ -1,25 +1,28 @@
-"""Locks and notes of the processes that use a lake, by the place of its `staging/`: `KernelLocks` on a disk,
-`TimedLocks` in a bucket. `flagdata.lake.leases` says what they are for.
+"""Locks and notes of the processes that use a lake, by the place of its `staging/`: `KernelLocks`
+on a disk, `TimedLocks` in a bucket. `flagdata.lake.leases` says what they are for.
 
-On a disk the kernel drops a lock when the process that has it ends, however it ends. Locks work between processes of
-one machine, and over file systems that carry flock between machines (NFS 4, Lustre).
+On a disk the kernel drops a lock when the process that has it ends, however it ends. Locks work
+between processes of one machine, and over file systems that carry flock between machines (NFS 4,
+Lustre).
 
     staging/.collect      the lock, taken shared or exclusively behind the turnstile staging/.turn
     staging/ID/lease      a running transaction, locked by it: its owner, and the objects it holds, a line each
 
-In a bucket no kernel does that. Each lock and note is an object that its holder writes anew every few seconds; the
-store's own clock says when it was written last. One that was not for `LIFE` seconds is void. A process that finds one
-made on its own machine by a process that has ended need not wait for that.
+In a bucket no kernel does that. Each lock and note is an object that its holder writes anew every
+few seconds; the store's own clock says when it was written last. One that was not for `LIFE`
+seconds is void. A process that finds one made on its own machine by a process that has ended need
+not wait for that.
 
     staging/collect       the exclusive lock: taken by `create`, or from a dead holder by a conditional put
     staging/shared/ID     a holder of the shared lock
     staging/ID/lease      as on a disk
 
-Who wants the shared lock puts an object and then looks for the exclusive one; who wants that puts it and then looks for
-shared ones. A store answers each read with what was put before, so of two that come at once at least one sees the
-other, and the one who shares withdraws. A transaction that relies on an object puts its lease so, and then waits until
-nobody has the exclusive lock: a collection that begins later sees the lease. A holder that could not write for half of
-`LIFE` does not publish and deletes nothing more: see `Held.check`.
+Who wants the shared lock puts an object and then looks for the exclusive one; who wants that puts
+it and then looks for shared ones. A store answers each read with what was put before, so of two
+that come at once at least one sees the other, and the one who shares withdraws. A transaction that
+relies on an object puts its lease so, and then waits until
+nobody has the exclusive lock: a collection that begins later sees the lease. A holder that could
+not write for half of `LIFE` does not publish and deletes nothing more: see `Held.check`.
 """
 
 from __future__ import annotations
@@ -130,12 +133,17 @@ class KernelLocks:
 
     @contextmanager
     def _hold_lock(self, mode: int) -> Iterator[None]:
-        """Takes the lock behind a turnstile: a process that waits for it holds the turnstile, so that a stream of
-        shared holders cannot keep an exclusive one out for ever. Not to be nested."""
+        """Takes the lock behind a turnstile: a process that waits for it holds the turnstile, so
+        that a stream of shared holders cannot keep an exclusive one out for ever. Not to be
+        nested."""
         with ExitStack() as stack:
             with _open_lock(self.staging / TURN) as turn:
                 lock(turn, fcntl.LOCK_EX, where=self.staging)
-                lock(stack.enter_context(_open_lock(self.staging / COLLECT)), mode, where=self.staging)
+                lock(
+                    stack.enter_context(_open_lock(self.staging / COLLECT)),
+                    mode,
+                    where=self.staging,
+                )
             yield
 
 
@@ -148,7 +156,11 @@ class FileNote:
 
     def __init__(self, locks: KernelLocks) -> None:
         self._locks = locks
-        owner = {"pid": os.getpid(), "host": socket.gethostname(), "since": datetime.now(UTC).isoformat()}
+        owner = {
+            "pid": os.getpid(),
+            "host": socket.gethostname(),
+            "since": datetime.now(UTC).isoformat(),
+        }
         with locks.sharing():
             self.folder = locks.staging / uuid.uuid4().hex
             self.folder.mkdir()
@@ -210,7 +222,9 @@ def _plain(path: Path, mode: int = os.O_RDONLY) -> IO[str]:
         if error.errno != errno.ELOOP:
             raise
         raise LinkError(
-            "there is a link where a lock of the lake belongs", where=str(path), fix="delete the link"
+            "there is a link where a lock of the lake belongs",
+            where=str(path),
+            fix="delete the link",
         ) from None
     return os.fdopen(descriptor, encoding="utf-8", errors="replace")
 
@@ -239,7 +253,11 @@ class TimedLocks:
         """Takes the lock alone, see `Locks.alone`."""
         target = self.staging / _EXCLUSIVE
         text = _line({**owner(), "id": uuid.uuid4().hex})
-        tag = next(tag for _ in _pauses(self.staging) if (tag := _taken(target, text, self.staging)) is not None)
+        tag = next(
+            tag
+            for _ in _pauses(self.staging)
+            if (tag := _taken(target, text, self.staging)) is not None
+        )
         lock = Held(target, text, e_tag=tag)
         try:
             next(None for _ in _pauses(self.staging) if not self._are_shared())
@@ -260,19 +278,25 @@ class TimedLocks:
         return lease.read_bytes().decode(errors="replace").splitlines(), alive
 
     def is_claimed(self, *, done: Place) -> bool:
-        """Returns whether this process makes the lake: nobody did, or who did was killed before `done` was there."""
+        """Returns whether this process makes the lake: nobody did, or who did was killed before
+        `done` was there."""
         text = _line({**owner(), "id": uuid.uuid4().hex})
         if (self.staging / MADE).create(text.encode()):
             return True
-        return self.unfinished(done=done) and _taken(self.staging / MADE, text, self.staging) is not None
+        return (
+            self.unfinished(done=done)
+            and _taken(self.staging / MADE, text, self.staging) is not None
+        )
 
     def unfinished(self, *, done: Place) -> bool:
-        """Returns whether a process began to make the lake and was killed before `done` was there."""
+        """Returns whether a process began to make the lake and was killed before `done` was
+        there."""
         marker = self.staging / MADE
         return marker.exists() and living(marker, self.staging) is None and not done.exists()
 
     def _are_shared(self) -> bool:
-        """Returns whether anybody has the shared lock; what dead processes left of it is deleted."""
+        """Returns whether anybody has the shared lock; what dead processes left of it is
+        deleted."""
         alive = False
         for shared in (self.staging / SHARED).rglob("*"):
             if living(shared, self.staging) is not None:
@@ -287,7 +311,8 @@ class Held:
 
     Args:
         place: of the object.
-        e_tag: its version, if only that may be replaced: then it is lost where another has replaced it.
+        e_tag: its version, if only that may be replaced: then it is lost where another has replaced
+            it.
     """
 
     def __init__(self, place: RemotePath, text: str, *, e_tag: str | None = None) -> None:
@@ -314,7 +339,8 @@ class Held:
         """
         if self._lost or _now() - self._written > LIFE / 2:
             raise ConflictError(
-                "the store could not be reached for so long that others may take this process for dead",
+                "the store could not be reached for so long that others may take this process for "
+                "dead",
                 where=str(self.place),
                 fix="check the network, then do it again",
             )
@@ -370,7 +396,8 @@ def owner() -> dict[str, Any]:
 
 
 def _taken(lock: RemotePath, text: str, staging: RemotePath) -> str | None:
-    """Returns the version of the exclusive lock if it is this process's now: it was free, or its holder is dead."""
+    """Returns the version of the exclusive lock if it is this process's now: it was free, or its
+    holder is dead."""
     data = text.encode()
     with suppress(FileNotFoundError):  # somebody gives it up in this moment
         if lock.create(data):
@@ -382,9 +409,11 @@ def _taken(lock: RemotePath, text: str, staging: RemotePath) -> str | None:
 
 
 def _replace_object(lock: RemotePath, tag: str | None, data: bytes) -> str | None:
-    """Replaces an object if it has that version, and returns its new one; `None` where it had another one.
+    """Replaces an object if it has that version, and returns its new one; `None` where it had
+    another one.
 
-    A request that is sent again because its first answer was lost finds what itself has put, and counts as done.
+    A request that is sent again because its first answer was lost finds what itself has put, and
+    counts as done.
     """
     if (new := lock.replace_if(tag, data)) is not None:
         return new
@@ -396,8 +425,8 @@ def _replace_object(lock: RemotePath, tag: str | None, data: bytes) -> str | Non
 
 
 def _pauses(staging: RemotePath) -> Iterator[None]:
-    """Yields endless tries, the first at once, with waits between them that grow; a wait that becomes long is
-    reported."""
+    """Yields endless tries, the first at once, with waits between them that grow; a wait that
+    becomes long is reported."""
     wait, begun, is_reported = _FIRST_WAIT, _now(), False
     while True:
         yield
@@ -406,8 +435,10 @@ def _pauses(staging: RemotePath) -> Iterator[None]:
         if not is_reported and _now() - begun > _SILENT:
             is_reported = True
             _LOG.warning(
-                "flagdata: waiting for another process that uses the lake: it collects, names a version or commits\n"
-                "  where: %s\n  fix:   none needed; if it was killed on another machine, its lock is void after %.0f s",
+                "flagdata: waiting for another process that uses the lake: it collects, names a "
+                "version or commits\n"
+                "  where: %s\n  fix:   none needed; if it was killed on another machine, its lock "
+                "is void after %.0f s",
                 staging,
                 LIFE,
             )
@@ -423,10 +454,16 @@ def _line(content: dict[str, Any]) -> str:
 
 
 def living(lock: RemotePath, staging: RemotePath) -> dict[str, Any] | None:
-    """Reads the owner of a lock or lease if it counts; None where it is not there, void, or its process has ended."""
+    """Reads the owner of a lock or lease if it counts; None where it is not there, void, or its
+    process has ended."""
     try:
         content = from_json(lock.read_bytes().decode().split("\n")[0])
-        life, machine, pid, started = float(content["life"]), content["machine"], content["pid"], content["started"]
+        life, machine, pid, started = (
+            float(content["life"]),
+            content["machine"],
+            content["pid"],
+            content["started"],
+        )
         life = min(_LONGEST_LIFE, life)  # also of what is not a number
     except FileNotFoundError:
         return None
@@ -442,18 +479,20 @@ def living(lock: RemotePath, staging: RemotePath) -> dict[str, Any] | None:
 
 
 def _now() -> float:
-    """Seconds that go on while the machine sleeps: by CLOCK_BOOTTIME, or by CLOCK_MONOTONIC where there is none.
+    """Seconds that go on while the machine sleeps: by CLOCK_BOOTTIME, or by CLOCK_MONOTONIC where
+    there is none.
 
-    The latter goes on in sleep on macOS. Where it does not, a machine that slept while it published may publish after
-    others took it for dead; then a collection may have deleted an object of its commit, which `doctor` reports.
+    The latter goes on in sleep on macOS. Where it does not, a machine that slept while it published
+    may publish after others took it for dead; then a collection may have deleted an object of its
+    commit, which `doctor` reports.
     """
     return time.clock_gettime(getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC))
 
 
 @cache
 def _machine() -> str | None:
-    """Identifies this machine since it was started, and the processes that it numbers together; None where it does not
-    say."""
+    """Identifies this machine since it was started, and the processes that it numbers together;
+    None where it does not say."""
     if (since := boot()) is not None:
         with suppress(OSError):
             return f"{since} {Path('/proc/self/ns/pid').readlink()}"

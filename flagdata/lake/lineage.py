@@ -1,9 +1,11 @@
-"""What the notes of the log say: how branches came to be, why rows went, and the labels of artifacts.
+"""What the notes of the log say: how branches came to be, why rows went, and the labels of
+artifacts.
 
-All branches share one sequence of versions. A commit on a branch notes its name; a merge also notes which branch it
-took in, and at which version. So for a branch at a version it is known which commits of which branches went into it,
-and for two branches what they last had in common. A name that was deleted and used again is another branch: each is
-identified by the version that deleted the one before it.
+All branches share one sequence of versions. A commit on a branch notes its name; a merge also notes
+which branch it took in, and at which version. So for a branch at a version it is known which
+commits of which branches went into it, and for two branches what they last had in common. A name
+that was deleted and used again is another branch: each is identified by the version that deleted
+the one before it.
 """
 
 from __future__ import annotations
@@ -26,24 +28,31 @@ Life = tuple[str, int]
 
 
 def noted_labels(entry: Entry) -> Mapping[str, Mapping[str, Any]]:
-    """Maps the artifacts that a commit put labels on to name → value, `None` where it takes one off.
+    """Maps the artifacts that a commit put labels on to name → value, `None` where it takes one
+    off.
 
     Raises:
         CorruptError: the note cannot be read.
     """
     with _reading(entry):
-        noted = {artifact: dict(values.items()) for artifact, values in from_json(entry[LABELS]).items()}
-        if any(isinstance(value, list | dict) for values in noted.values() for value in values.values()):
+        noted = {
+            artifact: dict(values.items()) for artifact, values in from_json(entry[LABELS]).items()
+        }
+        if any(
+            isinstance(value, list | dict) for values in noted.values() for value in values.values()
+        ):
             raise ValueError("the value of a label is a list or table")
         return noted
 
 
 LABELS = "labels"
-"""Note of a commit that puts labels on artifacts: artifact → name → value, `null` where it takes one off."""
+"""Note of a commit that puts labels on artifacts: artifact → name → value, `null` where it takes
+one off."""
 
 
 HIDDEN_ON = "hidden_on"
-"""Note of a commit by which rows leave several branches: each but the first → the rows of its base that it hides."""
+"""Note of a commit by which rows leave several branches: each but the first → the rows of its base
+that it hides."""
 
 
 def _noted_merge(entry: Entry) -> Slice:
@@ -69,9 +78,9 @@ def _reading(entry: Entry) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Removal:
-    """A commit by which rows, or the data of rows, went for a reason: withdrawn from a branch or hidden on it, erased
-    everywhere, shown by a tag or branch that was deleted, or of versions that expired. Notes of the log are read as
-    they are asked for.
+    """A commit by which rows, or the data of rows, went for a reason: withdrawn from a branch or
+    hidden on it, erased everywhere, shown by a tag or branch that was deleted, or of versions that
+    expired. Notes of the log are read as they are asked for.
 
     Raises:
         CorruptError: the note that is asked for cannot be read.
@@ -89,7 +98,8 @@ class Removal:
 
     @property
     def branch(self) -> str:
-        """Returns the branch that it is on, the first of several; "" for one of a tag or of versions."""
+        """Returns the branch that it is on, the first of several; "" for one of a tag or of
+        versions."""
         return str(self.entry.get("branch", ""))
 
     @property
@@ -104,7 +114,8 @@ class Removal:
 
     @property
     def branches(self) -> frozenset[str]:
-        """Returns the branches that do not show some rows any more; none for one of a tag or of versions."""
+        """Returns the branches that do not show some rows any more; none for one of a tag or of
+        versions."""
         return frozenset({self.branch} - {""}) | self._hidden_elsewhere().keys()
 
     def hidden(self, branch: str) -> frozenset[str]:
@@ -114,10 +125,14 @@ class Removal:
             return frozenset(map(str, noted)) | self._hidden_elsewhere().get(branch, frozenset())
 
     def _hidden_elsewhere(self) -> Mapping[str, frozenset[str]]:
-        """Reads what it hides on further branches than its own, with those of which it hides nothing."""
+        """Reads what it hides on further branches than its own, with those of which it hides
+        nothing."""
         with _reading(self.entry):
             noted = from_json(self.entry.get(HIDDEN_ON, "{}"))
-            return {Slice(branch=branch, version=0).branch: frozenset(map(str, ids)) for branch, ids in noted.items()}
+            return {
+                Slice(branch=branch, version=0).branch: frozenset(map(str, ids))
+                for branch, ids in noted.items()
+            }
 
     @property
     def erased(self) -> Mapping[str, str | None]:
@@ -141,8 +156,8 @@ class Removal:
 
     @property
     def expired(self) -> tuple[int, frozenset[str]]:
-        """Returns the newest version that it let expire, with all before it, and the names of the objects that went; -1
-        and none where it let none expire."""
+        """Returns the newest version that it let expire, with all before it, and the names of the
+        objects that went; -1 and none where it let none expire."""
         if "expired" not in self.entry:
             return -1, frozenset()
         with _reading(self.entry):
@@ -171,14 +186,19 @@ class Lineage:
                     continue
                 if branch not in self._entries:
                     with _reading(entry):
-                        Slice(branch=branch, version=entry["version"])  # whether that is a branch's name
+                        Slice(
+                            branch=branch, version=entry["version"]
+                        )  # whether that is a branch's name
                 self._entries.setdefault(branch, []).append(entry)
         self._forks = {**forks, MAIN: ()}
 
     def fork(self, part: Slice) -> View | None:
-        """Finds what the branch that had a name at a version began from; nothing for main, and `None` where its ref is
+        """Finds what the branch that had a name at a version began from; nothing for main, and
+        `None` where its ref is
         lost: it is not there, though nobody deleted it."""
-        later = (entry for entry in self._entries.get(part.branch, ()) if entry["version"] > part.version)
+        later = (
+            entry for entry in self._entries.get(part.branch, ()) if entry["version"] > part.version
+        )
         for entry in later:
             if DELETED in entry:
                 return Removal(entry).view
@@ -198,53 +218,76 @@ class Lineage:
     def life(self, part: Slice) -> Life:
         """Finds which of the branches of that name had it at a version."""
         deleted = (e["version"] for e in self._entries.get(part.branch, ()) if DELETED in e)
-        return (part.branch, max((version for version in deleted if version <= part.version), default=-1))
+        return (
+            part.branch,
+            max((version for version in deleted if version <= part.version), default=-1),
+        )
 
     def commits(self, part: Slice) -> Sequence[Entry]:
-        """Lists the commits of a branch up to a version, oldest first; those of an earlier one of that name are not
-        its."""
+        """Lists the commits of a branch up to a version, oldest first; those of an earlier one of
+        that name are not its."""
         begin = self.life(part)[1]
-        return [e for e in self._entries.get(part.branch, ()) if begin < e["version"] <= part.version]
+        return [
+            e for e in self._entries.get(part.branch, ()) if begin < e["version"] <= part.version
+        ]
 
     def hidden(self, part: Slice) -> frozenset[str]:
-        """Ids of rows of its base that a branch does not show, since they were withdrawn from it."""
-        return frozenset(artifact for entry in self.commits(part) for artifact in Removal(entry).hidden(part.branch))
+        """Ids of rows of its base that a branch does not show, since they were withdrawn from
+        it."""
+        return frozenset(
+            artifact
+            for entry in self.commits(part)
+            for artifact in Removal(entry).hidden(part.branch)
+        )
 
     def labels(self, part: Slice) -> dict[str, dict[str, Any]]:
-        """Returns the labels of each artifact, after all commits that went into a branch at a version.
+        """Returns the labels of each artifact, after all commits that went into a branch at a
+        version.
 
         Raises:
             CorruptError: what a commit notes cannot be read.
         """
         labelled = [
-            e for branch, entries in self._entries.items() for e in entries if LABELS in e and e["branch"] == branch
+            e
+            for branch, entries in self._entries.items()
+            for e in entries
+            if LABELS in e and e["branch"] == branch
         ]
         newest_versions = self._newest(part) if labelled else {}
         labels: dict[str, dict[str, Any]] = {}
         for entry in sorted(labelled, key=lambda entry: entry["version"]):
             life = self.life(Slice(branch=entry["branch"], version=entry["version"]))
             for artifact, values in (
-                noted_labels(entry).items() if entry["version"] <= newest_versions.get(life, -1) else ()
+                noted_labels(entry).items()
+                if entry["version"] <= newest_versions.get(life, -1)
+                else ()
             ):
                 merged = {**labels.get(artifact, {}), **values}
-                labels[artifact] = {name: value for name, value in merged.items() if value is not None}
+                labels[artifact] = {
+                    name: value for name, value in merged.items() if value is not None
+                }
         return {artifact: values for artifact, values in labels.items() if values}
 
     def knows(self, part: Slice, other_part: Slice) -> bool:
         """Checks whether all commits that went into `other_part` went into `part` too."""
         newest_versions = self._newest(part)
-        return all(newest_versions.get(life, -1) >= version for life, version in self._newest(other_part).items())
+        return all(
+            newest_versions.get(life, -1) >= version
+            for life, version in self._newest(other_part).items()
+        )
 
     def merge_base(self, first_part: Slice, second_part: Slice) -> Slice | None:
-        """Finds what two branches last had in common: of the branches whose commits went into both, the one that took
-        in most of the others; `None` where they share no commit."""
+        """Finds what two branches last had in common: of the branches whose commits went into both,
+        the one that took in most of the others; `None` where they share no commit."""
         first, second = self._newest(first_part), self._newest(second_part)
         common = {life: min(first[life], second[life]) for life in first.keys() & second.keys()}
         points = [Slice(branch=branch, version=version) for (branch, _), version in common.items()]
 
         def rank(point: Slice) -> tuple[int, int]:
             newest_versions = self._newest(point)
-            return sum(newest_versions.get(life, -1) >= version for life, version in common.items()), point.version
+            return sum(
+                newest_versions.get(life, -1) >= version for life, version in common.items()
+            ), point.version
 
         return max(points, key=rank, default=None)
 
@@ -279,6 +322,7 @@ def with_labels(rows: pa.Table, labels: Mapping[str, Mapping[str, Any]]) -> pa.T
 
 
 def labels_of(rows: pa.Table) -> dict[str, dict[str, Any]]:
-    """Returns the labels of each artifact, of a table of rows that `Store.table` gave, whole or filtered."""
+    """Returns the labels of each artifact, of a table of rows that `Store.table` gave, whole or
+    filtered."""
     text = (rows.schema.metadata or {}).get(_BESIDE)
     return {} if text is None else json.loads(text)

@@ -1,4 +1,5 @@
-"""Rows that have given values. A program selects by values this way: no value is ever pasted into SQL."""
+"""Rows that have given values. A program selects by values this way: no value is ever pasted into
+SQL."""
 
 from __future__ import annotations
 
@@ -14,14 +15,16 @@ from flagdata.core.schema import CATALOG
 from flagdata.errors import UnknownNameError, UsageError
 
 Values: TypeAlias = Mapping[str, Any]
-"""Column → the value wanted, `None` where the column must be empty, or several values (list, tuple, set), one of which
-a row must have."""
+"""Column → the value wanted, `None` where the column must be empty, or several values (list, tuple,
+set), one of which a row must have."""
 Where: TypeAlias = str | Values
-"""A filter over the catalog: the user's SQL expression as in `flagdata.lake.selection`, or values that columns have."""
+"""A filter over the catalog: the user's SQL expression as in `flagdata.lake.selection`, or values
+that columns have."""
 
 
 def matching(rows: pa.Table, values: Values) -> pa.Table:
-    """Selects the rows with these values in these columns, in their order; all rows where no column is named.
+    """Selects the rows with these values in these columns, in their order; all rows where no column
+    is named.
 
     Raises:
         UnknownNameError: no such column.
@@ -52,9 +55,16 @@ def _condition(column: str, value: object) -> pc.Expression:
     wanted = list(value) if isinstance(value, list | tuple | set | frozenset) else [value]
     try:
         values = pa.array([value for value in wanted if value is not None], CATALOG[column].type)
-    except (pa.ArrowInvalid, pa.ArrowTypeError, pa.ArrowNotImplementedError, OverflowError) as error:
+    except (
+        pa.ArrowInvalid,
+        pa.ArrowTypeError,
+        pa.ArrowNotImplementedError,
+        OverflowError,
+    ) as error:
         raise UsageError(
-            f"the column {column} cannot hold {value!r}: {error}", where=column, fix=f"give {CATALOG[column].type}"
+            f"the column {column} cannot hold {value!r}: {error}",
+            where=column,
+            fix=f"give {CATALOG[column].type}",
         ) from None
     condition = pc.field(column).isin(values)
     return condition | pc.field(column).is_null() if None in wanted else condition

@@ -1,10 +1,12 @@
-"""The three-way merge: what a branch changed since it and the other last had the same, and nothing else.
+"""The three-way merge: what a branch changed since it and the other last had the same, and nothing
+else.
 
-A row that both had and that the other has withdrawn since stays withdrawn; a row that both had and that the branch has
-withdrawn is withdrawn. So it is where no merge is recorded (lakes of older versions of flagdata, or the same source
-ingested on both): a withdrawal that is later than the branch's own row stands. What is made anew on the branch after
-the other withdrew it comes back, and is named. Labels are merged by `flagdata.lake.label_merging`. `difference` says
-what changed between any two refs.
+A row that both had and that the other has withdrawn since stays withdrawn; a row that both had and
+that the branch has withdrawn is withdrawn. So it is where no merge is recorded (lakes of older
+versions of flagdata, or the same source ingested on both): a withdrawal that is later than the
+branch's own row stands. What is made anew on the branch after the other withdrew it comes back, and
+is named. Labels are merged by `flagdata.lake.label_merging`. `difference` says what changed between
+any two refs.
 """
 
 from __future__ import annotations
@@ -44,7 +46,8 @@ class MergeResult:
         existing: ids of new rows of the branch that were there already.
         withdrawn: ids of rows that it took off, since the branch had withdrawn them.
         left_out: id of a row of the branch that stays withdrawn → the version that withdrew it.
-        brought_back: id of a row that it brought, though it had been withdrawn → the version that withdrew it.
+        brought_back: id of a row that it brought, though it had been withdrawn → the version that
+            withdrew it.
     """
 
     version: int
@@ -103,7 +106,9 @@ def _attempt(lake: Store, branch: str, message: str, into: str) -> MergeResult:
         fresh=_published_rows(fresh, into),
         held=fresh["object"].drop_null().to_pylist(),
         leaving={into: withdrawn} if withdrawn else {},
-        labels=amended_labels(labels_after(lake, into, {**notes, "branch": into}, head), labels, here | added),
+        labels=amended_labels(
+            labels_after(lake, into, {**notes, "branch": into}, head), labels, here | added
+        ),
         notes=notes,
     )
     version = commit(lake, change, base=head)
@@ -114,7 +119,9 @@ def _attempt(lake: Store, branch: str, message: str, into: str) -> MergeResult:
         existing=tuple(sorted(new & ids_here)),
         withdrawn=tuple(sorted(withdrawn)),
         left_out=left_out,
-        brought_back={artifact: version for artifact, version in brought_back.items() if artifact in added},
+        brought_back={
+            artifact: version for artifact, version in brought_back.items() if artifact in added
+        },
     )
 
 
@@ -135,17 +142,25 @@ def _published_rows(rows: pa.Table, branch: str) -> pa.Table:
 def _decide_withdrawals(
     lake: Store, ours: Slice, theirs: Slice, candidates: frozenset[str], *, since: int
 ) -> tuple[dict[str, int], dict[str, int]]:
-    """Decides on new rows of the branch that ours withdrew after `since`: those that stay withdrawn, since the branch
-    had them when that was done, and those that are newer. Each with the version that withdrew it last."""
+    """Decides on new rows of the branch that ours withdrew after `since`: those that stay
+    withdrawn, since the branch had them when that was done, and those that are newer. Each with the
+    version that withdrew it last."""
     lineage = lake.lineage()
     left_out: dict[str, int] = {}
     brought_back: dict[str, int] = {}
     first = max(since, lineage.life(ours)[1])
     for removal in reversed(removals(lake.catalog.history())):
-        if not (candidates and removal.withdrawn and removal.version > first and ours.branch in removal.branches):
+        if not (
+            candidates
+            and removal.withdrawn
+            and removal.version > first
+            and ours.branch in removal.branches
+        ):
             continue
         if removed := (left(lake, removal).keys() | removal.hidden(ours.branch)) & candidates:
-            then = Slice(branch=theirs.branch, version=max(removal.version, lineage.life(theirs)[1]))
+            then = Slice(
+                branch=theirs.branch, version=max(removal.version, lineage.life(theirs)[1])
+            )
             had = removed & lake.identities(lineage.view(then))
             for artifact in removed:
                 left_out.pop(artifact, None)
@@ -162,7 +177,13 @@ def _check_objects(lake: Store, rows: pa.Table) -> None:
 
 
 def _check_parents(
-    mine: pa.Table, branch_rows: pa.Table, *, added: frozenset[str], withdrawn: frozenset[str], branch: str, into: str
+    mine: pa.Table,
+    branch_rows: pa.Table,
+    *,
+    added: frozenset[str],
+    withdrawn: frozenset[str],
+    branch: str,
+    into: str,
 ) -> None:
     """Checks whether each row finds what it was made from.
 
@@ -175,10 +196,14 @@ def _check_parents(
     for row in matching(branch_rows, {"artifact": list(added)}).to_pylist():
         for parent in row["parents"]:
             if parent not in after:
-                message = f"{row['kind']} {row['name']!r} ({row['artifact']}) was made from {parent}"
+                message = (
+                    f"{row['kind']} {row['name']!r} ({row['artifact']}) was made from {parent}"
+                )
                 if parent not in ids_on_branch:
                     raise NotFoundError(
-                        f"{message}, a parent that is not there", where=f"branch {branch}", fix="run flagdata doctor"
+                        f"{message}, a parent that is not there",
+                        where=f"branch {branch}",
+                        fix="run flagdata doctor",
                     )
                 raise ConflictError(
                     f"{message}, which was withdrawn from {into!r}",
@@ -189,7 +214,8 @@ def _check_parents(
         for parent in row["parents"]:
             if parent in withdrawn and row["artifact"] in after:
                 raise ConflictError(
-                    f"{row['kind']} {row['name']!r} ({row['artifact']}) was made from {parent}, which was withdrawn"
+                    f"{row['kind']} {row['name']!r} ({row['artifact']}) was made from {parent}, "
+                    "which was withdrawn"
                     f" from {branch!r}",
                     where=f"branch {into}",
                     fix=_ways_to_agree(parent, gone=branch, branch=into),
@@ -197,9 +223,19 @@ def _check_parents(
 
 
 def _ways_to_agree(parent: str, *, gone: str, branch: str) -> str:
-    """Explains how two branches agree again on an artifact that one withdrew and the other made something from."""
+    """Explains how two branches agree again on an artifact that one withdrew and the other made
+    something from."""
     return (
-        command_line("flagdata", "withdraw", parent, "--with-descendants", "--branch", branch, "-m", f"as on {gone}")
+        command_line(
+            "flagdata",
+            "withdraw",
+            parent,
+            "--with-descendants",
+            "--branch",
+            branch,
+            "-m",
+            f"as on {gone}",
+        )
         + f", or ingest its source again with {command_line('--branch', gone)}"
     )
 
@@ -210,7 +246,8 @@ class Difference:
 
     Attributes:
         added, removed: rows of the catalog, whole.
-        objects_added, objects_removed: names, sorted; an object that several rows share counts when the last one goes.
+        objects_added, objects_removed: names, sorted; an object that several rows share counts when
+            the last one goes.
     """
 
     added: pa.Table
@@ -220,7 +257,8 @@ class Difference:
 
 
 def difference(lake: Store, before: str | None, after: str | None) -> Difference:
-    """Finds what `after` shows that `before` does not, and the other way round; rows are compared by identity.
+    """Finds what `after` shows that `before` does not, and the other way round; rows are compared
+    by identity.
 
     Raises:
         NotFoundError: no such ref.
@@ -236,8 +274,8 @@ def difference(lake: Store, before: str | None, after: str | None) -> Difference
 
 
 def added_since(lake: Store, branch: str) -> Callable[[], str]:
-    """Returns a call that says what a branch has gained since, in words, such as "on branch main: camera 2, recording
-    1"; "" if nothing. For `flagdata.core.console.in_steps`.
+    """Returns a call that says what a branch has gained since, in words, such as "on branch main:
+    camera 2, recording 1"; "" if nothing. For `flagdata.core.console.in_steps`.
 
     Raises:
         NotFoundError: no such branch.
@@ -245,7 +283,9 @@ def added_since(lake: Store, branch: str) -> Callable[[], str]:
     before = lake.rows(at=branch, columns=["artifact", "kind"])
 
     def words() -> str:
-        added = Counter(_without(lake.rows(at=branch, columns=["artifact", "kind"]), before)["kind"].to_pylist())
+        added = Counter(
+            _without(lake.rows(at=branch, columns=["artifact", "kind"]), before)["kind"].to_pylist()
+        )
         kinds = ", ".join(f"{kind} {count}" for kind, count in sorted(added.items()))
         return f"on branch {branch}: {kinds}" if kinds else ""
 
@@ -255,7 +295,10 @@ def added_since(lake: Store, branch: str) -> Callable[[], str]:
 def _without(table: pa.Table, other_table: pa.Table) -> pa.Table:
     identities = set(other_table["artifact"].to_pylist())
     return table.filter(
-        pa.array([identity not in identities for identity in table["artifact"].to_pylist()], type=pa.bool_())
+        pa.array(
+            [identity not in identities for identity in table["artifact"].to_pylist()],
+            type=pa.bool_(),
+        )
     )
 
 

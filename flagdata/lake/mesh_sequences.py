@@ -1,22 +1,26 @@
-"""Mesh sequences in Zarr v3: write-once folders that xarray opens, and that come back as frozen typed sequences.
+"""Mesh sequences in Zarr v3: write-once folders that xarray opens, and that come back as frozen
+typed sequences.
 
-A store of one topology holds `positions (time, vertex, xyz)`, `faces (face, corner)`, `rest (vertex, uv)`, `time`.
-A store whose topology changes from frame to frame ("ragged") holds the frames' vertices and faces one after another,
-`positions (vertex, xyz)`, `faces (face, corner)`, `rest (vertex, uv)`, and where each frame begins:
-`vertex_offset (edge)` and `face_offset (edge)`, one more than frames. Face indices count within their own frame.
+A store of one topology holds `positions (time, vertex, xyz)`, `faces (face, corner)`, `rest
+(vertex, uv)`, `time`. A store whose topology changes from frame to frame ("ragged") holds the
+frames' vertices and faces one after another, `positions (vertex, xyz)`, `faces (face, corner)`,
+`rest (vertex, uv)`, and where each frame begins: `vertex_offset (edge)` and `face_offset (edge)`,
+one more than frames. Face indices count within their own frame.
 
-There is no settled convention for moving meshes in Zarr: the Zarr Vectors draft of the Allen Institute is chunked in
-space, PhysicsNeMo writes `mesh_pos (time, vertex, 3)`. Where conventions of xarray's world apply, attributes follow
-them: CF 1.11 for the time axis and units, UGRID 1.0 (`cf_role`, `start_index`) for the connectivity.
+There is no settled convention for moving meshes in Zarr: the Zarr Vectors draft of the Allen
+Institute is chunked in space, PhysicsNeMo writes `mesh_pos (time, vertex, 3)`. Where conventions of
+xarray's world apply, attributes follow
+them: CF 1.11 for the time axis and units, UGRID 1.0 (`cf_role`, `start_index`) for the
+connectivity.
 
-Tracked points of a cloth are stored beside them: `positions (time, marker, xyz)`, NaN where a point was not tracked,
-`rest (marker, uv)` and `time`, and in the attributes the markers' names and how many positions were tracked: a lost
-chunk cannot pass for lost markers.
+Tracked points of a cloth are stored beside them: `positions (time, marker, xyz)`, NaN where a point
+was not tracked, `rest (marker, uv)` and `time`, and in the attributes the markers' names and how
+many positions were tracked: a lost chunk cannot pass for lost markers.
 
-The same arrays give the same bytes (with the same zarr and blosc), so equal sequences are stored once. Positions are
-chunked by whole frames, about 1 MiB a chunk, up to 64 chunks a shard file; within a chunk x, y and z come one after the
-other and bytes of equal weight together before zstd. Simulated flags take 77 % of their raw size so, and 90 % with
-Zarr's defaults.
+The same arrays give the same bytes (with the same zarr and blosc), so equal sequences are stored
+once. Positions are chunked by whole frames, about 1 MiB a chunk, up to 64 chunks a shard file;
+within a chunk x, y and z come one after the other and bytes of equal weight together before zstd.
+Simulated flags take 77 % of their raw size so, and 90 % with Zarr's defaults.
 """
 
 from __future__ import annotations
@@ -63,7 +67,8 @@ Instants = IntArray
 
 @dataclass(frozen=True, kw_only=True)
 class Mesh:
-    """One frame: positions (vertex, 3) [m], faces (face, 3) vertex indices, rest (vertex, 2) [m], time [ns]."""
+    """One frame: positions (vertex, 3) [m], faces (face, 3) vertex indices, rest (vertex, 2) [m],
+    time [ns]."""
 
     time: int
     positions: Float32Array
@@ -88,12 +93,17 @@ class _Moving(ABC):
         return f"{type(self).__name__}({self._description()})"
 
     def _repr_html_(self) -> str:
-        return table(self._description(), {name: str(value) for name, value in self.attributes.items()})
+        return table(
+            self._description(), {name: str(value) for name, value in self.attributes.items()}
+        )
 
     def _description(self) -> str:
         seconds = (int(self.time[-1]) - int(self.time[0])) / NANOSECONDS if len(self) else 0.0
         first = self.frame(0)
-        return f"{len(self)} frames in {seconds:.2f} s, {len(first.rest)} vertices, {len(first.faces)} faces"
+        return (
+            f"{len(self)} frames in {seconds:.2f} s, {len(first.rest)} vertices, "
+            f"{len(first.faces)} faces"
+        )
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -108,7 +118,8 @@ class MeshSequence(_Moving):
         attributes: what else is known, JSON values (parameters of the simulation, source).
 
     Raises:
-        InputError: shapes that disagree, values that are not finite, indices out of range, time that does not increase.
+        InputError: shapes that disagree, values that are not finite, indices out of range, time
+            that does not increase.
     """
 
     time: Instants
@@ -120,14 +131,25 @@ class MeshSequence(_Moving):
     def __post_init__(self) -> None:
         _check(self.time, self.positions, self.faces, self.rest, self.attributes)
         if self.positions.ndim != 3 or self.positions.shape[::2] != (len(self.time), 3):
-            raise _wrong(f"positions have shape {self.positions.shape} for {len(self.time)} times", "(time, vertex, 3)")
+            raise _wrong(
+                f"positions have shape {self.positions.shape} for {len(self.time)} times",
+                "(time, vertex, 3)",
+            )
         if self.rest.shape != (self.positions.shape[1], 2):
-            raise _wrong(f"rest has shape {self.rest.shape} for {self.positions.shape[1]} vertices", "(vertex, 2)")
+            raise _wrong(
+                f"rest has shape {self.rest.shape} for {self.positions.shape[1]} vertices",
+                "(vertex, 2)",
+            )
         _check_faces(self.faces, self.positions.shape[1], "faces")
 
     def frame(self, index: int) -> Mesh:
         """Returns the mesh at one time; negative indices count from the end."""
-        return Mesh(time=int(self.time[index]), positions=self.positions[index], faces=self.faces, rest=self.rest)
+        return Mesh(
+            time=int(self.time[index]),
+            positions=self.positions[index],
+            faces=self.faces,
+            rest=self.rest,
+        )
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -156,14 +178,24 @@ class RaggedMeshSequence(_Moving):
 
     def __post_init__(self) -> None:
         _check(self.time, self.positions, self.faces, self.rest, self.attributes)
-        if self.positions.ndim != 2 or self.positions.shape[1] != 3 or self.rest.shape != (len(self.positions), 2):
+        if (
+            self.positions.ndim != 2
+            or self.positions.shape[1] != 3
+            or self.rest.shape != (len(self.positions), 2)
+        ):
             shapes = f"positions {self.positions.shape}, rest {self.rest.shape}"
-            raise _wrong(f"shapes that do not fit: {shapes}", "(all vertices, 3) and (all vertices, 2)")
+            raise _wrong(
+                f"shapes that do not fit: {shapes}", "(all vertices, 3) and (all vertices, 2)"
+            )
         _check_offsets(self.vertex_offset, len(self.time), len(self.positions), "vertex_offset")
         _check_offsets(self.face_offset, len(self.time), len(self.faces), "face_offset")
         for i in range(len(self.time)):
             frame_faces = self.faces[self.face_offset[i] : self.face_offset[i + 1]]
-            _check_faces(frame_faces, int(self.vertex_offset[i + 1] - self.vertex_offset[i]), f"faces of frame {i}")
+            _check_faces(
+                frame_faces,
+                int(self.vertex_offset[i + 1] - self.vertex_offset[i]),
+                f"faces of frame {i}",
+            )
 
     def frame(self, index: int) -> Mesh:
         """Returns the mesh at one time; negative indices count from the end."""
@@ -189,7 +221,9 @@ def write_meshes(path: Path, sequence: MeshSequence | RaggedMeshSequence) -> Non
 
     if path.exists():
         raise ConflictError(
-            "a file or folder is there already", where=str(path), fix="give a path at which nothing is yet"
+            "a file or folder is there already",
+            where=str(path),
+            fix="give a path at which nothing is yet",
         )
     ragged = isinstance(sequence, RaggedMeshSequence)
     with disk_errors("writing meshes", path):
@@ -211,8 +245,11 @@ def write_meshes(path: Path, sequence: MeshSequence | RaggedMeshSequence) -> Non
         write_array(group, "rest", sequence.rest, CHANNELS["rest"].dims)
 
 
-def read_meshes(path: Path, *, first: int = 0, count: int | None = None) -> MeshSequence | RaggedMeshSequence:
-    """Frames `first` to `first + count` of a stored sequence (to the end if `None`), reading no others.
+def read_meshes(
+    path: Path, *, first: int = 0, count: int | None = None
+) -> MeshSequence | RaggedMeshSequence:
+    """Frames `first` to `first + count` of a stored sequence (to the end if `None`), reading no
+    others.
 
     Raises:
         CorruptError: not such a store, damaged, or of a newer format.
@@ -225,7 +262,9 @@ def read_meshes(path: Path, *, first: int = 0, count: int | None = None) -> Mesh
         frames = int(group["time"].shape[0])  # type: ignore[union-attr]
     last = frames if count is None else first + count
     if not 0 <= first < last <= frames:
-        raise InputError(f"frames {first} to {last} of {frames}", where=str(path), fix="ask for frames it has")
+        raise InputError(
+            f"frames {first} to {last} of {frames}", where=str(path), fix="ask for frames it has"
+        )
     with store_errors(path, _DAMAGED):
         part = partial(read_part, group, where=str(path))
         time = part("time", first, last)
@@ -252,7 +291,8 @@ def read_meshes(path: Path, *, first: int = 0, count: int | None = None) -> Mesh
 
 
 def open_meshes(path: Path) -> xr.Dataset:
-    """Opens the store as an xarray dataset; arrays are read when they are used. `time` is decoded to datetime64[ns].
+    """Opens the store as an xarray dataset; arrays are read when they are used. `time` is decoded
+    to datetime64[ns].
 
     Raises:
         CorruptError: not such a store, or of a newer format.
@@ -283,7 +323,9 @@ def check_format(head: Any, newest_format: int, path: Path, *, noun: str) -> dic
     """
     if not isinstance(head, dict) or not isinstance(head.get("format"), int):
         raise CorruptError(
-            f"this is a Zarr store, but not of {noun}", where=str(path), fix="open it with zarr or xarray"
+            f"this is a Zarr store, but not of {noun}",
+            where=str(path),
+            fix="open it with zarr or xarray",
         )
     if head["format"] > newest_format:
         raise CorruptError(
@@ -299,7 +341,9 @@ def _layout(group: zarr.Group, path: Path) -> str:
         head = check_format(group.attrs.get(_HEAD), MESHES_FORMAT, path, noun="meshes")
     if head.get("layout") not in ("fixed", "ragged"):
         raise CorruptError(
-            "this is a Zarr store, but not of meshes", where=str(path), fix="open it with zarr or xarray"
+            "this is a Zarr store, but not of meshes",
+            where=str(path),
+            fix="open it with zarr or xarray",
         )
     return head["layout"]
 
@@ -316,14 +360,21 @@ def store_errors(path: Path, problem: str, *, fix: str = _RESTORE) -> Iterator[N
     except (LimitError, CorruptError):
         raise
     except FlagdataError as error:
-        raise CorruptError(f"{problem}; its reader says: {error.what}", where=str(path), fix=fix) from error
+        raise CorruptError(
+            f"{problem}; its reader says: {error.what}", where=str(path), fix=fix
+        ) from error
     except Exception as error:
         reason = " ".join(f"{type(error).__name__}: {error}".split())
-        raise CorruptError(f"{problem}; its reader says: {reason[:300]}", where=str(path), fix=fix) from error
+        raise CorruptError(
+            f"{problem}; its reader says: {reason[:300]}", where=str(path), fix=fix
+        ) from error
 
 
-def read_part(group: zarr.Group, name: str, first: int | None, last: int | None, *, where: str) -> AnyArray:
-    """Rows `first` to `last` of an array, once its size and its chunks are known to be within the limits.
+def read_part(
+    group: zarr.Group, name: str, first: int | None, last: int | None, *, where: str
+) -> AnyArray:
+    """Rows `first` to `last` of an array, once its size and its chunks are known to be within the
+    limits.
 
     Raises:
         LimitError: more than `ARRAY_BYTES`, `CHUNK_BYTES` or `CHUNKS`.
@@ -334,20 +385,40 @@ def read_part(group: zarr.Group, name: str, first: int | None, last: int | None,
     array = group[name]
     if not isinstance(array, zarr.Array):
         raise TypeError(f"{name} is no array")
-    shape = (len(range(*slice(first, last).indices(array.shape[0]))), *array.shape[1:]) if array.ndim else ()
+    shape = (
+        (len(range(*slice(first, last).indices(array.shape[0]))), *array.shape[1:])
+        if array.ndim
+        else ()
+    )
     blocks = [array.chunks] if array.shards is None else [array.chunks, array.shards]
     for message, size, most in (
         ("bytes", math.prod(shape) * array.dtype.itemsize, ARRAY_BYTES),
-        ("bytes a chunk", max(math.prod(block) for block in blocks) * array.dtype.itemsize, CHUNK_BYTES),
-        ("chunks", math.prod(-(-side // part) for side, part in zip(array.shape, array.chunks, strict=True)), CHUNKS),
+        (
+            "bytes a chunk",
+            max(math.prod(block) for block in blocks) * array.dtype.itemsize,
+            CHUNK_BYTES,
+        ),
+        (
+            "chunks",
+            math.prod(
+                -(-side // part) for side, part in zip(array.shape, array.chunks, strict=True)
+            ),
+            CHUNKS,
+        ),
     ):
         if size > most:
-            raise LimitError(f"{name} has {size} {message}", where=where, fix=f"at most {most} are read")
+            raise LimitError(
+                f"{name} has {size} {message}", where=where, fix=f"at most {most} are read"
+            )
     return np.asarray(array[first:last])
 
 
 _ATTRIBUTES: dict[str, dict[str, Any]] = {
-    "time": {"standard_name": "time", "units": "nanoseconds since 1970-01-01", "calendar": "proleptic_gregorian"},
+    "time": {
+        "standard_name": "time",
+        "units": "nanoseconds since 1970-01-01",
+        "calendar": "proleptic_gregorian",
+    },
     "faces": {"cf_role": "face_node_connectivity", "start_index": 0, "units": "1"},
     "vertex_offset": {"units": "1"},
     "face_offset": {"units": "1"},
@@ -355,7 +426,8 @@ _ATTRIBUTES: dict[str, dict[str, Any]] = {
 
 
 def write_array(group: zarr.Group, name: str, values: AnyArray, dims: tuple[str, ...]) -> None:
-    """Write an array of a moving mesh or of markers into a Zarr group: chunked by its first axis, with its units."""
+    """Write an array of a moving mesh or of markers into a Zarr group: chunked by its first axis,
+    with its units."""
     from zarr.codecs import BloscCodec, TransposeCodec
 
     rows = max(1, len(values))
@@ -373,9 +445,15 @@ def write_array(group: zarr.Group, name: str, values: AnyArray, dims: tuple[str,
         dtype=values.dtype,
         chunks=(chunk, *rest),
         shards=(shard, *rest),
-        filters=[TransposeCodec(order=(values.ndim - 1, *range(values.ndim - 1)))] if values.ndim > 1 else None,
-        compressors=BloscCodec(cname="zstd", clevel=5, shuffle="shuffle", typesize=values.dtype.itemsize),
-        fill_value=np.nan if values.dtype.kind == "f" else -1,  # so that a lost chunk cannot pass for data
+        filters=[TransposeCodec(order=(values.ndim - 1, *range(values.ndim - 1)))]
+        if values.ndim > 1
+        else None,
+        compressors=BloscCodec(
+            cname="zstd", clevel=5, shuffle="shuffle", typesize=values.dtype.itemsize
+        ),
+        fill_value=np.nan
+        if values.dtype.kind == "f"
+        else -1,  # so that a lost chunk cannot pass for data
         dimension_names=dims,
         attributes=attributes,
     )
@@ -387,9 +465,17 @@ def _wrong(problem: str, wanted: str) -> InputError:
 
 
 def _check(
-    time: Instants, positions: Float32Array, faces: Indices, rest: Float32Array, attributes: Mapping[str, Any]
+    time: Instants,
+    positions: Float32Array,
+    faces: Indices,
+    rest: Float32Array,
+    attributes: Mapping[str, Any],
 ) -> None:
-    arrays = (("time", time, np.int64), ("positions", positions, np.float32), ("faces", faces, np.int32))
+    arrays = (
+        ("time", time, np.int64),
+        ("positions", positions, np.float32),
+        ("faces", faces, np.int32),
+    )
     for name, values, dtype in (*arrays, ("rest", rest, np.float32)):
         if values.dtype != dtype:
             raise _wrong(f"{name} is of type {values.dtype}", f"{np.dtype(dtype)}")
@@ -397,30 +483,44 @@ def _check(
         raise _wrong("time is empty or does not increase", "one increasing instant a frame")
     if not bool(np.isfinite(positions).all()) or not bool(np.isfinite(rest).all()):
         raise _wrong(
-            "positions or rest coordinates that are not finite", "finite ones; cut a sequence where it blew up"
+            "positions or rest coordinates that are not finite",
+            "finite ones; cut a sequence where it blew up",
         )
     try:
         canonical(attributes)
     except (TypeError, ValueError) as error:
-        raise _wrong(f"attributes that are not JSON: {error}", "text, finite numbers, lists and mappings") from None
+        raise _wrong(
+            f"attributes that are not JSON: {error}", "text, finite numbers, lists and mappings"
+        ) from None
 
 
 def _check_faces(faces: Indices, vertices: int, noun: str) -> None:
     if faces.ndim != 2 or faces.shape[1] != 3:
         raise _wrong(f"{noun} have shape {faces.shape}", "(face, 3)")
     if faces.size and not 0 <= int(faces.min()) <= int(faces.max()) < vertices:
-        raise _wrong(f"{noun} name vertices outside 0 to {vertices - 1}", "indices into the frame's vertices, from 0")
-
-
-def _check_offsets(offset: Instants, frames: int, total: int, name: str) -> None:
-    fits = offset.dtype == np.int64 and offset.shape == (frames + 1,) and offset[0] == 0 and offset[-1] == total
-    if not fits or bool(np.any(np.diff(offset) < 0)):
         raise _wrong(
-            f"{name} does not fit {frames} frames and {total} rows", "int64 from 0 to the number of rows, rising"
+            f"{noun} name vertices outside 0 to {vertices - 1}",
+            "indices into the frame's vertices, from 0",
         )
 
 
-def write_plain(group: zarr.Group, name: str, values: AnyArray, dims: tuple[str, ...] | None = None) -> None:
+def _check_offsets(offset: Instants, frames: int, total: int, name: str) -> None:
+    fits = (
+        offset.dtype == np.int64
+        and offset.shape == (frames + 1,)
+        and offset[0] == 0
+        and offset[-1] == total
+    )
+    if not fits or bool(np.any(np.diff(offset) < 0)):
+        raise _wrong(
+            f"{name} does not fit {frames} frames and {total} rows",
+            "int64 from 0 to the number of rows, rising",
+        )
+
+
+def write_plain(
+    group: zarr.Group, name: str, values: AnyArray, dims: tuple[str, ...] | None = None
+) -> None:
     """Write an array of a measurement into a Zarr group, in one chunk."""
     from zarr.codecs import BloscCodec
 
@@ -451,8 +551,8 @@ class MarkerSequence:
         attributes: what else is known, JSON values.
 
     Raises:
-        InputError: shapes that disagree, values that are infinite, rest coordinates that are not finite, time that does
-            not increase, two markers of one name.
+        InputError: shapes that disagree, values that are infinite, rest coordinates that are not
+            finite, time that does not increase, two markers of one name.
     """
 
     time: IntArray
@@ -465,12 +565,15 @@ class MarkerSequence:
         frames, markers = len(self.time), len(self.names)
         if self.positions.shape != (frames, markers, 3) or self.rest.shape != (markers, 2):
             raise self._wrong(
-                f"{frames} times and {markers} names with positions of shape {self.positions.shape} and rest of shape "
+                f"{frames} times and {markers} names with positions of shape "
+                f"{self.positions.shape} and rest of shape "
                 f"{self.rest.shape}",
                 "give (time, marker, 3) and (marker, 2)",
             )
         if np.isinf(self.positions).any() or not np.isfinite(self.rest).all():
-            raise self._wrong("a coordinate is not finite", "mark points that were lost by NaN; give all u and v")
+            raise self._wrong(
+                "a coordinate is not finite", "mark points that were lost by NaN; give all u and v"
+            )
         if not frames or self.time[0] != 0 or (np.diff(self.time) <= 0).any():
             raise self._wrong("time does not increase from 0", "sort the frames, each once")
         if len(set(self.names)) < markers:
@@ -496,7 +599,9 @@ def write_markers(path: Path, sequence: MarkerSequence) -> None:
 
     if path.exists():
         raise ConflictError(
-            "a file or folder is there already", where=str(path), fix="give a path at which nothing is yet"
+            "a file or folder is there already",
+            where=str(path),
+            fix="give a path at which nothing is yet",
         )
     with disk_errors("writing markers", path):
         group = zarr.open_group(path, mode="w-", zarr_format=3)
@@ -528,13 +633,20 @@ def read_markers(path: Path) -> MarkerSequence:
         attributes: Any = group.attrs["attributes"]
         names: Any = group.attrs["names"]
         time, positions, rest = (
-            read_part(group, name, None, None, where=str(path)) for name in ("time", "positions", "rest")
+            read_part(group, name, None, None, where=str(path))
+            for name in ("time", "positions", "rest")
         )
         sequence = MarkerSequence(
-            time=time, positions=positions, rest=rest, names=tuple(names), attributes=dict(attributes)
+            time=time,
+            positions=positions,
+            rest=rest,
+            names=tuple(names),
+            attributes=dict(attributes),
         )
     if sequence.tracked != head.get("tracked"):
         raise CorruptError(
-            f"{sequence.tracked} positions, where {head.get('tracked')} were tracked", where=str(path), fix=restore
+            f"{sequence.tracked} positions, where {head.get('tracked')} were tracked",
+            where=str(path),
+            fix=restore,
         )
     return sequence

@@ -1,4 +1,5 @@
-"""What a user means who names an artifact: by its id or the beginning of it, its name, or the file it came from.
+"""What a user means who names an artifact: by its id or the beginning of it, its name, or the file
+it came from.
 
 Which rows revise which, by what their recipes state: see `flagdata.lake.results`.
 """
@@ -18,7 +19,8 @@ from flagdata.recipes.documents import column_json
 COLUMNS = ("artifact", "kind", "name", "parents", "source_name")
 """Columns that are looked at."""
 OF_RESULTS = (*COLUMNS, "recipe", "created")
-"""The same where measurements, verdicts and their models may be meant: which of them are superseded."""
+"""The same where measurements, verdicts and their models may be meant: which of them are
+superseded."""
 
 
 def condition(wanted: str) -> pc.Expression:
@@ -28,12 +30,17 @@ def condition(wanted: str) -> pc.Expression:
     return begins | (pc.field("name") == wanted) | (pc.field("source_name") == file)
 
 
-def meant(rows: Iterable[Mapping[str, Any]], wanted: str, *, kinds: Collection[Kind] = ()) -> list[Mapping[str, Any]]:
-    """Selects the artifacts that `wanted` may mean: one, or none, or several that nothing decides between.
+def meant(
+    rows: Iterable[Mapping[str, Any]], wanted: str, *, kinds: Collection[Kind] = ()
+) -> list[Mapping[str, Any]]:
+    """Selects the artifacts that `wanted` may mean: one, or none, or several that nothing decides
+    between.
 
-    An id comes first, then a name, then the file that was ingested, then the beginning of an id. Of several of one
-    name those of `kinds` come first; then a clip is not meant beside its recording, nor an artifact beside what was
-    made from it: a film that was aligned has the name of its recording. Of versions of a result the newest is meant.
+    An id comes first, then a name, then the file that was ingested, then the beginning of an id. Of
+    several of one name those of `kinds` come first; then a clip is not meant beside its recording,
+    nor an artifact beside what was
+    made from it: a film that was aligned has the name of its recording. Of versions of a result the
+    newest is meant.
 
     Args:
         rows: of the catalog, with `COLUMNS`; with `OF_RESULTS` where results may be meant.
@@ -55,12 +62,13 @@ def meant(rows: Iterable[Mapping[str, Any]], wanted: str, *, kinds: Collection[K
 
 
 REVISION = "revision"
-"""Key of a later version's recipe: `of`, the id of the first version, and `code`, the version of the code that inferred
-it. The models that a verdict left have that of the verdict."""
+"""Key of a later version's recipe: `of`, the id of the first version, and `code`, the version of
+the code that inferred it. The models that a verdict left have that of the verdict."""
 
 
 def first_revised(recipe: Mapping[str, Any]) -> str | None:
-    """Returns the id of the first version of what a row revises; `None` where it revises nothing."""
+    """Returns the id of the first version of what a row revises; `None` where it revises
+    nothing."""
     revision = recipe.get(REVISION)
     return revision.get("of") if isinstance(revision, Mapping) else None
 
@@ -87,7 +95,9 @@ def superseded_rows(rows: Iterable[Mapping[str, Any]]) -> set[str]:
     older: set[str] = set()
     for row in rows:
         artifact = row["artifact"]
-        revised_ids = (first[artifact],) if artifact in first else (artifact, *(row["parents"] or ()))
+        revised_ids = (
+            (first[artifact],) if artifact in first else (artifact, *(row["parents"] or ()))
+        )
         if any(newest[identity] > row["created"] for identity in revised_ids if identity in newest):
             older.add(artifact)
     return older

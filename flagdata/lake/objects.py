@@ -1,9 +1,11 @@
-"""Immutable objects under the hash of their content: single MCAP files, Zarr folders, and folders of trained models.
+"""Immutable objects under the hash of their content: single MCAP files, Zarr folders, and folders
+of trained models.
 
-In a bucket they are `mcap/<sha256>.mcap`, and folders as `zarr/<treehash>.zarr/…`. A folder's files are put first and
-`.sums`, the lines whose SHA-256 is its name, last: without it the folder is not there. `.sums` is deleted first.
-Objects are read from a local copy, see `flagdata.core.files.object_cache`; of large records only the parts that are
-needed are fetched, see `flagdata.core.files.object_ranges`.
+In a bucket they are `mcap/<sha256>.mcap`, and folders as `zarr/<treehash>.zarr/…`. A folder's files
+are put first and `.sums`, the lines whose SHA-256 is its name, last: without it the folder is not
+there. `.sums` is deleted first. Objects are read from a local copy, see
+`flagdata.core.files.object_cache`; of large records only the parts that are needed are fetched, see
+`flagdata.core.files.object_ranges`.
 """
 
 from __future__ import annotations
@@ -31,7 +33,10 @@ from flagdata.storage import Place, RemotePath
 _READ_ONLY = 0o444
 DAMAGED = ".damaged"
 """Ends the name of the note that an object was found damaged, which lies beside it."""
-REMEDY = f"do again what made it: flagdata verify says what that is, and the damaged object is replaced; or {HEAL}"
+REMEDY = (
+    "do again what made it: flagdata verify says what that is, and the damaged object is "
+    f"replaced; or {HEAL}"
+)
 _AT_ONCE = 8
 """Objects that are compared with their names at the same time."""
 _ATTEMPTS = 5
@@ -49,8 +54,8 @@ class StoredObject:
 
 
 class Objects:
-    """The stores `mcap/`, `zarr/` and `model/` of a lake at `root`; a lake made before format 2 gets `model/` when its
-    first model is stored."""
+    """The stores `mcap/`, `zarr/` and `model/` of a lake at `root`; a lake made before format 2
+    gets `model/` when its first model is stored."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
@@ -82,8 +87,8 @@ class Objects:
         return path
 
     def readable(self, name: str) -> Place:
-        """Returns a place from which the record can be read, see `flagdata.record.Record`: the object itself; for a
-        bucket, a local copy, or the bucket's own object if it is large.
+        """Returns a place from which the record can be read, see `flagdata.record.Record`: the
+        object itself; for a bucket, a local copy, or the bucket's own object if it is large.
 
         Raises:
             NotFoundError: it is not there.
@@ -91,7 +96,8 @@ class Objects:
         return self.existing(name)
 
     def openers(self, names: Sequence[str]) -> tuple[Callable[[], Place], ...]:
-        """Returns for each record a function that says where it is read from, which other processes may call, too.
+        """Returns for each record a function that says where it is read from, which other processes
+        may call, too.
 
         Raises:
             NotFoundError: one is not there.
@@ -100,7 +106,9 @@ class Objects:
 
     def missing(self, name: str) -> NotFoundError:
         """Returns the error for an object that is not there."""
-        return NotFoundError(f"object {name} is missing", where=str(self.path(name)), fix="run flagdata doctor")
+        return NotFoundError(
+            f"object {name} is missing", where=str(self.path(name)), fix="run flagdata doctor"
+        )
 
     def size(self, name: str) -> int:
         """Bytes of the object.
@@ -119,19 +127,26 @@ class Objects:
         files = files_of(staged)
         if staged.is_file() and staged.suffix != ".mcap":
             raise InputError(
-                "this is not an .mcap file", where=str(staged), fix="objects are .mcap files and Zarr folders"
+                "this is not an .mcap file",
+                where=str(staged),
+                fix="objects are .mcap files and Zarr folders",
             )
         if sum(f.stat().st_size for f in files) == 0:
-            raise InputError("the object is empty", where=str(staged), fix="write it before putting it")
-        store = "mcap" if staged.is_file() else "model" if staged.suffix == STORES["model"] else "zarr"
+            raise InputError(
+                "the object is empty", where=str(staged), fix="write it before putting it"
+            )
+        store = (
+            "mcap" if staged.is_file() else "model" if staged.suffix == STORES["model"] else "zarr"
+        )
         return f"{store}/{content_hash(staged)}"
 
     def publish(self, staged: Path, name: str) -> bool:
-        """Move `staged`, whose name was computed by `name_of`, to its place; durable when it returns.
+        """Move `staged`, whose name was computed by `name_of`, to its place; durable when it
+        returns.
 
-        An object of that name that is there and whole is kept and `staged` removed; one that does not hash to its
-        name is replaced, so that ingesting again heals a damaged lake. So it is with one that another writer publishes
-        in the same moment.
+        An object of that name that is there and whole is kept and `staged` removed; one that does
+        not hash to its name is replaced, so that ingesting again heals a damaged lake. So it is
+        with one that another writer publishes in the same moment.
 
         Returns:
             whether a whole object is there now that was not before.
@@ -163,7 +178,8 @@ class Objects:
         return True
 
     def is_there(self, name: str, size: int | None) -> bool:
-        """Checks whether the object is there, has `size` bytes if that is known, and no note says that it is damaged.
+        """Checks whether the object is there, has `size` bytes if that is known, and no note says
+        that it is damaged.
 
         Its bytes are not hashed: see `is_whole`.
         """
@@ -178,19 +194,23 @@ class Objects:
         return self.is_there(name, size) and self.is_whole(name)
 
     def unsound(self, sizes: Mapping[str, int | None]) -> frozenset[str]:
-        """Selects those of many objects, by name with their sizes, that are not as `is_sound` has it."""
+        """Selects those of many objects, by name with their sizes, that are not as `is_sound` has
+        it."""
         with ThreadPoolExecutor(_AT_ONCE) as pool:
             sound = pool.map(lambda name: self.is_sound(name, sizes[name]), sizes)
-            return frozenset(name for name, is_right in zip(sizes, sound, strict=True) if not is_right)
+            return frozenset(
+                name for name, is_right in zip(sizes, sound, strict=True) if not is_right
+            )
 
     def note_damage(self, name: str) -> None:
-        """Notes beside an object that it was found damaged, so that what makes it again, or has it, replaces it; where
-        the lake can only be read, nothing is noted."""
+        """Notes beside an object that it was found damaged, so that what makes it again, or has it,
+        replaces it; where the lake can only be read, nothing is noted."""
         with suppress(OSError, FlagdataError):
             self._note(name).write_bytes(b"")
 
     def note_whole(self, name: str) -> None:
-        """Take the note away that an object is damaged, if there is one and the lake can be written."""
+        """Take the note away that an object is damaged, if there is one and the lake can be
+        written."""
         with suppress(OSError, FlagdataError):
             if self._note(name).exists():
                 self._remove_note(name)
@@ -217,7 +237,8 @@ class Objects:
         return refused
 
     def delete(self, name: str) -> None:
-        """Delete an object, and what is noted of it; a power cut may bring it back until its store is flushed.
+        """Delete an object, and what is noted of it; a power cut may bring it back until its store
+        is flushed.
 
         Raises:
             OSError: what the disk refused.
@@ -258,23 +279,32 @@ class Objects:
         try:
             is_unchanged = content_hash(path) == name.partition("/")[2]
         except InputError:
-            raise LinkError(f"{name} is, or holds, a link or special file", where=str(path), fix=REMEDY) from None
+            raise LinkError(
+                f"{name} is, or holds, a link or special file", where=str(path), fix=REMEDY
+            ) from None
         if not is_unchanged:
-            raise CorruptError(f"the bytes of {name} have changed since they were written", where=str(path), fix=REMEDY)
+            raise CorruptError(
+                f"the bytes of {name} have changed since they were written",
+                where=str(path),
+                fix=REMEDY,
+            )
 
     def whole(self, name: str) -> Path:
-        """Returns where the object is, once its bytes have been compared with its name; raises as `check`."""
+        """Returns where the object is, once its bytes have been compared with its name; raises as
+        `check`."""
         self.check(name)
         return self.existing(name)
 
     def __iter__(self) -> Iterator[StoredObject]:
-        """Yields everything in the stores that has an object's name; a link counts for itself, not for what it leads
-        to."""
+        """Yields everything in the stores that has an object's name; a link counts for itself, not
+        for what it leads to."""
         for store, suffix in STORES.items():
             for path in sorted((self.root / store).glob("*")):
                 name = f"{store}/{path.name.removesuffix(suffix)}"
                 if path.name.endswith(suffix) and OBJECT_NAME.fullmatch(name):
-                    yield StoredObject(name=name, path=path, size=bytes_at(path), modified=path.lstat().st_mtime)
+                    yield StoredObject(
+                        name=name, path=path, size=bytes_at(path), modified=path.lstat().st_mtime
+                    )
 
     @staticmethod
     def remove(path: Place) -> None:
@@ -306,7 +336,9 @@ def path_in_lake(name: str) -> Path:
 def bytes_at(path: Place) -> int:
     """Bytes of whatever lies at a path; a link counts for itself, not for what it leads to."""
     inside = path.rglob("*") if path.is_dir() and not path.is_symlink() else ()
-    return sum(entry.lstat().st_size for entry in (path, *inside) if entry.is_symlink() or entry.is_file())
+    return sum(
+        entry.lstat().st_size for entry in (path, *inside) if entry.is_symlink() or entry.is_file()
+    )
 
 
 SUMS = ".sums"
@@ -347,14 +379,16 @@ class RemoteObjects(Objects):
             return copy
         size = self.size(name)
         try:
-            return fetch_copy(name, remote.suffix, size=size, fetch=partial(self._fetch, name), where=str(remote))
+            return fetch_copy(
+                name, remote.suffix, size=size, fetch=partial(self._fetch, name), where=str(remote)
+            )
         except CorruptError:
             self.note_damage(name)
             raise
 
     def readable(self, name: str) -> Place:
-        """Returns a local copy, or the place in the bucket of a record that is larger than `WHOLE`: of it only what is
-        needed is fetched.
+        """Returns a local copy, or the place in the bucket of a record that is larger than `WHOLE`:
+        of it only what is needed is fetched.
 
         Raises:
             NotFoundError, CorruptError: see `existing`.
@@ -367,10 +401,13 @@ class RemoteObjects(Objects):
         except FileNotFoundError:
             raise self.missing(name) from None
         large = status.st_size > WHOLE
-        return RemotePath(remote.bucket, remote.key, status=status) if large else self.existing(name)
+        return (
+            RemotePath(remote.bucket, remote.key, status=status) if large else self.existing(name)
+        )
 
     def openers(self, names: Sequence[str]) -> tuple[Callable[[], Place], ...]:
-        """Returns functions as for a disk; what is needed is fetched once its function was called."""
+        """Returns functions as for a disk; what is needed is fetched once its function was
+        called."""
         if not all(map(self._is_copied, names)):
             stored_names = {stored.name for stored in self}
             for name in names:
@@ -399,7 +436,8 @@ class RemoteObjects(Objects):
         return sum(size for key, size in sizes.items() if not _is_beside(key))
 
     def is_sound(self, name: str, size: int | None) -> bool:
-        """As `is_there`: to compare the bytes would fetch all of them. What verify or a reader found damaged counts."""
+        """As `is_there`: to compare the bytes would fetch all of them. What verify or a reader
+        found damaged counts."""
         return self.is_there(name, size)
 
     def unsound(self, sizes: Mapping[str, int | None]) -> frozenset[str]:
@@ -410,14 +448,16 @@ class RemoteObjects(Objects):
         return frozenset(
             name
             for name, size in sizes.items()
-            if name not in stored_sizes or size not in (None, stored_sizes[name]) or self._note(name).name in noted
+            if name not in stored_sizes
+            or size not in (None, stored_sizes[name])
+            or self._note(name).name in noted
         )
 
     def publish(self, staged: Path, name: str) -> bool:
         """Puts `staged`, whose name was computed by `name_of`; durable when it returns.
 
-        What is there under that name has the same bytes, unless it was damaged, and is put anew: so it counts as young,
-        and ingesting again heals a lake.
+        What is there under that name has the same bytes, unless it was damaged, and is put anew: so
+        it counts as young, and ingesting again heals a lake.
 
         Returns:
             whether nothing that `is_sound` was there before.
@@ -428,7 +468,10 @@ class RemoteObjects(Objects):
             remote.upload(staged)
         else:
             with ThreadPoolExecutor(_FILES_AT_ONCE) as pool:
-                uploads = [pool.submit((remote / file.relative_to(staged)).upload, file) for file in files_of(staged)]
+                uploads = [
+                    pool.submit((remote / file.relative_to(staged)).upload, file)
+                    for file in files_of(staged)
+                ]
                 for upload in uploads:
                     upload.result()
             (remote / SUMS).write_bytes(sums_of(staged).encode())
@@ -447,7 +490,9 @@ class RemoteObjects(Objects):
             is_unchanged = False
         if not is_unchanged:
             raise CorruptError(
-                f"the bytes of {name} have changed since they were written", where=str(remote), fix=REMEDY
+                f"the bytes of {name} have changed since they were written",
+                where=str(remote),
+                fix=REMEDY,
             )
 
     def __iter__(self) -> Iterator[StoredObject]:
@@ -460,15 +505,21 @@ class RemoteObjects(Objects):
                     sizes[name] = sizes.get(name, 0) + (0 if _is_beside(key) else status.st_size)
                     modified[name] = max(modified.get(name, 0.0), status.st_mtime)
             for name, size in sorted(sizes.items()):
-                yield StoredObject(name=name, path=self.path(name), size=size, modified=modified[name])
+                yield StoredObject(
+                    name=name, path=self.path(name), size=size, modified=modified[name]
+                )
 
     @staticmethod
     def remove(path: Place) -> None:
         if isinstance(path, RemotePath):
             name = f"{path.parent.name}/{path.stem}"
-            forget(name, path.suffix)  # first: once the object is gone, nobody would ask for its copy again
+            forget(
+                name, path.suffix
+            )  # first: once the object is gone, nobody would ask for its copy again
             path.remove_tree(first=None if path.suffix == ".mcap" else SUMS)
-            forget(name, path.suffix)  # what a reader fetched meanwhile: what is erased stays nowhere on this machine
+            forget(
+                name, path.suffix
+            )  # what a reader fetched meanwhile: what is erased stays nowhere on this machine
         else:
             Objects.remove(path)
 
@@ -499,7 +550,8 @@ class RemoteObjects(Objects):
         """Reads relative path → SHA-256 of a folder's files.
 
         Raises:
-            CorruptError: they cannot be read, are not those of its name, or name files outside the folder.
+            CorruptError: they cannot be read, are not those of its name, or name files outside the
+                folder.
         """
         content = (remote / SUMS).read_bytes()
         try:
@@ -509,9 +561,13 @@ class RemoteObjects(Objects):
         if (
             sums is None
             or hashlib.sha256(content).hexdigest() != remote.stem
-            or any("\0" in file or file.startswith("/") or ".." in Path(file).parts for file in sums)
+            or any(
+                "\0" in file or file.startswith("/") or ".." in Path(file).parts for file in sums
+            )
         ):
-            raise CorruptError("the sums of its files are damaged", where=str(remote / SUMS), fix=REMEDY)
+            raise CorruptError(
+                "the sums of its files are damaged", where=str(remote / SUMS), fix=REMEDY
+            )
         return sums
 
     def _hash(self, name: str) -> str:
@@ -523,7 +579,8 @@ class RemoteObjects(Objects):
 
 
 def _is_beside(key: str) -> bool:
-    """Checks whether a key is that of the sums, or of what an operating system put beside an object's files."""
+    """Checks whether a key is that of the sums, or of what an operating system put beside an
+    object's files."""
     return any(map(is_beside, key.split("/")))
 
 

@@ -1,10 +1,12 @@
-"""What every commit relies on at the place of a lake, tried before the first one: a disk, or a bucket.
+"""What every commit relies on at the place of a lake, tried before the first one: a disk, or a
+bucket.
 
-Of a disk: names that are put whole or not at all (hard links), locks that keep others out, a flush of files and of
-folders, and a rename that replaces. Portable disks (exFAT, FAT32) and shares of a network may lack any of them.
+Of a disk: names that are put whole or not at all (hard links), locks that keep others out, a flush
+of files and of folders, and a rename that replaces. Portable disks (exFAT, FAT32) and shares of a
+network may lack any of them.
 
-Of a store: the conditions of puts. Some servers take `If-None-Match` and `If-Match` and ignore them: of two writers at
-one version both would win, and a commit would be lost without a word.
+Of a store: the conditions of puts. Some servers take `If-None-Match` and `If-Match` and ignore
+them: of two writers at one version both would win, and a commit would be lost without a word.
 """
 
 from __future__ import annotations
@@ -14,7 +16,15 @@ import uuid
 from functools import cache
 from pathlib import Path
 
-from flagdata.core.files.durable import disk_errors, flush_file, flush_folder, lacking, lacks, link, make_folders
+from flagdata.core.files.durable import (
+    disk_errors,
+    flush_file,
+    flush_folder,
+    lacking,
+    lacks,
+    link,
+    make_folders,
+)
 from flagdata.core.files.file_locks import check_locks
 from flagdata.errors import FlagdataError, RefusedError
 from flagdata.lake.lake_locks import KernelLocks
@@ -24,7 +34,8 @@ from flagdata.storage.refusals import DeniedError
 
 @cache
 def probe(staging: Place) -> None:
-    """Tries in a lake's `staging/` what every commit relies on, and leaves nothing there: once a process and lake.
+    """Tries in a lake's `staging/` what every commit relies on, and leaves nothing there: once a
+    process and lake.
 
     Raises:
         RefusedError: the disk cannot do it, or the store did what it was asked not to do.
@@ -37,7 +48,8 @@ def probe(staging: Place) -> None:
 
 
 def _probe_disk(staging: Path) -> None:
-    """Tries it in the folder of a lease, so that no collection takes it away, and one does if this process dies."""
+    """Tries it in the folder of a lease, so that no collection takes it away, and one does if this
+    process dies."""
     with disk_errors("preparing to write to the lake", staging):
         make_folders(staging)
         note = KernelLocks(staging).note()
@@ -51,7 +63,8 @@ def _probe_disk(staging: Path) -> None:
 
 
 def _check_names(folder: Path) -> None:
-    """Gives names by links, also one that is taken, replaces them by renames, and flushes a file and the folder once.
+    """Gives names by links, also one that is taken, replaces them by renames, and flushes a file
+    and the folder once.
 
     Raises:
         RefusedError: the disk cannot do it.
@@ -66,7 +79,10 @@ def _check_names(folder: Path) -> None:
     except FileExistsError:
         pass
     else:
-        raise lacking("gives a name that is taken away again, so that writers would lose each other's commits", folder)
+        raise lacking(
+            "gives a name that is taken away again, so that writers would lose each other's commits",
+            folder,
+        )
     try:
         second.replace(name)
         for path in (first, second):
@@ -74,9 +90,13 @@ def _check_names(folder: Path) -> None:
             path.mkdir()
         first.rename(second)
     except OSError as error:
-        if error.errno not in {errno.EEXIST, errno.ENOTEMPTY, errno.EISDIR} and not lacks(error, folder):
+        if error.errno not in {errno.EEXIST, errno.ENOTEMPTY, errno.EISDIR} and not lacks(
+            error, folder
+        ):
             raise
-        raise lacking("does not replace a name that is taken by another in one step", folder, error=error) from error
+        raise lacking(
+            "does not replace a name that is taken by another in one step", folder, error=error
+        ) from error
     if name.read_bytes() != b"2":
         raise lacking("does not replace a name that is taken by another in one step", folder)
     flush_file(name)
@@ -84,7 +104,8 @@ def _check_names(folder: Path) -> None:
 
 
 def _probe_store(folder: RemotePath) -> None:
-    """Puts one object twice in `folder`, each time only if its name is free, and replaces it by a version it has not.
+    """Puts one object twice in `folder`, each time only if its name is free, and replaces it by a
+    version it has not.
 
     Raises:
         RefusedError: the store did what it was asked not to do.
@@ -99,7 +120,9 @@ def _probe_store(folder: RemotePath) -> None:
         probe_object.unlink()
     except DeniedError as error:
         raise FlagdataError(
-            f"this lake can be read, but not written: {error.strerror}", where=str(folder.parent), fix=error.fix
+            f"this lake can be read, but not written: {error.strerror}",
+            where=str(folder.parent),
+            fix=error.fix,
         ) from None
     except StoreError as error:
         raise FlagdataError(
@@ -109,7 +132,9 @@ def _probe_store(folder: RemotePath) -> None:
         ) from None
     if not first or twice or swapped or content != b"1":
         raise RefusedError(
-            "the store ignores the conditions of puts, so that writers would lose each other's commits",
+            "the store ignores the conditions of puts, so that writers would lose each other's "
+            "commits",
             where=str(folder.parent),
-            fix="use a store that keeps If-None-Match and If-Match (S3 itself does), or a lake in a local folder",
+            fix="use a store that keeps If-None-Match and If-Match (S3 itself does), or a lake in "
+            "a local folder",
         )

@@ -1,12 +1,13 @@
 """Tags and branches are made and deleted, each by one commit that says what it shows.
 
-A tag lists what was erased since the version that it names, without data, as every older tag does. A branch hides it,
-by the commit that begins the branch: what was erased is on no branch. Other data that went are no longer to be had, so
-neither shows a version that lacks them.
+A tag lists what was erased since the version that it names, without data, as every older tag does.
+A branch hides it,
+by the commit that begins the branch: what was erased is on no branch. Other data that went are no
+longer to be had, so neither shows a version that lacks them.
 
-A name is taken from the commit on, whatever becomes of files; one that was deleted may be used again, for a tag if it
-shows the same artifacts. A process that is killed after the commit has made or deleted the ref; the file that repeats
-it is written by the next `flagdata doctor`.
+A name is taken from the commit on, whatever becomes of files; one that was deleted may be used
+again, for a tag if it shows the same artifacts. A process that is killed after the commit has made
+or deleted the ref; the file that repeats it is written by the next `flagdata doctor`.
 """
 
 from __future__ import annotations
@@ -50,7 +51,9 @@ def make_ref(lake: Store, kind: str, name: str, *, at: str | None, notes: Mappin
             raise ConflictError(
                 f"there is a tag or branch {name!r} already",
                 where=str(lake.path),
-                fix="choose another name; a tag never moves" if kind == "tags" else "choose another name",
+                fix="choose another name; a tag never moves"
+                if kind == "tags"
+                else "choose another name",
             )
         view = lake.view(at)
         erased = _check_whole(lake, view, head)
@@ -62,7 +65,12 @@ def make_ref(lake: Store, kind: str, name: str, *, at: str | None, notes: Mappin
             _check_orphans(lake, view, erased)
             noted[ERASED] = str(len(erased))
             change = replace(change, leaving={name: erased})
-        ref = Ref(name=name, created=datetime.now(UTC).isoformat(timespec="seconds"), view=view, notes=noted)
+        ref = Ref(
+            name=name,
+            created=datetime.now(UTC).isoformat(timespec="seconds"),
+            view=view,
+            notes=noted,
+        )
         commit(lake, replace(change, made={(kind, name): ref}), base=head)
         return ref
 
@@ -74,8 +82,8 @@ def make_ref(lake: Store, kind: str, name: str, *, at: str | None, notes: Mappin
 
 
 def _check_whole(lake: Store, view: View, head: int) -> frozenset[str]:
-    """Checks whether a new tag or branch may show a view: not one that lacks data, unless they were erased. What a ref
-    shows already is not looked for.
+    """Checks whether a new tag or branch may show a view: not one that lacks data, unless they were
+    erased. What a ref shows already is not looked for.
 
     Returns:
         ids of the rows that were erased since, and did not come again.
@@ -89,9 +97,14 @@ def _check_whole(lake: Store, view: View, head: int) -> frozenset[str]:
     rows = lake.columns(view, _WITH_DATA)
     whole = unerase(lake, rows, view)
     on_branches = [lake.columns(each, _WITH_DATA) for each in branches]
-    of_tags = [unerase(lake, lake.columns(tag.view, _WITH_DATA), tag.view) for tag in lake.refs.tags().values()]
+    of_tags = [
+        unerase(lake, lake.columns(tag.view, _WITH_DATA), tag.view)
+        for tag in lake.refs.tags().values()
+    ]
     needed = {name for table in (*on_branches, *of_tags) for name in table["object"].to_pylist()}
-    for why in lost(lake, whole.filter(~pc.field("object").isin(pa.array(needed, pa.string())))).values():
+    for why in lost(
+        lake, whole.filter(~pc.field("object").isin(pa.array(needed, pa.string())))
+    ).values():
         raise ConflictError(why.what, where=str(lake.path), fix=_NEWER)
     alive = {artifact for table in on_branches for artifact in table["artifact"].to_pylist()}
     return frozenset(rows["artifact"].to_pylist()) - set(whole["artifact"].to_pylist()) - alive
@@ -114,13 +127,16 @@ def _check_orphans(lake: Store, view: View, erased: Collection[str]) -> None:
 
 
 def _check_reuse(lake: Store, name: str, view: View) -> None:
-    """Checks whether a tag may have a name: one that was published and deleted never shows anything else.
+    """Checks whether a tag may have a name: one that was published and deleted never shows anything
+    else.
 
     Raises:
         ConflictError: a deleted tag of that name showed other artifacts.
     """
     for removal in removals(lake.catalog.history()):
-        if removal.deleted == f"tag {name}" and lake.identities(removal.view) != lake.identities(view):
+        if removal.deleted == f"tag {name}" and lake.identities(removal.view) != lake.identities(
+            view
+        ):
             raise ConflictError(
                 f"a tag {name!r} showed other artifacts until it was deleted",
                 where=str(lake.path),
@@ -141,12 +157,18 @@ def delete_ref(lake: Store, kind: str, name: str, message: str | None, *, discar
         refs = lake.refs.tags() if kind == "tags" else lake.refs.branches()
         if name not in refs:
             raise NotFoundError(
-                f"there is no {noun} {name!r}", where=str(lake.path), fix=UnknownNameError.of(noun, name, refs).fix
+                f"there is no {noun} {name!r}",
+                where=str(lake.path),
+                fix=UnknownNameError.of(noun, name, refs).fix,
             )
         rows = lake.table(refs[name].view if kind == "tags" else lake.refs.view(name, head))
         if not discard:
             _check_elsewhere(lake, noun, name, set(rows["artifact"].to_pylist()))
-        leaving = {} if kind == "tags" else {name: rows.filter(pc.field("branch") == name)["artifact"].to_pylist()}
+        leaving = (
+            {}
+            if kind == "tags"
+            else {name: rows.filter(pc.field("branch") == name)["artifact"].to_pylist()}
+        )
         change = Change(
             message=message or f"delete the {noun} {name}",
             leaving=leaving,
@@ -157,7 +179,9 @@ def delete_ref(lake: Store, kind: str, name: str, message: str | None, *, discar
 
     lake.check_writable()
     if name == MAIN:
-        raise UsageError(f"{MAIN} cannot be deleted", fix="withdraw what is on it, or begin a new lake")
+        raise UsageError(
+            f"{MAIN} cannot be deleted", fix="withdraw what is on it, or begin a new lake"
+        )
     with lake.changing(f"deleting the {noun} {name}", alone=True):
         version = persist(attempt, where=lake.catalog.path)
         with confirming(f"the deletion of the {noun} {name}", lake.refs.root):
@@ -173,10 +197,13 @@ def _check_elsewhere(lake: Store, noun: str, name: str, identities: set[str]) ->
     """
     for ref in (MAIN, *lake.refs.branches(), *lake.refs.tags()):
         if ref != name:
-            identities = identities - set(lake.rows(at=ref, columns=["artifact"])["artifact"].to_pylist())
+            identities = identities - set(
+                lake.rows(at=ref, columns=["artifact"])["artifact"].to_pylist()
+            )
     if identities:
         raise ConflictError(
-            f"{len(identities)} artifacts are shown by this {noun} alone: without it, gc deletes them",
+            f"{len(identities)} artifacts are shown by this {noun} alone: without it, gc deletes "
+            "them",
             where=f"{noun} {name}",
             fix="merge or tag them first, or add --discard to give them up",
         )

@@ -1,15 +1,19 @@
-"""Tags and branches. Delta has neither: each is an entry of the log, which says what it shows and when it was deleted.
+"""Tags and branches. Delta has neither: each is an entry of the log, which says what it shows and
+when it was deleted.
 
-The files in `refs/tags` and `refs/branches` repeat the log for earlier versions of flagdata, whose refs were these
-files alone. What the log says counts; `flagdata doctor` writes a file anew that says something else. A ref that only a
-file states, of an earlier version, is entered into the log by the next commit.
+The files in `refs/tags` and `refs/branches` repeat the log for earlier versions of flagdata, whose
+refs were these files alone. What the log says counts; `flagdata doctor` writes a file anew that
+says something else. A ref that only a file states, of an earlier version, is entered into the log
+by the next commit.
 
-A view is what a ref shows: for each branch of its line, that branch's rows at one version of the table. A branch's
-view is its own rows at the head, and its parent's view at the version it forked from, without rows that were withdrawn
-from the branch; so `main` may go on without the branch noticing. Every row names the branch that it was committed on. A
-tag states its whole view and stays what it was. Each file ends with the SHA-256 of what it states.
+A view is what a ref shows: for each branch of its line, that branch's rows at one version of the
+table. A branch's view is its own rows at the head, and its parent's view at the version it forked
+from, without rows that were withdrawn from the branch; so `main` may go on without the branch
+noticing. Every row names the branch that it was committed on. A tag states its whole view and stays
+what it was. Each file ends with the SHA-256 of what it states.
 
-Instants by which a version can be named: 2026-11-26 (the end of that day, UTC), a time with its zone, 3.days.ago.
+Instants by which a version can be named: 2026-11-26 (the end of that day, UTC), a time with its
+zone, 3.days.ago.
 """
 
 from __future__ import annotations
@@ -35,7 +39,14 @@ from flagdata.core.files.durable import (
 )
 from flagdata.core.files.regular_files import open_regular
 from flagdata.core.provenance import recipe_hash
-from flagdata.errors import CorruptError, FlagdataError, NotFoundError, TimeError, UnknownNameError, UsageError
+from flagdata.errors import (
+    CorruptError,
+    FlagdataError,
+    NotFoundError,
+    TimeError,
+    UnknownNameError,
+    UsageError,
+)
 from flagdata.recipes.documents import from_json
 from flagdata.storage import Place
 from flagdata.timebase import NANOSECONDS, from_datetime, names_zone, parse
@@ -60,17 +71,23 @@ def moment(text: str, *, now: datetime | None = None) -> int | None:
         try:
             return from_datetime((now or datetime.now(UTC)) - passed)
         except OverflowError:
-            raise UsageError(f"{text!r} is before the year 1", where="--at", fix="name a later instant") from None
+            raise UsageError(
+                f"{text!r} is before the year 1", where="--at", fix="name a later instant"
+            ) from None
     if not re.match(_DAY, text):
         return None
     try:
         if _DAY.fullmatch(text):
             return parse(f"{text}T00:00:00Z") + 86_400 * NANOSECONDS - 1
         if not names_zone(text):
-            raise UsageError(f"{text!r} names no zone", where="--at", fix=f"write {text}Z, or +02:00 behind it")
+            raise UsageError(
+                f"{text!r} names no zone", where="--at", fix=f"write {text}Z, or +02:00 behind it"
+            )
         return parse(text)
     except TimeError as error:
-        raise UsageError(error.what, where="--at", fix="write 2026-11-26, or 2026-11-26T12:00:00Z") from None
+        raise UsageError(
+            error.what, where="--at", fix="write 2026-11-26, or 2026-11-26T12:00:00Z"
+        ) from None
 
 
 Entry: TypeAlias = Mapping[str, Any]
@@ -82,7 +99,8 @@ _SHOWN = 60  # characters of a name in a message
 NOUNS = {"tags": "tag", "branches": "branch"}
 """Kind of a ref, which is the folder of its file → what it is called."""
 ERASED = "erased"
-"""Note of a branch: how many artifacts of the version that it began from it hides, since they had been erased."""
+"""Note of a branch: how many artifacts of the version that it began from it hides, since they had
+been erased."""
 _HASH = "sha256"
 _COMMIT = re.compile(r"c[0-9a-f]{16}")
 
@@ -127,7 +145,8 @@ def view_from(stored: Iterable[Mapping[str, Any]]) -> View:
 
 @dataclass(frozen=True, kw_only=True)
 class Ref:
-    """A tag (its view is fixed) or a branch (its view is what it forked from, without its own rows).
+    """A tag (its view is fixed) or a branch (its view is what it forked from, without its own
+    rows).
 
     Attributes:
         created: when it was made, ISO 8601.
@@ -151,7 +170,8 @@ class Deletion:
     timestamp: int
 
     def ends(self, ref: Ref) -> bool:
-        """Checks whether a ref of that name was made before, so that it is the one that was deleted."""
+        """Checks whether a ref of that name was made before, so that it is the one that was
+        deleted."""
         return datetime.fromisoformat(ref.created).timestamp() * 1000 <= self.timestamp
 
 
@@ -163,16 +183,19 @@ def check_name(name: str, *, noun: str) -> str:
     """Checks whether `name` can name a tag or branch, and returns it.
 
     Raises:
-        UsageError: characters that are not allowed, or a name that could be taken for a version or commit.
+        UsageError: characters that are not allowed, or a name that could be taken for a version or
+            commit.
     """
     if not _NAME.fullmatch(name):
         raise UsageError(
             f"{name!r} cannot name a {noun}",
-            fix="use up to 100 letters, digits, dots, dashes and underscores, beginning with a letter or digit",
+            fix="use up to 100 letters, digits, dots, dashes and underscores, beginning with a "
+            "letter or digit",
         )
     if name.isdecimal() or _COMMIT.fullmatch(name) or name.endswith(".json"):
         raise UsageError(
-            f"{name!r} cannot name a {noun}: it looks like a version, commit or file", fix="add a word to it"
+            f"{name!r} cannot name a {noun}: it looks like a version, commit or file",
+            fix="add a word to it",
         )
     return name
 
@@ -199,7 +222,8 @@ class Refs:
         return self._all("branches")
 
     def older(self) -> dict[Key, Ref]:
-        """Reads the refs that only a file states, by kind and name: those that an earlier version of flagdata made.
+        """Reads the refs that only a file states, by kind and name: those that an earlier version
+        of flagdata made.
 
         Raises:
             CorruptError: a file that cannot be read, or has changed since it was written.
@@ -208,7 +232,8 @@ class Refs:
         return {key: ref for key, ref in found.items() if ref is not None}
 
     def enterable(self, head: int) -> dict[Key, Ref]:
-        """Reads those of them that the log can take: what is damaged, or names a version after `head`, stays a file."""
+        """Reads those of them that the log can take: what is damaged, or names a version after
+        `head`, stays a file."""
         found: dict[Key, Ref] = {}
         for key, path in self._unstated_files().items():
             with suppress(FlagdataError):
@@ -218,7 +243,8 @@ class Refs:
         return found
 
     def damaged(self) -> dict[Key, Place]:
-        """Lists those of them that cannot be read, or have changed since they were written, by kind and name."""
+        """Lists those of them that cannot be read, or have changed since they were written, by kind
+        and name."""
         found: dict[Key, Place] = {}
         for key, path in self._unstated_files().items():
             try:
@@ -239,7 +265,8 @@ class Refs:
         return None if isinstance(life, Deletion) and life.ends(ref) else ref
 
     def lives(self) -> Mapping[Key, Ref | Deletion]:
-        """Finds for each name that the log states, by kind, the ref that has it now, or the last deletion.
+        """Finds for each name that the log states, by kind, the ref that has it now, or the last
+        deletion.
 
         Raises:
             CorruptError: a note of the log cannot be read.
@@ -260,7 +287,8 @@ class Refs:
         return {key: content_of(ref) for key, ref in self._by_key().items()}
 
     def cache(self, kind: str, ref: Ref) -> None:
-        """Write the file of a ref that the log states, for earlier versions of flagdata. A file of other content goes.
+        """Write the file of a ref that the log states, for earlier versions of flagdata. A file of
+        other content goes.
 
         Raises:
             OSError: what the disk refused.
@@ -272,20 +300,25 @@ class Refs:
             put_if_absent(path, content_of(ref))
 
     def stale_files(self) -> list[Place]:
-        """Lists the files of refs that do not say what the log says: missing, changed, or of a ref that was deleted."""
+        """Lists the files of refs that do not say what the log says: missing, changed, or of a ref
+        that was deleted."""
         live = self._by_key()
         stale = [
             path
             for (kind, name), ref in live.items()
             if not self._states(path := self.root / kind / f"{name}.json", ref)
         ]
-        stale += [path for kind in NOUNS for path in self._files(kind) if (kind, path.stem) not in live]
+        stale += [
+            path for kind in NOUNS for path in self._files(kind) if (kind, path.stem) not in live
+        ]
         return sorted(stale)  # type: ignore[type-var]
 
     def strays(self) -> list[Place]:
         """Lists what lies among the files of refs and has no ref's name."""
         paths = [path for kind in NOUNS for path in (self.root / kind).glob("*")]
-        strays = [path for path in paths if path.suffix != ".json" or not _NAME.fullmatch(path.stem)]
+        strays = [
+            path for path in paths if path.suffix != ".json" or not _NAME.fullmatch(path.stem)
+        ]
         return sorted(path for path in strays if not SCRATCH.fullmatch(path.name))  # type: ignore[type-var]
 
     def write_files(self) -> None:
@@ -324,7 +357,9 @@ class Refs:
         newest = max(part.version for part in ref.view)
         if newest > head:
             path = self.root / kind / f"{ref.name}.json"
-            message = f"the {NOUNS[kind]} {ref.name!r} shows version {newest}, but the newest is {head}"
+            message = (
+                f"the {NOUNS[kind]} {ref.name!r} shows version {newest}, but the newest is {head}"
+            )
             raise CorruptError(message, where=str(path), fix=HEAL)
         return ref.view
 
@@ -351,7 +386,8 @@ class Refs:
                 flush_folder(path.parent)
 
     def adopt(self, kind: str, name: str, stored: bytes) -> None:
-        """Put the file of a ref that a lake of the same history has as a file only, unless it is there."""
+        """Put the file of a ref that a lake of the same history has as a file only, unless it is
+        there."""
         path = self.root / kind / f"{name}.json"
         with disk_errors(f"creating the ref {name}", path):
             put_if_absent(path, stored)
@@ -365,8 +401,11 @@ class Refs:
         return dict(sorted({**stated, **self.older()}.items()))
 
     def _files(self, kind: str) -> list[Place]:
-        """Lists the files of refs of a kind. What has no ref's name is none: it may be of any program."""
-        files = [path for path in (self.root / kind).glob("[!.]*.json") if _NAME.fullmatch(path.stem)]
+        """Lists the files of refs of a kind. What has no ref's name is none: it may be of any
+        program."""
+        files = [
+            path for path in (self.root / kind).glob("[!.]*.json") if _NAME.fullmatch(path.stem)
+        ]
         return sorted(files)  # type: ignore[type-var]
 
     @staticmethod
@@ -375,7 +414,9 @@ class Refs:
             with open_regular(path) as stream:
                 content: dict[str, Any] = from_json(stream.read())
             noted = content.pop(_HASH, None)  # which those of older lakes lack
-            if content["name"] != path.stem or (noted is not None and noted != recipe_hash(content)):
+            if content["name"] != path.stem or (
+                noted is not None and noted != recipe_hash(content)
+            ):
                 raise ValueError("it has changed since it was written")
             return _from_stated(content)
         except OSError as error:
@@ -401,7 +442,9 @@ def _from_stated(stated: Mapping[str, Any]) -> Ref:
         ValueError, KeyError, TypeError, AttributeError: it states no ref.
     """
     notes = {key: value for key, value in stated.get("notes", {}).items() if isinstance(value, str)}
-    return Ref(name=stated["name"], created=stated["created"], view=view_from(stated["view"]), notes=notes)
+    return Ref(
+        name=stated["name"], created=stated["created"], view=view_from(stated["view"]), notes=notes
+    )
 
 
 def content_of(ref: Ref) -> bytes:
@@ -432,7 +475,10 @@ def made_by(entry: Entry) -> dict[Key, Ref]:
     if MADE not in entry:
         return {}
     try:
-        made = {(str(stated["kind"]), str(stated["name"])): _from_stated(stated) for stated in from_json(entry[MADE])}
+        made = {
+            (str(stated["kind"]), str(stated["name"])): _from_stated(stated)
+            for stated in from_json(entry[MADE])
+        }
         if not all(kind in NOUNS and _NAME.fullmatch(name) for kind, name in made):
             raise ValueError("what is made is neither a tag nor a branch, or has no name")
     except (ValueError, KeyError, TypeError, AttributeError):
@@ -458,22 +504,29 @@ def resolve(
     commits: Callable[[], Mapping[str, View]],
     history: Callable[[], Iterable[Mapping[str, Any]]],
 ) -> View:
-    """Finds the view of a tag, branch, version number, commit id, or of main at an instant; `None` is the head of main.
+    """Finds the view of a tag, branch, version number, commit id, or of main at an instant; `None`
+    is the head of main.
 
     Args:
         commits: gives commit id → what it shows; called only when `at` has the form of a commit id.
-        history: gives version and timestamp [UTC ms] of each version; called only when `at` names an instant.
+        history: gives version and timestamp [UTC ms] of each version; called only when `at` names
+            an instant.
 
     Raises:
-        NotFoundError: none of these, with the nearest name; or a version beyond the newest, or before the first.
+        NotFoundError: none of these, with the nearest name; or a version beyond the newest, or
+            before the first.
         UsageError: an instant that is none, see `moments.moment`.
     """
     if at is None:
         return refs.view(MAIN, head)
     if _VERSION.fullmatch(at):
         number = at.lstrip("0") or "0"
-        if len(number) > len(str(head)) or int(number) > head:  # Python reads no number of thousands of digits
-            raise NotFoundError(f"there is no version {_quote_name(at)}", fix=f"the newest is {head}")
+        if (
+            len(number) > len(str(head)) or int(number) > head
+        ):  # Python reads no number of thousands of digits
+            raise NotFoundError(
+                f"there is no version {_quote_name(at)}", fix=f"the newest is {head}"
+            )
         return (Slice(branch=MAIN, version=int(number)),)
     if _COMMIT.fullmatch(at):
         views = commits()
@@ -488,15 +541,21 @@ def resolve(
         return refs.view(at, head)
     instant = moment(at)
     if instant is not None:
-        before = [entry["version"] for entry in history() if entry["timestamp"] * 1_000_000 <= instant]
+        before = [
+            entry["version"] for entry in history() if entry["timestamp"] * 1_000_000 <= instant
+        ]
         if not before:
-            raise NotFoundError(f"the lake has no version of {at} or before", fix="flagdata log lists its versions")
+            raise NotFoundError(
+                f"the lake has no version of {at} or before", fix="flagdata log lists its versions"
+            )
         return (Slice(branch=MAIN, version=max(before)),)
     raise _not_there("tag, branch or commit", at, [MAIN, *tags, *branches])
 
 
 def _not_there(noun: str, at: str, names: Iterable[str]) -> NotFoundError:
-    at = _quote_name(at)  # also since names that are alike are sought in time with the square of the length
+    at = _quote_name(
+        at
+    )  # also since names that are alike are sought in time with the square of the length
     return NotFoundError(f"there is no {noun} {at!r}", fix=UnknownNameError.of(noun, at, names).fix)
 
 

@@ -1,18 +1,20 @@
-"""Rows go, for a reason: withdrawn from a branch, erased everywhere, with versions that expire, or with a branch or tag
-that is deleted, see `flagdata.lake.ref_commits`. All go by one commit, see `flagdata.lake.commits`, whose notes say
-which rows and why.
+"""Rows go, for a reason: withdrawn from a branch, erased everywhere, with versions that expire, or
+with a branch or tag that is deleted, see `flagdata.lake.ref_commits`. All go by one commit, see
+`flagdata.lake.commits`, whose notes say which rows and why.
 
-*Withdrawn*: the branch's rows leave the table; rows of its base, which its parent goes on to show, are hidden by a
-note, see `flagdata.lake.lineage`. `gc` deletes their data after the grace period.
+*Withdrawn*: the branch's rows leave the table; rows of its base, which its parent goes on to show,
+are hidden by a note, see `flagdata.lake.lineage`. `gc` deletes their data after the grace period.
 
-*Erased*: off every branch by one commit, the bytes deleted at once, also where a tag or an old version shows them.
-Their rows stay in tags and older versions, which say what was erased and why. Objects that other rows need stay. What a
-lake cannot reach is named: exports, clones, caches. The commit comes first: a process that is killed before it has
-deleted the bytes, or a disk that refuses, leaves an erasure that the log knows, see `find_unfinished`. The same command
-finishes it, and so does `gc`.
+*Erased*: off every branch by one commit, the bytes deleted at once, also where a tag or an old
+version shows them. Their rows stay in tags and older versions, which say what was erased and why.
+Objects that other rows need stay. What a
+lake cannot reach is named: exports, clones, caches. The commit comes first: a process that is
+killed before it has deleted the bytes, or a disk that refuses, leaves an erasure that the log
+knows, see `find_unfinished`. The same command finishes it, and so does `gc`.
 
-*Expired*: the oldest versions give up the data that only they show, at once. Their rows stay readable, and what a
-branch or a tag shows does not change. What a process that is killed has not deleted, `gc` does.
+*Expired*: the oldest versions give up the data that only they show, at once. Their rows stay
+readable, and what a branch or a tag shows does not change. What a process that is killed has not
+deleted, `gc` does.
 """
 
 from __future__ import annotations
@@ -89,19 +91,22 @@ def withdraw(lake: Store, artifacts: Collection[str], message: str, *, branch: s
 
 
 def clips_of(rows: pa.Table, artifacts: Collection[str]) -> frozenset[str]:
-    """Ids of the clips that are slices of the objects of `artifacts` themselves, so that they mean nothing without."""
+    """Ids of the clips that are slices of the objects of `artifacts` themselves, so that they mean
+    nothing without."""
     parents = matching(rows, {"artifact": list(artifacts)}).select(CLIP_COLUMNS).to_pylist()
     objects = {row["artifact"]: row["object"] for row in parents}
     clips = matching(made_from(rows, objects), {"kind": Kind.CLIP}).select(CLIP_COLUMNS).to_pylist()
     return frozenset(
         row["artifact"]
         for row in clips
-        if row["object"] is not None and any(objects.get(parent) == row["object"] for parent in row["parents"])
+        if row["object"] is not None
+        and any(objects.get(parent) == row["object"] for parent in row["parents"])
     ) - frozenset(artifacts)
 
 
 def descendants(rows: pa.Table, artifacts: Collection[str]) -> frozenset[str]:
-    """Ids of all rows that were made from `artifacts`, or from what was made from them; without `artifacts`."""
+    """Ids of all rows that were made from `artifacts`, or from what was made from them; without
+    `artifacts`."""
     reached, newest = set(artifacts), set(artifacts)
     while newest:
         newest = set(made_from(rows, newest)["artifact"].to_pylist()) - reached
@@ -156,28 +161,45 @@ class Erasure:
     kept: dict[str, str]
 
 
-def erase(lake: Store, artifacts: Collection[str], message: str, *, with_descendants: bool) -> Erasure:
+def erase(
+    lake: Store, artifacts: Collection[str], message: str, *, with_descendants: bool
+) -> Erasure:
     """Erases artifacts, see `Lake.erase`."""
     asked = frozenset(artifacts)
     with lake.changing("erasing", alone=True) as check:
         tags = lake.refs.tags()
         rows_of_refs = {ref: lake.rows(at=ref) for ref in (MAIN, *lake.refs.branches(), *tags)}
         version, before = _erased_with(lake, asked)
-        going = _all(rows_of_refs, asked, erased=before, with_descendants=with_descendants, where=str(lake.path))
+        going = _all(
+            rows_of_refs,
+            asked,
+            erased=before,
+            with_descendants=with_descendants,
+            where=str(lake.path),
+        )
         erased = {artifact: name for artifact, name in before.items() if artifact in going} | {
             row["artifact"]: row["object"]
             for table in rows_of_refs.values()
             for row in table.select(["artifact", "object"]).to_pylist()
             if row["artifact"] in going
         }
-        concerned = [ref for ref, table in rows_of_refs.items() if going.intersection(table["artifact"].to_pylist())]
+        concerned = [
+            ref
+            for ref, table in rows_of_refs.items()
+            if going.intersection(table["artifact"].to_pylist())
+        ]
         branches = [ref for ref in concerned if ref not in tags]
 
         def attempt() -> int:
             head = lake.catalog.head()
-            leaving = {branch: erased.keys() & lake.identities(lake.refs.view(branch, head)) for branch in branches}
+            leaving = {
+                branch: erased.keys() & lake.identities(lake.refs.view(branch, head))
+                for branch in branches
+            }
             notes = {"erased": json.dumps(erased, sort_keys=True)}
-            return commit(lake, Change(message=message, leaving=leaving or {MAIN: ()}, notes=notes), base=head)
+            return commit(
+                lake, Change(message=message, leaving=leaving or {MAIN: ()}, notes=notes), base=head
+            )
 
         if branches or not going <= before.keys():
             version = persist(attempt, where=lake.catalog.path)
@@ -194,9 +216,11 @@ def erase(lake: Store, artifacts: Collection[str], message: str, *, with_descend
 
 
 def _erased_with(lake: Store, asked: frozenset[str]) -> tuple[int, dict[str, str | None]]:
-    """Returns the newest version that erased some artifacts before, 0 where there is none, and what these versions
-    erased, artifact by object, that nothing which was committed since needs."""
-    earlier = [removal for removal in removals(lake.catalog.history()) if asked & removal.erased.keys()]
+    """Returns the newest version that erased some artifacts before, 0 where there is none, and what
+    these versions erased, artifact by object, that nothing which was committed since needs."""
+    earlier = [
+        removal for removal in removals(lake.catalog.history()) if asked & removal.erased.keys()
+    ]
     if not earlier:
         return 0, {}
     needed = mark(lake, grace=_GRACE).objects
@@ -205,8 +229,8 @@ def _erased_with(lake: Store, asked: frozenset[str]) -> tuple[int, dict[str, str
 
 
 def erased_objects(lake: Store) -> dict[str, tuple[int, str]]:
-    """Returns, for each object of which an artifact was erased from all refs, the newest version that did so and
-    why."""
+    """Returns, for each object of which an artifact was erased from all refs, the newest version
+    that did so and why."""
     return {
         name: (removal.version, removal.reason)
         for removal in reversed(removals(lake.catalog.history()))
@@ -217,7 +241,8 @@ def erased_objects(lake: Store) -> dict[str, tuple[int, str]]:
 
 @dataclass(frozen=True, kw_only=True)
 class Unfinished:
-    """An object that a commit gave up, and that is stored all the same: the process was killed, or the disk refused.
+    """An object that a commit gave up, and that is stored all the same: the process was killed, or
+    the disk refused.
 
     Attributes:
         name: of the object.
@@ -233,8 +258,9 @@ class Unfinished:
 
 
 def find_unfinished(lake: Store, needed: Collection[str]) -> list[Unfinished]:
-    """Finds what commits left to be done: objects that are stored though all artifacts of them were erased, or though
-    they went with versions that expired; by name. Nothing else asks the log for that.
+    """Finds what commits left to be done: objects that are stored though all artifacts of them were
+    erased, or though they went with versions that expired; by name. Nothing else asks the log for
+    that.
 
     Args:
         needed: objects of other rows, and those that running transactions hold.
@@ -252,12 +278,14 @@ def find_unfinished(lake: Store, needed: Collection[str]) -> list[Unfinished]:
 
 
 def erased_as(lake: Store, artifact: str) -> str | None:
-    """Finds the id of an artifact that was erased, by an id, its beginning, or the name that it had; `None` where there
-    is none, or more than one."""
+    """Finds the id of an artifact that was erased, by an id, its beginning, or the name that it
+    had; `None` where there is none, or more than one."""
     for removal in removals(lake.catalog.history()):
         if gone := removal.erased:
             rows = lake.catalog.rows(removal.version - 1).select(naming.COLUMNS)
-            matches = naming.meant(rows.filter(pc.field("artifact").isin(sorted(gone))).to_pylist(), artifact)
+            matches = naming.meant(
+                rows.filter(pc.field("artifact").isin(sorted(gone))).to_pylist(), artifact
+            )
             identities = {row["artifact"] for row in matches} or {
                 identity for identity in gone if identity.startswith(artifact)
             }
@@ -274,7 +302,8 @@ def _all(
     with_descendants: bool,
     where: str,
 ) -> frozenset[str]:
-    """Lists what goes: what was asked for, its clips and, if wanted, its descendants, wherever a ref shows them.
+    """Lists what goes: what was asked for, its clips and, if wanted, its descendants, wherever a
+    ref shows them.
 
     Args:
         erased: those that were erased before, which no ref need show.
@@ -288,17 +317,24 @@ def _all(
         going |= clips_of(table, asked)
         if with_descendants:
             going |= descendants(table, asked)
-    identities = {artifact for table in rows_of_refs.values() for artifact in table["artifact"].to_pylist()}
+    identities = {
+        artifact for table in rows_of_refs.values() for artifact in table["artifact"].to_pylist()
+    }
     if foreign := sorted(asked - identities - set(erased)):
-        raise NotFoundError(f"no ref shows {', '.join(foreign)}", where=where, fix="flagdata ls --at REF lists ids")
+        raise NotFoundError(
+            f"no ref shows {', '.join(foreign)}", where=where, fix="flagdata ls --at REF lists ids"
+        )
     for ref, table in rows_of_refs.items():
         present = going.intersection(table["artifact"].to_pylist())
         check_leaving(table, present, branch=ref, where=where)
     return frozenset(going)
 
 
-def _delete(lake: Store, names: Collection[str], check: Check) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Deletes the objects that nothing else needs; the lock that keeps transactions out is held, and checked.
+def _delete(
+    lake: Store, names: Collection[str], check: Check
+) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Deletes the objects that nothing else needs; the lock that keeps transactions out is held,
+    and checked.
 
     Raises:
         ConflictError: the lock may have been lost.
@@ -306,19 +342,30 @@ def _delete(lake: Store, names: Collection[str], check: Check) -> tuple[tuple[st
         FlagdataError: the disk refuses to delete some; the others are gone.
     """
     marked = mark(lake, grace=timedelta(0))
-    marked.check(outcome=", so none was deleted", fix="mend what flagdata doctor reports, and run the command again")
+    marked.check(
+        outcome=", so none was deleted",
+        fix="mend what flagdata doctor reports, and run the command again",
+    )
     in_use = _in_use(lake)
-    reasons_kept = dict.fromkeys(sorted(set(names) & marked.objects), "another artifact has the same content")
-    reasons_kept |= dict.fromkeys(sorted(set(names) & in_use - marked.objects), "a running transaction holds it")
-    gone = sorted({stored.name for stored in lake.objects}.intersection(names) - reasons_kept.keys())
+    reasons_kept = dict.fromkeys(
+        sorted(set(names) & marked.objects), "another artifact has the same content"
+    )
+    reasons_kept |= dict.fromkeys(
+        sorted(set(names) & in_use - marked.objects), "a running transaction holds it"
+    )
+    gone = sorted(
+        {stored.name for stored in lake.objects}.intersection(names) - reasons_kept.keys()
+    )
     refused = lake.objects.delete_all(gone, check)
     if refused:
         name, error = next(iter(refused.items()))
         raise FlagdataError(
-            f"the artifacts are erased from all refs, but the data of {len(refused)} of {len(gone)} objects are still "
+            f"the artifacts are erased from all refs, but the data of {len(refused)} of "
+            f"{len(gone)} objects are still "
             f"there, {name} among them: {error.strerror}",
             where=str(lake.objects.path(name)),
-            fix="let its folder and what is in it be written, and run the same command again, or flagdata gc",
+            fix="let its folder and what is in it be written, and run the same command again, or "
+            "flagdata gc",
         )
     return tuple(gone), reasons_kept
 
@@ -341,8 +388,8 @@ class Expiry:
 
 
 def last_version(lake: Store, *, older_than: timedelta | None, keep: int | None) -> int:
-    """Finds the newest version that expires: one that another replaced so long ago, and that is not among the newest
-    `keep`; −1 where there is none. The head never expires."""
+    """Finds the newest version that expires: one that another replaced so long ago, and that is not
+    among the newest `keep`; −1 where there is none. The head never expires."""
     history = lake.catalog.history()  # newest first
     last = history[0]["version"] - 1
     if keep is not None:
@@ -355,7 +402,8 @@ def last_version(lake: Store, *, older_than: timedelta | None, keep: int | None)
 
 
 def expire(lake: Store, up_to: int, message: str | None = None, *, dry_run: bool = False) -> Expiry:
-    """Let the versions up to `up_to` expire: note it, and delete what no other version, branch or tag shows.
+    """Let the versions up to `up_to` expire: note it, and delete what no other version, branch or
+    tag shows.
 
     Args:
         up_to: before the head.
@@ -363,7 +411,8 @@ def expire(lake: Store, up_to: int, message: str | None = None, *, dry_run: bool
         dry_run: find out only.
 
     Raises:
-        CorruptError: a ref cannot be read or the catalog is damaged, so what is needed is unknown; nothing was deleted.
+        CorruptError: a ref cannot be read or the catalog is damaged, so what is needed is unknown;
+            nothing was deleted.
     """
     if dry_run or up_to < 0:
         if not dry_run:
@@ -373,8 +422,12 @@ def expire(lake: Store, up_to: int, message: str | None = None, *, dry_run: bool
     with lake.changing("expiring versions", alone=True) as check:
         going = _expiring(lake, up_to)
         noted = json.dumps({"up_to": up_to, "objects": list(going.objects)})
-        change = Change(message=message or f"expire versions up to {up_to}", notes={"expired": noted})
-        version = persist(lambda: commit(lake, change, base=lake.catalog.head()), where=lake.catalog.path)
+        change = Change(
+            message=message or f"expire versions up to {up_to}", notes={"expired": noted}
+        )
+        version = persist(
+            lambda: commit(lake, change, base=lake.catalog.head()), where=lake.catalog.path
+        )
         for error in lake.objects.delete_all(going.objects, check).values():
             raise error
     return replace(going, version=version)
@@ -384,12 +437,15 @@ def _expiring(lake: Store, up_to: int) -> Expiry:
     """Returns what goes with the versions up to one; transactions are kept out."""
     in_use = _in_use(lake)
     marked = mark(lake, grace=timedelta(0), first=up_to + 1)
-    # Rows read from a changed file may name other objects than those they need, so files are re-hashed first.
+    # Rows read from a changed file may name other objects than those they need, so files are
+    # re-hashed first.
     marked.check(*catalog_files(lake))
     committed = lake.catalog.objects() - marked.objects - in_use
     going = [stored for stored in lake.objects if stored.name in committed]
     return Expiry(
-        up_to=up_to, objects=tuple(sorted(stored.name for stored in going)), size=sum(stored.size for stored in going)
+        up_to=up_to,
+        objects=tuple(sorted(stored.name for stored in going)),
+        size=sum(stored.size for stored in going),
     )
 
 
@@ -399,11 +455,13 @@ def _in_use(lake: Store) -> set[str]:
 
 
 def left(lake: Store, removal: Removal) -> dict[str, str | None]:
-    """Returns the rows that left the table by a removal, id by object; later versions do not show them, unless another
-    branch does or they came again."""
+    """Returns the rows that left the table by a removal, id by object; later versions do not show
+    them, unless another branch does or they came again."""
     if not removal.withdrawn:
         return {}
-    before, after = (_stored_rows(lake, version) for version in (removal.version - 1, removal.version))
+    before, after = (
+        _stored_rows(lake, version) for version in (removal.version - 1, removal.version)
+    )
     gone = pc.invert(pc.is_in(_keys(before), value_set=_keys(after)))  # type: ignore[attr-defined]
     return {row["artifact"]: row["object"] for row in before.filter(gone).to_pylist()}
 
@@ -420,10 +478,14 @@ def _keys(rows: pa.Table) -> pa.ChunkedArray:
 
 
 def explain_missing(lake: Store, name: str, missing: NotFoundError) -> NotFoundError:
-    """Returns why an object is missing: it was erased, it went with versions that expired, or it was collected after a
-    version withdrew it; `missing` where no version did, or where the catalog cannot be asked."""
+    """Returns why an object is missing: it was erased, it went with versions that expired, or it
+    was collected after a version withdrew it; `missing` where no version did, or where the catalog
+    cannot be asked."""
     reasons = (
-        ("was erased from all versions by version {0.version} ({0.reason})", lambda r: name in r.erased.values()),
+        (
+            "was erased from all versions by version {0.version} ({0.reason})",
+            lambda r: name in r.erased.values(),
+        ),
         (
             "went when versions up to {0.expired[0]} expired, by version {0.version} ({0.reason})",
             lambda r: name in r.expired[1],

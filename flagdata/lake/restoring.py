@@ -1,13 +1,16 @@
-"""`flagdata heal`: what is damaged or missing in a lake is taken from another lake of the same history.
+"""`flagdata heal`: what is damaged or missing in a lake is taken from another lake of the same
+history.
 
-The other one may be older, as a backup is, or newer, a clone of this lake or the lake that this is a clone of, and may
-be damaged itself: what is right in it is taken. An entry of the log is right by the hash that the entry after it or the
-mark notes, see `flagdata.lake.right_entries`; a file of rows by the hash that its commit notes; an object by its name.
-Nothing that is whole is touched, and nothing that this lake never had comes in: that is `pull`'s.
+The other one may be older, as a backup is, or newer, a clone of this lake or the lake that this is
+a clone of, and may
+be damaged itself: what is right in it is taken. An entry of the log is right by the hash that the
+entry after it or the mark notes, see `flagdata.lake.right_entries`; a file of rows by the hash that
+its commit notes; an object by its name. Nothing that is whole is touched, and nothing that this
+lake never had comes in: that is `pull`'s.
 
-The order is that in which one makes the other readable: folders, marker, log, files of rows, refs, objects. Each item
-is put durably before the next, so that what was stopped is gone on with by the same command. Others are kept out while
-the catalog is healed; objects come as any writer's do.
+The order is that in which one makes the other readable: folders, marker, log, files of rows, refs,
+objects. Each item is put durably before the next, so that what was stopped is gone on with by the
+same command. Others are kept out while the catalog is healed; objects come as any writer's do.
 """
 
 from __future__ import annotations
@@ -50,8 +53,8 @@ class Taken:
     """Something that was damaged or missing, and is whole.
 
     Attributes:
-        kind: "object", "file of rows", "log entry", "mark", "summary", "checkpoint", "ref", "marker" or "folder"; or
-            "local copy", of a bucket's object.
+        kind: "object", "file of rows", "log entry", "mark", "summary", "checkpoint", "ref",
+            "marker" or "folder"; or "local copy", of a bucket's object.
         name: of an object; of anything else, where it is.
         why: what was wrong with it.
         size: bytes that were taken; 0 where it was deleted, and is made again when it is needed.
@@ -83,7 +86,8 @@ Unsound = Callable[[Lake, Sequence[str]], Iterable[str]]
 
 
 def heal(lake: Lake, source: Lake, *, bars: Bars) -> Healed:
-    """Takes what is damaged or missing in a lake from another one. All bytes of the lake are compared.
+    """Takes what is damaged or missing in a lake from another one. All bytes of the lake are
+    compared.
 
     Args:
         lake, source: as `Lake.found` gives them: neither need be readable.
@@ -108,7 +112,8 @@ def heal(lake: Lake, source: Lake, *, bars: Bars) -> Healed:
 
 
 def heal_noted(lake: Lake, source: Lake, *, bars: Bars) -> Healed:
-    """As `heal`, but of the objects those alone that are missing, of another size, or were found damaged before."""
+    """As `heal`, but of the objects those alone that are missing, of another size, or were found
+    damaged before."""
 
     def noted_objects(lake: Lake, names: Sequence[str]) -> Iterator[str]:
         sizes = read_refs(lake).sizes
@@ -133,13 +138,18 @@ def _heal_lake(lake: Lake, source: Lake, unsound: Unsound, *, bars: Bars) -> Hea
         came = {taken.name: taken for taken in _objects(lake, source, missing, bars=bars)}
         taken += [*came.values(), *_copies(lake, names)]
     still_missing = [name for name in missing if name not in came]
-    damaged = (*_marker_findings(lake), *verify_catalog(lake, marked), *verify(lake, still_missing, marked))
+    damaged = (
+        *_marker_findings(lake),
+        *verify_catalog(lake, marked),
+        *verify(lake, still_missing, marked),
+    )
     left = tuple(finding for finding in damaged if finding.severity is Severity.ERROR)
     return Healed(taken=tuple(taken), left=left)
 
 
 def _needed_objects(lake: Lake) -> tuple[Marked, list[str]]:
-    """Reads what refs show, and lists the objects that are needed or stored, but for what was erased."""
+    """Reads what refs show, and lists the objects that are needed or stored, but for what was
+    erased."""
     marked = read_refs(lake)
     erased: set[str] = set()
     with suppress(FlagdataError):  # of a log that is damaged still, so that no erasure is known
@@ -160,7 +170,8 @@ def _check_kinship(lake: Lake, source: Lake) -> None:
 
 
 def _identity(lake: Lake) -> object:
-    """Reads what a lake's marker says it is, which all its clones say; `None` where it cannot be read."""
+    """Reads what a lake's marker says it is, which all its clones say; `None` where it cannot be
+    read."""
     with suppress(ValueError, KeyError, TypeError):
         return from_json(read_bytes(lake.path / MARKER) or b"")["lake"]
     return None
@@ -229,7 +240,8 @@ def _rows(lake: Lake, source: Lake) -> Iterator[Taken]:
 
 
 def _is_right(content: bytes | None, noted: str | None) -> bool:
-    """Checks whether a file of rows is what its commit noted; of one of before that was noted, whether it is read."""
+    """Checks whether a file of rows is what its commit noted; of one of before that was noted,
+    whether it is read."""
     if content is None or noted is not None:
         return content is not None and hashlib.sha256(content).hexdigest() == noted
     return _is_table(content)
@@ -244,13 +256,18 @@ def _is_table(content: bytes) -> bool:
 
 
 def _what_saves_time(lake: Lake, source: Lake) -> Iterator[Taken]:
-    """Takes summaries and checkpoints that have changed, or deletes them: the entries of the log hold all."""
+    """Takes summaries and checkpoints that have changed, or deletes them: the entries of the log
+    hold all."""
     for name in summaries_in(lake.path / "refs" / "history"):
         summary_hash = name.removesuffix(".json").rpartition("-")[2]
-        content, instead = (read_bytes(one.path / "refs" / "history" / name) for one in (lake, source))
+        content, instead = (
+            read_bytes(one.path / "refs" / "history" / name) for one in (lake, source)
+        )
         if content is not None and hashlib.sha256(content).hexdigest() != summary_hash:
             is_right = instead is not None and hashlib.sha256(instead).hexdigest() == summary_hash
-            yield _put_or_deleted(lake.path / "refs" / "history" / name, instead if is_right else None, "summary")
+            yield _put_or_deleted(
+                lake.path / "refs" / "history" / name, instead if is_right else None, "summary"
+            )
     log = lake.catalog.path / "_delta_log"
     noted: dict[int, str] = {}
     with suppress(FlagdataError):  # of a log that is damaged still
@@ -271,24 +288,34 @@ def _what_saves_time(lake: Lake, source: Lake) -> Iterator[Taken]:
 
 
 def _refs(lake: Lake, source: Lake) -> Iterator[Taken]:
-    """Takes tags and branches that files alone state, as earlier versions of flagdata made them: damaged ones, and
-    those that are missing and were not deleted. What the log states is in the log; its files are written anew."""
+    """Takes tags and branches that files alone state, as earlier versions of flagdata made them:
+    damaged ones, and those that are missing and were not deleted. What the log states is in the
+    log; its files are written anew."""
     with suppress(FlagdataError):  # of a log, here or there, that is damaged still
         head, lives = lake.catalog.head(), lake.refs.lives()
         damaged = lake.refs.damaged()
         alone = source.refs.enterable(head)
         stated = {key: ref for key, ref in source.refs.lives().items() if isinstance(ref, Ref)}
-        there = {MAIN, *(name for kind, name in (*lives, *lake.refs.enterable(head)) if kind == "branches")}
+        there = {
+            MAIN,
+            *(name for kind, name in (*lives, *lake.refs.enterable(head)) if kind == "branches"),
+        }
         lost = {*lake.catalog.rows(head)["branch"].to_pylist()} - there
         for key, ref in {**stated, **alone}.items():
             kind, name = key
             life, path = lives.get(key), lake.refs.root / kind / f"{name}.json"
             is_deleted = isinstance(life, Deletion) and life.ends(ref)
-            is_missing = (kind == "branches" and name in lost) or (key in alone and not path.exists())
+            is_missing = (kind == "branches" and name in lost) or (
+                key in alone and not path.exists()
+            )
             if not isinstance(life, Ref) and not is_deleted and (key in damaged or is_missing):
                 yield _put(path, content_of(ref), "ref")
         for path in lake.refs.stale_files():
-            yield Taken(kind="ref", name=str(path), why="did not say what the log says, and was written anew")
+            yield Taken(
+                kind="ref",
+                name=str(path),
+                why="did not say what the log says, and was written anew",
+            )
         lake.refs.write_files()
 
 
@@ -308,7 +335,8 @@ def _put_or_deleted(path: Place, content: bytes | None, kind: str) -> Taken:
 
 
 def _objects(lake: Lake, source: Lake, names: Sequence[str], *, bars: Bars) -> Iterator[Taken]:
-    """Takes those of the objects that the other lake has rightly; of what is erased meanwhile, none comes back."""
+    """Takes those of the objects that the other lake has rightly; of what is erased meanwhile, none
+    comes back."""
     if not names:
         return
     with closing(Lease(lake.staging)) as lease, bars(len(names), "objects", "object") as advance:
@@ -334,4 +362,8 @@ def _copies(lake: Lake, names: Sequence[str]) -> Iterator[Taken]:
     for name in names:
         suffix = lake.objects.path(name).suffix
         if object_cache.has_copy(name, suffix) and not object_cache.is_whole(name, suffix):
-            yield Taken(kind="local copy", name=name, why=f"{_CHANGED}, and was deleted: it is fetched again")
+            yield Taken(
+                kind="local copy",
+                name=name,
+                why=f"{_CHANGED}, and was deleted: it is fetched again",
+            )

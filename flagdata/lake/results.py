@@ -1,9 +1,11 @@
-"""Results that a program infers, in versions: what other code makes of the same inputs is another version of it.
+"""Results that a program infers, in versions: what other code makes of the same inputs is another
+version of it.
 
-Data are the same whichever code wrote them, so that a repeated ingest or simulation adds nothing. A measurement or a
-verdict may have been wrong until the code was mended: docs/decisions/057-versions-of-a-result.md. The recipe of a later
-version states what it revises and the code that inferred it, which gives it an identity of its own; that of the first
-version states neither.
+Data are the same whichever code wrote them, so that a repeated ingest or simulation adds nothing. A
+measurement or a verdict may have been wrong until the code was mended:
+docs/decisions/057-versions-of-a-result.md. The recipe of a later version states what it revises and
+the code that inferred it, which gives it an identity of its own; that of the first version states
+neither.
 """
 
 from __future__ import annotations
@@ -30,7 +32,8 @@ class Placed:
 
     Attributes:
         artifact: its row; without its object where it was not on the branch.
-        others: versions that were on the branch, in the order of their commits; `artifact` itself where it was.
+        others: versions that were on the branch, in the order of their commits; `artifact` itself
+            where it was.
         new: whether it was not there.
         healed: what was done where it was there, and its object damaged or missing.
     """
@@ -43,7 +46,11 @@ class Placed:
     @property
     def version(self) -> int:
         """Its number, from 1."""
-        return len(self.others) + 1 if self.new else [version.id for version in self.others].index(self.artifact.id) + 1
+        return (
+            len(self.others) + 1
+            if self.new
+            else [version.id for version in self.others].index(self.artifact.id) + 1
+        )
 
     @property
     def sentence(self) -> str:
@@ -62,7 +69,8 @@ class Placed:
 
 
 def versions(lake: Store, result: Artifact, *, at: str | None = None) -> tuple[Artifact, ...]:
-    """Lists the versions of a measurement that a ref shows, in the order of their commits; none of another kind."""
+    """Lists the versions of a measurement that a ref shows, in the order of their commits; none of
+    another kind."""
     if result.kind is not Kind.MEASUREMENT:
         return ()
     first = first_revised(result.recipe) or result.id
@@ -70,12 +78,15 @@ def versions(lake: Store, result: Artifact, *, at: str | None = None) -> tuple[A
     wanted = (pc.field("kind") == result.kind.value) & ((pc.field("artifact") == first) | mentioned)
     rows = sorted(lake.meeting(lake.view(at), wanted).to_pylist(), key=lambda row: row["created"])
     return tuple(
-        version for version in map(Artifact.from_row, rows) if first in (version.id, first_revised(version.recipe))
+        version
+        for version in map(Artifact.from_row, rows)
+        if first in (version.id, first_revised(version.recipe))
     )
 
 
 def place_result(lake: Store, result: Artifact, *, branch: str = MAIN) -> Placed:
-    """Finds where a result goes that this code inferred: it is there already if the same code's is, else it is new.
+    """Finds where a result goes that this code inferred: it is there already if the same code's is,
+    else it is new.
 
     Args:
         result: its row as a first version, without its object.
@@ -85,7 +96,10 @@ def place_result(lake: Store, result: Artifact, *, branch: str = MAIN) -> Placed
         if version.code_version == result.code_version:
             return Placed(artifact=version, others=present_versions, new=False)
     if present_versions:
-        result = replace(result, recipe={**result.recipe, REVISION: {"of": result.id, "code": result.code_version}})
+        result = replace(
+            result,
+            recipe={**result.recipe, REVISION: {"of": result.id, "code": result.code_version}},
+        )
     return Placed(artifact=result, others=present_versions, new=True)
 
 
@@ -98,8 +112,8 @@ def keep(
     branch: str = MAIN,
     derived: Callable[[Artifact], Iterable[Artifact]] = lambda kept: (),
 ) -> Placed:
-    """Commits a result where it is new (see `place_result`), or its object damaged or missing, with what was derived
-    from it.
+    """Commits a result where it is new (see `place_result`), or its object damaged or missing, with
+    what was derived from it.
 
     Args:
         result: its row as a first version, without its object.
@@ -117,6 +131,8 @@ def keep(
             transaction.add(replace(placement.artifact, object=transaction.put(staged)))
             for row in derived(placement.artifact):
                 transaction.add(row)
-    if placement.new and placement.artifact.id not in transaction.result.added:  # another process was faster
+    if (
+        placement.new and placement.artifact.id not in transaction.result.added
+    ):  # another process was faster
         return place_result(lake, result, branch=branch)
     return replace(placement, healed=transaction.result.healed.get(placement.artifact.id))

@@ -1,12 +1,15 @@
-"""Which entries of a damaged log are right, and which of another log belong in the place of those that are not.
+"""Which entries of a damaged log are right, and which of another log belong in the place of those
+that are not.
 
-An entry is right whose SHA-256 is noted: by the entry after it, or by the mark of the newest. A hash proves itself, so
-that a note counts for an entry wherever it is read, also in an entry that is damaged elsewhere. Against an entry counts
-only the note of an entry that is right, or of the mark. So the log is looked at from the newest entry down, and what
-another log has is taken where its hash is noted: of an older log, a newer one, or one that went on otherwise.
+An entry is right whose SHA-256 is noted: by the entry after it, or by the mark of the newest. A
+hash proves itself, so that a note counts for an entry wherever it is read, also in an entry that is
+damaged elsewhere. Against an entry counts only the note of an entry that is right, or of the mark.
+So the log is looked at from the newest entry down, and what another log has is taken where its hash
+is noted: of an older log, a newer one, or one that went on otherwise.
 
-In lakes of before entries noted hashes, an entry that is missing or makes no sense is taken where both logs have the
-same entry after it. Of a log that is gone, mark and all, nothing is known, and all entries of the other are taken.
+In lakes of before entries noted hashes, an entry that is missing or makes no sense is taken where
+both logs have the same entry after it. Of a log that is gone, mark and all, nothing is known, and
+all entries of the other are taken.
 """
 
 from __future__ import annotations
@@ -25,7 +28,8 @@ from flagdata.storage import Place, StoreError
 _HASH = re.compile(r"[0-9a-f]{64}").fullmatch
 _PREVIOUS = re.compile(rb'"' + re.escape(PREVIOUS_HASH).encode() + rb'": ?"([0-9a-f]{64})"')
 _ALIKE = 48
-"""Of the 64 digits of a hash, so many at least are the same in a mark of it that a few flipped bits changed."""
+"""Of the 64 digits of a hash, so many at least are the same in a mark of it that a few flipped bits
+changed."""
 _AT_ONCE = 16  # entries of a bucket that are read at the same time
 
 
@@ -36,8 +40,8 @@ class Mending:
     Attributes:
         entries: version → the entry, as the other log has it.
         missing: those of these versions that the log has not.
-        mark: the version whose mark is written, and its SHA-256; `None` where the mark is right, or it is not known
-            what it should say.
+        mark: the version whose mark is written, and its SHA-256; `None` where the mark is right, or
+            it is not known what it should say.
     """
 
     entries: Mapping[int, bytes]
@@ -60,22 +64,31 @@ def mending(log: Log, other: Log) -> Mending:
     mark = _mark(log, newest)
     right: dict[int, bytes] = {}
     taken: dict[int, bytes] = {}
-    versions = {*present, *(version for version in theirs.there if version <= max([newest, *present]))}
+    versions = {
+        *present,
+        *(version for version in theirs.there if version <= max([newest, *present])),
+    }
     for version in sorted(versions, reverse=True):
         entry, following = mine.of(version), right.get(version + 1, b"")
         is_newest = version == newest
         against = _previous(following) | ({mark} if is_newest and _HASH(mark) else set())
         noted = against | _previous(mine.of(version + 1))
 
-        def proven(candidate: bytes, noted: set[str] = noted, mark: str = mark if is_newest else "") -> bool:
-            return bool(candidate) and (_digest(candidate) in noted or _is_like(mark, _digest(candidate)))
+        def proven(
+            candidate: bytes, noted: set[str] = noted, mark: str = mark if is_newest else ""
+        ) -> bool:
+            return bool(candidate) and (
+                _digest(candidate) in noted or _is_like(mark, _digest(candidate))
+            )
 
         if proven(entry):
             right[version] = entry
         elif proven(instead := theirs.of(version)):
             right[version] = taken[version] = instead
         elif mine.makes_sense(version):
-            if not against or (is_newest and entry == instead):  # else the mark may be what has changed
+            if not against or (
+                is_newest and entry == instead
+            ):  # else the mark may be what has changed
                 right[version] = entry
         elif following and following == theirs.of(version + 1) and theirs.makes_sense(version):
             right[version] = taken[version] = instead
@@ -87,9 +100,13 @@ def mending(log: Log, other: Log) -> Mending:
 
 
 def are_of_one_history(log: Log, other: Log) -> bool:
-    """Checks whether two logs have an entry in common, or note one, so that they are of one lake."""
+    """Checks whether two logs have an entry in common, or note one, so that they are of one
+    lake."""
     mine, theirs = _Entries(log, log.present()), _Entries(other, other.present())
-    if any(mine.of(version) == theirs.of(version) != b"" for version in sorted(mine.there & theirs.there)):
+    if any(
+        mine.of(version) == theirs.of(version) != b""
+        for version in sorted(mine.there & theirs.there)
+    ):
         return True
     return not mine.known().isdisjoint(theirs.known())
 
@@ -110,7 +127,9 @@ class _Entries:
     def of(self, version: int) -> bytes:
         """Reads one; nothing where it is missing, empty, or cannot be read."""
         if version not in self._known:
-            self._known[version] = read_bytes(self._log.path(version)) or b"" if version in self.there else b""
+            self._known[version] = (
+                read_bytes(self._log.path(version)) or b"" if version in self.there else b""
+            )
         return self._known[version]
 
     def known(self) -> set[str]:
@@ -129,7 +148,8 @@ class _Entries:
 
 
 def read_bytes(path: Place) -> bytes | None:
-    """Reads the bytes of a file; nothing of what the disk does not give, as of a folder; `None` where there is none.
+    """Reads the bytes of a file; nothing of what the disk does not give, as of a folder; `None`
+    where there is none.
 
     Raises:
         StoreError: a store did not answer.
@@ -154,10 +174,16 @@ def _all(other: Log) -> Mending:
 
 def _mark(log: Log, newest: int) -> str:
     """Reads what a mark says; nothing where there is none."""
-    return (read_bytes(log.marks / str(newest)) or b"").decode(errors="replace").strip() if newest >= 0 else ""
+    return (
+        (read_bytes(log.marks / str(newest)) or b"").decode(errors="replace").strip()
+        if newest >= 0
+        else ""
+    )
 
 
-def _right_mark(mark: str, newest: int, right: Mapping[int, bytes], *, theirs_marked: bool) -> tuple[int, str] | None:
+def _right_mark(
+    mark: str, newest: int, right: Mapping[int, bytes], *, theirs_marked: bool
+) -> tuple[int, str] | None:
     if newest < 0 and theirs_marked and right:  # a lake of before there were marks lacks none
         newest = max(right)
     if newest not in right or _digest(right[newest]) == mark:

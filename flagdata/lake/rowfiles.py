@@ -1,16 +1,20 @@
-"""The catalog's Parquet files: read whole as one table in order, or column by column while a query runs.
+"""The catalog's Parquet files: read whole as one table in order, or column by column while a query
+runs.
 
-A million rows have some 400 MB as a table and 20 MB as files, of which a query uses a few columns and a commit the
-identities alone. A table is sorted, and so copied, only where its files are not in order already.
+A million rows have some 400 MB as a table and 20 MB as files, of which a query uses a few columns
+and a commit the identities alone. A table is sorted, and so copied, only where its files are not in
+order already.
 
-Each file is compared with the SHA-256 that its commit noted when it is read (2 ms/MB): Parquet would give other values
-for most flipped bits.
+Each file is compared with the SHA-256 that its commit noted when it is read (2 ms/MB): Parquet
+would give other values for most flipped bits.
 
-What rows of older formats record about their data set in another place than its columns, read into the columns.
+What rows of older formats record about their data set in another place than its columns, read into
+the columns.
 
-Until format 3 a film's data set and side were in its name alone: `flagdata build` called it DATASET-SIDE-NUMBER and
-kept what it was filmed by in the recipe, under the key "film". Neither side nor number has a hyphen, so that the name
-states both exactly, whatever hyphens the data set's own name has. Clips belong to where their recording does.
+Until format 3 a film's data set and side were in its name alone: `flagdata build` called it
+DATASET-SIDE-NUMBER and kept what it was filmed by in the recipe, under the key "film". Neither side
+nor number has a hyphen, so that the name states both exactly, whatever hyphens the data set's own
+name has. Clips belong to where their recording does.
 """
 
 from __future__ import annotations
@@ -42,7 +46,8 @@ _DIGITS = 5  # of a film's number, at least
 
 
 def with_data_sets(rows: pa.Table) -> pa.Table:
-    """Fills `dataset` and `side` of rows where films and clips were built before these columns existed.
+    """Fills `dataset` and `side` of rows where films and clips were built before these columns
+    existed.
 
     Args:
         rows: with the catalog's columns.
@@ -55,8 +60,11 @@ def with_data_sets(rows: pa.Table) -> pa.Table:
     )
     sets_of_films = {
         artifact: of
-        for artifact, name, recipe in zip(*(films[c].to_pylist() for c in ("artifact", "name", "recipe")), strict=True)
-        if (of := _data_set_of(name)) is not None and "film" in column_json(recipe or "{}", "recipe", artifact=artifact)
+        for artifact, name, recipe in zip(
+            *(films[c].to_pylist() for c in ("artifact", "name", "recipe")), strict=True
+        )
+        if (of := _data_set_of(name)) is not None
+        and "film" in column_json(recipe or "{}", "recipe", artifact=artifact)
     }
     if not sets_of_films:
         return rows
@@ -68,11 +76,15 @@ def with_data_sets(rows: pa.Table) -> pa.Table:
     ]
     for position, column in enumerate(("dataset", "side")):
         filled = [
-            value if value is not None or film not in sets_of_films else sets_of_films[film][position]
+            value
+            if value is not None or film not in sets_of_films
+            else sets_of_films[film][position]
             for value, film in zip(rows[column].to_pylist(), made_of, strict=True)
         ]
         number = rows.schema.get_field_index(column)
-        rows = rows.set_column(number, rows.schema.field(number), pa.array(filled, CATALOG[column].type))
+        rows = rows.set_column(
+            number, rows.schema.field(number), pa.array(filled, CATALOG[column].type)
+        )
     return rows
 
 
@@ -80,7 +92,12 @@ def _data_set_of(name: str) -> tuple[str, str] | None:
     """Reads the data set and the side that a film is called after."""
     rest, _, number = name.rpartition("-")
     dataset, _, side = rest.rpartition("-")
-    if not dataset or side not in _SIDES or len(number) < _DIGITS or not (number.isascii() and number.isdigit()):
+    if (
+        not dataset
+        or side not in _SIDES
+        or len(number) < _DIGITS
+        or not (number.isascii() and number.isdigit())
+    ):
         return None
     return dataset, side
 
@@ -104,20 +121,23 @@ class RowFiles:
         self._tables: dict[str, pa.Table] = {}
 
     def table(self, names: Sequence[str]) -> pa.Table:
-        """Reads all rows of these files in the catalog's schema and `ROW_ORDER`. Columns that old rows lack are null,
-        but for those that `flagdata.lake.rowfiles` fills.
+        """Reads all rows of these files in the catalog's schema and `ROW_ORDER`. Columns that old
+        rows lack are null, but for those that `flagdata.lake.rowfiles` fills.
 
         Raises:
             CorruptError: a file cannot be read.
         """
         self._tables = {name: self.read(name) for name in names}
-        parts = sorted((part for part in self._tables.values() if part.num_rows), key=_first_created)
+        parts = sorted(
+            (part for part in self._tables.values() if part.num_rows), key=_first_created
+        )
         rows = with_data_sets(pa.concat_tables(parts) if parts else catalog_schema().empty_table())
         return in_order(rows)
 
     def scan(self, names: Sequence[str]) -> Scan | None:
-        """Opens the same rows, by commit, of which only the columns and rows that are asked for are decoded; `None`
-        where rows of an older format have columns to be filled, or a file lacks columns.
+        """Opens the same rows, by commit, of which only the columns and rows that are asked for are
+        decoded; `None` where rows of an older format have columns to be filled, or a file lacks
+        columns.
 
         Raises:
             CorruptError: a file cannot be read.
@@ -135,7 +155,9 @@ class RowFiles:
                     return None
                 timed_contents.append((created, content))
             count += file.num_rows
-            size += sum(file.row_group(number).total_byte_size for number in range(file.num_row_groups))
+            size += sum(
+                file.row_group(number).total_byte_size for number in range(file.num_row_groups)
+            )
         contents = tuple(content for _, content in sorted(timed_contents, key=lambda pair: pair[0]))
         return Scan(contents=contents, count=count, size=size, check=lambda: self.table(names))
 
@@ -202,14 +224,17 @@ class RowFiles:
 def encode_rows(rows: pa.Table) -> bytes:
     """Returns the bytes of a file of rows."""
     sink = pa.BufferOutputStream()
-    # The Arrow schema is schema.py's, and most values occur once: without both, a row's file has 6 kB, not 15.
+    # The Arrow schema is schema.py's, and most values occur once: without both, a row's file has 6
+    # kB, not 15.
     pq.write_table(rows, sink, compression="zstd", store_schema=False, use_dictionary=False)
     return sink.getvalue().to_pybytes()
 
 
 def changed_file(path: Place) -> CorruptError:
     """Returns the error for a file that is not what its commit noted."""
-    return CorruptError("a file of the catalog has changed since it was written", where=str(path), fix=HEAL)
+    return CorruptError(
+        "a file of the catalog has changed since it was written", where=str(path), fix=HEAL
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -251,14 +276,17 @@ class Scan:
 def _conform(table: pa.Table) -> pa.Table:
     schema = catalog_schema()
     columns = [
-        table[f.name].cast(f.type) if f.name in table.column_names else pa.nulls(table.num_rows, f.type) for f in schema
+        table[f.name].cast(f.type)
+        if f.name in table.column_names
+        else pa.nulls(table.num_rows, f.type)
+        for f in schema
     ]
     return pa.Table.from_arrays(columns, schema=schema)
 
 
 def _statistics(file: pq.FileMetaData) -> tuple[int, int]:
-    """Reads the lowest format version of a file's rows and when the first was committed [us]; 0 where it does not state
-    them."""
+    """Reads the lowest format version of a file's rows and when the first was committed [us]; 0
+    where it does not state them."""
     lowest: dict[str, list[int]] = {"format_version": [], "created": []}
     for number in range(file.num_row_groups):
         group = file.row_group(number)
@@ -291,5 +319,9 @@ def _is_ordered(rows: pa.Table) -> bool:
             return False
         equal &= values[:-1] == values[1:]
     (ties,) = np.nonzero(equal)
-    first, second = (rows["artifact"].take(pa.array(index)).to_pylist() for index in (ties, ties + 1))
-    return all(first_value <= second_value for first_value, second_value in zip(first, second, strict=True))
+    first, second = (
+        rows["artifact"].take(pa.array(index)).to_pylist() for index in (ties, ties + 1)
+    )
+    return all(
+        first_value <= second_value for first_value, second_value in zip(first, second, strict=True)
+    )

@@ -1,7 +1,9 @@
-"""Rows of the catalog by filter or SQL, at any ref. DuckDB over the Arrow catalog, in a process of its own.
+"""Rows of the catalog by filter or SQL, at any ref. DuckDB over the Arrow catalog, in a process of
+its own.
 
-`flagdata.lake.catalog_sql` describes what SQL sees and may do. Its process is ended when the time limit is over and may
-take 2 GB; where the rows are to be held at once, these are limited too. The process stays for the next question.
+`flagdata.lake.catalog_sql` describes what SQL sees and may do. Its process is ended when the time
+limit is over and may take 2 GB; where the rows are to be held at once, these are limited too. The
+process stays for the next question.
 """
 
 from __future__ import annotations
@@ -29,7 +31,8 @@ from flagdata.recipes.retired_names import present_query
 
 DEFAULT_ORDER = "kind, start NULLS LAST, artifact"
 TIME_LIMIT = 60.0
-"""What a query may take, if nothing else is asked for [s]; a catalog of a million rows takes one."""
+"""What a query may take, if nothing else is asked for [s]; a catalog of a million rows takes
+one."""
 CELL_LIMIT, BYTE_LIMIT = 5_000_000, 256 << 20
 """Most that SQL may give to be held at once, or else twice what the catalog itself has."""
 
@@ -47,8 +50,8 @@ class Request:
     """What to select.
 
     Attributes:
-        where: an SQL boolean expression over the columns of `COLUMNS`, or the values that columns of the catalog must
-            have; `None` is every row.
+        where: an SQL boolean expression over the columns of `COLUMNS`, or the values that columns
+            of the catalog must have; `None` is every row.
         columns: names in the order wanted; `None` is every stored column.
         order: SQL order terms ("wind DESC, start"); `None` is by kind, start and identity.
         sql: one SELECT over `catalog` instead of all of the above.
@@ -56,7 +59,8 @@ class Request:
         time_limit: what DuckDB may take for it in all [s].
 
     Raises:
-        UsageError: `sql` together with `where`, `columns` or `order`; a negative limit; a time limit that is none.
+        UsageError: `sql` together with `where`, `columns` or `order`; a negative limit; a time
+            limit that is none.
         UnknownNameError: a column that is not in the catalog.
     """
 
@@ -76,7 +80,9 @@ class Request:
         if self.limit is not None and self.limit < 0:
             raise UsageError(f"the limit is {self.limit} rows", fix="give 0 or more")
         if not (math.isfinite(self.time_limit) and self.time_limit > 0):
-            raise UsageError(f"the time limit is {self.time_limit} s", fix="give seconds, more than 0")
+            raise UsageError(
+                f"the time limit is {self.time_limit} s", fix="give seconds, more than 0"
+            )
         if self.columns is not None and not self.columns:
             raise UsageError("no columns are named", fix=f"name some of: {', '.join(COLUMNS)}")
         for name in self.columns or ():
@@ -88,11 +94,13 @@ class Selection:
     """The answer to a request over one catalog, computed when it is read.
 
     Args:
-        catalog: rows with the columns of `schema.CATALOG`; of a scan only those columns are decoded that are asked for.
+        catalog: rows with the columns of `schema.CATALOG`; of a scan only those columns are decoded
+            that are asked for.
         request: what is wanted of them.
 
     Raises:
-        UsageError: SQL that is not a single SELECT, does not parse, names what is not there, or needs too much memory.
+        UsageError: SQL that is not a single SELECT, does not parse, names what is not there, or
+            needs too much memory.
         LimitError: it takes longer than it may. These are raised by the methods, too.
     """
 
@@ -109,13 +117,20 @@ class Selection:
         labels: dict[str, pa.Array] = {}
         stored: Any
         if isinstance(catalog, Scan):
-            stored, cells, size = (catalog.contents, catalog.condition), catalog.count * len(CATALOG), catalog.size
+            stored, cells, size = (
+                (catalog.contents, catalog.condition),
+                catalog.count * len(CATALOG),
+                catalog.size,
+            )
         else:
             labels, stored = columns(catalog), catalog
             for name, values in labels.items():
                 stored = stored.append_column(name, values)
             cells, size = stored.num_rows * stored.num_columns, stored.nbytes
-        self._labels = {name: Field(type=values.type, about="a label of the user's") for name, values in labels.items()}
+        self._labels = {
+            name: Field(type=values.type, about="a label of the user's")
+            for name, values in labels.items()
+        }
         for name in request.columns or ():
             if name not in COLUMNS and name not in labels:
                 raise UnknownNameError.of("column", name, [*COLUMNS, *labels])
@@ -152,13 +167,18 @@ class Selection:
             while (part := self._ask("part")) is not None:
                 batch = pa.ipc.open_stream(part).read_next_batch()
                 yield pa.RecordBatch.from_arrays(
-                    [array.cast(field.type) for array, field in zip(batch.columns, schema, strict=True)], schema=schema
+                    [
+                        array.cast(field.type)
+                        for array, field in zip(batch.columns, schema, strict=True)
+                    ],
+                    schema=schema,
                 )
 
         return pa.RecordBatchReader.from_batches(schema, stream())
 
     def table(self) -> pa.Table:
-        """Returns the rows, whole. Columns of the catalog carry their unit and description; those of free SQL do not.
+        """Returns the rows, whole. Columns of the catalog carry their unit and description; those
+        of free SQL do not.
 
         Raises:
             LimitError: SQL gives more than can be held.
@@ -178,7 +198,8 @@ class Selection:
         return pa.Table.from_batches(batches, schema=stream.schema)
 
     def _schema(self, raw: pa.Schema) -> pa.Schema:
-        """Returns the catalog's own schema, for rows of the catalog; what free SQL makes has no description."""
+        """Returns the catalog's own schema, for rows of the catalog; what free SQL makes has no
+        description."""
         if self.request.sql is not None:
             return raw
         if self.request.columns is None:
@@ -205,7 +226,8 @@ class Selection:
             if ended.late:
                 self._left = 0.0
                 raise LimitError(
-                    f"the query was stopped, since it took longer than {self.request.time_limit:g} s",
+                    f"the query was stopped, since it took longer than {self.request.time_limit:g} "
+                    "s",
                     where=_sql_of(self.request),
                     fix="narrow it down; `flagdata query --time-limit SECONDS` allows more",
                 ) from None
@@ -214,7 +236,9 @@ class Selection:
         except RuntimeError as error:
             self._check_rows()
             raise FlagdataError(
-                f"the SQL could not be run: {error}", where=_sql_of(self.request), fix="write it in another way"
+                f"the SQL could not be run: {error}",
+                where=_sql_of(self.request),
+                fix="write it in another way",
             ) from None
         self._left -= time.monotonic() - begun
         if isinstance(answer, UsageError):
@@ -230,14 +254,21 @@ class Selection:
             return UsageError("it needs more memory than there is", where=where, fix=fix)
         if ended.end is End.SIGNAL and ended.detail == "SIGKILL":
             message = (
-                "the process that runs SQL was killed (SIGKILL), by another program or for want of the machine's memory"
+                "the process that runs SQL was killed (SIGKILL), by another program or for want of "
+                "the machine's memory"
             )
-            return FlagdataError(message, where=where, fix="end other programs, or narrow it down, and do it again")
+            return FlagdataError(
+                message, where=where, fix="end other programs, or narrow it down, and do it again"
+            )
         if ended.end is End.SIGNAL:
             message = f"the process that runs SQL crashed ({ended.detail}): DuckDB cannot run this"
-            return FlagdataError(message, where=where, fix="write it in another way, or narrow it down")
+            return FlagdataError(
+                message, where=where, fix="write it in another way, or narrow it down"
+            )
         return FlagdataError(
-            f"the process that runs SQL has ended: {ended.detail or ended.end}", where=where, fix="do it again"
+            f"the process that runs SQL has ended: {ended.detail or ended.end}",
+            where=where,
+            fix="do it again",
         )
 
     def _check_rows(self) -> None:
@@ -274,7 +305,8 @@ def select(
     """Rows of a lake's catalog at a ref; arguments as in `Request`.
 
     Raises:
-        UsageError: SQL that cannot be run; the message carries DuckDB's reason and, for a misspelt column, its name.
+        UsageError: SQL that cannot be run; the message carries DuckDB's reason and, for a misspelt
+            column, its name.
         LimitError: it takes longer, or gives more, than it may.
         NotFoundError: no such ref.
     """

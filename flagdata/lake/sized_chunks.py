@@ -1,7 +1,8 @@
 """Blosc chunks of Zarr stores, refused where their head states another length than they have.
 
-numcodecs hands Blosc a chunk without its length, and Blosc reads as much memory as the head states: of a chunk that was
-cut, or whose head is damaged, memory beyond it, which ends the process by a segmentation fault where none is mapped.
+numcodecs hands Blosc a chunk without its length, and Blosc reads as much memory as the head states:
+of a chunk that was cut, or whose head is damaged, memory beyond it, which ends the process by a
+segmentation fault where none is mapped.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""The process of each thread that runs SQL, which stays for the next question; it can start before the lake is read."""
+"""The process of each thread that runs SQL, which stays for the next question; it can start before
+the lake is read."""
 
 from __future__ import annotations
 

@@ -39,7 +39,8 @@ _NAMES = 10_000
 
 
 class Store:
-    """A lake's catalog, objects and refs, and the rows that a ref shows. `Lake` adds what changes them.
+    """A lake's catalog, objects and refs, and the rows that a ref shows. `Lake` adds what changes
+    them.
 
     Attributes:
         path: the lake's folder, or its place in a bucket.
@@ -59,11 +60,13 @@ class Store:
         return (type(self), (self.path,))
 
     def check_writable(self) -> None:
-        """Checks whether this process may write here: called before the first second of work that ends in a commit.
+        """Checks whether this process may write here: called before the first second of work that
+        ends in a commit.
 
         Raises:
             LinkError: a folder of the lake is a link, so that what is written would lie elsewhere.
-            RefusedError: the place lacks what every commit relies on, see `flagdata.lake.place_probing`.
+            RefusedError: the place lacks what every commit relies on, see
+                `flagdata.lake.place_probing`.
             FlagdataError: the lake can only be read.
         """
         check_writable(self.path)
@@ -71,7 +74,8 @@ class Store:
 
     @contextmanager
     def changing(self, doing: str, *, alone: bool = False) -> Iterator[Check]:
-        """Keeps collections out while the block commits, or all other processes that change the lake. Tidies before.
+        """Keeps collections out while the block commits, or all other processes that change the
+        lake. Tidies before.
 
         Args:
             doing: what the block does, for errors of the disk ("withdrawing").
@@ -86,7 +90,8 @@ class Store:
                 yield check
 
     def tidy(self) -> None:
-        """Tidies the catalog, if that is due: alone, so that it is not always overtaken by commits."""
+        """Tidies the catalog, if that is due: alone, so that it is not always overtaken by
+        commits."""
         if self.catalog.is_due_for_tidying():
             with collecting(self.staging), suppress(Moved):
                 self.catalog.tidy()
@@ -94,8 +99,8 @@ class Store:
     def now(self) -> float:
         """Read the clock by which files of the lake have their times [s since 1970].
 
-        It is the store's. Of a folder it is the disk's, perhaps another machine's, and is read from a file without a
-        name; where nothing can be written, this machine's.
+        It is the store's. Of a folder it is the disk's, perhaps another machine's, and is read from
+        a file without a name; where nothing can be written, this machine's.
 
         Raises:
             FlagdataError: the store did not say.
@@ -110,14 +115,19 @@ class Store:
             return time.time()
 
     def rows(
-        self, where: Where | None = None, *, at: str | None = None, columns: Sequence[str] | None = None
+        self,
+        where: Where | None = None,
+        *,
+        at: str | None = None,
+        columns: Sequence[str] | None = None,
     ) -> pa.Table:
         """Rows of the catalog in the order of commit, then start, then frame.
 
         Args:
-            where: the values that columns must have, {"kind": Kind.CLIP, "recording": identity}, see
-                `flagdata.lake.matching`; or an SQL expression as in `flagdata.lake.selection` ("kind = 'clip' and wind
-                between 3 and 6"; the column "end" needs its quotes, `end_time` does not).
+            where: the values that columns must have, {"kind": Kind.CLIP, "recording": identity},
+                see `flagdata.lake.matching`; or an SQL expression as in `flagdata.lake.selection`
+                ("kind = 'clip' and wind between 3 and 6"; the column "end" needs its quotes,
+                `end_time` does not).
             at: tag, branch, version number or commit id; the head of main if `None`.
             columns: which to return, in this order; all if `None`.
 
@@ -140,8 +150,11 @@ class Store:
             table = self.table(view)
         return table if columns is None else table.select(list(columns))
 
-    def artifact(self, artifact: str, *, at: str | None = None, kinds: Collection[Kind] = ()) -> Artifact:
-        """Finds the artifact that `artifact` means, as in `flagdata.lake.naming`, or NAME@REF at that tag or branch.
+    def artifact(
+        self, artifact: str, *, at: str | None = None, kinds: Collection[Kind] = ()
+    ) -> Artifact:
+        """Finds the artifact that `artifact` means, as in `flagdata.lake.naming`, or NAME@REF at
+        that tag or branch.
 
         Args:
             kinds: which of several of that name are meant, if they are of these.
@@ -170,20 +183,30 @@ class Store:
         if len(meant_rows) == 1:
             return self.matching(view, {"artifact": meant_rows[0]["artifact"]})
         where = str(self.path)
-        listed = "flagdata ls lists them" if at is None else f"{command_line('flagdata', 'ls', '--at', at)} lists them"
+        listed = (
+            "flagdata ls lists them"
+            if at is None
+            else f"{command_line('flagdata', 'ls', '--at', at)} lists them"
+        )
         if not meant_rows:
             names = self.columns(view, ["name"])["name"].unique().to_pylist()
             close = difflib.get_close_matches(artifact, filter(None, names[:_NAMES]), n=1)
             suggestion = f"did you mean {close[0]!r}? {listed}" if close else listed
             raise NotFoundError(f"there is no artifact {artifact!r}", where=where, fix=suggestion)
         several = ", ".join(f"{row['kind']} {row['artifact'][:SHORT]}" for row in meant_rows[:4])
-        message = f"{artifact!r} may mean {len(meant_rows)} artifacts: {several}{', …' if len(meant_rows) > 4 else ''}"
+        message = (
+            f"{artifact!r} may mean {len(meant_rows)} artifacts: "
+            f"{several}{', …' if len(meant_rows) > 4 else ''}"
+        )
         raise NotFoundError(message, where=where, fix=f"give the id of one: {listed}")
 
     def view(self, at: str | None) -> View:
-        """Finds what a ref shows: the versions at which branches are read, see `flagdata.lake.refs`."""
+        """Finds what a ref shows: the versions at which branches are read, see
+        `flagdata.lake.refs`."""
         history = self.catalog.history
-        return references.resolve(self.refs, at, head=self.catalog.head(), commits=self._commits, history=history)
+        return references.resolve(
+            self.refs, at, head=self.catalog.head(), commits=self._commits, history=history
+        )
 
     def table(self, view: View) -> pa.Table:
         """Reads all rows of a view, its base first. An identity is on one branch of a view only."""
@@ -197,22 +220,28 @@ class Store:
         return with_labels(rows, lineage.labels(view[0]))
 
     def scan(self, view: View) -> pa.Table | Scan:
-        """Opens what `table` gives, decoded as it is asked for where the view is one branch's rows without labels."""
+        """Opens what `table` gives, decoded as it is asked for where the view is one branch's rows
+        without labels."""
         if len(view) == 1 and not self.lineage().labels(view[0]):
             opened = self.catalog.scan(view[0].version)
             if opened is not None:
                 return opened.matching(pc.field("branch") == view[0].branch)
         return self.table(view)
 
-    def meeting(self, view: View, condition: pc.Expression, columns: Sequence[str] = tuple(CATALOG)) -> pa.Table:
+    def meeting(
+        self, view: View, condition: pc.Expression, columns: Sequence[str] = tuple(CATALOG)
+    ) -> pa.Table:
         """Reads some columns of the rows of a view that meet a condition."""
         rows = self.scan(view)
         if isinstance(rows, Scan):
             return rows.matching(condition).table(columns)
         return rows.filter(condition).select(list(columns))
 
-    def matching(self, view: View, values: Values, columns: Sequence[str] | None = None) -> pa.Table:
-        """Rows of a view with these values, see `flagdata.lake.matching`, with at least some columns; all if `None`.
+    def matching(
+        self, view: View, values: Values, columns: Sequence[str] | None = None
+    ) -> pa.Table:
+        """Rows of a view with these values, see `flagdata.lake.matching`, with at least some
+        columns; all if `None`.
 
         Raises:
             UnknownNameError, UsageError: as there.
@@ -221,18 +250,21 @@ class Store:
         if scans is None:
             return matching(self.table(view), values)
         wanted = CATALOG if columns is None else dict.fromkeys([*columns, *ROW_ORDER])
-        return pa.concat_tables(in_order(scan.matching(condition(values)).table(wanted)) for scan in scans)
+        return pa.concat_tables(
+            in_order(scan.matching(condition(values)).table(wanted)) for scan in scans
+        )
 
     def columns(self, view: View, names: Sequence[str]) -> pa.Table:
-        """Reads some columns of all rows of a view, its base first, by commit; no others are decoded where that can
-        be."""
+        """Reads some columns of all rows of a view, its base first, by commit; no others are
+        decoded where that can be."""
         scans = self._scans(view)
         if scans is None:
             return self.table(view).select(names)
         return pa.concat_tables(scan.table(names) for scan in scans)
 
     def _scans(self, view: View) -> list[Scan] | None:
-        """Opens the rows of a view by branch, its base first, without labels; `None` where files cannot be scanned."""
+        """Opens the rows of a view by branch, its base first, without labels; `None` where files
+        cannot be scanned."""
         scans: list[Scan] = []
         hidden: frozenset[str] = frozenset()
         for part in view:
@@ -248,9 +280,13 @@ class Store:
         return scans[::-1]
 
     def identities(self, view: View) -> frozenset[str]:
-        """Lists the ids of all rows of a view. Those of the view that was asked for last are kept."""
+        """Lists the ids of all rows of a view. Those of the view that was asked for last are
+        kept."""
         if self._identities is None or self._identities[0] != view:
-            self._identities = (view, frozenset(self.columns(view, ["artifact"])["artifact"].to_pylist()))
+            self._identities = (
+                view,
+                frozenset(self.columns(view, ["artifact"])["artifact"].to_pylist()),
+            )
         return self._identities[1]
 
     def lineage(self) -> Lineage:
@@ -275,10 +311,17 @@ class Store:
             for entry in self.catalog.history()
             if "commit" in entry
         }
-        return {commit: lineage.view(part) for commit, part in parts.items() if lineage.fork(part) is not None}
+        return {
+            commit: lineage.view(part)
+            for commit, part in parts.items()
+            if lineage.fork(part) is not None
+        }
 
 
 def _filter(table: pa.Table | Scan, where: str) -> pa.Table:
-    from flagdata.lake.selection import Request, Selection  # it knows what a view is, so it imports this package
+    from flagdata.lake.selection import (
+        Request,
+        Selection,
+    )  # it knows what a view is, so it imports this package
 
     return Selection(table, Request(where=where, order=_ORDER)).table()

@@ -1,4 +1,5 @@
-"""Names that a package hands out and imports only when they are first asked for: the package's door."""
+"""Names that a package hands out and imports only when they are first asked for: the package's
+door."""
 
 from __future__ import annotations
 
@@ -13,16 +14,18 @@ from flagdata.packages.installed_names import PREFIX
 
 
 def lazy_exports(package: str, file: str) -> Callable[[str], Any]:
-    """Returns the `__getattr__` of a package whose `__init__.py` imports names where a type checker reads them.
+    """Returns the `__getattr__` of a package whose `__init__.py` imports names where a type checker
+    reads them.
 
         if TYPE_CHECKING:
             from measure.verdict.verdict_record import Record
 
         __getattr__ = lazy_exports(__name__, __file__)
 
-    `from measure.verdict import Record` then imports `measure.verdict.verdict_record` and no other module of the
-    package. A name that is also a module's cannot be among them: once the module is imported, the package's attribute
-    is it. Where packages have the names of an installation (`flagdata.packages.installed_names`), so have the modules.
+    `from measure.verdict import Record` then imports `measure.verdict.verdict_record` and no other
+    module of the package. A name that is also a module's cannot be among them: once the module is
+    imported, the package's attribute is it. Where packages have the names of an installation
+    (`flagdata.packages.installed_names`), so have the modules.
     """
     part = package.removeprefix(PREFIX)
 
@@ -30,7 +33,9 @@ def lazy_exports(package: str, file: str) -> Callable[[str], Any]:
         module = None if name.startswith("__") else exports(file).get(name)
         if module is None:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        return getattr(import_module(package + module.removeprefix(PREFIX).removeprefix(part)), name)
+        return getattr(
+            import_module(package + module.removeprefix(PREFIX).removeprefix(part)), name
+        )
 
     return attribute
 
@@ -44,7 +49,8 @@ def exports(file: str) -> dict[str, str]:
 
 
 def export_blocks(tree: ast.Module) -> list[ast.If]:
-    """Returns the blocks `if TYPE_CHECKING` of a package that calls `lazy_exports`, none of another module."""
+    """Returns the blocks `if TYPE_CHECKING` of a package that calls `lazy_exports`, none of another
+    module."""
     calls = [
         node
         for node in tree.body
@@ -53,5 +59,7 @@ def export_blocks(tree: ast.Module) -> list[ast.If]:
         and ast.unparse(node.value.func) == "lazy_exports"
     ]
     return [
-        node for node in tree.body if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING" and calls
+        node
+        for node in tree.body
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING" and calls
     ]

@@ -1,4 +1,5 @@
-"""A package that is called as the verb of its name: `flagdata.ingest` holds readers, `flagdata.ingest(...)` reads."""
+"""A package that is called as the verb of its name: `flagdata.ingest` holds readers,
+`flagdata.ingest(...)` reads."""
 
 from __future__ import annotations
 

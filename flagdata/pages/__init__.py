@@ -1,4 +1,5 @@
-"""The kit of all reports: one frame and style, escaped text, tables, figures and pictures inside a single HTML file."""
+"""The kit of all reports: one frame and style, escaped text, tables, figures and pictures inside a
+single HTML file."""
 
 from __future__ import annotations
 

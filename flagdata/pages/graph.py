@@ -1,8 +1,9 @@
-"""A graph of boxes in columns, drawn as SVG: the lineage of an artifact, what it was made from on its left.
+"""A graph of boxes in columns, drawn as SVG: the lineage of an artifact, what it was made from on
+its left.
 
-Boxes of a column are ordered by where their neighbours are (the barycentre method of Sugiyama, Tagawa and Toda, 1981);
-a line that passes a column gets a place in it, so that it crosses no box. Colours are attributes, which a page's style
-overrides by the classes.
+Boxes of a column are ordered by where their neighbours are (the barycentre method of Sugiyama,
+Tagawa and Toda, 1981); a line that passes a column gets a place in it, so that it crosses no box.
+Colours are attributes, which a page's style overrides by the classes.
 """
 
 from __future__ import annotations
@@ -96,9 +97,16 @@ def layout(boxes: Sequence[Box], edges: Collection[tuple[str, str]]) -> GraphLay
         for box_place in column:
             box_place.y = y + box_place.height / 2
             y += box_place.height + _GAP_Y
-    at = {box_place.key: (number, box_place) for number, column in enumerate(columns) for box_place in column}
+    at = {
+        box_place.key: (number, box_place)
+        for number, column in enumerate(columns)
+        for box_place in column
+    }
     return GraphLayout(
-        size=(2 * _MARGIN + len(columns) * WIDTH + (len(columns) - 1) * _GAP_X, 2 * _MARGIN + height),
+        size=(
+            2 * _MARGIN + len(columns) * WIDTH + (len(columns) - 1) * _GAP_X,
+            2 * _MARGIN + height,
+        ),
         at=at,
         ways=[[at[key] for key in way] for way in ways],
     )
@@ -133,7 +141,9 @@ def _place_boxes(
     boxes: Sequence[Box], edges: Collection[tuple[str, str]], tall: int
 ) -> tuple[list[list[Place]], list[tuple[str, ...]]]:
     """Places the boxes of each column, and lists the keys that each line leads through."""
-    numbers = {column: number for number, column in enumerate(sorted({box.column for box in boxes}))}
+    numbers = {
+        column: number for number, column in enumerate(sorted({box.column for box in boxes}))
+    }
     columns: list[list[Place]] = [[] for _ in numbers]
     where = {box.key: numbers[box.column] for box in boxes}
     for box in boxes:
@@ -151,7 +161,8 @@ def _place_boxes(
 
 
 def _order(columns: Sequence[list[Place]], ways: Sequence[Sequence[str]]) -> None:
-    """Sort each column by the mean place of its neighbours, from left to right and back, a few times."""
+    """Sort each column by the mean place of its neighbours, from left to right and back, a few
+    times."""
     before: dict[str, list[str]] = {}
     behind: dict[str, list[str]] = {}
     for way in ways:
@@ -162,9 +173,15 @@ def _order(columns: Sequence[list[Place]], ways: Sequence[Sequence[str]]) -> Non
         forth = sweep % 2 == 0
         neighbours = before if forth else behind
         for column in columns if forth else reversed(columns):
-            rank = {box_place.key: number / max(1, len(c) - 1) for c in columns for number, box_place in enumerate(c)}
+            rank = {
+                box_place.key: number / max(1, len(c) - 1)
+                for c in columns
+                for number, box_place in enumerate(c)
+            }
             column.sort(
-                key=lambda box_place: _mean([rank[key] for key in neighbours.get(box_place.key, [box_place.key])])
+                key=lambda box_place: _mean(
+                    [rank[key] for key in neighbours.get(box_place.key, [box_place.key])]
+                )
             )
 
 
@@ -185,8 +202,8 @@ Point = tuple[float, float]
 
 
 def curves(way: Sequence[tuple[int, Place]]) -> list[tuple[Point, Point, Point, Point]]:
-    """Computes a line as cubic curves, each from one column to the next; where it passes a column it goes on
-    straight."""
+    """Computes a line as cubic curves, each from one column to the next; where it passes a column
+    it goes on straight."""
     (number, box_place), *following = way
     x, y = left(number) + WIDTH, box_place.y
     pieces = []
@@ -203,9 +220,12 @@ def _line(way: Sequence[tuple[int, Place]]) -> str:
     for (x, y), control_1, control_2, (end, below) in curves(way):
         path.append(f"{'H' if path else 'M'}{x:.0f}" + ("" if path else f" {y:.1f}"))
         path.append(
-            f"C{control_1[0]:.1f} {control_1[1]:.1f} {control_2[0]:.1f} {control_2[1]:.1f} {end:.0f} {below:.1f}"
+            f"C{control_1[0]:.1f} {control_1[1]:.1f} {control_2[0]:.1f} {control_2[1]:.1f} "
+            f"{end:.0f} {below:.1f}"
         )
-    return f'<path class="edge" d="{" ".join(path)}" fill="none" stroke="{RULE}" stroke-width="1.5"/>'
+    return (
+        f'<path class="edge" d="{" ".join(path)}" fill="none" stroke="{RULE}" stroke-width="1.5"/>'
+    )
 
 
 def _box(box: Box, column: int, box_place: Place) -> str:
@@ -221,12 +241,16 @@ def _box(box: Box, column: int, box_place: Place) -> str:
     ]
     drawn = (
         f"<title>{_text(box.about)}</title>"
-        f'<rect class="box{" marked" if box.marked else ""}" x="{x:.0f}" y="{y:.1f}" width="{WIDTH}" '
-        f'height="{box_place.height}" rx="6" fill="{PAPER}" stroke="{frame[0]}" stroke-width="{frame[1]}"/>'
-        f'<rect x="{x + 5:.0f}" y="{y + 8:.1f}" width="3" height="{box_place.height - 16}" rx="1.5" fill="{colour}"/>'
-        + "".join(texts)
+        f'<rect class="box{" marked" if box.marked else ""}" x="{x:.0f}" y="{y:.1f}" '
+        f'width="{WIDTH}" '
+        f'height="{box_place.height}" rx="6" fill="{PAPER}" stroke="{frame[0]}" '
+        f'stroke-width="{frame[1]}"/>'
+        f'<rect x="{x + 5:.0f}" y="{y + 8:.1f}" width="3" height="{box_place.height - 16}" '
+        f'rx="1.5" fill="{colour}"/>' + "".join(texts)
     )
-    return f"<g>{drawn}</g>" if box.link is None else f'<a href="{html.escape(box.link)}">{drawn}</a>'
+    return (
+        f"<g>{drawn}</g>" if box.link is None else f'<a href="{html.escape(box.link)}">{drawn}</a>'
+    )
 
 
 def _text(text: str) -> str:

@@ -18,9 +18,12 @@ _STEPS = 24  # straight pieces of a curve
 
 
 def png(boxes: Sequence[Box], edges: Collection[tuple[str, str]]) -> bytes:
-    """Draws boxes and lines as a PNG; arguments as of `graph.svg`. Pillow's own font has ASCII alone: see `_ascii`."""
+    """Draws boxes and lines as a PNG; arguments as of `graph.svg`. Pillow's own font has ASCII
+    alone: see `_ascii`."""
     drawn = graph.layout(boxes, edges)
-    picture = Image.new("RGB", (round(_SCALE * drawn.size[0]), round(_SCALE * drawn.size[1])), graph.PAPER)
+    picture = Image.new(
+        "RGB", (round(_SCALE * drawn.size[0]), round(_SCALE * drawn.size[1])), graph.PAPER
+    )
     pen = ImageDraw.Draw(picture)
     for way in drawn.ways:
         for curve in graph.curves(way):
@@ -45,8 +48,12 @@ def _box(pen: ImageDraw.ImageDraw, box: Box, column: int, box_place: graph.Place
     corners = [_scale_point((x, y)), _scale_point((x + graph.WIDTH, y + box_place.height))]
     pen.rounded_rectangle(corners, radius=6 * _SCALE, fill=graph.PAPER, outline=edge, width=width)
     colour = graph.COLOURS.get(box.kind or "", graph.QUIET)
-    pen.rectangle([_scale_point((x + 5, y + 8)), _scale_point((x + 8, y + box_place.height - 8))], fill=colour)
-    _write(pen, (x + 14, y + 20), graph.cut(box.title, graph.TITLE_CELLS), size=13, colour=graph.INK)
+    pen.rectangle(
+        [_scale_point((x + 5, y + 8)), _scale_point((x + 8, y + box_place.height - 8))], fill=colour
+    )
+    _write(
+        pen, (x + 14, y + 20), graph.cut(box.title, graph.TITLE_CELLS), size=13, colour=graph.INK
+    )
     for number, text in enumerate(box.lines):
         below = (x + 14, y + 36 + graph.NEXT * number)
         _write(pen, below, graph.cut(text, graph.LINE_CELLS), size=11, colour=graph.QUIET)
@@ -58,9 +65,14 @@ def _write(pen: ImageDraw.ImageDraw, at: Point, text: str, *, size: int, colour:
 
 
 def _ascii(text: str) -> str:
-    """Converts a text to ASCII: letters without their accents, and "?" for what has nothing like it."""
+    """Converts a text to ASCII: letters without their accents, and "?" for what has nothing like
+    it."""
     plain = unicodedata.normalize("NFKD", text.translate(_LIKE))
-    return "".join(letter for letter in plain if not unicodedata.combining(letter)).encode("ascii", "replace").decode()
+    return (
+        "".join(letter for letter in plain if not unicodedata.combining(letter))
+        .encode("ascii", "replace")
+        .decode()
+    )
 
 
 def _points(begin: Point, control_1: Point, control_2: Point, end: Point) -> list[Point]:
@@ -70,7 +82,10 @@ def _points(begin: Point, control_1: Point, control_2: Point, end: Point) -> lis
         t = step / _STEPS
         weights = (1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3
         x, y = (
-            sum(w * p[axis] for w, p in zip(weights, (begin, control_1, control_2, end), strict=True))
+            sum(
+                w * p[axis]
+                for w, p in zip(weights, (begin, control_1, control_2, end), strict=True)
+            )
             for axis in (0, 1)
         )
         points.append((x, y))

@@ -13,7 +13,11 @@ MOST = 8
 
 
 def picture(
-    ancestry: Ancestry, *, details: bool = False, most: int | None = MOST, link: Callable[[str], str] | None = None
+    ancestry: Ancestry,
+    *,
+    details: bool = False,
+    most: int | None = MOST,
+    link: Callable[[str], str] | None = None,
 ) -> str:
     """Draws the lineage as SVG.
 
@@ -26,13 +30,18 @@ def picture(
 
 
 def graph(
-    ancestry: Ancestry, *, details: bool = False, most: int | None = MOST, link: Callable[[str], str] | None = None
+    ancestry: Ancestry,
+    *,
+    details: bool = False,
+    most: int | None = MOST,
+    link: Callable[[str], str] | None = None,
 ) -> tuple[list[Box], list[tuple[str, str]]]:
     """Builds the boxes and edges of the lineage's picture.
 
     Args:
         details: with recipe hash, code version and seed.
-        most: more relatives of a kind in one generation are one box that counts them; `None` draws all.
+        most: more relatives of a kind in one generation are one box that counts them; `None` draws
+            all.
         link: gives the address to which the box of an id leads.
     """
     boxes: list[Box] = []
@@ -47,8 +56,17 @@ def graph(
             if len(group) > 1:
                 boxes.append(_several(group, generation))
             else:
-                boxes.append(_single(first, details=details, link=link, marked=first.artifact == ancestry.artifact))
-    return boxes, list(dict.fromkeys((key_of[parent], key_of[child]) for parent, child in ancestry.edges))
+                boxes.append(
+                    _single(
+                        first,
+                        details=details,
+                        link=link,
+                        marked=first.artifact == ancestry.artifact,
+                    )
+                )
+    return boxes, list(
+        dict.fromkeys((key_of[parent], key_of[child]) for parent, child in ancestry.edges)
+    )
 
 
 def detail_lines(relative: Relative) -> list[str]:
@@ -63,7 +81,9 @@ def detail_lines(relative: Relative) -> list[str]:
     return lines
 
 
-def _single(relative: Relative, *, details: bool, link: Callable[[str], str] | None, marked: bool) -> Box:
+def _single(
+    relative: Relative, *, details: bool, link: Callable[[str], str] | None, marked: bool
+) -> Box:
     is_listed = relative.kind is not None
     message = detail_lines(relative)
     return Box(
@@ -72,7 +92,10 @@ def _single(relative: Relative, *, details: bool, link: Callable[[str], str] | N
         kind=relative.kind,
         marked=marked,
         title=relative.name or "not at this version",
-        lines=[f"{relative.kind or 'artifact'} {relative.artifact[:SHORT]}", *(message if details else ())],
+        lines=[
+            f"{relative.kind or 'artifact'} {relative.artifact[:SHORT]}",
+            *(message if details else ()),
+        ],
         about="\n".join([relative.name or "", relative.artifact, *message]),
         link=link(relative.artifact) if link is not None and is_listed else None,
     )

@@ -34,19 +34,24 @@ def figure_url(figure: Figure, *, dpi: float = 110) -> str:
 
 
 def still(frame: UInt8Array | Image.Image, *, side: int | None = None) -> str:
-    """Writes a frame (height, width) as a JPEG in a data URL, at its own size or `side` pixels wide and high."""
+    """Writes a frame (height, width) as a JPEG in a data URL, at its own size or `side` pixels wide
+    and high."""
     return _url([_shrink_picture(frame, side)], "jpeg", quality=85)
 
 
 def moving(clip: Sequence[UInt8Array] | UInt8Array, *, rate: float, side: int) -> str:
-    """Writes the largest centred square of a clip (frame, height, width), gray or in colour, endless at `rate` [Hz], as
-    a WebP in a data URL."""
+    """Writes the largest centred square of a clip (frame, height, width), gray or in colour,
+    endless at `rate` [Hz], as a WebP in a data URL."""
     frames = np.asarray(clip)
     square = min(frames.shape[1:3])
     top, left_edge = (frames.shape[1] - square) // 2, (frames.shape[2] - square) // 2
     cut = frames[:, top : top + square, left_edge : left_edge + square]
     return _url(
-        [_shrink_picture(frame, side) for frame in cut], "webp", quality=60, duration=round(1000 / rate), loop=0
+        [_shrink_picture(frame, side) for frame in cut],
+        "webp",
+        quality=60,
+        duration=round(1000 / rate),
+        loop=0,
     )
 
 

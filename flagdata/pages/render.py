@@ -11,12 +11,16 @@ from markupsafe import Markup
 
 
 def render(
-    package: str, template: str, values: Mapping[str, Any], *, filters: Mapping[str, Callable[..., Any]] | None = None
+    package: str,
+    template: str,
+    values: Mapping[str, Any],
+    *,
+    filters: Mapping[str, Callable[..., Any]] | None = None,
 ) -> str:
     """Renders the page that `template` of `package` makes of `values`.
 
-    Templates extend "base.html.j2" and may use `filters` and `asset(name)`, the text of a style or script of theirs.
-    Values are escaped unless they are `Markup`; a name the template uses and
+    Templates extend "base.html.j2" and may use `filters` and `asset(name)`, the text of a style or
+    script of theirs. Values are escaped unless they are `Markup`; a name the template uses and
     `values` lacks is an error.
     """
     environment = Environment(

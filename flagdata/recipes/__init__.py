@@ -1,1 +1,2 @@
-"""Recipes: found by name or path, parsed within limits, typed, under their former names as well; tables of plug-ins."""
+"""Recipes: found by name or path, parsed within limits, typed, under their former names as well;
+tables of plug-ins."""

@@ -1,4 +1,5 @@
-"""TOML and JSON to values, within limits: the one boundary where the text of a recipe or a card is parsed."""
+"""TOML and JSON to values, within limits: the one boundary where the text of a recipe or a card is
+parsed."""
 
 from __future__ import annotations
 
@@ -14,13 +15,16 @@ from flagdata.errors import CorruptError, InputError
 from flagdata.recipes.retired_names import present_names
 
 SIZE_LIMIT = 64 << 20
-"""Longest text that is parsed [characters]; a cloth model's mesh is in its recipe. Lists within a list take most memory
+"""Longest text that is parsed [characters]; a cloth model's mesh is in its recipe. Lists within a
+list take most memory
 for their length, 30 bytes a character: 2 GB at most."""
 NESTING_LIMIT = 100
 """Most tables and lists within one another."""
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _PART = r"(?:[A-Za-z0-9_-]++|\"[^\"\n]*+\"|'[^'\n]*+')"
-_DEEP_KEY = re.compile(rf"(?:^|[\[{{,])[ \t]*+{_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{NESTING_LIMIT}}}", re.MULTILINE)
+_DEEP_KEY = re.compile(
+    rf"(?:^|[\[{{,])[ \t]*+{_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{NESTING_LIMIT}}}", re.MULTILINE
+)
 
 
 class LimitsError(ValueError):
@@ -48,7 +52,8 @@ def from_toml(text: str) -> dict[str, Any]:
 
 
 def to_toml(content: Mapping[str, Any], *, inside: str = "") -> str:
-    """Writes a TOML text of these tables: texts, numbers, truth values, lists of them, tables, and lists of tables.
+    """Writes a TOML text of these tables: texts, numbers, truth values, lists of them, tables, and
+    lists of tables.
 
     Args:
         inside: the table's own name, with a dot behind it.
@@ -65,7 +70,9 @@ def to_toml(content: Mapping[str, Any], *, inside: str = "") -> str:
         parts.append(f"\n[{path}]\n{to_toml(value, inside=f'{path}.')}")
     for key, value in lists.items():
         path = f"{inside}{_toml_key(key)}"
-        parts += [f"\n[[{path}]]\n{to_toml(inner_table, inside=f'{path}.')}" for inner_table in value]
+        parts += [
+            f"\n[[{path}]]\n{to_toml(inner_table, inside=f'{path}.')}" for inner_table in value
+        ]
     return "".join(parts)
 
 
@@ -74,20 +81,27 @@ def _toml_key(key: str) -> str:
 
 
 def _toml_value(value: Any) -> str:
-    """Writes a value as JSON does where TOML has the same form, and a number that is not finite as TOML does."""
+    """Writes a value as JSON does where TOML has the same form, and a number that is not finite as
+    TOML does."""
     if isinstance(value, float) and not math.isfinite(value):
         return "nan" if math.isnan(value) else "inf" if value > 0 else "-inf"
     if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")  # which JSON does not escape
+        return json.dumps(value, ensure_ascii=False).replace(
+            "\x7f", "\\u007F"
+        )  # which JSON does not escape
     if isinstance(value, bool | int | float):
         return json.dumps(value)
     if isinstance(value, Sequence):
         return f"[{', '.join(map(_toml_value, value))}]"
-    raise InputError(f"{value!r} has no form in TOML", where="recipe", fix="give numbers, texts, lists or tables")
+    raise InputError(
+        f"{value!r} has no form in TOML", where="recipe", fix="give numbers, texts, lists or tables"
+    )
 
 
 def _are_tables(value: Any) -> bool:
-    return isinstance(value, list) and bool(value) and all(isinstance(item, Mapping) for item in value)
+    return (
+        isinstance(value, list) and bool(value) and all(isinstance(item, Mapping) for item in value)
+    )
 
 
 def from_json(text: str | bytes) -> Any:
@@ -103,7 +117,8 @@ def from_json(text: str | bytes) -> Any:
 
 
 def from_stored_json(text: str) -> Any:
-    """Parses the value of a JSON text that a lake holds; older versions stored numbers that are not finite.
+    """Parses the value of a JSON text that a lake holds; older versions stored numbers that are not
+    finite.
 
     Raises:
         LimitsError: longer than `SIZE_LIMIT`, or nested deeper than `NESTING_LIMIT`.
@@ -123,10 +138,16 @@ def column_json(text: str, column: str, *, artifact: str) -> Any:
     """
     try:
         content = from_stored_json(text)
-        return present_names(content) if column == "parameters" and isinstance(content, dict) else content
+        return (
+            present_names(content)
+            if column == "parameters" and isinstance(content, dict)
+            else content
+        )
     except ValueError as error:
         where = f"artifact {artifact}"
-        raise CorruptError(f"its {column} cannot be read: {error}", where=where, fix="run flagdata doctor") from None
+        raise CorruptError(
+            f"its {column} cannot be read: {error}", where=where, fix="run flagdata doctor"
+        ) from None
 
 
 def read_json(path: Path, *, noun: str, fix: str = "restore it from a copy") -> dict[str, Any]:
@@ -140,10 +161,14 @@ def read_json(path: Path, *, noun: str, fix: str = "restore it from a copy") -> 
     """
     try:
         if path.stat().st_size > SIZE_LIMIT:
-            raise LimitsError(f"a file of {path.stat().st_size} bytes, at most {SIZE_LIMIT} are read")
+            raise LimitsError(
+                f"a file of {path.stat().st_size} bytes, at most {SIZE_LIMIT} are read"
+            )
         content = from_json(path.read_bytes())
     except (OSError, ValueError) as error:
-        raise CorruptError(f"the {noun} cannot be read: {error}", where=str(path), fix=fix) from None
+        raise CorruptError(
+            f"the {noun} cannot be read: {error}", where=str(path), fix=fix
+        ) from None
     if not isinstance(content, dict):
         raise CorruptError(f"the {noun} is no JSON object", where=str(path), fix=fix)
     return content

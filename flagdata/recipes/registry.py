@@ -1,4 +1,5 @@
-"""Explicit tables of plug-ins: a name, and the "module:Attr" that is imported only when the name is asked for."""
+"""Explicit tables of plug-ins: a name, and the "module:Attr" that is imported only when the name is
+asked for."""
 
 from __future__ import annotations
 
@@ -22,9 +23,9 @@ class PlugInError(FlagdataError):
 class Registry(Mapping[str, Any]):
     """A read-only mapping from name to a lazily imported attribute.
 
-    Looking up what an installed package adds raises a PlugInError that names the package, where it cannot be imported
-    or is none of these. One that has a name of the table, or of another package, is not added: the name is refused, so
-    that an installed package cannot replace another silently.
+    Looking up what an installed package adds raises a PlugInError that names the package, where it
+    cannot be imported or is none of these. One that has a name of the table, or of another package,
+    is not added: the name is refused, so that an installed package cannot replace another silently.
 
     Args:
         noun: what the entries are, for error messages ("sensor format").
@@ -94,12 +95,18 @@ class Registry(Mapping[str, Any]):
         return _package(added[-1]) if added else None
 
     def usable(self, names: Iterable[str] | None = None) -> Iterator[tuple[str, Any]]:
-        """Yields the entries that can be used, of some names or of all; a warning is logged of each that cannot."""
+        """Yields the entries that can be used, of some names or of all; a warning is logged of each
+        that cannot."""
         for name in self if names is None else names:
             try:
                 yield name, self[name]
             except PlugInError as error:
-                _LOG.warning("warning: left out: %s\n  where: %s\n  fix:   %s", error.what, error.where, error.fix)
+                _LOG.warning(
+                    "warning: left out: %s\n  where: %s\n  fix:   %s",
+                    error.what,
+                    error.where,
+                    error.fix,
+                )
 
     def __contains__(self, name: object) -> bool:
         return name in self._own or name in self._entry_points()

@@ -1,8 +1,9 @@
 """Names that quantities had in the last version: the one table of them, and how they are read.
 
-A quantity has one name (docs/glossary.md). What a user types under its former name is read with a warning, what a lake
-keeps under it is read silently. What hashes are made of keeps the former name for good: an artifact's identity is that
-of its recipe, so that a renamed key would make another artifact of the same source.
+A quantity has one name (docs/glossary.md). What a user types under its former name is read with a
+warning, what a lake keeps under it is read silently. What hashes are made of keeps the former name
+for good: an artifact's identity is that of its recipe, so that a renamed key would make another
+artifact of the same source.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ NAMES: Mapping[str, str] = {
     "density_error": "area_weight_error",
 }
 """Former name → name, in JSON, among parameters and among a network's targets."""
-KEYS: Mapping[str, str] = {old.replace("_", "-"): new.replace("_", "-") for old, new in NAMES.items()}
+KEYS: Mapping[str, str] = {
+    old.replace("_", "-"): new.replace("_", "-") for old, new in NAMES.items()
+}
 """Former key → key of a recipe's cloth."""
 TABLES: Mapping[str, str] = {"pins": "attachment"}
 """Former table → table of an experiment's recipe."""
@@ -46,12 +49,15 @@ def warn_of_old_name(old: str, new: str, given: Collection[str], *, where: str) 
         UsageError: both names are given.
     """
     if new in given:
-        raise UsageError(f"{old} is called {new} now, and both are given", where=where, fix="keep one of them")
+        raise UsageError(
+            f"{old} is called {new} now, and both are given", where=where, fix="keep one of them"
+        )
     say(f"{old} is called {new} now", mark="warning")
 
 
 def with_present_keys(content: Any, *, where: str, keys: Mapping[str, str] = KEYS) -> Any:
-    """Returns a table that a user wrote with its keys as they are called now; raises as `warn_of_old_name`."""
+    """Returns a table that a user wrote with its keys as they are called now; raises as
+    `warn_of_old_name`."""
     if not isinstance(content, Mapping) or not keys.keys() & content.keys():
         return content
     for old in keys.keys() & content.keys():
@@ -78,8 +84,8 @@ def present_recipe(stored: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def present_sql(column: str) -> str:
-    """Writes SQL that gives a column of JSON objects with their present names; of cloth models the text as it is, in
-    which an air force has a density."""
+    """Writes SQL that gives a column of JSON objects with their present names; of cloth models the
+    text as it is, in which an air force has a density."""
     renamed = f'"{column}"'
     for old in _PARAMETERS:
         renamed = f"replace({renamed}, '\"{old}\":', '\"{NAMES[old]}\":')"
@@ -87,11 +93,14 @@ def present_sql(column: str) -> str:
 
 
 def present_query(text: str | None) -> str | None:
-    """Returns a user's SQL that names parameters as they are called now, and warns of each old name."""
+    """Returns a user's SQL that names parameters as they are called now, and warns of each old
+    name."""
     if text is None:
         return None
     for old in _PARAMETERS:
-        pattern = re.compile(rf"""(\bparameters"?\s*(?:->>?|,)\s*'(?:\$\.)?){old}(?=')""", re.IGNORECASE)
+        pattern = re.compile(
+            rf"""(\bparameters"?\s*(?:->>?|,)\s*'(?:\$\.)?){old}(?=')""", re.IGNORECASE
+        )
         if pattern.search(text):
             warn_of_old_name(old, NAMES[old], (), where=text)
             text = pattern.sub(rf"\g<1>{NAMES[old]}", text)
@@ -109,5 +118,6 @@ def hashed_name(name: str) -> str:
 
 
 def hashed_key(key: str) -> str:
-    """Returns the recipe key by which random draws know a quantity: a draw depends on the name that it is for."""
+    """Returns the recipe key by which random draws know a quantity: a draw depends on the name that
+    it is for."""
     return hashed_name(key.replace("-", "_")).replace("_", "-")

@@ -1,7 +1,9 @@
-"""Recipes by name or by path: where the text of one is found. Its content is parsed by the module that knows its form.
+"""Recipes by name or by path: where the text of one is found. Its content is parsed by the module
+that knows its form.
 
-Each kind of recipe has a folder of `catalogs` with files NAME.toml. Wherever one is named, a path that ends in .toml
-names the user's own file in its place. Installed packages add recipes to some kinds by entry points.
+Each kind of recipe has a folder of `catalogs` with files NAME.toml. Wherever one is named, a path
+that ends in .toml names the user's own file in its place. Installed packages add recipes to some
+kinds by entry points.
 """
 
 from __future__ import annotations
@@ -32,7 +34,8 @@ class Found:
     Attributes:
         name: in the catalog, or of the file without its suffix.
         data: what the file holds.
-        folder: to which paths inside the recipe are relative; the working directory for recipes of the catalog.
+        folder: to which paths inside the recipe are relative; the working directory for recipes of
+            the catalog.
         where: for error messages.
     """
 
@@ -58,7 +61,8 @@ class Shelf:
     Args:
         folder: of `catalogs`.
         noun: what one is called in error messages ("data set").
-        group: an entry-point group by which installed packages add recipes; each entry leads to the path of a file.
+        group: an entry-point group by which installed packages add recipes; each entry leads to the
+            path of a file.
     """
 
     folder: str
@@ -67,11 +71,13 @@ class Shelf:
 
     @cached_property
     def registry(self) -> Registry:
-        """The names of the catalog and of installed packages; looking up a name of an installed package gives its
-        path, names of the catalog cannot be looked up."""
+        """The names of the catalog and of installed packages; looking up a name of an installed
+        package gives its path, names of the catalog cannot be looked up."""
         entries = (entry.name for entry in self.place().iterdir())
         names = sorted(name.removesuffix(_SUFFIX) for name in entries if name.endswith(_SUFFIX))
-        return Registry(self.noun, dict.fromkeys(names, ""), group=self.group, accepts=_is_recipe_path)
+        return Registry(
+            self.noun, dict.fromkeys(names, ""), group=self.group, accepts=_is_recipe_path
+        )
 
     def place(self) -> Traversable:
         """Returns the folder in which the files of the catalog are."""
@@ -104,7 +110,8 @@ class Shelf:
         return Found(name=name, data=data, folder=Path(), where=f"{self.noun} {name!r}")
 
     def find(self, source: str) -> Found:
-        """Finds the recipe of that name in the catalog, or the file of that path, which ends in .toml.
+        """Finds the recipe of that name in the catalog, or the file of that path, which ends in
+        .toml.
 
         Raises:
             UnknownNameError: no such name; the nearest is suggested.
@@ -137,7 +144,9 @@ def read_recipe(path: Path) -> Found:
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise InputError(f"the recipe cannot be read: {error.strerror}", where=str(path), fix="check it") from None
+        raise InputError(
+            f"the recipe cannot be read: {error.strerror}", where=str(path), fix="check it"
+        ) from None
     return Found(name=path.stem, data=data, folder=path.parent, where=str(path))
 
 
@@ -147,8 +156,14 @@ def _is_recipe_path(entry: object) -> bool:
 
 
 def is_name(value: object) -> bool:
-    """Checks whether a recipe, and what is made by it, can be called so: text of printable characters, not too long."""
-    return isinstance(value, str) and bool(value.strip()) and value.isprintable() and len(value) <= NAME_LIMIT
+    """Checks whether a recipe, and what is made by it, can be called so: text of printable
+    characters, not too long."""
+    return (
+        isinstance(value, str)
+        and bool(value.strip())
+        and value.isprintable()
+        and len(value) <= NAME_LIMIT
+    )
 
 
 def parse_recipe(text: str, *, where: str) -> dict[str, Any]:
@@ -161,6 +176,8 @@ def parse_recipe(text: str, *, where: str) -> dict[str, Any]:
     try:
         return from_toml(text)
     except LimitsError as error:
-        raise LimitError(str(error), where=where, fix="shorten the file or nest less: no recipe needs more") from None
+        raise LimitError(
+            str(error), where=where, fix="shorten the file or nest less: no recipe needs more"
+        ) from None
     except ValueError as error:
         raise InputError(str(error), where=where, fix="correct the file") from None

@@ -1,8 +1,8 @@
 """Parsed TOML as typed values, read by msgspec, and ranges that values are drawn from.
 
-A recipe is a dataclass whose fields are the keys of a table. The type of a field says what its key may hold: a number
-within bounds, one of some names, a list, a table inside. Unknown keys are refused before any value is looked at, and
-the nearest is named.
+A recipe is a dataclass whose fields are the keys of a table. The type of a field says what its key
+may hold: a number within bounds, one of some names, a list, a table inside. Unknown keys are
+refused before any value is looked at, and the nearest is named.
 """
 
 from __future__ import annotations
@@ -13,7 +13,17 @@ from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from enum import EnumMeta, StrEnum
 from functools import cache
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, TypeAlias, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import (
+    Annotated,
+    Any,
+    Literal,
+    TypeAlias,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 import msgspec
 from msgspec import Meta
@@ -43,7 +53,8 @@ class Range:
     """Values from `low` to `high`, uniform in the value or in its logarithm.
 
     Raises:
-        InputError: bounds that are not finite or not in order, or a logarithm of what is not positive.
+        InputError: bounds that are not finite or not in order, or a logarithm of what is not
+            positive.
     """
 
     low: float
@@ -58,7 +69,8 @@ class Range:
             )
         if self.scale is Scale.LOG and self.low <= 0:
             raise InputError(
-                f"a logarithmic range cannot begin at {self.low!r}", fix="let it begin above 0, or take it linear"
+                f"a logarithmic range cannot begin at {self.low!r}",
+                fix="let it begin above 0, or take it linear",
             )
 
     def at(self, share: float) -> float:
@@ -104,7 +116,8 @@ Count: TypeAlias = Annotated[int, Meta(ge=1, le=WHOLE_LIMIT)]
 Seed: TypeAlias = Annotated[int, Meta(ge=0, le=SEED_LIMIT)]
 Index: TypeAlias = Annotated[int, Meta(ge=0)]
 Angle: TypeAlias = Annotated[float, _Mark.ANGLE]
-"""[rad], under its key; or in degrees, under the key with `DEGREES` behind it. A whole turn at most."""
+"""[rad], under its key; or in degrees, under the key with `DEGREES` behind it. A whole turn at
+most."""
 AngleQuantity: TypeAlias = Annotated[Quantity, _Mark.ANGLE]
 Spelled: TypeAlias = Annotated[tuple[str, ...], _Mark.SPELLED]
 """Texts, or values that are taken as they are spelled."""
@@ -118,7 +131,9 @@ def ends(quantity: Quantity) -> tuple[float, float]:
 def in_radians(quantity: Quantity) -> Quantity:
     """Converts a quantity that is given in degrees."""
     if isinstance(quantity, Range):
-        return Range(low=math.radians(quantity.low), high=math.radians(quantity.high), scale=quantity.scale)
+        return Range(
+            low=math.radians(quantity.low), high=math.radians(quantity.high), scale=quantity.scale
+        )
     return math.radians(quantity)
 
 
@@ -136,9 +151,9 @@ def within(kind: Any, least: float = -math.inf, most: float = math.inf) -> Any:
 def read(kind: type[R], content: Any, *, where: str, **computed: Any) -> R:
     """Reads a dataclass whose fields are the keys of a table in kebab-case.
 
-    The class says what a missing key stands for, and in `WAS` which keys it had in the last version. A missing table is
-    an empty one; a text without a default is not blank. An error of the class itself that names no place gets that of
-    the table.
+    The class says what a missing key stands for, and in `WAS` which keys it had in the last
+    version. A missing table is an empty one; a text without a default is not blank. An error of the
+    class itself that names no place gets that of the table.
 
     Args:
         computed: values of fields that are not read by their type; their keys may be there.
@@ -151,8 +166,12 @@ def read(kind: type[R], content: Any, *, where: str, **computed: Any) -> R:
     content = with_present_keys(content, where=where, keys=getattr(kind, "WAS", {}))
     hints = _hints(kind)
     keys = {entry.name.replace("_", "-"): entry for entry in fields(kind)}  # pyright: ignore[reportArgumentType]
-    types = {key: Any if entry.name in computed else hints[entry.name] for key, entry in keys.items()}
-    values = {keys[key].name: entry for key, entry in entries(types, content, where=where).items()} | computed
+    types = {
+        key: Any if entry.name in computed else hints[entry.name] for key, entry in keys.items()
+    }
+    values = {
+        keys[key].name: entry for key, entry in entries(types, content, where=where).items()
+    } | computed
     for key, entry in keys.items():
         if entry.default is not MISSING or entry.default_factory is not MISSING:
             continue
@@ -196,15 +215,17 @@ def check_keys(content: Any, allowed: Collection[str], *, where: str) -> None:
         UnknownNameError: a key that is not known; the nearest is suggested.
     """
     if not isinstance(content, Mapping):
-        raise InputError(f"{_excerpt(content)} is not a table", where=where, fix="write it as [table] with keys")
+        raise InputError(
+            f"{_excerpt(content)} is not a table", where=where, fix="write it as [table] with keys"
+        )
     for key in content:
         if key not in allowed:
             raise UnknownNameError.of("key", key, allowed, where=where)
 
 
 def value(kind: Any, content: Any, *, key: str, where: str) -> Any:
-    """Reads the value of a key as a type: one of msgspec's, a dataclass, a quantity or a range, or tables or a list of
-    them. Numbers are finite.
+    """Reads the value of a key as a type: one of msgspec's, a dataclass, a quantity or a range, or
+    tables or a list of them. Numbers are finite.
 
     Raises:
         UnknownNameError, InputError, LimitError: as `read`.
@@ -223,7 +244,8 @@ def value(kind: Any, content: Any, *, key: str, where: str) -> Any:
         item, marks = _strip_annotations(inner[0])
         if _is_table(item):
             return tuple(
-                _table(item, entry, where=f"{where} [[{key}]] {n}") for n, entry in enumerate(content, start=1)
+                _table(item, entry, where=f"{where} [[{key}]] {n}")
+                for n, entry in enumerate(content, start=1)
             )
         if isinstance(item, EnumMeta) or any(isinstance(mark, Named) for mark in marks):
             return tuple(value(inner[0], item, key=key, where=where) for item in content)
@@ -235,13 +257,16 @@ def _is_table(bare: Any) -> bool:
 
 
 def _table(bare: Any, content: Any, *, where: str) -> Any:
-    """Reads a dataclass, or a table whose keys are names of one type and whose values are of another."""
+    """Reads a dataclass, or a table whose keys are names of one type and whose values are of
+    another."""
     if is_dataclass(bare):
         return read(bare, content, where=where)  # pyright: ignore[reportArgumentType]
     check_keys(content, content if isinstance(content, Mapping) else (), where=where)
     name, kind = get_args(bare)
     names = {entry: value(name, entry, key="name", where=where) for entry in content}
-    return {names[entry]: value(kind, item, key=entry, where=where) for entry, item in content.items()}
+    return {
+        names[entry]: value(kind, item, key=entry, where=where) for entry, item in content.items()
+    }
 
 
 def _quantity(bare: Any, notes: list[Any], content: Any, *, key: str, where: str) -> Quantity:
@@ -296,11 +321,15 @@ def _convert_value(bare: Any, notes: list[Any], content: Any, *, key: str, where
 
 def _refusal(bare: Any, bounds: list[Meta], content: Any, *, key: str, where: str) -> Exception:
     if isinstance(bare, EnumMeta):
-        return UnknownNameError.of(key, str(content), [option.value for option in bare], where=where)  # pyright: ignore[reportAttributeAccessIssue]
+        return UnknownNameError.of(
+            key, str(content), [option.value for option in bare], where=where
+        )  # pyright: ignore[reportAttributeAccessIssue]
     most = min((bound.le for bound in bounds if bound.le is not None), default=math.inf)
     if bare is int and isinstance(content, int) and content > most:
         return LimitError(f"{key} is {_excerpt(content)}", where=where, fix=f"give at most {most}")
-    return InputError(f"{key} is {_excerpt(content)}", where=where, fix=f"give {_wanted_words(bare, bounds)}")
+    return InputError(
+        f"{key} is {_excerpt(content)}", where=where, fix=f"give {_wanted_words(bare, bounds)}"
+    )
 
 
 def _wanted_words(bare: Any, bounds: list[Meta]) -> str:
@@ -360,5 +389,10 @@ def _excerpt(content: Any) -> str:
 
 
 _EXCERPT = 60
-_WORDS = {float: "a finite number", int: "a whole number", str: "text in quotes", bool: "true or false"}
+_WORDS = {
+    float: "a finite number",
+    int: "a whole number",
+    str: "text in quotes",
+    bool: "true or false",
+}
 _EXAMPLES = {float: "0.0", int: "0", str: '"…"'}

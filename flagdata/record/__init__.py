@@ -1,4 +1,5 @@
-"""Records: frames, wind, parameters and their provenance on one clock, one MCAP file each (https://mcap.dev/spec).
+"""Records: frames, wind, parameters and their provenance on one clock, one MCAP file each
+(https://mcap.dev/spec).
 
     topic (schema.TOPIC_…)  schema, protobuf                    one message is
     /camera/image           foxglove.CompressedImage            a JPEG, gray
@@ -7,16 +8,18 @@
     /wind/1hz               flagdata.WindMean                   the mean of a second, with its σ
     /truth/parameters       flagdata.TruthParameters            what a simulated record was made with
 
-`log_time` is the record's common clock, `publish_time` the device's own, a message's `timestamp` mid-exposure (frames),
-the sample's instant, or the END of the mean's second, on the common clock; all UTC nanoseconds. In a camera or wind
-artifact both clocks are the device's. A field of a WindSample that is absent was not measured; NaN is a value that is
-missing. Units and conventions are in the comments of the schemas, inside the file.
+`log_time` is the record's common clock, `publish_time` the device's own, a message's `timestamp`
+mid-exposure (frames), the sample's instant, or the END of the mean's second, on the common clock;
+all UTC nanoseconds. In a camera or wind artifact both clocks are the device's. A field of a
+WindSample that is absent was not measured; NaN is a value that is missing. Units and conventions
+are in the comments of the schemas, inside the file.
 
-Metadata records: "camera", "sensor", "provenance", "clock/<device>" (a ClockModel as JSON), "salvage/<n>" (what a
-salvage lost). Attachments are the vendor's log, the sensor recipe that was named, pictures; a media type ending in
-"+gzip" says that it was packed on writing.
+Metadata records: "camera", "sensor", "provenance", "clock/<device>" (a ClockModel as JSON),
+"salvage/<n>" (what a salvage lost). Attachments are the vendor's log, the sensor recipe that was
+named, pictures; a media type ending in "+gzip" says that it was packed on writing.
 
-Chunks are not compressed (JPEG and H.264 do not shrink further), so that a frame is read from its place in the file.
+Chunks are not compressed (JPEG and H.264 do not shrink further), so that a frame is read from its
+place in the file.
 """
 
 from __future__ import annotations

@@ -12,9 +12,10 @@ first-order autoregressive process (Bayley and Hammersley 1946, J. R. Stat. Soc.
 ρ = 1 - mean (v_{i+1} - v_i)² / (2 s²), kept within 0 and 1. a is the larger of the sensor's accuracy and its relative
 accuracy × v (systematic: not reduced by averaging; JCGM 100:2008, 4.3), q its resolution (rectangular, 4.3.7).
 
-Not included: what the sensor missed while it gave no sample, its response time, its distance from the flag, tilt, and
-clock errors. A bin with one sample has no scatter to see: its sigma is the instrument's alone. A sensor whose recipe
-names no accuracy counts as exact, so that its sigma is a lower bound.
+Not included: what the sensor missed while it gave no sample, its response time, its distance from
+the flag, tilt, and clock errors. A bin with one sample has no scatter to see: its sigma is the
+instrument's alone. A sensor whose recipe names no accuracy counts as exact, so that its sigma is a
+lower bound.
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ _DIRECTION_OF = {
 def average(series: WindSeries, period: float = 1.0, *, channel: str = "wind_speed") -> WindAverage:
     """Averages `channel` over bins of `period` [s] that end at whole multiples of it since 1970.
 
-    A sample stamped at a bin's end belongs to that bin: (end - period, end]. Bins without a usable sample are absent.
+    A sample stamped at a bin's end belongs to that bin: (end - period, end]. Bins without a usable
+    sample are absent.
 
     Raises:
         InputError: the series has no such channel.
@@ -47,7 +49,9 @@ def average(series: WindSeries, period: float = 1.0, *, channel: str = "wind_spe
     """
     if not (math.isfinite(period) and period >= 1e-6):
         raise UsageError(
-            f"the averaging period {period} s is not a positive number", where="period", fix="give seconds above 0"
+            f"the averaging period {period} s is not a positive number",
+            where="period",
+            fix="give seconds above 0",
         )
     if channel not in series.channels:
         raise InputError(
@@ -60,7 +64,11 @@ def average(series: WindSeries, period: float = 1.0, *, channel: str = "wind_spe
     usable = ((series.flags & UNUSABLE) == 0) & np.isfinite(speed)
     time, speed = series.time[usable], speed[usable]
     bins = -(-time // length)
-    starts = np.flatnonzero(np.concatenate(([True], np.diff(bins) > 0))) if len(bins) else np.zeros(0, dtype=np.int64)
+    starts = (
+        np.flatnonzero(np.concatenate(([True], np.diff(bins) > 0)))
+        if len(bins)
+        else np.zeros(0, dtype=np.int64)
+    )
     count = np.diff(np.append(starts, len(bins)))
     if len(starts) == 0:
         empty = np.zeros(0)
@@ -89,13 +97,15 @@ def average(series: WindSeries, period: float = 1.0, *, channel: str = "wind_spe
 
 
 def instrument_sigma(sensor: Sensor, speed: FloatArray) -> FloatArray:
-    """Computes the standard uncertainty of a reading by the instrument alone: accuracy and resolution [m/s]."""
+    """Computes the standard uncertainty of a reading by the instrument alone: accuracy and
+    resolution [m/s]."""
     accuracy = np.maximum(sensor.accuracy or 0.0, (sensor.accuracy_relative or 0.0) * np.abs(speed))
     return np.hypot(accuracy, (sensor.resolution or 0.0) / math.sqrt(12))
 
 
 def correlation(speed: FloatArray, starts: IntArray, count: IntArray) -> float:
-    """Estimates the correlation ρ of neighbouring samples within bins, 0 to 1, see the module's text."""
+    """Estimates the correlation ρ of neighbouring samples within bins, 0 to 1, see the module's
+    text."""
     if len(speed) == 0 or int(count.max()) < 2:
         return 0.0
     mean = np.repeat(np.add.reduceat(speed, starts) / count, count)
@@ -110,7 +120,8 @@ def correlation(speed: FloatArray, starts: IntArray, count: IntArray) -> float:
 
 
 def _scatter(speed: FloatArray, starts: IntArray, count: IntArray, mean: FloatArray) -> FloatArray:
-    """Computes the standard deviation of each bin's mean from the scatter within it [m/s]; 0 for bins of one sample."""
+    """Computes the standard deviation of each bin's mean from the scatter within it [m/s]; 0 for
+    bins of one sample."""
     square = np.add.reduceat((speed - np.repeat(mean, count)) ** 2, starts)
     variance = square / np.maximum(count - 1, 1)
     rho = correlation(speed, starts, count)
@@ -119,8 +130,8 @@ def _scatter(speed: FloatArray, starts: IntArray, count: IntArray, mean: FloatAr
 
 
 def _vector_mean(speed: FloatArray, direction: FloatArray, starts: IntArray) -> FloatArray:
-    """Computes the direction of the mean wind vector of each bin [rad, 0 to 2π]; NaN where nothing blows or nothing is
-    known."""
+    """Computes the direction of the mean wind vector of each bin [rad, 0 to 2π]; NaN where nothing
+    blows or nothing is known."""
     finite = np.isfinite(direction)
     east = np.add.reduceat(np.where(finite, speed * np.sin(direction), 0.0), starts)
     north = np.add.reduceat(np.where(finite, speed * np.cos(direction), 0.0), starts)

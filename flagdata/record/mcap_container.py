@@ -1,6 +1,6 @@
-"""The MCAP container read by offset: the summary at its end, and where each message of a topic lies. No message is
-decoded here, no offset is trusted before what it points at has been checked, and no payload is given out before its
-checksum is.
+"""The MCAP container read by offset: the summary at its end, and where each message of a topic
+lies. No message is decoded here, no offset is trusted before what it points at has been checked,
+and no payload is given out before its checksum is.
 
 Source: the MCAP specification, https://mcap.dev/spec.
 """
@@ -19,14 +19,29 @@ import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Attachment, AttachmentIndex, Channel, ChunkIndex, Metadata, MetadataIndex, Schema
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    ChunkIndex,
+    Metadata,
+    MetadataIndex,
+    Schema,
+)
 from numpy.typing import NDArray
 
 from flagdata.core.arrays import IntArray
 from flagdata.errors import CorruptError, InputError
 from flagdata.record.mcap_file import CHUNK, MAGIC, MESSAGE, RECORD_HEAD
 from flagdata.record.record_bytes import Bytes
-from flagdata.record.record_checksums import CHECKSUMS, FIX, HEAD_BYTES, ChannelChecksums, Checksums, metadata_checksum
+from flagdata.record.record_checksums import (
+    CHECKSUMS,
+    FIX,
+    HEAD_BYTES,
+    ChannelChecksums,
+    Checksums,
+    metadata_checksum,
+)
 
 MESSAGE_HEAD = MESSAGE.size  # then the data
 CHUNK_HEAD = CHUNK.size  # and the name of the compression; then the records
@@ -37,7 +52,14 @@ _TAIL = _FOOTER.size + len(MAGIC)
 _LAST = 512 << 10
 """Bytes at the end of a record that hold its summary and checksums, unless it is very long."""
 _MESSAGE = np.dtype(
-    [("opcode", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log", "<u8"), ("publish", "<u8")]
+    [
+        ("opcode", "u1"),
+        ("length", "<u8"),
+        ("channel", "<u2"),
+        ("sequence", "<u4"),
+        ("log", "<u8"),
+        ("publish", "<u8"),
+    ]
 )
 _RECOVER = "run `flagdata recover` on the file"
 
@@ -68,8 +90,10 @@ class Messages:
     Attributes:
         log_time, publish_time: [UTC ns].
         offset, length: of the message's data in the file [B].
-        checksums: (n,) uint32, of each message's data; `None` where the channel has one checksum, or none.
-        checksum: of the data of all messages in file order; `None` where each has its own, or there are none.
+        checksums: (n,) uint32, of each message's data; `None` where the channel has one checksum,
+            or none.
+        checksum: of the data of all messages in file order; `None` where each has its own, or there
+            are none.
         first: number of the topic's message in row 0.
     """
 
@@ -95,7 +119,9 @@ def read_exact(file: Bytes, length: int, offset: int, *, where: str) -> bytes:
     while len(data) < length:
         further = file.read(length - len(data), offset + len(data))
         if not further:
-            raise CorruptError(f"the record ends before byte {offset + length}", where=where, fix=_RECOVER)
+            raise CorruptError(
+                f"the record ends before byte {offset + length}", where=where, fix=_RECOVER
+            )
         data += further
     return data
 
@@ -109,7 +135,9 @@ def read_summary(file: Bytes, *, where: str) -> Summary:
     size = file.size
     file.prepare([(0, len(MAGIC)), (size - _LAST, size)])
     if size < len(MAGIC) + _TAIL or file.read(len(MAGIC), 0) != MAGIC:
-        raise CorruptError("this is no MCAP record", where=where, fix="check that it is the right file")
+        raise CorruptError(
+            "this is no MCAP record", where=where, fix="check that it is the right file"
+        )
     tail = read_exact(file, _TAIL, size - _TAIL, where=where)
     if tail[-len(MAGIC) :] != MAGIC:
         raise CorruptError("the record is cut off: its end is missing", where=where, fix=_RECOVER)
@@ -120,7 +148,9 @@ def read_summary(file: Bytes, *, where: str) -> Summary:
         raise CorruptError("the record has no summary", where=where, fix=_RECOVER)
     body = read_exact(file, size - _TAIL - start, start, where=where)
     if zlib.crc32(tail[: _FOOTER.size - 4], zlib.crc32(body)) != checksum:
-        raise CorruptError("the checksum of the record's summary is wrong", where=where, fix=_RECOVER)
+        raise CorruptError(
+            "the checksum of the record's summary is wrong", where=where, fix=_RECOVER
+        )
     return _with_checksums(file, _summary(body, start, where=where), where=where)
 
 
@@ -148,8 +178,16 @@ def _summary(body: bytes, start: int, *, where: str) -> Summary:
             channels[channel.topic] = channel
         elif opcode == Opcode.CHUNK_INDEX:
             chunk = parse(ChunkIndex.read, record, where=where)
-            _check_span(chunk.chunk_start_offset, chunk.chunk_length + chunk.message_index_length, start, where=where)
-            if CHUNK_HEAD + len(chunk.compression.encode()) + chunk.compressed_size != chunk.chunk_length:
+            _check_span(
+                chunk.chunk_start_offset,
+                chunk.chunk_length + chunk.message_index_length,
+                start,
+                where=where,
+            )
+            if (
+                CHUNK_HEAD + len(chunk.compression.encode()) + chunk.compressed_size
+                != chunk.chunk_length
+            ):
                 raise CorruptError("the lengths of a chunk do not agree", where=where, fix=_RECOVER)
             chunks.append(chunk)
         elif opcode == Opcode.ATTACHMENT_INDEX:
@@ -174,7 +212,9 @@ def _summary(body: bytes, start: int, *, where: str) -> Summary:
 def _check_span(offset: int, length: int, end: int, *, where: str) -> None:
     if offset < len(MAGIC) or offset + length > end:
         raise CorruptError(
-            f"the summary points to bytes {offset} to {offset + length} of {end}", where=where, fix=_RECOVER
+            f"the summary points to bytes {offset} to {offset + length} of {end}",
+            where=where,
+            fix=_RECOVER,
         )
 
 
@@ -192,7 +232,9 @@ def split_records(body: bytes | memoryview, *, where: str) -> Iterator[tuple[int
         opcode, length = struct.unpack_from("<BQ", body, at)
         at += RECORD_HEAD
         if at + length > len(body):
-            raise CorruptError(f"a record of {length} bytes reaches beyond its section", where=where, fix=_RECOVER)
+            raise CorruptError(
+                f"a record of {length} bytes reaches beyond its section", where=where, fix=_RECOVER
+            )
         yield opcode, body[at : at + length]
         at += length
 
@@ -206,7 +248,9 @@ def parse(read: Callable[[ReadDataStream], R], record: bytes | memoryview, *, wh
     try:
         return read(ReadDataStream(BytesIO(record)))
     except (struct.error, UnicodeDecodeError, McapError, OverflowError) as error:
-        raise CorruptError(f"a record of the container cannot be read: {error}", where=where, fix=_RECOVER) from None
+        raise CorruptError(
+            f"a record of the container cannot be read: {error}", where=where, fix=_RECOVER
+        ) from None
 
 
 def data_start(chunk: ChunkIndex) -> int:
@@ -217,14 +261,16 @@ def data_start(chunk: ChunkIndex) -> int:
 def read_messages(
     file: Bytes, summary: Summary, topic: str, *, where: str, span: tuple[int, int] | None = None
 ) -> Messages:
-    """Finds where each message of `topic` lies; every head is read and compared with the index. None if the topic is
-    absent.
+    """Finds where each message of `topic` lies; every head is read and compared with the index.
+    None if the topic is absent.
 
     Args:
-        span: only these messages, (first, count) of a topic in order, see `in_order`; no head of others is read.
+        span: only these messages, (first, count) of a topic in order, see `in_order`; no head of
+            others is read.
 
     Raises:
-        CorruptError: an index that does not fit the messages, or heads that have changed since they were written.
+        CorruptError: an index that does not fit the messages, or heads that have changed since they
+            were written.
         InputError: compressed chunks, whose messages have no place in the file.
     """
     channel = summary.channels.get(topic)
@@ -261,7 +307,9 @@ def read_messages(
         )
     order = np.argsort(time, kind="stable")
     if span is not None and not np.array_equal(order, np.arange(len(time))):
-        raise CorruptError(f"the messages of {topic} are not in order of time", where=where, fix=_RECOVER)
+        raise CorruptError(
+            f"the messages of {topic} are not in order of time", where=where, fix=_RECOVER
+        )
     return Messages(
         log_time=time[order],
         publish_time=head["publish"].astype(np.int64)[order],
@@ -276,15 +324,20 @@ def read_messages(
 
 
 def in_order(file: Bytes, summary: Summary, topic: str, *, where: str) -> bool:
-    """Checks whether a topic's messages lie in order of time from chunk to chunk, each with a checksum of its own, so
-    that `read_messages` may read a span of them. The summary states from when to when each chunk has messages; an index
-    is read only of chunks in which other topics overlap with the next.
+    """Checks whether a topic's messages lie in order of time from chunk to chunk, each with a
+    checksum of its own, so that `read_messages` may read a span of them. The summary states from
+    when to when each chunk has messages; an index is read only of chunks in which other topics
+    overlap with the next.
 
     Raises:
         CorruptError: an index that is damaged.
     """
     stored_checksums = None if summary.checksums is None else summary.checksums.channels.get(topic)
-    if stored_checksums is None or stored_checksums.messages is None or topic not in summary.channels:
+    if (
+        stored_checksums is None
+        or stored_checksums.messages is None
+        or topic not in summary.channels
+    ):
         return False
     channel = summary.channels[topic].id
     chunks = [chunk for chunk in summary.chunks if channel in chunk.message_index_offsets]
@@ -294,21 +347,30 @@ def in_order(file: Bytes, summary: Summary, topic: str, *, where: str) -> bool:
     ):
         return False
     bounds = [(chunk.message_start_time, chunk.message_end_time) for chunk in chunks]
-    overlaps = {i + k for i, (earlier, later) in enumerate(pairwise(bounds)) if later[0] <= earlier[1] for k in (0, 1)}
+    overlaps = {
+        i + k
+        for i, (earlier, later) in enumerate(pairwise(bounds))
+        if later[0] <= earlier[1]
+        for k in (0, 1)
+    }
     shared = [i for i in sorted(overlaps) if len(chunks[i].message_index_offsets) > 1]
     file.prepare([_index_span(chunks[i], channel) for i in shared])
     for i in shared:
-        time, _ = _message_index(file, chunks[i].message_index_offsets[channel], channel, summary.data_end, where=where)
+        time, _ = _message_index(
+            file, chunks[i].message_index_offsets[channel], channel, summary.data_end, where=where
+        )
         bounds[i] = (int(time.min(initial=0)), int(time.max(initial=0)))
     return all(earlier[1] < later[0] for earlier, later in pairwise(bounds))
 
 
 def _index_span(chunk: ChunkIndex, channel: int) -> tuple[int, int]:
-    """Returns where the index of a channel's messages in a chunk begins and ends [B]: indexes follow their chunk in a
-    row."""
+    """Returns where the index of a channel's messages in a chunk begins and ends [B]: indexes
+    follow their chunk in a row."""
     first = chunk.message_index_offsets[channel]
     later = [at for at in chunk.message_index_offsets.values() if at > first]
-    return first, min(later, default=chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length)
+    return first, min(
+        later, default=chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length
+    )
 
 
 def message_count(chunk: ChunkIndex, channel: int) -> int:
@@ -320,7 +382,8 @@ def message_count(chunk: ChunkIndex, channel: int) -> int:
 def _places(
     file: Bytes, summary: Summary, channel: int, *, where: str, span: tuple[int, int] | None
 ) -> tuple[IntArray, IntArray, IntArray]:
-    """Finds the log time of messages, where their heads lie, and where the records of their chunks end, in file order.
+    """Finds the log time of messages, where their heads lie, and where the records of their chunks
+    end, in file order.
 
     Args:
         span: see `read_messages`; what is read of these messages next is prepared.
@@ -336,7 +399,9 @@ def _places(
                     fix=_RECOVER + " to rewrite it",
                 )
             count = message_count(chunk, channel)
-            first, last = (0, count) if span is None else (span[0] - before, span[0] + span[1] - before)
+            first, last = (
+                (0, count) if span is None else (span[0] - before, span[0] + span[1] - before)
+            )
             if span is None or (first < count and last > 0):
                 parts.append((chunk, max(first, 0), last))
             before += count
@@ -346,7 +411,9 @@ def _places(
     for chunk, first, last in parts:
         at = chunk.message_index_offsets[channel]
         time, offset = _message_index(file, at, channel, summary.data_end, where=where)
-        if len(offset) and (offset.min() < 0 or offset.max() + MESSAGE_HEAD > chunk.compressed_size):
+        if len(offset) and (
+            offset.min() < 0 or offset.max() + MESSAGE_HEAD > chunk.compressed_size
+        ):
             raise CorruptError("a message index points out of its chunk", where=where, fix=_RECOVER)
         limit = data_start(chunk) + chunk.compressed_size
         rows = slice(None) if span is None else slice(first, last)
@@ -361,11 +428,15 @@ def _places(
     return np.concatenate(times), np.concatenate(places), np.concatenate(limits)
 
 
-def _of_span(stored_checksums: ChannelChecksums | None, span: tuple[int, int]) -> ChannelChecksums | None:
+def _of_span(
+    stored_checksums: ChannelChecksums | None, span: tuple[int, int]
+) -> ChannelChecksums | None:
     if stored_checksums is None or stored_checksums.messages is None:
         return None
     first, count = span
-    return replace(stored_checksums, messages=stored_checksums.messages[first : first + count], count=count)
+    return replace(
+        stored_checksums, messages=stored_checksums.messages[first : first + count], count=count
+    )
 
 
 def _check_heads(
@@ -374,15 +445,25 @@ def _check_heads(
     """Returns the channel's checksums, once its heads, in file order, agree with them."""
     if stored_checksums is None or stored_checksums.count != len(head):
         count = "no" if stored_checksums is None else str(stored_checksums.count)
-        raise CorruptError(f"{topic} has {len(head)} messages, and {count} checksums", where=where, fix=FIX)
+        raise CorruptError(
+            f"{topic} has {len(head)} messages, and {count} checksums", where=where, fix=FIX
+        )
     head_bytes = np.frombuffer(head.tobytes(), dtype=np.uint8).reshape(len(head), MESSAGE_HEAD)
-    if zlib.crc32(np.ascontiguousarray(head_bytes[:, MESSAGE_HEAD - HEAD_BYTES :]).tobytes()) != stored_checksums.heads:
-        raise CorruptError(f"the times of {topic} have changed since they were written", where=where, fix=FIX)
+    if (
+        zlib.crc32(np.ascontiguousarray(head_bytes[:, MESSAGE_HEAD - HEAD_BYTES :]).tobytes())
+        != stored_checksums.heads
+    ):
+        raise CorruptError(
+            f"the times of {topic} have changed since they were written", where=where, fix=FIX
+        )
     return stored_checksums
 
 
-def check_parts(parts: Sequence[bytes | memoryview], table: Messages, topic: str, *, first: int, where: str) -> None:
-    """Compares the payloads of consecutive messages from row `first` on with their checksums, where there are any.
+def check_parts(
+    parts: Sequence[bytes | memoryview], table: Messages, topic: str, *, first: int, where: str
+) -> None:
+    """Compares the payloads of consecutive messages from row `first` on with their checksums, where
+    there are any.
 
     Of a channel with one checksum, `parts` are all messages.
 
@@ -393,7 +474,8 @@ def check_parts(parts: Sequence[bytes | memoryview], table: Messages, topic: str
         for index, part in enumerate(parts, start=first):
             if zlib.crc32(part) != table.checksums[index]:
                 raise CorruptError(
-                    f"message {table.first + index} of {topic} has changed since it was written: its checksum is wrong",
+                    f"message {table.first + index} of {topic} has changed since it was written: "
+                    "its checksum is wrong",
                     where=f"{where}, byte {table.offset[index]}",
                     fix=FIX,
                 )
@@ -404,21 +486,28 @@ def check_parts(parts: Sequence[bytes | memoryview], table: Messages, topic: str
         if total != table.checksum:
             raise CorruptError(
                 f"{topic} has changed since it was written: its checksum is wrong",
-                where=f"{where}, bytes {table.offset.min()} to {(table.offset + table.length).max()}",
+                where=f"{where}, bytes {table.offset.min()} to "
+                f"{(table.offset + table.length).max()}",
                 fix=FIX,
             )
 
 
 def check_chunk(file: Bytes, chunk: ChunkIndex, *, where: str) -> None:
-    """Compares the records of an uncompressed chunk with the chunk's own checksum, where it has one.
+    """Compares the records of an uncompressed chunk with the chunk's own checksum, where it has
+    one.
 
     Raises:
         CorruptError: they have changed since they were written.
     """
     start = data_start(chunk)
     head = read_exact(file, start - chunk.chunk_start_offset, chunk.chunk_start_offset, where=where)
-    (checksum,) = struct.unpack_from("<I", head, RECORD_HEAD + 24)  # after the two times and the size
-    if checksum and zlib.crc32(read_exact(file, chunk.compressed_size, start, where=where)) != checksum:
+    (checksum,) = struct.unpack_from(
+        "<I", head, RECORD_HEAD + 24
+    )  # after the two times and the size
+    if (
+        checksum
+        and zlib.crc32(read_exact(file, chunk.compressed_size, start, where=where)) != checksum
+    ):
         raise CorruptError(
             "a chunk has changed since it was written: its checksum is wrong",
             where=f"{where}, bytes {start} to {start + chunk.compressed_size}",
@@ -430,16 +519,22 @@ def _empty() -> IntArray:
     return np.empty(0, dtype=np.int64)
 
 
-def _message_index(file: Bytes, at: int, channel: int, end: int, *, where: str) -> tuple[IntArray, IntArray]:
+def _message_index(
+    file: Bytes, at: int, channel: int, end: int, *, where: str
+) -> tuple[IntArray, IntArray]:
     if at + _INDEX.size > end:
         raise CorruptError("a message index lies beyond the data", where=where, fix=_RECOVER)
     opcode, length, owner, size = _INDEX.unpack(read_exact(file, _INDEX.size, at, where=where))
     is_sound = size + 6 == length and size % _INDEX_ENTRY == 0
     if opcode != Opcode.MESSAGE_INDEX or owner != channel or not is_sound or at + size > end:
         raise CorruptError(
-            "there is no message index where the summary says", where=f"{where}, byte {at}", fix=_RECOVER
+            "there is no message index where the summary says",
+            where=f"{where}, byte {at}",
+            fix=_RECOVER,
         )
-    pairs = np.frombuffer(read_exact(file, size, at + _INDEX.size, where=where), dtype="<u8").astype(np.int64)
+    pairs = np.frombuffer(
+        read_exact(file, size, at + _INDEX.size, where=where), dtype="<u8"
+    ).astype(np.int64)
     return pairs[0::2], pairs[1::2]
 
 
@@ -457,10 +552,12 @@ def read_metadata(file: Bytes, summary: Summary, *, where: str) -> dict[str, dic
         record = _record_at(file, entry.offset, entry.length, Opcode.METADATA, where=where)
         content = parse(Metadata.read, record, where=where)
         if stored_checksums is not None and (
-            content.name != entry.name or stored_checksums.get(entry.name) != metadata_checksum(content.metadata)
+            content.name != entry.name
+            or stored_checksums.get(entry.name) != metadata_checksum(content.metadata)
         ):
             raise CorruptError(
-                f"the metadata {entry.name!r} has changed since it was written: its checksum is wrong",
+                f"the metadata {entry.name!r} has changed since it was written: its checksum is "
+                "wrong",
                 where=f"{where}, byte {entry.offset}",
                 fix=FIX,
             )
@@ -476,7 +573,9 @@ def read_attachment(file: Bytes, entry: AttachmentIndex, *, where: str) -> bytes
     """
     record = _record_at(file, entry.offset, entry.length, Opcode.ATTACHMENT, where=where)
     if zlib.crc32(record[:-4]) != int.from_bytes(record[-4:], "little"):
-        raise CorruptError(f"the checksum of attachment {entry.name!r} is wrong", where=where, fix=_RECOVER)
+        raise CorruptError(
+            f"the checksum of attachment {entry.name!r} is wrong", where=where, fix=_RECOVER
+        )
     return parse(Attachment.read, record, where=where).data
 
 
@@ -484,5 +583,7 @@ def _record_at(file: Bytes, offset: int, length: int, opcode: Opcode, *, where: 
     record = read_exact(file, length, offset, where=where)
     records = list(split_records(record, where=where))
     if len(records) != 1 or records[0][0] != opcode:
-        raise CorruptError(f"there is no {opcode.name.lower()} at byte {offset}", where=where, fix=_RECOVER)
+        raise CorruptError(
+            f"there is no {opcode.name.lower()} at byte {offset}", where=where, fix=_RECOVER
+        )
     return records[0][1]

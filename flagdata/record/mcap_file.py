@@ -1,8 +1,9 @@
-"""An MCAP file as it is written: single messages, whole blocks of them, and attachments that come in pieces.
+"""An MCAP file as it is written: single messages, whole blocks of them, and attachments that come
+in pieces.
 
-Source: MCAP format specification, version 0. The bytes are those that `mcap.writer.Writer` of the mcap library writes
-for the same calls without compression, which is tested; that one takes its messages one by one, and 1.7 million of them
-take half a minute.
+Source: MCAP format specification, version 0. The bytes are those that `mcap.writer.Writer` of the
+mcap library writes for the same calls without compression, which is tested; that one takes its
+messages one by one, and 1.7 million of them take half a minute.
 """
 
 from __future__ import annotations
@@ -38,7 +39,8 @@ MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log tim
 RECORD_HEAD = 9
 """Bytes of opcode and length of a record, which the length does not count."""
 CHUNK = struct.Struct("<BQQQQIIQ")
-"""Opcode, length; first and last time, size and CRC of the records, length of the compression's name, their length."""
+"""Opcode, length; first and last time, size and CRC of the records, length of the compression's
+name, their length."""
 _NOTE = struct.Struct("<QQ")  # log time, offset in the chunk
 
 
@@ -111,7 +113,12 @@ class McapFile:
         return schema.id
 
     def register_channel(
-        self, *, topic: str, message_encoding: str, schema_id: int, metadata: Mapping[str, str] | None = None
+        self,
+        *,
+        topic: str,
+        message_encoding: str,
+        schema_id: int,
+        metadata: Mapping[str, str] | None = None,
     ) -> int:
         """Add a channel; its number."""
         channel = Channel(
@@ -126,11 +133,15 @@ class McapFile:
         self._end_full_chunk()
         return channel.id
 
-    def add_message(self, *, channel_id: int, log_time: int, publish_time: int, sequence: int, data: bytes) -> None:
+    def add_message(
+        self, *, channel_id: int, log_time: int, publish_time: int, sequence: int, data: bytes
+    ) -> None:
         """Add one message; times are UTC nanoseconds of 1970 or later."""
         length = MESSAGE.size - RECORD_HEAD + len(data)
         offset = len(self._chunk.data)
-        self._chunk.data += MESSAGE.pack(Opcode.MESSAGE, length, channel_id, sequence, log_time, publish_time)
+        self._chunk.data += MESSAGE.pack(
+            Opcode.MESSAGE, length, channel_id, sequence, log_time, publish_time
+        )
         self._chunk.data += data
         self._count(channel_id, 1, log_time, log_time)
         self._chunk.note(channel_id, _NOTE.pack(log_time, offset), 1, log_time, log_time)
@@ -141,9 +152,20 @@ class McapFile:
         lengths = block.used.sum(axis=1).astype(np.int64)
         head = np.zeros(
             len(lengths),
-            dtype=[("op", "u1"), ("n", "<u8"), ("ch", "<u2"), ("seq", "<u4"), ("log", "<u8"), ("pub", "<u8")],
+            dtype=[
+                ("op", "u1"),
+                ("n", "<u8"),
+                ("ch", "<u2"),
+                ("seq", "<u4"),
+                ("log", "<u8"),
+                ("pub", "<u8"),
+            ],
         )
-        head["op"], head["n"], head["ch"] = Opcode.MESSAGE, lengths + (MESSAGE.size - RECORD_HEAD), channel_id
+        head["op"], head["n"], head["ch"] = (
+            Opcode.MESSAGE,
+            lengths + (MESSAGE.size - RECORD_HEAD),
+            channel_id,
+        )
         head["seq"] = np.arange(sequence, sequence + len(lengths))
         head["log"], head["pub"] = block.log_time, block.publish_time
         head = head.view(np.uint8).reshape(-1, MESSAGE.size)
@@ -159,7 +181,9 @@ class McapFile:
             log = block.log_time[rows]
             notes = np.empty((last - first, 2), dtype="<u8")
             notes[:, 0] = log
-            notes[:, 1] = np.concatenate(([before], ends[first : last - 1])) - before + len(self._chunk.data)
+            notes[:, 1] = (
+                np.concatenate(([before], ends[first : last - 1])) - before + len(self._chunk.data)
+            )
             self._chunk.data += records[rows][used[rows]].tobytes()
             low, high = int(log.min()), int(log.max())
             self._count(channel_id, last - first, low, high)
@@ -168,10 +192,20 @@ class McapFile:
             first = last
 
     def add_attachment(
-        self, *, log_time: int, name: str, media_type: str, data: Iterable[bytes], size: int, create_time: int = 0
+        self,
+        *,
+        log_time: int,
+        name: str,
+        media_type: str,
+        data: Iterable[bytes],
+        size: int,
+        create_time: int = 0,
     ) -> None:
         """Add an attachment of `size` bytes that come in pieces."""
-        fixed = [struct.pack("<QQ", log_time, create_time), *(_prefix_length(text) for text in (name, media_type))]
+        fixed = [
+            struct.pack("<QQ", log_time, create_time),
+            *(_prefix_length(text) for text in (name, media_type)),
+        ]
         head = b"".join(fixed) + struct.pack("<Q", size)
         length = len(head) + size + 4
         offset = self._at
@@ -222,14 +256,19 @@ class McapFile:
         offsets = bytearray()
         for opcode, records in groups:
             data = b"".join(_bytes(record) for record in records)
-            offset = SummaryOffset(group_opcode=opcode, group_start=start + len(summary), group_length=len(data))
+            offset = SummaryOffset(
+                group_opcode=opcode, group_start=start + len(summary), group_length=len(data)
+            )
             offsets += _bytes(offset)
             summary += data
         places = start + len(summary)
         summary += offsets
         crc = zlib.crc32(summary + struct.pack("<BQQQ", Opcode.FOOTER, 8 + 8 + 4, start, places))
         self._stream.write(summary)
-        self._stream.write(_bytes(Footer(summary_start=start, summary_offset_start=places, summary_crc=crc)) + MAGIC)
+        self._stream.write(
+            _bytes(Footer(summary_start=start, summary_offset_start=places, summary_crc=crc))
+            + MAGIC
+        )
 
     def _statistics(self) -> Statistics:
         return Statistics(
@@ -259,13 +298,18 @@ class McapFile:
         done, self._chunk = self._chunk, _OpenChunk()
         offset, size = self._at, len(done.data)
         length, crc = CHUNK.size + size, zlib.crc32(done.data)
-        self._write(CHUNK.pack(Opcode.CHUNK, length - RECORD_HEAD, done.start, done.end, size, crc, 0, size))
+        self._write(
+            CHUNK.pack(Opcode.CHUNK, length - RECORD_HEAD, done.start, done.end, size, crc, 0, size)
+        )
         self._write(done.data)  # never copied: one message may be of hundreds of megabytes
         places: dict[int, int] = {}
         first = self._at
         for channel, notes in done.notes.items():
             places[channel] = self._at
-            self._write(struct.pack("<BQHI", Opcode.MESSAGE_INDEX, 6 + len(notes), channel, len(notes)) + notes)
+            self._write(
+                struct.pack("<BQHI", Opcode.MESSAGE_INDEX, 6 + len(notes), channel, len(notes))
+                + notes
+            )
         self._chunks.append(
             ChunkIndex(
                 message_start_time=done.start,

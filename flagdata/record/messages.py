@@ -1,7 +1,9 @@
-"""The protobuf messages of a record: Foxglove's for pictures, our own for wind and parameters, built without protoc.
+"""The protobuf messages of a record: Foxglove's for pictures, our own for wind and parameters,
+built without protoc.
 
-Field numbers are a promise to files already written: a number is never reused and never changes its meaning. Every
-field's comment, unit and convention travels inside the file, in the schema's FileDescriptorSet.
+Field numbers are a promise to files already written: a number is never reused and never changes its
+meaning. Every field's comment, unit and convention travels inside the file, in the schema's
+FileDescriptorSet.
 """
 
 from __future__ import annotations
@@ -74,13 +76,19 @@ class _Sheet:
         self._comment([], about)
 
     def _comment(self, tail: list[int], text: str) -> None:
-        self._file.source_code_info.location.add(path=self._path + tail, leading_comments=f" {text}\n")
+        self._file.source_code_info.location.add(
+            path=self._path + tail, leading_comments=f" {text}\n"
+        )
 
-    def field(self, name: str, number: int, kind: int, about: str, *, type_name: str | None = None) -> None:
+    def field(
+        self, name: str, number: int, kind: int, about: str, *, type_name: str | None = None
+    ) -> None:
         """Adds a field without presence: its zero value is not written."""
         self._add(name, number, kind, about, type_name, _FIELD.LABEL_OPTIONAL)
 
-    def repeated(self, name: str, number: int, kind: int, about: str, *, type_name: str | None = None) -> None:
+    def repeated(
+        self, name: str, number: int, kind: int, about: str, *, type_name: str | None = None
+    ) -> None:
         self._add(name, number, kind, about, type_name, _FIELD.LABEL_REPEATED)
 
     def optional(self, name: str, number: int, kind: int, about: str) -> None:
@@ -106,26 +114,55 @@ def _build() -> descriptor_pb2.FileDescriptorProto:
     file = descriptor_pb2.FileDescriptorProto(name=_FILE, package="flagdata", syntax="proto3")
     file.dependency.append("google/protobuf/timestamp.proto")
 
-    sample = _Sheet(file, "WindSample", "One sample of an anemometer. A field that is absent was not measured.")
-    sample.field("timestamp", 1, _FIELD.TYPE_MESSAGE, "Instant on the record's common clock.", type_name=_TIMESTAMP)
+    sample = _Sheet(
+        file, "WindSample", "One sample of an anemometer. A field that is absent was not measured."
+    )
+    sample.field(
+        "timestamp",
+        1,
+        _FIELD.TYPE_MESSAGE,
+        "Instant on the record's common clock.",
+        type_name=_TIMESTAMP,
+    )
     for channel, (name, number) in WIND_FIELDS.items():
         about = CHANNELS[channel]
         frame = f"; {about.frame}" if about.frame else ""
-        sample.optional(name, number, _FIELD.TYPE_DOUBLE, f"{about.about} [{about.unit}{frame}]; NaN where missing.")
-    sample.field("flags", _FLAGS_NUMBER, _FIELD.TYPE_UINT32, "Bits of flagdata.core.schema.SampleFlag; 0 is sound.")
+        sample.optional(
+            name,
+            number,
+            _FIELD.TYPE_DOUBLE,
+            f"{about.about} [{about.unit}{frame}]; NaN where missing.",
+        )
     sample.field(
-        "host_time", _HOST_TIME_NUMBER, _FIELD.TYPE_MESSAGE, "The logging computer's own clock.", type_name=_TIMESTAMP
+        "flags",
+        _FLAGS_NUMBER,
+        _FIELD.TYPE_UINT32,
+        "Bits of flagdata.core.schema.SampleFlag; 0 is sound.",
+    )
+    sample.field(
+        "host_time",
+        _HOST_TIME_NUMBER,
+        _FIELD.TYPE_MESSAGE,
+        "The logging computer's own clock.",
+        type_name=_TIMESTAMP,
     )
 
     mean = _Sheet(file, "WindMean", "Mean of the usable samples of one period.")
-    mean.field("timestamp", 1, _FIELD.TYPE_MESSAGE, "END of the period, on the common clock.", type_name=_TIMESTAMP)
+    mean.field(
+        "timestamp",
+        1,
+        _FIELD.TYPE_MESSAGE,
+        "END of the period, on the common clock.",
+        type_name=_TIMESTAMP,
+    )
     mean.field("speed", 2, _FIELD.TYPE_DOUBLE, "Mean wind speed [m/s].")
     mean.field("sigma", 3, _FIELD.TYPE_DOUBLE, "Standard uncertainty of that mean [m/s].")
     mean.field(
         "direction",
         4,
         _FIELD.TYPE_DOUBLE,
-        "Vector-mean direction [rad; from, clockwise from true north]; NaN where the sensor has none.",
+        "Vector-mean direction [rad; from, clockwise from true north]; NaN where the sensor has "
+        "none.",
     )
     mean.field("count", 5, _FIELD.TYPE_INT32, "Usable samples in the period.")
     mean.field("period", 6, _FIELD.TYPE_DOUBLE, "Length of the period [s].")
@@ -134,8 +171,12 @@ def _build() -> descriptor_pb2.FileDescriptorProto:
     parameter.field("name", 1, _FIELD.TYPE_STRING, "Name in the parameter table.")
     parameter.field("value", 2, _FIELD.TYPE_DOUBLE, "Value in the SI unit of that name.")
     truth = _Sheet(file, "TruthParameters", "What a simulated record was made with.")
-    truth.field("timestamp", 1, _FIELD.TYPE_MESSAGE, "Instant on the common clock.", type_name=_TIMESTAMP)
-    truth.repeated("parameters", 2, _FIELD.TYPE_MESSAGE, "Sorted by name.", type_name=".flagdata.Parameter")
+    truth.field(
+        "timestamp", 1, _FIELD.TYPE_MESSAGE, "Instant on the common clock.", type_name=_TIMESTAMP
+    )
+    truth.repeated(
+        "parameters", 2, _FIELD.TYPE_MESSAGE, "Sorted by name.", type_name=".flagdata.Parameter"
+    )
     return file
 
 
@@ -156,8 +197,8 @@ TruthParameters: Any = _message_class("TruthParameters")
 
 
 def descriptor_set(message: Any) -> bytes:
-    """Returns the FileDescriptorSet an MCAP schema embeds for a message class, dependencies first; our own with
-    comments."""
+    """Returns the FileDescriptorSet an MCAP schema embeds for a message class, dependencies first;
+    our own with comments."""
     files = descriptor_pb2.FileDescriptorSet()
     added: set[str] = set()
 
@@ -196,7 +237,9 @@ def _varint(data: bytes | memoryview, at: int) -> tuple[int, int]:
             return value, at
         shift += 7
         if shift > 63:
-            raise CorruptError("a protobuf varint has more than ten bytes", fix="run flagdata verify")
+            raise CorruptError(
+                "a protobuf varint has more than ten bytes", fix="run flagdata verify"
+            )
 
 
 _FIXED: Mapping[int, int] = {1: 8, 5: 4}
@@ -237,4 +280,7 @@ def payload(message: memoryview, *, field: int) -> memoryview:
                 return data
     except IndexError:
         pass
-    raise CorruptError(f"a frame's message is not a protobuf with bytes in field {field}", fix="run flagdata verify")
+    raise CorruptError(
+        f"a frame's message is not a protobuf with bytes in field {field}",
+        fix="run flagdata verify",
+    )

@@ -1,4 +1,5 @@
-"""Opening a stored record that something new is made of, so that no damage in it gets a sound hash of its own."""
+"""Opening a stored record that something new is made of, so that no damage in it gets a sound hash
+of its own."""
 
 from __future__ import annotations
 
@@ -13,7 +14,8 @@ if TYPE_CHECKING:
 def open_parent(lake: Lake, name: str) -> Record:
     """Opens the record stored as `name` ("mcap/…"), of which all that is read is checked.
 
-    A record with checksums checks each part as it is read. One that was written before there were any is hashed whole.
+    A record with checksums checks each part as it is read. One that was written before there were
+    any is hashed whole.
 
     Raises:
         NotFoundError: it is not there.

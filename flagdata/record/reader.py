@@ -1,7 +1,9 @@
-"""Reads a record: frames straight from their place in the file, wind, parameters, metadata and attachments.
+"""Reads a record: frames straight from their place in the file, wind, parameters, metadata and
+attachments.
 
-Nothing is given out that has changed since it was written: frames, channels and metadata are compared with the record's
-checksums; in a record without any, whole chunks against MCAP's own, once each.
+Nothing is given out that has changed since it was written: frames, channels and metadata are
+compared with the record's checksums; in a record without any, whole chunks against MCAP's own, once
+each.
 """
 
 from __future__ import annotations
@@ -34,16 +36,21 @@ FRAME_PIXELS = 1 << 26
 """No frame of a record is larger [px]; a header that says so is damaged."""
 SPAN_SLACK = 256 << 10
 """Bytes of other topics that one read of neighbouring frames may take along."""
-_CODINGS: dict[Coding, Any] = {Coding.JPEG: messages.CompressedImage, Coding.H264: messages.CompressedVideo}
+_CODINGS: dict[Coding, Any] = {
+    Coding.JPEG: messages.CompressedImage,
+    Coding.H264: messages.CompressedVideo,
+}
 _VERIFY = "run flagdata verify"
 
 
 class Record:
-    """A record opened for reading. Cheap to open and to pickle: each process opens the file itself, when first needed,
-    and reads the summary and the frame index once. Reads are by offset, so that a fork or threads share nothing.
+    """A record opened for reading. Cheap to open and to pickle: each process opens the file itself,
+    when first needed, and reads the summary and the frame index once. Reads are by offset, so that
+    a fork or threads share nothing.
 
-    Of a record in a bucket the frames that are asked for are fetched, with the summary and their own part of the index;
-    `frame_times`, `device_frame_times` and the wind need the heads of all messages of their topic.
+    Of a record in a bucket the frames that are asked for are fetched, with the summary and their
+    own part of the index; `frame_times`, `device_frame_times` and the wind need the heads of all
+    messages of their topic.
 
     Attributes:
         path: the file, or its place in a bucket.
@@ -88,7 +95,8 @@ class Record:
 
     @property
     def has_checksums(self) -> bool:
-        """Whether frames, channels and metadata have checksums of their own; old records have those of chunks only."""
+        """Whether frames, channels and metadata have checksums of their own; old records have those
+        of chunks only."""
         return self._summary.checksums is not None
 
     @property
@@ -109,23 +117,35 @@ class Record:
         """
         where = str(self.path)
         if TOPIC_IMAGE not in self._summary.channels:
-            raise NotFoundError("the record has no frames", where=where, fix="name a camera or recording artifact")
+            raise NotFoundError(
+                "the record has no frames", where=where, fix="name a camera or recording artifact"
+            )
         schema = self._schema(TOPIC_IMAGE)
         names = {kind.DESCRIPTOR.full_name: coding for coding, kind in _CODINGS.items()}
         if schema not in names:
-            raise InputError(f"{TOPIC_IMAGE} holds {schema}", where=where, fix=f"write it as one of {', '.join(names)}")
+            raise InputError(
+                f"{TOPIC_IMAGE} holds {schema}",
+                where=where,
+                fix=f"write it as one of {', '.join(names)}",
+            )
         return names[schema]
 
     @functools.cached_property
     def _in_spans(self) -> bool:
         """Whether frames are found without the heads of all others."""
         remote = not isinstance(self.path, Path)
-        return remote and mcap_container.in_order(self._file, self._summary, TOPIC_IMAGE, where=str(self.path))
+        return remote and mcap_container.in_order(
+            self._file, self._summary, TOPIC_IMAGE, where=str(self.path)
+        )
 
     @property
     def frame_count(self) -> int:
         checksums = self._summary.checksums
-        return checksums.channels[TOPIC_IMAGE].count if checksums is not None and self._in_spans else len(self._frames)
+        return (
+            checksums.channels[TOPIC_IMAGE].count
+            if checksums is not None and self._in_spans
+            else len(self._frames)
+        )
 
     @property
     def frame_times(self) -> IntArray:
@@ -138,7 +158,8 @@ class Record:
         return self._frames.publish_time
 
     def times(self, first: int, count: int) -> IntArray:
-        """Reads (count,) instants of consecutive frames from index `first` on the common clock [UTC ns].
+        """Reads (count,) instants of consecutive frames from index `first` on the common clock [UTC
+        ns].
 
         Raises:
             NotFoundError: the record has no such frames.
@@ -160,18 +181,23 @@ class Record:
         try:
             height, width, _, _ = simplejpeg.decode_jpeg_header(pictures[0])
             if int(height) * int(width) > FRAME_PIXELS:
-                raise CorruptError(f"frame {first} claims {width}×{height} pixels", where=where, fix=_VERIFY)
+                raise CorruptError(
+                    f"frame {first} claims {width}×{height} pixels", where=where, fix=_VERIFY
+                )
             out = np.empty((count, int(height), int(width), 1), dtype=np.uint8)
             for i, picture in enumerate(pictures):
                 decoded = simplejpeg.decode_jpeg(picture, colorspace="GRAY", buffer=out[i])
                 if decoded.shape != out.shape[1:]:
                     raise CorruptError(
-                        f"frame {first + i} is {decoded.shape[1]}×{decoded.shape[0]}, others {width}×{height}",
+                        f"frame {first + i} is {decoded.shape[1]}×{decoded.shape[0]}, others "
+                        f"{width}×{height}",
                         where=where,
                         fix="ingest the camera file again",
                     )
         except ValueError as error:
-            raise CorruptError(f"frames {first} to {first + count - 1}: {error}", where=where, fix=_VERIFY) from None
+            raise CorruptError(
+                f"frames {first} to {first + count - 1}: {error}", where=where, fix=_VERIFY
+            ) from None
         return out[..., 0]
 
     def jpeg(self, index: int) -> bytes:
@@ -179,8 +205,8 @@ class Record:
         return self.jpegs(index, 1)[0]
 
     def jpegs(self, first: int, count: int) -> list[bytes]:
-        """Reads consecutive frames as JPEG: the stored bytes, or the decoded frames encoded anew where the record is
-        H.264.
+        """Reads consecutive frames as JPEG: the stored bytes, or the decoded frames encoded anew
+        where the record is H.264.
 
         Raises:
             NotFoundError: the record has no such frames.
@@ -201,12 +227,15 @@ class Record:
             decoded = [kind.FromString(bytes(part)) for part in self._read_frames(first, count)]
         except DecodeError as error:
             raise CorruptError(
-                f"a message of {TOPIC_IMAGE} cannot be read: {error}", where=str(self.path), fix=_VERIFY
+                f"a message of {TOPIC_IMAGE} cannot be read: {error}",
+                where=str(self.path),
+                fix=_VERIFY,
             ) from None
         return np.array([messages.timestamp_of(m.timestamp) for m in decoded], dtype=np.int64)
 
     def wind(self) -> WindSeries | None:
-        """Reads all samples of the anemometer, on the common clock; `None` if the record has no wind."""
+        """Reads all samples of the anemometer, on the common clock; `None` if the record has no
+        wind."""
         table = self._messages(TOPIC_WIND)
         if not len(table):
             return None
@@ -214,7 +243,9 @@ class Record:
         columns: dict[str, FloatArray] = {}
         for channel, (name, _) in messages.WIND_FIELDS.items():
             if any(sample.HasField(name) for sample in samples):
-                columns[channel] = np.array([getattr(s, name) if s.HasField(name) else np.nan for s in samples])
+                columns[channel] = np.array(
+                    [getattr(s, name) if s.HasField(name) else np.nan for s in samples]
+                )
         hosts = [messages.timestamp_of(s.host_time) for s in samples if s.HasField("host_time")]
         return WindSeries(
             time=table.log_time,
@@ -281,10 +312,14 @@ class Record:
         pictures = self._payloads(first, count)
         while not is_key(pictures[0]):
             if key == 0:
-                raise CorruptError(f"there is no key frame up to frame {first}", where=str(self.path), fix=_VERIFY)
+                raise CorruptError(
+                    f"there is no key frame up to frame {first}", where=str(self.path), fix=_VERIFY
+                )
             key -= 1
             pictures[:0] = self._payloads(key, 1)
-        from flagdata.record.video_archive import decode  # FFmpeg, which a wind's record needs nothing of
+        from flagdata.record.video_archive import (
+            decode,
+        )  # FFmpeg, which a wind's record needs nothing of
 
         return np.stack(decode(pictures, where=str(self.path))[first - key :])
 
@@ -311,7 +346,10 @@ class Record:
             NotFoundError: the record has no such frames.
         """
         if count < 1 or first < 0:
-            raise UsageError(f"{count} frames from {first} were asked for", fix="ask for at least one, from 0 or later")
+            raise UsageError(
+                f"{count} frames from {first} were asked for",
+                fix="ask for at least one, from 0 or later",
+            )
         if first + count > self.frame_count:
             raise NotFoundError(
                 f"frames {first} to {first + count - 1} of {self.frame_count}",
@@ -321,10 +359,15 @@ class Record:
         if not self._in_spans:
             return self._frames
         where, span = str(self.path), (first, count)
-        return mcap_container.read_messages(self._file, self._summary, TOPIC_IMAGE, where=where, span=span)
+        return mcap_container.read_messages(
+            self._file, self._summary, TOPIC_IMAGE, where=where, span=span
+        )
 
-    def _read(self, topic: str, table: mcap_container.Messages, first: int, count: int) -> Sequence[memoryview]:
-        """Reads the payloads of consecutive rows, checked; of any channel but that of the frames, all its messages."""
+    def _read(
+        self, topic: str, table: mcap_container.Messages, first: int, count: int
+    ) -> Sequence[memoryview]:
+        """Reads the payloads of consecutive rows, checked; of any channel but that of the frames,
+        all its messages."""
         parts = self._parts(table, first, count)
         if self.has_checksums:
             mcap_container.check_parts(parts, table, topic, first=first, where=str(self.path))
@@ -333,19 +376,27 @@ class Record:
         return parts
 
     def _check_chunks(self, offsets: IntArray) -> None:
-        starts = np.array([chunk.chunk_start_offset for chunk in self._summary.chunks], dtype=np.int64)
+        starts = np.array(
+            [chunk.chunk_start_offset for chunk in self._summary.chunks], dtype=np.int64
+        )
         for index in np.unique(np.searchsorted(starts, offsets, side="right") - 1).tolist():
             if index not in self._sound:
-                mcap_container.check_chunk(self._file, self._summary.chunks[index], where=str(self.path))
+                mcap_container.check_chunk(
+                    self._file, self._summary.chunks[index], where=str(self.path)
+                )
                 self._sound.add(index)
 
-    def _parts(self, table: mcap_container.Messages, first: int, count: int) -> Sequence[memoryview]:
+    def _parts(
+        self, table: mcap_container.Messages, first: int, count: int
+    ) -> Sequence[memoryview]:
         offsets = table.offset[first : first + count].tolist()
         lengths = table.length[first : first + count].tolist()
         start, end = offsets[0], offsets[-1] + lengths[-1]
         where = str(self.path)
         if offsets == sorted(offsets) and end - start <= sum(lengths) + SPAN_SLACK:
-            block = memoryview(mcap_container.read_exact(self._file, end - start, start, where=where))
+            block = memoryview(
+                mcap_container.read_exact(self._file, end - start, start, where=where)
+            )
             return [block[o - start : o - start + n] for o, n in zip(offsets, lengths, strict=True)]
         return [
             memoryview(mcap_container.read_exact(self._file, n, o, where=where))
@@ -360,7 +411,9 @@ class Record:
                 fix=f"write it as {kind.DESCRIPTOR.full_name}",
             )
         try:
-            return [kind.FromString(bytes(part)) for part in self._read(topic, table, 0, len(table))]
+            return [
+                kind.FromString(bytes(part)) for part in self._read(topic, table, 0, len(table))
+            ]
         except DecodeError as error:
             raise CorruptError(
                 f"a message of {topic} cannot be read: {error}", where=str(self.path), fix=_VERIFY
@@ -376,7 +429,12 @@ def _unpack(data: bytes, name: str) -> bytes:
     try:
         out = unpacker.decompress(data, ATTACHMENT_LIMIT)
     except zlib.error as error:
-        raise CorruptError(f"attachment {name!r} cannot be unpacked: {error}", fix=_VERIFY) from None
+        raise CorruptError(
+            f"attachment {name!r} cannot be unpacked: {error}", fix=_VERIFY
+        ) from None
     if not unpacker.eof:
-        raise CorruptError(f"attachment {name!r} is cut off or unpacks beyond {ATTACHMENT_LIMIT} bytes", fix=_VERIFY)
+        raise CorruptError(
+            f"attachment {name!r} is cut off or unpacks beyond {ATTACHMENT_LIMIT} bytes",
+            fix=_VERIFY,
+        )
     return out

@@ -1,4 +1,5 @@
-"""Where the bytes of a record come from: a file of this machine, or ranges of an object in a bucket."""
+"""Where the bytes of a record come from: a file of this machine, or ranges of an object in a
+bucket."""
 
 from __future__ import annotations
 
@@ -26,7 +27,8 @@ class Bytes(Protocol):
         ...
 
     def prepare(self, spans: Sequence[tuple[int, int]]) -> None:
-        """Spans, first byte and end each, will be read next: what lies apart may be fetched together."""
+        """Spans, first byte and end each, will be read next: what lies apart may be fetched
+        together."""
         ...
 
     def close(self) -> None: ...

@@ -1,16 +1,17 @@
 """The checksums of a record: one for each frame, for each channel and for each metadata record.
 
-The object's hash says whether a whole file is as it was written; these say it of the part that is read, so that every
-reader can check what it uses. They are CRC-32 (ISO 3309, as in MCAP itself), kept in the metadata record
-"flagdata.checksums": `content` is a JSON document and `crc32` its own checksum in hexadecimal. It maps each topic to
+The object's hash says whether a whole file is as it was written; these say it of the part that is
+read, so that every reader can check what it uses. They are CRC-32 (ISO 3309, as in MCAP itself),
+kept in the metadata record "flagdata.checksums": `content` is a JSON document and `crc32` its own
+checksum in hexadecimal. It maps each topic to
 
     count      how many messages the channel has
     heads      over channel id, sequence number, log time and publish time of all its messages, in file order
     data       over the payloads of all its messages, in file order; not of frames
     messages   over the payload of each message, eight hexadecimal digits each, in file order; of frames only
 
-and each metadata record's name to the checksum of its content. Attachments and the summary have those of MCAP.
-Records that were written before there were checksums have none.
+and each metadata record's name to the checksum of its content. Attachments and the summary have
+those of MCAP. Records that were written before there were checksums have none.
 """
 
 from __future__ import annotations
@@ -33,7 +34,8 @@ CHECKSUMS = "flagdata.checksums"
 """Name of the metadata record."""
 SCHEMA = "flagdata.checksums/1"
 FIX = (
-    "run flagdata verify: it lists all of a lake that is damaged, and what replaces it; or restore the record from a "
+    "run flagdata verify: it lists all of a lake that is damaged, and what replaces it; or restore "
+    "the record from a "
     "copy, or save the rest of it: flagdata recover"
 )
 _HEAD = struct.Struct("<HIQQ")
@@ -78,11 +80,15 @@ class Checksums:
                 raise ValueError("their own checksum is wrong")
             document = json.loads(content)
             if document["schema"] != SCHEMA:
-                raise ValueError(f"they are of {document['schema']!r}, which this version does not know")
+                raise ValueError(
+                    f"they are of {document['schema']!r}, which this version does not know"
+                )
             channels = {topic: _channel(entry) for topic, entry in document["channels"].items()}
             metadata = {name: int(value) for name, value in document["metadata"].items()}
         except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
-            raise CorruptError(f"the record's checksums cannot be read: {error}", where=where, fix=FIX) from None
+            raise CorruptError(
+                f"the record's checksums cannot be read: {error}", where=where, fix=FIX
+            ) from None
         return cls(channels=channels, metadata=metadata)
 
 
@@ -93,7 +99,10 @@ def _channel(entry: Mapping[str, Any]) -> ChannelChecksums:
         if len(messages) != entry["count"]:
             raise ValueError(f"{len(messages)} checksums of {entry['count']} messages")
     return ChannelChecksums(
-        count=int(entry["count"]), heads=int(entry["heads"]), data=entry.get("data"), messages=messages
+        count=int(entry["count"]),
+        heads=int(entry["heads"]),
+        data=entry.get("data"),
+        messages=messages,
     )
 
 
@@ -134,7 +143,12 @@ class ChecksummedFile(McapFile):
         super().__init__(stream, chunk_size=chunk_size, profile=profile, library=library)
 
     def register_channel(
-        self, *, topic: str, message_encoding: str, schema_id: int, metadata: Mapping[str, str] | None = None
+        self,
+        *,
+        topic: str,
+        message_encoding: str,
+        schema_id: int,
+        metadata: Mapping[str, str] | None = None,
     ) -> int:
         """Registers a channel, see `McapFile`."""
         channel = super().register_channel(
@@ -143,18 +157,28 @@ class ChecksummedFile(McapFile):
         self._tallies[channel] = _Tally(topic)
         return channel
 
-    def add_message(self, *, channel_id: int, log_time: int, publish_time: int, sequence: int, data: bytes) -> None:
+    def add_message(
+        self, *, channel_id: int, log_time: int, publish_time: int, sequence: int, data: bytes
+    ) -> None:
         """Adds a message, see `McapFile`."""
         super().add_message(
-            channel_id=channel_id, log_time=log_time, publish_time=publish_time, sequence=sequence, data=data
+            channel_id=channel_id,
+            log_time=log_time,
+            publish_time=publish_time,
+            sequence=sequence,
+            data=data,
         )
-        self._tallies[channel_id].add(_HEAD.pack(channel_id, sequence, log_time, publish_time), data)
+        self._tallies[channel_id].add(
+            _HEAD.pack(channel_id, sequence, log_time, publish_time), data
+        )
 
     def add_messages(self, block: MessageBlock, *, channel_id: int, sequence: int) -> None:
         """Adds messages, see `McapFile`."""
         super().add_messages(block, channel_id=channel_id, sequence=sequence)
         count = len(block.log_time)
-        heads = np.empty(count, dtype=[("ch", "<u2"), ("seq", "<u4"), ("log", "<u8"), ("pub", "<u8")])
+        heads = np.empty(
+            count, dtype=[("ch", "<u2"), ("seq", "<u4"), ("log", "<u8"), ("pub", "<u8")]
+        )
         heads["ch"], heads["seq"] = channel_id, np.arange(sequence, sequence + count)
         heads["log"], heads["pub"] = block.log_time, block.publish_time
         self._tallies[channel_id].add(heads.tobytes(), block.payload[block.used].tobytes(), count)
@@ -172,5 +196,7 @@ class ChecksummedFile(McapFile):
             "metadata": self._checksums,
         }
         content = json.dumps(document, sort_keys=True)
-        super().add_metadata(CHECKSUMS, {"content": content, "crc32": f"{zlib.crc32(content.encode()):08x}"})
+        super().add_metadata(
+            CHECKSUMS, {"content": content, "crc32": f"{zlib.crc32(content.encode()):08x}"}
+        )
         super().finish()

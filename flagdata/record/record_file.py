@@ -1,4 +1,5 @@
-"""The file a record is written to: what the disk refuses is a clear error, whichever write meets it."""
+"""The file a record is written to: what the disk refuses is a clear error, whichever write meets
+it."""
 
 from __future__ import annotations
 
@@ -30,7 +31,9 @@ class Output(io.BufferedWriter):
             try:
                 raw = io.FileIO(path, "xb")
             except FileExistsError:
-                raise ConflictError("the record exists already", where=str(path), fix="choose another path") from None
+                raise ConflictError(
+                    "the record exists already", where=str(path), fix="choose another path"
+                ) from None
         super().__init__(raw)
 
     def write(self, buffer: Any, /) -> int:

@@ -1,16 +1,19 @@
-"""Recovers what a cut-off or damaged MCAP file still holds, in one pass from its start, into a whole record.
+"""Recovers what a cut-off or damaged MCAP file still holds, in one pass from its start, into a
+whole record.
 
-A crash, a full disk or a pulled cable leaves a file without the summary that readers by offset need. Everything before
-the break is sound: whole chunks are checked by their CRC-32, and whole messages of a last, partial, uncompressed chunk
-are kept too, named as unchecked. After a stretch that cannot be read (a bad sector) the pass goes on at the next chunk
-whose checksum is right; where the summary is sound, the messages between are kept that have a right checksum of their
-own. Nothing is invented: every message written is byte for byte one that was read.
+A crash, a full disk or a pulled cable leaves a file without the summary that readers by offset
+need. Everything before
+the break is sound: whole chunks are checked by their CRC-32, and whole messages of a last, partial,
+uncompressed chunk are kept too, named as unchecked. After a stretch that cannot be read (a bad
+sector) the pass goes on at the next chunk whose checksum is right; where the summary is sound, the
+messages between are kept that have a right checksum of their own. Nothing is invented: every
+message written is byte for byte one that was read.
 
 Messages of a damaged record that have a right checksum of their own, whatever lies around them.
 
-A record states a checksum of each frame, one of all payloads of any other channel, and one of all heads of a channel,
-see `flagdata.record.record_checksums`. So where a chunk's own checksum is wrong, it is known which of its messages are
-as they were written.
+A record states a checksum of each frame, one of all payloads of any other channel, and one of all
+heads of a channel, see `flagdata.record.record_checksums`. So where a chunk's own checksum is
+wrong, it is known which of its messages are as they were written.
 """
 
 from __future__ import annotations
@@ -58,15 +61,17 @@ from flagdata.timebase import iso
 
 
 class SoundMessages:
-    """The messages of the record at `path`, found by its summary; of a record without a sound summary, none."""
+    """The messages of the record at `path`, found by its summary; of a record without a sound
+    summary, none."""
 
     def __init__(self, path: Path, summary: Summary | None) -> None:
         self._path = path
         self._summary = summary
 
     def between(self, start: int, end: int) -> list[Message | None] | None:
-        """Finds messages that begin between two bytes of the file, in file order, and a `None` for each that is lost:
-        damaged itself, or of a channel without checksums or with changed heads, so that no instant of it is certain.
+        """Finds messages that begin between two bytes of the file, in file order, and a `None` for
+        each that is lost: damaged itself, or of a channel without checksums or with changed heads,
+        so that no instant of it is certain.
 
         `None` instead of all where no summary states what was there.
         """
@@ -88,7 +93,11 @@ class SoundMessages:
         offset, length = int(table.offset[row]), int(table.length[row])
         head = self._read(offset - MESSAGE_HEAD, MESSAGE_HEAD)
         data = self._read(offset, length)
-        right = self._are_right[channel] if table.checksums is None else zlib.crc32(data) == table.checksums[row]
+        right = (
+            self._are_right[channel]
+            if table.checksums is None
+            else zlib.crc32(data) == table.checksums[row]
+        )
         if not right:
             return None
         return Message(
@@ -114,7 +123,9 @@ class SoundMessages:
         try:
             for topic, channel in self._summary.channels.items():
                 with suppress(FlagdataError):
-                    tables[channel.id] = read_messages(file, self._summary, topic, where=str(self._path))
+                    tables[channel.id] = read_messages(
+                        file, self._summary, topic, where=str(self._path)
+                    )
         finally:
             file.close()
         return tables
@@ -127,7 +138,9 @@ class SoundMessages:
             if table.checksums is None:
                 total = 0
                 for row in np.argsort(table.offset, kind="stable").tolist():
-                    total = zlib.crc32(self._read(int(table.offset[row]), int(table.length[row])), total)
+                    total = zlib.crc32(
+                        self._read(int(table.offset[row]), int(table.length[row])), total
+                    )
                 are_right[channel] = total == table.checksum
         return are_right
 
@@ -144,7 +157,9 @@ _DATA_OPCODES = _IN_CHUNK | {
 }
 _FIRST_PRIVATE = 0x80
 _DATA_END_BYTES = 4
-_CHUNK_START = re.compile(rb"\x06.{3}[\x00-\x40]\x00{4}", re.DOTALL)  # the opcode, and a length within CHUNK_LIMIT
+_CHUNK_START = re.compile(
+    rb"\x06.{3}[\x00-\x40]\x00{4}", re.DOTALL
+)  # the opcode, and a length within CHUNK_LIMIT
 _CHUNK_FIELDS = struct.Struct("<QQQII")
 _LOOKS = 64
 """How often the bytes of a file are looked at, at most, for what may be a chunk behind damage."""
@@ -165,10 +180,14 @@ def salvage(source: Path, target: Path) -> tuple[Finding, ...]:
     """Write all that can be read of the record `source` into the new record `target`.
 
     Returns:
-        what was found: where the file breaks off ("cut-off"), what was left out because its checksum or content is
-        wrong ("damaged-chunk", "damaged-attachment", "damaged-record"), stretches without a record ("unreadable"),
-        messages kept without a checksum ("unchecked-messages"), messages of channels whose definition is lost
-        ("unknown-channel"), messages that the old summary counted and that are gone ("lost-messages"), and how much
+        what was found: where the file breaks off ("cut-off"), what was left out because its
+            checksum or content is
+        wrong ("damaged-chunk", "damaged-attachment", "damaged-record"), stretches without a record
+            ("unreadable"),
+        messages kept without a checksum ("unchecked-messages"), messages of channels whose
+            definition is lost
+        ("unknown-channel"), messages that the old summary counted and that are gone
+            ("lost-messages"), and how much
         was recovered ("recovered").
 
     Raises:
@@ -180,10 +199,14 @@ def salvage(source: Path, target: Path) -> tuple[Finding, ...]:
     try:
         stream = source.open("rb")
     except FileNotFoundError:
-        raise NotFoundError("there is no such record", where=str(source), fix="check the path") from None
+        raise NotFoundError(
+            "there is no such record", where=str(source), fix="check the path"
+        ) from None
     with stream:
         if stream.read(len(MAGIC)) != MAGIC:
-            raise CorruptError("this is no MCAP record", where=str(source), fix="check that it is the right file")
+            raise CorruptError(
+                "this is no MCAP record", where=str(source), fix="check that it is the right file"
+            )
         out = Output(target)
         try:
             with out:
@@ -192,9 +215,15 @@ def salvage(source: Path, target: Path) -> tuple[Finding, ...]:
                 if summary is not None:
                     copy.define(summary)
                 sound = SoundMessages(source, summary)
-                _Pass(stream, size=source.stat().st_size, where=str(source), copy=copy, sound=sound).run()
+                _Pass(
+                    stream, size=source.stat().st_size, where=str(source), copy=copy, sound=sound
+                ).run()
                 if not copy.counts:
-                    raise CorruptError("no whole message is left in the record", where=str(source), fix="it is lost")
+                    raise CorruptError(
+                        "no whole message is left in the record",
+                        where=str(source),
+                        fix="it is lost",
+                    )
                 copy.finish()
         except BaseException:
             target.unlink()
@@ -229,22 +258,31 @@ class _Copy:
         )
 
     def define(self, summary: Summary) -> None:
-        """Schemas and channels of a sound summary: the chunk that holds them first may be damaged."""
+        """Schemas and channels of a sound summary: the chunk that holds them first may be
+        damaged."""
         for schema in summary.schemas.values():
             self.schema(schema)
         for channel in summary.channels.values():
             self.channel(channel)
 
-    def find(self, kind: str, severity: Severity, text: str, *, where: str | None = None, count: int = 1) -> None:
-        self.findings.append(Finding(kind=kind, severity=severity, what=text, where=where, count=count))
+    def find(
+        self, kind: str, severity: Severity, text: str, *, where: str | None = None, count: int = 1
+    ) -> None:
+        self.findings.append(
+            Finding(kind=kind, severity=severity, what=text, where=where, count=count)
+        )
 
     def schema(self, schema: Schema) -> None:
         if schema.id not in self._schemas:
-            written = self._writer.register_schema(name=schema.name, encoding=schema.encoding, data=schema.data)
+            written = self._writer.register_schema(
+                name=schema.name, encoding=schema.encoding, data=schema.data
+            )
             self._schemas[schema.id] = (schema, written)
 
     def channel(self, channel: Channel) -> None:
-        if channel.id in self._channels or (channel.schema_id and channel.schema_id not in self._schemas):
+        if channel.id in self._channels or (
+            channel.schema_id and channel.schema_id not in self._schemas
+        ):
             return
         written = self._writer.register_channel(
             topic=channel.topic,
@@ -308,7 +346,9 @@ class _Copy:
             f"{total} messages from {iso(self._times[0])} to {iso(self._times[1])}: {parts}",
             count=total,
         )
-        losses = [finding.what for finding in self.findings if finding.severity is not Severity.NOTE]
+        losses = [
+            finding.what for finding in self.findings if finding.severity is not Severity.NOTE
+        ]
         if losses:
             name = f"{SALVAGE}/{self._salvaged + 1}"
             self._writer.add_metadata(name, {str(i): message for i, message in enumerate(losses)})
@@ -318,13 +358,17 @@ class _Copy:
 class _Pass:
     """One pass through the damaged file."""
 
-    def __init__(self, stream: IO[bytes], *, size: int, where: str, copy: _Copy, sound: SoundMessages) -> None:
+    def __init__(
+        self, stream: IO[bytes], *, size: int, where: str, copy: _Copy, sound: SoundMessages
+    ) -> None:
         self._stream = stream
         self._size = size
         self._where = where
         self._copy = copy
         self._sound = sound
-        self._damaged: list[int] = []  # which findings are of damage whose lost messages are not counted
+        self._damaged: list[
+            int
+        ] = []  # which findings are of damage whose lost messages are not counted
         self._looked = 0  # bytes of chunks that were looked for
         self._lost = 0  # messages, in the findings that count them
 
@@ -333,7 +377,9 @@ class _Pass:
             start = self._stream.tell()
             head = self._stream.read(RECORD_HEAD)
             if len(head) < RECORD_HEAD:
-                return self._cut_off(start, "inside a record's head" if head else "between two records")
+                return self._cut_off(
+                    start, "inside a record's head" if head else "between two records"
+                )
             opcode, length = struct.unpack("<BQ", head)
             if opcode == Opcode.DATA_END and length == _DATA_END_BYTES:
                 self._stream.seek(length, os.SEEK_CUR)
@@ -355,7 +401,8 @@ class _Pass:
             self._stream.seek(following)
 
     def _next_chunk(self, start: int) -> int | None:
-        """Finds where the next chunk begins whose lengths fit and whose checksum is right, at or after `start`."""
+        """Finds where the next chunk begins whose lengths fit and whose checksum is right, at or
+        after `start`."""
         with mmap.mmap(self._stream.fileno(), 0, access=mmap.ACCESS_READ) as view:
             for start_match in _CHUNK_START.finditer(view, start):
                 at = start_match.start()
@@ -369,9 +416,14 @@ class _Pass:
                 try:
                     chunk = parse(Chunk.read, view[at + RECORD_HEAD : end], where=self._where)
                     records = unpack_chunk(chunk)
-                except FlagdataError:  # anything may follow a byte that only looks like a chunk's first
+                except (
+                    FlagdataError
+                ):  # anything may follow a byte that only looks like a chunk's first
                     continue
-                if len(records) == chunk.uncompressed_size and zlib.crc32(records) == chunk.uncompressed_crc:
+                if (
+                    len(records) == chunk.uncompressed_size
+                    and zlib.crc32(records) == chunk.uncompressed_crc
+                ):
                     return at
         return None
 
@@ -386,11 +438,16 @@ class _Pass:
             elif opcode in _IN_CHUNK:
                 self._inner(opcode, content)
         except FlagdataError as error:
-            self._copy.find("damaged-record", Severity.ERROR, f"a record left out: {error.what}", where=f"byte {start}")
+            self._copy.find(
+                "damaged-record",
+                Severity.ERROR,
+                f"a record left out: {error.what}",
+                where=f"byte {start}",
+            )
 
     def _spare_messages(self, start: int, end: int) -> tuple[int, int] | None:
-        """Copies the messages of damaged bytes of the file that are sound by themselves: how many these are, and how
-        many there were; `None` where the record does not state it."""
+        """Copies the messages of damaged bytes of the file that are sound by themselves: how many
+        these are, and how many there were; `None` where the record does not state it."""
         messages = self._sound.between(start, end)
         if messages is None:
             return None
@@ -432,11 +489,13 @@ class _Pass:
         self._copy.attachment(parse(Attachment.read, content, where=self._where))
 
     def _rest(self) -> bytes:
-        """Reads what follows in the file, up to what a chunk may hold; a read of more would take the memory first."""
+        """Reads what follows in the file, up to what a chunk may hold; a read of more would take
+        the memory first."""
         return self._stream.read(min(CHUNK_LIMIT, max(0, self._size - self._stream.tell())))
 
     def _partial(self, start: int) -> None:
-        """Keep the whole messages of a plain chunk whose end is missing, or whose length is wrong."""
+        """Keep the whole messages of a plain chunk whose end is missing, or whose length is
+        wrong."""
         content = self._rest()
         if len(content) <= CHUNK_HEAD - RECORD_HEAD:
             return
@@ -464,8 +523,8 @@ class _Pass:
             )
 
     def _plausible(self, message: Message) -> bool:
-        """Checks whether a message without a checksum decodes as what its channel says (a crash may leave zeros
-        behind)."""
+        """Checks whether a message without a checksum decodes as what its channel says (a crash may
+        leave zeros behind)."""
         kind = _KNOWN.get(self._copy.schema_name(message.channel_id) or "")
         if kind is None:
             return True
@@ -476,8 +535,8 @@ class _Pass:
         return kind is not messages.CompressedImage or decoded.data.endswith(b"\xff\xd9")
 
     def _end(self) -> None:
-        """Ends the copy once all data was read. The summary is written anew; what is left of the old one says how much
-        there was."""
+        """Ends the copy once all data was read. The summary is written anew; what is left of the
+        old one says how much there was."""
         stated_count: int | None = None
         for opcode, record in _whole_records(self._rest(), among=frozenset(Opcode)):
             if opcode == Opcode.STATISTICS and len(record) >= 8:
@@ -486,11 +545,16 @@ class _Pass:
         if lost > 0 and len(self._damaged) == 1:
             (damage_index,) = self._damaged
             finding = self._copy.findings[damage_index]
-            text = f"{finding.what}; {lost} of the record's {stated_count} messages are lost with it"
+            text = (
+                f"{finding.what}; {lost} of the record's {stated_count} messages are lost with it"
+            )
             self._copy.findings[damage_index] = replace(finding, what=text, count=lost)
         elif lost > 0:
             self._copy.find(
-                "lost-messages", Severity.ERROR, f"{lost} of {stated_count} messages of the record are lost", count=lost
+                "lost-messages",
+                Severity.ERROR,
+                f"{lost} of {stated_count} messages of the record are lost",
+                count=lost,
             )
         self._stream.seek(self._size - len(MAGIC))
         if self._stream.read() != MAGIC:
@@ -503,20 +567,32 @@ class _Pass:
 
     def _cut_off(self, start: int, position: str) -> None:
         self._copy.find(
-            "cut-off", Severity.WARNING, f"the file ends {position}, at byte {self._size}", where=f"byte {start}"
+            "cut-off",
+            Severity.WARNING,
+            f"the file ends {position}, at byte {self._size}",
+            where=f"byte {start}",
         )
 
     def _unreadable(self, start: int, end: int, spared: tuple[int, int] | None) -> None:
         if spared is None:
-            self._damage("unreadable", start, f"bytes {start} to {end} hold no record that can be read")
+            self._damage(
+                "unreadable", start, f"bytes {start} to {end} hold no record that can be read"
+            )
         else:
             self._damage("unreadable", start, f"bytes {start} to {end} are damaged", spared)
 
     def _damaged_chunk(self, start: int, end: int, why: str) -> None:
         spared = self._spare_messages(start, end)
-        self._damage("damaged-chunk", start, ("a chunk left out: " if spared is None else "a chunk: ") + why, spared)
+        self._damage(
+            "damaged-chunk",
+            start,
+            ("a chunk left out: " if spared is None else "a chunk: ") + why,
+            spared,
+        )
 
-    def _damage(self, kind: str, start: int, text: str, spared: tuple[int, int] | None = None) -> None:
+    def _damage(
+        self, kind: str, start: int, text: str, spared: tuple[int, int] | None = None
+    ) -> None:
         """Reports damage at one place."""
         if spared is None:
             self._damaged.append(len(self._copy.findings))
@@ -524,7 +600,9 @@ class _Pass:
             return
         copied, present = spared
         if not present:
-            self._copy.find(kind, Severity.WARNING, f"{text}; no message was there", where=f"byte {start}")
+            self._copy.find(
+                kind, Severity.WARNING, f"{text}; no message was there", where=f"byte {start}"
+            )
             return
         self._copy.find(
             kind,
@@ -536,23 +614,25 @@ class _Pass:
 
 
 def _is_chunk(view: mmap.mmap, at: int, length: int) -> bool:
-    """Checks whether the head of a chunk of that length lies there, by the lengths that it states: one read in place,
-    since any byte may look like a chunk's first."""
+    """Checks whether the head of a chunk of that length lies there, by the lengths that it states:
+    one read in place, since any byte may look like a chunk's first."""
     fields = view[at + RECORD_HEAD : at + CHUNK_HEAD]
     if len(fields) < CHUNK_HEAD - RECORD_HEAD:
         return False
     name_length = _CHUNK_FIELDS.unpack_from(fields)[-1]
     if name_length > _LONGEST_NAME:
         return False
-    packed = int.from_bytes(view[at + CHUNK_HEAD - 8 + name_length : at + CHUNK_HEAD + name_length], "little")
+    packed = int.from_bytes(
+        view[at + CHUNK_HEAD - 8 + name_length : at + CHUNK_HEAD + name_length], "little"
+    )
     return CHUNK_HEAD - RECORD_HEAD + name_length + packed == length
 
 
 def _whole_records(
     body: bytes | memoryview, *, among: frozenset[Opcode] = _IN_CHUNK
 ) -> Iterator[tuple[int, memoryview]]:
-    """Yields opcode and content of the records that lie whole in `body`, up to the first that does not or is not
-    `among`."""
+    """Yields opcode and content of the records that lie whole in `body`, up to the first that does
+    not or is not `among`."""
     at = 0
     body = memoryview(body)
     while at + RECORD_HEAD <= len(body):
@@ -566,7 +646,9 @@ def _whole_records(
 
 def _read_message(length: int) -> Callable[[Any], Message]:
     if length < MESSAGE_HEAD - RECORD_HEAD:
-        raise CorruptError(f"a message has {length} bytes", fix="run `flagdata recover` on the file")
+        raise CorruptError(
+            f"a message has {length} bytes", fix="run `flagdata recover` on the file"
+        )
     return lambda stream: Message.read(stream, length)
 
 

@@ -1,4 +1,5 @@
-"""What ingest hands over: wind series and frame streams, on their devices' own clocks. Frozen, checked, format-free."""
+"""What ingest hands over: wind series and frame streams, on their devices' own clocks. Frozen,
+checked, format-free."""
 
 from __future__ import annotations
 
@@ -71,12 +72,19 @@ class WindSeries:
             arrays["host_time"] = self.host_time
         for name, values in arrays.items():
             if len(values) != n:
-                raise InputError(f"{name} has {len(values)} values for {n} times", fix="this is a defect of the reader")
+                raise InputError(
+                    f"{name} has {len(values)} values for {n} times",
+                    fix="this is a defect of the reader",
+                )
         for name in self.channels:
             if name not in CHANNELS:
-                raise InputError(f"channel {name!r} is not in schema.CHANNELS", fix="add it there with its unit")
+                raise InputError(
+                    f"channel {name!r} is not in schema.CHANNELS", fix="add it there with its unit"
+                )
         if n > 1 and not bool(np.all(np.diff(self.time) > 0)):
-            raise InputError("time does not increase", fix="sort and report the disorder in the reader")
+            raise InputError(
+                "time does not increase", fix="sort and report the disorder in the reader"
+            )
 
     def __len__(self) -> int:
         return len(self.time)
@@ -89,8 +97,10 @@ class WindAverage:
     Attributes:
         time: (n,) the END of each bin, UTC nanoseconds; bins with no usable sample are absent.
         speed: (n,) mean [m/s].
-        sigma: (n,) standard uncertainty of the bin's mean [m/s]: scatter within the bin and the sensor's accuracy.
-        direction: (n,) vector-mean direction [rad, from, clockwise from north], NaN where the source has none.
+        sigma: (n,) standard uncertainty of the bin's mean [m/s]: scatter within the bin and the
+            sensor's accuracy.
+        direction: (n,) vector-mean direction [rad, from, clockwise from north], NaN where the
+            source has none.
         count: (n,) usable samples in the bin.
         period: length of a bin [s].
     """
@@ -120,7 +130,8 @@ class Frame:
 
 @dataclass(frozen=True, kw_only=True)
 class CameraInfo:
-    """A camera file after its options are settled; all rates in Hz, sizes in pixels, `start` in UTC nanoseconds."""
+    """A camera file after its options are settled; all rates in Hz, sizes in pixels, `start` in UTC
+    nanoseconds."""
 
     container: str
     codec: str
@@ -137,7 +148,8 @@ class CameraInfo:
     crop: tuple[int, int, int, int]
     """x, y, width, height in the upright source image."""
     start_sigma: float | None = None
-    """Standard uncertainty of reading `start` off the file [s], clock error apart; `None` where the user gave it."""
+    """Standard uncertainty of reading `start` off the file [s], clock error apart; `None` where the
+    user gave it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,12 +171,15 @@ class LogRow:
 
 @dataclass(frozen=True, kw_only=True)
 class WindLog:
-    """What an anemometer reader returns: the series, what it found, and why it thinks the file is of this format.
+    """What an anemometer reader returns: the series, what it found, and why it thinks the file is
+    of this format.
 
     Attributes:
         plan: what was understood of the file, see `ingest.anemometer.log.understood`.
-        drafted: the recipe (TOML) that was drafted from the file's own text, "" where it was read by another.
-        stated: whether the file itself states all that a draft says, so that nothing of it is a guess.
+        drafted: the recipe (TOML) that was drafted from the file's own text, "" where it was read
+            by another.
+        stated: whether the file itself states all that a draft says, so that nothing of it is a
+            guess.
         rows: of a draft that is one, some rows to judge it by.
     """
 

@@ -1,4 +1,5 @@
-"""Chunks of MCAP files unpacked piece by piece, never to more than they state or than `UNPACKED_LIMIT` allows.
+"""Chunks of MCAP files unpacked piece by piece, never to more than they state or than
+`UNPACKED_LIMIT` allows.
 
 A few bytes of LZ4 or Zstandard may unpack to gigabytes, whatever a chunk states beside them.
 """
@@ -27,13 +28,15 @@ def unpack_chunk(chunk: Chunk, *, where: str | None = None) -> memoryview:
 
     Raises:
         LimitError: a compressed chunk that states more than `UNPACKED_LIMIT`.
-        CorruptError: it does not unpack, unpacks to more than it states, or its checksum is wrong; or its compression
-            is not of the MCAP specification.
+        CorruptError: it does not unpack, unpacks to more than it states, or its checksum is wrong;
+            or its compression is not of the MCAP specification.
     """
     if chunk.compression:
         check_stated(chunk.uncompressed_size, where=where)
         data: bytes | bytearray = _join_pieces(
-            _pieces(chunk.compression, chunk.data, where=where), chunk.uncompressed_size, where=where
+            _pieces(chunk.compression, chunk.data, where=where),
+            chunk.uncompressed_size,
+            where=where,
         )
     else:
         data = chunk.data
@@ -67,7 +70,9 @@ def _join_pieces(pieces: Iterator[bytes], stated_size: int, *, where: str | None
     except (zstandard.ZstdError, RuntimeError) as error:  # the second is LZ4's
         raise CorruptError(f"the chunk does not unpack: {error}", where=where, fix=_FIX) from None
     if len(unpacked_bytes) < stated_size:
-        message = f"the chunk unpacks to {len(unpacked_bytes)} of the {stated_size} bytes that it states"
+        message = (
+            f"the chunk unpacks to {len(unpacked_bytes)} of the {stated_size} bytes that it states"
+        )
         raise CorruptError(message, where=where, fix=_FIX)
     return unpacked_bytes
 

@@ -1,7 +1,8 @@
-"""H.264 for archives: 4 to 14 times smaller than JPEG, slower to reach a frame, since decoding starts at a key frame.
+"""H.264 for archives: 4 to 14 times smaller than JPEG, slower to reach a frame, since decoding
+starts at a key frame.
 
-As foxglove.CompressedVideo asks: Annex B, one picture a message, no B-frames, SPS and PPS on every key frame. Gray
-values are the luma, full range, so that a decoded frame has the range it had.
+As foxglove.CompressedVideo asks: Annex B, one picture a message, no B-frames, SPS and PPS on every
+key frame. Gray values are the luma, full range, so that a decoded frame has the range it had.
 """
 
 from __future__ import annotations
@@ -21,13 +22,16 @@ from flagdata.errors import CorruptError, InputError
 KEY_INTERVAL = 25
 """Frames from one key frame to the next."""
 CONSTANT_RATE_FACTOR = 18
-"""x264's quality: 41 to 42 dB on a flag of 352×288 (DynTex 571c110), where JPEG at quality 90 has 45 dB."""
+"""x264's quality: 41 to 42 dB on a flag of 352×288 (DynTex 571c110), where JPEG at quality 90 has
+45 dB."""
 
 
 class VideoEncoder:
-    """Encodes gray frames one by one; each gives its picture at once (no look-ahead), so that a crash loses none.
+    """Encodes gray frames one by one; each gives its picture at once (no look-ahead), so that a
+    crash loses none.
 
-    One thread and `cpu-independent`, so that the same frames give the same bytes on any machine with the same x264.
+    One thread and `cpu-independent`, so that the same frames give the same bytes on any machine
+    with the same x264.
 
     Args:
         height, width: of all frames [px]; even, as 4:2:0 asks.
@@ -39,10 +43,17 @@ class VideoEncoder:
     """
 
     def __init__(
-        self, *, height: int, width: int, rate_factor: float = CONSTANT_RATE_FACTOR, preset: str = "medium"
+        self,
+        *,
+        height: int,
+        width: int,
+        rate_factor: float = CONSTANT_RATE_FACTOR,
+        preset: str = "medium",
     ) -> None:
         if height % 2 or width % 2:
-            raise InputError(f"H.264 of {width}×{height} pixels", fix="use an even width and height, or JPEG")
+            raise InputError(
+                f"H.264 of {width}×{height} pixels", fix="use an even width and height, or JPEG"
+            )
         self._shape = (height, width)
         self._count = 0
         codec: Any = av.CodecContext.create("libx264", "w")
@@ -66,7 +77,8 @@ class VideoEncoder:
         """
         if image.shape != self._shape or image.dtype != np.uint8:
             raise InputError(
-                f"a frame of shape {image.shape} and type {image.dtype}, the first was {self._shape} uint8",
+                f"a frame of shape {image.shape} and type {image.dtype}, the first was "
+                f"{self._shape} uint8",
                 fix="give frames of one size",
             )
         frame = av.VideoFrame(self._shape[1], self._shape[0], "yuv420p")
@@ -106,7 +118,11 @@ def decode(pictures: Iterable[bytes | memoryview], *, where: str) -> list[UInt8A
             f"an H.264 picture cannot be decoded: {error}", where=where, fix="run flagdata verify"
         ) from None
     if len(frames) != count:
-        raise CorruptError(f"{count} H.264 pictures gave {len(frames)} frames", where=where, fix="run flagdata verify")
+        raise CorruptError(
+            f"{count} H.264 pictures gave {len(frames)} frames",
+            where=where,
+            fix="run flagdata verify",
+        )
     return frames
 
 

@@ -1,12 +1,13 @@
-"""Writes a record: frames, wind, parameters and attachments into one MCAP file, streaming, with reproducible bytes.
+"""Writes a record: frames, wind, parameters and attachments into one MCAP file, streaming, with
+reproducible bytes.
 
 Attachments of a record packed as they are read, piece by piece.
 
 Wind samples and their means as protobuf messages in bulk: arrays in, rows of bytes out.
 
-The bytes are those of `messages.WindSample` and `messages.WindMean` serialised one by one in order of field numbers,
-which is tested. Source: Protocol Buffers, Encoding: tag = number << 3 | wire type, base-128 varints, doubles as
-8 bytes.
+The bytes are those of `messages.WindSample` and `messages.WindMean` serialised one by one in order
+of field numbers, which is tested. Source: Protocol Buffers, Encoding: tag = number << 3 | wire
+type, base-128 varints, doubles as 8 bytes.
 """
 
 from __future__ import annotations
@@ -25,7 +26,13 @@ from mcap.well_known import MessageEncoding, SchemaEncoding
 
 from flagdata.core.arrays import BoolArray, IntArray, UInt8Array
 from flagdata.core.clock_model import ClockModel
-from flagdata.core.schema import FORMAT_VERSION, TOPIC_IMAGE, TOPIC_TRUTH, TOPIC_WIND, TOPIC_WIND_1HZ
+from flagdata.core.schema import (
+    FORMAT_VERSION,
+    TOPIC_IMAGE,
+    TOPIC_TRUTH,
+    TOPIC_WIND,
+    TOPIC_WIND_1HZ,
+)
 from flagdata.errors import ConflictError, InputError, LimitError, TimeError, UsageError
 from flagdata.record import messages
 from flagdata.record.averaging import average
@@ -62,12 +69,16 @@ class Payloads:
 
 
 def samples(series: WindSeries, log_time: IntArray, rows: slice) -> Payloads:
-    """Encodes `WindSample` of some rows of a series, whose instants on the common clock are `log_time` (n,) [UTC
-    ns]."""
+    """Encodes `WindSample` of some rows of a series, whose instants on the common clock are
+    `log_time` (n,) [UTC ns]."""
     numbers = {messages.WIND_FIELDS[name]: values for name, values in series.channels.items()}
     parts = [_timestamp("timestamp", messages.WindSample, log_time[rows])]
     for (name, _), values in sorted(numbers.items(), key=lambda item: item[0][1]):
-        parts.append(_double(name, messages.WindSample, np.asarray(values, dtype=np.float64)[rows], presence=True))
+        parts.append(
+            _double(
+                name, messages.WindSample, np.asarray(values, dtype=np.float64)[rows], presence=True
+            )
+        )
     parts.append(_integer("flags", messages.WindSample, series.flags[rows].astype(np.int64)))
     if series.host_time is not None:
         parts.append(_timestamp("host_time", messages.WindSample, series.host_time[rows]))
@@ -81,7 +92,10 @@ def means(average: WindAverage) -> Payloads:
     return _join_parts(
         [
             _timestamp("timestamp", kind, average.time),
-            *(_double(name, kind, getattr(average, name), presence=False) for name in ("speed", "sigma", "direction")),
+            *(
+                _double(name, kind, getattr(average, name), presence=False)
+                for name in ("speed", "sigma", "direction")
+            ),
             _integer("count", kind, average.count.astype(np.int64)),
             _double("period", kind, period, presence=False),
         ]
@@ -89,7 +103,9 @@ def means(average: WindAverage) -> Payloads:
 
 
 def _join_parts(parts: Sequence[Payloads]) -> Payloads:
-    return Payloads(data=np.hstack([p.data for p in parts]), used=np.hstack([p.used for p in parts]))
+    return Payloads(
+        data=np.hstack([p.data for p in parts]), used=np.hstack([p.used for p in parts])
+    )
 
 
 def _tag(number: int, wire: int) -> list[int]:
@@ -121,7 +137,11 @@ def _double(name: str, kind: object, values: Series, *, presence: bool) -> Paylo
     bits = raw.view("<u8")
     written = np.ones(len(raw), dtype=bool) if presence else bits != 0
     data = raw.view(np.uint8).reshape(-1, 8)
-    return _tag_values(_tag(_number(name, kind), _DOUBLE), Payloads(data=data, used=np.ones(data.shape, bool)), written)
+    return _tag_values(
+        _tag(_number(name, kind), _DOUBLE),
+        Payloads(data=data, used=np.ones(data.shape, bool)),
+        written,
+    )
 
 
 def _integer(name: str, kind: object, values: IntArray) -> Payloads:
@@ -144,19 +164,24 @@ def _timestamp(name: str, kind: object, time: IntArray) -> Payloads:
 
 
 def _varint(values: IntArray) -> Payloads:
-    """Encodes base-128 varints, least significant group first; of a negative number those of its two's complement."""
+    """Encodes base-128 varints, least significant group first; of a negative number those of its
+    two's complement."""
     unsigned = np.ascontiguousarray(values, dtype=np.int64).view(np.uint64)
     width = max(1, -(-int(unsigned.max(initial=0)).bit_length() // 7))
     groups = unsigned[:, None] >> (7 * np.arange(width, dtype=np.uint64))
     continues = (groups >> 7) > 0
     used = np.hstack([np.ones((len(values), 1), dtype=bool), continues[:, :-1]])
-    return Payloads(data=((groups & 0x7F) | (continues.astype(np.uint64) << np.uint64(7))).astype(np.uint8), used=used)
+    return Payloads(
+        data=((groups & 0x7F) | (continues.astype(np.uint64) << np.uint64(7))).astype(np.uint8),
+        used=used,
+    )
 
 
 PIECE = 1 << 20
 """Bytes read at a time."""
 QUICK_ABOVE = 8 << 20
-"""Bytes from which an attachment is packed for speed: zlib's level 1 takes a quarter of level 9's time on a log."""
+"""Bytes from which an attachment is packed for speed: zlib's level 1 takes a quarter of level 9's
+time on a log."""
 _GZIP = 31  # wbits of zlib for a gzip stream, whose header then holds neither name nor time
 
 
@@ -174,10 +199,14 @@ def pieces_of(path: Path, size: int) -> Iterator[bytes]:
                 done += len(piece)
                 yield piece
     except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", where=str(path), fix="check its permissions") from None
+        raise InputError(
+            f"cannot be read: {error.strerror}", where=str(path), fix="check its permissions"
+        ) from None
     if done != size:
         raise ConflictError(
-            f"the file had {size} bytes and then {done}", where=str(path), fix="ingest it when it is complete"
+            f"the file had {size} bytes and then {done}",
+            where=str(path),
+            fix="ingest it when it is complete",
         )
 
 
@@ -196,7 +225,9 @@ FRAME_ID = "camera"
 PROFILE = "flagdata"
 ATTACHMENT_LIMIT = 256 << 20
 COMPRESS_ATTACHMENTS_ABOVE = 64 << 10
-GZIP_SUFFIX = "+gzip"  # of the media type of an attachment that was packed here (RFC 8460, section 6.5)
+GZIP_SUFFIX = (
+    "+gzip"  # of the media type of an attachment that was packed here (RFC 8460, section 6.5)
+)
 MEAN_PERIOD = 1.0  # s, of the derived means on schema.TOPIC_WIND_1HZ
 _ROWS_AT_ONCE = 16_384  # samples made into bytes together
 
@@ -207,7 +238,8 @@ class Chunking(StrEnum):
     COMMITTED = "committed"
     """Chunks of 1 MiB, for a file that is written in one go."""
     LIVE = "live"
-    """Chunks of 256 KiB, and one at least every second of log time, for a file written while recording."""
+    """Chunks of 256 KiB, and one at least every second of log time, for a file written while
+    recording."""
 
 
 class Coding(StrEnum):
@@ -223,14 +255,17 @@ CHUNK_BYTES = {Chunking.COMMITTED: 1 << 20, Chunking.LIVE: 256 << 10}
 
 
 def library_name() -> str:
-    """Returns what the header of a record says wrote it: the format, not the program's version, so that bytes last."""
+    """Returns what the header of a record says wrote it: the format, not the program's version, so
+    that bytes last."""
     return f"flagdata format {FORMAT_VERSION}"
 
 
 class RecordWriter:
-    """Writes one record; a context manager. Chunks are not compressed, so that readers reach a frame directly.
+    """Writes one record; a context manager. Chunks are not compressed, so that readers reach a
+    frame directly.
 
-    Leaving the block normally completes the file. Leaving it by an exception, or a crash, leaves a file without a
+    Leaving the block normally completes the file. Leaving it by an exception, or a crash, leaves a
+    file without a
     summary: `salvage` recovers its whole chunks. The same calls give the same bytes.
 
     Args:
@@ -242,7 +277,8 @@ class RecordWriter:
 
     Raises:
         ConflictError: `path` exists.
-        FlagdataError: the disk refuses it (no space, no permission, a file too large), now or at any later call.
+        FlagdataError: the disk refuses it (no space, no permission, a file too large), now or at
+            any later call.
     """
 
     def __init__(
@@ -255,9 +291,13 @@ class RecordWriter:
         quality: int = JPEG_QUALITY,
     ) -> None:
         if not 1 <= quality <= 100:
-            raise UsageError(f"JPEG quality {quality} is not between 1 and 100", fix="leave it at the default")
+            raise UsageError(
+                f"JPEG quality {quality} is not between 1 and 100", fix="leave it at the default"
+            )
         if CHECKSUMS in metadata:
-            raise ConflictError(f"metadata {CHECKSUMS!r} is the record's own", where=str(path), fix="rename it")
+            raise ConflictError(
+                f"metadata {CHECKSUMS!r} is the record's own", where=str(path), fix="rename it"
+            )
         self.path = path
         self._quality = quality
         self._chunking = chunking
@@ -279,49 +319,64 @@ class RecordWriter:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         with self._stream:
             if kind is None:
                 self._writer.finish()
                 self._stream.sync()
 
-    def frame(self, *, log_time: int, publish_time: int, timestamp: int, image: UInt8Array | bytes) -> None:
+    def frame(
+        self, *, log_time: int, publish_time: int, timestamp: int, image: UInt8Array | bytes
+    ) -> None:
         """Appends one frame.
 
         Args:
             log_time: instant on the common clock [UTC ns]; greater than the last frame's.
             publish_time: instant on the camera's own clock [UTC ns].
             timestamp: mid-exposure on the common clock [UTC ns].
-            image: (height, width) uint8 gray, encoded here; or the bytes of a JPEG or of an H.264 picture (Annex B,
-                the first a key frame), as the coding is, kept as they are.
+            image: (height, width) uint8 gray, encoded here; or the bytes of a JPEG or of an H.264
+                picture (Annex B, the first a key frame), as the coding is, kept as they are.
 
         Raises:
-            InputError: an array of another shape or type, bytes that are no JPEG, or time that does not increase.
+            InputError: an array of another shape or type, bytes that are no JPEG, or time that does
+                not increase.
         """
         self._check_order(log_time, publish_time)
         if self._coding is Coding.JPEG:
-            message = messages.CompressedImage(frame_id=FRAME_ID, format="jpeg", data=self._jpeg(image))
+            message = messages.CompressedImage(
+                frame_id=FRAME_ID, format="jpeg", data=self._jpeg(image)
+            )
         else:
-            message = messages.CompressedVideo(frame_id=FRAME_ID, format="h264", data=self._picture(image))
+            message = messages.CompressedVideo(
+                frame_id=FRAME_ID, format="h264", data=self._picture(image)
+            )
         messages.set_timestamp(message.timestamp, timestamp)
         self._message(TOPIC_IMAGE, message, log_time=log_time, publish_time=publish_time)
 
     def wind(self, series: WindSeries, *, clock: ClockModel | None = None) -> None:
-        """Write all samples of an anemometer, and the means of its wind speed over 1 s of the common clock.
+        """Write all samples of an anemometer, and the means of its wind speed over 1 s of the
+        common clock.
 
-        A log without wind over ground (only apparent wind from a moving platform, say) has no means.
+        A log without wind over ground (only apparent wind from a moving platform, say) has no
+        means.
 
         Args:
             series: on the device's own clock.
-            clock: of the device on the common clock; `None` where the device's clock is the common clock.
+            clock: of the device on the common clock; `None` where the device's clock is the common
+                clock.
 
         Raises:
             ConflictError: called twice.
             InputError: the clock model folds time back over a jump.
         """
         if TOPIC_WIND in self._channels:
-            raise ConflictError("the record has wind already", where=str(self.path), fix="write one series a record")
+            raise ConflictError(
+                "the record has wind already", where=str(self.path), fix="write one series a record"
+            )
         self._metadata(SENSOR, sensor_metadata(series.sensor))
         common = series.time
         if clock is not None:
@@ -331,7 +386,9 @@ class RecordWriter:
         for first in range(0, len(series), _ROWS_AT_ONCE):
             rows = slice(first, first + _ROWS_AT_ONCE)
             payloads = samples(series, common, rows)
-            self._messages(TOPIC_WIND, messages.WindSample, payloads, common[rows], series.time[rows])
+            self._messages(
+                TOPIC_WIND, messages.WindSample, payloads, common[rows], series.time[rows]
+            )
         if "wind_speed" in series.channels:
             self._means(aligned)
 
@@ -343,18 +400,22 @@ class RecordWriter:
             InputError: a value that is not finite.
         """
         if TOPIC_TRUTH in self._channels:
-            raise ConflictError("the record has parameters already", where=str(self.path), fix="write them once")
+            raise ConflictError(
+                "the record has parameters already", where=str(self.path), fix="write them once"
+            )
         message = messages.TruthParameters()
         messages.set_timestamp(message.timestamp, log_time)
         for name in sorted(parameters):
             if not math.isfinite(parameters[name]):
-                raise InputError(f"parameter {name!r} is {parameters[name]}", fix="leave unknown parameters out")
+                raise InputError(
+                    f"parameter {name!r} is {parameters[name]}", fix="leave unknown parameters out"
+                )
             message.parameters.add(name=name, value=parameters[name])
         self._message(TOPIC_TRUTH, message, log_time=log_time, publish_time=log_time)
 
     def attach(self, name: str, data: bytes, *, media_type: str, log_time: int) -> None:
-        """Attaches a file (the vendor's log, a calibration). Above 64 KiB it is stored gzipped as `name`.gz where that
-        is smaller; readers give it back by its own name.
+        """Attaches a file (the vendor's log, a calibration). Above 64 KiB it is stored gzipped as
+        `name`.gz where that is smaller; readers give it back by its own name.
 
         Raises:
             ConflictError: the name is taken.
@@ -371,66 +432,97 @@ class RecordWriter:
             InputError: it cannot be read, or changed while it was.
         """
         size = self._check_attachment(name, path.stat().st_size, media_type)
-        self._attach(name, lambda: pieces_of(path, size), size, media_type=media_type, log_time=log_time)
+        self._attach(
+            name, lambda: pieces_of(path, size), size, media_type=media_type, log_time=log_time
+        )
 
     def _check_attachment(self, name: str, size: int, media_type: str) -> int:
         """Returns the size, if such an attachment may be added; its name is taken from now on."""
         if size > ATTACHMENT_LIMIT:
-            raise LimitError(f"attachment of {size} bytes", where=name, fix=f"attach at most {ATTACHMENT_LIMIT} bytes")
+            raise LimitError(
+                f"attachment of {size} bytes",
+                where=name,
+                fix=f"attach at most {ATTACHMENT_LIMIT} bytes",
+            )
         if f"attachment {name}" in self._names:
-            raise ConflictError(f"attachment {name!r} is there already", where=str(self.path), fix="rename it")
+            raise ConflictError(
+                f"attachment {name!r} is there already", where=str(self.path), fix="rename it"
+            )
         self._names.add(f"attachment {name}")
         if media_type.endswith(GZIP_SUFFIX):
             raise InputError(
-                f"media type {media_type!r} is reserved for attachments that the record itself compresses",
+                f"media type {media_type!r} is reserved for attachments that the record itself "
+                "compresses",
                 fix="use application/gzip",
             )
         return size
 
     def _attach(
-        self, name: str, read: Callable[[], Iterable[bytes]], size: int, *, media_type: str, log_time: int
+        self,
+        name: str,
+        read: Callable[[], Iterable[bytes]],
+        size: int,
+        *,
+        media_type: str,
+        log_time: int,
     ) -> None:
         gzipped = compress_pieces(read(), size) if size > COMPRESS_ATTACHMENTS_ABOVE else None
         if gzipped is not None:
             size, name, media_type = sum(map(len, gzipped)), f"{name}.gz", media_type + GZIP_SUFFIX
         data = read() if gzipped is None else gzipped
-        self._writer.add_attachment(log_time=log_time, name=name, media_type=media_type, data=data, size=size)
+        self._writer.add_attachment(
+            log_time=log_time, name=name, media_type=media_type, data=data, size=size
+        )
 
     def _jpeg(self, image: UInt8Array | bytes) -> bytes:
         if not isinstance(image, bytes):
             return encode_jpeg(image, quality=self._quality)
         if not (image.startswith(b"\xff\xd8") and image.endswith(b"\xff\xd9")):
-            raise InputError("a frame's bytes are not a JPEG", fix="give a (height, width) uint8 array or a whole JPEG")
+            raise InputError(
+                "a frame's bytes are not a JPEG",
+                fix="give a (height, width) uint8 array or a whole JPEG",
+            )
         return image
 
     def _picture(self, image: UInt8Array | bytes) -> bytes:
         if isinstance(image, bytes):
             if not image.startswith((b"\x00\x00\x01", b"\x00\x00\x00\x01")):
-                raise InputError("a frame's bytes are no H.264 picture", fix="give Annex B, or an array")
+                raise InputError(
+                    "a frame's bytes are no H.264 picture", fix="give Annex B, or an array"
+                )
             if TOPIC_IMAGE not in self._channels and not is_key(image):
                 raise InputError("the first H.264 picture is no key frame", fix="begin with one")
             return image
         if self._video is None:
             _check_image(image)
-            from flagdata.record.video_archive import VideoEncoder  # FFmpeg, which a wind's record needs nothing of
+            from flagdata.record.video_archive import (
+                VideoEncoder,
+            )  # FFmpeg, which a wind's record needs nothing of
 
             self._video = VideoEncoder(height=image.shape[0], width=image.shape[1])
         return self._video.encode(image)
 
     def _metadata(self, name: str, values: Mapping[str, str]) -> None:
         if name in self._names:
-            raise ConflictError(f"metadata {name!r} is there already", where=str(self.path), fix="write it once")
+            raise ConflictError(
+                f"metadata {name!r} is there already", where=str(self.path), fix="write it once"
+            )
         self._names.add(name)
         self._writer.add_metadata(name, dict(values))
 
     def _means(self, aligned: WindSeries) -> None:
         averaged = average(aligned, MEAN_PERIOD)
-        self._messages(TOPIC_WIND_1HZ, messages.WindMean, means(averaged), averaged.time, averaged.time)
+        self._messages(
+            TOPIC_WIND_1HZ, messages.WindMean, means(averaged), averaged.time, averaged.time
+        )
 
     def _check_order(self, log_time: int, publish_time: int) -> None:
-        if self._last_frame is not None and (log_time <= self._last_frame[0] or publish_time <= self._last_frame[1]):
+        if self._last_frame is not None and (
+            log_time <= self._last_frame[0] or publish_time <= self._last_frame[1]
+        ):
             raise InputError(
-                f"a frame at {log_time} (device {publish_time}) does not follow {self._last_frame[0]} "
+                f"a frame at {log_time} (device {publish_time}) does not follow "
+                f"{self._last_frame[0]} "
                 f"(device {self._last_frame[1]})",
                 where=str(self.path),
                 fix="give frames in order of time",
@@ -489,7 +581,9 @@ class RecordWriter:
             )
         if topic not in self._channels:
             schema = self._writer.register_schema(
-                name=kind.DESCRIPTOR.full_name, encoding=SchemaEncoding.Protobuf, data=messages.descriptor_set(kind)
+                name=kind.DESCRIPTOR.full_name,
+                encoding=SchemaEncoding.Protobuf,
+                data=messages.descriptor_set(kind),
             )
             self._channels[topic] = self._writer.register_channel(
                 topic=topic, message_encoding=MessageEncoding.Protobuf, schema_id=schema
@@ -512,7 +606,9 @@ def encode_jpeg(image: UInt8Array, *, quality: int = JPEG_QUALITY) -> bytes:
         InputError: another shape or type.
     """
     _check_image(image)
-    return simplejpeg.encode_jpeg(np.ascontiguousarray(image)[..., None], quality=quality, colorspace="GRAY")
+    return simplejpeg.encode_jpeg(
+        np.ascontiguousarray(image)[..., None], quality=quality, colorspace="GRAY"
+    )
 
 
 def _check_image(image: UInt8Array) -> None:

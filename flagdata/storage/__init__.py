@@ -1,4 +1,5 @@
-"""Object storage: buckets of S3 as paths, with conditional puts, ranged reads, and a local cache of objects."""
+"""Object storage: buckets of S3 as paths, with conditional puts, ranged reads, and a local cache of
+objects."""
 
 from __future__ import annotations
 
@@ -17,8 +18,8 @@ if TYPE_CHECKING:
 
 
 Place = Path | RemotePath
-"""Where a lake, or a part of it, is: on a disk or in a bucket. What both offer is the subset of `Path` that a lake
-uses."""
+"""Where a lake, or a part of it, is: on a disk or in a bucket. What both offer is the subset of
+`Path` that a lake uses."""
 
 __all__ = ["Place", "RemotePath", "StoreError"]
 

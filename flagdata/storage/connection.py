@@ -1,8 +1,10 @@
-"""How a bucket is reached: credentials from the environment or a profile, time-outs, retries, and what errors may say.
+"""How a bucket is reached: credentials from the environment or a profile, time-outs, retries, and
+what errors may say.
 
-Credentials are read when a process first needs a bucket. They are kept in the client's memory alone: paths, and lakes
-that are pickled for other processes, name the bucket; each process reads its own environment. No message repeats them:
-what a server answers is cut to its first line and searched for them before anybody reads it.
+Credentials are read when a process first needs a bucket. They are kept in the client's memory
+alone: paths, and lakes that are pickled for other processes, name the bucket; each process reads
+its own environment. No message repeats them: what a server answers is cut to its first line and
+searched for them before anybody reads it.
 """
 
 from __future__ import annotations
@@ -50,20 +52,31 @@ def settings() -> dict[str, str]:
     Raises:
         UsageError: a profile that is not there, or that has no keys of its own.
     """
-    credentials = {name: value for name, variable in _ENVIRONMENT.items() if (value := os.environ.get(variable))}
+    credentials = {
+        name: value
+        for name, variable in _ENVIRONMENT.items()
+        if (value := os.environ.get(variable))
+    }
     profile = os.environ.get("AWS_PROFILE")
     profile_settings = _profile(
         profile or os.environ.get("AWS_DEFAULT_PROFILE") or "default", required=profile is not None
     )
     if profile is not None or "aws_access_key_id" not in credentials:
-        credentials |= {name: profile_settings[name] for name in _ENVIRONMENT if name in profile_settings}
+        credentials |= {
+            name: profile_settings[name] for name in _ENVIRONMENT if name in profile_settings
+        }
         if profile is not None and "aws_access_key_id" not in profile_settings:
             raise UsageError(
                 f"the profile {profile!r} has no access key of its own",
                 where="AWS_PROFILE",
-                fix="put its keys into the environment: eval $(aws configure export-credentials --format env)",
+                fix="put its keys into the environment: eval $(aws configure export-credentials "
+                "--format env)",
             )
-    region = os.environ.get("AWS_REGION") or os.environ.get("AWS_DEFAULT_REGION") or profile_settings.get("region")
+    region = (
+        os.environ.get("AWS_REGION")
+        or os.environ.get("AWS_DEFAULT_REGION")
+        or profile_settings.get("region")
+    )
     endpoint = (
         os.environ.get("AWS_ENDPOINT_URL_S3")
         or os.environ.get("AWS_ENDPOINT_URL")
@@ -78,8 +91,8 @@ def settings() -> dict[str, str]:
 
 
 def delta_options() -> dict[str, str]:
-    """Returns what the Delta library needs to reach a bucket. It publishes by conditional puts too, said here so that a
-    change of its defaults cannot undo it."""
+    """Returns what the Delta library needs to reach a bucket. It publishes by conditional puts too,
+    said here so that a change of its defaults cannot undo it."""
     return {
         **settings(),
         "conditional_put": "etag",
@@ -97,8 +110,8 @@ def client(bucket: str) -> S3Store:
     """Returns the client of a bucket, one a process.
 
     Raises:
-        FlagdataError: the package obstore is not installed; or a forked child of a process that used one: it would
-            hang there.
+        FlagdataError: the package obstore is not installed; or a forked child of a process that
+            used one: it would hang there.
     """
     _PROCESS.check()
     return _client(bucket)
@@ -128,7 +141,11 @@ def _client(bucket: str) -> S3Store:
         retry_config={
             "max_retries": RETRIES,
             "retry_timeout": timedelta(seconds=RETRY_TIMEOUT),
-            "backoff": {"init_backoff": timedelta(milliseconds=100), "max_backoff": timedelta(seconds=10), "base": 2},
+            "backoff": {
+                "init_backoff": timedelta(milliseconds=100),
+                "max_backoff": timedelta(seconds=10),
+                "base": 2,
+            },
         },
     )
 
@@ -144,7 +161,8 @@ def plain(error: BaseException | str) -> str:
 
 
 def redact_credentials(text: str) -> str:
-    """Removes from `text` the credentials in use, the user of an address, and anything of the form of an access key."""
+    """Removes from `text` the credentials in use, the user of an address, and anything of the form
+    of an access key."""
     for variable in _ENVIRONMENT:
         if (value := settings().get(variable)) and len(value) > 3:
             text = text.replace(value, "…")
@@ -163,10 +181,20 @@ def _profile(name: str, *, required: bool) -> dict[str, str]:
         parser = configparser.RawConfigParser()
         try:
             parser.read(path, encoding="utf-8")
-        except (configparser.Error, OSError, UnicodeDecodeError):  # whose text may show a line of the file
-            raise UsageError("the profiles cannot be read", where=str(path), fix="mend the file") from None
+        except (
+            configparser.Error,
+            OSError,
+            UnicodeDecodeError,
+        ):  # whose text may show a line of the file
+            raise UsageError(
+                "the profiles cannot be read", where=str(path), fix="mend the file"
+            ) from None
         if parser.has_section(section):
             profile_settings |= dict(parser.items(section))
     if required and not profile_settings:
-        raise UsageError(f"there is no profile {name!r}", where="AWS_PROFILE", fix=f"name one of {home / 'config'}")
+        raise UsageError(
+            f"there is no profile {name!r}",
+            where="AWS_PROFILE",
+            fix=f"name one of {home / 'config'}",
+        )
     return profile_settings

@@ -1,4 +1,5 @@
-"""Libraries whose threads do not survive a fork: a child of a process that used one is refused, since it would hang."""
+"""Libraries whose threads do not survive a fork: a child of a process that used one is refused,
+since it would hang."""
 
 from __future__ import annotations
 
@@ -30,7 +31,8 @@ class OneProcess:
             self._user = process
         elif self._user != process:
             raise FlagdataError(
-                f"{self._what} was used before this process was forked, and cannot be used in the child",
+                f"{self._what} was used before this process was forked, and cannot be used in the "
+                "child",
                 where=f"process {process}",
                 fix=self._fix,
             )

@@ -1,8 +1,9 @@
 """A place in a bucket, with the part of `Path` that a lake uses.
 
-A bucket has no folders: one is there as long as something lies in it. Each put shows whole or not at all, and is
-durable when it returns. `create` takes a name only if it is free. A request that fails is repeated, so a `create`
-may find the name taken by its own first try: then the bytes are there, and it has succeeded.
+A bucket has no folders: one is there as long as something lies in it. Each put shows whole or not
+at all, and is durable when it returns. `create` takes a name only if it is free. A request that
+fails is repeated, so a `create` may find the name taken by its own first try: then the bytes are
+there, and it has succeeded.
 """
 
 from __future__ import annotations
@@ -31,12 +32,15 @@ BLOCK = 8 << 20
 _UPLOADS = 3
 """How often a file is put whose parts the store does not find."""
 _BROKEN = 5
-"""How often a request is sent whose answer breaks off; each may be sent twice, see `RemotePath.create`."""
+"""How often a request is sent whose answer breaks off; each may be sent twice, see
+`RemotePath.create`."""
 _CONFLICTS = 8
-"""How often a conditional put is made that the store calls in conflict with another, and neither shows."""
+"""How often a conditional put is made that the store calls in conflict with another, and neither
+shows."""
 _ADDRESS = re.compile(r"s3://([a-z0-9][a-z0-9.-]{1,61}[a-z0-9])(?:/(.*))?", re.DOTALL)
 _SECRET = re.compile(r"(?<!^[sS]3):|[@?]")
-"""What stands beside credentials in an address: a user's name and password, or the query of a signed one."""
+"""What stands beside credentials in an address: a user's name and password, or the query of a
+signed one."""
 _KEY = re.compile(r"[A-Za-z0-9._=+-]+(?:/[A-Za-z0-9._=+-]+)*")
 
 T = TypeVar("T")
@@ -44,7 +48,8 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, kw_only=True)
 class Status:
-    """Size [B], when it was written [s since 1970, by the store's clock], and the version that conditions name."""
+    """Size [B], when it was written [s since 1970, by the store's clock], and the version that
+    conditions name."""
 
     st_size: int
     st_mtime: float
@@ -72,7 +77,8 @@ class RemotePath:
         """Parses an address "s3://bucket/prefix".
 
         Raises:
-            UsageError: not such an address, or a prefix that not every client writes in the same way.
+            UsageError: not such an address, or a prefix that not every client writes in the same
+                way.
         """
         match = _ADDRESS.fullmatch(address)
         if match is None:
@@ -80,13 +86,15 @@ class RemotePath:
             raise UsageError(
                 "this is not the address of a bucket",
                 where=safe_address,
-                fix="write s3://bucket/prefix; credentials are read from the environment or a profile",
+                fix="write s3://bucket/prefix; credentials are read from the environment or a "
+                "profile",
             )
         key = (match[2] or "").rstrip("/")
         if key and (not _KEY.fullmatch(key) or {".", ".."} & set(key.split("/"))):
             safe_address = f"{SCHEME}{match[1]}/…" if _SECRET.search(address) else address
             raise UsageError(
-                "the prefix of a lake has letters, digits and . _ = + - only, between single slashes",
+                "the prefix of a lake has letters, digits and . _ = + - only, between single "
+                "slashes",
                 where=safe_address,
                 fix="choose another prefix",
             )
@@ -102,7 +110,10 @@ class RemotePath:
         return f"RemotePath({str(self)!r})"
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, RemotePath) and (self.bucket, self.key) == (other.bucket, other.key)
+        return isinstance(other, RemotePath) and (self.bucket, self.key) == (
+            other.bucket,
+            other.key,
+        )
 
     def __hash__(self) -> int:
         return hash((self.bucket, self.key))
@@ -136,7 +147,8 @@ class RemotePath:
         return str(self)
 
     def exists(self) -> bool:
-        """Checks whether there is an object of this key; what only has others beneath it is none."""
+        """Checks whether there is an object of this key; what only has others beneath it is
+        none."""
         try:
             self.stat()
         except FileNotFoundError:
@@ -179,13 +191,18 @@ class RemotePath:
         """Reads at most `length` bytes at `offset`, fewer at the end of the object."""
         if length == 0:
             return b""
-        return self._ask(lambda obstore, store: bytes(obstore.get_range(store, self.key, start=offset, length=length)))
+        return self._ask(
+            lambda obstore, store: bytes(
+                obstore.get_range(store, self.key, start=offset, length=length)
+            )
+        )
 
     def read_ranges(self, offsets: Sequence[int], lengths: Sequence[int]) -> list[bytes]:
         """Reads several ranges; those that lie within 1 MiB of each other are read together."""
         return self._ask(
             lambda obstore, store: [
-                bytes(part) for part in obstore.get_ranges(store, self.key, starts=offsets, lengths=lengths)
+                bytes(part)
+                for part in obstore.get_ranges(store, self.key, starts=offsets, lengths=lengths)
             ]
         )
 
@@ -200,7 +217,8 @@ class RemotePath:
         self._ask(lambda obstore, store: obstore.put(store, self.key, data))
 
     def upload(self, file: Path) -> None:
-        """Put a file's bytes; of a large file in parts, which show together. What fails leaves no parts behind.
+        """Put a file's bytes; of a large file in parts, which show together. What fails leaves no
+        parts behind.
 
         Raises:
             StoreError: the store did not take it.
@@ -218,7 +236,8 @@ class RemotePath:
             raise
 
     def uploads(self) -> list[Upload]:
-        """Lists uploads of this key and of those beneath that were begun and are not finished, nor aborted.
+        """Lists uploads of this key and of those beneath that were begun and are not finished, nor
+        aborted.
 
         Raises:
             StoreError: the store did not list them; some cannot.
@@ -246,10 +265,13 @@ class RemotePath:
 
     def _upload(self, file: Path) -> None:
         for _ in range(_UPLOADS):
-            # A store that is asked again to join the parts, since its first answer was lost, knows of no parts.
+            # A store that is asked again to join the parts, since its first answer was lost, knows
+            # of no parts.
             with suppress(FileNotFoundError):
                 self._ask(
-                    lambda obstore, store: obstore.put(store, self.key, file, chunk_size=BLOCK, max_concurrency=4)
+                    lambda obstore, store: obstore.put(
+                        store, self.key, file, chunk_size=BLOCK, max_concurrency=4
+                    )
                 )
                 return
         raise StoreError(errno.EREMOTEIO, "the store lost the parts of an upload", str(self))
@@ -275,14 +297,19 @@ class RemotePath:
                         return True
                 raise
             return True
-        raise StoreError(errno.EREMOTEIO, "the store took none of several puts of this object", str(self))
+        raise StoreError(
+            errno.EREMOTEIO, "the store took none of several puts of this object", str(self)
+        )
 
     def replace_if(self, e_tag: str | None, data: bytes) -> str | None:
-        """Put an object in place of the one of that version; the new one's version, or None where it was not that."""
+        """Put an object in place of the one of that version; the new one's version, or None where
+        it was not that."""
         mode: Any = {"e_tag": e_tag}
         for _ in range(_CONFLICTS):
             try:
-                return self._ask(lambda obstore, store: obstore.put(store, self.key, data, mode=mode))["e_tag"]
+                return self._ask(
+                    lambda obstore, store: obstore.put(store, self.key, data, mode=mode)
+                )["e_tag"]
             except FileExistsError:
                 with suppress(FileNotFoundError):
                     if RemotePath(self.bucket, self.key).stat().e_tag == e_tag:  # 409, as above
@@ -342,7 +369,9 @@ class RemotePath:
 
     def iterdir(self) -> Iterator[RemotePath]:
         """Yields what lies directly beneath: objects, and folders."""
-        listing = self._ask(lambda obstore, store: obstore.list_with_delimiter(store, self.key or None))
+        listing = self._ask(
+            lambda obstore, store: obstore.list_with_delimiter(store, self.key or None)
+        )
         for key in listing["common_prefixes"]:
             yield RemotePath(self.bucket, key.rstrip("/"))
         for meta in listing["objects"]:
@@ -381,7 +410,9 @@ class RemotePath:
             except (FileNotFoundError, exceptions.NotFoundError) as error:
                 if "NoSuchBucket" in str(error):
                     raise self._refusal(error) from None
-                raise FileNotFoundError(errno.ENOENT, "there is no such object", str(self)) from None
+                raise FileNotFoundError(
+                    errno.ENOENT, "there is no such object", str(self)
+                ) from None
             except (exceptions.AlreadyExistsError, exceptions.PreconditionError) as error:
                 if "performing PUT" not in str(error):  # 409 of a bucket that is being changed
                     raise self._refusal(error) from None
@@ -399,4 +430,6 @@ class RemotePath:
 
 
 def _status(meta: Any) -> Status:
-    return Status(st_size=meta["size"], st_mtime=meta["last_modified"].timestamp(), e_tag=meta["e_tag"])
+    return Status(
+        st_size=meta["size"], st_mtime=meta["last_modified"].timestamp(), e_tag=meta["e_tag"]
+    )

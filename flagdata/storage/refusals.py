@@ -1,7 +1,7 @@
 """Why a store refused a request or did not answer, as what it is and with its own remedy.
 
-A store names the cause by a code in its answer. Where the client has none, since the request was one whose answer has
-no body or there was no answer, the store is asked once more, directly.
+A store names the cause by a code in its answer. Where the client has none, since the request was
+one whose answer has no body or there was no answer, the store is asked once more, directly.
 """
 
 from __future__ import annotations
@@ -21,14 +21,21 @@ _NEEDS = {
     "POST": "s3:PutObject",
     "DELETE": "s3:DeleteObject",
 }
-"""Actions that requests need permission for, by Amazon's names; those of an upload's parts are a put's."""
-_LISTING, _DELETING = re.compile(r"list-type=2|list request"), re.compile(r"DeleteObjects|\?delete\b")
+"""Actions that requests need permission for, by Amazon's names; those of an upload's parts are a
+put's."""
+_LISTING, _DELETING = (
+    re.compile(r"list-type=2|list request"),
+    re.compile(r"DeleteObjects|\?delete\b"),
+)
 _METHOD = re.compile(r"Error performing ([A-Z]+)")
 _AHEAD = 240.0
-"""From how many seconds on a difference of clocks explains a refusal: stores allow 15 minutes, some of them 5."""
+"""From how many seconds on a difference of clocks explains a refusal: stores allow 15 minutes, some
+of them 5."""
 _CODE = re.compile(r"<Code>([\w.]+)</Code>|\(code: ([\w.]+)\)")
 _STATUS = re.compile(r"status code[\s:↳]+(\d{3})")
-_REGION = re.compile(r"<Region>([a-z0-9-]+)</Region>|<Endpoint>(?:[^<]*\.)?s3[.-]([a-z]+-[a-z-]+-\d)\.[^<]*</Endpoint>")
+_REGION = re.compile(
+    r"<Region>([a-z0-9-]+)</Region>|<Endpoint>(?:[^<]*\.)?s3[.-]([a-z]+-[a-z-]+-\d)\.[^<]*</Endpoint>"
+)
 _ACTION = re.compile(r"perform[\s:↳]+([\w-]+:\w+)")
 _UNNAMED = {301, 302, 307, 308, 400, 401, 403, 503, 507, None}
 """States of answers that may have any of several causes."""
@@ -39,8 +46,8 @@ class StoreError(OSError):
 
     Attributes:
         fix: what can be done about it.
-        passing: whether the answer was cut off, or lost, by a store that answers again; the client repeats no request
-            whose answer breaks off.
+        passing: whether the answer was cut off, or lost, by a store that answers again; the client
+            repeats no request whose answer breaks off.
     """
 
     fix = "check the network and the store"
@@ -58,7 +65,10 @@ class CredentialsError(StoreError, PermissionError):
 class NoBucketError(StoreError):
     """There is no such bucket at this end point."""
 
-    fix = "make the bucket with the store's own tools, or check its name and the end point (AWS_ENDPOINT_URL)"
+    fix = (
+        "make the bucket with the store's own tools, or check its name and the end point "
+        "(AWS_ENDPOINT_URL)"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,27 +86,39 @@ class Cause:
 
 _KEYS = "AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or AWS_PROFILE"
 _MISSING = Cause(
-    what="there are no credentials in the environment or in a profile", fix=f"set {_KEYS}", kind=CredentialsError
+    what="there are no credentials in the environment or in a profile",
+    fix=f"set {_KEYS}",
+    kind=CredentialsError,
 )
 _SLOW = Cause(
     what="the store asks for a lower request rate, and was asked again in vain",
     fix="run fewer commands on it at a time, or do it again later",
 )
 _FAILED = Cause(
-    what="the store failed, and was asked again in vain", fix="do it again later; its operator has the reason"
+    what="the store failed, and was asked again in vain",
+    fix="do it again later; its operator has the reason",
 )
-_LACKING = Cause(what="the store cannot do this", fix="use a store that speaks the whole of S3's protocol")
+_LACKING = Cause(
+    what="the store cannot do this", fix="use a store that speaks the whole of S3's protocol"
+)
 _REDIRECTED = Cause(
-    what="the store sends the request to another end point, as for a bucket that was made a short while ago",
-    fix="set AWS_REGION to the bucket's region and AWS_ENDPOINT_URL, if at all, to the end point of that region; for a"
+    what="the store sends the request to another end point, as for a bucket that was made a short "
+    "while ago",
+    fix="set AWS_REGION to the bucket's region and AWS_ENDPOINT_URL, if at all, to the end point "
+    "of that region; for a"
     " new bucket do it again in an hour",
 )
-_ABROAD = ("PermanentRedirect", "AuthorizationHeaderMalformed", "IllegalLocationConstraintException")
+_ABROAD = (
+    "PermanentRedirect",
+    "AuthorizationHeaderMalformed",
+    "IllegalLocationConstraintException",
+)
 _CLOCK = ("RequestTimeTooSkewed", "RequestExpired", "RequestInTheFuture")
 _CAUSES = {
     ("ExpiredToken", "ExpiredTokenException", "TokenRefreshRequired"): Cause(
         what="the credentials have expired",
-        fix="get new ones and set AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and AWS_SESSION_TOKEN, or renew the profile",
+        fix="get new ones and set AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY and AWS_SESSION_TOKEN, "
+        "or renew the profile",
         kind=CredentialsError,
     ),
     ("InvalidToken", "InvalidSecurity", "UnrecognizedClientException"): Cause(
@@ -106,13 +128,15 @@ _CAUSES = {
     ),
     ("InvalidAccessKeyId", "InvalidClientTokenId", "NotSignedUp"): Cause(
         what="the store does not know the access key",
-        fix="check the credentials: AWS_ACCESS_KEY_ID, or AWS_PROFILE, and that they are of the store at"
+        fix="check the credentials: AWS_ACCESS_KEY_ID, or AWS_PROFILE, and that they are of the "
+        "store at"
         " AWS_ENDPOINT_URL",
         kind=CredentialsError,
     ),
     ("SignatureDoesNotMatch",): Cause(
         what="the secret key is not that of the access key",
-        fix="check the credentials: AWS_SECRET_ACCESS_KEY, or AWS_PROFILE, without spaces or quotes around",
+        fix="check the credentials: AWS_SECRET_ACCESS_KEY, or AWS_PROFILE, without spaces or "
+        "quotes around",
         kind=CredentialsError,
     ),
     ("MissingSecurityHeader", "MissingAuthenticationToken", "CredentialsNotSupported"): _MISSING,
@@ -134,13 +158,23 @@ _CAUSES = {
         fix="set AWS_VIRTUAL_HOSTED_STYLE_REQUEST=true and AWS_ENDPOINT_URL to https://BUCKET.HOST",
     ),
     ("InvalidObjectState",): Cause(
-        what="the object is in an archive", fix="restore it from its storage class by the store's own tools"
+        what="the object is in an archive",
+        fix="restore it from its storage class by the store's own tools",
     ),
-    ("QuotaExceeded", "EntityTooLarge", "XMinioStorageFull", "InsufficientStorage", "InsufficientCapacity"): Cause(
-        what="the store has no room for it", fix="free some space in the store, or ask for a larger quota"
+    (
+        "QuotaExceeded",
+        "EntityTooLarge",
+        "XMinioStorageFull",
+        "InsufficientStorage",
+        "InsufficientCapacity",
+    ): Cause(
+        what="the store has no room for it",
+        fix="free some space in the store, or ask for a larger quota",
     ),
     ("AllAccessDisabled", "AccountProblem"): Cause(
-        what="the account is closed or suspended", fix="ask the store's operator", kind=CredentialsError
+        what="the account is closed or suspended",
+        fix="ask the store's operator",
+        kind=CredentialsError,
     ),
     (
         "KMS.DisabledException",
@@ -153,7 +187,14 @@ _CAUSES = {
     ),
 }
 _BY_CODE = {code: cause for codes, cause in _CAUSES.items() for code in codes}
-_BY_STATUS = {429: _SLOW, 501: _LACKING, 405: _LACKING, 307: _REDIRECTED, 302: _REDIRECTED, 308: _REDIRECTED}
+_BY_STATUS = {
+    429: _SLOW,
+    501: _LACKING,
+    405: _LACKING,
+    307: _REDIRECTED,
+    302: _REDIRECTED,
+    308: _REDIRECTED,
+}
 
 
 def refusal(error: BaseException, *, bucket: str, where: str) -> StoreError:
@@ -178,8 +219,16 @@ def refusal(error: BaseException, *, bucket: str, where: str) -> StoreError:
             passing = cause is None and status is None
     if cause is None:
         cause = _of_status(status, needs)
-    store_said = plain(error) if cause.what == "" or "<Message>" in text else "" if state is None else state[0]
-    message = f"{cause.what} ({store_said})" if cause.what and store_said else cause.what or store_said
+    store_said = (
+        plain(error)
+        if cause.what == "" or "<Message>" in text
+        else ""
+        if state is None
+        else state[0]
+    )
+    message = (
+        f"{cause.what} ({store_said})" if cause.what and store_said else cause.what or store_said
+    )
     error_found = _error(cause, message, where)
     error_found.passing = passing
     return error_found
@@ -194,8 +243,14 @@ def refusal_of(answer: Answer | Unreachable, *, bucket: str, where: str, needs: 
     if isinstance(answer, Unreachable):
         return _error(Cause(what=answer.what, fix=answer.fix), answer.what, where)
     text = answer.body.decode(errors="replace")
-    cause = _cause(answer.code, answer.status, text, bucket=bucket, needs=needs) or _of_status(answer.status, needs)
-    return _error(cause, f"{cause.what or 'the store answered otherwise'} (status code: {answer.status})", where)
+    cause = _cause(answer.code, answer.status, text, bucket=bucket, needs=needs) or _of_status(
+        answer.status, needs
+    )
+    return _error(
+        cause,
+        f"{cause.what or 'the store answered otherwise'} (status code: {answer.status})",
+        where,
+    )
 
 
 def store_time(bucket: str) -> float:
@@ -208,7 +263,9 @@ def store_time(bucket: str) -> float:
     if isinstance(answer, Unreachable):
         raise refusal_of(answer, bucket=bucket, where=f"s3://{bucket}", needs="")
     if answer.date is None:
-        raise StoreError(errno.EREMOTEIO, "the store's answers do not state its time (Date)", f"s3://{bucket}")
+        raise StoreError(
+            errno.EREMOTEIO, "the store's answers do not state its time (Date)", f"s3://{bucket}"
+        )
     return answer.date.timestamp()
 
 
@@ -235,12 +292,16 @@ def _needs(text: str) -> str:
     return _NEEDS.get(method[1], "the action") if method else "the action"
 
 
-def _cause(code: str | None, status: int | None, text: str, *, bucket: str, needs: str) -> Cause | None:
+def _cause(
+    code: str | None, status: int | None, text: str, *, bucket: str, needs: str
+) -> Cause | None:
     """Finds the cause that a code names."""
     if code in _ABROAD:
         return _abroad(_first(_REGION, text) or _region_of(bucket))
     if code == "NoSuchBucket":
-        return Cause(what=f"there is no bucket {bucket!r}", fix=NoBucketError.fix, kind=NoBucketError)
+        return Cause(
+            what=f"there is no bucket {bucket!r}", fix=NoBucketError.fix, kind=NoBucketError
+        )
     if code in _CLOCK:
         answer = send_request(bucket, {"location": ""}, method="HEAD", waits=SHORTLY)
         return _skewed_cause(_ahead(answer) if isinstance(answer, Answer) else None)
@@ -251,7 +312,9 @@ def _cause(code: str | None, status: int | None, text: str, *, bucket: str, need
     return _BY_CODE.get(code or "")
 
 
-def _answered_cause(answer: Answer, *, bucket: str, needs: str, refused: int | None) -> Cause | None:
+def _answered_cause(
+    answer: Answer, *, bucket: str, needs: str, refused: int | None
+) -> Cause | None:
     """Finds the cause that the store's answer to another request shows."""
     region = answer.headers.get("x-amz-bucket-region")
     if answer.status != 200 and region is not None and region != settings()["aws_region"]:
@@ -287,9 +350,13 @@ def _abroad(region: str | None) -> Cause:
     end = ", and AWS_ENDPOINT_URL, if it is set, to the end point of that region"
     if region is None or region == used:
         return Cause(
-            what=f"the bucket is in another region than {used}", fix=f"set AWS_REGION to the bucket's region{end}"
+            what=f"the bucket is in another region than {used}",
+            fix=f"set AWS_REGION to the bucket's region{end}",
         )
-    return Cause(what=f"the bucket is in the region {region}, not in {used}", fix=f"set AWS_REGION={region}{end}")
+    return Cause(
+        what=f"the bucket is in the region {region}, not in {used}",
+        fix=f"set AWS_REGION={region}{end}",
+    )
 
 
 def _skewed_cause(ahead: float | None) -> Cause:
@@ -305,7 +372,10 @@ def _denied_cause(needs: str) -> Cause:
     if needs.startswith("kms:"):
         fix = f"have {needs} permitted on the key that encrypts the bucket"
         return Cause(what="the key service does not permit it", fix=fix, kind=DeniedError)
-    fix = f"have {needs} permitted (by the policies of user and bucket), or give other credentials: {_KEYS}"
+    fix = (
+        f"have {needs} permitted (by the policies of user and bucket), or give other credentials: "
+        f"{_KEYS}"
+    )
     return Cause(what=f"{needs} is not permitted", fix=fix, kind=DeniedError)
 
 

@@ -1,7 +1,8 @@
-"""Requests that the client library does not make: signed by version 4 of Amazon's process, over the standard library.
+"""Requests that the client library does not make: signed by version 4 of Amazon's process, over the
+standard library.
 
-They list and abort uploads in parts, ask for the store's time, and find out why the client was refused: the client's
-errors of requests without a body state neither code nor headers.
+They list and abort uploads in parts, ask for the store's time, and find out why the client was
+refused: the client's errors of requests without a body state neither code nor headers.
 """
 
 from __future__ import annotations
@@ -81,18 +82,30 @@ class _Staying(urllib.request.HTTPRedirectHandler):
     """Follows no redirection: the signature is of one place."""
 
     def redirect_request(
-        self, req: urllib.request.Request, fp: IO[bytes], code: int, msg: str, headers: HTTPMessage, newurl: str
+        self,
+        req: urllib.request.Request,
+        fp: IO[bytes],
+        code: int,
+        msg: str,
+        headers: HTTPMessage,
+        newurl: str,
     ) -> None:
         return None
 
 
 def send_request(
-    bucket: str, query: Mapping[str, str], *, method: str = "GET", key: str = "", waits: Sequence[float] = _WAITS
+    bucket: str,
+    query: Mapping[str, str],
+    *,
+    method: str = "GET",
+    key: str = "",
+    waits: Sequence[float] = _WAITS,
 ) -> Answer | Unreachable:
     """Sends a request for a bucket, or for a key of it, and returns the store's answer.
 
     Args:
-        waits: before a request that failed in the store, or whose answer broke off, is sent again [s].
+        waits: before a request that failed in the store, or whose answer broke off, is sent again
+            [s].
     """
     answer = _once(bucket, query, method, key)
     for wait in waits:
@@ -107,9 +120,13 @@ def _once(bucket: str, query: Mapping[str, str], method: str, key: str) -> Answe
     url = _address(bucket, key)
     text = urlencode(sorted(query.items()), quote_via=quote, safe="-_.~")
     headers = signed_headers(method, url, text, settings(), when=datetime.now(UTC))
-    request = urllib.request.Request(urlsplit(url)._replace(query=text).geturl(), method=method, headers=headers)
+    request = urllib.request.Request(
+        urlsplit(url)._replace(query=text).geturl(), method=method, headers=headers
+    )
     try:
-        with urllib.request.build_opener(_Staying).open(request, timeout=2 * CONNECT_TIMEOUT) as answer:
+        with urllib.request.build_opener(_Staying).open(
+            request, timeout=2 * CONNECT_TIMEOUT
+        ) as answer:
             return _answer(answer.status, answer.headers, answer.read())
     except HTTPError as error:
         with error:
@@ -119,9 +136,16 @@ def _once(bucket: str, query: Mapping[str, str], method: str, key: str) -> Answe
 
 
 def signed_headers(
-    method: str, url: str, query: str, options: Mapping[str, str], *, when: datetime, service: str = "s3"
+    method: str,
+    url: str,
+    query: str,
+    options: Mapping[str, str],
+    *,
+    when: datetime,
+    service: str = "s3",
 ) -> dict[str, str]:
-    """Signs the headers of a request without a body; without access keys those of one that nobody has signed.
+    """Signs the headers of a request without a body; without access keys those of one that nobody
+    has signed.
 
     Args:
         query: as it is sent, its names in order.
@@ -131,7 +155,11 @@ def signed_headers(
     """
     parts = urlsplit(url)
     stamp = when.strftime("%Y%m%dT%H%M%SZ")
-    headers = {"host": parts.netloc.rpartition("@")[2], "x-amz-content-sha256": _NOTHING, "x-amz-date": stamp}
+    headers = {
+        "host": parts.netloc.rpartition("@")[2],
+        "x-amz-content-sha256": _NOTHING,
+        "x-amz-date": stamp,
+    }
     if "aws_session_token" in options:
         headers["x-amz-security-token"] = options["aws_session_token"]
     if "aws_access_key_id" not in options or "aws_secret_access_key" not in options:
@@ -146,12 +174,15 @@ def signed_headers(
         secret = hmac.digest(secret, part.encode(), "sha256")
     signature = hmac.new(secret, text.encode(), "sha256").hexdigest()
     credential = f"{options['aws_access_key_id']}/{scope}"
-    headers["Authorization"] = f"AWS4-HMAC-SHA256 Credential={credential}, SignedHeaders={names}, Signature={signature}"
+    headers["Authorization"] = (
+        f"AWS4-HMAC-SHA256 Credential={credential}, SignedHeaders={names}, Signature={signature}"
+    )
     return headers
 
 
 def _address(bucket: str, key: str) -> str:
-    """Builds the URL of a key as the client writes it: behind the bucket's name, or at a host of the bucket's own."""
+    """Builds the URL of a key as the client writes it: behind the bucket's name, or at a host of
+    the bucket's own."""
     options = settings()
     virtual = os.environ.get(_VIRTUAL, "").lower() in ("1", "true", "yes", "on")
     endpoint = options.get("aws_endpoint")
@@ -164,7 +195,9 @@ def _address(bucket: str, key: str) -> str:
 
 
 def _answer(status: int, headers: Any, body: bytes) -> Answer:
-    return Answer(status=status, headers={name.lower(): value for name, value in headers.items()}, body=body)
+    return Answer(
+        status=status, headers={name.lower(): value for name, value in headers.items()}, body=body
+    )
 
 
 def _unreachable(reason: Any, url: str) -> Unreachable:
@@ -173,31 +206,43 @@ def _unreachable(reason: Any, url: str) -> Unreachable:
     host = parts.hostname or ""
     proxy = urllib.request.getproxies().get(parts.scheme)
     if proxy is not None and not urllib.request.proxy_bypass(host):
-        message = f"there was no answer of {host} through the proxy {redact_credentials(proxy)}: {_one_line(reason)}"
+        message = (
+            f"there was no answer of {host} through the proxy {redact_credentials(proxy)}: "
+            f"{_one_line(reason)}"
+        )
         variable = f"{parts.scheme.upper()}_PROXY"
         return Unreachable(
-            what=message, fix=f"check {variable}, or name {host} in NO_PROXY to reach it without a proxy"
+            what=message,
+            fix=f"check {variable}, or name {host} in NO_PROXY to reach it without a proxy",
         )
     end_point = "check the end point (AWS_ENDPOINT_URL)"
     if isinstance(reason, socket.gaierror):
         return Unreachable(
-            what=f"the name {host} has no address", fix=f"{end_point}, the region (AWS_REGION), and the network's DNS"
+            what=f"the name {host} has no address",
+            fix=f"{end_point}, the region (AWS_REGION), and the network's DNS",
         )
     if isinstance(reason, ssl.SSLCertVerificationError):
         return Unreachable(
             what=f"the certificate of {host} is not trusted: {reason.verify_message}",
-            fix="name the file of the authority that signed it in SSL_CERT_FILE, or check the end point"
+            fix="name the file of the authority that signed it in SSL_CERT_FILE, or check the end "
+            "point"
             " (AWS_ENDPOINT_URL) and this machine's clock",
         )
     if isinstance(reason, ssl.SSLError):
         return Unreachable(
-            what=f"{host} does not speak TLS: {_one_line(reason)}", fix=f"{end_point}: http:// or https://"
+            what=f"{host} does not speak TLS: {_one_line(reason)}",
+            fix=f"{end_point}: http:// or https://",
         )
     if isinstance(reason, ConnectionRefusedError):
-        message = f"{host} refuses connections to port {parts.port or (443 if parts.scheme == 'https' else 80)}"
+        message = (
+            f"{host} refuses connections to port "
+            f"{parts.port or (443 if parts.scheme == 'https' else 80)}"
+        )
         return Unreachable(what=message, fix=f"{end_point}, and that the store runs")
     if isinstance(reason, TimeoutError):
-        return Unreachable(what=f"{host} did not answer in time", fix=f"{end_point}, the network and its firewall")
+        return Unreachable(
+            what=f"{host} did not answer in time", fix=f"{end_point}, the network and its firewall"
+        )
     message = f"there was no answer of {host}: {_one_line(reason)}"
     broken = isinstance(reason, HTTPException | ConnectionError)
     return Unreachable(what=message, fix=f"{end_point} and the network", broken=broken)

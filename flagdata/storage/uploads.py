@@ -1,4 +1,5 @@
-"""Uploads in parts that were never finished: no listing of a bucket shows their parts, and its owner pays for them.
+"""Uploads in parts that were never finished: no listing of a bucket shows their parts, and its
+owner pays for them.
 
 A process that was killed leaves them. `doctor` names them, `gc` aborts them; a rule of the bucket
 (AbortIncompleteMultipartUpload) does so too.
@@ -43,9 +44,13 @@ class Upload:
         Raises:
             StoreError: the store did not.
         """
-        answer = send_request(self.bucket, {"uploadId": self.identity}, method="DELETE", key=self.key)
+        answer = send_request(
+            self.bucket, {"uploadId": self.identity}, method="DELETE", key=self.key
+        )
         if not isinstance(answer, Answer) or answer.status not in _GONE:
-            raise refusal_of(answer, bucket=self.bucket, where=str(self), needs="s3:AbortMultipartUpload")
+            raise refusal_of(
+                answer, bucket=self.bucket, where=str(self), needs="s3:AbortMultipartUpload"
+            )
 
 
 def list_unfinished(bucket: str, prefix: str) -> list[Upload]:
@@ -64,13 +69,19 @@ def _list_uploads(bucket: str, prefix: str) -> Iterator[Upload]:
         page = _page(answer)
         if page is None:
             raise refusal_of(
-                answer, bucket=bucket, where=f"s3://{bucket}/{prefix}", needs="s3:ListBucketMultipartUploads"
+                answer,
+                bucket=bucket,
+                where=f"s3://{bucket}/{prefix}",
+                needs="s3:ListBucketMultipartUploads",
             )
         for entry in page.findall("{*}Upload"):
             upload = _upload(bucket, entry)
             if upload is not None and upload.key.startswith(prefix):
                 yield upload
-        following = {"key-marker": _text(page, "NextKeyMarker"), "upload-id-marker": _text(page, "NextUploadIdMarker")}
+        following = {
+            "key-marker": _text(page, "NextKeyMarker"),
+            "upload-id-marker": _text(page, "NextUploadIdMarker"),
+        }
         if _text(page, "IsTruncated") != "true" or following == marks:
             return
         marks = following
@@ -93,7 +104,9 @@ def _upload(bucket: str, entry: ET.Element) -> Upload | None:
     except ValueError:  # not the time that a store writes: as old as can be
         begun = 0.0
     key, identity = _text(entry, "Key"), _text(entry, "UploadId")
-    return Upload(bucket=bucket, key=key, identity=identity, begun=begun) if key and identity else None
+    return (
+        Upload(bucket=bucket, key=key, identity=identity, begun=begun) if key and identity else None
+    )
 
 
 def _text(element: ET.Element, name: str) -> str:

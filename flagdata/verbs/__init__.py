@@ -1,1 +1,2 @@
-"""A verb stated once: its options, from which the command, the Python call and their documentation are made."""
+"""A verb stated once: its options, from which the command, the Python call and their documentation
+are made."""

@@ -1,4 +1,5 @@
-"""Values of the command line that are more than a text or a number: lengths of time, stated numbers, shares."""
+"""Values of the command line that are more than a text or a number: lengths of time, stated
+numbers, shares."""
 
 from __future__ import annotations
 
@@ -9,13 +10,22 @@ import click
 from flagdata.core.stated import Stated, parse
 from flagdata.errors import UsageError
 
-_SECONDS = {"ms": 1e-3, "s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0, "d": 86_400.0, "day": 86_400.0}
+_SECONDS = {
+    "ms": 1e-3,
+    "s": 1.0,
+    "m": 60.0,
+    "min": 60.0,
+    "h": 3600.0,
+    "d": 86_400.0,
+    "day": 86_400.0,
+}
 _CENTURY = 36_525 * 86_400.0  # s
 _WRITTEN = re.compile(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*(ms|s|min|m|h|day|d)\s*")
 
 
 def written_seconds(text: str) -> float | None:
-    """Returns the seconds of a length of time such as 10s, 2min or 1h; None where the text is none, or has no unit."""
+    """Returns the seconds of a length of time such as 10s, 2min or 1h; None where the text is none,
+    or has no unit."""
     found = _WRITTEN.fullmatch(text)
     return None if found is None else float(found[1]) * _SECONDS[found[2]]
 
@@ -25,13 +35,19 @@ class Duration(click.ParamType):
 
     name = "time"
 
-    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> float:
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
         """Returns the seconds."""
         if isinstance(value, float):
             return value
         seconds = written_seconds(str(value))
         if seconds is None:
-            self.fail(f"{value!r} is not a length of time; give a number and ms, s, min, h or d, e.g. 10s", param, ctx)
+            self.fail(
+                f"{value!r} is not a length of time; give a number and ms, s, min, h or d, e.g. 10s",
+                param,
+                ctx,
+            )
         if seconds > _CENTURY:
             self.fail(f"{value!r} is more than a century", param, ctx)
         return seconds
@@ -43,7 +59,9 @@ class StatedNumber(click.ParamType):
 
     name = "number"
 
-    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Stated:
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Stated:
         """Returns what it states."""
         if isinstance(value, Stated):
             return value
@@ -58,9 +76,13 @@ class Listed(click.ParamType):
 
     name = "list"
 
-    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> list[str]:
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> list[str]:
         """Returns the texts, without blanks around them."""
-        return [text.strip() for text in value.split(",")] if isinstance(value, str) else list(value)  # type: ignore[call-overload]
+        return (
+            [text.strip() for text in value.split(",")] if isinstance(value, str) else list(value)
+        )  # type: ignore[call-overload]
 
 
 DURATION = Duration()

@@ -1,4 +1,5 @@
-"""Options that several verbs share, each stated once: a verb's class of options inherits those that it takes."""
+"""Options that several verbs share, each stated once: a verb's class of options inherits those that
+it takes."""
 
 from __future__ import annotations
 
@@ -62,7 +63,8 @@ class AtVersion:
     """The version of a lake that a verb looks at."""
 
     at: str | None = option(
-        "Tag, branch, version number, commit, or main at a time: 2026-11-26 (its end, UTC), 3.days.ago; the head of "
+        "Tag, branch, version number, commit, or main at a time: 2026-11-26 (its end, UTC), "
+        "3.days.ago; the head of "
         "main by default.",
         default=None,
         metavar="REF",
@@ -77,7 +79,9 @@ class NamedRecording:
         "What to call the recording; the camera's name by default.", default=None, section=RECORDING
     )
     session: str | None = option(
-        "One set-up at one place, for splits; the parents' by default.", default=None, section=RECORDING
+        "One set-up at one place, for splits; the parents' by default.",
+        default=None,
+        section=RECORDING,
     )
 
 
@@ -113,7 +117,9 @@ class OfGarbage:
 class InFull:
     """How much of many relatives is listed."""
 
-    whole: bool = option("All columns and all relatives, also where there are many.", "--all", default=False)
+    whole: bool = option(
+        "All columns and all relatives, also where there are many.", "--all", default=False
+    )
 
 
 @options
@@ -142,14 +148,16 @@ class ByNulls(Shared):
         "Significance level of the test; 0.05 by default.", default=None, section=TEST, type=SHARE
     )
     nulls: int | None = option(
-        "Number of recordings without any effect to simulate for comparison, 160 or more; on films the number of "
+        "Number of recordings without any effect to simulate for comparison, 160 or more; on films "
+        "the number of "
         "meshes and time-stepping methods, 20 by default.",
         default=None,
         section=TEST,
         type=POSITIVE,
     )
     bank: Path | None = option(
-        "Folder of such simulations that were made before, by the study `challenge bank` of a checkout.",
+        "Folder of such simulations that were made before, by the study `challenge bank` of a "
+        "checkout.",
         default=None,
         section=TEST,
         type=LocalPath(exists=True),
@@ -160,7 +168,9 @@ class ByNulls(Shared):
         section=HOW,
         metavar="ADDRESS",
     )
-    seed: int = option("Seed of the simulated nulls.", default=0, section=TEST, type=click.IntRange(min=0))
+    seed: int = option(
+        "Seed of the simulated nulls.", default=0, section=TEST, type=click.IntRange(min=0)
+    )
 
 
 @options
@@ -188,7 +198,9 @@ class BesideLake(NamedLake):
     """The same, at one of its versions."""
 
     at: str | None = option(
-        "Tag, branch or version of the lake to look at; by default the branch's head.", default=None, metavar="REF"
+        "Tag, branch or version of the lake to look at; by default the branch's head.",
+        default=None,
+        metavar="REF",
     )
 
 
@@ -236,16 +248,23 @@ class OfCloth:
         metavar="X,Y,W,H",
     )
     flag: int | None = option(
-        "Which moving cloth, as numbered on the page of measure --report; by default the one that moves most.",
+        "Which moving cloth, as numbered on the page of measure --report; by default the one that "
+        "moves most.",
         default=None,
         section=FILM,
         type=POSITIVE,
         metavar="N",
     )
     start: float | None = option(
-        "Where to begin in the film [s], as in 12s.", default=None, section=FILM, type=DURATION, metavar="TIME"
+        "Where to begin in the film [s], as in 12s.",
+        default=None,
+        section=FILM,
+        type=DURATION,
+        metavar="TIME",
     )
-    end: float | None = option("Where to end [s].", default=None, section=FILM, type=DURATION, metavar="TIME")
+    end: float | None = option(
+        "Where to end [s].", default=None, section=FILM, type=DURATION, metavar="TIME"
+    )
 
 
 @options
@@ -253,9 +272,14 @@ class OfFilm(OfCloth):
     """The same, and the rates of a film that is a file."""
 
     true_fps: float | None = option(
-        "Rate at which a high-speed camera really ran [Hz].", default=None, section=FILM, metavar="HZ"
+        "Rate at which a high-speed camera really ran [Hz].",
+        default=None,
+        section=FILM,
+        metavar="HZ",
     )
-    sequence_fps: float | None = option("Rate of a folder of images [Hz].", default=None, section=FILM, metavar="HZ")
+    sequence_fps: float | None = option(
+        "Rate of a folder of images [Hz].", default=None, section=FILM, metavar="HZ"
+    )
 
 
 @options

@@ -1,4 +1,5 @@
-"""Options of a verb, stated once: its command, its Python call and their documentation are made from one dataclass.
+"""Options of a verb, stated once: its command, its Python call and their documentation are made
+from one dataclass.
 
     @options
     class Observing(OfFilm):
@@ -8,11 +9,12 @@
     @command(Observing)                    @called(Observing)
     def observe(chosen: Observing): ...    def observe(chosen: Observing): ...
 
-A verb's arguments are what its Python call takes by position. What several verbs share is a class that theirs inherit;
-what only the command has, as the form of what it prints, is a class that inherits that of the call.
+A verb's arguments are what its Python call takes by position. What several verbs share is a class
+that theirs inherit; what only the command has, as the form of what it prints, is a class that
+inherits that of the call.
 
-Where command and call differ in nothing but that, one function makes both. It yields its result, which the call returns
-and `--json` prints; what it does afterwards prints the result for people.
+Where command and call differ in nothing but that, one function makes both. It yields its result,
+which the call returns and `--json` prints; what it does afterwards prints the result for people.
 
     @verb(Listing, example='flagdata.ls(lake="field.lake")["artifacts"]')
     def ls(chosen: Listing) -> Iterator[Result]:
@@ -79,7 +81,8 @@ class Option:
         section: of a long help.
         argument: whether the command takes it by position.
         was: its names of the last version, which are read with a warning.
-        now: what says it now, of an option of the last version that no help shows; it is read with a warning.
+        now: what says it now, of an option of the last version that no help shows; it is read with
+            a warning.
         click: more that `click.Option` or `click.Argument` is given.
     """
 
@@ -93,7 +96,9 @@ class Option:
 
     def spelling_of(self, key: str) -> str:
         """Returns the name on the command line that errors use, of the option of such a field."""
-        return next((name for name in self.names if name.startswith("--")), f"--{key.replace('_', '-')}")
+        return next(
+            (name for name in self.names if name.startswith("--")), f"--{key.replace('_', '-')}"
+        )
 
 
 def option(
@@ -159,9 +164,15 @@ def described_fields(form: type) -> dict[str, tuple[Field[Any], Option]]:
     What a class states in `HELP`, field → text, stands in place of the help that it inherits.
     """
     table = {one.name: one for one in fields(form)}
-    names = dict.fromkeys(name for base in form.__mro__ for name in vars(base).get("__annotations__", ()))
+    names = dict.fromkeys(
+        name for base in form.__mro__ for name in vars(base).get("__annotations__", ())
+    )
     texts: dict[str, str] = getattr(form, "HELP", {})
-    return {name: (table[name], _help_of_option(table[name], texts.get(name))) for name in names if name in table}
+    return {
+        name: (table[name], _help_of_option(table[name], texts.get(name)))
+        for name in names
+        if name in table
+    }
 
 
 def _help_of_option(of_option: Field[Any], text: str | None) -> Option:
@@ -190,7 +201,9 @@ class SectionedOption(click.Option):
         was: its names of the last version.
     """
 
-    def __init__(self, *names: Any, section: str = REST, was: tuple[str, ...] = (), **more: Any) -> None:
+    def __init__(
+        self, *names: Any, section: str = REST, was: tuple[str, ...] = (), **more: Any
+    ) -> None:
         super().__init__(*names, **more)
         self.section = section
         self.was = was
@@ -209,14 +222,17 @@ class PlacedArgument(click.Argument):
 
 
 class LongCommand(click.Command):
-    """A command whose help prints its options in their sections, and that reads their names of the last version."""
+    """A command whose help prints its options in their sections, and that reads their names of the
+    last version."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         options = [param for param in self.params if isinstance(param, SectionedOption)]
         renamed = {old: option.opts[0] for option in options for old in option.was}
         arguments = [param for param in self.params if isinstance(param, PlacedArgument)]
         by_position = {
-            old: argument.make_metavar(ctx).removesuffix("...") for argument in arguments for old in argument.was
+            old: argument.make_metavar(ctx).removesuffix("...")
+            for argument in arguments
+            for old in argument.was
         }
         words = [word for name in args for word in _by_position(name, by_position)]
         return super().parse_args(ctx, [_present(word, renamed, args) for word in words])
@@ -259,7 +275,11 @@ def command(
     def made(run: Callable[[Any], object]) -> LongCommand:
         def callback(**values: Any) -> object:
             context = click.get_current_context()
-            names = {one for one in values if context.get_parameter_source(one) is ParameterSource.COMMANDLINE}
+            names = {
+                one
+                for one in values
+                if context.get_parameter_source(one) is ParameterSource.COMMANDLINE
+            }
             return run(_with_typed(form(**values), frozenset(names)))
 
         return cls(
@@ -273,7 +293,8 @@ def command(
 
 
 def _present(word: str, renamed: Mapping[str, str], words: Collection[str]) -> str:
-    """Returns a word of a command line with the name that an option has now, and warns of the old one.
+    """Returns a word of a command line with the name that an option has now, and warns of the old
+    one.
 
     Raises:
         UsageError: there are both names among the words.
@@ -287,7 +308,8 @@ def _present(word: str, renamed: Mapping[str, str], words: Collection[str]) -> s
 
 
 def _by_position(word: str, names: Mapping[str, str]) -> tuple[str, ...]:
-    """Returns a word of a command line without the name of an option whose value is an argument now, and warns."""
+    """Returns a word of a command line without the name of an option whose value is an argument
+    now, and warns."""
     name, _, value = word.partition("=")
     if name not in names:
         return (word,)
@@ -296,14 +318,20 @@ def _by_position(word: str, names: Mapping[str, str]) -> tuple[str, ...]:
 
 
 def _parameter(key: str, place: Field[Any], row: Option) -> click.Parameter:
-    """Returns the parameter of a field; its kind is read from the annotation where the option states no other."""
+    """Returns the parameter of a field; its kind is read from the annotation where the option
+    states no other."""
     kind = str(place.type).removesuffix(" | None")
-    more: dict[str, Any] = {"type": _KINDS.get(kind.removeprefix("tuple[").removesuffix(", ...]")), **row.click}
+    more: dict[str, Any] = {
+        "type": _KINDS.get(kind.removeprefix("tuple[").removesuffix(", ...]")),
+        **row.click,
+    }
     several = kind.endswith(", ...]")
     required = place.default is MISSING
     if row.argument:
         several = {"nargs": -1} if several else {}
-        return PlacedArgument([key], required=required, was=row.was, **{"default": None, **several, **more})
+        return PlacedArgument(
+            [key], required=required, was=row.was, **{"default": None, **several, **more}
+        )
     if kind == "bool":
         more.update(is_flag=True, type=None)
     elif several:
@@ -312,27 +340,46 @@ def _parameter(key: str, place: Field[Any], row: Option) -> click.Parameter:
         more = {"show_default": True, **more}
     names = row.names or (row.spelling_of(key),)
     default = {} if required else {"default": more.pop("default", place.default)}
-    about = f"{row.about.removesuffix('.')}; also {more['envvar']}." if "envvar" in more else row.about
+    about = (
+        f"{row.about.removesuffix('.')}; also {more['envvar']}." if "envvar" in more else row.about
+    )
     return SectionedOption(
-        [*names, key], section=row.section, was=row.was, help=about, required=required, **default, **more
+        [*names, key],
+        section=row.section,
+        was=row.was,
+        help=about,
+        required=required,
+        **default,
+        **more,
     )
 
 
 def make_call(form: Callable[P, object]) -> Callable[[Callable[[Any], R]], Callable[P, R]]:
     """Makes the Python call of a verb from the class of its options and the function that runs it.
 
-    Values become plain Python's, each by its annotation (`flagdata.core.arguments`). The options are described in the
-    call's docstring, before what it raises. Errors about an option name it as the call does.
+    Values become plain Python's, each by its annotation (`flagdata.core.arguments`). The options
+    are described in the call's docstring, before what it raises. Errors about an option name it as
+    the call does.
     """
     from flagdata.core.arguments import converter  # loads NumPy
 
     build: Any = form
     rows = described_fields(build)
-    converts = {key: plain for key, (place, _) in rows.items() if (plain := converter(str(place.type))) is not None}
-    floats = {key for key, (place, _) in rows.items() if str(place.type).removesuffix(" | None") == "float"}
+    converts = {
+        key: plain
+        for key, (place, _) in rows.items()
+        if (plain := converter(str(place.type))) is not None
+    }
+    floats = {
+        key
+        for key, (place, _) in rows.items()
+        if str(place.type).removesuffix(" | None") == "float"
+    }
     signature = inspect.signature(form)
     renamed = {_keyword(old): key for key, (_, row) in rows.items() for old in row.was}
-    spelled = {name: key for key, (_, row) in rows.items() for name in (*row.names, row.spelling_of(key))}
+    spelled = {
+        name: key for key, (_, row) in rows.items() for name in (*row.names, row.spelling_of(key))
+    }
     ordered = sorted((signature.parameters[key] for key in rows), key=lambda one: one.kind)
 
     def made(run: Callable[[Any], R]) -> Callable[P, R]:
@@ -340,16 +387,25 @@ def make_call(form: Callable[P, object]) -> Callable[[Callable[[Any], R]], Calla
         def call(*positional: P.args, **named: P.kwargs) -> R:
             present = {_present(key, renamed, named): value for key, value in named.items()}
             values = bind(*positional, **present).arguments
-            plain = {key: converts[key](value, key) if key in converts else value for key, value in values.items()}
-            plain |= {key: float(plain[key]) for key in floats & plain.keys() if plain[key] is not None}
+            plain = {
+                key: converts[key](value, key) if key in converts else value
+                for key, value in values.items()
+            }
+            plain |= {
+                key: float(plain[key]) for key in floats & plain.keys() if plain[key] is not None
+            }
             try:
                 return run(_with_typed(build(**plain), frozenset(plain)))
             except FlagdataError as error:
                 if error.where in spelled:
-                    FlagdataError.__init__(error, error.what, where=spelled[error.where], fix=error.fix)
+                    FlagdataError.__init__(
+                        error, error.what, where=spelled[error.where], fix=error.fix
+                    )
                 raise
 
-        shown = signature.replace(parameters=ordered, return_annotation=run.__annotations__.get("return"))
+        shown = signature.replace(
+            parameters=ordered, return_annotation=run.__annotations__.get("return")
+        )
         bind: Any = shown.bind
         head, raised, rest = (inspect.getdoc(run) or "").partition("\nRaises:")
         vars(call).update(converts=frozenset(converts), __signature__=shown)
@@ -382,9 +438,9 @@ def verb(
 ) -> Callable[[Callable[[Any], Iterator[Result]]], Callable[P, Mapping[str, Any]]]:
     """Makes the Python call of a verb from the class of its options and the function that runs it.
 
-    Its attribute `command` is the command of the same name, which has `--json` beside the options of the class, and
-    `result` takes an object of the class. The function's docstring is the help. A function that yields nothing leaves
-    the result to another process.
+    Its attribute `command` is the command of the same name, which has `--json` beside the options
+    of the class, and `result` takes an object of the class. The function's docstring is the help. A
+    function that yields nothing leaves the result to another process.
 
     Args:
         example: of the call, in place of the command lines of the help.
@@ -411,10 +467,17 @@ def verb(
                 return next(steps, _NOTHING).content
 
         bases: Any = (form, AsJson)
-        shown = command(options(type(run.__name__, bases, {"__module__": run.__module__})))(print_result)
+        shown = command(options(type(run.__name__, bases, {"__module__": run.__module__})))(
+            print_result
+        )
         name = str(shown.name)
-        about = (part for part in (inspect.getdoc(run) or "").split("\n\n") if not part.startswith("\b"))
-        shows = (f"```python\n{example}\n```", f"Returns:\n    What `flagdata {name} --json` prints.")
+        about = (
+            part for part in (inspect.getdoc(run) or "").split("\n\n") if not part.startswith("\b")
+        )
+        shows = (
+            f"```python\n{example}\n```",
+            f"Returns:\n    What `flagdata {name} --json` prints.",
+        )
         result.__doc__ = "\n\n".join((*about, *shows))
         result.__annotations__ = {"return": "Mapping[str, Any]"}
         call = make_call(form)(result)
@@ -437,6 +500,8 @@ def _told(row: Option) -> str:
 def _arguments(rows: Mapping[str, tuple[Field[Any], Option]]) -> str:
     """Returns what a docstring says of each option."""
     return "\n".join(
-        textwrap.fill(f"{key}: {_told(row)}", _WIDTH, initial_indent="    ", subsequent_indent="        ")
+        textwrap.fill(
+            f"{key}: {_told(row)}", _WIDTH, initial_indent="    ", subsequent_indent="        "
+        )
         for key, (_, row) in rows.items()
     )

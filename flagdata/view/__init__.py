@@ -1,7 +1,8 @@
-"""The page of a lake, `flagdata view`: read-only, on this machine alone, with no part from anywhere else.
+"""The page of a lake, `flagdata view`: read-only, on this machine alone, with no part from anywhere
+else.
 
-films (what moves, as pictures) → media (thumbnails, frames, winds as answers) → pages (HTML) → routes (addresses to
-answers, without a socket) → server (the socket and who may ask).
+films (what moves, as pictures) → media (thumbnails, frames, winds as answers) → pages (HTML) →
+routes (addresses to answers, without a socket) → server (the socket and who may ask).
 """
 
 from __future__ import annotations

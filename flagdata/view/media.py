@@ -53,7 +53,9 @@ class Media:
         """
         film = self._film(row)
         if film is None:
-            raise NotFoundError("nothing moves in this artifact", where=row["artifact"], fix="look at its page")
+            raise NotFoundError(
+                "nothing moves in this artifact", where=row["artifact"], fix="look at its page"
+            )
         return film
 
     def thumbnail(self, row: Mapping[str, Any]) -> bytes:
@@ -77,7 +79,8 @@ class Media:
         return thumbnail_bytes
 
     def frames(self, row: Mapping[str, Any], first: int) -> bytes:
-        """Encodes at most `FRAMES_AT_ONCE` JPEGs from a frame on, each behind its length in four bytes.
+        """Encodes at most `FRAMES_AT_ONCE` JPEGs from a frame on, each behind its length in four
+        bytes.
 
         Raises:
             UsageError: no such frame.
@@ -86,16 +89,25 @@ class Media:
             film = self.film(row)
             if not 0 <= first < len(film):
                 raise UsageError(
-                    f"there is no frame {first} among {len(film)}", where=row["artifact"], fix="ask for one that it has"
+                    f"there is no frame {first} among {len(film)}",
+                    where=row["artifact"],
+                    fix="ask for one that it has",
                 )
             pictures = film.jpegs(first, min(FRAMES_AT_ONCE, len(film) - first))
         return b"".join(len(picture).to_bytes(4, "big") + picture for picture in pictures)
 
     def series(self, row: Mapping[str, Any]) -> dict[str, Any]:
-        """Returns the frames' times and the wind beside them as JSON values: seconds from the first frame, or from the
-        first mean of a wind; m/s; radians, blowing from, clockwise from north."""
+        """Returns the frames' times and the wind beside them as JSON values: seconds from the first
+        frame, or from the first mean of a wind; m/s; radians, blowing from, clockwise from
+        north."""
         film = self._film(row)
-        record = film.record if film is not None else self._record(row["object"]) if row["kind"] == Kind.WIND else None
+        record = (
+            film.record
+            if film is not None
+            else self._record(row["object"])
+            if row["kind"] == Kind.WIND
+            else None
+        )
         mean = record.wind_1hz() if record is not None else None
         charts: dict[str, Any] = {"frames": None, "wind": None, "clip": None}
         origin = 0
@@ -110,18 +122,22 @@ class Media:
                 "time": np.round(seconds, 6).tolist(),
             }
         if mean is not None:
-            low, high = (-(2**63), 2**63 - 1) if film is None or film.wind_span is None else film.wind_span
+            low, high = (
+                (-(2**63), 2**63 - 1) if film is None or film.wind_span is None else film.wind_span
+            )
             inside = (mean.time >= low) & (mean.time <= high)
             if not inside.any():
                 return charts
             origin = origin or int(mean.time[inside][0])
             middle = (mean.time[inside] - origin) / NANOSECONDS - mean.period / 2
-            charts["wind"] = _line(middle, mean.speed[inside], mean.sigma[inside], mean.direction[inside])
+            charts["wind"] = _line(
+                middle, mean.speed[inside], mean.sigma[inside], mean.direction[inside]
+            )
         return charts
 
     def evidence(self, row: Mapping[str, Any]) -> dict[str, Any]:
-        """Returns the search that led to a recording's clock model: offsets [s], score, evidence, and what accidents
-        reach.
+        """Returns the search that led to a recording's clock model: offsets [s], score, evidence,
+        and what accidents reach.
 
         Raises:
             NotFoundError: nothing was searched.
@@ -130,12 +146,18 @@ class Media:
         self._check_there(row)
         record = self._record(row["object"])
         if CURVE not in record.attachments:
-            raise NotFoundError("no search led to its clock model", where=row["artifact"], fix="look at its report")
+            raise NotFoundError(
+                "no search led to its clock model", where=row["artifact"], fix="look at its report"
+            )
         try:
             curve = from_stored_json(record.attachment(CURVE).decode())
-            shown_curve = {name: curve[name] for name in ("offset", "score", "evidence", "chance_score")}
+            shown_curve = {
+                name: curve[name] for name in ("offset", "score", "evidence", "chance_score")
+            }
         except (ValueError, KeyError, TypeError):
-            raise CorruptError("its search cannot be read", where=row["artifact"], fix="run flagdata verify") from None
+            raise CorruptError(
+                "its search cannot be read", where=row["artifact"], fix="run flagdata verify"
+            ) from None
         return shown_curve
 
     def is_lost(self, row: Mapping[str, Any]) -> bool:
@@ -143,14 +165,17 @@ class Media:
         return row["object"] is not None and not self._lake.objects.has(row["object"])
 
     def _check_there(self, row: Mapping[str, Any]) -> None:
-        """Checks that the object is there, also of what is kept here: an erased film is shown no more.
+        """Checks that the object is there, also of what is kept here: an erased film is shown no
+        more.
 
         Raises:
             NotFoundError: it has no data, or they are lost; why.
         """
         name = row["object"]
         if name is None:
-            raise NotFoundError("it has no data of its own", where=row["artifact"], fix="look at its page")
+            raise NotFoundError(
+                "it has no data of its own", where=row["artifact"], fix="look at its page"
+            )
         if self.is_lost(row):
             raise explain_missing(self._lake, name, self._lake.objects.missing(name))
 
@@ -180,9 +205,11 @@ class Media:
         return record
 
 
-def _line(time: FloatArray, speed: FloatArray, sigma: FloatArray, direction: FloatArray) -> dict[str, Any]:
-    """Reduces a line to at most `POINTS` points, and a band: ± σ, or the lowest and highest of the stretch of each
-    point."""
+def _line(
+    time: FloatArray, speed: FloatArray, sigma: FloatArray, direction: FloatArray
+) -> dict[str, Any]:
+    """Reduces a line to at most `POINTS` points, and a band: ± σ, or the lowest and highest of the
+    stretch of each point."""
     stretch = math.ceil(len(time) / POINTS)
     starts = np.arange(0, len(time), stretch)
     if stretch == 1:
@@ -200,6 +227,11 @@ def _line(time: FloatArray, speed: FloatArray, sigma: FloatArray, direction: Flo
         "time": np.round(time[starts], 3).tolist(),
         **{
             name: [round(value, 4) if math.isfinite(value) else None for value in values.tolist()]
-            for name, values in (("speed", mean), ("low", low), ("high", high), ("direction", direction[starts]))
+            for name, values in (
+                ("speed", mean),
+                ("low", low),
+                ("high", high),
+                ("direction", direction[starts]),
+            )
         },
     }

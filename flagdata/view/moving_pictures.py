@@ -1,4 +1,5 @@
-"""What moves in an artifact, as JPEGs with their instants: frames of records, and drawings of meshes and markers."""
+"""What moves in an artifact, as JPEGs with their instants: frames of records, and drawings of
+meshes and markers."""
 
 from __future__ import annotations
 
@@ -51,7 +52,9 @@ class FilmStrip:
         return len(self.times)
 
 
-def film_of(lake: Lake, row: Mapping[str, Any], opened: Callable[[str], Record]) -> FilmStrip | None:
+def film_of(
+    lake: Lake, row: Mapping[str, Any], opened: Callable[[str], Record]
+) -> FilmStrip | None:
     """Finds what moves in an artifact; `None` where nothing does.
 
     Args:
@@ -80,7 +83,9 @@ def film_of(lake: Lake, row: Mapping[str, Any], opened: Callable[[str], Record])
         return None
     if (size := lake.objects.size(name)) > _DRAWN_BYTES:
         raise LimitError(
-            f"a sequence of {size} B is not drawn", where=row["artifact"], fix="export a part of it, and look at that"
+            f"a sequence of {size} B is not drawn",
+            where=row["artifact"],
+            fix="export a part of it, and look at that",
         )
     return _meshes(lake, name) if kind == Kind.MESHES else _markers(lake, name)
 
@@ -93,7 +98,10 @@ def _meshes(lake: Lake, name: str) -> FilmStrip:
         mesh = sequence.frame(index)
         return _jpeg(_cloth(project(mesh.positions), mesh.positions, mesh.faces))
 
-    return FilmStrip(times=sequence.time, jpegs=lambda at, count: [drawn(index) for index in range(at, at + count)])
+    return FilmStrip(
+        times=sequence.time,
+        jpegs=lambda at, count: [drawn(index) for index in range(at, at + count)],
+    )
 
 
 def _markers(lake: Lake, name: str) -> FilmStrip:
@@ -108,13 +116,19 @@ def _markers(lake: Lake, name: str) -> FilmStrip:
             pen.ellipse((x - 2, y - 2, x + 2, y + 2), fill=_INK)
         return _jpeg(image)
 
-    return FilmStrip(times=sequence.time, jpegs=lambda at, count: [drawn(index) for index in range(at, at + count)])
+    return FilmStrip(
+        times=sequence.time,
+        jpegs=lambda at, count: [drawn(index) for index in range(at, at + count)],
+    )
 
 
 def _camera(points: AnyArray) -> Callable[[AnyArray], FloatArray]:
-    """Places points (n, 3) [m], z up, on a square picture that holds all of the given ones: (n, 3) x, y [px], depth."""
+    """Places points (n, 3) [m], z up, on a square picture that holds all of the given ones: (n, 3)
+    x, y [px], depth."""
     forth = np.array([-np.sin(_AZIMUTH), np.cos(_AZIMUTH), 0.0])  # along the picture's x
-    away = np.array([np.cos(_AZIMUTH) * np.cos(_HEIGHT), np.sin(_AZIMUTH) * np.cos(_HEIGHT), np.sin(_HEIGHT)])
+    away = np.array(
+        [np.cos(_AZIMUTH) * np.cos(_HEIGHT), np.sin(_AZIMUTH) * np.cos(_HEIGHT), np.sin(_HEIGHT)]
+    )
     axes = np.stack([forth, np.cross(away, forth), away])
     axes[1] *= -1 if axes[1][2] > 0 else 1  # the picture's y points down
     flat = points[np.isfinite(points).all(axis=1)] @ axes.T
@@ -137,7 +151,11 @@ def _cloth(corners: FloatArray, positions: AnyArray, faces: NDArray[np.int32]) -
     first, second, third = (positions[faces[:, corner]].astype(np.float64) for corner in range(3))
     normal = np.cross(second - first, third - first)
     length = np.linalg.norm(normal, axis=1)
-    facing = np.abs(normal @ np.array([np.cos(_AZIMUTH), np.sin(_AZIMUTH), 0.5])) / np.maximum(length, 1e-12) / 1.12
+    facing = (
+        np.abs(normal @ np.array([np.cos(_AZIMUTH), np.sin(_AZIMUTH), 0.5]))
+        / np.maximum(length, 1e-12)
+        / 1.12
+    )
     gray = (_CLOTH - _SHADE * (1 - facing)).astype(int)
     order = np.argsort(corners[faces, 2].mean(axis=1))
     for face, value in zip(corners[faces[order], :2].tolist(), gray[order].tolist(), strict=True):

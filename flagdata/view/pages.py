@@ -43,8 +43,10 @@ ROWS, SECONDS, CHARACTERS = 200, 5.0, 10_000
 """Most that a query of the page may show, take and have."""
 EXAMPLES = (
     "select kind, count(*) n, sum(object_bytes) bytes from catalog group by kind order by n desc",
-    "select artifact, name, start_time, wind, wind_sigma from catalog where kind = 'clip' order by wind desc",
-    "select session, day, count(*) clips, round(avg(wind), 2) wind from catalog where kind = 'clip' group by all",
+    "select artifact, name, start_time, wind, wind_sigma from catalog where kind = 'clip' order by "
+    "wind desc",
+    "select session, day, count(*) clips, round(avg(wind), 2) wind from catalog where kind = "
+    "'clip' group by all",
 )
 ICON = (
     b'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 16 16">'
@@ -54,8 +56,24 @@ ICON = (
 _ID = 32  # characters of an artifact's id
 _FILMED = frozenset({Kind.CAMERA, Kind.RECORDING, Kind.CLIP, *DRAWN})
 _REPORTED = frozenset({Kind.WIND, Kind.MEASUREMENT, Kind.MODEL})
-_ASIDE = frozenset({"artifact", "name", "kind", "parents", "report", "recipe", "parameters", "clock_model", "quality"})
-_CLOCK = (("clock_offset", "offset", "s"), ("clock_sigma", "σ of the offset", "s"), ("clock_drift", "drift", "s/s"))
+_ASIDE = frozenset(
+    {
+        "artifact",
+        "name",
+        "kind",
+        "parents",
+        "report",
+        "recipe",
+        "parameters",
+        "clock_model",
+        "quality",
+    }
+)
+_CLOCK = (
+    ("clock_offset", "offset", "s"),
+    ("clock_sigma", "σ of the offset", "s"),
+    ("clock_drift", "drift", "s/s"),
+)
 _EVIDENCE = (
     ("interval", "interval of the offset", "s"),
     ("drift_sigma", "σ of the drift", "s/s"),
@@ -66,7 +84,8 @@ _EVIDENCE = (
 
 
 class Tables:
-    """The rows of the views that were asked for last: what a view shows never changes, and a page asks many times."""
+    """The rows of the views that were asked for last: what a view shows never changes, and a page
+    asks many times."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -76,7 +95,10 @@ class Tables:
         """Reads all rows of a view."""
         with self._lock:
             if view not in self._known:
-                self._known = {view: lake.table(view), **dict(list(self._known.items())[: _VIEWS - 1])}
+                self._known = {
+                    view: lake.table(view),
+                    **dict(list(self._known.items())[: _VIEWS - 1]),
+                }
             return self._known[view]
 
 
@@ -100,7 +122,11 @@ class Site:
 
     def link(self, path: str = "", **values: Any) -> str:
         """Returns the address of a page of this version."""
-        query = {name: value for name, value in {"at": self.at, **values}.items() if value not in (None, "")}
+        query = {
+            name: value
+            for name, value in {"at": self.at, **values}.items()
+            if value not in (None, "")
+        }
         return f"{self.base}{path}" + (f"?{urlencode(query)}" if query else "")
 
     def rows(self) -> pa.Table:
@@ -142,7 +168,8 @@ class PageTable:
 
 
 def overview(site: Site, *, kind: str | None, name: str | None, page: int) -> str:
-    """Renders the artifacts of a version, newest first; clips are listed where that kind is asked for.
+    """Renders the artifacts of a version, newest first; clips are listed where that kind is asked
+    for.
 
     Raises:
         NotFoundError: no such version.
@@ -151,16 +178,22 @@ def overview(site: Site, *, kind: str | None, name: str | None, page: int) -> st
     if kind is not None and kind not in list(Kind):
         raise UnknownNameError.of("kind", kind, [known_kind.value for known_kind in Kind])
     rows = site.rows()
-    counts = {entry["values"]: entry["counts"] for entry in pc.value_counts(rows["kind"]).to_pylist()}  # type: ignore[attr-defined]
+    counts = {
+        entry["values"]: entry["counts"] for entry in pc.value_counts(rows["kind"]).to_pylist()
+    }  # type: ignore[attr-defined]
     chosen = pc.field("kind") != Kind.CLIP.value if kind is None else pc.field("kind") == kind
     if name:
         chosen &= pc.match_substring(pc.field("name"), name, ignore_case=True)  # type: ignore[attr-defined]
     # Of a large catalog a filter or sort of whole rows would copy them all.
-    listed = rows.select([*_ORDER, "kind", "name"]).append_column("row", pa.array(np.arange(rows.num_rows)))
+    listed = rows.select([*_ORDER, "kind", "name"]).append_column(
+        "row", pa.array(np.arange(rows.num_rows))
+    )
     newest_first = listed.filter(chosen).sort_by(list(_ORDER.items()))["row"]
     last = max(0, (len(newest_first) - 1) // CARDS)
     page = min(page, last)
-    cards = [_card(site, row) for row in rows.take(newest_first.slice(page * CARDS, CARDS)).to_pylist()]
+    cards = [
+        _card(site, row) for row in rows.take(newest_first.slice(page * CARDS, CARDS)).to_pylist()
+    ]
     return _page(
         site,
         "overview.html.j2",
@@ -176,7 +209,8 @@ def overview(site: Site, *, kind: str | None, name: str | None, page: int) -> st
 
 
 def artifact(site: Site, identity: str) -> str:
-    """Renders one artifact: its film beside its wind, what was found, how it was aligned, where it comes from.
+    """Renders one artifact: its film beside its wind, what was found, how it was aligned, where it
+    comes from.
 
     Raises:
         NotFoundError: no such version, or it does not show the artifact.
@@ -186,10 +220,14 @@ def artifact(site: Site, identity: str) -> str:
     lost = site.media.is_lost(row)
     clips, count = _clips(site, rows, row)
     labels = labels_of(rows).get(identity, {})
-    facts = [(name, printable(said(name, value))) for name, value in row.items() if _is_fact(name, value)]
+    facts = [
+        (name, printable(said(name, value))) for name, value in row.items() if _is_fact(name, value)
+    ]
     facts += [(PREFIX + name, printable(str(value))) for name, value in labels.items()]
     facts += [(f"version {number}", text) for number, text in _versions(site, row)]
-    drawn = picture(ancestry(rows, identity), link=lambda relative: site.link(f"artifact/{relative}"))
+    drawn = picture(
+        ancestry(rows, identity), link=lambda relative: site.link(f"artifact/{relative}")
+    )
     documents = {name: _from_column(row, name) for name in ("recipe", "parameters", "clock_model")}
     return _page(
         site,
@@ -201,7 +239,11 @@ def artifact(site: Site, identity: str) -> str:
         findings=_findings(report),
         words=_sentence(report),
         evidence=_evidence(row, report),
-        stated={name: json.dumps(value, indent=2, ensure_ascii=False) for name, value in documents.items() if value},
+        stated={
+            name: json.dumps(value, indent=2, ensure_ascii=False)
+            for name, value in documents.items()
+            if value
+        },
         films=row["kind"] in _FILMED and row["object"] is not None,
         blows=row["kind"] == Kind.WIND,
         lineage=Markup(drawn),  # its texts are escaped
@@ -222,19 +264,27 @@ def sql(site: Site, text: str | None) -> tuple[str, FlagdataError | None]:
             table = _answer(site, text)
         except FlagdataError as refused:
             error = refused
-    columns = [(name, str(column.type), column.unit, column.about) for name, column in COLUMNS.items()]
-    return _page(site, "query.html.j2", sql=text or "", found=table, error=error, columns=columns, rows=ROWS), error
+    columns = [
+        (name, str(column.type), column.unit, column.about) for name, column in COLUMNS.items()
+    ]
+    return _page(
+        site, "query.html.j2", sql=text or "", found=table, error=error, columns=columns, rows=ROWS
+    ), error
 
 
 def problem(site: Site, error: FlagdataError, status: int) -> str:
     """Renders the page of an error; it reads nothing of the lake."""
-    return _fill_template(site, "problem.html.j2", error=error, status=status, refs=[], version=None)
+    return _fill_template(
+        site, "problem.html.j2", error=error, status=status, refs=[], version=None
+    )
 
 
 def style() -> bytes:
     """Returns the sheet of all pages."""
     kinds = "".join(f".k-{kind} {{ --kind: {colour}; }}\n" for kind, colour in COLOURS.items())
-    return (text_of("flagdata.pages", "base.css") + text_of("flagdata.view", "view.css") + kinds).encode()
+    return (
+        text_of("flagdata.pages", "base.css") + text_of("flagdata.view", "view.css") + kinds
+    ).encode()
 
 
 def script() -> bytes:
@@ -249,14 +299,30 @@ def _page(site: Site, template: str, **values: Any) -> str:
 
 
 def _fill_template(site: Site, template: str, **values: Any) -> str:
-    common_values = {"site": site, "link": site.link, "lake": str(site.lake.path), "examples": EXAMPLES, "short": SHORT}
-    return render("flagdata.view", template, {**common_values, **values}, filters={"printable": printable})
+    common_values = {
+        "site": site,
+        "link": site.link,
+        "lake": str(site.lake.path),
+        "examples": EXAMPLES,
+        "short": SHORT,
+    }
+    return render(
+        "flagdata.view", template, {**common_values, **values}, filters={"printable": printable}
+    )
 
 
 def _card(site: Site, row: Mapping[str, Any]) -> dict[str, Any]:
     """Returns what a tile shows of a row."""
-    seconds = None if row["start"] is None or row["end"] is None else (row["end"] - row["start"]) / 1e9
-    length = None if seconds is None else f"{seconds:.3g} s" if seconds < 120 else f"{seconds / 60:.3g} min"
+    seconds = (
+        None if row["start"] is None or row["end"] is None else (row["end"] - row["start"]) / 1e9
+    )
+    length = (
+        None
+        if seconds is None
+        else f"{seconds:.3g} s"
+        if seconds < 120
+        else f"{seconds / 60:.3g} min"
+    )
     size = None if row["kind"] == Kind.CLIP else size_text(row["object_bytes"])
     wind = row["wind"]
     report = _from_column(row, "report") or {} if row["kind"] in _REPORTED else {}
@@ -268,7 +334,9 @@ def _card(site: Site, row: Mapping[str, Any]) -> dict[str, Any]:
         "kind": row["kind"],
         "name": printable(row["name"]),
         "quality": row["quality"],
-        "start": None if row["start"] is None else iso(row["start"] // 10**9 * 10**9).replace("T", " "),
+        "start": None
+        if row["start"] is None
+        else iso(row["start"] // 10**9 * 10**9).replace("T", " "),
         "length": _together(length),
         "size": _together(size),
         "drawn": row["kind"] in DRAWN,
@@ -296,9 +364,12 @@ def _versions(site: Site, row: Mapping[str, Any]) -> list[tuple[int, str]]:
     return [
         (
             number,
-            f"{result.id[:SHORT]} by code {result.code_version}{', this one' if result.id == row['artifact'] else ''}",
+            f"{result.id[:SHORT]} by code "
+            f"{result.code_version}{', this one' if result.id == row['artifact'] else ''}",
         )
-        for number, result in enumerate(result_versions if len(result_versions) > 1 else (), start=1)
+        for number, result in enumerate(
+            result_versions if len(result_versions) > 1 else (), start=1
+        )
     ]
 
 
@@ -309,7 +380,9 @@ def _clips(site: Site, rows: pa.Table, row: Mapping[str, Any]) -> tuple[list[dic
     wanted = (pc.field("kind") == Kind.CLIP.value) & (pc.field("recording") == row["artifact"])
     clips = rows.filter(wanted).sort_by("start")
     step = max(1, -(-clips.num_rows // CLIPS))
-    return [_card(site, clip) for clip in clips.take(list(range(0, clips.num_rows, step))).to_pylist()], clips.num_rows
+    return [
+        _card(site, clip) for clip in clips.take(list(range(0, clips.num_rows, step))).to_pylist()
+    ], clips.num_rows
 
 
 def _evidence(row: Mapping[str, Any], report: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -317,20 +390,30 @@ def _evidence(row: Mapping[str, Any], report: Mapping[str, Any]) -> list[tuple[s
     if row["clock_method"] is None:
         return []
     facts = [("method", str(row["clock_method"]))]
-    facts += [(words, f"{row[name]:.4g} {unit}") for name, words, unit in _CLOCK if row[name] is not None]
+    facts += [
+        (words, f"{row[name]:.4g} {unit}") for name, words, unit in _CLOCK if row[name] is not None
+    ]
     for name, words, unit in _EVIDENCE:
         value = report.get(name)
         if isinstance(value, int | float):
             facts.append((words, f"{value:.4g} {unit}".strip()))
         elif isinstance(value, list) and len(value) == 2:
-            facts.append((f"{words}, {report.get('level', 0.9):.0%}", f"{value[0]:.4g} to {value[1]:.4g} {unit}"))
+            facts.append(
+                (
+                    f"{words}, {report.get('level', 0.9):.0%}",
+                    f"{value[0]:.4g} to {value[1]:.4g} {unit}",
+                )
+            )
     return facts
 
 
 def _findings(report: Mapping[str, Any]) -> list[dict[str, str]]:
     """Lists what a report found; one of another program may lack parts of it."""
     return [
-        {name: printable(str(finding.get(name) or "")) for name in ("severity", "kind", "what", "fix")}
+        {
+            name: printable(str(finding.get(name) or ""))
+            for name in ("severity", "kind", "what", "fix")
+        }
         for finding in report.get("findings", [])
     ]
 
@@ -350,9 +433,16 @@ def _answer(site: Site, text: str) -> PageTable:
     selection = Selection(rows, Request(sql=text, limit=ROWS, time_limit=SECONDS))
     answer = selection.table()
     values = [column.to_pylist() for column in answer.columns]
-    texts = {value for column in values for value in column if isinstance(value, str) and len(value) == _ID}
+    texts = {
+        value
+        for column in values
+        for value in column
+        if isinstance(value, str) and len(value) == _ID
+    }
     ids = rows["artifact"]
-    identities = set(ids.filter(pc.is_in(ids, value_set=pa.array(sorted(texts), pa.string()))).to_pylist())  # type: ignore[attr-defined]
+    identities = set(
+        ids.filter(pc.is_in(ids, value_set=pa.array(sorted(texts), pa.string()))).to_pylist()
+    )  # type: ignore[attr-defined]
     columns = [[_cell(site, value, identities) for value in column] for column in values]
     return PageTable(
         header=[printable(name) for name in answer.column_names],
@@ -369,4 +459,6 @@ def _cell(site: Site, value: Any, identities: set[str]) -> tuple[str, str | None
         return plain_value[:SHORT], site.link(f"artifact/{plain_value}")
     if isinstance(plain_value, float):
         return f"{plain_value:.6g}", None
-    return printable(", ".join(map(str, plain_value)) if isinstance(plain_value, list) else str(plain_value)), None
+    return printable(
+        ", ".join(map(str, plain_value)) if isinstance(plain_value, list) else str(plain_value)
+    ), None

@@ -1,13 +1,15 @@
-"""The socket of the page, and who may ask: this machine alone, by the whole address, and only to read.
+"""The socket of the page, and who may ask: this machine alone, by the whole address, and only to
+read.
 
-The server listens on loopback. Its address has a part that is drawn anew at each start, without which no page is shown:
-other users of the machine, and pages of others in the user's browser, do not know it. The header Host must be the
-server's own, so that a name on the web that leads here is refused. Answers forbid the browser everything that does not
-come from this server.
+The server listens on loopback. Its address has a part that is drawn anew at each start, without
+which no page is shown: other users of the machine, and pages of others in the user's browser, do
+not know it. The header Host must be the server's own, so that a name on the web that leads here is
+refused. Answers forbid the browser everything that does not come from this server.
 
 From an address to an answer, without a socket: which pages there are, and what an error looks like.
 
-No part of an address becomes a path: artifacts are named by their ids, versions by refs that the lake looks up.
+No part of an address becomes a path: artifacts are named by their ids, versions by refs that the
+lake looks up.
 """
 
 from __future__ import annotations
@@ -60,7 +62,8 @@ class ServerAnswer:
 
 
 Route = Callable[[Site, tuple[str, ...], Mapping[str, str]], ServerAnswer]
-"""Answers a request: the site at its version, the parts of the path in brackets, the fields of the query."""
+"""Answers a request: the site at its version, the parts of the path in brackets, the fields of the
+query."""
 
 
 def answer(site: Site, target: str) -> ServerAnswer:
@@ -96,7 +99,9 @@ def _route_of(site: Site, target: str) -> tuple[Site, Route, tuple[str, ...], Ma
     except ValueError:
         raise UsageError("an address that cannot be read", fix="go back to the overview") from None
     if not address.path.startswith(site.base):
-        raise NotFoundError("nothing is here", fix="open the whole address that flagdata view printed")
+        raise NotFoundError(
+            "nothing is here", fix="open the whole address that flagdata view printed"
+        )
     path = address.path.removeprefix(site.base)
     fields = {name: values[-1] for name, values in query.items()}
     for pattern, function in _ROUTES.items():
@@ -109,7 +114,9 @@ def _overview(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) ->
     page = fields.get("page", "0")
     if not re.fullmatch("[0-9]{1,9}", page, flags=re.ASCII):
         raise UsageError(f"{page!r} is no number of a page", fix="go back to the overview")
-    return _html(pages.overview(site, kind=fields.get("kind"), name=fields.get("name"), page=int(page)))
+    return _html(
+        pages.overview(site, kind=fields.get("kind"), name=fields.get("name"), page=int(page))
+    )
 
 
 def _query(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> ServerAnswer:
@@ -123,13 +130,17 @@ def _artifact(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) ->
 
 def _thumbnail(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> ServerAnswer:
     return ServerAnswer(
-        status=HTTPStatus.OK, media_type="image/jpeg", content=site.media.thumbnail(site.row(groups[0]))
+        status=HTTPStatus.OK,
+        media_type="image/jpeg",
+        content=site.media.thumbnail(site.row(groups[0])),
     )
 
 
 def _frames(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> ServerAnswer:
     content = site.media.frames(site.row(groups[0]), int(groups[1]))
-    return ServerAnswer(status=HTTPStatus.OK, media_type="application/octet-stream", content=content)
+    return ServerAnswer(
+        status=HTTPStatus.OK, media_type="application/octet-stream", content=content
+    )
 
 
 def _series(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> ServerAnswer:
@@ -141,11 +152,15 @@ def _evidence(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) ->
 
 
 def _style(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> ServerAnswer:
-    return ServerAnswer(status=HTTPStatus.OK, media_type="text/css; charset=utf-8", content=pages.style())
+    return ServerAnswer(
+        status=HTTPStatus.OK, media_type="text/css; charset=utf-8", content=pages.style()
+    )
 
 
 def _script(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> ServerAnswer:
-    return ServerAnswer(status=HTTPStatus.OK, media_type="text/javascript; charset=utf-8", content=pages.script())
+    return ServerAnswer(
+        status=HTTPStatus.OK, media_type="text/javascript; charset=utf-8", content=pages.script()
+    )
 
 
 def _icon(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> ServerAnswer:
@@ -154,7 +169,9 @@ def _icon(site: Site, groups: tuple[str, ...], fields: Mapping[str, str]) -> Ser
 
 def _html(text: str, status: HTTPStatus = HTTPStatus.OK) -> ServerAnswer:
     return ServerAnswer(
-        status=status, media_type="text/html; charset=utf-8", content=text.encode(errors="backslashreplace")
+        status=status,
+        media_type="text/html; charset=utf-8",
+        content=text.encode(errors="backslashreplace"),
     )
 
 
@@ -182,7 +199,8 @@ _ROUTES: dict[str, Route] = {
 HOST = "127.0.0.1"
 _PATIENCE = 30.0  # s, for a request to arrive
 _POLICY = (
-    "default-src 'none'; img-src 'self'; style-src 'self'; script-src 'self'; connect-src 'self'; form-action 'self'; "
+    "default-src 'none'; img-src 'self'; style-src 'self'; script-src 'self'; connect-src 'self'; "
+    "form-action 'self'; "
     "base-uri 'none'; frame-ancestors 'none'"
 )
 HEADERS = {
@@ -193,7 +211,8 @@ HEADERS = {
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cache-Control": "no-store",
 }
-"""Sent with each answer; nothing is kept, since what is erased from the lake must not stay in a browser."""
+"""Sent with each answer; nothing is kept, since what is erased from the lake must not stay in a
+browser."""
 
 
 class Server(ThreadingHTTPServer):
@@ -234,13 +253,21 @@ def respond(server: Server, method: str, target: str, headers: Message) -> Serve
         error = RefusedError("this server is asked for by another name", fix=f"open it at {HOST}")
         return refusal(_nowhere(server), error, HTTPStatus.FORBIDDEN)
     if headers.get("Sec-Fetch-Site", "none") not in ("none", "same-origin"):
-        error = RefusedError("another page led here", fix="open the address that flagdata view printed")
+        error = RefusedError(
+            "another page led here", fix="open the address that flagdata view printed"
+        )
         return refusal(_nowhere(server), error, HTTPStatus.FORBIDDEN)
-    if not secrets.compare_digest(target[: len(server.site.base)].encode(), server.site.base.encode()):
-        error = NotFoundError("nothing is here", fix="open the whole address that flagdata view printed")
+    if not secrets.compare_digest(
+        target[: len(server.site.base)].encode(), server.site.base.encode()
+    ):
+        error = NotFoundError(
+            "nothing is here", fix="open the whole address that flagdata view printed"
+        )
         return refusal(_nowhere(server), error)
     if method not in ("GET", "HEAD"):
-        error = UsageError("the page of a lake can only be read", fix="change the lake by flagdata's commands")
+        error = UsageError(
+            "the page of a lake can only be read", fix="change the lake by flagdata's commands"
+        )
         return refusal(server.site, error, HTTPStatus.METHOD_NOT_ALLOWED)
     return answer(server.site, target)
 

@@ -1,8 +1,8 @@
 """A flag beside an anemometer becomes an anemometer: what its film shows is regressed on the log.
 
-features    what each window of a film shows: the network's summary and its wind; and the picture's place
-regression  ridge regression with neighbouring windows, chosen by cross-validation over blocks of time
-intervals   conformal intervals and draws from the errors of blocks that were left out
+features    what each window of a film shows: the network's summary and its wind; and the picture's
+place regression  ridge regression with neighbouring windows, chosen by cross-validation over blocks
+of time intervals   conformal intervals and draws from the errors of blocks that were left out
 novelty     whether a film is of the same flag, seen from the same place
 reading     the reading model: from features to winds
 calibration recordings and their logs → a reading model

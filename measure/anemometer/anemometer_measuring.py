@@ -29,7 +29,8 @@ from measure.posterior_ends import limits_of
 from models.trained.estimator import Estimator
 
 _SAME_SIZE = 0.01
-"""Share by which a stated size may differ from that of the calibration: printed sizes are rounded."""
+"""Share by which a stated size may differ from that of the calibration: printed sizes are
+rounded."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +47,9 @@ class Familiarity(Verdict):
     def sentence(self) -> str:
         if self.faults:
             further = len(self.faults) - 1
-            suffix = "" if not further else f" ({further} more {'reasons' if further > 1 else 'reason'})"
+            suffix = (
+                "" if not further else f" ({further} more {'reasons' if further > 1 else 'reason'})"
+            )
             return f"{self.faults[0].what}{suffix}"
         return f"like the film of the calibration: {self.figures}"
 
@@ -73,12 +76,20 @@ def measure_by(
         RefusedError: nothing moves like cloth, or no window is whole.
     """
     _check(options, model)
-    features = features_of(film, estimator, model.size, first=options.first, last=options.last, advance=advance)
+    features = features_of(
+        film, estimator, model.size, first=options.first, last=options.last, advance=advance
+    )
     return measured_from(film, features, model, estimator, options, name=name)
 
 
 def measured_from(
-    film: ConditionedFilm, features: Features, model: ReadingModel, estimator: Estimator, options: Options, *, name: str
+    film: ConditionedFilm,
+    features: Features,
+    model: ReadingModel,
+    estimator: Estimator,
+    options: Options,
+    *,
+    name: str,
 ) -> Measurement:
     """Measures a film whose features were computed already."""
     findings = film.findings()
@@ -87,11 +98,17 @@ def measured_from(
     read = np.flatnonzero(np.isfinite(winds))
     verdict = _verdict(film, features, used, winds, model, options, findings)
     half = half_width(model.errors, options.level)
-    windows = tuple(_window(features, k, float(winds[k]), half, verdict, model, options) for k in read.tolist())
+    windows = tuple(
+        _window(features, k, float(winds[k]), half, verdict, model, options) for k in read.tolist()
+    )
     rng = stream(options.seed, "anemometer", "mean")
-    errors = mean_errors(model.errors, count=len(read), length=model.block, draws=DRAWS, generator=rng)
+    errors = mean_errors(
+        model.errors, count=len(read), length=model.block, draws=DRAWS, generator=rng
+    )
     draws = np.maximum(winds[read].mean() + errors, 0.0)
-    low, high = (float(end) for end in np.quantile(draws, [(1 - options.level) / 2, (1 + options.level) / 2]))
+    low, high = (
+        float(end) for end in np.quantile(draws, [(1 - options.level) / 2, (1 + options.level) / 2])
+    )
     learned = information(draws, model.winds)
     mean_wind = Quantity(
         name=WIND,
@@ -119,7 +136,9 @@ def measured_from(
         dependence=_dependence(errors, model, len(read)),
         gusts=None,
         verdict=verdict,
-        sizes=Sizes(given=model.size, scale=np.array([scale]), draws=np.full((1, DRAWS), scale), findings=()),
+        sizes=Sizes(
+            given=model.size, scale=np.array([scale]), draws=np.full((1, DRAWS), scale), findings=()
+        ),
         summary=features.summaries[middle],
         clip=features.clip,
         findings=(*findings, *_about(winds[read], features, model)),
@@ -145,13 +164,15 @@ def _size_reason(stated_size: FlagSize | None, model: ReadingModel) -> list[Find
     size = model.size
     if (
         stated_size is None
-        or max(abs(stated_size.length / size.length - 1), abs(stated_size.height / size.height - 1)) <= _SAME_SIZE
+        or max(abs(stated_size.length / size.length - 1), abs(stated_size.height / size.height - 1))
+        <= _SAME_SIZE
     ):
         return []
     return [
         Finding.of(
             "another-size",
-            f"the flag is stated as {stated_size.length:g} m × {stated_size.height:g} m, that of the calibration as "
+            f"the flag is stated as {stated_size.length:g} m × {stated_size.height:g} m, that of "
+            "the calibration as "
             f"{size.length:g} m × {size.height:g} m",
             value=stated_size.length / size.length,
             fix="check --flag-size, or calibrate this flag",
@@ -169,7 +190,9 @@ def _verdict(
     findings: Sequence[Finding],
 ) -> Familiarity:
     read = np.isfinite(winds)
-    compared = Compared.of(model.familiar.shift(used[read], winds[read]), features.place, model.places)
+    compared = Compared.of(
+        model.familiar.shift(used[read], winds[read]), features.place, model.places
+    )
     faults = [finding for finding in findings if finding.kind in REASONS]
     faults += [*_size_reason(options.size, model), *compared.reasons()]
     p = model.familiar.p_value(used[read], winds[read])
@@ -185,14 +208,24 @@ def _verdict(
         blank=(False,) * len(p),
         faults=tuple(Reason.counted(finding) for finding in faults),
         window_reasons=(
-            Reason(kind="familiar", what=f"the median p of its windows is {np.median(p):.2f}", p=float(np.median(p))),
+            Reason(
+                kind="familiar",
+                what=f"the median p of its windows is {np.median(p):.2f}",
+                p=float(np.median(p)),
+            ),
         ),
         figures=compared.figures,
     )
 
 
 def _window(
-    features: Features, k: int, wind: float, half: float, verdict: Verdict, model: ReadingModel, options: Options
+    features: Features,
+    k: int,
+    wind: float,
+    half: float,
+    verdict: Verdict,
+    model: ReadingModel,
+    options: Options,
 ) -> WindowAnswer:
     least, _ = limits_of(WIND)
     value = max(wind, least)
@@ -203,14 +236,23 @@ def _window(
         unit="m/s",
         value=value,
         sigma=model.rmse,
-        span=Span(low=max(wind - half, least), high=wind + half, level=options.level, bound=None, estimated=True),
+        span=Span(
+            low=max(wind - half, least),
+            high=wind + half,
+            level=options.level,
+            bound=None,
+            estimated=True,
+        ),
         assumed=model.range,
         constrained=learned >= LEAST_INFORMATION,
         information=learned,
     )
     start = float(features.starts[k])
     return WindowAnswer(
-        start=start, end=start + features.layout.length, quantities=(quantity,), p=verdict.window_p[position]
+        start=start,
+        end=start + features.layout.length,
+        quantities=(quantity,),
+        p=verdict.window_p[position],
     )
 
 
@@ -218,7 +260,9 @@ def _dependence(errors: FloatArray, model: ReadingModel, count: int) -> Dependen
     """Returns the correlation of windows at which the mean of so many errs as `errors` do."""
     ratio = float(errors.var() / model.errors.var()) * count
     correlation = 0.0 if count < 2 else float(np.clip((ratio - 1) / (count - 1), 0.0, 1.0))
-    return Dependence(wind=correlation, cloth=1.0, source="blocks of the calibration that were left out")
+    return Dependence(
+        wind=correlation, cloth=1.0, source="blocks of the calibration that were left out"
+    )
 
 
 def _about(winds: FloatArray, features: Features, model: ReadingModel) -> list[Finding]:
@@ -229,7 +273,8 @@ def _about(winds: FloatArray, features: Features, model: ReadingModel) -> list[F
         findings.append(
             Finding.of(
                 "beyond-calibration",
-                f"{beyond} of {len(winds)} windows read winds beyond those of the calibration ({low:.1f} to "
+                f"{beyond} of {len(winds)} windows read winds beyond those of the calibration "
+                f"({low:.1f} to "
                 f"{high:.1f} m/s), where nothing checked the intervals",
                 count=beyond,
                 value=beyond / len(winds),

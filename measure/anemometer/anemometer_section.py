@@ -33,7 +33,9 @@ def section(result: Calibrated) -> Section:
             }
             for recording in result.recordings
         ],
-        "findings": [{"severity": f.severity.value, "what": f.what, "fix": f.fix} for f in result.findings],
+        "findings": [
+            {"severity": f.severity.value, "what": f.what, "fix": f.fix} for f in result.findings
+        ],
     }
     body = Markup(render("measure.anemometer", "section.html.j2", values))
     return Section(anchor="anemometer", title="The flag as an anemometer", body=body)
@@ -46,7 +48,11 @@ def page(result: Calibrated, name: str, provenance: Mapping[str, str]) -> str:
         name: of the model.
         provenance: rows of a table, in order.
     """
-    values = {"name": name, "section": section(result), "provenance": {**provenance, "code": code_version()}}
+    values = {
+        "name": name,
+        "section": section(result),
+        "provenance": {**provenance, "code": code_version()},
+    }
     return render("measure.anemometer", "page.html.j2", values)
 
 
@@ -58,9 +64,13 @@ def _clock(result: Calibrated) -> str:
     if not result.clock:
         return "The recording states no uncertainty of its clock; none was fitted."
     if result.clock <= CLOCK:
-        return f"The clock is known to {result.clock:.2f} s, which matters for no window; no error of it was fitted."
+        return (
+            f"The clock is known to {result.clock:.2f} s, which matters for no window; no error of "
+            "it was fitted."
+        )
     return (
-        f"The log fits best {result.offset:+.2f} s later than its stamps, whose standard uncertainty is "
+        f"The log fits best {result.offset:+.2f} s later than its stamps, whose standard "
+        "uncertainty is "
         f"{result.clock:.2f} s."
     )
 
@@ -70,11 +80,15 @@ def _picture(result: Calibrated) -> str:
 
     model = result.model
     read = model.winds - model.errors
-    uncalibrated = np.concatenate([recording.features.winds[recording.usable] for recording in result.recordings])
+    uncalibrated = np.concatenate(
+        [recording.features.winds[recording.usable] for recording in result.recordings]
+    )
     figure = Figure(figsize=(9.5, 3.2), layout="constrained")
     course, scatter = figure.subplots(1, 2, width_ratios=(2.4, 1.0))
     time = model.step * np.arange(len(read))
-    course.fill_between(time, read - result.half_width, read + result.half_width, color=_BLUE, alpha=0.25, lw=0)
+    course.fill_between(
+        time, read - result.half_width, read + result.half_width, color=_BLUE, alpha=0.25, lw=0
+    )
     course.plot(time, read, color=_BLUE, lw=1)
     course.plot(time, model.winds, color="black", lw=1)
     course.set_xlabel("time over all windows [s]")

@@ -1,8 +1,9 @@
 """Intervals of winds from the errors that a fit makes in blocks of time that it was not fitted to.
 
-The interval of a window is conformal (Vovk, Gammerman and Shafer, Algorithmic Learning in a Random World, 2005): the
-quantile of the absolute errors of all windows, each predicted without its block (cross-conformal prediction). It is of
-what the anemometer would log, whose noise is among the errors.
+The interval of a window is conformal (Vovk, Gammerman and Shafer, Algorithmic Learning in a Random
+World, 2005): the quantile of the absolute errors of all windows, each predicted without its block
+(cross-conformal prediction). It is of what the anemometer would log, whose noise is among the
+errors.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ from flagdata.core.arrays import FloatArray
 
 
 def half_width(errors: FloatArray, level: float) -> float:
-    """Returns half of the interval that contains the wind with probability `level` [m/s], from errors (n,); infinite
-    where they are too few."""
+    """Returns half of the interval that contains the wind with probability `level` [m/s], from
+    errors (n,); infinite where they are too few."""
     n = len(errors)
     rank = math.ceil(level * (n + 1))
     return math.inf if rank > n else float(np.sort(np.abs(errors))[rank - 1])
@@ -25,8 +26,8 @@ def half_width(errors: FloatArray, level: float) -> float:
 def mean_errors(
     errors: FloatArray, *, count: int, length: int, draws: int, generator: np.random.Generator
 ) -> FloatArray:
-    """Draws errors (draw,) of the mean over `count` windows [m/s]: blocks of neighbouring errors drawn with replacement
-    (moving blocks: Künsch, Annals of Statistics 17, 1989).
+    """Draws errors (draw,) of the mean over `count` windows [m/s]: blocks of neighbouring errors
+    drawn with replacement (moving blocks: Künsch, Annals of Statistics 17, 1989).
 
     Args:
         errors: (n,) in the order of time.

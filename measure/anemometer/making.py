@@ -1,9 +1,10 @@
 """From the recordings that a user names to a reading model in the lake.
 
-A reading model in the lake: a measurement of its recordings, whose object is a Zarr folder of plain arrays.
+A reading model in the lake: a measurement of its recordings, whose object is a Zarr folder of plain
+arrays.
 
-Its identity is a hash of what went in: the recordings and their parts, the network, the flag's size and how films were
-read.
+Its identity is a hash of what went in: the recordings and their parts, the network, the flag's size
+and how films were read.
 """
 
 from __future__ import annotations
@@ -144,7 +145,10 @@ def made(
 
     opened_subjects, unopened = usable(sources, open_subject, name=str)
     reader = network(model, lake=lake, at=at)
-    seconds = sum(min(subject.film.duration, math.inf if last is None else last) - first for subject in opened_subjects)
+    seconds = sum(
+        min(subject.film.duration, math.inf if last is None else last) - first
+        for subject in opened_subjects
+    )
     if seconds < LEAST:
         raise InputError(
             f"only {max(seconds, 0.0):.0f} s of film have a log beside them",

@@ -1,4 +1,5 @@
-"""The model that measures: a network that comes with the package, lies in a folder or in a lake, or a reading model."""
+"""The model that measures: a network that comes with the package, lies in a folder or in a lake, or
+a reading model."""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ CALIBRATED = "anemometer"
 
 
 def gate_beside(model: Network, *, false_alarm: float) -> WindowGate:
-    """Opens the gate of a network: the calibrated one in the model's folder, else the distance of summaries.
+    """Opens the gate of a network: the calibrated one in the model's folder, else the distance of
+    summaries.
 
     Raises:
         CorruptError: the calibrated one is damaged, or another network's.
@@ -45,8 +47,8 @@ class Network:
 
     Attributes:
         estimator: at work.
-        identity: SHA-256 of its card, without how it errs in a series, and its weights; of a reading model the id of
-            its artifact.
+        identity: SHA-256 of its card, without how it errs in a series, and its weights; of a
+            reading model the id of its artifact.
         artifact: of the lake; None of a folder or of a model that comes with the package.
         folder: of its files, where what belongs to it may lie beside them.
         reading: the reading model that uses its summary; None where the network itself measures.
@@ -62,7 +64,10 @@ class Network:
     def described(self) -> str:
         """Which one it is, for people."""
         if self.reading is not None and self.artifact is not None:
-            return f"reading model {self.artifact.name}, {self.identity}, on the network {self.estimator.name}"
+            return (
+                f"reading model {self.artifact.name}, {self.identity}, on the network "
+                f"{self.estimator.name}"
+            )
         return f"{self.estimator.name}, SHA-256 {self.identity}"
 
 
@@ -70,8 +75,8 @@ def network(name: str | None, *, lake: Lake | None, at: str | None) -> Network:
     """Opens the model of a name.
 
     Args:
-        name: of a model that comes with the package, a folder, or a network or reading model of the lake by its name or
-            id; None is the package's default.
+        name: of a model that comes with the package, a folder, or a network or reading model of the
+            lake by its name or id; None is the package's default.
 
     Raises:
         UnknownNameError: none of these.
@@ -88,9 +93,13 @@ def network(name: str | None, *, lake: Lake | None, at: str | None) -> Network:
     rows = [] if lake is None else _models(lake, at)
     same = meant(rows, chosen)
     if not same or lake is None:
-        raise UnknownNameError.of("model", chosen, shipped | {str(row["name"]) for row in rows}, where="--model")
+        raise UnknownNameError.of(
+            "model", chosen, shipped | {str(row["name"]) for row in rows}, where="--model"
+        )
     if len(same) > 1:
-        raise UsageError(f"{len(same)} models are called {chosen!r}", where="--model", fix="give the id of one")
+        raise UsageError(
+            f"{len(same)} models are called {chosen!r}", where="--model", fix="give the id of one"
+        )
     artifact = lake.artifact(same[0]["artifact"], at=at)
     folder = lake.object_path(str(artifact.object))
     return (
@@ -102,8 +111,14 @@ def network(name: str | None, *, lake: Lake | None, at: str | None) -> Network:
 
 def _models(lake: Lake, at: str | None) -> list[dict[str, Any]]:
     """Networks and reading models of a lake."""
-    rows = lake.rows({"kind": (Kind.NETWORK, Kind.MEASUREMENT)}, at=at, columns=OF_RESULTS).to_pylist()
-    return [row for row in rows if row["kind"] == Kind.NETWORK or CALIBRATED in json.loads(row["recipe"] or "{}")]
+    rows = lake.rows(
+        {"kind": (Kind.NETWORK, Kind.MEASUREMENT)}, at=at, columns=OF_RESULTS
+    ).to_pylist()
+    return [
+        row
+        for row in rows
+        if row["kind"] == Kind.NETWORK or CALIBRATED in json.loads(row["recipe"] or "{}")
+    ]
 
 
 def _calibrated_network(folder: Path, artifact: Artifact, lake: Lake, at: str | None) -> Network:
@@ -119,14 +134,24 @@ def _calibrated_network(folder: Path, artifact: Artifact, lake: Lake, at: str | 
 
 
 def _load_network(folder: Path, artifact: Artifact | None) -> Network:
-    return Network(estimator=estimator.load(folder), identity=_identity(folder), artifact=artifact, folder=folder)
+    return Network(
+        estimator=estimator.load(folder),
+        identity=_identity(folder),
+        artifact=artifact,
+        folder=folder,
+    )
 
 
 def _identity(folder: Path) -> str:
-    """Hashes the card and the weights of a network. How it errs in a series of windows is no part of what it is: where
-    its card states that later, a reading model that was made before is still one of the same network."""
+    """Hashes the card and the weights of a network. How it errs in a series of windows is no part
+    of what it is: where its card states that later, a reading model that was made before is still
+    one of the same network."""
     card = read_card(folder)
     hashed = file_hash(folder / CARD)
     if SERIES_KEY in card:
-        hashed = digest(card_bytes({key: card[key] for key in card if key not in ("format", SERIES_KEY)}).decode())
+        hashed = digest(
+            card_bytes(
+                {key: card[key] for key in card if key not in ("format", SERIES_KEY)}
+            ).decode()
+        )
     return digest(f"{hashed} {file_hash(folder / WEIGHTS)}")

@@ -18,7 +18,13 @@ from measure.anemometer.intervals import half_width
 from measure.anemometer.networks import Network
 from measure.anemometer.novelty import Familiar
 from measure.anemometer.reading_model import ReadingModel
-from measure.anemometer.regression import BLOCK, Ridge, blocks_of, validate_penalties, with_neighbours
+from measure.anemometer.regression import (
+    BLOCK,
+    Ridge,
+    blocks_of,
+    validate_penalties,
+    with_neighbours,
+)
 from measure.anemometer.window_features import SUMMARY, Features, features_of
 from measure.cloth.blown_wind import STEADY, Log
 from measure.film.film_source import Subject
@@ -28,14 +34,15 @@ from measure.gate.reasons import REASONS
 ANSWER = 1
 """Raised when the same recordings give another reading model."""
 LEAST = 60.0
-"""s of film beside a log: three blocks of time. Lower, and too few blocks are left to choose a penalty by."""
+"""s of film beside a log: three blocks of time. Lower, and too few blocks are left to choose a
+penalty by."""
 ENOUGH = 240.0
 """s of film from which on intervals rest on enough blocks of time."""
 _OFFSETS = np.linspace(-2.0, 2.0, 9)
 """Errors of the clock that are tried, in its standard uncertainties."""
 CLOCK = 0.05
-"""s below which a clock's uncertainty matters for no window. Lower, and offsets are fitted where they change
-nothing."""
+"""s below which a clock's uncertainty matters for no window. Lower, and offsets are fitted where
+they change nothing."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,7 +71,8 @@ class Recording:
         return self.features.whole & self.log.covers(starts, starts + self.features.layout.step)
 
     def winds(self, offset: float) -> FloatArray:
-        """Computes the log's mean over each window, (w,) [m/s], with the log `offset` seconds later than its stamps."""
+        """Computes the log's mean over each window, (w,) [m/s], with the log `offset` seconds later
+        than its stamps."""
         starts = self.features.starts - offset
         return self.log.mean_speed(starts, starts + self.features.layout.step)
 
@@ -101,8 +109,10 @@ class Calibrated:
         """In one line."""
         low, high = self.model.range
         return (
-            f"reads the wind of {self.model.step:.2g} s to {self.model.rmse:.2f} m/s (RMSE in blocks of time that were "
-            f"left out, n = {len(self.model.winds)} windows; {self.level:.0%} within ±{self.half_width:.2f} m/s) "
+            f"reads the wind of {self.model.step:.2g} s to {self.model.rmse:.2f} m/s (RMSE in "
+            "blocks of time that were "
+            f"left out, n = {len(self.model.winds)} windows; {self.level:.0%} within "
+            f"±{self.half_width:.2f} m/s) "
             f"between {low:.1f} and {high:.1f} m/s; the network alone {self.uncalibrated:.2f} m/s"
         )
 
@@ -166,16 +176,22 @@ def windows_of_recording(
             fix="align a film and a log (flagdata align), and name the recording that comes out",
         )
     log = Log.of(wind, start=film.start, clock=subject.artifact.clock_sigma or 0.0)
-    if log.times[0] > min(film.duration, math.inf if last is None else last) or log.times[-1] < first:
+    if (
+        log.times[0] > min(film.duration, math.inf if last is None else last)
+        or log.times[-1] < first
+    ):
         raise InputError(
-            f"the log runs from {log.times[0]:.1f} to {log.times[-1]:.1f} s of the film's time and covers none of it",
+            f"the log runs from {log.times[0]:.1f} to {log.times[-1]:.1f} s of the film's time and "
+            "covers none of it",
             where=film.name,
             fix="align the film with the log of its own time (flagdata align)",
         )
     features = features_of(film, network.estimator, size, first=first, last=last, advance=advance)
     findings = film.findings()
     if faults := [finding for finding in findings if finding.kind in REASONS]:
-        raise RefusedError(faults[0].what, where=film.name, fix=faults[0].fix or "give another film")
+        raise RefusedError(
+            faults[0].what, where=film.name, fix=faults[0].fix or "give another film"
+        )
     return Recording(
         name=film.name,
         identity=subject.artifact.id,
@@ -186,12 +202,15 @@ def windows_of_recording(
     )
 
 
-def calibrate_reading(recordings: Sequence[Recording], *, network: Network, size: FlagSize, level: float) -> Calibrated:
+def calibrate_reading(
+    recordings: Sequence[Recording], *, network: Network, size: FlagSize, level: float
+) -> Calibrated:
     """Fits a reading model.
 
     Raises:
         InputError: too little film.
-        RefusedError: a wind that hardly changes; films of several places; a film that does not show the wind.
+        RefusedError: a wind that hardly changes; films of several places; a film that does not show
+            the wind.
     """
     # Usable windows have all their frames and a log that is not silent.
     step = recordings[0].features.layout.step
@@ -201,7 +220,8 @@ def calibrate_reading(recordings: Sequence[Recording], *, network: Network, size
         raise InputError(
             f"only {count * step:.0f} s of film have all their frames and a log beside them",
             where=recordings[0].name,
-            fix=f"give {LEAST:.0f} s or more that the log covers; {ENOUGH / 60:.0f} minutes are better",
+            fix=f"give {LEAST:.0f} s or more that the log covers; {ENOUGH / 60:.0f} minutes are "
+            "better",
         )
     _check_wind(recordings, usable)
     # Their features, with the neighbours' and without, in blocks of time.
@@ -209,13 +229,19 @@ def calibrate_reading(recordings: Sequence[Recording], *, network: Network, size
     rows, plain = _rows(recordings, usable)
     numbers = np.repeat(np.arange(len(recordings)), [int(mask.sum()) for mask in usable])
     times = np.concatenate(
-        [recording.features.starts[mask] for recording, mask in zip(recordings, usable, strict=True)]
+        [
+            recording.features.starts[mask]
+            for recording, mask in zip(recordings, usable, strict=True)
+        ]
     )
     blocks = blocks_of(times, numbers)
 
     def winds(offset: float) -> FloatArray:
         return np.concatenate(
-            [recording.winds(offset)[mask] for recording, mask in zip(recordings, usable, strict=True)]
+            [
+                recording.winds(offset)[mask]
+                for recording, mask in zip(recordings, usable, strict=True)
+            ]
         )
 
     # The clock's error first: it moves the winds that the features are fitted to.
@@ -224,12 +250,16 @@ def calibrate_reading(recordings: Sequence[Recording], *, network: Network, size
     offset = _best_offset(plain, winds, blocks, clock, is_named)
     logged = winds(offset)
     # Penalty and weights by cross-validation over blocks; its errors become the intervals.
-    checked = validate_penalties(rows, logged, blocks, np.tile(is_named, rows.shape[1] // len(names)))
+    checked = validate_penalties(
+        rows, logged, blocks, np.tile(is_named, rows.shape[1] // len(names))
+    )
     spread = float(logged.std())
     if checked.rmse >= spread:
         raise RefusedError(
-            f"the wind that is read of windows left out errs by {checked.rmse:.2f} m/s, as much as their mean would "
-            f"({spread:.2f} m/s): what moves may not be the flag, or film and log may not be of one time",
+            f"the wind that is read of windows left out errs by {checked.rmse:.2f} m/s, as much as "
+            "their mean would "
+            f"({spread:.2f} m/s): what moves may not be the flag, or film and log may not be of "
+            "one time",
             where=recordings[0].name,
             fix="check the flag with --crop or --flag, and the clocks with flagdata align",
         )
@@ -262,48 +292,69 @@ def calibrate_reading(recordings: Sequence[Recording], *, network: Network, size
 
 
 def _check_wind(recordings: Sequence[Recording], usable: Sequence[BoolArray]) -> None:
-    winds = np.concatenate([recording.winds(0.0)[mask] for recording, mask in zip(recordings, usable, strict=True)])
+    winds = np.concatenate(
+        [recording.winds(0.0)[mask] for recording, mask in zip(recordings, usable, strict=True)]
+    )
     if winds.std() < STEADY * winds.mean():
         raise RefusedError(
-            f"the wind hardly changes ({winds.mean():.1f} m/s, its windows within {winds.std():.2f} m/s), so that "
+            f"the wind hardly changes ({winds.mean():.1f} m/s, its windows within "
+            f"{winds.std():.2f} m/s), so that "
             "nothing shows how the flag follows it",
             where=recordings[0].name,
             fix="film for longer, or in gusts; several recordings are taken together",
         )
 
 
-def _rows(recordings: Sequence[Recording], usable: Sequence[BoolArray]) -> tuple[FloatArray, FloatArray]:
-    """Returns features of all usable windows: (n, 3 · column) with the neighbours', and (n, column) without."""
+def _rows(
+    recordings: Sequence[Recording], usable: Sequence[BoolArray]
+) -> tuple[FloatArray, FloatArray]:
+    """Returns features of all usable windows: (n, 3 · column) with the neighbours', and (n, column)
+    without."""
     pairs = list(zip(recordings, usable, strict=True))
-    rows = np.concatenate([with_neighbours(recording.features.values)[mask] for recording, mask in pairs])
+    rows = np.concatenate(
+        [with_neighbours(recording.features.values)[mask] for recording, mask in pairs]
+    )
     return rows, np.concatenate([recording.features.values[mask] for recording, mask in pairs])
 
 
 def _best_offset(
-    plain: FloatArray, winds: Callable[[float], FloatArray], blocks: NDArray[np.int_], clock: float, is_named: BoolArray
+    plain: FloatArray,
+    winds: Callable[[float], FloatArray],
+    blocks: NDArray[np.int_],
+    clock: float,
+    is_named: BoolArray,
 ) -> float:
-    """Fits the error of the clock [s], by windows without their neighbours, which could make up for it."""
+    """Fits the error of the clock [s], by windows without their neighbours, which could make up for
+    it."""
     if clock <= CLOCK:
         return 0.0
-    errors = [validate_penalties(plain, winds(share * clock), blocks, is_named).rmse for share in _OFFSETS.tolist()]
+    errors = [
+        validate_penalties(plain, winds(share * clock), blocks, is_named).rmse
+        for share in _OFFSETS.tolist()
+    ]
     misfit = len(plain) * np.log(errors) + np.square(_OFFSETS) / 2
     return float(_OFFSETS[misfit.argmin()]) * clock
 
 
-def _uncalibrated_error_of(recordings: Sequence[Recording], usable: Sequence[BoolArray], logged: FloatArray) -> float:
+def _uncalibrated_error_of(
+    recordings: Sequence[Recording], usable: Sequence[BoolArray], logged: FloatArray
+) -> float:
     network_winds = np.concatenate(
         [recording.features.winds[mask] for recording, mask in zip(recordings, usable, strict=True)]
     )
     return float(np.sqrt(np.mean((network_winds - logged) ** 2)))
 
 
-def _notices(recordings: Sequence[Recording], seconds: float, offset: float, clock: float) -> list[Finding]:
+def _notices(
+    recordings: Sequence[Recording], seconds: float, offset: float, clock: float
+) -> list[Finding]:
     findings = []
     if seconds < ENOUGH:
         findings.append(
             Finding.of(
                 "short-calibration",
-                f"{seconds:.0f} s of film beside a log are few: the intervals rest on {seconds / BLOCK:.0f} "
+                f"{seconds:.0f} s of film beside a log are few: the intervals rest on "
+                f"{seconds / BLOCK:.0f} "
                 "blocks of time",
                 value=seconds,
                 fix=f"give {ENOUGH / 60:.0f} minutes or more",
@@ -313,7 +364,8 @@ def _notices(recordings: Sequence[Recording], seconds: float, offset: float, clo
         findings.append(
             Finding.of(
                 "clock-at-limit",
-                f"the log fits best {offset:+.2f} s later than its stamps, whose uncertainty is {clock:.2f} s",
+                f"the log fits best {offset:+.2f} s later than its stamps, whose uncertainty is "
+                f"{clock:.2f} s",
                 value=offset,
                 fix="check the clocks with flagdata align",
             )
@@ -323,7 +375,8 @@ def _notices(recordings: Sequence[Recording], seconds: float, offset: float, clo
         findings.append(
             Finding.of(
                 "anemometer-accuracy",
-                f"the anemometer states ±{accuracy:g} m/s, which the reading model takes over and no interval contains",
+                f"the anemometer states ±{accuracy:g} m/s, which the reading model takes over and "
+                "no interval contains",
                 value=accuracy,
             )
         )

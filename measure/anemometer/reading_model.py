@@ -1,4 +1,5 @@
-"""A reading model: from what the windows of a film show to the wind at the flag, for one flag from one place."""
+"""A reading model: from what the windows of a film show to the wind at the flag, for one flag from
+one place."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ class ReadingModel:
     """A flag that was calibrated beside an anemometer.
 
     Attributes:
-        network, identity: name of the network whose summary is used, and SHA-256 of its card and weights.
+        network, identity: name of the network whose summary is used, and SHA-256 of its card and
+            weights.
         size: of the flag.
         step: length of a window [s].
         names: of the features that are used.

@@ -29,8 +29,9 @@ _FAMILIAR: Mapping[str, tuple[str, ...]] = {
 
 
 def write(path: Path, model: ReadingModel, about: Mapping[str, Any]) -> None:
-    """Writes a new Zarr folder: the regression over `column`, the windows' `winds` and `errors` over `window`, what
-    windows show beside the wind over `feature`, and the `hoist`, `background` and `bare` of each camera's place.
+    """Writes a new Zarr folder: the regression over `column`, the windows' `winds` and `errors`
+    over `window`, what windows show beside the wind over `feature`, and the `hoist`, `background`
+    and `bare` of each camera's place.
 
     Args:
         about: what is reported of the calibration, JSON values.
@@ -63,7 +64,9 @@ def write(path: Path, model: ReadingModel, about: Mapping[str, Any]) -> None:
         write_plain(group, f"familiar_{name}", getattr(familiar, name), dims)
     for number, place in enumerate(model.places):
         write_plain(group, f"hoist_{number}", place.hoist, ("end", "coordinate"))
-        write_plain(group, f"background_{number}", place.background, (f"row_{number}", f"col_{number}"))
+        write_plain(
+            group, f"background_{number}", place.background, (f"row_{number}", f"col_{number}")
+        )
         write_plain(group, f"bare_{number}", place.bare, (f"row_{number}", f"col_{number}"))
 
 
@@ -76,7 +79,9 @@ def read(path: Path) -> ReadingModel:
     """
     from flagdata.lake.sized_chunks import open_group
 
-    with store_errors(path, "the reading model is damaged", fix="run flagdata verify; calibrate again"):
+    with store_errors(
+        path, "the reading model is damaged", fix="run flagdata verify; calibrate again"
+    ):
         group = open_group(path)
         check_format(group.attrs.get(HEAD), FORMAT, path, noun="reading models")
         about: dict[str, Any] = json.loads(json.dumps(dict(group.attrs)))

@@ -24,8 +24,8 @@ SUMMARY = "summary-"
 VERSION = 1
 """Raised when the same film gives other features."""
 THUMBNAIL = 64
-"""Longer side of the picture by which a place is known again [px]. Larger shows more detail of the place, and more of
-what moves in it."""
+"""Longer side of the picture by which a place is known again [px]. Larger shows more detail of the
+place, and more of what moves in it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -33,8 +33,8 @@ class Place:
     """Where the camera stands, as far as its picture shows it.
 
     Attributes:
-        hoist: (2, 2) upper and lower end of the hoist: column and row, in longer sides of the picture; NaN where it was
-            not found.
+        hoist: (2, 2) upper and lower end of the hoist: column and row, in longer sides of the
+            picture; NaN where it was not found.
         side: 1 where the flag flies to the right, -1 to the left.
         background: (rows, columns) float32 the picture averaged down to `THUMBNAIL` [gray levels].
         bare: (rows, columns) where no cloth moves.
@@ -56,7 +56,8 @@ class Features:
         layout: of the windows.
         values: (w, feature), a row of NaN where frames are missing.
         names: of the features.
-        summaries: (w, dimension) of the network's first learner, by which films are compared; NaN likewise.
+        summaries: (w, dimension) of the network's first learner, by which films are compared; NaN
+            likewise.
         winds: (w,) that the network reads by itself [m/s]; NaN likewise.
         clip: (frames, height, width) of the first whole window.
         place: of the camera.
@@ -107,20 +108,29 @@ def features_of(
     winds = np.full(layout.count, np.nan)
     clip: UInt8Array | None = None
     hoist = _Hoist()
-    watcher = Watcher(film, size, begin=layout.first, count=layout.count, seconds=layout.step, deliver=hoist.take)
+    watcher = Watcher(
+        film, size, begin=layout.first, count=layout.count, seconds=layout.step, deliver=hoist.take
+    )
     reader.look = watcher.look
     for window in reader.windows(advance):
         embeddings = model.embeddings(model.inputs(window.clips))
         summary = embeddings[0][0].cpu().numpy().astype(np.float32)
         if summaries is None:
-            summaries, clip = np.full((layout.count, len(summary)), np.nan, np.float32), window.clips[0]
+            summaries, clip = (
+                np.full((layout.count, len(summary)), np.nan, np.float32),
+                window.clips[0],
+            )
         summaries[window.index] = summary
-        rows[window.index] = np.concatenate([embedding[0].cpu().numpy() for embedding in embeddings])
+        rows[window.index] = np.concatenate(
+            [embedding[0].cpu().numpy() for embedding in embeddings]
+        )
         values = model.learners[0].scaling.values(model.posterior(embeddings).mean().float())
         winds[window.index] = float(values[0, 0]) * scale ** POWERS[WIND]
     if summaries is None or clip is None:
         raise RefusedError(
-            "no window of the film has all its frames", where=film.name, fix="choose another part by --start and --end"
+            "no window of the film has all its frames",
+            where=film.name,
+            fix="choose another part by --start and --end",
         )
     watcher.finish()
     features = np.full((layout.count, len(next(iter(rows.values())))), np.nan)
@@ -153,8 +163,8 @@ class _Hoist:
                 self._side += window.side
 
     def found(self) -> tuple[FloatArray, float]:
-        """Returns the hoist's ends (2, 2) in the picture's sides, NaN where no window shows them, and the side the flag
-        flies to."""
+        """Returns the hoist's ends (2, 2) in the picture's sides, NaN where no window shows them,
+        and the side the flag flies to."""
         if not self._ends:
             return np.full((2, 2), np.nan), 0.0
         return np.median(self._ends, axis=0), float(np.sign(self._side))
@@ -175,8 +185,13 @@ def _place_of(film: ConditionedFilm, hoist: FloatArray, side: float) -> Place:
     background = cv2.resize(reference.astype(np.float32), shape[::-1], interpolation=cv2.INTER_AREA)
     bare = np.ones(shape, bool)
     for region in detection.regions:
-        left, top, right, bottom = (edge / detection.scale / longer * THUMBNAIL for edge in region.box)
-        bare[max(0, int(top) - 1) : int(np.ceil(bottom)) + 1, max(0, int(left) - 1) : int(np.ceil(right)) + 1] = False
+        left, top, right, bottom = (
+            edge / detection.scale / longer * THUMBNAIL for edge in region.box
+        )
+        bare[
+            max(0, int(top) - 1) : int(np.ceil(bottom)) + 1,
+            max(0, int(left) - 1) : int(np.ceil(right)) + 1,
+        ] = False
     square = detection.square
     corner = np.array([square.x, square.y], dtype=np.float64)
     return Place(

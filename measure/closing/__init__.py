@@ -1,7 +1,8 @@
-"""`flagdata close-loop`: sources in; a verdict, its report, its models and what the lake keeps of them out.
+"""`flagdata close-loop`: sources in; a verdict, its report, its models and what the lake keeps of
+them out.
 
-It composes the stages of a verdict and may import all of them: `measure.loop` finds the numbers, `measure.report` the
-words.
+It composes the stages of a verdict and may import all of them: `measure.loop` finds the numbers,
+`measure.report` the words.
 """
 
 from __future__ import annotations

@@ -9,13 +9,16 @@ from measure.report.verdict_statement import with_sentences
 from measure.verdict.verdict_record import Verdict
 
 
-def close_loop(experiment: Experiment, options: LoopOptions, *, stage: Stage | None = None) -> Verdict:
+def close_loop(
+    experiment: Experiment, options: LoopOptions, *, stage: Stage | None = None
+) -> Verdict:
     """Reaches the verdict on an experiment.
 
     Args:
         stage: called with progress.
 
     Raises:
-        InputError: recordings that cannot be used (see `measure.observe.checks` for what is looked at before).
+        InputError: recordings that cannot be used (see `measure.observe.checks` for what is looked
+            at before).
     """
     return with_sentences(solve(experiment, options, stage=stage))

@@ -46,7 +46,9 @@ def close_on_arrays(chosen: Closing) -> Closed:
         nulls=FEWEST_NULLS if chosen.nulls is None else chosen.nulls,
     )
     observed = observe(_tracked_observations(chosen), _setup(chosen))
-    return _answer(with_warnings(close_loop(observed.experiment, options), check_findings(observed.findings)))
+    return _answer(
+        with_warnings(close_loop(observed.experiment, options), check_findings(observed.findings))
+    )
 
 
 def _setup(chosen: Closing) -> Setup:
@@ -57,7 +59,9 @@ def _setup(chosen: Closing) -> Setup:
         raise UnknownNameError.of("attachment", attachment, names, where="attachment")
     setup = Setup(
         material=named_material(chosen.material),
-        pins=Hold(attachment) if isinstance(attachment, str) else tuple((float(u), float(v)) for u, v in attachment),
+        pins=Hold(attachment)
+        if isinstance(attachment, str)
+        else tuple((float(u), float(v)) for u, v in attachment),
         outline=None if chosen.flag_size is None else sheet(*chosen.flag_size),
     )
     weight = None if chosen.area_weight is None else Stated.of(chosen.area_weight)
@@ -81,18 +85,30 @@ def _tracked_observations(chosen: Closing) -> list[Observation]:
 
 
 def _several(recordings: Recordings) -> list[ArrayLike | MeshSequence]:
-    if isinstance(recordings, MeshSequence) or (isinstance(recordings, np.ndarray) and recordings.ndim == 3):
+    if isinstance(recordings, MeshSequence) or (
+        isinstance(recordings, np.ndarray) and recordings.ndim == 3
+    ):
         return [recordings]
     return list(recordings)  # type: ignore[arg-type]
 
 
-def _observation(recording: ArrayLike | MeshSequence, chosen: Closing, *, name: str, wind: WindTrack) -> Observation:
+def _observation(
+    recording: ArrayLike | MeshSequence, chosen: Closing, *, name: str, wind: WindTrack
+) -> Observation:
     if isinstance(recording, MeshSequence):
         return replace(from_sequence(recording, name=name), wind=wind, noise=chosen.noise)
     if chosen.rest is None or chosen.rate is None:
-        raise UsageError("the positions have no rest coordinates or no rate", where=name, fix="give rest= and rate=")
-    positions, places = (np.asarray(values, dtype=np.float64) for values in (recording, chosen.rest))
-    return from_arrays(name=name, positions=positions, rest=places, rate=chosen.rate, wind=wind, noise=chosen.noise)
+        raise UsageError(
+            "the positions have no rest coordinates or no rate",
+            where=name,
+            fix="give rest= and rate=",
+        )
+    positions, places = (
+        np.asarray(values, dtype=np.float64) for values in (recording, chosen.rest)
+    )
+    return from_arrays(
+        name=name, positions=positions, rest=places, rate=chosen.rate, wind=wind, noise=chosen.noise
+    )
 
 
 def _track(wind: Any) -> WindTrack:
@@ -136,6 +152,12 @@ def _quantity(name: str, strength: Estimate) -> Quantity:
         unit=strength.unit,
         value=strength.value if bound is None else None,
         sigma=None,
-        span=Span(low=strength.low, high=strength.high, level=strength.level, bound=bound, estimated=bound is None),
+        span=Span(
+            low=strength.low,
+            high=strength.high,
+            level=strength.level,
+            bound=bound,
+            estimated=bound is None,
+        ),
         constrained=bound is not Bound.NOTHING,
     )

@@ -1,7 +1,8 @@
-"""The models of a verdict as recipes that `flagdata simulate` runs at once: the base model, and that with the effects.
+"""The models of a verdict as recipes that `flagdata simulate` runs at once: the base model, and
+that with the effects.
 
-They run with the fit's own mesh and steps, whose damping is part of what was calibrated, in the frame of the fit: pole
-base at the origin, wind along +x.
+They run with the fit's own mesh and steps, whose damping is part of what was calibrated, in the
+frame of the fit: pole base at the origin, wind along +x.
 """
 
 from __future__ import annotations
@@ -44,9 +45,11 @@ class NamedModel:
     content: Mapping[str, Any]
 
 
-def models(verdict: Verdict, experiment: Experiment, *, name: str, seed: int) -> tuple[NamedModel, ...]:
-    """Makes the base model as calibrated and, where effects act, the larger one; none of a carried cloth, since recipes
-    hold cloth still.
+def models(
+    verdict: Verdict, experiment: Experiment, *, name: str, seed: int
+) -> tuple[NamedModel, ...]:
+    """Makes the base model as calibrated and, where effects act, the larger one; none of a carried
+    cloth, since recipes hold cloth still.
 
     Args:
         name: that theirs begin with.
@@ -60,14 +63,19 @@ def models(verdict: Verdict, experiment: Experiment, *, name: str, seed: int) ->
     if effects := acting(verdict):
         models_made.append(
             _model(
-                "-".join(dict.fromkeys([name, *(c.effect for c in effects)])), verdict, common, turned.specimen, effects
+                "-".join(dict.fromkeys([name, *(c.effect for c in effects)])),
+                verdict,
+                common,
+                turned.specimen,
+                effects,
             )
         )
     return tuple(models_made)
 
 
 def acting(verdict: Verdict) -> tuple[Candidate, ...]:
-    """Lists the effects of the larger model: all that are named as acting, or the first of those that may be."""
+    """Lists the effects of the larger model: all that are named as acting, or the first of those
+    that may be."""
     if not verdict.named:
         return ()
     unrejected = tuple(candidate for candidate in verdict.ranking if not candidate.why_not)
@@ -76,22 +84,32 @@ def acting(verdict: Verdict) -> tuple[Candidate, ...]:
 
 def fitted_parameters(verdict: Verdict, effects: Sequence[Candidate]) -> dict[str, float]:
     """Parameters of the cloth, calibrated with the effects where there are any, by their names."""
-    return {p.name: (p.after if effects and p.after is not None else p.before).value for p in verdict.parameters}
+    return {
+        p.name: (p.after if effects and p.after is not None else p.before).value
+        for p in verdict.parameters
+    }
 
 
 def acting_effects(effects: Sequence[Candidate]) -> dict[str, dict[str, dict[str, float]]]:
-    """Makes the table `effects` of a recipe, with the fitted strengths; nothing where there are none."""
+    """Makes the table `effects` of a recipe, with the fitted strengths; nothing where there are
+    none."""
     strengths: dict[str, dict[str, float]] = {}
     for candidate in effects:
         described = EFFECTS[candidate.effect].parameters()[candidate.parameter]
         of_effect = strengths.setdefault(candidate.effect, {})
-        of_effect[candidate.parameter.replace("_", "-")] = described.nearest(candidate.strength.value)
+        of_effect[candidate.parameter.replace("_", "-")] = described.nearest(
+            candidate.strength.value
+        )
         of_effect.update(SHAPES.get(candidate.effect, ()))
     return {"effects": strengths} if strengths else {}
 
 
 def _model(
-    name: str, verdict: Verdict, common: Mapping[str, Any], specimen: Specimen, effects: Sequence[Candidate]
+    name: str,
+    verdict: Verdict,
+    common: Mapping[str, Any],
+    specimen: Specimen,
+    effects: Sequence[Candidate],
 ) -> NamedModel:
     fit = fitted_parameters(verdict, effects)
     material = _material(specimen.material)
@@ -100,7 +118,10 @@ def _model(
         "bending-factor": fit["bending"],
         "damping": fit["damping"],
     }
-    return NamedModel(name=name, content={"title": name, **common, "material": material, **acting_effects(effects)})
+    return NamedModel(
+        name=name,
+        content={"title": name, **common, "material": material, **acting_effects(effects)},
+    )
 
 
 def _common(experiment: Experiment, seed: int) -> dict[str, Any]:
@@ -143,9 +164,18 @@ def _flag(specimen: Specimen) -> dict[str, Any] | None:
         return None
     if not np.allclose(specimen.anchors, upright(flat)[list(specimen.held)], atol=1e-3 * width):
         return None
-    for attachment, vertices in (("corners", handles.corners(flat.rest)), ("hoist", handles.full_hoist(flat.rest))):
+    for attachment, vertices in (
+        ("corners", handles.corners(flat.rest)),
+        ("hoist", handles.full_hoist(flat.rest)),
+    ):
         if specimen.held == vertices:
-            return {"shape": "flag", "width": width, "height": height, "columns": columns, "attachment": attachment}
+            return {
+                "shape": "flag",
+                "width": width,
+                "height": height,
+                "columns": columns,
+                "attachment": attachment,
+            }
     return None
 
 

@@ -1,4 +1,5 @@
-"""What commands that test against nulls share: their options, what findings end them, and bars of progress."""
+"""What commands that test against nulls share: their options, what findings end them, and bars of
+progress."""
 
 from __future__ import annotations
 
@@ -17,21 +18,31 @@ if TYPE_CHECKING:
     from measure.observe.experiment_recipe import ExperimentRecipe
 
 
-def nulls_given(recipe: ExperimentRecipe | None, chosen: ByNulls, *, level: float | None) -> dict[str, Any]:
-    """Returns `level` and `nulls` as the command line or else the recipe says them; without what neither does.
+def nulls_given(
+    recipe: ExperimentRecipe | None, chosen: ByNulls, *, level: float | None
+) -> dict[str, Any]:
+    """Returns `level` and `nulls` as the command line or else the recipe says them; without what
+    neither does.
 
     Raises:
         UsageError: a bank, and a number of nulls to simulate.
     """
     if chosen.bank is not None and chosen.nulls is not None:
-        raise UsageError("both --nulls and --bank are given", where="--nulls", fix="keep one of them")
+        raise UsageError(
+            "both --nulls and --bank are given", where="--nulls", fix="keep one of them"
+        )
     if chosen.bank is not None and chosen.scheduler is not None:
         raise UsageError(
-            "--scheduler and --bank are given: nothing is simulated", where="--scheduler", fix="keep one of them"
+            "--scheduler and --bank are given: nothing is simulated",
+            where="--scheduler",
+            fix="keep one of them",
         )
     values = {"level": level, "nulls": chosen.nulls}
     if recipe is not None:
-        values = {name: getattr(recipe, name) if value is None else value for name, value in values.items()}
+        values = {
+            name: getattr(recipe, name) if value is None else value
+            for name, value in values.items()
+        }
     return {name: value for name, value in values.items() if value is not None}
 
 
@@ -49,12 +60,19 @@ def stage_bars() -> Stage:
     from tqdm import tqdm
 
     bars: dict[str, tqdm] = {}
-    interval = 0.2 if sys.stderr.isatty() else 10.0  # a log file gets a line now and then, not an animation
+    interval = (
+        0.2 if sys.stderr.isatty() else 10.0
+    )  # a log file gets a line now and then, not an animation
 
     def advance(stage: str, done: int, total: int) -> None:
         if stage not in bars:
             bars[stage] = tqdm(
-                total=total, desc=printable(stage), unit="part", ncols=100, mininterval=interval, file=sys.stderr
+                total=total,
+                desc=printable(stage),
+                unit="part",
+                ncols=100,
+                mininterval=interval,
+                file=sys.stderr,
             )
         bars[stage].update(done - bars[stage].n)
         if done >= total:

@@ -1,7 +1,9 @@
-"""A verdict and its models in the lake, in one commit: what was concluded, from which recordings, by which nulls.
+"""A verdict and its models in the lake, in one commit: what was concluded, from which recordings,
+by which nulls.
 
-The identity of a verdict is a hash of all that went in (recordings, wind, cloth, options), not of the files it came in.
-A measurement's object is a Zarr folder with the verdict's JSON, its report and the nulls' statistics.
+The identity of a verdict is a hash of all that went in (recordings, wind, cloth, options), not of
+the files it came in. A measurement's object is a Zarr folder with the verdict's JSON, its report
+and the nulls' statistics.
 """
 
 from __future__ import annotations
@@ -121,7 +123,8 @@ def answer_of(
 
 
 def keep(lake: Lake, answer: VerdictAnswer, *, branch: str = "main") -> Kept:
-    """Publishes a verdict and its models in one commit where it is new, see `flagdata.lake.results`.
+    """Publishes a verdict and its models in one commit where it is new, see
+    `flagdata.lake.results`.
 
     Raises:
         FlagdataError: as `Lake.transaction`.
@@ -147,7 +150,8 @@ def models_of(lake: Lake, measurement: str, branch: str) -> tuple[str, ...]:
 
 
 def write(path: Path, verdict: Verdict, *, page: str) -> None:
-    """Writes a new Zarr folder: `verdict` (UTF-8 JSON), `report` (UTF-8 HTML) and `nulls` (statistic of each)."""
+    """Writes a new Zarr folder: `verdict` (UTF-8 JSON), `report` (UTF-8 HTML) and `nulls`
+    (statistic of each)."""
     import zarr
 
     group = zarr.open_group(path, mode="w-", zarr_format=3)
@@ -174,22 +178,30 @@ def read(path: Path) -> tuple[Verdict, str]:
     """
     from flagdata.lake.sized_chunks import open_group
 
-    with store_errors(path, "the measurement is damaged", fix="run flagdata verify; close the loop again"):
+    with store_errors(
+        path, "the measurement is damaged", fix="run flagdata verify; close the loop again"
+    ):
         group = open_group(path)
         check_format(group.attrs.get(_HEAD), _FORMAT, path, noun="verdicts")
         verdict, report = (
-            read_part(group, name, None, None, where=str(path)).tobytes().decode() for name in ("verdict", "report")
+            read_part(group, name, None, None, where=str(path)).tobytes().decode()
+            for name in ("verdict", "report")
         )
         return from_document(json.loads(verdict)), report
 
 
 def fingerprint(experiment: Experiment) -> str:
-    """Hashes an experiment with its uncertainties, SHA-256: cloth, pins, recordings and wind; not of names and
-    files."""
+    """Hashes an experiment with its uncertainties, SHA-256: cloth, pins, recordings and wind; not
+    of names and files."""
     content, arrays = describe_cloth(experiment.specimen)
     content["recordings"] = [[r.rate, r.noise, *r.wind.uncertainty] for r in experiment.recordings]
     for recording in experiment.recordings:
-        arrays += [recording.markers, recording.positions, recording.wind.times, recording.wind.velocity]
+        arrays += [
+            recording.markers,
+            recording.positions,
+            recording.wind.times,
+            recording.wind.velocity,
+        ]
         arrays += [] if recording.seen is None else [recording.seen]
     return array_hash(content, arrays)
 
@@ -197,7 +209,11 @@ def fingerprint(experiment: Experiment) -> str:
 def _measurement(answer: VerdictAnswer) -> Artifact:
     verdict = answer.verdict
     fitted = {p.name: (p.after or p.before).value for p in verdict.parameters}
-    fitted |= {f"{c.effect}.{c.parameter}": c.strength.value for c in answer.effects if c.strength.bound is None}
+    fitted |= {
+        f"{c.effect}.{c.parameter}": c.strength.value
+        for c in answer.effects
+        if c.strength.bound is None
+    }
     report = {
         "schema": "flagdata.close-loop-report/1",
         "conclusion": verdict.conclusion.value,

@@ -17,14 +17,17 @@ _DOUBTFUL = ("inertia-does-not-fit", "wind-does-not-fit", "flies-aside", "still-
 
 
 def check_findings(findings: Sequence[Finding]) -> tuple[Finding, ...]:
-    """Returns the findings, none of which is an error: what is wrong with the data must not come out as an effect.
+    """Returns the findings, none of which is an error: what is wrong with the data must not come
+    out as an effect.
 
     Raises:
         InputError: the first that is one.
     """
     for finding in findings:
         if finding.severity is Severity.ERROR:
-            raise InputError(finding.what, where=finding.where, fix=finding.fix or "correct the data")
+            raise InputError(
+                finding.what, where=finding.where, fix=finding.fix or "correct the data"
+            )
     return tuple(findings)
 
 
@@ -36,11 +39,17 @@ def finding_text(finding: Finding) -> str:
 
 
 def with_warnings(verdict: Verdict, findings: Sequence[Finding]) -> Verdict:
-    """Adds to the verdict the remarks on its data; with those in its words that may themselves be what was found."""
+    """Adds to the verdict the remarks on its data; with those in its words that may themselves be
+    what was found."""
     warnings = [finding_text(finding) for finding in findings if finding.kind in _DOUBTFUL]
     beware = (
-        f" The data themselves may be wrong, which would look like an effect: {'; '.join(warnings)}."
+        " The data themselves may be wrong, which would look like an effect: "
+        f"{'; '.join(warnings)}."
         if warnings
         else ""
     )
-    return replace(verdict, words=verdict.words + beware, findings=tuple((f.kind, finding_text(f)) for f in findings))
+    return replace(
+        verdict,
+        words=verdict.words + beware,
+        findings=tuple((f.kind, finding_text(f)) for f in findings),
+    )

@@ -28,7 +28,11 @@ from measure.report.verdict_sentences import after_label
 def joint_page(joint: Joint) -> str:
     """Renders the page, HTML; it lies beside the folders `markers` and `films`."""
     kinds = [
-        {"name": name, "verdict": verdict, "after_label": after_label(verdict) if verdict.named else ""}
+        {
+            "name": name,
+            "verdict": verdict,
+            "after_label": after_label(verdict) if verdict.named else "",
+        }
         for name, verdict in (("markers", joint.markers), ("films", joint.films))
     ]
     values = {"joint": joint, "tone": TONES[joint.conclusion], "kinds": kinds}
@@ -96,8 +100,17 @@ def deliver_joint(joint: Joint, answers: Sequence[VerdictAnswer], delivery: Deli
         for kind, answer in zip(KINDS, answers, strict=True)
     }
     content = {**plain(joint.as_dict()), **documents}
-    text = json.dumps({"schema": "flagdata.joint-verdict/1", **content}, indent=1, allow_nan=False, ensure_ascii=False)
-    write_files(delivery.out, dict(zip(JOINT, (joint_page(joint), text + "\n"), strict=True)), command="close-loop")
+    text = json.dumps(
+        {"schema": "flagdata.joint-verdict/1", **content},
+        indent=1,
+        allow_nan=False,
+        ensure_ascii=False,
+    )
+    write_files(
+        delivery.out,
+        dict(zip(JOINT, (joint_page(joint), text + "\n"), strict=True)),
+        command="close-loop",
+    )
     say(f"wrote {', '.join(str(delivery.out / file) for file in JOINT)}")
     if delivery.as_json:
         document("joint-verdict", content)

@@ -1,4 +1,5 @@
-"""What `close-loop` is given on its command line, as observations: sources, and winds beside them."""
+"""What `close-loop` is given on its command line, as observations: sources, and winds beside
+them."""
 
 from __future__ import annotations
 
@@ -61,12 +62,14 @@ class SourceOptions:
     confirm: Confirm = UNASKED
 
 
-def read(sources: Sequence[str], winds: Sequence[str], reading: SourceOptions, lake: Lake | None) -> list[Observation]:
+def read(
+    sources: Sequence[str], winds: Sequence[str], reading: SourceOptions, lake: Lake | None
+) -> list[Observation]:
     """Reads the recordings of some sources.
 
     Args:
-        winds: one for all recordings, one each, or none where the sources know theirs: a speed [m/s], a log, or an
-            artifact.
+        winds: one for all recordings, one each, or none where the sources know theirs: a speed
+            [m/s], a log, or an artifact.
 
     Raises:
         NotFoundError: a source that is neither a file nor an artifact.
@@ -77,19 +80,25 @@ def read(sources: Sequence[str], winds: Sequence[str], reading: SourceOptions, l
         (observation.turned(reading.up), source, wind)
         for observation, source, wind in _beside(sources, winds, reading, lake)
     ]
-    return distinct([blown(observation, wind, _HERE, lake) for observation, _, wind in observations])
+    return distinct(
+        [blown(observation, wind, _HERE, lake) for observation, _, wind in observations]
+    )
 
 
 def _beside(
     sources: Sequence[str], winds: Sequence[str], reading: SourceOptions, lake: Lake | None
 ) -> list[tuple[Observation, RecordingSource, WindSource | None]]:
-    """Returns the recordings of some sources as they are, each with its source and its wind; as `read`."""
+    """Returns the recordings of some sources as they are, each with its source and its wind; as
+    `read`."""
     observations: list[tuple[Observation, RecordingSource]] = []
     for text in sources:
-        source = RecordingSource(source=text, rate=reading.rate, unit=reading.unit, noise=reading.noise)
+        source = RecordingSource(
+            source=text, rate=reading.rate, unit=reading.unit, noise=reading.noise
+        )
         several = open_recordings(source, _HERE, lake)
         observations += [
-            (observation, replace(source, take=observation.name if len(several) > 1 else "")) for observation in several
+            (observation, replace(source, take=observation.name if len(several) > 1 else ""))
+            for observation in several
         ]
     if len(winds) not in (0, 1, len(observations)):
         raise UsageError(
@@ -106,21 +115,33 @@ def _beside(
         }
         for name in options:
             if options[name] is not None:
-                raise UsageError("no wind is a log", where=f"--{name}", fix="leave it out, or name a log by --wind")
+                raise UsageError(
+                    "no wind is a log",
+                    where=f"--{name}",
+                    fix="leave it out, or name a log by --wind",
+                )
     wind_sources = [
         _wind(wind, reading)
         for wind in (winds if len(winds) == len(observations) else [*winds[:1]] * len(observations))
     ]
     return [
         (observation, source, wind)
-        for (observation, source), wind in zip(observations, wind_sources or [None] * len(observations), strict=True)
+        for (observation, source), wind in zip(
+            observations, wind_sources or [None] * len(observations), strict=True
+        )
     ]
 
 
 def draft_recordings(
-    sources: Sequence[str], winds: Sequence[str], reading: SourceOptions, lake: Lake | None, *, folder: Path
+    sources: Sequence[str],
+    winds: Sequence[str],
+    reading: SourceOptions,
+    lake: Lake | None,
+    *,
+    folder: Path,
 ) -> dict[str, Any]:
-    """Returns what a recipe says of the recordings of some sources, see `measure.observe.experiment_recipe`.
+    """Returns what a recipe says of the recordings of some sources, see
+    `measure.observe.experiment_recipe`.
 
     Args:
         folder: of the recipe, which its paths are relative to.
@@ -147,7 +168,11 @@ def draft_recordings(
 
     tables = []
     for _, source, wind in _beside(sources, winds, reading, lake):
-        table = {**vars(source), "source": place_source(source.source), "wind": None if wind is None else blowing(wind)}
+        table = {
+            **vars(source),
+            "source": place_source(source.source),
+            "wind": None if wind is None else blowing(wind),
+        }
         tables.append(table)
     return filled_entries({"up": reading.up.value, "recording": tables})
 
@@ -182,7 +207,9 @@ def _wind(text: str, reading: SourceOptions) -> WindSource:
     speed = float(text)
     if reading.axis is None:
         raise UsageError(
-            "the speed has no direction", where=command_line("--wind", text), fix="give --axis, not --north"
+            "the speed has no direction",
+            where=command_line("--wind", text),
+            fix="give --axis, not --north",
         )
     x, y, z = (speed * np.array(reading.axis) / float(np.linalg.norm(reading.axis))).tolist()
     return WindSource(velocity=(x, y, z))
@@ -192,6 +219,8 @@ def distinct(recordings: Sequence[Recorded]) -> list[Recorded]:
     """Makes recordings' names different where two are the same."""
     names = [recording.name for recording in recordings]
     return [
-        replace(recording, name=f"{recording.name} ({number})") if names.count(recording.name) > 1 else recording
+        replace(recording, name=f"{recording.name} ({number})")
+        if names.count(recording.name) > 1
+        else recording
         for number, recording in enumerate(recordings, start=1)
     ]

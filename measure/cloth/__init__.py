@@ -1,4 +1,5 @@
-"""The cloth of a filmed flag with a log of the wind: weighed (`calibrate`), and tested for effects (`close-loop`)."""
+"""The cloth of a filmed flag with a log of the wind: weighed (`calibrate`), and tested for effects
+(`close-loop`)."""
 
 from __future__ import annotations
 
@@ -27,13 +28,36 @@ if TYPE_CHECKING:
     )
     from measure.cloth.emulator import Emulator, informative
     from measure.cloth.films_verdict import close_loop, verdict_of
-    from measure.cloth.flag_prior import AZIMUTH, CLOTH, ELEVATION, NUISANCES, TABLES, Normal, Uncertain, draws
+    from measure.cloth.flag_prior import (
+        AZIMUTH,
+        CLOTH,
+        ELEVATION,
+        NUISANCES,
+        TABLES,
+        Normal,
+        Uncertain,
+        draws,
+    )
     from measure.cloth.flag_recordings import Part, films_among
-    from measure.cloth.flag_simulation import COLUMNS, OBSERVED, RATE, Discretisation, Flag, FlagBatch, mean_bending
+    from measure.cloth.flag_simulation import (
+        COLUMNS,
+        OBSERVED,
+        RATE,
+        Discretisation,
+        Flag,
+        FlagBatch,
+        mean_bending,
+    )
     from measure.cloth.loop import FilmLoopOptions, solve
     from measure.cloth.model_evidence import Experiments
     from measure.cloth.numerics import FLAGS, MEASURED, Finer, with_errors
-    from measure.cloth.observed_recording import LEAST_WINDOWS, Observed, Projection, constant_wind, usable
+    from measure.cloth.observed_recording import (
+        LEAST_WINDOWS,
+        Observed,
+        Projection,
+        constant_wind,
+        usable,
+    )
     from measure.cloth.score_test import Judged, directions, judge, score
     from measure.cloth.sight import Sight
     from measure.cloth.simulations import Simulations, of_base, of_nulls, sights_of

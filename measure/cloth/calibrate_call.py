@@ -31,7 +31,9 @@ Arrays = Mapping[str, ArrayLike]
 Number = float | tuple[float, float] | str | Stated
 
 
-def options_of(chosen: OfFlag, size: FlagSize, *, simulations: int, level: float, seed: int) -> CalibrationOptions:
+def options_of(
+    chosen: OfFlag, size: FlagSize, *, simulations: int, level: float, seed: int
+) -> CalibrationOptions:
     """Returns how a flag of such a size is calibrated.
 
     Args:
@@ -47,7 +49,9 @@ def options_of(chosen: OfFlag, size: FlagSize, *, simulations: int, level: float
         return usual if value is None else stated_angle(usual, Stated.of(value), where=f"--{name}")
 
     return CalibrationOptions(
-        flag=Flag(length=size.length, height=size.height, attachment=_attachment(chosen.attachment)),
+        flag=Flag(
+            length=size.length, height=size.height, attachment=_attachment(chosen.attachment)
+        ),
         azimuth=angle("azimuth", chosen.azimuth_deg, AZIMUTH),
         elevation=angle("elevation", chosen.elevation_deg, ELEVATION),
         distance=FAR if chosen.distance is None else chosen.distance,
@@ -64,7 +68,12 @@ def folder_of(chosen: OfFlag) -> Path:
 
 
 def sources_of(
-    recordings: Sequence[Arrays | Path | str], chosen: OfFlag, size: FlagSize, lake: Lake | None, *, at: str
+    recordings: Sequence[Arrays | Path | str],
+    chosen: OfFlag,
+    size: FlagSize,
+    lake: Lake | None,
+    *,
+    at: str,
 ) -> Sources:
     """Opens recordings: tables that are given as arrays, paths of tables, and recordings of a lake.
 
@@ -103,12 +112,16 @@ def calibrate_arrays(chosen: Calibrating) -> Calibrated:
         raise InputError("no recordings are given", where="recordings", fix="give at least one")
     if chosen.flag_size is None:
         raise UsageError(
-            "the flag's size is missing", where="flag_size", fix="give length and height in metres, as in (1.5, 1.0)"
+            "the flag's size is missing",
+            where="flag_size",
+            fix="give length and height in metres, as in (1.5, 1.0)",
         )
     size = FlagSize.of(chosen.flag_size)
     drawn = {"simulations": chosen.simulations, "level": chosen.level, "seed": chosen.seed}
     options = options_of(chosen, size, **drawn)
-    gathered = sources_of(several, chosen, size, lake_of(chosen.lake), at=chosen.at or "main").read(size)
+    gathered = sources_of(several, chosen, size, lake_of(chosen.lake), at=chosen.at or "main").read(
+        size
+    )
     calibration = calibrate(
         gathered.recordings,
         options,
@@ -120,16 +133,22 @@ def calibrate_arrays(chosen: Calibrating) -> Calibrated:
 
 
 def of_arrays(columns: Arrays, *, name: str) -> tuple[Observed, ...]:
-    """Returns the recordings of a table that is given as arrays, in the units of the table of observables.
+    """Returns the recordings of a table that is given as arrays, in the units of the table of
+    observables.
 
     Raises:
         InputError: a column that is not known, columns of different lengths, or as
             `measure.cloth.tables_of_observables.of_table`.
     """
-    values = {key.replace("_", "-"): np.asarray(column, dtype=np.float64) for key, column in columns.items()}
+    values = {
+        key.replace("_", "-"): np.asarray(column, dtype=np.float64)
+        for key, column in columns.items()
+    }
     lengths = {column.shape for column in values.values()}
     if len(lengths) != 1 or len(next(iter(lengths), ())) != 1:
-        raise InputError(f"columns of shapes {sorted(lengths)}", where=name, fix="give (n,) for each, of one n")
+        raise InputError(
+            f"columns of shapes {sorted(lengths)}", where=name, fix="give (n,) for each, of one n"
+        )
     known_columns(tuple(values), where=name)
     if TIME in values:
         values[TIME] = values[TIME] - values[TIME][0]

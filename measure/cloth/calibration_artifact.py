@@ -34,7 +34,10 @@ def artifact(calibration: Calibration, reading: FilmReading, parents: tuple[str,
     """
     values = {q.name: q.value for q in calibration.cloth if q.value is not None}
     sources = [recording.observed.source for recording in calibration.recordings]
-    spans = [[recording.observed.first, recording.observed.duration] for recording in calibration.recordings]
+    spans = [
+        [recording.observed.first, recording.observed.duration]
+        for recording in calibration.recordings
+    ]
     return Artifact(
         kind=Kind.MEASUREMENT,
         name=", ".join(recording.observed.name for recording in calibration.recordings),
@@ -57,7 +60,12 @@ def artifact(calibration: Calibration, reading: FilmReading, parents: tuple[str,
 
 
 def keep(
-    lake: Lake, calibration: Calibration, reading: FilmReading, parents: tuple[str, ...], *, branch: str
+    lake: Lake,
+    calibration: Calibration,
+    reading: FilmReading,
+    parents: tuple[str, ...],
+    *,
+    branch: str,
 ) -> Placed:
     """Commit a calibration where it is new, see `flagdata.lake.results`.
 
@@ -65,12 +73,14 @@ def keep(
         FlagdataError: as `Lake.transaction`.
     """
     row = artifact(calibration, reading, parents)
-    return results.keep(lake, row, lambda staged: write(staged, calibration), f"calibrate {row.name}", branch=branch)
+    return results.keep(
+        lake, row, lambda staged: write(staged, calibration), f"calibrate {row.name}", branch=branch
+    )
 
 
 def write(path: Path, calibration: Calibration) -> None:
-    """Writes a new Zarr folder: `cloth` (draw, quantity) where the weight is not withheld, and for each recording
-    `readings-N` (window, observable) and `wind-N` (window)."""
+    """Writes a new Zarr folder: `cloth` (draw, quantity) where the weight is not withheld, and for
+    each recording `readings-N` (window, observable) and `wind-N` (window)."""
     import zarr
 
     group = zarr.open_group(path, mode="w-", zarr_format=3)
@@ -93,4 +103,9 @@ def write(path: Path, calibration: Calibration) -> None:
             recording.observed.readings.astype(np.float32),
             (f"window-{number}", "observable"),
         )
-        write_plain(group, f"wind-{number}", recording.observed.speed.astype(np.float32), (f"window-{number}",))
+        write_plain(
+            group,
+            f"wind-{number}",
+            recording.observed.speed.astype(np.float32),
+            (f"window-{number}",),
+        )

@@ -1,4 +1,5 @@
-"""A calibration as one HTML file that refers to no other, with each recording's observables against the wind."""
+"""A calibration as one HTML file that refers to no other, with each recording's observables against
+the wind."""
 
 from __future__ import annotations
 
@@ -35,8 +36,11 @@ class Band:
     colour: str
 
 
-def against_wind(observed: Observed, names: Sequence[str], bands: Sequence[Band], *, dots: str, opacity: float) -> str:
-    """Draws each observable against the wind, a panel for each, and returns the picture as a data URL.
+def against_wind(
+    observed: Observed, names: Sequence[str], bands: Sequence[Band], *, dots: str, opacity: float
+) -> str:
+    """Draws each observable against the wind, a panel for each, and returns the picture as a data
+    URL.
 
     Args:
         names: of the observables.
@@ -85,8 +89,15 @@ def calibration_page(
     values = {
         "name": ", ".join(recording.observed.name for recording in calibration.recordings),
         "sentence": calibration.sentence,
-        "tone": "settled" if calibration.weight.value is not None else "open" if calibration.weighs else "missed",
-        "findings": [{"severity": f.severity.value, "what": f.what, "fix": f.fix} for f in calibration.findings],
+        "tone": "settled"
+        if calibration.weight.value is not None
+        else "open"
+        if calibration.weighs
+        else "missed",
+        "findings": [
+            {"severity": f.severity.value, "what": f.what, "fix": f.fix}
+            for f in calibration.findings
+        ],
         "level": f"{calibration.options.level * 100:.3g} %",
         "cloth": [shown_quantity(q) for q in calibration.cloth],
         "stated": calibration.stated,
@@ -115,8 +126,8 @@ def calibration_page(
 
 
 def shown_quantity(quantity: Quantity) -> dict[str, str]:
-    """Returns a quantity as text: angles in degrees, and as `interval` what its values can be: both ends, or a bound
-    with its level."""
+    """Returns a quantity as text: angles in degrees, and as `interval` what its values can be: both
+    ends, or a bound with its level."""
     turn = 180 / math.pi if quantity.name in _DEGREES else 1.0
     least, most = quantity.assumed or quantity.interval
     unit = "" if quantity.unit == "1" else quantity.unit
@@ -151,7 +162,9 @@ def _posterior(calibration: Calibration) -> str:
         )  # the prior: the bins have equal shares of it
         if logarithmic:
             axes.set_xscale("log")
-            axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 30 * low else (1.0,)))
+            axes.xaxis.set_major_locator(
+                LogLocator(subs=(1.0, 2.0, 5.0) if high < 30 * low else (1.0,))
+            )
             axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
             axes.xaxis.set_minor_formatter(NullFormatter())
         axes.set_title(about.name.replace("_", " "), fontsize=11)

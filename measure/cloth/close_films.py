@@ -1,4 +1,5 @@
-"""`flagdata close-loop` on films with logs and on tables of observables: read, judged, and made an answer."""
+"""`flagdata close-loop` on films with logs and on tables of observables: read, judged, and made an
+answer."""
 
 from __future__ import annotations
 
@@ -88,18 +89,24 @@ def models(verdict: Verdict, outcome: SolvedLoop, *, name: str) -> tuple[NamedMo
     Args:
         name: that theirs begin with.
     """
-    recipes = [NamedModel(name=f"{name}-base", content=_content(verdict, outcome, f"{name}-base", ()))]
+    recipes = [
+        NamedModel(name=f"{name}-base", content=_content(verdict, outcome, f"{name}-base", ()))
+    ]
     if effects := acting(verdict)[:1]:
         larger = f"{name}-{effects[0].effect}"
         recipes.append(NamedModel(name=larger, content=_content(verdict, outcome, larger, effects)))
     return tuple(recipes)
 
 
-def _content(verdict: Verdict, outcome: SolvedLoop, title: str, effects: Sequence[Candidate]) -> Mapping[str, Any]:
+def _content(
+    verdict: Verdict, outcome: SolvedLoop, title: str, effects: Sequence[Candidate]
+) -> Mapping[str, Any]:
     calibration, cloth = outcome.options.calibration, fitted_parameters(verdict, effects)
     speeds = [float(recording.speed.mean()) for recording in outcome.recordings]
     fabric = FABRIC if calibration.material is None else calibration.material.tables[0]
-    speed: Any = speeds[0] if min(speeds) == max(speeds) else {"low": min(speeds), "high": max(speeds)}
+    speed: Any = (
+        speeds[0] if min(speeds) == max(speeds) else {"low": min(speeds), "high": max(speeds)}
+    )
     return {
         "title": title,
         "seed": calibration.seed,
@@ -172,7 +179,9 @@ def close_films(
         area_weight=None if chosen.area_weight is None else weight(chosen.area_weight),
         level=CRITERIA.level if level is None else level,
         kinds=CRITERIA.film_kinds if chosen.nulls is None else chosen.nulls,
-        suspected=None if chosen.suspect is None else Suspicion.parse(chosen.suspect, weighable(calibration.flag)),
+        suspected=None
+        if chosen.suspect is None
+        else Suspicion.parse(chosen.suspect, weighable(calibration.flag)),
     )
     reading = FilmReading.of(chosen, size)
     opened = sources_of(sources, chosen, size, lake, at=branch)
@@ -181,7 +190,8 @@ def close_films(
     recordings = distinct(gathered.recordings)
     say(
         announce_simulations(
-            workload([recording.duration for recording in recordings], options), workers=chosen.processes
+            workload([recording.duration for recording in recordings], options),
+            workers=chosen.processes,
         )
     )
     outcome = solve(
@@ -193,7 +203,9 @@ def close_films(
     )
     verdict = verdict_of(outcome)
     left_out = tuple((finding.kind, finding.what) for finding in gathered.left_out)
-    verdict = replace(verdict, findings=(*left_out, *verdict.findings), seconds=time.monotonic() - begun)
+    verdict = replace(
+        verdict, findings=(*left_out, *verdict.findings), seconds=time.monotonic() - begun
+    )
     called = name or recordings[0].name
     return answer_of(
         verdict,
@@ -206,13 +218,14 @@ def close_films(
 
 
 def simulations_of(recordings: int) -> int:
-    """Counts simulations of the base model for each of so many recordings: as many as the covariance of all their
-    summaries asks for."""
+    """Counts simulations of the base model for each of so many recordings: as many as the
+    covariance of all their summaries asks for."""
     return _FEW if recordings <= _TWO else _MANY
 
 
 def workload(durations: Sequence[float], options: FilmLoopOptions) -> float:
-    """Seconds of all flags that are simulated: of the base model, finer, with each effect, and of null experiments.
+    """Seconds of all flags that are simulated: of the base model, finer, with each effect, and of
+    null experiments.
 
     Args:
         durations: of the recordings [s].
@@ -224,7 +237,8 @@ def workload(durations: Sequence[float], options: FilmLoopOptions) -> float:
 
 
 def weight(area_weight: Stated) -> tuple[float, float]:
-    """Returns mean and standard deviation of a stated area weight [kg/m²]; of a range those of a uniform distribution.
+    """Returns mean and standard deviation of a stated area weight [kg/m²]; of a range those of a
+    uniform distribution.
 
     Raises:
         UsageError: a weight that no cloth has.
@@ -236,4 +250,6 @@ def weight(area_weight: Stated) -> tuple[float, float]:
             where="--area-weight",
             fix="give one above 0, as in 0.155±0.005",
         )
-    return middle, max(area_weight.sigma, (area_weight.high - area_weight.low) / 12**0.5, _RELATIVE * middle)
+    return middle, max(
+        area_weight.sigma, (area_weight.high - area_weight.low) / 12**0.5, _RELATIVE * middle
+    )

@@ -1,4 +1,5 @@
-"""From recordings of one flag to its cloth: simulated, emulated, weighed, and checked on simulations left out."""
+"""From recordings of one flag to its cloth: simulated, emulated, weighed, and checked on
+simulations left out."""
 
 from __future__ import annotations
 
@@ -36,18 +37,19 @@ from measure.posterior_ends import PILED, WITHIN, span
 ANSWER = 5
 """Raised when the same recordings and options get another answer."""
 DETERMINED = 0.8
-"""Share of the prior's spread, in ranks, below which a posterior is an answer: above it, it is the prior. Higher gives
-a value where the film says little; lower withholds more of them."""
+"""Share of the prior's spread, in ranks, below which a posterior is an answer: above it, it is the
+prior. Higher gives a value where the film says little; lower withholds more of them."""
 _FOLDS = 8
 _CHECKED = 48
-"""Simulations left out that are weighed to check the intervals. More make the check of the intervals surer, and slower
-in proportion."""
+"""Simulations left out that are weighed to check the intervals. More make the check of the
+intervals surer, and slower in proportion."""
 _UNLIKE = 0.01
-"""Tail probability of a recording's summary among those that the answer predicts below which the weight is withheld: of
-recordings that are as the model has them one in a hundred. Higher withholds more weights of flags that are as the model
-has them."""
+"""Tail probability of a recording's summary among those that the answer predicts below which the
+weight is withheld: of recordings that are as the model has them one in a hundred. Higher withholds
+more weights of flags that are as the model has them."""
 _LOOK = (
-    "look at the readings with flagdata observe --picture, check --flag-size, --attachment, --azimuth, --elevation and "
+    "look at the readings with flagdata observe --picture, check --flag-size, --attachment, "
+    "--azimuth, --elevation and "
     "--distance; flagdata close-loop looks for what is missing"
 )
 _APART = 2.0
@@ -79,10 +81,12 @@ class Fitted:
 
     Attributes:
         observed: the recording.
-        low, middle, high: (window, observable) of simulated flags of the posterior at the level, by the emulator.
+        low, middle, high: (window, observable) of simulated flags of the posterior at the level, by
+            the emulator.
         used: (observable,) those whose mean or slope the answer rests on.
         misfit: tail probability of its summary among those that the answer predicts.
-        deviations: (2·observable,) summaries less those that the answer predicts, in their standard deviations.
+        deviations: (2·observable,) summaries less those that the answer predicts, in their standard
+            deviations.
         failed: simulations that diverged or hardly show the flag.
     """
 
@@ -109,7 +113,9 @@ class Fitted:
         ]
         if not distant:
             return "its observables together"
-        return ", ".join(f"{name} {abs(z):.1f} σ too {'large' if z > 0 else 'small'}" for name, z in distant[:4])
+        return ", ".join(
+            f"{name} {abs(z):.1f} σ too {'large' if z > 0 else 'small'}" for name, z in distant[:4]
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -153,8 +159,8 @@ class Calibration:
 
     @property
     def stated(self) -> str | None:
-        """Returns the area weight as `flagdata measure --area-weight` takes it; None where it is not determined or a
-        bound."""
+        """Returns the area weight as `flagdata measure --area-weight` takes it; None where it is
+        not determined or a bound."""
         weight = self.weight
         if weight.value is None or weight.sigma is None:
             return None
@@ -176,12 +182,21 @@ class Calibration:
         if weight.is_bound:
             low, high = CLOTH[0].ends or weight.interval
             bound = f"{weight.span.phrase(3, ' kg/m²')}, {weight.span.percent}"
-            return f"area weight {bound}, n = {windows} windows (assumed: {low:.3f} to {high:.3f} kg/m²)"
+            return (
+                f"area weight {bound}, n = {windows} windows (assumed: {low:.3f} to {high:.3f} "
+                "kg/m²)"
+            )
         if weight.value is None:
             low, high = weight.assumed or weight.interval
-            return f"area weight: not determined by {windows} windows (assumed: {low:.3f} to {high:.3f} kg/m²)"
+            return (
+                f"area weight: not determined by {windows} windows (assumed: {low:.3f} to "
+                f"{high:.3f} kg/m²)"
+            )
         low, high = weight.interval
-        return f"area weight {weight.value:.3f} kg/m² [{low:.3f}, {high:.3f}] {level}, n = {windows} windows"
+        return (
+            f"area weight {weight.value:.3f} kg/m² [{low:.3f}, {high:.3f}] {level}, n = {windows} "
+            "windows"
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """Returns JSON values."""
@@ -196,7 +211,9 @@ class Calibration:
                     "wind_speed": float(recording.observed.speed.mean()),
                     "misfit": recording.misfit,
                     "failed": recording.failed,
-                    "observables": [name for name, used in zip(OBSERVED, recording.used, strict=True) if used],
+                    "observables": [
+                        name for name, used in zip(OBSERVED, recording.used, strict=True) if used
+                    ],
                     "place": {q.name: q.as_dict() for q in view},
                 }
                 for recording, view in zip(self.recordings, self.places, strict=True)
@@ -237,7 +254,9 @@ def calibrate(
     simulations: list[tuple[Observed, Mapping[str, FloatArray], FloatArray, Correction]] = []
     for recording, design in zip(recordings, designs_of(recordings, options), strict=True):
         readings = simulated_values(design, folder=folder, workers=workers, advance=advance)
-        correction = measure_correction(design, readings, folder=folder, workers=workers, advance=advance)
+        correction = measure_correction(
+            design, readings, folder=folder, workers=workers, advance=advance
+        )
         simulations.append((recording, design.values(), readings, correction))
     return answer_of(simulations, options, left_out=left_out)
 
@@ -283,19 +302,22 @@ def answer_of(
     *,
     left_out: Sequence[Finding] = (),
 ) -> Calibration:
-    """Returns the answer from recordings, each with its simulations' values, name → (simulation,), their readings
-    (simulation, window, observable), and how far these lie from those of a finer mesh. Those whose simulations do not
-    show what they show are left out.
+    """Returns the answer from recordings, each with its simulations' values, name → (simulation,),
+    their readings (simulation, window, observable), and how far these lie from those of a finer
+    mesh. Those whose simulations do not show what they show are left out.
 
     Args:
         left_out: a warning for each recording that is not among them.
 
     Raises:
-        RefusedError: simulations show nothing of any recording, see `informative` and `Emulator.fit`.
+        RefusedError: simulations show nothing of any recording, see `informative` and
+            `Emulator.fit`.
         InputError: too little is left.
     """
 
-    def seen(simulation: tuple[Observed, Mapping[str, FloatArray], FloatArray, Correction]) -> tuple[_Simulated, Sight]:
+    def seen(
+        simulation: tuple[Observed, Mapping[str, FloatArray], FloatArray, Correction],
+    ) -> tuple[_Simulated, Sight]:
         observed, values, readings, correction = simulation
         summaries = with_errors(observed, readings, correction, seed=options.seed)
         visible = np.tile(shown(observed.readings), 2 if observed.projection.changes else 1)
@@ -317,23 +339,35 @@ def _without_unlike(
     *,
     left_out: Sequence[Finding],
 ) -> Calibration:
-    """Returns the answer of those recordings that simulated flags look like, if there are such; otherwise the answer
-    as it is, which then is withheld with the reason."""
+    """Returns the answer of those recordings that simulated flags look like, if there are such;
+    otherwise the answer as it is, which then is withheld with the reason."""
     unlike = [recording for recording in calibration.recordings if recording.unlike is not None]
-    like = [pair for pair, recording in zip(models, calibration.recordings, strict=True) if recording.unlike is None]
+    like = [
+        pair
+        for pair, recording in zip(models, calibration.recordings, strict=True)
+        if recording.unlike is None
+    ]
     if not unlike or sum(pair.observed.duration for pair, _ in like) < LEAST_IN_ALL * WINDOW - 1e-9:
         return calibration
-    warned = [Finding(kind=LEFT_OUT, severity=Severity.WARNING, what=_unlike(fitted), fix=_LOOK) for fitted in unlike]
+    warned = [
+        Finding(kind=LEFT_OUT, severity=Severity.WARNING, what=_unlike(fitted), fix=_LOOK)
+        for fitted in unlike
+    ]
     again = _answer_of(like, options, left_out=(*left_out, *warned))
     return calibration if again.withheld is not None else again
 
 
 def _answer_of(
-    models: Sequence[tuple[_Simulated, Sight]], options: CalibrationOptions, *, left_out: Sequence[Finding]
+    models: Sequence[tuple[_Simulated, Sight]],
+    options: CalibrationOptions,
+    *,
+    left_out: Sequence[Finding],
 ) -> Calibration:
     """Returns the answer from recordings whose simulations show what they show."""
     simulations, sights = [simulation for simulation, _ in models], [sight for _, sight in models]
-    draws = posterior(sights, [simulation.observed.summary for simulation in simulations], seed=options.seed)
+    draws = posterior(
+        sights, [simulation.observed.summary for simulation in simulations], seed=options.seed
+    )
     fitted = tuple(
         _fitted_values(simulation, sight, draws, number, options)
         for number, (simulation, sight) in enumerate(zip(simulations, sights, strict=True))
@@ -345,13 +379,16 @@ def _answer_of(
         check=check_coverage(simulations, options),
         cloth=tuple(quantity(q, draws.cloth[q.name], options.level) for q in CLOTH),
         places=tuple(
-            tuple(quantity(q, view[q.name], options.level) for q in _uncertain_places(options)) for view in draws.places
+            tuple(quantity(q, view[q.name], options.level) for q in _uncertain_places(options))
+            for view in draws.places
         ),
     )
     findings = (*left_out, *_findings(calibration))
     if calibration.withheld is not None:
         assumed = np.linspace(0.0, 1.0, 1001)
-        calibration = replace(calibration, cloth=tuple(quantity(q, q.at(assumed), options.level) for q in CLOTH))
+        calibration = replace(
+            calibration, cloth=tuple(quantity(q, q.at(assumed), options.level) for q in CLOTH)
+        )
     return replace(calibration, findings=findings)
 
 
@@ -363,7 +400,9 @@ def quantity(about: Uncertain, draws: FloatArray, level: float) -> Quantity:
     determined = float(ranks.std()) < DETERMINED / math.sqrt(12)
     # What is not determined has the prior's interval, which has no end where draws pile up.
     places = ranks if determined and about.ends is not None else None
-    interval = span(draws, places, level=level, limits=about.limits, assumed=about.ends or about.limits)
+    interval = span(
+        draws, places, level=level, limits=about.limits, assumed=about.ends or about.limits
+    )
     return Quantity(
         name=about.name,
         unit=about.unit,
@@ -376,14 +415,22 @@ def quantity(about: Uncertain, draws: FloatArray, level: float) -> Quantity:
 
 
 def check_coverage(recordings: Sequence[_Simulated], options: CalibrationOptions) -> Check:
-    """Weighs simulations of all recordings together, an eighth at a time, by emulators fitted to the others; of the
-    first recording alone where the others are of other cloths."""
+    """Weighs simulations of all recordings together, an eighth at a time, by emulators fitted to
+    the others; of the first recording alone where the others are of other cloths."""
     weights = [simulation.values[CLOTH[0].name] for simulation in recordings]
     recordings = [
-        simulation for simulation, drawn in zip(recordings, weights, strict=True) if np.array_equal(drawn, weights[0])
+        simulation
+        for simulation, drawn in zip(recordings, weights, strict=True)
+        if np.array_equal(drawn, weights[0])
     ]
     complete = np.flatnonzero(
-        np.all([np.isfinite(simulation.summaries[:, simulation.used]).all(axis=1) for simulation in recordings], axis=0)
+        np.all(
+            [
+                np.isfinite(simulation.summaries[:, simulation.used]).all(axis=1)
+                for simulation in recordings
+            ],
+            axis=0,
+        )
     )
     rng = stream(options.seed, "calibrate", "check")
     chosen = rng.permutation(complete)[:_CHECKED]
@@ -397,10 +444,16 @@ def check_coverage(recordings: Sequence[_Simulated], options: CalibrationOptions
         summaries = [simulation.summaries[fold_members] for simulation in recordings]
         weight = weigh_cloths(sights, summaries, seed=seed)[CLOTH[0].name]
         truth = weights[0][fold_members]
-        low, middle, high = np.quantile(weight, [(1 - options.level) / 2, 0.5, (1 + options.level) / 2], axis=1)
+        low, middle, high = np.quantile(
+            weight, [(1 - options.level) / 2, 0.5, (1 + options.level) / 2], axis=1
+        )
         contained += int(((low <= truth) & (truth <= high)).sum())
         errors.extend(np.abs(middle / truth - 1).tolist())
-    return Check(count=len(errors), contained=contained, error=float(np.median(errors)) if errors else math.nan)
+    return Check(
+        count=len(errors),
+        contained=contained,
+        error=float(np.median(errors)) if errors else math.nan,
+    )
 
 
 def _uncertain_places(options: CalibrationOptions) -> tuple[Uncertain, ...]:
@@ -408,7 +461,11 @@ def _uncertain_places(options: CalibrationOptions) -> tuple[Uncertain, ...]:
 
 
 def _fitted_values(
-    simulated_recording: _Simulated, sight: Sight, posterior_draws: Posterior, index: int, options: CalibrationOptions
+    simulated_recording: _Simulated,
+    sight: Sight,
+    posterior_draws: Posterior,
+    index: int,
+    options: CalibrationOptions,
 ) -> Fitted:
     """Returns what the emulator says that flags of the posterior show."""
     recording, summaries = simulated_recording.observed, simulated_recording.summaries
@@ -422,10 +479,15 @@ def _fitted_values(
     replicates = np.where(np.isfinite(summaries), summaries, np.nanmean(summaries, axis=0))[rows]
     replicates[:, used] = predicted
     windows = recording.projection.at(replicates.reshape(len(predicted), -1, count))
-    low, middle, high = np.quantile(windows, [(1 - options.level) / 2, 0.5, (1 + options.level) / 2], axis=0)
+    low, middle, high = np.quantile(
+        windows, [(1 - options.level) / 2, 0.5, (1 + options.level) / 2], axis=0
+    )
     compared = np.isfinite(recording.summary) & np.isfinite(replicates).all(axis=0)
     # The recording's distance among those of the replicates is the misfit.
-    centre, inverse = replicates[:, compared].mean(axis=0), np.linalg.pinv(np.cov(replicates[:, compared].T))
+    centre, inverse = (
+        replicates[:, compared].mean(axis=0),
+        np.linalg.pinv(np.cov(replicates[:, compared].T)),
+    )
     offsets = np.concatenate([replicates[:, compared], recording.summary[None, compared]]) - centre
     *distances, distance_observed = ((offsets @ inverse) * offsets).sum(axis=1).tolist()
     distance = np.array(distances)
@@ -463,7 +525,8 @@ def _findings(calibration: Calibration) -> tuple[Finding, ...]:
     check, level = calibration.check, calibration.options.level
     if check.contained < check.count * level - 2.6 * math.sqrt(check.count * level * (1 - level)):
         text = (
-            f"of {check.count} simulations left out, the intervals of {check.contained} contain the area weight, where "
+            f"of {check.count} simulations left out, the intervals of {check.contained} contain "
+            "the area weight, where "
             f"{check.count * level:.0f} are expected: they are too narrow"
         )
         fix = "give more simulations with --simulations"
@@ -479,9 +542,11 @@ def _findings(calibration: Calibration) -> tuple[Finding, ...]:
 def _unlike(recording: Fitted) -> str:
     """Returns what is unlike about a recording, and what may be the cause."""
     return (
-        f"no simulated flag looks like {recording.observed.name} (p = {recording.misfit:.1g}): {recording.unlike}. "
+        f"no simulated flag looks like {recording.observed.name} (p = {recording.misfit:.1g}): "
+        f"{recording.unlike}. "
         "The cloth may not be "
-        "separated from what is behind it, or its size, attachment or place be another than stated, or something may "
+        "separated from what is behind it, or its size, attachment or place be another than "
+        "stated, or something may "
         "act on it that the model lacks"
     )
 
@@ -495,8 +560,10 @@ def _leaning(calibration: Calibration) -> list[Finding]:
         most = quantity.bound is Bound.MOST
         end = f"{about.ends[0 if most else 1]:.3g} {quantity.unit}"
         text = (
-            f"{quantity.name.replace('_', ' ')}: {PILED:.0%} of the posterior or more lie within {WITHIN:.0%} of the "
-            f"end of what is assumed, {end}; {'less' if most else 'more'} would look the same, so that only a bound is "
+            f"{quantity.name.replace('_', ' ')}: {PILED:.0%} of the posterior or more lie within "
+            f"{WITHIN:.0%} of the "
+            f"end of what is assumed, {end}; {'less' if most else 'more'} would look the same, so "
+            "that only a bound is "
             "given"
         )
         fix = "check the flag's size and where the camera stood" + (

@@ -2,14 +2,15 @@
 
     p(cloth | y) ∝ p(cloth) ∫ ∏_j p(place_j, gain_j) p(y | cloth, places, gains) d(places, gains)
 
-over recordings j, y being the summaries of all of them: what is unknown of the cloth and of the numerics is the same in
-all recordings, so that they are not independent (`measure.cloth.emulator`).
+over recordings j, y being the summaries of all of them: what is unknown of the cloth and of the
+numerics is the same in all recordings, so that they are not independent (`measure.cloth.emulator`).
 
 Draws from a density by an ensemble of walkers, several densities at once.
 
-Each walker steps along its line to another one, stretched by a random factor (Goodman and Weare, Communications in
-Applied Mathematics and Computational Science 5, 2010). Coordinates are normal scores, in which the prior is standard
-normal. Walkers start at draws of the prior that are chosen by their likelihood.
+Each walker steps along its line to another one, stretched by a random factor (Goodman and Weare,
+Communications in Applied Mathematics and Computational Science 5, 2010). Coordinates are normal
+scores, in which the prior is standard normal. Walkers start at draws of the prior that are chosen
+by their likelihood.
 """
 
 from __future__ import annotations
@@ -25,10 +26,11 @@ from measure.cloth.model_evidence import Hypothesis, hypothesis
 from measure.cloth.sight import Sight
 
 _STARTS = 4096
-"""Draws of the prior among which walkers start. More start walkers nearer to a narrow posterior, and cost one
-prediction each."""
+"""Draws of the prior among which walkers start. More start walkers nearer to a narrow posterior,
+and cost one prediction each."""
 _THIN = 10
-"""Steps between draws that are kept. Fewer keep draws that are correlated; more keep fewer of them."""
+"""Steps between draws that are kept. Fewer keep draws that are correlated; more keep fewer of
+them."""
 _STRETCH = 2.0
 """Largest factor of a step, and the inverse of the least one (Goodman and Weare's a)."""
 
@@ -42,8 +44,8 @@ def ensemble(
     steps: int,
     rng: np.random.Generator,
 ) -> FloatArray:
-    """Draws (group, draw, dimension) normal scores; of the steps the first half is not kept, and one in `_THIN` of the
-    rest.
+    """Draws (group, draw, dimension) normal scores; of the steps the first half is not kept, and
+    one in `_THIN` of the rest.
 
     Args:
         likelihood: logarithms (group, n) at normal scores (group, n, dimension).
@@ -65,8 +67,12 @@ def ensemble(
     sides = (slice(0, half), slice(half, None))
     for step in range(steps):
         for moving, still in (sides, sides[::-1]):
-            stretch = (1 + rng.random((groups, half)) * (_STRETCH - 1)) ** 2 / _STRETCH  # of density ∝ 1/√z
-            partner = np.take_along_axis(at[:, still], rng.integers(half, size=(groups, half, 1)), axis=1)
+            stretch = (
+                1 + rng.random((groups, half)) * (_STRETCH - 1)
+            ) ** 2 / _STRETCH  # of density ∝ 1/√z
+            partner = np.take_along_axis(
+                at[:, still], rng.integers(half, size=(groups, half, 1)), axis=1
+            )
             tried = partner + stretch[..., None] * (at[:, moving] - partner)
             tried_density = density(tried)
             odds = (dimension - 1) * np.log(stretch) + tried_density - value[:, moving]
@@ -107,32 +113,54 @@ def posterior(sights: Sequence[Sight], observed: Sequence[FloatArray], *, seed: 
     """
     base = hypothesis(sights, None)
     rng = stream(seed, "calibrate", "posterior")
-    scores = _drawn(base, [summary[None] for summary in observed], walkers=WALKERS, steps=STEPS, rng=rng)
+    scores = _drawn(
+        base, [summary[None] for summary in observed], walkers=WALKERS, steps=STEPS, rng=rng
+    )
     cloth, places, _ = base.values(scores[0])
     return Posterior(cloth=cloth, places=tuple(places), together=base.scatter.together)
 
 
-def weigh_cloths(sights: Sequence[Sight], observed: Sequence[FloatArray], *, seed: int) -> Mapping[str, FloatArray]:
-    """Draws the cloths of several flags, each by itself, seen from the sights' places: name → (flag, draw).
+def weigh_cloths(
+    sights: Sequence[Sight], observed: Sequence[FloatArray], *, seed: int
+) -> Mapping[str, FloatArray]:
+    """Draws the cloths of several flags, each by itself, seen from the sights' places: name →
+    (flag, draw).
 
     Args:
         observed: of each recording (flag, summary).
     """
     base, (walkers, steps) = hypothesis(sights, None), CHECK
-    scores = _drawn(base, observed, walkers=walkers, steps=steps, rng=stream(seed, "calibrate", "weighed"))
+    scores = _drawn(
+        base, observed, walkers=walkers, steps=steps, rng=stream(seed, "calibrate", "weighed")
+    )
     cloth, _, _ = base.values(scores.reshape(-1, scores.shape[2]))
     return {name: values.reshape(scores.shape[:2]) for name, values in cloth.items()}
 
 
 def _drawn(
-    base: Hypothesis, observed: Sequence[FloatArray], *, walkers: int, steps: int, rng: np.random.Generator
+    base: Hypothesis,
+    observed: Sequence[FloatArray],
+    *,
+    walkers: int,
+    steps: int,
+    rng: np.random.Generator,
 ) -> FloatArray:
-    """Draws normal scores (flag, draw, dimension) of flags whose summaries are (flag, summary) in each recording."""
-    summaries = np.concatenate([rows[:, sight.used] for sight, rows in zip(base.sights, observed, strict=True)], axis=1)
+    """Draws normal scores (flag, draw, dimension) of flags whose summaries are (flag, summary) in
+    each recording."""
+    summaries = np.concatenate(
+        [rows[:, sight.used] for sight, rows in zip(base.sights, observed, strict=True)], axis=1
+    )
 
     def likelihood(scores: FloatArray) -> FloatArray:
         mean, stretch, _ = base.predicted(scores.reshape(-1, scores.shape[2]))
         offset = np.repeat(summaries, scores.shape[1], axis=0) - mean
         return base.scatter.log_density(offset, stretch).reshape(scores.shape[:2])
 
-    return ensemble(likelihood, groups=len(summaries), dimension=base.dimension, walkers=walkers, steps=steps, rng=rng)
+    return ensemble(
+        likelihood,
+        groups=len(summaries),
+        dimension=base.dimension,
+        walkers=walkers,
+        steps=steps,
+        rng=rng,
+    )

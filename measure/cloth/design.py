@@ -1,12 +1,14 @@
-"""The simulations that calibrate and close-loop need of one recording: planned, run in batches, each batch kept in a
-file named by the hash of its inputs.
+"""The simulations that calibrate and close-loop need of one recording: planned, run in batches,
+each batch kept in a file named by the hash of its inputs.
 
-An interrupted calibration goes on where it was, and another one of the same film, log and seed simulates nothing.
+An interrupted calibration goes on where it was, and another one of the same film, log and seed
+simulates nothing.
 
-The base model's simulations of a verdict are those of `flagdata calibrate`, so that a loop after a calibration makes
-none of them anew. Each simulation with an effect repeats one of these with the same cloth, place and turbulence, so
-that the two differ by the effect and by chaos alone. Null experiments are of the same minutes of wind, of cloths
-and places over the same priors, each kind of numerics a batch.
+The base model's simulations of a verdict are those of `flagdata calibrate`, so that a loop after a
+calibration makes none of them anew. Each simulation with an effect repeats one of these with the
+same cloth, place and turbulence, so that the two differ by the effect and by chaos alone. Null
+experiments are of the same minutes of wind, of cloths and places over the same priors, each kind of
+numerics a batch.
 """
 
 from __future__ import annotations
@@ -69,7 +71,8 @@ class Weighable(Strengths):
 
 
 def weighable(flag: Flag) -> tuple[Weighable, ...]:
-    """Returns the effects that are weighed for a flag: one that is held along its hoist cannot be held more."""
+    """Returns the effects that are weighed for a flag: one that is held along its hoist cannot be
+    held more."""
     return tuple(
         Weighable(column=strength.column, low=strength.low, high=strength.high)
         for strength in all_strengths()
@@ -78,7 +81,8 @@ def weighable(flag: Flag) -> tuple[Weighable, ...]:
 
 
 FAR = 15.0
-"""m from which a flag is filmed where the user gives no distance: beyond some flag lengths it hardly matters."""
+"""m from which a flag is filmed where the user gives no distance: beyond some flag lengths it
+hardly matters."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -93,7 +97,8 @@ class Design:
         count: of simulations.
         seed: of all draws.
         distance: of the camera [m].
-        recording: label of the recording; recordings of one cloth have the same cloths and different turbulence.
+        recording: label of the recording; recordings of one cloth have the same cloths and
+            different turbulence.
         place: label of the place; recordings at one place share its view and its anemometer.
         fabric: which measured tables the cloths have.
     """
@@ -129,7 +134,8 @@ class Design:
 
     def values(self) -> Mapping[str, FloatArray]:
         """Name → (count,), by ascending damping, so that batches can be simulated in long steps."""
-        # In another order in each place: two scramblings of a Sobol sequence are correlated, row by row.
+        # In another order in each place: two scramblings of a Sobol sequence are correlated, row by
+        # row.
         seed = child_seed(self.seed, "calibrate", "place", self.place)
         order = stream(seed, "calibrate", "order").permutation(self.count)
         placed = draws(self.quantities(), self.count, seed=seed, name="design")
@@ -157,7 +163,10 @@ class Design:
             duration=self.duration,
             values=values,
             places=np.stack(view, axis=1)[:, None],
-            seeds=tuple(child_seed(self.seed, "calibrate", "flag", self.recording, int(number)) for number in which),
+            seeds=tuple(
+                child_seed(self.seed, "calibrate", "flag", self.recording, int(number))
+                for number in which
+            ),
         )
 
     def in_longest_steps(self) -> IntArray:
@@ -214,9 +223,17 @@ def designs_of(recordings: Sequence[Observed], options: CalibrationOptions) -> l
     """
     check_in_all(recordings)
     names = [f"{recording.source} {recording.name} {recording.first:g}" for recording in recordings]
-    twice = [recording.name for number, recording in enumerate(recordings) if names[number] in names[:number]]
+    twice = [
+        recording.name
+        for number, recording in enumerate(recordings)
+        if names[number] in names[:number]
+    ]
     if twice:
-        raise InputError(f"{twice[0]} is given twice", where="recordings", fix="give each recording of the flag once")
+        raise InputError(
+            f"{twice[0]} is given twice",
+            where="recordings",
+            fix="give each recording of the flag once",
+        )
     return [
         Design(
             flag=options.flag,
@@ -236,9 +253,14 @@ def designs_of(recordings: Sequence[Observed], options: CalibrationOptions) -> l
 
 
 def simulated_values(
-    design: Design, *, folder: Path, workers: int = 1, advance: Callable[[int], object] | None = None
+    design: Design,
+    *,
+    folder: Path,
+    workers: int = 1,
+    advance: Callable[[int], object] | None = None,
 ) -> FloatArray:
-    """Returns (simulation, window, observable) in the order of the design's values; NaN where a flag diverged.
+    """Returns (simulation, window, observable) in the order of the design's values; NaN where a
+    flag diverged.
 
     Args:
         folder: where batches are kept.
@@ -268,18 +290,30 @@ class Simulatable(Protocol):
 
 
 def readings_of(
-    batches: Sequence[Simulatable], *, folder: Path, workers: int = 1, advance: Callable[[int], object] | None = None
+    batches: Sequence[Simulatable],
+    *,
+    folder: Path,
+    workers: int = 1,
+    advance: Callable[[int], object] | None = None,
 ) -> FloatArray:
-    """Returns what batches read, (cloth, …) in order, of flags (flag, place, window, observable); those that the folder
-    lacks are simulated. As `simulated_values`."""
+    """Returns what batches read, (cloth, …) in order, of flags (flag, place, window, observable);
+    those that the folder lacks are simulated. As `simulated_values`."""
     paths = [folder / f"{digest(canonical(dict(batch.content())))[:32]}.npz" for batch in batches]
     missing = [number for number, path in enumerate(paths) if not path.exists()]
     if advance is not None and len(missing) < len(batches):
-        advance(sum(len(batch.seeds) for number, batch in enumerate(batches) if number not in set(missing)))
+        advance(
+            sum(
+                len(batch.seeds)
+                for number, batch in enumerate(batches)
+                if number not in set(missing)
+            )
+        )
     folder.mkdir(parents=True, exist_ok=True)
     if missing:
         with connect_workers(None, workers=min(workers, len(missing)), say=say_beside_bars) as pool:
-            for count in pool.results((_make, (batches[number], paths[number])) for number in missing):
+            for count in pool.results(
+                (_make, (batches[number], paths[number])) for number in missing
+            ):
                 if advance is not None:
                     advance(count)
     return np.concatenate([_read(path) for path in paths])
@@ -299,25 +333,28 @@ def _read(path: Path) -> FloatArray:
     try:
         return np.asarray(content["readings"], dtype=np.float64)
     except (ValueError, KeyError, TypeError) as error:
-        raise CorruptError(f"kept simulations cannot be read: {error}", where=str(path), fix=again) from None
+        raise CorruptError(
+            f"kept simulations cannot be read: {error}", where=str(path), fix=again
+        ) from None
 
 
 TOGETHER = 8
-"""Flags in a batch of pairs or nulls (a design's batches have `BATCH`): eight take as long as one, and sixteen take
-2.7 times as long."""
+"""Flags in a batch of pairs or nulls (a design's batches have `BATCH`): eight take as long as one,
+and sixteen take 2.7 times as long."""
 PAIRS = 16
-"""Flags with each effect, for each recording. More estimate an effect's change better and take as many more simulations
-for each effect and recording."""
+"""Flags with each effect, for each recording. More estimate an effect's change better and take as
+many more simulations for each effect and recording."""
 LONGEST_PAIRS = 120.0
-"""s of all recordings together in which flags with an effect are simulated, a minute of each at most."""
+"""s of all recordings together in which flags with an effect are simulated, a minute of each at
+most."""
 MINUTE = 60.0
 FEWEST_WINDOWS = 8
 _DAMPING = next(one for one in CLOTH if one.name == "damping")
 
 
 def lasting(recordings: int) -> float:
-    """Returns the seconds of each of so many recordings in which flags with an effect are simulated: a whole number
-    of windows."""
+    """Returns the seconds of each of so many recordings in which flags with an effect are
+    simulated: a whole number of windows."""
     most = min(MINUTE, LONGEST_PAIRS / recordings)
     return WINDOW * max(FEWEST_WINDOWS, int(most / WINDOW + 1e-9))
 
@@ -340,7 +377,8 @@ class Pairs:
 
 
 def pairs(design: Design, effect: Weighable, *, until: float) -> Pairs:
-    """Chooses the flags of a recording's design that are simulated with an effect, those of its longest steps.
+    """Chooses the flags of a recording's design that are simulated with an effect, those of its
+    longest steps.
 
     Args:
         until: part of the film that is simulated [s].
@@ -364,9 +402,11 @@ def pairs(design: Design, effect: Weighable, *, until: float) -> Pairs:
     return Pairs(effect=effect, indices=indices, strengths=strengths, batches=tuple(batches))
 
 
-def nulls(designs: Sequence[Design], places: Sequence[int], *, kinds: int, seed: int) -> list[list[FlagBatch]]:
-    """Designs null experiments: for each recording a batch a kind of numerics, of `TOGETHER` cloths each. A cloth is
-    the same in all recordings, its place and anemometer are not.
+def nulls(
+    designs: Sequence[Design], places: Sequence[int], *, kinds: int, seed: int
+) -> list[list[FlagBatch]]:
+    """Designs null experiments: for each recording a batch a kind of numerics, of `TOGETHER` cloths
+    each. A cloth is the same in all recordings, its place and anemometer are not.
 
     Args:
         places: for each recording the first one of its place.
@@ -376,13 +416,17 @@ def nulls(designs: Sequence[Design], places: Sequence[int], *, kinds: int, seed:
     experiments = []
     for number, design in zip(places, designs, strict=True):
         drawn = {
-            quantity.name: quantity.at(stream(seed, "films", "null places", number, quantity.name).random(count))
+            quantity.name: quantity.at(
+                stream(seed, "films", "null places", number, quantity.name).random(count)
+            )
             for quantity in design.quantities()
         }
         drawn |= cloths
         if design.log.distance is not None:
             drawn["distance_constant"] = np.full(count, design.log.distance)
-        views = np.stack([drawn["azimuth"], drawn["elevation"], np.full(count, design.distance)], axis=1)
+        views = np.stack(
+            [drawn["azimuth"], drawn["elevation"], np.full(count, design.distance)], axis=1
+        )
         first = design.batches()[0]
         batches = []
         for kind in range(kinds):
@@ -396,7 +440,10 @@ def nulls(designs: Sequence[Design], places: Sequence[int], *, kinds: int, seed:
                     values=values,
                     places=views[part][:, None],
                     discretisation=numerics,
-                    seeds=tuple(child_seed(seed, "films", "null", design.recording, int(member)) for member in part),
+                    seeds=tuple(
+                        child_seed(seed, "films", "null", design.recording, int(member))
+                        for member in part
+                    ),
                 )
             )
         experiments.append(batches)
@@ -417,7 +464,8 @@ def _damping(drawn: FloatArray, *, explicit: bool) -> FloatArray:
 
 
 _PACE = 25.0
-"""Seconds of one flag that one core simulates in a second: 128 flags for two minutes took some ten minutes."""
+"""Seconds of one flag that one core simulates in a second: 128 flags for two minutes took some ten
+minutes."""
 
 
 def announce_simulations(flag_seconds: float, *, workers: int) -> str:

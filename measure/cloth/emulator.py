@@ -1,15 +1,17 @@
-"""What summaries a flag would have of a cloth, a place and an anemometer's gain, by a regression on simulations.
+"""What summaries a flag would have of a cloth, a place and an anemometer's gain, by a regression on
+simulations.
 
-Its predictive density is that of `measure.refine.metamodel`: multivariate t, whose scatter holds what differs among
-simulations and is not regressed on (fabric, stretching, eddies, turbulence above the log's rate, chaos) and how little
-so many simulations know. Errors of numerics and of pixels are drawn and added to the simulations' summaries, so that
-they are a part of that scatter as well.
+Its predictive density is that of `measure.refine.metamodel`: multivariate t, whose scatter holds
+what differs among simulations and is not regressed on (fabric, stretching, eddies, turbulence above
+the log's rate, chaos) and how little so many simulations know. Errors of numerics and of pixels are
+drawn and added to the simulations' summaries, so that they are a part of that scatter as well.
 
-What is not regressed on, the fabric most of all, is the same in all recordings of a cloth: the residuals of droop and
-extension of two recordings are correlated by 0.9. So their covariance is that of all recordings' summaries at once,
-from simulated flags that are the same cloths in all of them. It is the predictive one, S/(n − p − k − 1) of n
-simulations' residuals with p regressors and k summaries (`measure.refine.metamodel`), so that it is the wider the more
-summaries so few simulations are asked for.
+What is not regressed on, the fabric most of all, is the same in all recordings of a cloth: the
+residuals of droop and extension of two recordings are correlated by 0.9. So their covariance is
+that of all recordings' summaries at once, from simulated flags that are the same cloths in all of
+them. It is the predictive one, S/(n − p − k − 1) of n simulations' residuals with p regressors and
+k summaries (`measure.refine.metamodel`), so that it is the wider the more summaries so few
+simulations are asked for.
 """
 
 from __future__ import annotations
@@ -30,22 +32,27 @@ from measure.cloth.flag_prior import CLOTH, Uncertain
 from measure.refine.metamodel import Metamodel, least
 
 SHOWN_BY = 0.8
-"""Share of the simulations that are to show a summary that is used. Higher drops summaries that some flags hide; lower
-leaves fewer complete simulations to fit to."""
+"""Share of the simulations that are to show a summary that is used. Higher drops summaries that
+some flags hide; lower leaves fewer complete simulations to fit to."""
 INFORMATIVE = 0.8
-"""Error of a summary's emulator, as a share of the summary's spread, from which on it is left out of a weighing: what
-depends on nothing that is regressed on adds noise to the scatter's estimate, and nothing else."""
+"""Error of a summary's emulator, as a share of the summary's spread, from which on it is left out
+of a weighing: what depends on nothing that is regressed on adds noise to the scatter's estimate,
+and nothing else."""
 
 
 def regressors(values: Mapping[str, FloatArray]) -> FloatArray:
-    """Returns (n, p) what summaries are linear in: quadratics in the logarithms of weight and damping with their
-    product, the logarithm of bending, and the place through the cosine of its azimuth, the chord's shortening."""
+    """Returns (n, p) what summaries are linear in: quadratics in the logarithms of weight and
+    damping with their product, the logarithm of bending, and the place through the cosine of its
+    azimuth, the chord's shortening."""
     weight, bending, damping = (
         np.log(values[quantity.name] / _middle(quantity)) / _half(quantity) for quantity in CLOTH
     )
     gain, scale = np.log(values["gain"]) / 0.03, np.log(values["scale"]) / 0.01
     along, up = np.cos(values["azimuth"]), np.sin(values["elevation"]) / 0.09
-    return np.stack([weight, weight**2, bending, damping, damping**2, weight * damping, gain, scale, along, up], axis=1)
+    return np.stack(
+        [weight, weight**2, bending, damping, damping**2, weight * damping, gain, scale, along, up],
+        axis=1,
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -56,7 +63,8 @@ class Emulator:
         model: of the summaries that are used.
         used: (2·observable,) which.
         residuals: (simulation, k) of them; NaN of simulations that do not show all.
-        weights: (simulation,) area weights [kg/m²], by which recordings of the same cloths are known.
+        weights: (simulation,) area weights [kg/m²], by which recordings of the same cloths are
+            known.
     """
 
     model: Metamodel
@@ -66,7 +74,12 @@ class Emulator:
 
     @classmethod
     def fit(
-        cls, values: Mapping[str, FloatArray], summaries: FloatArray, is_shown: BoolArray, *, name: str
+        cls,
+        values: Mapping[str, FloatArray],
+        summaries: FloatArray,
+        is_shown: BoolArray,
+        *,
+        name: str,
     ) -> Emulator:
         """Fit it to simulations.
 
@@ -80,26 +93,34 @@ class Emulator:
             RefusedError: too few simulations show what the recording shows.
         """
         used = is_shown & (np.isfinite(summaries).mean(axis=0) > SHOWN_BY)
-        complete = np.asarray(np.isfinite(summaries[:, used]).all(axis=1) & used.any(), dtype=np.bool_)
+        complete = np.asarray(
+            np.isfinite(summaries[:, used]).all(axis=1) & used.any(), dtype=np.bool_
+        )
         x, y = regressors(values)[complete], summaries[complete][:, used]
         needed = least(x.shape[1] + 1, y.shape[1]) + 8
         if len(x) < needed:
             raise RefusedError(
-                f"{len(x)} of {len(summaries)} simulations show what the film shows, and {needed} are needed",
+                f"{len(x)} of {len(summaries)} simulations show what the film shows, and {needed} "
+                "are needed",
                 where=name,
-                fix="check --flag-size, --attachment and --azimuth: flags that were simulated so look otherwise; or "
+                fix="check --flag-size, --attachment and --azimuth: flags that were simulated so "
+                "look otherwise; or "
                 "give more simulations with --simulations",
             )
         model = Metamodel.fit(x, y, np.arange(len(x)))
         residuals = np.full((len(summaries), y.shape[1]), np.nan)
         emulator = cls(model=model, used=used, residuals=residuals, weights=values[CLOTH[0].name])
         mean, _ = emulator.predict(values)
-        return replace(emulator, residuals=np.where(complete[:, None], summaries[:, used] - mean, np.nan))
+        return replace(
+            emulator, residuals=np.where(complete[:, None], summaries[:, used] - mean, np.nan)
+        )
 
     @property
     def factor(self) -> FloatArray:
         """Returns the lower Cholesky factor of the scale matrix of this recording alone."""
-        return np.asarray(np.linalg.cholesky(self.model.scatter / self.model.freedom), dtype=np.float64)
+        return np.asarray(
+            np.linalg.cholesky(self.model.scatter / self.model.freedom), dtype=np.float64
+        )
 
     @property
     def deviations(self) -> FloatArray:
@@ -165,14 +186,16 @@ def _ends(quantity: Uncertain) -> tuple[float, float]:
 
 
 FEWEST_FREEDOM = 20
-"""Degrees of freedom below which recordings are taken as independent. Higher does so more often, and leaves out how
-their residuals are correlated."""
+"""Degrees of freedom below which recordings are taken as independent. Higher does so more often,
+and leaves out how their residuals are correlated."""
 HEAVY = 10.0
-"""Most degrees of freedom of the t distribution: residuals of simulations have a kurtosis of 4, 3 + 6/(ν − 4). Fewer
-allow for larger residuals and widen the intervals; more approach a normal distribution."""
+"""Most degrees of freedom of the t distribution: residuals of simulations have a kurtosis of 4, 3 +
+6/(ν − 4). Fewer allow for larger residuals and widen the intervals; more approach a normal
+distribution."""
 TAKEN_APART = Finding.of(
     "recordings-taken-apart",
-    "too few simulations for so many recordings: the cloth was taken as a different one in each, so that "
+    "too few simulations for so many recordings: the cloth was taken as a different one in each, "
+    "so that "
     "intervals are too narrow and probabilities too sure",
     fix="give fewer recordings, or more simulations with --simulations",
 )
@@ -195,9 +218,14 @@ class Scatter:
     together: bool
 
     def log_density(self, offset: FloatArray, stretch: FloatArray) -> FloatArray:
-        """Returns (n,) logarithm of multivariate t at offsets (n, k), its covariance (n,) times as large."""
+        """Returns (n,) logarithm of multivariate t at offsets (n, k), its covariance (n,) times as
+        large."""
         k, freedom = offset.shape[1], self.freedom
-        constant = gammaln((freedom + k) / 2) - gammaln(freedom / 2) - 0.5 * k * math.log(freedom * math.pi)
+        constant = (
+            gammaln((freedom + k) / 2)
+            - gammaln(freedom / 2)
+            - 0.5 * k * math.log(freedom * math.pi)
+        )
         return (
             constant
             - self.determinant
@@ -224,8 +252,8 @@ def scatter(emulators: Sequence[Emulator]) -> Scatter:
 
 
 def _covariance(emulators: Sequence[Emulator]) -> tuple[FloatArray, float, bool]:
-    """Estimates the predictive covariance of the residuals, its degrees of freedom, and whether it is of all
-    recordings together."""
+    """Estimates the predictive covariance of the residuals, its degrees of freedom, and whether it
+    is of all recordings together."""
     first = emulators[0]
     if all(np.array_equal(emulator.weights, first.weights) for emulator in emulators):
         residuals = np.concatenate([emulator.residuals for emulator in emulators], axis=1)
@@ -234,5 +262,11 @@ def _covariance(emulators: Sequence[Emulator]) -> tuple[FloatArray, float, bool]
         if freedom >= FEWEST_FREEDOM or len(emulators) == 1:
             freedom = max(freedom, 3.0)
             return np.asarray(complete.T @ complete / (freedom - 2)), freedom, True
-    blocks = [emulator.model.scatter / max(emulator.model.freedom - 2, 1.0) for emulator in emulators]
-    return np.asarray(block_diag(*blocks)), max(min(emulator.model.freedom for emulator in emulators), 3.0), False
+    blocks = [
+        emulator.model.scatter / max(emulator.model.freedom - 2, 1.0) for emulator in emulators
+    ]
+    return (
+        np.asarray(block_diag(*blocks)),
+        max(min(emulator.model.freedom for emulator in emulators), 3.0),
+        False,
+    )

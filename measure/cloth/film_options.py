@@ -1,4 +1,5 @@
-"""Options of `flagdata close-loop` that are about films, and which options belong to one kind of source alone."""
+"""Options of `flagdata close-loop` that are about films, and which options belong to one kind of
+source alone."""
 
 from __future__ import annotations
 
@@ -51,14 +52,16 @@ class OfFilms(OfFlag):
         metavar="LxH",
     )
     attachment: str | None = option(  # pyright: ignore[reportIncompatibleVariableOverride]  as the source states
-        "How the cloth is held: at both corners of its hoist, or along all of the hoist; of markers also top-corners, "
+        "How the cloth is held: at both corners of its hoist, or along all of the hoist; of "
+        "markers also top-corners, "
         "or u,v;u,v;… [m]. By default corners, of markers as the source states.",
         default=None,
         section=FLAG,
         was=("--pins",),
     )
     area_weight: Stated | None = option(
-        "Of a cloth that was weighed [kg/m²], as in 0.155±0.005; by default that of any flag, of markers that of the "
+        "Of a cloth that was weighed [kg/m²], as in 0.155±0.005; by default that of any flag, of "
+        "markers that of the "
         "material, to 30 %.",
         default=None,
         section=FLAG,
@@ -66,7 +69,8 @@ class OfFilms(OfFlag):
         metavar="VALUE",
     )
     simulations: int | None = option(
-        "Of films: simulated flags of the base model for each recording; by default 64, from three recordings on 128.",
+        "Of films: simulated flags of the base model for each recording; by default 64, from three "
+        "recordings on 128.",
         default=None,
         section=HOW,
         type=click.IntRange(min=64),
@@ -78,14 +82,16 @@ class JudgingFilms(OfFilms, ByNulls):
     """All that a verdict on films takes."""
 
     material: str | None = option(
-        "Nominal material, a name of the catalog; by default the one that the source states. Of films: what the flag "
+        "Nominal material, a name of the catalog; by default the one that the source states. Of "
+        "films: what the flag "
         "is made of, as in woven-polyester, knit or camel-ponte-roma; by default any fabric.",
         default=None,
         section=FLAG,
         metavar="NAME",
     )
     suspect: str | None = option(
-        "An effect that was suspected before the recordings were looked at, as in lift or vertical-wind-; it alone is "
+        "An effect that was suspected before the recordings were looked at, as in lift or "
+        "vertical-wind-; it alone is "
         "tested for, in that direction, and seen where it is weaker.",
         default=None,
         section=TEST,
@@ -108,4 +114,8 @@ def refuse_of_others(chosen: JudgingFilms, *, films: bool) -> None:
             kind = "films and tables of observables" if films else "markers and meshes"
             other_kind = "markers and meshes" if films else "films and tables of observables"
             spelled = rows[name][1].spelling_of(name)
-            raise UsageError(f"the sources are {kind}", where=spelled, fix=f"leave it out: it is about {other_kind}")
+            raise UsageError(
+                f"the sources are {kind}",
+                where=spelled,
+                fix=f"leave it out: it is about {other_kind}",
+            )

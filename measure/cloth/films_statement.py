@@ -1,4 +1,5 @@
-"""The verdict on films in sentences: what was assumed, what is missing, and all of it for a terminal."""
+"""The verdict on films in sentences: what was assumed, what is missing, and all of it for a
+terminal."""
 
 from __future__ import annotations
 
@@ -13,7 +14,15 @@ from measure.report.lead_sentences import lead
 from measure.report.verdict_sentences import list_names
 from measure.report.verdict_words import item, wrap_lines
 from measure.verdict.decided import NOT_REJECTED
-from measure.verdict.quantity import estimate_text, known, level_text, number, probability, share, with_level
+from measure.verdict.quantity import (
+    estimate_text,
+    known,
+    level_text,
+    number,
+    probability,
+    share,
+    with_level,
+)
 from measure.verdict.verdict_record import Candidate, Comparison, Conclusion, Verdict
 
 _MOST = 4
@@ -53,7 +62,8 @@ def separating(verdict: Verdict, *, has_weight: bool) -> str:
     if verdict.conclusion is not Conclusion.ONE_OF:
         return ""
     return (
-        f"a recording in another wind, or {'more minutes of it' if has_weight else 'the cloth weighed (--area-weight)'}"
+        "a recording in another wind, or "
+        f"{'more minutes of it' if has_weight else 'the cloth weighed (--area-weight)'}"
     )
 
 
@@ -66,35 +76,51 @@ def missing(departing: Sequence[Departure]) -> str:
         unit = OBSERVABLES[departure.observable].unit
         sign = "+" if departure.off > 0 else ""
         parts.append(
-            f"{departure.observable} {sign}{number(departure.off, digits=2)}{'' if unit == '1' else f' {unit}'} "
-            f"({departure.recording}; {number(abs(departure.deviations), digits=2)} standard deviations of replicates)"
+            f"{departure.observable} "
+            f"{sign}{number(departure.off, digits=2)}{'' if unit == '1' else f' {unit}'} "
+            f"({departure.recording}; {number(abs(departure.deviations), digits=2)} standard "
+            "deviations of replicates)"
         )
-    return f"What the base model as calibrated does not show, observed less predicted: {', '.join(parts)}."
+    return (
+        "What the base model as calibrated does not show, observed less predicted: "
+        f"{', '.join(parts)}."
+    )
 
 
-def assumptions(recordings: Sequence[Observed], *, has_weight: bool, unseen: tuple[str, ...]) -> tuple[str, ...]:
+def assumptions(
+    recordings: Sequence[Observed], *, has_weight: bool, unseen: tuple[str, ...]
+) -> tuple[str, ...]:
     """Returns what was taken as given."""
     steady = bool(constant_wind(recordings))
     sentences = [
-        "the flag has the stated size and is held as stated, and the camera is where it is stated to be",
-        "area weight, bending and damping are calibrated, so that what only changes them is not an effect",
+        "the flag has the stated size and is held as stated, and the camera is where it is stated "
+        "to be",
+        "area weight, bending and damping are calibrated, so that what only changes them is not an "
+        "effect",
     ]
     if not has_weight:
         sentences.append(
-            "the cloth was not weighed: its weight, the air's density and drag, holes in the cloth, wetness and the "
-            "anemometer's gain act alike in a film, so that none of them is found beyond what is assumed of them"
+            "the cloth was not weighed: its weight, the air's density and drag, holes in the "
+            "cloth, wetness and the "
+            "anemometer's gain act alike in a film, so that none of them is found beyond what is "
+            "assumed of them"
         )
     if steady:
         sentences.append(
-            "the wind hardly changes: a film in one steady wind shows only the ratio of the air's pressure to the "
+            "the wind hardly changes: a film in one steady wind shows only the ratio of the air's "
+            "pressure to the "
             "cloth's weight"
         )
     if unseen:
         sentences.append(
-            f"even where they are strong, {list_names(unseen)} would move what these recordings show by less than two "
+            f"even where they are strong, {list_names(unseen)} would move what these recordings "
+            "show by less than two "
             "standard errors beyond what another cloth or view does: they are not excluded"
         )
-    sentences.append("a wind that is turned from its log looks like another place of the camera, and is not weighed")
+    sentences.append(
+        "a wind that is turned from its log looks like another place of the camera, and is not "
+        "weighed"
+    )
     return tuple(sentences)
 
 
@@ -102,18 +128,22 @@ _RUNNERS_UP = 3
 
 
 def words(verdict: Verdict) -> str:
-    """Writes the verdict, its test, the errors before and after, what else was weighed and what was assumed; lines
-    of at most 100 characters, without a final line break."""
+    """Writes the verdict, its test, the errors before and after, what else was weighed and what was
+    assumed; lines of at most 100 characters, without a final line break."""
     return "\n".join(
-        line for label, text in _items(verdict) for line in (item(label, text) if label else wrap_lines(text))
+        line
+        for label, text in _items(verdict)
+        for line in (item(label, text) if label else wrap_lines(text))
     )
 
 
 def probability_of(candidate: Candidate) -> str:
     """Returns the evidence for an effect: `probability 0.97, log Bayes factor 12.3 nat`."""
     return (
-        f"probability {share(candidate.probability)}, given that one effect is missing; logarithm of the Bayes factor "
-        f"against the base model {number(candidate.gain)} nat; p = {probability(candidate.leftover)} for what remains"
+        f"probability {share(candidate.probability)}, given that one effect is missing; logarithm "
+        "of the Bayes factor "
+        f"against the base model {number(candidate.gain)} nat; p = "
+        f"{probability(candidate.leftover)} for what remains"
     )
 
 
@@ -136,7 +166,9 @@ def _items(verdict: Verdict) -> Iterator[tuple[str, str]]:
     yield "", verdict.words
     yield (
         "test",
-        " ".join([verdict_sentences.test_sentence(verdict), verdict_sentences.test_remark(verdict.test)]).strip(),
+        " ".join(
+            [verdict_sentences.test_sentence(verdict), verdict_sentences.test_remark(verdict.test)]
+        ).strip(),
     )
     if power := verdict_sentences.power_text(verdict):
         yield "power", power

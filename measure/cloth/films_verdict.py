@@ -1,4 +1,5 @@
-"""The verdict on films in numbers: which effects may be missing, how strong, and what the cloth is with them.
+"""The verdict on films in numbers: which effects may be missing, how strong, and what the cloth is
+with them.
 
 verdict = close_loop(recordings, FilmLoopOptions(calibration=...), folder=..., workers=2)
 """
@@ -78,7 +79,9 @@ def verdict_of(outcome: SolvedLoop) -> Verdict:
     effects = outcome.weighing.effects
     names = tuple(dict.fromkeys(effects[number].column.effect for number in decision.named))
     acting = outcome.best if decision.named else None
-    rest = [number for number in np.argsort(-decision.probability) if number not in decision.confident]
+    rest = [
+        number for number in np.argsort(-decision.probability) if number not in decision.confident
+    ]
     comparisons = compare_models(
         outcome.recordings,
         outcome.halves,
@@ -105,7 +108,9 @@ def verdict_of(outcome: SolvedLoop) -> Verdict:
         },
         power=_power(outcome),
         open=decision.open,
-        findings=tuple((f.kind, f.what) for f in outcome.findings if f.severity is not Severity.NOTE),
+        findings=tuple(
+            (f.kind, f.what) for f in outcome.findings if f.severity is not Severity.NOTE
+        ),
     )
     unseen = [
         effect.column.effect
@@ -117,12 +122,18 @@ def verdict_of(outcome: SolvedLoop) -> Verdict:
         outcome.recordings,
         has_weight=options.area_weight is not None,
         unseen=tuple(dict.fromkeys(unseen)),
-        departing=tuple(departure for departure in outcome.departures if abs(departure.deviations) >= SEEN),
+        departing=tuple(
+            departure for departure in outcome.departures if abs(departure.deviations) >= SEEN
+        ),
     )
 
 
 def _test(outcome: SolvedLoop) -> NullTest:
-    scored, level, suspected = outcome.judged.scored, outcome.options.level, outcome.options.suspected
+    scored, level, suspected = (
+        outcome.judged.scored,
+        outcome.options.level,
+        outcome.options.suspected,
+    )
     nulls, statistic = scored.nulls, scored.statistic
     low, high = nulls.interval(statistic, level=CRITERIA.interval)
     return NullTest(
@@ -130,15 +141,20 @@ def _test(outcome: SolvedLoop) -> NullTest:
         null=nulls.null.tolist(),
         kinds=nulls.count,
         level=level,
-        p_value=Estimate(value=scored.p_value, low=low, high=high, unit="1", level=CRITERIA.interval),
+        p_value=Estimate(
+            value=scored.p_value, low=low, high=high, unit="1", level=CRITERIA.interval
+        ),
         critical=nulls.critical(level),
         open=low <= level <= high,
-        settling=nulls.settling(statistic, at=level, level=CRITERIA.interval) if low <= level <= high else None,
+        settling=nulls.settling(statistic, at=level, level=CRITERIA.interval)
+        if low <= level <= high
+        else None,
         effective=nulls.effective,
         correlation=nulls.correlation,
         tail=nulls.tail(statistic),
         suspected="" if suspected is None else suspected.words,
-        nulls=f"{len(nulls.null)} flags of {nulls.count} meshes and methods in the same minutes of wind, over "
+        nulls=f"{len(nulls.null)} flags of {nulls.count} meshes and methods in the same minutes of "
+        "wind, over "
         "the priors of cloth, view and anemometer",
     )
 
@@ -172,13 +188,17 @@ def _parameters(outcome: SolvedLoop) -> tuple[Parameter, ...]:
                 name=quantity.name,
                 before=before[number][0],
                 after=None if later is None else later[0],
-                shift=None if later is None else (later[0].value - before[number][0].value) / before[number][1],
+                shift=None
+                if later is None
+                else (later[0].value - before[number][0].value) / before[number][1],
             )
         )
     return tuple(parameters)
 
 
-def _cloths(outcome: SolvedLoop, effect: Weighable | None, fit: Fit) -> list[tuple[Estimate, float]]:
+def _cloths(
+    outcome: SolvedLoop, effect: Weighable | None, fit: Fit
+) -> list[tuple[Estimate, float]]:
     cloth, _, _ = hypothesis(outcome.sights, effect).values(fit.scores[0])
     return [_marginal(cloth[quantity.name], fit.weights[0], quantity.unit) for quantity in CLOTH]
 
@@ -192,10 +212,14 @@ def _marginal(values: FloatArray, weights: FloatArray, unit: str) -> tuple[Estim
 
 
 def strength_of(effect: Weighable, fit: Fit) -> Estimate:
-    """Estimates a strength, its interval widened by what meshes and cloths do to effects, as on trajectories; a
-    bound where the posterior leans on an end of what is assumed of it (`measure.posterior_ends`)."""
+    """Estimates a strength, its interval widened by what meshes and cloths do to effects, as on
+    trajectories; a bound where the posterior leans on an end of what is assumed of it
+    (`measure.posterior_ends`)."""
     shares = ndtr(fit.scores[0][:, -1])  # the last coordinate
-    strengths, factor = effect.prior.at(shares), float(np.exp(CRITERIA.reach * CRITERIA.strength_factor))
+    strengths, factor = (
+        effect.prior.at(shares),
+        float(np.exp(CRITERIA.reach * CRITERIA.strength_factor)),
+    )
     marginal, _ = _marginal(strengths, fit.weights[0], effect.column.unit)
     if (bound := _bound(effect, strengths, shares, fit.weights[0], factor=factor)) is not None:
         return bound
@@ -212,12 +236,18 @@ def strength_of(effect: Weighable, fit: Fit) -> Estimate:
 
 
 def _bound(
-    effect: Weighable, strengths: FloatArray, shares: FloatArray, weights: FloatArray, *, factor: float
+    effect: Weighable,
+    strengths: FloatArray,
+    shares: FloatArray,
+    weights: FloatArray,
+    *,
+    factor: float,
 ) -> Estimate | None:
     """Returns a strength that is known on one side only; None of one with two ends.
 
     Args:
-        strengths, shares: (n,) of it beyond null, and their places in its prior, of importance samples.
+        strengths, shares: (n,) of it beyond null, and their places in its prior, of importance
+            samples.
         weights: (n,) of them, of sum 1.
         factor: factor by which a strength may be off.
     """
@@ -234,9 +264,14 @@ def _bound(
         return None
     least = interval.bound is Bound.LEAST
     end = (
-        interval.high if interval.bound is Bound.MOST else interval.low if least else float(np.median(strengths[drawn]))
+        interval.high
+        if interval.bound is Bound.MOST
+        else interval.low
+        if least
+        else float(np.median(strengths[drawn]))
     )
-    # A bound gives way by the factor: upwards where it is one from above, and towards zero where it holds a size.
+    # A bound gives way by the factor: upwards where it is one from above, and towards zero where it
+    # holds a size.
     wider = end / factor if (end > 0) == least else end * factor
     null = effect.column.described.null
     ends = {Bound.LEAST: (wider, interval.high), Bound.MOST: (interval.low, wider)}.get(

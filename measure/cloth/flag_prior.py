@@ -1,16 +1,20 @@
-"""What is not known of a flag, its place and its anemometer before it is filmed, what a user states, and draws of it.
+"""What is not known of a flag, its place and its anemometer before it is filmed, what a user
+states, and draws of it.
 
-A draw is a row of numbers in [0, 1), one a quantity, which each distribution turns into a value. Rows come from a Sobol
-sequence (Owen's scrambling), so that few simulations cover all quantities evenly.
+A draw is a row of numbers in [0, 1), one a quantity, which each distribution turns into a value.
+Rows come from a Sobol sequence (Owen's scrambling), so that few simulations cover all quantities
+evenly.
 
-Fabrics are the ten whose bending and stretching Wang, O'Brien and Ramamoorthi measured (ACM TOG 30(4):71, 2011). What
-each is made of is in the list that they publish beside their tables (Berkeley Garment Library, README of its
-materials). The list states fibres and not how a cloth is made. Woven are denim, by its name, and cloths as stiff as it
-(at rest, 200 N/m or more along warp and weft); knit are rib, interlock, ponte roma, swim and sweat, by their names, and
-a cloth as compliant (below 100 N/m in one direction). `pink-ribbon-brown` lies between and is in neither.
+Fabrics are the ten whose bending and stretching Wang, O'Brien and Ramamoorthi measured (ACM TOG
+30(4):71, 2011). What each is made of is in the list that they publish beside their tables (Berkeley
+Garment Library, README of its materials). The list states fibres and not how a cloth is made. Woven
+are denim, by its name, and cloths as stiff as it (at rest, 200 N/m or more along warp and weft);
+knit are rib, interlock, ponte roma, swim and sweat, by their names, and a cloth as compliant (below
+100 N/m in one direction). `pink-ribbon-brown` lies between and is in neither.
 
-Nobody has published such tables of a flag's bunting, so that a class is the nearest that was measured. Of nylon one
-knit swimsuit was measured, while flags of nylon are woven: their class is that of all woven cloths.
+Nobody has published such tables of a flag's bunting, so that a class is the nearest that was
+measured. Of nylon one knit swimsuit was measured, while flags of nylon are woven: their class is
+that of all woven cloths.
 """
 
 from __future__ import annotations
@@ -47,7 +51,9 @@ class Normal:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.mean) and self.sigma > 0):
             raise InputError(
-                f"the prior is {self.mean} ± {self.sigma}", where="prior", fix="give a finite mean and a deviation > 0"
+                f"the prior is {self.mean} ± {self.sigma}",
+                where="prior",
+                fix="give a finite mean and a deviation > 0",
             )
 
     def at(self, share: FloatArray) -> FloatArray:
@@ -89,8 +95,8 @@ class Uncertain:
         unit: SI.
         prior: its distribution.
         source: what the prior is from.
-        limits: values that the quantity can have at all, or that the user states: beyond an end of the prior that lies
-            there is nothing.
+        limits: values that the quantity can have at all, or that the user states: beyond an end of
+            the prior that lies there is nothing.
     """
 
     name: str
@@ -134,14 +140,16 @@ CLOTH = (
         name="area_weight",
         unit="kg/m²",
         prior=_log(0.05, 0.45),
-        source="flag cloths are sold from 50 g/m² (spun polyester) to 350 g/m² (denim, wool bunting: 150 to 240)",
+        source="flag cloths are sold from 50 g/m² (spun polyester) to 350 g/m² (denim, wool "
+        "bunting: 150 to 240)",
         limits=_POSITIVE,
     ),
     Uncertain(
         name="bending",
         unit="N·m",
         prior=_log(3e-6, 6e-4),
-        source="mean coefficient of the fabrics of Wang et al. 2011, a tenth to ten times, as Runia et al. 2020 search",
+        source="mean coefficient of the fabrics of Wang et al. 2011, a tenth to ten times, as "
+        "Runia et al. 2020 search",
         limits=_POSITIVE,
     ),
     Uncertain(
@@ -163,11 +171,17 @@ FABRIC = Uncertain(
     name="fabric",
     unit="1",
     prior=Range(low=0.0, high=1.0),
-    source="place in the list of the fabrics that Wang et al. 2011 measured, none of which is a flag's",
+    source="place in the list of the fabrics that Wang et al. 2011 measured, none of which is a "
+    "flag's",
 )
 """What a cloth is beside, the same in all recordings of it: left to the scatter."""
 NUISANCES = (
-    Uncertain(name="gain", unit="1", prior=Normal(mean=1.0, sigma=0.03), source="classes of cups, IEC 61400-12-1"),
+    Uncertain(
+        name="gain",
+        unit="1",
+        prior=Normal(mean=1.0, sigma=0.03),
+        source="classes of cups, IEC 61400-12-1",
+    ),
     Uncertain(
         name="scale",
         unit="1",
@@ -178,11 +192,12 @@ NUISANCES = (
         name="eddies",
         unit="m",
         prior=_log(20.0, 120.0),
-        source="integral length along the wind, 50 to 100 m at 10 m height and less near the ground (ESDU 85020)",
+        source="integral length along the wind, 50 to 100 m at 10 m height and less near the "
+        "ground (ESDU 85020)",
     ),
 )
-"""What a simulation needs beside, another one in each recording. Gain and scale are fitted, eddies are left to the
-scatter."""
+"""What a simulation needs beside, another one in each recording. Gain and scale are fitted, eddies
+are left to the scatter."""
 DISTANCE = Uncertain(
     name="distance_constant",
     unit="m",
@@ -194,16 +209,23 @@ DISTANCE = Uncertain(
 
 def clock_error(sigma: float) -> Uncertain:
     """Makes the prior of a log's times beside the film's, their standard uncertainty [s]."""
-    return Uncertain(name="clock_error", unit="s", prior=Normal(mean=0.0, sigma=sigma), source="the log's clock model")
+    return Uncertain(
+        name="clock_error",
+        unit="s",
+        prior=Normal(mean=0.0, sigma=sigma),
+        source="the log's clock model",
+    )
 
 
 DIRECTION = math.radians(5.0)
-"""Standard uncertainty of the logged wind's direction: north, or a tunnel's axis, lined up by eye and compass [rad]."""
+"""Standard uncertainty of the logged wind's direction: north, or a tunnel's axis, lined up by eye
+and compass [rad]."""
 AZIMUTH = Uncertain(
     name="azimuth",
     unit="rad",
     prior=Range(low=math.radians(30.0), high=math.radians(150.0)),
-    source="a camera that was not placed by a vane; within 30° of the wind's axis a flag shows no length",
+    source="a camera that was not placed by a vane; within 30° of the wind's axis a flag shows no "
+    "length",
 )
 """Of the camera's axis to the wind where the user gives none."""
 ELEVATION = Uncertain(
@@ -214,19 +236,26 @@ ELEVATION = Uncertain(
 )
 
 
-def draws(quantities: tuple[Uncertain, ...], count: int, *, seed: int, name: str) -> Mapping[str, FloatArray]:
+def draws(
+    quantities: tuple[Uncertain, ...], count: int, *, seed: int, name: str
+) -> Mapping[str, FloatArray]:
     """Name → (count,) values, from a scrambled Sobol sequence of the named stream.
 
     Args:
         count: a power of two covers best.
     """
     engine = qmc.Sobol(len(quantities), scramble=True, rng=stream(seed, "calibrate", name))
-    shares = np.asarray(engine.random_base2(max(0, math.ceil(math.log2(max(count, 1))))), dtype=np.float64)[:count]
-    return {quantity.name: quantity.at(shares[:, column]) for column, quantity in enumerate(quantities)}
+    shares = np.asarray(
+        engine.random_base2(max(0, math.ceil(math.log2(max(count, 1))))), dtype=np.float64
+    )[:count]
+    return {
+        quantity.name: quantity.at(shares[:, column]) for column, quantity in enumerate(quantities)
+    }
 
 
 def stated_angle(about: Uncertain, angle: Stated, *, where: str) -> Uncertain:
-    """Makes the prior of an angle as the user states it [°], an exact value with the uncertainty of a direction.
+    """Makes the prior of an angle as the user states it [°], an exact value with the uncertainty of
+    a direction.
 
     Raises:
         UsageError: an azimuth that is not between 0 and 180, or an elevation beyond 60.
@@ -234,14 +263,18 @@ def stated_angle(about: Uncertain, angle: Stated, *, where: str) -> Uncertain:
     least, most = (1.0, 179.0) if about.name == "azimuth" else (-60.0, 60.0)
     if angle.low < least or angle.high > most:
         raise UsageError(
-            f"{about.name} is {angle.text}°", where=where, fix=f"give degrees from {least:g} to {most:g}, as in 70±7"
+            f"{about.name} is {angle.text}°",
+            where=where,
+            fix=f"give degrees from {least:g} to {most:g}, as in 70±7",
         )
     low, high = math.radians(angle.low), math.radians(angle.high)
     if low < high:
         return replace(about, prior=Range(low=low, high=high), source="stated", limits=(low, high))
     sigma = math.radians(angle.sigma)
     # An azimuth is to the wind, whose direction is not better known than it is lined up.
-    total = math.hypot(sigma, DIRECTION) if about.name == "azimuth" else max(sigma, math.radians(1.0))
+    total = (
+        math.hypot(sigma, DIRECTION) if about.name == "azimuth" else max(sigma, math.radians(1.0))
+    )
     return replace(about, prior=Normal(mean=low, sigma=total), source="stated")
 
 
@@ -257,8 +290,8 @@ TABLES = (
     "white-dots-on-blk",
     "white-swim-solid",
 )
-"""Materials of the catalog whose tables are multiplied; each simulation draws one. A simulation's number in [0, 1) is a
-place among these."""
+"""Materials of the catalog whose tables are multiplied; each simulation draws one. A simulation's
+number in [0, 1) is a place among these."""
 _WOVEN = ("11oz-black-denim", "royal-target", "white-dots-on-blk")
 CLASSES = {
     "woven": _WOVEN,
@@ -280,10 +313,11 @@ CLASSES = {
     "cotton-192": ("11oz-black-denim", "royal-target"),
     "wool-274": _WOVEN,
 }
-"""Name → those of `TABLES` that a cloth of it may have. Fibres: denim 99 % cotton; royal target 65 % cotton, 35 %
-polyester; white dots, tango 100 % polyester; navy 96 % polyester; camel 60 % polyester, 40 % rayon; ivory 95 % cotton;
-gray interlock 60 % cotton, 40 % polyester; white swim 87 % nylon. Cloths of which only weight and bending were measured
-have the tables of the class of their fibre."""
+"""Name → those of `TABLES` that a cloth of it may have. Fibres: denim 99 % cotton; royal target 65
+% cotton, 35 % polyester; white dots, tango 100 % polyester; navy 96 % polyester; camel 60 %
+polyester, 40 % rayon; ivory 95 % cotton; gray interlock 60 % cotton, 40 % polyester; white swim 87
+% nylon. Cloths of which only weight and bending were measured have the tables of the class of their
+fibre."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -302,7 +336,9 @@ class Fabric:
     def drawn(self) -> Uncertain:
         """Returns what simulations draw in place of any."""
         places = tuple(TABLES.index(table) for table in self.tables)
-        return replace(FABRIC, prior=Among(places=places, count=len(TABLES)), source=f"stated: {self.name}")
+        return replace(
+            FABRIC, prior=Among(places=places, count=len(TABLES)), source=f"stated: {self.name}"
+        )
 
 
 def fabric(name: str, *, where: str) -> Fabric:
@@ -313,5 +349,7 @@ def fabric(name: str, *, where: str) -> Fabric:
     """
     if name not in CLASSES and name not in TABLES:
         names = ", ".join([*CLASSES, *TABLES])
-        raise UnknownNameError(f"no cloth like {name!r} was measured", where=where, fix=f"give one of {names}")
+        raise UnknownNameError(
+            f"no cloth like {name!r} was measured", where=where, fix=f"give one of {names}"
+        )
     return Fabric(name=name, tables=CLASSES.get(name, (name,)))

@@ -1,4 +1,5 @@
-"""The recordings of one flag as `flagdata calibrate` and `close-loop` take them: opened, read, or left out."""
+"""The recordings of one flag as `flagdata calibrate` and `close-loop` take them: opened, read, or
+left out."""
 
 from __future__ import annotations
 
@@ -71,7 +72,15 @@ class Part:
     findings: tuple[Finding, ...] = ()
 
     @classmethod
-    def of(cls, film: ConditionedFilm, log: Log, *, source: str, first: float = 0.0, last: float | None = None) -> Part:
+    def of(
+        cls,
+        film: ConditionedFilm,
+        log: Log,
+        *,
+        source: str,
+        first: float = 0.0,
+        last: float | None = None,
+    ) -> Part:
         """Chooses the part from `first` to `last` [s], `LONGEST` at most.
 
         Raises:
@@ -103,7 +112,9 @@ class Part:
         film_windows = watch_film(film, size, first=first, last=self.end, advance=advance)
         findings = (*self.findings, *film.findings())
         if lost := [
-            finding for finding in findings if finding.kind == "camera-lost" and (finding.value or 0.0) > _LOST
+            finding
+            for finding in findings
+            if finding.kind == "camera-lost" and (finding.value or 0.0) > _LOST
         ]:
             raise RefusedError(
                 f"the camera may move, and cannot be followed: {lost[0].what}",
@@ -112,7 +123,9 @@ class Part:
             )
         nothing = [math.nan] * len(OBSERVED)
         readings = [
-            nothing if window is None else [OBSERVABLES[name].of_film(window).value for name in OBSERVED]
+            nothing
+            if window is None
+            else [OBSERVABLES[name].of_film(window).value for name in OBSERVED]
             for window in film_windows.windows
         ]
         return Observed(
@@ -135,7 +148,8 @@ class Opened:
         name: by which it was asked for.
         parent: the recording of a lake, or the log beside a table; None where it is neither.
         part: of a film; None of a table.
-        rows: what a table shows: a recording a row of rows against wind, everything else is one; empty for a film.
+        rows: what a table shows: a recording a row of rows against wind, everything else is one;
+            empty for a film.
     """
 
     name: str
@@ -148,7 +162,9 @@ class Opened:
         """Returns the duration [s]."""
         return sum(row.duration for row in self.rows) if self.part is None else self.part.duration
 
-    def read(self, size: FlagSize, *, advance: Callable[[int], object] | None = None) -> tuple[Observed, ...]:
+    def read(
+        self, size: FlagSize, *, advance: Callable[[int], object] | None = None
+    ) -> tuple[Observed, ...]:
         """Reads its recordings; as `Part.read`."""
         return self.rows if self.part is None else (self.part.read(size, advance=advance),)
 
@@ -181,7 +197,9 @@ class Sources:
     left_out: tuple[Finding, ...]
 
     @classmethod
-    def of(cls, sources: Sequence[S], opening: Callable[[S], Opened], *, name: Callable[[S], str]) -> Sources:
+    def of(
+        cls, sources: Sequence[S], opening: Callable[[S], Opened], *, name: Callable[[S], str]
+    ) -> Sources:
         """Open sources and add up how long they are; as `usable`.
 
         Raises:
@@ -205,7 +223,9 @@ class Sources:
             (*self.left_out, *unread),
         )
         check_in_all(recordings, left_out=left_out)
-        parents = dict.fromkeys(source.parent for source, _ in readings if source.parent is not None)
+        parents = dict.fromkeys(
+            source.parent for source, _ in readings if source.parent is not None
+        )
         return Gathered(recordings=recordings, parents=tuple(parents), left_out=left_out)
 
 
@@ -229,18 +249,22 @@ def open_recording(
         offset: seconds added to the table's clock to reach the log's; None to estimate it.
 
     Raises:
-        UsageError: a table, and a crop or a flag's number; a film, and a log or an offset; no lake that a log is in.
+        UsageError: a table, and a crop or a flag's number; a film, and a log or an offset; no lake
+            that a log is in.
         InputError: a film without a log, or a log that does not cover it; too short a part.
         FlagdataError: nothing of that name.
     """
     if is_table(source):
         if reading.crop is not None or reading.flag is not None:
             raise UsageError(
-                "a table of observables has no pictures that could be cropped or searched for a flag",
+                "a table of observables has no pictures that could be cropped or searched for a "
+                "flag",
                 where="--crop, --flag",
                 fix="leave both out; flagdata observe takes them when it makes the table",
             )
-        rows, parent = _of_table(Path(source), size, lake=lake, at=at, first=first, last=last, log=log, offset=offset)
+        rows, parent = _of_table(
+            Path(source), size, lake=lake, at=at, first=first, last=last, log=log, offset=offset
+        )
         return Opened(name=source, parent=parent, rows=rows)
     if log is not None or offset is not None:
         raise UsageError(
@@ -250,7 +274,9 @@ def open_recording(
         )
     (subject,) = subjects(source, query=None, lake=lake, at=at, reading=reading)
     part = part_of(subject, first=first, last=last)
-    return Opened(name=source, parent=None if subject.artifact is None else subject.artifact.id, part=part)
+    return Opened(
+        name=source, parent=None if subject.artifact is None else subject.artifact.id, part=part
+    )
 
 
 def _of_table(
@@ -268,18 +294,26 @@ def _of_table(
     if log is not None:
         if lake is None:
             raise UsageError(
-                "the log is of no lake", where="--log", fix="name the lake that it was ingested into: --lake"
+                "the log is of no lake",
+                where="--log",
+                fix="name the lake that it was ingested into: --lake",
             )
         log_beside, parent = join_log(path, size, lake=lake, log=log, at=at, offset=offset)
     elif offset is not None:
         raise UsageError(
-            "an offset needs a log", where="--clock-offset", fix="name the log: --log ARTIFACT --lake LAKE"
+            "an offset needs a log",
+            where="--clock-offset",
+            fix="name the log: --log ARTIFACT --lake LAKE",
         )
     recordings = of_table(path, size, wind_log=log_beside)
     if recordings[0].place is None:
         return tuple(cut(recording, first, last) for recording in recordings), parent
     if first > 0 or last is not None:
-        raise UsageError("rows against wind have no times", where="--start, --end", fix="leave out the rows themselves")
+        raise UsageError(
+            "rows against wind have no times",
+            where="--start, --end",
+            fix="leave out the rows themselves",
+        )
     return recordings, parent
 
 
@@ -305,13 +339,18 @@ _DESCRIPTIONS = (".toml", ".json")
 
 
 def films_among(
-    sources: Sequence[str], *, lake: Lake | None, at: str, sized: bool = False, tracked: bool = False
+    sources: Sequence[str],
+    *,
+    lake: Lake | None,
+    at: str,
+    sized: bool = False,
+    tracked: bool = False,
 ) -> tuple[str, ...]:
     """Returns those that are films or tables of observables, not markers and meshes.
 
     Args:
-        sized: whether a flag's size is given, which films need: then what cannot be found was meant as one, if nothing
-            else was.
+        sized: whether a flag's size is given, which films need: then what cannot be found was meant
+            as one, if nothing else was.
         tracked: whether there are recordings of markers beside the sources.
 
     Raises:

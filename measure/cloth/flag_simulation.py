@@ -1,8 +1,10 @@
-"""Flags of drawn cloths simulated in the minutes of a log, each in its own turbulence, and what places see of them.
+"""Flags of drawn cloths simulated in the minutes of a log, each in its own turbulence, and what
+places see of them.
 
-A batch is simulated together and read at once: its meshes are not kept, only its observables, window by window. The
-mesh is coarse, since what is asked for are means over windows; what that costs is measured against finer ones and is
-part of an answer's interval (`measure.cloth.numerics`). Null experiments have meshes and steps of other kinds.
+A batch is simulated together and read at once: its meshes are not kept, only its observables,
+window by window. The mesh is coarse, since what is asked for are means over windows; what that
+costs is measured against finer ones and is part of an answer's interval (`measure.cloth.numerics`).
+Null experiments have meshes and steps of other kinds.
 """
 
 from __future__ import annotations
@@ -39,13 +41,14 @@ from sim.run import simulation_loop
 from sim.wind.sampled import Beyond, Even, SampledWind
 
 FINER = (0.85, 1.2)
-"""Vertices along a side over the fit's, by its mean area a vertex: 11 to 16 columns. Up to 1.75 on trajectories; here a
-minute of film costs as much as 30 of their segments, and what finer meshes do is measured and part of the scatter
-(`measure.cloth.numerics`)."""
+"""Vertices along a side over the fit's, by its mean area a vertex: 11 to 16 columns. Up to 1.75 on
+trajectories; here a minute of film costs as much as 30 of their segments, and what finer meshes do
+is measured and part of the scatter (`measure.cloth.numerics`)."""
 STEPS = (2e-3, 3e-3, 4e-3)
 """Of backward Euler [s]."""
 LITTLE = 1e-3
-"""s of damping below which cloths are simulated by leapfrog, whose steps may be the longer the less they damp."""
+"""s of damping below which cloths are simulated by leapfrog, whose steps may be the longer the less
+they damp."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,17 +99,22 @@ class Discretisation:
 
     def content(self) -> dict[str, float | int | None]:
         """Returns JSON values."""
-        return {"finer": self.finer, "diagonals": self.diagonals, "uneven": self.uneven, "step": self.step}
+        return {
+            "finer": self.finer,
+            "diagonals": self.diagonals,
+            "uneven": self.uneven,
+            "step": self.step,
+        }
 
 
 COLUMNS = 12
 RATE = 12.5
-"""Frames of a simulation [Hz]: a flag of a metre flutters at 1 to 3 Hz, and to observe flags costs a third of what they
-do to simulate. Higher shows faster motion and costs drawing in proportion; lower misses the second harmonic of the
-flutter."""
+"""Frames of a simulation [Hz]: a flag of a metre flutters at 1 to 3 Hz, and to observe flags costs
+a third of what they do to simulate. Higher shows faster motion and costs drawing in proportion;
+lower misses the second harmonic of the flutter."""
 SETTLE = 4.0
-"""s before the film's first frame that are simulated and not looked at: two swings of a flag of 1.5 m. Shorter leaves
-the start in the film; longer costs time in proportion."""
+"""s before the film's first frame that are simulated and not looked at: two swings of a flag of 1.5
+m. Shorter leaves the start in the film; longer costs time in proportion."""
 BATCH = 16
 """Flags that are simulated together: what a vector register holds in single precision."""
 VERSION = 6
@@ -121,12 +129,15 @@ OBSERVED = (
     "amplitude-across",
     "area",
 )
-"""Observables that are asked for: a coarse mesh shows no travelling waves, and few windows show them."""
+"""Observables that are asked for: a coarse mesh shows no travelling waves, and few windows show
+them."""
 _STEPS = (1e-3, 2e-3, 4e-3)
-"""Steps of backward Euler [s], which damps as much by itself; the least damping of a batch allows the step. Cloths that
-all damp less than the shortest are simulated by leapfrog, whose steps may be the longer the less they damp."""
+"""Steps of backward Euler [s], which damps as much by itself; the least damping of a batch allows
+the step. Cloths that all damp less than the shortest are simulated by leapfrog, whose steps may be
+the longer the less they damp."""
 _TOLERANCE = 1e-2
-"""Relative residual of a step's solve; a tenth of it costs a third more and shows the same (decision 042)."""
+"""Relative residual of a step's solve; a tenth of it costs a third more and shows the same
+(decision 042)."""
 _ROUGH = 1e-3
 """Standard deviation of the free vertices' start [m]."""
 _AHEAD = 0.3
@@ -153,7 +164,9 @@ class Flag:
 
     def handles(self, mesh: Mesh) -> Handles:
         """Returns how it is held."""
-        vertices = held.full_hoist(mesh.rest) if self.attachment == "hoist" else held.corners(mesh.rest)
+        vertices = (
+            held.full_hoist(mesh.rest) if self.attachment == "hoist" else held.corners(mesh.rest)
+        )
         return Handles(vertices=vertices)
 
 
@@ -165,13 +178,15 @@ class FlagBatch:
         flag: that was filmed.
         log: of the wind beside it.
         duration: of the film, a whole number of windows [s].
-        values: name of a quantity → (flag,): area_weight, bending, damping, stretching, gain, scale, eddies,
-            fabric, distance_constant; clock_error [s] where the log's clock is uncertain.
+        values: name of a quantity → (flag,): area_weight, bending, damping, stretching, gain,
+            scale, eddies, fabric, distance_constant; clock_error [s] where the log's clock is
+            uncertain.
         places: azimuth, elevation [rad] and distance [m] of each place, (flag, place, 3).
         seeds: (flag,) of the start and the turbulence.
         columns: of the mesh.
         observables: names.
-        effects: what acts beside the base model, each with its strengths beyond the null one, (flag,).
+        effects: what acts beside the base model, each with its strengths beyond the null one,
+            (flag,).
         until: the film's part that is simulated, in the wind of all of it [s]; None for all.
         discretisation: the mesh and the steps where they are others than the fit's.
     """
@@ -203,7 +218,11 @@ class FlagBatch:
         return {
             "version": VERSION,
             "flag": [self.flag.length, self.flag.height, self.flag.attachment],
-            "log": [log.times.tolist(), log.speed.tolist(), None if log.turn is None else log.turn.tolist()],
+            "log": [
+                log.times.tolist(),
+                log.speed.tolist(),
+                None if log.turn is None else log.turn.tolist(),
+            ],
             "averaging": log.averaging,
             "duration": self.duration,
             "values": {name: numbers.tolist() for name, numbers in sorted(self.values.items())},
@@ -234,19 +253,32 @@ class FlagBatch:
         return content
 
     def read(self) -> FloatArray:
-        """Simulates and observes (flag, place, window, observable), NaN where a window does not show one or a flag
-        diverged."""
+        """Simulates and observes (flag, place, window, observable), NaN where a window does not
+        show one or a flag diverged."""
         numerics = self.discretisation
-        mesh = self.flag.mesh(self.columns) if numerics is None else numerics.mesh(self.flag.mesh(self.columns))
+        mesh = (
+            self.flag.mesh(self.columns)
+            if numerics is None
+            else numerics.mesh(self.flag.mesh(self.columns))
+        )
         positions = self.positions(mesh)
-        readings = np.full((len(self.seeds), self.places.shape[1], self.windows, len(self.observables)), np.nan)
+        readings = np.full(
+            (len(self.seeds), self.places.shape[1], self.windows, len(self.observables)), np.nan
+        )
         for member, flag in enumerate(np.moveaxis(positions, -1, 0)):
             if np.isfinite(flag).all():
                 scale = float(self.values["scale"][member])
-                for number, (azimuth, elevation, distance) in enumerate(self.places[member].tolist()):
+                for number, (azimuth, elevation, distance) in enumerate(
+                    self.places[member].tolist()
+                ):
                     view = View(azimuth=azimuth, elevation=elevation, distance=distance)
                     readings[member, number] = windows(
-                        flag * scale, mesh=mesh, flag=self.flag, view=view, rate=RATE, observables=self.observables
+                        flag * scale,
+                        mesh=mesh,
+                        flag=self.flag,
+                        view=view,
+                        rate=RATE,
+                        observables=self.observables,
                     )
         return readings
 
@@ -254,18 +286,27 @@ class FlagBatch:
         """Simulates (frame, vertex, 3, flag) [m] of the film's frames, `rate` a second [Hz]."""
         system, state, integrator = self._assemble_flags(mesh)
         simulated = simulation_loop.Batch(
-            system=system, state=state, integrator=integrator, divergence=simulation_loop.Divergence.KEEP
+            system=system,
+            state=state,
+            integrator=integrator,
+            divergence=simulation_loop.Divergence.KEEP,
         )
-        return simulated.positions(simulation_loop.after(SETTLE, self._simulated_seconds, rate), rate)
+        return simulated.positions(
+            simulation_loop.after(SETTLE, self._simulated_seconds, rate), rate
+        )
 
     def _assemble_flags(self, mesh: Mesh) -> tuple[System, State, Integrator]:
         """Flags in their winds at rest, and what simulates them."""
         step = self.step
         system, state = assemble(self._scenes(mesh, damped=step or 0.0))
-        integrator = Symplectic() if step is None else BackwardEuler(step=step, tolerance=_TOLERANCE)
+        integrator = (
+            Symplectic() if step is None else BackwardEuler(step=step, tolerance=_TOLERANCE)
+        )
         system = replace(system, wind=self._wind(system))
         system, state = apply(
-            [effect.at(torch.from_numpy(strengths)) for effect, strengths in self.effects], system, state
+            [effect.at(torch.from_numpy(strengths)) for effect, strengths in self.effects],
+            system,
+            state,
         )
         return system, state, integrator
 
@@ -275,7 +316,9 @@ class FlagBatch:
         scenes = []
         for member, seed in enumerate(self.seeds):
             along = mesh.rest[:, 0]
-            flat = np.stack([along * math.cos(_AHEAD), along * math.sin(_AHEAD), mesh.rest[:, 1]], axis=1)
+            flat = np.stack(
+                [along * math.cos(_AHEAD), along * math.sin(_AHEAD), mesh.rest[:, 1]], axis=1
+            )
             material = self._material(member, damped)
             start = roughen_start(flat, handles, stream(seed, "calibrate", "start"), _ROUGH)
             scenes.append(Scene(mesh=mesh, position=start, material=material, handles=handles))
@@ -319,8 +362,11 @@ class FlagBatch:
         return max((step for step in _STEPS if step <= damping.min()), default=min(_STEPS))
 
 
-def cloth(area_weight: float, bending: float, damping: float, *, stretching: float, fabric: str) -> Material:
-    """Returns a cloth of an area weight [kg/m²], a mean bending coefficient [N·m] and a damping [s].
+def cloth(
+    area_weight: float, bending: float, damping: float, *, stretching: float, fabric: str
+) -> Material:
+    """Returns a cloth of an area weight [kg/m²], a mean bending coefficient [N·m] and a damping
+    [s].
 
     Args:
         stretching: factor on the fabric's table.
@@ -337,16 +383,23 @@ def cloth(area_weight: float, bending: float, damping: float, *, stretching: flo
 
 
 def mean_bending(material: Material) -> float:
-    """Returns the geometric mean of the bending coefficients [N·m], which takes a coefficient of 0 for a thousandth of
-    the mean."""
+    """Returns the geometric mean of the bending coefficients [N·m], which takes a coefficient of 0
+    for a thousandth of the mean."""
     table = np.maximum(material.bending, 1e-3 * float(material.bending.mean()))
     return float(np.exp(np.log(table).mean()))
 
 
 def windows(
-    positions: NDArray[np.floating], *, mesh: Mesh, flag: Flag, view: View, rate: float, observables: Sequence[str]
+    positions: NDArray[np.floating],
+    *,
+    mesh: Mesh,
+    flag: Flag,
+    view: View,
+    rate: float,
+    observables: Sequence[str],
 ) -> FloatArray:
-    """Observes (window, observable) of a flag (frame, vertex, 3) [m] in the wind along +x, seen from a place.
+    """Observes (window, observable) of a flag (frame, vertex, 3) [m] in the wind along +x, seen
+    from a place.
 
     Args:
         rate: frames a second [Hz].

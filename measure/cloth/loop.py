@@ -1,8 +1,9 @@
-"""Closing the loop on films with logs of the wind: from recordings to all that a verdict is made of.
+"""Closing the loop on films with logs of the wind: from recordings to all that a verdict is made
+of.
 
 `recordings` are `measure.cloth.observed_recording.Observed`, of a film or a table of observables
-(`measure.cloth.flag_recordings`), or built directly; `calibration` are the options of `flagdata calibrate`. Simulations
-are kept in the folder by their
+(`measure.cloth.flag_recordings`), or built directly; `calibration` are the options of `flagdata
+calibrate`. Simulations are kept in the folder by their
 design: a run that was interrupted goes on, and a second one simulates nothing.
 """
 
@@ -24,10 +25,26 @@ from measure.cloth.design import CalibrationOptions, Weighable, weighable
 from measure.cloth.emulator import TAKEN_APART
 from measure.cloth.flag_prior import CLOTH
 from measure.cloth.flag_simulation import OBSERVED
-from measure.cloth.model_evidence import Experiments, Fit, Sight, Weighing, fit_model, hypothesis, misfits, weigh
+from measure.cloth.model_evidence import (
+    Experiments,
+    Fit,
+    Sight,
+    Weighing,
+    fit_model,
+    hypothesis,
+    misfits,
+    weigh,
+)
 from measure.cloth.observed_recording import Observed, constant_wind
 from measure.cloth.score_test import Judged, directions, judge, score
-from measure.cloth.simulations import Simulations, of_base, of_nulls, of_recordings, shown_by, simulate_all
+from measure.cloth.simulations import (
+    Simulations,
+    of_base,
+    of_nulls,
+    of_recordings,
+    shown_by,
+    simulate_all,
+)
 from measure.cloth.unseen_windows import Halves, halve_recordings
 from measure.forecasting.setting import Stage
 from measure.forecasting.strengths import Suspicion
@@ -50,7 +67,9 @@ class Departure:
     deviations: float
 
 
-def departures(recordings: Sequence[Observed], sights: Sequence[Sight], base: Fit) -> tuple[Departure, ...]:
+def departures(
+    recordings: Sequence[Observed], sights: Sequence[Sight], base: Fit
+) -> tuple[Departure, ...]:
     """Lists departures of each recording's observables that are used, the farthest first.
 
     Args:
@@ -64,7 +83,10 @@ def departures(recordings: Sequence[Observed], sights: Sequence[Sight], base: Fi
         columns = np.flatnonzero(sight.used).tolist()
         departed += [
             Departure(
-                recording=recording.name, observable=OBSERVED[column], off=float(size), deviations=float(size / sigma)
+                recording=recording.name,
+                observable=OBSERVED[column],
+                off=float(size),
+                deviations=float(size / sigma),
             )
             for column, size, sigma in zip(columns, off, sight.emulator.deviations, strict=True)
             if column < len(OBSERVED)
@@ -80,13 +102,16 @@ def root_mean_square(departing: Sequence[Departure]) -> float:
 STRONG = 0.9
 """Share of the prior of strengths at which an effect counts as strong."""
 _BEYOND = 2.0
-"""Factor by which a stated area weight may lie beyond those of the null experiments: fewer and fewer are as heavy."""
+"""Factor by which a stated area weight may lie beyond those of the null experiments: fewer and
+fewer are as heavy."""
 _DIFFERENCE = 1e-3
 
 
-def sensitivity(sights: Sequence[Sight], effects: Sequence[Weighable], base: Fit, observed: Experiments) -> FloatArray:
-    """Returns (effect,) standard errors by which the strong effect moves the summaries, what a change of cloth, view
-    and anemometer makes up for left out.
+def sensitivity(
+    sights: Sequence[Sight], effects: Sequence[Weighable], base: Fit, observed: Experiments
+) -> FloatArray:
+    """Returns (effect,) standard errors by which the strong effect moves the summaries, what a
+    change of cloth, view and anemometer makes up for left out.
 
     Args:
         base: the base model fitted to the recordings, about whose cloth and view it is found.
@@ -97,9 +122,17 @@ def sensitivity(sights: Sequence[Sight], effects: Sequence[Weighable], base: Fit
     moved = np.concatenate([at, at + _DIFFERENCE * np.eye(at.shape[1])])
     mean, _, weight = base_model.predicted(moved)
     off = observed.repeated(len(moved)).off(weight)
-    slopes = np.concatenate([base_model.scatter.white @ (mean[1:] - mean[0]).T, (off[1:] - off[0])[None]]) / _DIFFERENCE
-    # What the prior lets them make up for: ridge regression on slopes, the scores' prior being standard normal.
-    unexplained = np.eye(len(slopes)) - slopes @ np.linalg.solve(slopes.T @ slopes + np.eye(slopes.shape[1]), slopes.T)
+    slopes = (
+        np.concatenate(
+            [base_model.scatter.white @ (mean[1:] - mean[0]).T, (off[1:] - off[0])[None]]
+        )
+        / _DIFFERENCE
+    )
+    # What the prior lets them make up for: ridge regression on slopes, the scores' prior being
+    # standard normal.
+    unexplained = np.eye(len(slopes)) - slopes @ np.linalg.solve(
+        slopes.T @ slopes + np.eye(slopes.shape[1]), slopes.T
+    )
     cloth, places, _ = base_model.values(at)
     errors = []
     for effect in effects:
@@ -119,16 +152,19 @@ class FilmLoopOptions:
     """How the loop is closed.
 
     Attributes:
-        calibration: the flag, its view, the number of simulations and the seed, as for `flagdata calibrate`.
-        area_weight: mean and standard deviation of a cloth that was weighed [kg/m²]; None for the prior of all cloths.
+        calibration: the flag, its view, the number of simulations and the seed, as for `flagdata
+            calibrate`.
+        area_weight: mean and standard deviation of a cloth that was weighed [kg/m²]; None for the
+            prior of all cloths.
         level: of the test.
         kinds: of numerics among null experiments.
         only: names of the effects that are weighed; empty for all.
-        suspected: the effect with its sign that was suspected before the recordings were looked at, along which alone
-            is looked; None to look along all.
+        suspected: the effect with its sign that was suspected before the recordings were looked at,
+            along which alone is looked; None to look along all.
 
     Raises:
-        UsageError: a level, a number or a weight that makes no sense, or an effect that is not weighed.
+        UsageError: a level, a number or a weight that makes no sense, or an effect that is not
+            weighed.
     """
 
     calibration: CalibrationOptions
@@ -147,21 +183,32 @@ class FilmLoopOptions:
             )
         (ends,) = (uncertain.ends for uncertain in CLOTH if uncertain.name == "area_weight")
         low, high = ends or (0.0, math.inf)
-        if self.area_weight is not None and not low / _BEYOND < self.area_weight[0] < high * _BEYOND:
+        if (
+            self.area_weight is not None
+            and not low / _BEYOND < self.area_weight[0] < high * _BEYOND
+        ):
             raise UsageError(
-                f"an area weight of {self.area_weight[0]:.3g} kg/m²; null experiments have flags of {low:g} "
+                f"an area weight of {self.area_weight[0]:.3g} kg/m²; null experiments have flags "
+                f"of {low:g} "
                 f"to {high:g}",
                 where="--area-weight",
                 fix="give kg/m² (155 g/m² is 0.155)",
             )
         names = [effect.name for effect in weighable(self.calibration.flag)]
         if unknown := set(self.only) - set(names):
-            raise UsageError(f"{', '.join(sorted(unknown))}: not weighed on films", fix=f"give {', '.join(names)}")
+            raise UsageError(
+                f"{', '.join(sorted(unknown))}: not weighed on films",
+                fix=f"give {', '.join(names)}",
+            )
 
     @property
     def effects(self) -> tuple[Weighable, ...]:
         """Returns the effects that are weighed."""
-        return tuple(effect for effect in weighable(self.calibration.flag) if not self.only or effect.name in self.only)
+        return tuple(
+            effect
+            for effect in weighable(self.calibration.flag)
+            if not self.only or effect.name in self.only
+        )
 
     def recipe(self) -> dict[str, Any]:
         """Returns JSON values."""
@@ -186,7 +233,8 @@ class SolvedLoop:
         base: the base model fitted to the recordings.
         best: the most probable effect's model fitted to them; None where nothing was weighed.
         departures: of the observables from the base model, the farthest first.
-        sensitivity: (effect,) standard errors by which each moves the recordings where it is strong.
+        sensitivity: (effect,) standard errors by which each moves the recordings where it is
+            strong.
         together: whether what is unknown of the cloth was taken as the same in all recordings.
         left_out: a warning for each recording whose simulations do not show what it shows.
     """
@@ -241,16 +289,31 @@ def solve(
     effects, seed = options.effects, options.calibration.seed
     # All simulations, read where they were made before.
     simulations = simulate_all(
-        recordings, options.calibration, effects, kinds=options.kinds, folder=folder, workers=workers, stage=stage
+        recordings,
+        options.calibration,
+        effects,
+        kinds=options.kinds,
+        folder=folder,
+        workers=workers,
+        stage=stage,
     )
     # A model of what each recording shows, by its simulations; recordings without one are left out.
     recordings, simulations, sights, left_out = shown_by(recordings, simulations)
-    effects = tuple(effect for effect in effects if all(effect.name in sight.responses for sight in sights))
+    effects = tuple(
+        effect for effect in effects if all(effect.name in sight.responses for sight in sights)
+    )
     # Null experiments, the base model's simulations and the recordings, in the same form.
     null, kinds = of_nulls(sights, recordings, simulations, options.area_weight, seed=seed)
     model = of_base(sights, recordings, simulations, options.area_weight, seed=seed)
     experiment = of_recordings(sights, recordings, options.area_weight)
-    scored = score(experiment, model, null, kinds, directions(sights, effects, options.suspected), level=options.level)
+    scored = score(
+        experiment,
+        model,
+        null,
+        kinds,
+        directions(sights, effects, options.suspected),
+        level=options.level,
+    )
     base = fit_model(sights, experiment, None, seed=seed)
     departing = departures(recordings, sights, base)
     weighing = weigh(sights, experiment, effects, seed=seed)

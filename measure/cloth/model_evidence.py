@@ -1,9 +1,11 @@
-"""How well the base model and each effect predict what recordings show, averaged over all that is not known.
+"""How well the base model and each effect predict what recordings show, averaged over all that is
+not known.
 
     p(y | e) = ∫ p(θ) p(s) ∏_j p(place_j) t(y_j | θ, s, place_j)
 
-in normal scores, in which the prior is standard normal, by importance sampling from normal distributions about the
-posterior's modes (two, since a strength may have two signs), which Gauss–Newton steps find. Many experiments are
+in normal scores, in which the prior is standard normal, by importance sampling from normal
+distributions about the posterior's modes (two, since a strength may have two signs), which
+Gauss–Newton steps find. Many experiments are
 evaluated at once: null experiments go the same way as the recordings.
 """
 
@@ -28,11 +30,11 @@ _DIFFERENCE = 1e-3
 _STARTS = (-0.7, 0.7)
 """Normal scores of the strength at which a search begins."""
 _DRAWS = 256
-"""Importance samples of each experiment. More lower the error of a Bayes factor with the root of their number, and take
-time in proportion."""
+"""Importance samples of each experiment. More lower the error of a Bayes factor with the root of
+their number, and take time in proportion."""
 _WIDER = 1.3
-"""Standard deviations of what they are drawn from over those of the posterior's normal approximation. Nearer to 1
-misses posteriors with heavier tails; larger wastes draws."""
+"""Standard deviations of what they are drawn from over those of the posterior's normal
+approximation. Nearer to 1 misses posteriors with heavier tails; larger wastes draws."""
 _TAIL = 6.0
 """Degrees of freedom of what they are drawn from."""
 
@@ -68,9 +70,13 @@ class Experiments:
         )
 
     def off(self, weight: FloatArray) -> FloatArray:
-        """Returns (n,) by how many standard deviations stated weights are off from (n,) [kg/m²]; 0 where none was
-        stated."""
-        return np.zeros(len(weight)) if self.stated is None else np.log(self.stated / weight) / self.sigma
+        """Returns (n,) by how many standard deviations stated weights are off from (n,) [kg/m²]; 0
+        where none was stated."""
+        return (
+            np.zeros(len(weight))
+            if self.stated is None
+            else np.log(self.stated / weight) / self.sigma
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -79,7 +85,8 @@ class Fit:
 
     Attributes:
         evidence: (n,) logarithms of p(y | e).
-        misfit: (n,) squared standardised distance at the mode, that of the scores from their prior included.
+        misfit: (n,) squared standardised distance at the mode, that of the scores from their prior
+            included.
         scores: (n, draw, dimension) of importance samples.
         weights: (n, draw) of them, of sum 1.
     """
@@ -109,28 +116,33 @@ class Hypothesis:
 
     @property
     def dimension(self) -> int:
-        """Counts coordinates of the scores: cloth, then each recording's place, then the strength."""
+        """Counts coordinates of the scores: cloth, then each recording's place, then the
+        strength."""
         return dimension(self.sights) + (self.effect is not None)
 
     def values(
         self, scores: FloatArray
     ) -> tuple[dict[str, FloatArray], list[dict[str, FloatArray]], FloatArray | None]:
-        """Cloths, places of each recording, and strengths beyond null, at normal scores (n, dimension)."""
+        """Cloths, places of each recording, and strengths beyond null, at normal scores (n,
+        dimension)."""
         cloth, places = values(scores, self.sights)
         return cloth, places, None if self.effect is None else self.effect.at(ndtr(scores[:, -1]))
 
     def predicted(self, scores: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Means (n, k) of all recordings' summaries, factors (n,) of their scatter, area weights (n,) [kg/m²]."""
+        """Means (n, k) of all recordings' summaries, factors (n,) of their scatter, area weights
+        (n,) [kg/m²]."""
         cloth, places, strength = self.values(scores)
         name = None if self.effect is None else self.effect.name
         predictions = [
-            sight.predict({**cloth, **view}, name, strength) for sight, view in zip(self.sights, places, strict=True)
+            sight.predict({**cloth, **view}, name, strength)
+            for sight, view in zip(self.sights, places, strict=True)
         ]
         mean = np.concatenate([part for part, _ in predictions], axis=1)
         return mean, np.mean([part for _, part in predictions], axis=0), cloth["area_weight"]
 
     def log_posterior(self, scores: FloatArray, observed: Experiments) -> FloatArray:
-        """Returns (n,) logarithm of likelihood times prior, but for a constant of stated weights."""
+        """Returns (n,) logarithm of likelihood times prior, but for a constant of stated
+        weights."""
         mean, stretch, weight = self.predicted(scores)
         total = -0.5 * np.square(scores).sum(axis=1) - 0.5 * scores.shape[1] * np.log(2 * np.pi)
         total += self.scatter.log_density(observed.whole - mean, stretch)
@@ -145,13 +157,18 @@ class Hypothesis:
         for at, curvature, _ in modes:
             root = np.linalg.cholesky(np.linalg.inv(curvature)) * _WIDER
             heavy = np.sqrt(_TAIL / rng.chisquare(_TAIL, (n, size, 1)))
-            drawn.append(at[:, None] + np.einsum("nij,nmj->nmi", root, rng.standard_normal((n, size, d))) * heavy)
+            drawn.append(
+                at[:, None]
+                + np.einsum("nij,nmj->nmi", root, rng.standard_normal((n, size, d))) * heavy
+            )
         scores = np.concatenate(drawn, axis=1)
         for at, curvature, _ in modes:
             density.append(_log_t(scores - at[:, None], curvature / _WIDER**2))
         proposal = logsumexp(density, axis=0) - np.log(len(modes))
         flat = scores.reshape(-1, d)
-        ratio = self.log_posterior(flat, observed.repeated(scores.shape[1])).reshape(n, -1) - proposal
+        ratio = (
+            self.log_posterior(flat, observed.repeated(scores.shape[1])).reshape(n, -1) - proposal
+        )
         evidence = logsumexp(ratio, axis=1) - np.log(scores.shape[1])
         misfits = np.array([misfit for _, _, misfit in modes])
         return Fit(
@@ -175,12 +192,17 @@ class Hypothesis:
             modes.append(self._climb(at, observed))
         return modes
 
-    def _climb(self, at: FloatArray, observed: Experiments) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Climbs to a mode (n, d) from a start, the curvature there (n, d, d), and the misfit (n,)."""
+    def _climb(
+        self, at: FloatArray, observed: Experiments
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Climbs to a mode (n, d) from a start, the curvature there (n, d, d), and the misfit
+        (n,)."""
         value, damping = self.log_posterior(at, observed), np.full(len(at), 1.0)
         for _ in range(_STEPS):
             gradient, curvature = self._slope(at, observed)
-            step = np.linalg.solve(curvature * (1 + damping[:, None, None] * np.eye(at.shape[1])), gradient[..., None])
+            step = np.linalg.solve(
+                curvature * (1 + damping[:, None, None] * np.eye(at.shape[1])), gradient[..., None]
+            )
             tried = np.clip(at + np.clip(step[..., 0], -2.0, 2.0), -5.0, 5.0)
             stepped = self.log_posterior(tried, observed)
             better = stepped > value
@@ -192,7 +214,8 @@ class Hypothesis:
         return at, curvature, misfit + self.scatter.distance(observed.whole - mean, stretch)
 
     def _slope(self, at: FloatArray, observed: Experiments) -> tuple[FloatArray, FloatArray]:
-        """Computes gradient (n, d) and Gauss–Newton's curvature (n, d, d) of minus the logarithm, at scores (n, d)."""
+        """Computes gradient (n, d) and Gauss–Newton's curvature (n, d, d) of minus the logarithm,
+        at scores (n, d)."""
         n, d = at.shape
         moved = at[:, None] + _DIFFERENCE * np.concatenate([np.zeros((1, d)), np.eye(d)])
         gradient, curvature = -at.copy(), np.broadcast_to(np.eye(d), (n, d, d)).copy()
@@ -213,8 +236,8 @@ class Hypothesis:
 
 
 def _log_t(offset: FloatArray, precision: FloatArray) -> FloatArray:
-    """Returns (n, m) logarithm of multivariate t with `_TAIL` degrees of freedom, at offsets (n, m, d) from its
-    middle."""
+    """Returns (n, m) logarithm of multivariate t with `_TAIL` degrees of freedom, at offsets (n, m,
+    d) from its middle."""
     d = offset.shape[2]
     distance = np.einsum("nmi,nij,nmj->nm", offset, precision, offset)
     _, determinant = np.linalg.slogdet(precision)
@@ -226,7 +249,10 @@ def quantiles(values: FloatArray, weights: FloatArray, shares: Sequence[float]) 
     """Returns quantiles of weighted draws (m,)."""
     order = np.argsort(values)
     total: FloatArray = np.cumsum(weights[order])
-    return [float(values[order][min(int(np.searchsorted(total, share)), len(order) - 1)]) for share in shares]
+    return [
+        float(values[order][min(int(np.searchsorted(total, share)), len(order) - 1)])
+        for share in shares
+    ]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -284,14 +310,20 @@ def weigh(
     return Weighing(
         effects=tuple(effects),
         factors=_side_by_side([fit.evidence - base.evidence for fit in fits], len(observed)),
-        misfits=Misfits(base=base.misfit, left=_side_by_side([fit.misfit for fit in fits], len(observed))),
+        misfits=Misfits(
+            base=base.misfit, left=_side_by_side([fit.misfit for fit in fits], len(observed))
+        ),
     )
 
 
-def misfits(sights: Sequence[Sight], observed: Experiments, effects: Sequence[Weighable]) -> Misfits:
+def misfits(
+    sights: Sequence[Sight], observed: Experiments, effects: Sequence[Weighable]
+) -> Misfits:
     """Returns the misfits of `weigh`, without Bayes factors."""
     leftovers = [hypothesis(sights, effect).misfit(observed) for effect in effects]
-    return Misfits(base=hypothesis(sights, None).misfit(observed), left=_side_by_side(leftovers, len(observed)))
+    return Misfits(
+        base=hypothesis(sights, None).misfit(observed), left=_side_by_side(leftovers, len(observed))
+    )
 
 
 def _side_by_side(columns: Sequence[FloatArray], count: int) -> FloatArray:

@@ -1,17 +1,21 @@
-"""What is calibrated on: the observables of a film's windows, the log of the wind beside it, and their summary.
+"""What is calibrated on: the observables of a film's windows, the log of the wind beside it, and
+their summary.
 
 A summary is each observable at the log's mean wind, and how it changes with wind,
 
     y_w = a + b ln(U_w/⟨U⟩) + n_w
 
-by least squares over the windows that show it. a and b of a simulation scatter about those of another one of the same
-cloth as n_w lets them, correlated between neighbouring windows or not: so no correlation has to be modelled.
+by least squares over the windows that show it. a and b of a simulation scatter about those of
+another one of the same cloth as n_w lets them, correlated between neighbouring windows or not: so
+no correlation has to be modelled.
 
-A part of an observable's error by pixels lasts: it is the same in all windows of a film. How large that part is differs
-by observable: an area is off by the same amount in every window, a frequency by another one in each. Of what lasts in a
-film a part is the flag's look, its colours, background and view, and the same in all recordings of it; the rest is the
-film's, whose wind bends the flag otherwise and whose light is another. Errors of observables that are read from the
-same outline are correlated. All is from films whose geometry is known (`python -m tests.studies looks`).
+A part of an observable's error by pixels lasts: it is the same in all windows of a film. How large
+that part is differs
+by observable: an area is off by the same amount in every window, a frequency by another one in
+each. Of what lasts in a film a part is the flag's look, its colours, background and view, and the
+same in all recordings of it; the rest is the film's, whose wind bends the flag otherwise and whose
+light is another. Errors of observables that are read from the same outline are correlated. All is
+from films whose geometry is known (`python -m tests.studies looks`).
 """
 
 from __future__ import annotations
@@ -33,8 +37,8 @@ from measure.observables.film_window import FilmWindow
 from measure.observables.observable import WINDOW
 
 SHOWN = 0.6
-"""Share of the windows that are to show an observable. Higher drops observables that some windows hide; lower lets a
-few windows stand for a recording."""
+"""Share of the windows that are to show an observable. Higher drops observables that some windows
+hide; lower lets a few windows stand for a recording."""
 LEAST_WINDOWS = 4
 """Fewest windows of a recording: 10 s. Fewer give means that one gust decides."""
 LEAST_IN_ALL = 8
@@ -61,8 +65,8 @@ class Projection:
         return np.stack([constant, relative], axis=1) if self.changes else constant[:, None]
 
     def of(self, readings: FloatArray) -> FloatArray:
-        """Projects readings to (…, 1 or 2, observable), from (…, window, observable); NaN where too few windows show
-        one."""
+        """Projects readings to (…, 1 or 2, observable), from (…, window, observable); NaN where too
+        few windows show one."""
         x = self.regressors
         finite = np.isfinite(readings)
         y = np.where(finite, readings, 0.0)
@@ -84,11 +88,11 @@ def shown(readings: FloatArray) -> BoolArray:
 
 
 LASTING = np.array([0.70, 0.93, 0.79, 0.31, 0.57, 0.31, 0.56, 0.97])
-"""(observable of `simulation.OBSERVED`) share of the variance that lasts: of 118 windows of 64 films by VTK, whose
-deviation is `Observable.sigma` (docs/results/validate-looks.md)."""
+"""(observable of `simulation.OBSERVED`) share of the variance that lasts: of 118 windows of 64
+films by VTK, whose deviation is `Observable.sigma` (docs/results/validate-looks.md)."""
 COMMON = 0.63
-"""Share of what lasts in a film that is the same in all recordings of the flag: 0.37 to 0.77, of two films each of
-twelve looks by the raster renderer, of all observables together."""
+"""Share of what lasts in a film that is the same in all recordings of the flag: 0.37 to 0.77, of
+two films each of twelve looks by the raster renderer, of all observables together."""
 LASTING_TOGETHER = {
     ("extension", "area"): 0.77,
     ("frequency", "bandwidth"): 0.85,
@@ -100,8 +104,11 @@ PASSING_TOGETHER = {("frequency", "bandwidth"): 0.75, ("bandwidth", "amplitude-u
 """The same of the differences of their two windows."""
 
 
-def pixel_errors(projection: Projection, windows: int, count: int, *, name: str, seed: int) -> FloatArray:
-    """Draws (count, 1 or 2, observable) errors of summaries of films whose windows err by a standard deviation of one.
+def pixel_errors(
+    projection: Projection, windows: int, count: int, *, name: str, seed: int
+) -> FloatArray:
+    """Draws (count, 1 or 2, observable) errors of summaries of films whose windows err by a
+    standard deviation of one.
 
     Args:
         projection: of the film's windows.
@@ -109,8 +116,13 @@ def pixel_errors(projection: Projection, windows: int, count: int, *, name: str,
         name: of the recording.
     """
     size = len(OBSERVED)
-    passing = stream(seed, "pixels", "passing", name).standard_normal((count, windows, size)) @ _PASSING.T
-    look, film = (stream(seed, "pixels", "lasting", *names).standard_normal((count, size)) for names in ((), (name,)))
+    passing = (
+        stream(seed, "pixels", "passing", name).standard_normal((count, windows, size)) @ _PASSING.T
+    )
+    look, film = (
+        stream(seed, "pixels", "lasting", *names).standard_normal((count, size))
+        for names in ((), (name,))
+    )
     lasting = (np.sqrt(COMMON) * look + np.sqrt(1 - COMMON) * film) @ _LASTING.T
     errors = projection.of(np.sqrt(1 - LASTING) * passing)
     errors[:, 0] += np.sqrt(LASTING) * lasting
@@ -126,7 +138,9 @@ def correlations(together: Mapping[tuple[str, str], float]) -> FloatArray:
     return matrix
 
 
-_LASTING, _PASSING = (np.linalg.cholesky(correlations(one)) for one in (LASTING_TOGETHER, PASSING_TOGETHER))
+_LASTING, _PASSING = (
+    np.linalg.cholesky(correlations(one)) for one in (LASTING_TOGETHER, PASSING_TOGETHER)
+)
 LONGEST = 120.0
 """s of a film that are simulated: two minutes cost minutes."""
 
@@ -145,11 +159,17 @@ class Excerpt:
 
     @classmethod
     def of(cls, windows: Sequence[FilmWindow | None]) -> Excerpt | None:
-        """Returns the window nearest to the middle of a film's second half; None where no window of that half was
-        read."""
+        """Returns the window nearest to the middle of a film's second half; None where no window of
+        that half was read."""
         half = len(windows) // 2
-        later = [cls(number=half + k, window=window) for k, window in enumerate(windows[half:]) if window is not None]
-        return min(later, key=lambda excerpt: abs(excerpt.number - (half + len(windows)) / 2), default=None)
+        later = [
+            cls(number=half + k, window=window)
+            for k, window in enumerate(windows[half:])
+            if window is not None
+        ]
+        return min(
+            later, key=lambda excerpt: abs(excerpt.number - (half + len(windows)) / 2), default=None
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -159,13 +179,13 @@ class Observed:
     Attributes:
         name: what people call it.
         source: identity of what it was read from.
-        readings: (window, observable) of windows of `WINDOW` seconds that follow one another, in the order of
-            `simulation.OBSERVED`; NaN where a window does not show one.
+        readings: (window, observable) of windows of `WINDOW` seconds that follow one another, in
+            the order of `simulation.OBSERVED`; NaN where a window does not show one.
         sigma: (observable,) what a window's readings of a film are off by; 0 for geometry.
         log: of the wind, its times since the first window begins.
         first: where the first window begins in the film or table [s].
-        place: what is shared by recordings from one place with one anemometer, whose gain and view are one; None for
-            a recording of a place of its own.
+        place: what is shared by recordings from one place with one anemometer, whose gain and view
+            are one; None for a recording of a place of its own.
         findings: what was noticed.
         excerpt: some of its film; None where there is no film.
 
@@ -186,19 +206,28 @@ class Observed:
 
     def __post_init__(self) -> None:
         count = len(OBSERVED)
-        if self.readings.ndim != 2 or self.readings.shape[1] != count or self.sigma.shape != (count,):
+        if (
+            self.readings.ndim != 2
+            or self.readings.shape[1] != count
+            or self.sigma.shape != (count,)
+        ):
             raise InputError(
-                f"readings of shape {self.readings.shape}", where=self.name, fix=f"give (window, {count}) of {OBSERVED}"
+                f"readings of shape {self.readings.shape}",
+                where=self.name,
+                fix=f"give (window, {count}) of {OBSERVED}",
             )
         check_duration(len(self.readings) * WINDOW, where=self.name)
         if not shown(self.readings).any():
             most = int(np.isfinite(self.readings).sum(axis=0).max())
             raise RefusedError(
                 f"no observable could be read in {SHOWN:.0%} of the windows, the best in {most} of "
-                f"{len(self.readings)}: the outline is lost in the others, or what is followed is not the flag",
+                f"{len(self.readings)}: the outline is lost in the others, or what is followed is "
+                "not the flag",
                 where=self.name,
-                fix="look at the flag on the page of flagdata measure --report, and choose it by --crop or --flag, or "
-                "a part by --start and --end; flagdata observe with its --flag-size says why windows show nothing",
+                fix="look at the flag on the page of flagdata measure --report, and choose it by "
+                "--crop or --flag, or "
+                "a part by --start and --end; flagdata observe with its --flag-size says why "
+                "windows show nothing",
             )
 
     @property
@@ -230,7 +259,9 @@ class Observed:
 
     def pixels(self, count: int, *, seed: int) -> FloatArray:
         """Draws (count, 1 or 2, observable) of what errors of pixels add to its summary."""
-        return self.sigma * pixel_errors(self.projection, len(self.readings), count, name=self.name, seed=seed)
+        return self.sigma * pixel_errors(
+            self.projection, len(self.readings), count, name=self.name, seed=seed
+        )
 
 
 def constant_wind(recordings: Sequence[Observed]) -> tuple[Finding, ...]:
@@ -239,8 +270,10 @@ def constant_wind(recordings: Sequence[Observed]) -> tuple[Finding, ...]:
     if speed.std() >= STEADY * speed.mean():
         return ()
     text = (
-        f"the wind hardly changes ({speed.mean():.1f} m/s, its windows within {speed.std():.2f} m/s): "
-        "air density, drag coefficient, the anemometer's gain and the weight act alike, and the weight rests on "
+        f"the wind hardly changes ({speed.mean():.1f} m/s, its windows within {speed.std():.2f} "
+        "m/s): "
+        "air density, drag coefficient, the anemometer's gain and the weight act alike, and the "
+        "weight rests on "
         "what is assumed of the others"
     )
     fix = "add recordings in other winds: flagdata calibrate takes several of one flag"
@@ -261,7 +294,13 @@ def cut(observed: Observed, first: float, last: float | None) -> Observed:
         findings = (*findings, first_part((min(end, len(observed.readings)) - begin) * WINDOW))
     readings = observed.readings[begin : min(end, most)]
     log = observed.log.cut(begin * WINDOW, (begin + len(readings)) * WINDOW)
-    return replace(observed, readings=readings, log=log, first=observed.first + begin * WINDOW, findings=findings)
+    return replace(
+        observed,
+        readings=readings,
+        log=log,
+        first=observed.first + begin * WINDOW,
+        findings=findings,
+    )
 
 
 def check_duration(seconds: float, *, where: str) -> None:
@@ -320,8 +359,8 @@ LEFT_OUT = "left-out"
 def usable(
     recordings: Sequence[S], use: Callable[[S], T], *, name: Callable[[S], str]
 ) -> tuple[list[T], tuple[Finding, ...]]:
-    """Uses the recordings that can be used, with a warning for each that cannot. Errors of a kind that is not the
-    recording's, such as a name that nothing has, are raised.
+    """Uses the recordings that can be used, with a warning for each that cannot. Errors of a kind
+    that is not the recording's, such as a name that nothing has, are raised.
 
     Args:
         use: raises InputError or RefusedError where a recording cannot be used.
@@ -348,6 +387,11 @@ def usable(
             fix="; ".join(dict.fromkeys(error.fix for _, error in failed)),
         )
     return results, tuple(
-        Finding(kind=LEFT_OUT, severity=Severity.WARNING, what=f"{who} is left out: {error.what}", fix=error.fix)
+        Finding(
+            kind=LEFT_OUT,
+            severity=Severity.WARNING,
+            what=f"{who} is left out: {error.what}",
+            fix=error.fix,
+        )
         for who, error in failed
     )

@@ -2,23 +2,27 @@
 
     z_e = d_eᵀ V⁻¹ (y − f(w)) / √(d_eᵀ V⁻¹ d_e)
 
-y are the summaries of all recordings side by side, f their regression on the logarithm of the area weight alone, fitted
-to simulations of the base model, V the covariance of the residuals of these and of null flags about it, drawn towards
-equal variances (Ledoit and Wolf). Bending, damping, gain, view, fabric, meshes, time steps and errors of pixels are
-left in V: nothing is fitted to the recordings. d_e is the mean change by effect e over its pairs. z_0 is the cube root
-(Wilson and Hilferty) of the whole misfit yᵀV⁻¹y, so that a change along no effect of the library is seen as well.
+y are the summaries of all recordings side by side, f their regression on the logarithm of the area
+weight alone, fitted to simulations of the base model, V the covariance of the residuals of these
+and of null flags about it, drawn towards equal variances (Ledoit and Wolf). Bending, damping, gain,
+view, fabric, meshes, time steps and errors of pixels are
+left in V: nothing is fitted to the recordings. d_e is the mean change by effect e over its pairs.
+z_0 is the cube root (Wilson and Hilferty) of the whole misfit yᵀV⁻¹y, so that a change along no
+effect of the library is seen as well.
 
-Each is brought to the scale of null flags of kinds of numerics that are left out: of V, and of the flags by which they
-are judged. T is the largest: of z_e where an effect has one sign, of |z_e| where it has two, and of z_0; or the one
-direction that was suspected beforehand. A null flag goes the whole way as the recordings do, by the flags of all other
-kinds, so that a kind that is odd does not judge itself. A weight that is stated to σ is read by a scale of that σ in
-simulations and null flags too, which widens V by what it leaves open; null flags whose weight is within a factor of e
-of it are those by which recordings are judged.
+Each is brought to the scale of null flags of kinds of numerics that are left out: of V, and of the
+flags by which they are judged. T is the largest: of z_e where an effect has one sign, of |z_e|
+where it has two, and of z_0; or the one direction that was suspected beforehand. A null flag goes
+the whole way as the recordings do, by the flags of all other kinds, so that a kind that is odd does
+not judge itself. A weight that is stated to σ is read by a scale of that σ in simulations and null
+flags too, which widens V by what it leaves open; null flags whose weight is within a factor of e of
+it are those by which recordings are judged.
 
-Given that something is missing, effects have posterior probabilities with equal priors. The confidence set is the
-smallest that has 95 % of it; a name is given alone only where one effect has as much. None is named where what was
-found lies along no effect's direction. A model with one of them has to pass the test of its own misfit, against that of
-null flags with the same effect fitted to them.
+Given that something is missing, effects have posterior probabilities with equal priors. The
+confidence set is the smallest that has 95 % of it; a name is given alone only where one effect has
+as much. None is named where what was found lies along no effect's direction. A model with one of
+them has to pass the test of its own misfit, against that of null flags with the same effect fitted
+to them.
 """
 
 from __future__ import annotations
@@ -50,7 +54,8 @@ class Directions:
     """Along which changes are looked for.
 
     Attributes:
-        changes: (effect, k) mean change of the summaries by each effect at its expected strength, upwards.
+        changes: (effect, k) mean change of the summaries by each effect at its expected strength,
+            upwards.
         signs: (effect,) 1 where it can only be stronger, 0 where it may have either sign.
         suspected: place and sign of the one that was suspected beforehand; None to look along all.
     """
@@ -60,7 +65,8 @@ class Directions:
     suspected: tuple[int, int] | None = None
 
     def far(self, z: FloatArray) -> FloatArray:
-        """Returns (n, direction) of standardised z (n, effect + 1): how far each goes in the direction that counts."""
+        """Returns (n, direction) of standardised z (n, effect + 1): how far each goes in the
+        direction that counts."""
         if self.suspected is not None:
             direction, sign = self.suspected
             return sign * z[:, direction : direction + 1]
@@ -143,7 +149,12 @@ class Scene:
 
     @classmethod
     def of(
-        cls, observed: Experiments, base: Experiments, nulls: Experiments, kinds: IntArray, changes: FloatArray
+        cls,
+        observed: Experiments,
+        base: Experiments,
+        nulls: Experiments,
+        kinds: IntArray,
+        changes: FloatArray,
     ) -> Scene:
         """Fits the regression to summaries and weights as scales read them."""
         at = [_logarithm(experiment, observed) for experiment in (observed, base, nulls)]
@@ -166,13 +177,19 @@ class Scene:
         key = frozenset(without)
         if key not in self._known:
             remaining = ~np.isin(self.kinds, list(key))
-            self._known[key] = Axes.of(np.concatenate([self.base, self.null[remaining]]), self.changes)
+            self._known[key] = Axes.of(
+                np.concatenate([self.base, self.null[remaining]]), self.changes
+            )
         return self._known[key]
 
     def standing(self, without: int | None) -> Standing:
         """Standardises by null flags of all kinds but one; None for all."""
         without_kinds = () if without is None else (without,)
-        kinds = [kind for kind in np.unique(self.kinds[self.comparable]).tolist() if kind not in without_kinds]
+        kinds = [
+            kind
+            for kind in np.unique(self.kinds[self.comparable]).tolist()
+            if kind not in without_kinds
+        ]
         if not kinds:
             raise InputError(
                 "no null experiment of another kind of numerics has a flag as heavy as the cloth",
@@ -180,11 +197,16 @@ class Scene:
                 fix="check its unit (kg/m²), or simulate more kinds",
             )
         scores = np.concatenate(
-            [self.axes(*without_kinds, kind).z(self.null[self.comparable & (self.kinds == kind)]) for kind in kinds]
+            [
+                self.axes(*without_kinds, kind).z(self.null[self.comparable & (self.kinds == kind)])
+                for kind in kinds
+            ]
         )
         spread = scores.std(axis=0, ddof=1)
         return Standing(
-            axes=self.axes(*without_kinds), centre=scores.mean(axis=0), spread=np.where(spread > 0, spread, 1.0)
+            axes=self.axes(*without_kinds),
+            centre=scores.mean(axis=0),
+            spread=np.where(spread > 0, spread, 1.0),
         )
 
 
@@ -199,7 +221,8 @@ class Scored:
         nulls: T of the null flags that are alike, each judged by all other kinds.
         alone: (effect,) p of each direction by itself.
         family: (effect,) p of each as the largest of all.
-        power: (effect,) share of null flags that are beyond the critical value once moved by the effect.
+        power: (effect,) share of null flags that are beyond the critical value once moved by the
+            effect.
         tested: (effect,) the same of those that are looked for: the suspected one, or all.
         pointed: whether what makes the statistic at the level lies along an effect.
         comparable: (null,) which null flags these are.
@@ -252,7 +275,9 @@ def score(
     farthest = ClusteredNulls(null=directions.far(scores).max(axis=1), kinds=null_kinds)
     along, alone = directions.along(z)[0], directions.along(scores)
     # As the largest of all directions, whichever was suspected.
-    largest = ClusteredNulls(null=np.concatenate([alone, scores[:, -1:]], axis=1).max(axis=1), kinds=null_kinds)
+    largest = ClusteredNulls(
+        null=np.concatenate([alone, scores[:, -1:]], axis=1).max(axis=1), kinds=null_kinds
+    )
     family = np.array([largest.p(float(size)) for size in along])
     power = _power(scene, standings, directions, farthest.critical(level))
     suspected = directions.suspected
@@ -275,8 +300,11 @@ def score(
     )
 
 
-def _power(scene: Scene, by_kind: dict[int, Standing], directions: Directions, critical: float | None) -> FloatArray:
-    """Returns (effect,) share of null flags that are beyond a critical value once each effect acts on them."""
+def _power(
+    scene: Scene, by_kind: dict[int, Standing], directions: Directions, critical: float | None
+) -> FloatArray:
+    """Returns (effect,) share of null flags that are beyond a critical value once each effect acts
+    on them."""
     power = np.zeros(len(directions.changes))
     if critical is None:
         return power
@@ -285,9 +313,9 @@ def _power(scene: Scene, by_kind: dict[int, Standing], directions: Directions, c
         if directions.suspected is not None and directions.suspected[0] == column:
             signs = (directions.suspected[1],)
         beyond = [
-            directions.far(standing.of(scene.null[scene.comparable & (scene.kinds == kind)] + sign * change)).max(
-                axis=1
-            )
+            directions.far(
+                standing.of(scene.null[scene.comparable & (scene.kinds == kind)] + sign * change)
+            ).max(axis=1)
             > critical
             for kind, standing in by_kind.items()
             for sign in signs
@@ -297,8 +325,8 @@ def _power(scene: Scene, by_kind: dict[int, Standing], directions: Directions, c
 
 
 def _logarithm(experiments: Experiments, observed: Experiments) -> FloatArray:
-    """Returns (n,) of area weights as a scale read them over the stated one; 0 where none was stated, so that all
-    are alike."""
+    """Returns (n,) of area weights as a scale read them over the stated one; 0 where none was
+    stated, so that all are alike."""
     return (
         np.zeros(len(experiments))
         if experiments.stated is None or observed.stated is None
@@ -311,9 +339,11 @@ def _regressors(logarithm: FloatArray) -> FloatArray:
     return np.stack([np.ones_like(logarithm), logarithm, logarithm**2], axis=1)
 
 
-def directions(sights: Sequence[Sight], effects: Sequence[Weighable], suspected: Suspicion | None) -> Directions:
-    """Finds the directions along which the recordings are tested: the mean changes of their summaries by the effects'
-    pairs.
+def directions(
+    sights: Sequence[Sight], effects: Sequence[Weighable], suspected: Suspicion | None
+) -> Directions:
+    """Finds the directions along which the recordings are tested: the mean changes of their
+    summaries by the effects' pairs.
 
     Args:
         effects: those that all sights' models know a response of.
@@ -339,13 +369,15 @@ def directions(sights: Sequence[Sight], effects: Sequence[Weighable], suspected:
 
 
 TEMPERED = 0.5
-"""Share of the Bayes factors' logarithms that counts: regressions of an effect from 16 pairs err in the same way in all
-recordings (decision 046). Nearer to 1 names single effects more often, and wrong ones too."""
+"""Share of the Bayes factors' logarithms that counts: regressions of an effect from 16 pairs err in
+the same way in all recordings (decision 046). Nearer to 1 names single effects more often, and
+wrong ones too."""
 CONFIDENCE = 0.95
-"""Of the set of effects that may be what is missing. Higher names more effects side by side; lower leaves out the right
-one more often."""
+"""Of the set of effects that may be what is missing. Higher names more effects side by side; lower
+leaves out the right one more often."""
 PART = 0.25
-"""Share of the misfit beyond that of null flags which an effect that is called a part takes away."""
+"""Share of the misfit beyond that of null flags which an effect that is called a part takes
+away."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -359,7 +391,8 @@ class Judged:
         probability: (effect,) given that one of them is missing.
         leftover: (effect,) p of what the model with each leaves.
         scored: the test.
-        open: why the base model is neither rejected nor said to suffice, sentences; empty where it is.
+        open: why the base model is neither rejected nor said to suffice, sentences; empty where it
+            is.
     """
 
     conclusion: Conclusion
@@ -377,7 +410,13 @@ class Judged:
 
 
 def judge(
-    weighing: Weighing, nulls: Misfits, kinds: IntArray, scored: Scored, *, level: float, departure: float
+    weighing: Weighing,
+    nulls: Misfits,
+    kinds: IntArray,
+    scored: Scored,
+    *,
+    level: float,
+    departure: float,
 ) -> Judged:
     """Judge one experiment.
 
@@ -387,7 +426,8 @@ def judge(
         kinds: (null,) of their numerics.
         scored: how it was tested.
         level: of the tests.
-        departure: root mean square departure of its observables from the base model fitted to it [their scatters].
+        departure: root mean square departure of its observables from the base model fitted to it
+            [their scatters].
     """
     nulls, kinds = nulls.rows(np.flatnonzero(scored.comparable).tolist()), kinds[scored.comparable]
     factors = weighing.factors[0]
@@ -397,12 +437,16 @@ def judge(
     confident = tuple(int(column) for column in order[:count])
     leftover = np.array(
         [
-            ClusteredNulls(null=nulls.left[:, column], kinds=kinds).p(float(weighing.misfits.left[0, column]))
+            ClusteredNulls(null=nulls.left[:, column], kinds=kinds).p(
+                float(weighing.misfits.left[0, column])
+            )
             for column in range(len(weighing.effects))
         ]
     )
 
-    def conclude(conclusion: Conclusion, indices: tuple[int, ...] = (), reasons: tuple[str, ...] = ()) -> Judged:
+    def conclude(
+        conclusion: Conclusion, indices: tuple[int, ...] = (), reasons: tuple[str, ...] = ()
+    ) -> Judged:
         return Judged(
             conclusion=conclusion,
             named=indices,
@@ -416,7 +460,9 @@ def judge(
     if not scored.nulls.tests(level):
         return conclude(Conclusion.UNTESTED)
     if scored.p_value > level:
-        reasons = undecided_sentences(scored.p_value, level=level, departure=departure, power=scored.tested.tolist())
+        reasons = undecided_sentences(
+            scored.p_value, level=level, departure=departure, power=scored.tested.tolist()
+        )
         return conclude(Conclusion.UNDECIDED if reasons else Conclusion.SUFFICIENT, reasons=reasons)
     if not scored.pointed:
         return conclude(Conclusion.OUTSIDE)

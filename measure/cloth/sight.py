@@ -1,17 +1,18 @@
 """What summaries a recording would have of a cloth, a place, and an effect of a strength.
 
-A place is one in normal scores, in which a quantity's prior is standard normal: first the cloth's, then those of each
-place. Recordings from one place with one anemometer share gain and view.
+A place is one in normal scores, in which a quantity's prior is standard normal: first the cloth's,
+then those of each place. Recordings from one place with one anemometer share gain and view.
 
-Without an effect this is an emulator, of all summaries that the recording shows. An effect adds what it changed in
-pairs of simulations,
+Without an effect this is an emulator, of all summaries that the recording shows. An effect adds
+what it changed in pairs of simulations,
 
     Δ = Dᵀz(s, θ),   z = (u, u², u ln w),
 
-u the strength or its logarithm, whichever predicts pairs that are left out better, and w the area weight. How far what
-is shown lies from its prediction is in `measure.cloth.emulator`. With an effect its covariance S is that of the base
-model times 1 + c + h r: c is by how much flags with the effect scatter more about their prediction than the same
-flags without it, and h r what so few pairs leave open of D, in units of S each, averages over all summaries.
+u the strength or its logarithm, whichever predicts pairs that are left out better, and w the area
+weight. How far what is shown lies from its prediction is in `measure.cloth.emulator`. With an
+effect its covariance S is that of the base model times 1 + c + h r: c is by how much flags with the
+effect scatter more about their prediction than the same flags without it, and h r what so few pairs
+leave open of D, in units of S each, averages over all summaries.
 """
 
 from __future__ import annotations
@@ -75,7 +76,8 @@ class Sight:
     Attributes:
         emulator: of its simulations' summaries that are used.
         azimuth, elevation: their priors.
-        place: what recordings from one place with one anemometer share; None for a place of its own.
+        place: what recordings from one place with one anemometer share; None for a place of its
+            own.
         responses: name of an effect → what it changes.
     """
 
@@ -88,7 +90,11 @@ class Sight:
     @property
     def quantities(self) -> tuple[Uncertain, ...]:
         """Returns what is fitted for it alone: gain, scale, azimuth and elevation."""
-        return (*(nuisance for nuisance in NUISANCES if nuisance.name in BESIDE), self.azimuth, self.elevation)
+        return (
+            *(nuisance for nuisance in NUISANCES if nuisance.name in BESIDE),
+            self.azimuth,
+            self.elevation,
+        )
 
     @property
     def used(self) -> BoolArray:
@@ -96,7 +102,10 @@ class Sight:
         return self.emulator.used
 
     def predict(
-        self, values: Mapping[str, FloatArray], effect: str | None = None, strength: FloatArray | None = None
+        self,
+        values: Mapping[str, FloatArray],
+        effect: str | None = None,
+        strength: FloatArray | None = None,
     ) -> tuple[FloatArray, FloatArray]:
         """Returns means (n, k) of the used summaries, and factors (n,) of the scatter."""
         mean, stretch = self.emulator.predict(values)
@@ -105,20 +114,29 @@ class Sight:
         response = self.responses[effect]
         z = response.features(strength, values["area_weight"])
         leverage = ((z @ response.inverse) * z).sum(axis=1)
-        return mean + z @ response.coefficients, stretch + response.excess + leverage * response.residual
+        return (
+            mean + z @ response.coefficients,
+            stretch + response.excess + leverage * response.residual,
+        )
 
 
 def first_of(places: Sequence[str | None]) -> list[int]:
     """Returns for each recording the first one of its place; None is a place of its own."""
-    return [number if name is None else list(places).index(name) for number, name in enumerate(places)]
+    return [
+        number if name is None else list(places).index(name) for number, name in enumerate(places)
+    ]
 
 
 def dimension(sights: Sequence[Sight]) -> int:
     """Counts the coordinates of the cloth and of all places."""
-    return len(CLOTH) + sum(len(sights[first].quantities) for first in set(first_of([sight.place for sight in sights])))
+    return len(CLOTH) + sum(
+        len(sights[first].quantities) for first in set(first_of([sight.place for sight in sights]))
+    )
 
 
-def values(scores: FloatArray, sights: Sequence[Sight]) -> tuple[dict[str, FloatArray], list[dict[str, FloatArray]]]:
+def values(
+    scores: FloatArray, sights: Sequence[Sight]
+) -> tuple[dict[str, FloatArray], list[dict[str, FloatArray]]]:
     """Returns cloths, and places of each recording, at normal scores (n, dimension or more)."""
     shares: Iterator[FloatArray] = iter(ndtr(scores).T)
     cloth = {quantity.name: quantity.at(next(shares)) for quantity in CLOTH}
@@ -164,7 +182,8 @@ def response_of(
     coefficients = inverse @ z.T @ change
     predicted, stretch = emulator.predict(values)
     off = np.linalg.solve(emulator.factor, (without[finite][:, emulator.used] - predicted).T).T
-    # The regression was fitted to the flags without the effect: their residuals are the smaller for it.
+    # The regression was fitted to the flags without the effect: their residuals are the smaller for
+    # it.
     fitted, fresh = (2 - stretch)[:, None], stretch[:, None]
     return Response(
         effect=effect,
@@ -172,13 +191,17 @@ def response_of(
         coefficients=coefficients,
         inverse=inverse,
         residual=float(np.square(missed).sum() / (max(len(z) - z.shape[1], 1) * missed.shape[1])),
-        excess=max(0.0, float((np.square(off + missed) / fresh).mean() - (np.square(off) / fitted).mean())),
+        excess=max(
+            0.0, float((np.square(off + missed) / fresh).mean() - (np.square(off) / fitted).mean())
+        ),
         expected=float(np.abs(strengths).mean()),
         change=(np.sign(strengths)[:, None] * change).mean(axis=0),
     )
 
 
-def _features(effect: Weighable, logarithmic: bool, strength: FloatArray, weight: FloatArray) -> FloatArray:
+def _features(
+    effect: Weighable, logarithmic: bool, strength: FloatArray, weight: FloatArray
+) -> FloatArray:
     most = max(abs(effect.low), abs(effect.high))
     u = strength / most
     if logarithmic:

@@ -1,4 +1,5 @@
-"""All simulations of a verdict, gathered: each is read from the folder where it is kept, or made."""
+"""All simulations of a verdict, gathered: each is read from the folder where it is kept, or
+made."""
 
 from __future__ import annotations
 
@@ -39,7 +40,8 @@ class Simulations:
     Attributes:
         designs: one a recording.
         base: for each recording (simulation, window, observable) of the base model.
-        pairs: for each recording, of each effect: what was simulated, and (pair, window, observable) of it.
+        pairs: for each recording, of each effect: what was simulated, and (pair, window,
+            observable) of it.
         nulls: for each recording (null, window, observable).
         kinds: (null,) of numerics.
         weights: (null,) their area weights [kg/m²].
@@ -89,7 +91,12 @@ def simulate_all(
     designs = designs_of(recordings, options)
     until = lasting(len(designs))
     paired = [[pairs(design, effect, until=until) for effect in effects] for design in designs]
-    null = nulls(designs, first_of([recording.place for recording in recordings]), kinds=kinds, seed=options.seed)
+    null = nulls(
+        designs,
+        first_of([recording.place for recording in recordings]),
+        kinds=kinds,
+        seed=options.seed,
+    )
 
     def all_of(label: str, batches: list) -> FloatArray:
         total, done = sum(len(batch.seeds) for batch in batches), 0
@@ -113,11 +120,14 @@ def simulate_all(
     ]
     of_effects = []
     for film, designed in zip(recordings, paired, strict=True):
-        readings = all_of(f"effects, {film.name}", [batch for pair in designed for batch in pair.batches])
+        readings = all_of(
+            f"effects, {film.name}", [batch for pair in designed for batch in pair.batches]
+        )
         ends = np.cumsum([len(pair.indices) for pair in designed])[:-1]
         of_effects.append(tuple(zip(designed, np.split(readings, ends), strict=True)))
     read_nulls = [
-        all_of(f"nulls, {recording.name}", designed) for recording, designed in zip(recordings, null, strict=True)
+        all_of(f"nulls, {recording.name}", designed)
+        for recording, designed in zip(recordings, null, strict=True)
     ]
     return Simulations(
         designs=tuple(designs),
@@ -127,7 +137,8 @@ def simulate_all(
         kinds=np.repeat(np.arange(kinds), TOGETHER),
         weights=np.concatenate([batch.values["area_weight"] for batch in null[0]]),
         corrections=tuple(
-            repeated.correction(readings, coarse) for repeated, readings, coarse in zip(finer, fine, base, strict=True)
+            repeated.correction(readings, coarse)
+            for repeated, readings, coarse in zip(finer, fine, base, strict=True)
         ),
     )
 
@@ -135,8 +146,8 @@ def simulate_all(
 def shown_by(
     recordings: Sequence[Observed], simulations: Simulations
 ) -> tuple[tuple[Observed, ...], Simulations, tuple[Sight, ...], tuple[Finding, ...]]:
-    """Returns the recordings whose simulations show what they show, their simulations and models, and a warning for
-    each other recording.
+    """Returns the recordings whose simulations show what they show, their simulations and models,
+    and a warning for each other recording.
 
     Raises:
         InputError: too little is left.
@@ -147,7 +158,9 @@ def shown_by(
         (fitted,) = sights_of([recordings[number]], simulations.of([number]))
         return number, fitted
 
-    sights, left_out = usable(range(len(recordings)), seen, name=lambda number: recordings[number].name)
+    sights, left_out = usable(
+        range(len(recordings)), seen, name=lambda number: recordings[number].name
+    )
     places = [number for number, _ in sights]
     shown_recordings = tuple(recordings[number] for number in places)
     check_in_all(shown_recordings, left_out=left_out)
@@ -155,7 +168,10 @@ def shown_by(
 
 
 def sights_of(
-    recordings: Sequence[Observed], simulations: Simulations, *, windows: Sequence[slice] | None = None
+    recordings: Sequence[Observed],
+    simulations: Simulations,
+    *,
+    windows: Sequence[slice] | None = None,
 ) -> tuple[Sight, ...]:
     """Fits each recording's model; as `sight`.
 
@@ -198,7 +214,9 @@ def sight(
         RefusedError: as `Emulator.fit`.
     """
     part = observed if windows is None else part_of(observed, windows)
-    summaries = with_errors(part, base if windows is None else base[:, windows], correction, seed=design.seed)
+    summaries = with_errors(
+        part, base if windows is None else base[:, windows], correction, seed=design.seed
+    )
     changes = part.projection.changes
     values = design.values()
     visible = np.tile(shown(part.readings), 1 + changes)
@@ -206,7 +224,8 @@ def sight(
         # A change with the wind that depends on nothing here widens the scatter of all others.
         dependent = informative(values, summaries, visible, name=observed.name)
         visible[len(OBSERVED) :] &= dependent[len(OBSERVED) :]
-    # What flags of the base model show, then what each effect changes in pairs of flags with and without it.
+    # What flags of the base model show, then what each effect changes in pairs of flags with and
+    # without it.
     emulator = Emulator.fit(values, summaries, visible, name=observed.name)
     responses = {}
     for pair, readings in effect_readings:
@@ -257,14 +276,19 @@ class _Part(Observed):
 
 
 def of_recordings(
-    sights: Sequence[Sight], recordings: Sequence[Observed], scale_weight: tuple[float, float] | None
+    sights: Sequence[Sight],
+    recordings: Sequence[Observed],
+    scale_weight: tuple[float, float] | None,
 ) -> Experiments:
     """Returns the recordings as the one experiment that they are.
 
     Args:
         scale_weight: mean and standard deviation of a stated area weight [kg/m²].
     """
-    summaries = tuple(recording.summary[None, sight.used] for sight, recording in zip(sights, recordings, strict=True))
+    summaries = tuple(
+        recording.summary[None, sight.used]
+        for sight, recording in zip(sights, recordings, strict=True)
+    )
     if scale_weight is None:
         return Experiments(summaries=summaries)
     mean, sigma = scale_weight
@@ -279,8 +303,9 @@ def of_nulls(
     *,
     seed: int,
 ) -> tuple[Experiments, IntArray]:
-    """Makes null experiments with errors of pixels and of the scale, those that show all, and their kinds of
-    numerics. Their meshes are about as coarse as the fit's, and are as far from a finer one."""
+    """Makes null experiments with errors of pixels and of the scale, those that show all, and their
+    kinds of numerics. Their meshes are about as coarse as the fit's, and are as far from a finer
+    one."""
     columns = []
     for sight, recording, readings, correction in zip(
         sights, recordings, simulations.nulls, simulations.corrections, strict=True
@@ -295,7 +320,9 @@ def of_nulls(
     complete = np.all([np.isfinite(rows).all(axis=1) for rows in columns], axis=0)
     experiments = Experiments(summaries=tuple(rows[complete] for rows in columns))
     kinds = simulations.kinds[complete]
-    return _as_weighed(experiments, simulations.weights, complete, scale_weight, seed=seed, stream_name="scale"), kinds
+    return _as_weighed(
+        experiments, simulations.weights, complete, scale_weight, seed=seed, stream_name="scale"
+    ), kinds
 
 
 def of_base(
@@ -306,18 +333,30 @@ def of_base(
     *,
     seed: int,
 ) -> Experiments:
-    """Returns the base model's simulations with errors of numerics, of pixels and of the scale, those that show all.
-    A cloth is the same in all recordings."""
+    """Returns the base model's simulations with errors of numerics, of pixels and of the scale,
+    those that show all. A cloth is the same in all recordings."""
     columns = [
         with_errors(recording, base, correction, seed=design.seed)[:, sight.used]
         for sight, recording, base, design, correction in zip(
-            sights, recordings, simulations.base, simulations.designs, simulations.corrections, strict=True
+            sights,
+            recordings,
+            simulations.base,
+            simulations.designs,
+            simulations.corrections,
+            strict=True,
         )
     ]
     complete = np.all([np.isfinite(rows).all(axis=1) for rows in columns], axis=0)
     experiments = Experiments(summaries=tuple(rows[complete] for rows in columns))
     weights = simulations.designs[0].values()["area_weight"]
-    return _as_weighed(experiments, weights, complete, scale_weight, seed=seed, stream_name="scale of the base model")
+    return _as_weighed(
+        experiments,
+        weights,
+        complete,
+        scale_weight,
+        seed=seed,
+        stream_name="scale of the base model",
+    )
 
 
 def _as_weighed(
@@ -329,7 +368,8 @@ def _as_weighed(
     seed: int,
     stream_name: str,
 ) -> Experiments:
-    """Experiments with their area weights as a scale reads them that is as good as the one of the recordings' cloth.
+    """Experiments with their area weights as a scale reads them that is as good as the one of the
+    recordings' cloth.
 
     Args:
         weights: (n,) of all that were simulated [kg/m²].
@@ -338,5 +378,7 @@ def _as_weighed(
     if scale_weight is None:
         return experiments
     share = scale_weight[1] / scale_weight[0]
-    read = weights * np.exp(share * stream(seed, "films", stream_name).standard_normal(len(weights)))
+    read = weights * np.exp(
+        share * stream(seed, "films", stream_name).standard_normal(len(weights))
+    )
     return replace(experiments, stated=read[which], sigma=share)

@@ -1,7 +1,9 @@
-"""A table of observables and a log of the wind beside it on one clock: by a given offset, or estimated.
+"""A table of observables and a log of the wind beside it on one clock: by a given offset, or
+estimated.
 
-Estimated as two logs of one wind are (`flagdata.align.logs`): the observable of the table that rises with the wind
-takes the place of the second log, of unknown gain. It follows the wind by the flag's response.
+Estimated as two logs of one wind are (`flagdata.align.logs`): the observable of the table that
+rises with the wind takes the place of the second log, of unknown gain. It follows the wind by the
+flag's response.
 """
 
 from __future__ import annotations
@@ -37,7 +39,8 @@ _FOLLOWS = (
     "droop",
     "frequency",
 )
-"""Observables that follow the wind, those that do so most closely first; the droop falls with it."""
+"""Observables that follow the wind, those that do so most closely first; the droop falls with
+it."""
 
 
 def join_log(
@@ -73,7 +76,9 @@ def join_log(
         )
     series = Record.open(lake.object_path(str(artifact.object))).wind()
     if series is None:
-        raise InputError("the wind artifact holds no samples", where=artifact.id, fix="ingest the log anew")
+        raise InputError(
+            "the wind artifact holds no samples", where=artifact.id, fix="ingest the log anew"
+        )
     names = (artifact.name or artifact.id[:12], path.stem)
     if offset is not None:
         clock = declared_clock(table, offset, names=names)
@@ -98,7 +103,14 @@ def declared_clock(table: Columns, offset: Stated, *, names: tuple[str, str]) ->
             fix="state how well it is known, as in 0.3±0.1",
         )
     times = instants(table)
-    return given(names[1], names[0], start=int(times[0]), end=int(times[-1]) + 1, offset=offset.low, sigma=offset.sigma)
+    return given(
+        names[1],
+        names[0],
+        start=int(times[0]),
+        end=int(times[-1]) + 1,
+        offset=offset.low,
+        sigma=offset.sigma,
+    )
 
 
 def estimated_clock(
@@ -144,7 +156,8 @@ def estimated_clock(
         raise RefusedError(
             error.what,
             where=error.where,
-            fix="check that the table and the log are of one wind, or state what is added to the table's clock to "
+            fix="check that the table and the log are of one wind, or state what is added to the "
+            "table's clock to "
             "reach the log's: --clock-offset 0.3±0.1",
         ) from error
     segments = tuple(

@@ -1,12 +1,14 @@
-"""Tables of observables, as trackers and papers give them: rows against time, or rows against wind, in any unit.
+"""Tables of observables, as trackers and papers give them: rows against time, or rows against wind,
+in any unit.
 
-Rows against time, `time` and `wind` or a log beside it, are of one recording. A row is of the span about its time that
-reaches halfway to its neighbours, and no farther than half of the usual spacing; a window is the mean of the spans
-in it, by their lengths, and of root mean squares and deviations the quadratic mean. So rows may come faster or more
-slowly than windows, with gaps or without.
+Rows against time, `time` and `wind` or a log beside it, are of one recording. A row is of the span
+about its time that reaches halfway to its neighbours, and no farther than half of the usual
+spacing; a window is the mean of the spans in it, by their lengths, and of root mean squares and
+deviations the quadratic mean. So rows may come faster or more slowly than windows, with gaps or
+without.
 
-Rows against wind, `wind` and `duration` or `count` (of windows), are each of a steady wind of its own: a recording a
-row, all from one place and with one anemometer.
+Rows against wind, `wind` and `duration` or `count` (of windows), are each of a steady wind of its
+own: a recording a row, all from one place and with one anemometer.
 """
 
 from __future__ import annotations
@@ -46,7 +48,9 @@ SIGMA, _REASON = "-sigma", "-reason"
 _Value = TypeVar("_Value", int, float)
 _LIMIT = 1 << 26  # B
 _UNITS = {TIME: "s", WIND: "m/s", DURATION: "s", COUNT: "1"}
-_HEADING = re.compile(r"(?P<name>[^\[\](),/]+?)\s*(?:[\[(](?P<bracketed>[^\])]*)[\])]|[,/]\s*(?P<after>\S.*))?\s*")
+_HEADING = re.compile(
+    r"(?P<name>[^\[\](),/]+?)\s*(?:[\[(](?P<bracketed>[^\])]*)[\])]|[,/]\s*(?P<after>\S.*))?\s*"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,9 +59,10 @@ class Columns:
 
     Attributes:
         where: the file.
-        values: name → (n,) in its unit: `time`, `wind`, `duration`, `count`, observables and NAME-sigma; NaN where a
-            cell is blank. Times are seconds since `origin`.
-        origin: instant of the first row's time where that is a UTC stamp or seconds since 1970 [UTC ns].
+        values: name → (n,) in its unit: `time`, `wind`, `duration`, `count`, observables and
+            NAME-sigma; NaN where a cell is blank. Times are seconds since `origin`.
+        origin: instant of the first row's time where that is a UTC stamp or seconds since 1970 [UTC
+            ns].
         lines: (n,) where in the file each row stands.
     """
 
@@ -78,16 +83,19 @@ class Columns:
 
 
 def read_table(path: Path, size: FlagSize) -> Columns:
-    """Reads a table, Parquet or text with a heading, its columns separated by commas, semicolons or tabs.
+    """Reads a table, Parquet or text with a heading, its columns separated by commas, semicolons or
+    tabs.
 
-    A heading is a name, perhaps with a unit behind it: `droop`, `droop [deg]`, `droop (°)`. The unit is the
-    observable's own where none is stated. What is counted in lengths or heights of the flag may be stated in a length.
+    A heading is a name, perhaps with a unit behind it: `droop`, `droop [deg]`, `droop (°)`. The
+    unit is the observable's own where none is stated. What is counted in lengths or heights of the
+    flag may be stated in a length.
 
     Args:
         size: of the flag.
 
     Raises:
-        InputError: no such table, a column that is not known, a unit of something else, or a cell that is no number.
+        InputError: no such table, a column that is not known, a unit of something else, or a cell
+            that is no number.
         FlagdataError: a file that cannot be read.
     """
     check_input(path, limit=_LIMIT)
@@ -101,7 +109,9 @@ def read_table(path: Path, size: FlagSize) -> Columns:
     names = [name for _, name, _ in wanted]
     known_columns(names, where=where)
     if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise InputError(f"columns {', '.join(twice)} stand twice", where=where, fix="keep one of each")
+        raise InputError(
+            f"columns {', '.join(twice)} stand twice", where=where, fix="keep one of each"
+        )
     lines = tuple(number for number, _ in rows)
     values: dict[str, FloatArray] = {}
     origin = 0
@@ -111,12 +121,18 @@ def read_table(path: Path, size: FlagSize) -> Columns:
         if name == TIME:
             instants = _convert_cells(cells, lines, name, where, partial(_instant, scale=scale))
             if None in instants or not instants:
-                raise InputError("rows without a time", where=where, fix="leave them out, or fill their times in")
+                raise InputError(
+                    "rows without a time", where=where, fix="leave them out, or fill their times in"
+                )
             origin = instants[0] or 0
-            values[name] = np.array([((instant or 0) - origin) / NANOSECONDS for instant in instants])
+            values[name] = np.array(
+                [((instant or 0) - origin) / NANOSECONDS for instant in instants]
+            )
         else:
             numbers = _convert_cells(cells, lines, name, where, float)
-            values[name] = np.array([math.nan if cell_value is None else cell_value * scale for cell_value in numbers])
+            values[name] = np.array(
+                [math.nan if cell_value is None else cell_value * scale for cell_value in numbers]
+            )
     return Columns(where=where, values=values, origin=origin, lines=lines)
 
 
@@ -129,12 +145,14 @@ def known_columns(names: Sequence[str], *, where: str) -> None:
         raise InputError(
             f"columns {', '.join(unknown)} are not known",
             where=where,
-            fix=f"keep, and name, these: {', '.join(allowed)}; a unit stands behind a name, as in droop [deg]",
+            fix=f"keep, and name, these: {', '.join(allowed)}; a unit stands behind a name, as in "
+            "droop [deg]",
         )
 
 
 def column_names(path: Path) -> set[str]:
-    """Names of a table's columns, without its rows being read; none where it has no heading that can be read."""
+    """Names of a table's columns, without its rows being read; none where it has no heading that
+    can be read."""
     if path.suffix.lower() == ".parquet":
         import pyarrow as pa
         import pyarrow.parquet as pq
@@ -187,7 +205,8 @@ def _scale(name: str, stated_unit: str | None, size: FlagSize, *, where: str) ->
 
 
 def _cells(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """Headings of a table, and the line and cells of its rows; of Parquet, with the units that its fields state.
+    """Headings of a table, and the line and cells of its rows; of Parquet, with the units that its
+    fields state.
 
     Raises:
         InputError: no table of that format.
@@ -198,22 +217,37 @@ def _cells(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
         try:
             table = read_parquet(path)
         except pa.ArrowException as error:
-            raise InputError(f"this is no Parquet table: {error}", where=str(path), fix="name a table") from None
+            raise InputError(
+                f"this is no Parquet table: {error}", where=str(path), fix="name a table"
+            ) from None
         headings = []
         for field in table.schema:
             unit_text = (field.metadata or {}).get(b"unit", b"").decode()
             headings.append(
-                f"{field.name} [{unit_text}]" if unit_text and _parse_heading(field.name)[1] is None else field.name
+                f"{field.name} [{unit_text}]"
+                if unit_text and _parse_heading(field.name)[1] is None
+                else field.name
             )
-        columns = [["" if cell is None else str(cell) for cell in column.to_pylist()] for column in table.columns]
+        columns = [
+            ["" if cell is None else str(cell) for cell in column.to_pylist()]
+            for column in table.columns
+        ]
         rows = enumerate(map(list, zip(*columns, strict=True)), start=2)
         return headings, [(line, row) for line, row in rows if any(cell.strip() for cell in row)]
-    table = small_table(plain_text(path.read_bytes(), noun="table", where=str(path)), where=str(path))
-    return list(table.names), [(line, [table.number(cell) for cell in row]) for line, row in table.rows]
+    table = small_table(
+        plain_text(path.read_bytes(), noun="table", where=str(path)), where=str(path)
+    )
+    return list(table.names), [
+        (line, [table.number(cell) for cell in row]) for line, row in table.rows
+    ]
 
 
 def _convert_cells(
-    cells: Sequence[str], lines: Sequence[int], name: str, where: str, convert: Callable[[str], _Value]
+    cells: Sequence[str],
+    lines: Sequence[int],
+    name: str,
+    where: str,
+    convert: Callable[[str], _Value],
 ) -> list[_Value | None]:
     """Converts each cell, `None` where it is blank.
 
@@ -226,7 +260,9 @@ def _convert_cells(
             converted.append(convert(cell) if cell else None)
         except ValueError:
             raise InputError(
-                f"{cell!r} is no number", where=f"{where}, line {line}, column {name}", fix="correct the cell"
+                f"{cell!r} is no number",
+                where=f"{where}, line {line}, column {name}",
+                fix="correct the cell",
             ) from None
     return converted
 
@@ -277,10 +313,14 @@ def of_table(path: Path, size: FlagSize, *, wind_log: Beside | None = None) -> t
         InputError: no such table, or one whose columns do not say what its rows are of.
         FlagdataError: a file that cannot be read.
     """
-    return of_columns(read_table(path, size), name=path.stem, identity=file_hash(path), wind_log=wind_log)
+    return of_columns(
+        read_table(path, size), name=path.stem, identity=file_hash(path), wind_log=wind_log
+    )
 
 
-def of_columns(table: Columns, *, name: str, identity: str, wind_log: Beside | None) -> tuple[Observed, ...]:
+def of_columns(
+    table: Columns, *, name: str, identity: str, wind_log: Beside | None
+) -> tuple[Observed, ...]:
     """Returns the recordings of a table whose columns were read; as `of_table`.
 
     Args:
@@ -291,21 +331,35 @@ def of_columns(table: Columns, *, name: str, identity: str, wind_log: Beside | N
         InputError: as `of_table`.
     """
     if not any(column in table for column in OBSERVED):
-        raise InputError("no column is an observable", where=table.where, fix=f"name one of {', '.join(OBSERVED)}")
-    if (WIND in table) == (wind_log is not None):
-        problem = "no column wind" if wind_log is None else "a column wind, and a log of the wind beside it"
         raise InputError(
-            problem, where=table.where, fix="give the wind in the table or as a log (--log), in one of them"
+            "no column is an observable",
+            where=table.where,
+            fix=f"name one of {', '.join(OBSERVED)}",
+        )
+    if (WIND in table) == (wind_log is not None):
+        problem = (
+            "no column wind"
+            if wind_log is None
+            else "a column wind, and a log of the wind beside it"
+        )
+        raise InputError(
+            problem,
+            where=table.where,
+            fix="give the wind in the table or as a log (--log), in one of them",
         )
     if TIME not in table:
         if wind_log is not None:
             raise InputError(
-                "the table has no column time to join the log by", where=table.where, fix="add the rows' times"
+                "the table has no column time to join the log by",
+                where=table.where,
+                fix="add the rows' times",
             )
         return _against_wind(table, name=name, identity=identity)
     if extra := [column for column in (DURATION, COUNT) if column in table]:
         raise InputError(
-            f"the table has columns {TIME} and {', '.join(extra)}", where=table.where, fix="keep one of them"
+            f"the table has columns {TIME} and {', '.join(extra)}",
+            where=table.where,
+            fix="keep one of them",
         )
     return (_against_time(table, name=name, identity=identity, wind_log=wind_log),)
 
@@ -318,7 +372,9 @@ def rows_of(path: Path, size: FlagSize) -> Columns:
     """
     table = read_table(path, size)
     if TIME not in table:
-        raise InputError("the table has no column time", where=table.where, fix="add the rows' times")
+        raise InputError(
+            "the table has no column time", where=table.where, fix="add the rows' times"
+        )
     spacing(table)
     return table
 
@@ -331,12 +387,16 @@ def spacing(table: Columns) -> float:
     """
     times = table[TIME]
     if len(times) < _FEWEST_ROWS:
-        raise InputError(f"{len(times)} rows", where=table.where, fix=f"give {_FEWEST_ROWS} or more")
+        raise InputError(
+            f"{len(times)} rows", where=table.where, fix=f"give {_FEWEST_ROWS} or more"
+        )
     steps = np.diff(times)
     if not (steps > 0).all():
         line = table.lines[int(np.flatnonzero(steps <= 0)[0]) + 1]
         raise InputError(
-            "a time that is not after the one before it", where=f"{table.where}, line {line}", fix="sort the rows"
+            "a time that is not after the one before it",
+            where=f"{table.where}, line {line}",
+            fix="sort the rows",
         )
     return float(np.median(steps))
 
@@ -353,22 +413,33 @@ def _against_time(table: Columns, *, name: str, identity: str, wind_log: Beside 
     middles = (times[1:] + times[:-1]) / 2
     low = np.maximum(times - step / 2, np.concatenate([[begin], middles]))
     high = np.minimum(times + step / 2, np.concatenate([middles, [times[-1] + step / 2]]))
-    edges: FloatArray = begin + WINDOW * np.arange(int((float(high[-1]) - begin) / WINDOW + 1e-6) + 1, dtype=np.float64)
+    edges: FloatArray = begin + WINDOW * np.arange(
+        int((float(high[-1]) - begin) / WINDOW + 1e-6) + 1, dtype=np.float64
+    )
     if wind_log is None:
         finite = np.isfinite(table[WIND])
         if finite.sum() < _FEWEST_ROWS:
             raise InputError(
-                "the table has no wind", where=table.where, fix="fill the column in, or give a log beside the table"
+                "the table has no wind",
+                where=table.where,
+                fix="fill the column in, or give a log beside the table",
             )
         log = Log(times=times[finite] - begin, speed=table[WIND][finite], averaging=step)
     else:
         start = instants(table)[:1] - round(step / 2 * NANOSECONDS)
-        common, sigma = int(wind_log.clock.to_common(start)[0]), float(wind_log.clock.sigma(start)[0])
+        common, sigma = (
+            int(wind_log.clock.to_common(start)[0]),
+            float(wind_log.clock.sigma(start)[0]),
+        )
         log = Log.of(wind_log.series, start=common, clock=sigma)
-        identity = f"{identity}, its clock {(common - int(start[0])) / NANOSECONDS:+.3f} ± {sigma:.3f} s"
+        identity = (
+            f"{identity}, its clock {(common - int(start[0])) / NANOSECONDS:+.3f} ± {sigma:.3f} s"
+        )
     readings = np.stack(
         [
-            _windows(edges, low, high, table.of(observable), quadratic=OBSERVABLES[observable].quadratic)
+            _windows(
+                edges, low, high, table.of(observable), quadratic=OBSERVABLES[observable].quadratic
+            )
             for observable in OBSERVED
         ],
         axis=1,
@@ -386,11 +457,16 @@ def _against_time(table: Columns, *, name: str, identity: str, wind_log: Beside 
 def _windows(
     edges: FloatArray, low: FloatArray, high: FloatArray, values: FloatArray, *, quadratic: bool
 ) -> FloatArray:
-    """Averages to (window,) means of values (n,) that hold from `low` to `high`; NaN where they cover too little."""
+    """Averages to (window,) means of values (n,) that hold from `low` to `high`; NaN where they
+    cover too little."""
     finite = np.isfinite(values)
     if not finite.any():
         return np.full(len(edges) - 1, np.nan)
-    low, high, heights = low[finite], high[finite], np.square(values[finite]) if quadratic else values[finite]
+    low, high, heights = (
+        low[finite],
+        high[finite],
+        np.square(values[finite]) if quadratic else values[finite],
+    )
     places = np.stack([low, high], axis=1).ravel()
 
     def between(height: FloatArray) -> FloatArray:
@@ -407,9 +483,11 @@ def _against_wind(table: Columns, *, name: str, identity: str) -> tuple[Observed
     lengths = [column for column in (DURATION, COUNT) if column in table]
     if len(lengths) != 1:
         raise InputError(
-            f"rows against wind with {'both columns' if lengths else 'no column'} {DURATION} and {COUNT}",
+            f"rows against wind with {'both columns' if lengths else 'no column'} {DURATION} and "
+            f"{COUNT}",
             where=table.where,
-            fix=f"give how long each was observed: {DURATION} [s], or {COUNT}, of windows of {WINDOW:g} s; rows "
+            fix=f"give how long each was observed: {DURATION} [s], or {COUNT}, of windows of "
+            f"{WINDOW:g} s; rows "
             f"against time have a column {TIME}",
         )
     windows = table[lengths[0]] / (WINDOW if lengths[0] == DURATION else 1.0)
@@ -431,8 +509,12 @@ def _against_wind(table: Columns, *, name: str, identity: str) -> tuple[Observed
                 source=f"{identity}, line {line}",
                 place=identity,
                 readings=np.tile([table.of(column)[row] for column in OBSERVED], (count, 1)),
-                log=Log(times=steady, speed=np.full(len(steady), wind), distance=0.0, averaging=WINDOW),
-                sigma=np.array([_mean(table.of(f"{column}{SIGMA}")[row : row + 1]) for column in OBSERVED]),
+                log=Log(
+                    times=steady, speed=np.full(len(steady), wind), distance=0.0, averaging=WINDOW
+                ),
+                sigma=np.array(
+                    [_mean(table.of(f"{column}{SIGMA}")[row : row + 1]) for column in OBSERVED]
+                ),
             )
         )
     return tuple(recordings)
@@ -445,11 +527,16 @@ def _mean(values: FloatArray) -> float:
 
 def _of_rows(table: Columns, step: float) -> tuple[Finding, ...]:
     """Reports rows that come faster than a spectrum takes."""
-    fast = [name for name in OBSERVED if name in table and (OBSERVABLES[name].quadratic or name == "frequency")]
+    fast = [
+        name
+        for name in OBSERVED
+        if name in table and (OBSERVABLES[name].quadratic or name == "frequency")
+    ]
     if step >= _SHORT or not fast:
         return ()
     text = (
-        f"its rows come every {step:.2g} s: their {', '.join(fast)} are taken as of spans of {WINDOW:g} s, over which "
+        f"its rows come every {step:.2g} s: their {', '.join(fast)} are taken as of spans of "
+        f"{WINDOW:g} s, over which "
         "the tracker has to have formed them"
     )
     fix = "check the length of the tracker's own window; give rows of 2.5 s where it is shorter"

@@ -1,8 +1,9 @@
-"""Errors on windows that a model was not fitted to: each observable in its unit, beside the scatter of replicates.
+"""Errors on windows that a model was not fitted to: each observable in its unit, beside the scatter
+of replicates.
 
-The model is calibrated on one half of each recording and predicts the means of the other half, both ways; where there
-are several recordings, also on all but one of them, in turn. Errors are of means over windows, since single windows
-scatter by chaos whatever the model is.
+The model is calibrated on one half of each recording and predicts the means of the other half, both
+ways; where there are several recordings, also on all but one of them, in turn. Errors are of means
+over windows, since single windows scatter by chaos whatever the model is.
 """
 
 from __future__ import annotations
@@ -36,7 +37,8 @@ class Prediction:
 
     Attributes:
         observed: (observable,) mean over them; NaN where they do not show one.
-        before, after, control: predicted by the base model, with the effect, with the best wrong one.
+        before, after, control: predicted by the base model, with the effect, with the best wrong
+            one.
         scatter: (observable,) standard deviation of replicates.
         windows: how many.
     """
@@ -51,7 +53,8 @@ class Prediction:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Task:
-    """Sights that are fitted, and those that are predicted: (place of the fitted one or None, sight, observed)."""
+    """Sights that are fitted, and those that are predicted: (place of the fitted one or None,
+    sight, observed)."""
 
     fitted: tuple[tuple[Sight, Observed], ...]
     predicted: tuple[tuple[int | None, Sight, Observed], ...]
@@ -109,7 +112,9 @@ def compare_models(
                 if math.isfinite(prediction.observed[column] + prediction.before[column])
             ]
             if shown_by:
-                comparisons.append(_comparison(f"{name}, {words}", name, column, shown_by, control, seed=seed))
+                comparisons.append(
+                    _comparison(f"{name}, {words}", name, column, shown_by, control, seed=seed)
+                )
     return tuple(comparisons)
 
 
@@ -127,9 +132,11 @@ def _other_halves(halves: Sequence[Halves]) -> list[_Task]:
 def halve_recordings(
     recordings: Sequence[Observed], simulations: Simulations
 ) -> tuple[tuple[Halves, ...], tuple[Finding, ...]]:
-    """Returns the halves of the recordings that have two, and a warning for each of which one cannot be fitted.
+    """Returns the halves of the recordings that have two, and a warning for each of which one
+    cannot be fitted.
 
-    Recordings that are too short have none, nor have rows of a table against wind, whose windows are the same.
+    Recordings that are too short have none, nor have rows of a table against wind, whose windows
+    are the same.
     """
     halves: list[Halves] = []
     whole: list[Finding] = []
@@ -138,10 +145,13 @@ def halve_recordings(
             continue
         middle, own = len(recording.readings) // 2, simulations.of([number])
         try:
-            first, second = (_half(recording, own, part) for part in (slice(0, middle), slice(middle, None)))
+            first, second = (
+                _half(recording, own, part) for part in (slice(0, middle), slice(middle, None))
+            )
         except RefusedError as error:
             what = (
-                f"{recording.name}: one half of it shows no observable that a model can be fitted to, so that no half "
+                f"{recording.name}: one half of it shows no observable that a model can be fitted "
+                "to, so that no half "
                 f"of it predicts the other: {error.what}"
             )
             whole.append(Finding.of("half-without-readings", what, fix=error.fix))
@@ -189,14 +199,17 @@ def _predict_windows(
                 if fitted_number is not None
                 else {q.name: q.at(rng.random(len(fit.weights[0]))) for q in sight.quantities}
             )
-            mean, _ = sight.predict({**cloth, **values}, None if which is None else which.name, strength)
+            mean, _ = sight.predict(
+                {**cloth, **values}, None if which is None else which.name, strength
+            )
             full = np.full(len(sight.used), np.nan)
             full[sight.used] = fit.weights[0] @ mean
             columns.append(full[: len(OBSERVED)])
         return columns
 
     responding = all(
-        added is None or all(added.name in s.responses for s in (*sights, *(p for _, p, _ in task.predicted)))
+        added is None
+        or all(added.name in s.responses for s in (*sights, *(p for _, p, _ in task.predicted)))
         for added in (effect, control)
     )
     before = means(None)
@@ -220,14 +233,24 @@ def _predict_windows(
 
 
 def _comparison(
-    words: str, name: str, index: int, predictions: Sequence[Prediction], control: Weighable | None, *, seed: int
+    words: str,
+    name: str,
+    index: int,
+    predictions: Sequence[Prediction],
+    control: Weighable | None,
+    *,
+    seed: int,
 ) -> Comparison:
-    """Compares root mean squares over the predicted parts, with intervals by the scatter of replicates."""
+    """Compares root mean squares over the predicted parts, with intervals by the scatter of
+    replicates."""
     unit = OBSERVABLES[name].unit
     observed, scatter = (
-        np.array([getattr(prediction, key)[index] for prediction in predictions]) for key in ("observed", "scatter")
+        np.array([getattr(prediction, key)[index] for prediction in predictions])
+        for key in ("observed", "scatter")
     )
-    noise = scatter * stream(seed, "films", "unseen", words).standard_normal((_DRAWS, len(predictions)))
+    noise = scatter * stream(seed, "films", "unseen", words).standard_normal(
+        (_DRAWS, len(predictions))
+    )
 
     def errors(predicted: Sequence[FloatArray]) -> tuple[float, FloatArray]:
         off = observed - np.array([prediction[index] for prediction in predicted])
@@ -235,8 +258,13 @@ def _comparison(
 
     before = errors([prediction.before for prediction in predictions])
     with_effect = [prediction.after for prediction in predictions if prediction.after is not None]
-    with_control = [prediction.control for prediction in predictions if prediction.control is not None]
-    after, wrong = errors(with_effect) if with_effect else None, errors(with_control) if with_control else None
+    with_control = [
+        prediction.control for prediction in predictions if prediction.control is not None
+    ]
+    after, wrong = (
+        errors(with_effect) if with_effect else None,
+        errors(with_control) if with_control else None,
+    )
     floor = float(np.sqrt(np.square(scatter).mean()))
     reduction = None if after is None else (before[0] - after[0], before[1] - after[1])
     error_before = _estimate(before, unit)
@@ -247,7 +275,9 @@ def _comparison(
         after=_estimate(after, unit),
         reduction=_estimate(reduction, unit),
         floor=Estimate(value=floor, low=floor, high=floor, unit=unit, level=CRITERIA.interval),
-        share=None if reduction is None or error_before.low <= floor else reduction[0] / (before[0] - floor),
+        share=None
+        if reduction is None or error_before.low <= floor
+        else reduction[0] / (before[0] - floor),
         control=None if wrong is None else _estimate(wrong, unit),
         control_name="" if wrong is None or control is None else control.column.effect,
     )
@@ -255,8 +285,12 @@ def _comparison(
 
 def _estimate(value_and_draws: tuple[float, FloatArray] | None, unit: str) -> Estimate:
     if value_and_draws is None:
-        return Estimate(value=math.nan, low=math.nan, high=math.nan, unit=unit, level=CRITERIA.interval)
+        return Estimate(
+            value=math.nan, low=math.nan, high=math.nan, unit=unit, level=CRITERIA.interval
+        )
     value, draws = value_and_draws
     tails = [(1 - CRITERIA.interval) / 2, (1 + CRITERIA.interval) / 2]
     low, high = np.quantile(draws, tails).tolist()
-    return Estimate(value=value, low=min(low, value), high=max(high, value), unit=unit, level=CRITERIA.interval)
+    return Estimate(
+        value=value, low=min(low, value), high=max(high, value), unit=unit, level=CRITERIA.interval
+    )

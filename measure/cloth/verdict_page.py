@@ -1,9 +1,9 @@
 """The report of a verdict on films as one page that refers to no other file.
 
-A window of a film is beside flags that the models simulate in its wind, seen from the fitted place, in motion. The
-models are fitted to the first half of each recording, and the window is of the second one. Turbulence that is quicker
-than the log is drawn anew in each simulation, so that single waves differ, and how high the flag flies, how far it
-reaches and how it beats can be compared.
+A window of a film is beside flags that the models simulate in its wind, seen from the fitted place,
+in motion. The models are fitted to the first half of each recording, and the window is of the
+second one. Turbulence that is quicker than the log is drawn anew in each simulation, so that single
+waves differ, and how high the flag flies, how far it reaches and how it beats can be compared.
 """
 
 from __future__ import annotations
@@ -77,7 +77,8 @@ class SideBySide:
 
 
 def side_by_side(outcome: SolvedLoop, index: int, *, after: str) -> SideBySide | None:
-    """Returns a recording's window beside what was simulated; None without a film, or where it has no two halves.
+    """Returns a recording's window beside what was simulated; None without a film, or where it has
+    no two halves.
 
     Args:
         index: of the recording.
@@ -89,20 +90,32 @@ def side_by_side(outcome: SolvedLoop, index: int, *, after: str) -> SideBySide |
     if excerpt is None or place is None:
         return None
     sights = [pair.first[0] for pair in halves]
-    experiment = of_recordings(sights, [pair.first[1] for pair in halves], outcome.options.area_weight)
+    experiment = of_recordings(
+        sights, [pair.first[1] for pair in halves], outcome.options.area_weight
+    )
     film = excerpt.window
     instants = np.arange(round(WINDOW * RATE)) / RATE
     drawings = [
-        _moving("the film", [film.frames[np.abs(film.times - film.times[0] - at).argmin()] for at in instants.tolist()])
+        _moving(
+            "the film",
+            [
+                film.frames[np.abs(film.times - film.times[0] - at).argmin()]
+                for at in instants.tolist()
+            ],
+        )
     ]
-    models: list[tuple[str, Weighable | None, tuple[int, int, int]]] = [("base model", None, _BEFORE_RGB)]
+    models: list[tuple[str, Weighable | None, tuple[int, int, int]]] = [
+        ("base model", None, _BEFORE_RGB)
+    ]
     if after and outcome.best is not None:
         models.append((after, outcome.best[0], _AFTER_RGB))
     for label, effect, colour in models:
         model_fitted = hypothesis(sights, effect)
         fit = fit_model(sights, experiment, effect, seed=outcome.options.calibration.seed)
         cloth, places, strength = model_fitted.values(fit.weights[:1] @ fit.scores[0])
-        window, depth = _flown(outcome, index, excerpt.number, {**cloth, **places[place]}, effect, strength)
+        window, depth = _flown(
+            outcome, index, excerpt.number, {**cloth, **places[place]}, effect, strength
+        )
         drawings.append(_moving(label, drawn(window, depth, film, colour)))
     return SideBySide(
         start=observed.first + excerpt.number * WINDOW,
@@ -119,25 +132,33 @@ def _flown(
     effect: Weighable | None,
     strength: FloatArray | None,
 ) -> tuple[ClothWindow, FloatArray]:
-    """Simulates one flag in the wind of a window, as its place sees it, and how far away (frame, vertex) its cloth is
-    [m].
+    """Simulates one flag in the wind of a window, as its place sees it, and how far away (frame,
+    vertex) its cloth is [m].
 
     Args:
-        values: name → (1,) of the cloth, the place and the anemometer's gain; what is not among them is at the middle
-            of its prior.
+        values: name → (1,) of the cloth, the place and the anemometer's gain; what is not among
+            them is at the middle of its prior.
     """
     design = outcome.simulations.designs[index]
     middle = {quantity.name: quantity.at(np.array([0.5])) for quantity in design.quantities()}
     if design.log.distance is not None:
         middle["distance_constant"] = np.array([design.log.distance])
     values = middle | values
-    view = View(azimuth=float(values["azimuth"][0]), elevation=float(values["elevation"][0]), distance=design.distance)
+    view = View(
+        azimuth=float(values["azimuth"][0]),
+        elevation=float(values["elevation"][0]),
+        distance=design.distance,
+    )
     start = number * WINDOW
     batch = FlagBatch(
         flag=design.flag,
         log=replace(design.log.cut(start, start + WINDOW), clock=0.0),
         duration=WINDOW,
-        values={name: numbers for name, numbers in values.items() if name not in ("azimuth", "elevation")},
+        values={
+            name: numbers
+            for name, numbers in values.items()
+            if name not in ("azimuth", "elevation")
+        },
         places=np.array([[[view.azimuth, view.elevation, view.distance]]]),
         seeds=(child_seed(design.seed, "films", "side by side", number),),
         effects=() if effect is None or strength is None else ((effect.column, strength),),
@@ -158,7 +179,9 @@ def _flown(
     return window, positions @ view.axes(0.0)[2]
 
 
-def drawn(cloth: ClothWindow, depth: FloatArray, film: FilmWindow, colour: tuple[int, int, int]) -> list[UInt8Array]:
+def drawn(
+    cloth: ClothWindow, depth: FloatArray, film: FilmWindow, colour: tuple[int, int, int]
+) -> list[UInt8Array]:
     """Frames (size, size, 3) of cloth as large and where the film has its own, at a pole.
 
     Args:
@@ -191,7 +214,11 @@ def drawn(cloth: ClothWindow, depth: FloatArray, film: FilmWindow, colour: tuple
 
 def _moving(label: str, frames: Sequence[UInt8Array]) -> Moving:
     pictures = np.stack(frames)
-    return Moving(label=label, url=moving(pictures, rate=RATE, side=_SIDE), first=still(pictures[0], side=_SIDE))
+    return Moving(
+        label=label,
+        url=moving(pictures, rate=RATE, side=_SIDE),
+        first=still(pictures[0], side=_SIDE),
+    )
 
 
 _DRAWS = 400
@@ -226,7 +253,10 @@ def verdict_page(verdict: Verdict, outcome: SolvedLoop) -> str:
         ],
         "provenance": [
             (name, value if isinstance(value, str) else json.dumps(value))
-            for name, value in {**verdict.provenance.get("options", {}), **verdict.provenance}.items()
+            for name, value in {
+                **verdict.provenance.get("options", {}),
+                **verdict.provenance,
+            }.items()
             if name != "options"
         ],
     }
@@ -243,9 +273,9 @@ def bands(
     *,
     seed: int,
 ) -> FloatArray:
-    """Returns (3, window, observable) lower end, middle and upper end of what a model of the posterior shows in the
-    windows' winds, without the scatter among windows; NaN of observables that are not used. A change with the wind that
-    is not used is drawn as none.
+    """Returns (3, window, observable) lower end, middle and upper end of what a model of the
+    posterior shows in the windows' winds, without the scatter among windows; NaN of observables
+    that are not used. A change with the wind that is not used is drawn as none.
 
     Args:
         values: name → (draw,) of cloth and place; `weights` of the draws.
@@ -258,7 +288,10 @@ def bands(
         None if effect is None else effect.name,
         None if strength is None else strength[rows],
     )
-    mean = mean + (rng.standard_normal(mean.shape) @ sight.emulator.factor.T) * np.sqrt(stretch)[:, None]
+    mean = (
+        mean
+        + (rng.standard_normal(mean.shape) @ sight.emulator.factor.T) * np.sqrt(stretch)[:, None]
+    )
     summaries = np.full((_DRAWS, len(sight.used)), np.nan)
     summaries[:, len(OBSERVED) :] = 0.0  # changes that nothing predicts are none
     summaries[:, sight.used] = mean
@@ -286,5 +319,9 @@ def _against_wind(outcome: SolvedLoop, index: int, *, with_effect: bool) -> str:
             seed=outcome.options.calibration.seed,
         )
         drawn.append(Band(limits=band, colour=colour))
-    names = [name for column, name in enumerate(OBSERVED) if np.isfinite(drawn[0].limits[:, :, column]).all()]
+    names = [
+        name
+        for column, name in enumerate(OBSERVED)
+        if np.isfinite(drawn[0].limits[:, :, column]).all()
+    ]
     return against_wind(recording, names, drawn, dots=_DOT, opacity=0.25)

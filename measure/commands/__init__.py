@@ -1,4 +1,5 @@
-"""The verbs of measuring: what each option means, the parts that it asks in turn, what is printed and written."""
+"""The verbs of measuring: what each option means, the parts that it asks in turn, what is printed
+and written."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""`flagdata calibrate`: a filmed flag, with the log of the wind beside it, is weighed and made an anemometer."""
+"""`flagdata calibrate`: a filmed flag, with the log of the wind beside it, is weighed and made an
+anemometer."""
 
 from __future__ import annotations
 
@@ -17,7 +18,15 @@ from flagdata.core.shell import command_line
 from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.examples import check_without_lake
 from flagdata.verbs.shared_options import FLAG, HOW, WRITTEN, Keeping, Shared
-from flagdata.verbs.verb_options import AsJson, argument, command, described_fields, option, options, typed_names
+from flagdata.verbs.verb_options import (
+    AsJson,
+    argument,
+    command,
+    described_fields,
+    option,
+    options,
+    typed_names,
+)
 
 if TYPE_CHECKING:
     from flagdata.lake import Lake
@@ -32,19 +41,23 @@ if TYPE_CHECKING:
 class CalibrateCommand(AsJson, Shared, Calibrating, Keeping):  # pyright: ignore[reportIncompatibleVariableOverride]  all cores
     """The same on the command line, the reading model that is made beside, and what is written."""
 
-    recordings: tuple[str, ...] = argument("Recordings of one flag; see `flagdata.calibrate`.", "RECORDING...")
+    recordings: tuple[str, ...] = argument(
+        "Recordings of one flag; see `flagdata.calibrate`.", "RECORDING..."
+    )
     flag_size: str | None = option(  # pyright: ignore[reportIncompatibleVariableOverride]  refused with a fix
         f"{LENGTHS}.", default=None, section=FLAG, metavar="LxH"
     )
     only: str | None = option(
-        "Do only one: weigh the cloth, in minutes of simulation, or calibrate the flag as an anemometer, as fast as "
+        "Do only one: weigh the cloth, in minutes of simulation, or calibrate the flag as an "
+        "anemometer, as fast as "
         "its film is read.",
         default=None,
         section=HOW,
         type=click.Choice(["weight", "anemometer"]),
     )
     name: str | None = option(
-        "Of the reading model, by which flagdata measure --model finds it; by default the first recording's with "
+        "Of the reading model, by which flagdata measure --model finds it; by default the first "
+        "recording's with "
         "-anemometer.",
         default=None,
         section=HOW,
@@ -57,40 +70,45 @@ class CalibrateCommand(AsJson, Shared, Calibrating, Keeping):  # pyright: ignore
         metavar="NAME|FOLDER|ID",
     )
     verbose: bool = option(
-        "Print the camera's place that was fitted to each recording too, and how simulations left out were weighed; by "
+        "Print the camera's place that was fitted to each recording too, and how simulations left "
+        "out were weighed; by "
         "default the cloth alone.",
         default=False,
         section=WRITTEN,
     )
     report: Path | None = option(
-        "Write a page that needs no other.", default=None, section=WRITTEN, type=LocalPath(), metavar="FILE.html"
+        "Write a page that needs no other.",
+        default=None,
+        section=WRITTEN,
+        type=LocalPath(),
+        metavar="FILE.html",
     )
 
 
 @command(CalibrateCommand)
 def calibrate(chosen: CalibrateCommand) -> None:
-    """Weigh the cloth of a flag from its motion and the log of the wind beside it: area weight, bending and damping,
-    with intervals. And make the flag an anemometer: a reading model of this flag from this place, which flagdata
-    measure --model takes for other films of it.
+    """Weigh the cloth of a flag from its motion and the log of the wind beside it: area weight,
+    bending and damping, with intervals. And make the flag an anemometer: a reading model of this
+    flag from this place, which flagdata measure --model takes for other films of it.
 
-    RECORDING is a film with its log, a recording of --lake by its name or id. Or it is a table of observables,
-    Parquet or text, as flagdata observe --parquet, another tracker or a paper gives it: rows against `time` [s], with
-    `wind`, the logged mean over the row [m/s], or with a --log of the lake; or rows against `wind` alone, each with
-    its `duration` [s]. Its other columns are observables by their names (droop, extension, middle-speed, frequency,
-    bandwidth, amplitude-up, amplitude-across, area), each perhaps with a unit, as in `droop [deg]`, and with
-    NAME-sigma, what it is off by. Several recordings are of one flag; one that cannot be used is
-    left out, with a warning. Where no weight is given, neither a value nor a bound, the exit code is 3.
+    RECORDING is a film with its log, a recording of --lake by its name or id. Or it is a table of
+    observables, Parquet or text, as flagdata observe --parquet, another tracker or a paper gives
+    it: rows against `time` [s], with `wind`, the logged mean over the row [m/s], or with a --log of
+    the lake; or rows against `wind` alone, each with its `duration` [s]. Its other columns are
+    observables by their names (droop, extension, middle-speed, frequency, bandwidth, amplitude-up,
+    amplitude-across, area), each perhaps with a unit, as in `droop [deg]`, and with NAME-sigma,
+    what it is off by. Several recordings are of one flag; one that cannot be used is left out, with
+    a warning. Where no weight is given, neither a value nor a bound, the exit code is 3.
 
-    Or, with --area-weight, RECORDING is a folder of drapes: scans (.obj, z upwards, in metres, texture coordinates of
-    the flat disc) of pieces of one cloth, discs of 0.3 m over a pedestal of 0.18 m. They show its bending; a second
-    folder is of drapes with the other face up.
+    Or, with --area-weight, RECORDING is a folder of drapes: scans (.obj, z upwards, in metres,
+    texture coordinates of the flat disc) of pieces of one cloth, discs of 0.3 m over a pedestal of
+    0.18 m. They show its bending; a second folder is of drapes with the other face up.
 
-    \b
-      flagdata calibrate recording-7 --lake lake --flag-size 1.5x1.0 --azimuth 70±7 --report page.html
-      flagdata calibrate monday.csv tuesday.csv --flag-size 1.5x1.0 --lake lake --json
-      flagdata calibrate tracked.csv --log 3f2a9c --clock-offset 0.3±0.1 --lake lake --flag-size 0.9x0.6
-      flagdata calibrate recording-7 --lake lake --flag-size 1.5x1.0 --only anemometer --name garden
-      flagdata calibrate drapes/up drapes/down --area-weight 0.192±0.004
+    \b flagdata calibrate recording-7 --lake lake --flag-size 1.5x1.0 --azimuth 70±7 --report
+      page.html flagdata calibrate monday.csv tuesday.csv --flag-size 1.5x1.0 --lake lake --json
+      flagdata calibrate tracked.csv --log 3f2a9c --clock-offset 0.3±0.1 --lake lake --flag-size
+      0.9x0.6 flagdata calibrate recording-7 --lake lake --flag-size 1.5x1.0 --only anemometer
+      --name garden flagdata calibrate drapes/up drapes/down --area-weight 0.192±0.004
     """
     _check_only(chosen)
     if chosen.area_weight is not None:
@@ -136,9 +154,14 @@ def calibrate(chosen: CalibrateCommand) -> None:
     with progress(None, label="observe", unit="window") as advance:
         gathered = weighable.read(size, advance=advance)
     observed, parents = gathered.recordings, gathered.parents
-    work = sum(options.simulations * recording.duration + effort(recording.duration) for recording in observed)
+    work = sum(
+        options.simulations * recording.duration + effort(recording.duration)
+        for recording in observed
+    )
     say(announce_simulations(work, workers=workers))
-    with progress((options.simulations + FLAGS) * len(observed), label="calibrate", unit="flag") as advance:
+    with progress(
+        (options.simulations + FLAGS) * len(observed), label="calibrate", unit="flag"
+    ) as advance:
         calibration = calibrated(
             observed,
             options,
@@ -149,7 +172,9 @@ def calibrate(chosen: CalibrateCommand) -> None:
         )
     wanted = None
     if lake is not None and not chosen.read_only:
-        wanted = place_result(lake, artifact(calibration, reading, parents), branch=chosen.branch).artifact.id
+        wanted = place_result(
+            lake, artifact(calibration, reading, parents), branch=chosen.branch
+        ).artifact.id
     text = (
         None
         if chosen.report is None
@@ -166,7 +191,10 @@ def calibrate(chosen: CalibrateCommand) -> None:
             say(f"report: {chosen.report}")
     if chosen.as_json:
         anemometer_answer = None if anemometer is None else anemometer.as_dict()
-        document("calibrate", {**calibration.as_dict(), "artifact": wanted, "anemometer": anemometer_answer})
+        document(
+            "calibrate",
+            {**calibration.as_dict(), "artifact": wanted, "anemometer": anemometer_answer},
+        )
     else:
         _print(calibration, verbose=chosen.verbose)
     if not calibration.weighs:
@@ -188,7 +216,16 @@ _OF_WEIGHT = {
 }
 
 
-_OF_DRAPES = {"recordings", "area_weight", "simulations", "level", "seed", "workers", "cache", "as_json"}
+_OF_DRAPES = {
+    "recordings",
+    "area_weight",
+    "simulations",
+    "level",
+    "seed",
+    "workers",
+    "cache",
+    "as_json",
+}
 
 
 def _check_only(chosen: CalibrateCommand) -> None:
@@ -198,10 +235,14 @@ def _check_only(chosen: CalibrateCommand) -> None:
     ignored = {"weight": {"name", "model"}, "anemometer": _OF_WEIGHT}.get(chosen.only or "", set())
     if chosen.area_weight is not None:
         ignored = set(described_fields(CalibrateCommand)) - _OF_DRAPES
-    other = "--area-weight" if chosen.area_weight is not None else command_line("--only", chosen.only)
+    other = (
+        "--area-weight" if chosen.area_weight is not None else command_line("--only", chosen.only)
+    )
     for name in sorted(ignored & typed_names(chosen)):
         spelled = described_fields(CalibrateCommand)[name][1].spelling_of(name)
-        raise UsageError(f"{spelled} cannot be combined with {other}", where=spelled, fix=f"leave {spelled} out")
+        raise UsageError(
+            f"{spelled} cannot be combined with {other}", where=spelled, fix=f"leave {spelled} out"
+        )
 
 
 def _drapes(chosen: CalibrateCommand) -> None:
@@ -221,9 +262,11 @@ def _drapes(chosen: CalibrateCommand) -> None:
         say_finding(finding)
 
 
-def _anemometer(chosen: CalibrateCommand, size: FlagSize, reading: FilmReading, lake: Lake | None) -> Made | None:
-    """Makes the reading model; returns None with the reason on stderr where none can be made and the weight was asked
-    for as well."""
+def _anemometer(
+    chosen: CalibrateCommand, size: FlagSize, reading: FilmReading, lake: Lake | None
+) -> Made | None:
+    """Makes the reading model; returns None with the reason on stderr where none can be made and
+    the weight was asked for as well."""
     from measure.anemometer.making import made
     from measure.cloth.flag_recordings import is_table
 
@@ -280,8 +323,14 @@ def _report(anemometer: Made, report: Path | None, *, as_json: bool) -> None:
     from measure.anemometer.anemometer_section import page
 
     if report is not None:
-        rows = {recording.name: f"recording {recording.identity}" for recording in anemometer.result.recordings}
-        rows |= {"network": f"{anemometer.result.model.network}, SHA-256 {anemometer.result.model.identity}"}
+        rows = {
+            recording.name: f"recording {recording.identity}"
+            for recording in anemometer.result.recordings
+        }
+        rows |= {
+            "network": f"{anemometer.result.model.network}, SHA-256 "
+            f"{anemometer.result.model.identity}"
+        }
         rows |= {} if anemometer.artifact is None else {"artifact": anemometer.artifact}
         text = page(anemometer.result, anemometer.name, rows)
         with following(f"the reading model {anemometer.artifact}", "writing its report"):
@@ -295,12 +344,18 @@ def _report(anemometer: Made, report: Path | None, *, as_json: bool) -> None:
 
 def _provenance(calibration: Calibration, artifact: str | None) -> dict[str, str]:
     rows = {
-        f"recording {number}": f"{recording.observed.name}, from {recording.observed.first:g} s on, "
+        f"recording {number}": f"{recording.observed.name}, from {recording.observed.first:g} s "
+        "on, "
         f"{recording.observed.source}"
         for number, recording in enumerate(calibration.recordings, start=1)
     }
-    rows |= {name.replace("_", " "): str(value) for name, value in calibration.options.recipe().items()}
-    rows |= {about.name: about.degrees for about in (calibration.options.azimuth, calibration.options.elevation)}
+    rows |= {
+        name.replace("_", " "): str(value) for name, value in calibration.options.recipe().items()
+    }
+    rows |= {
+        about.name: about.degrees
+        for about in (calibration.options.azimuth, calibration.options.elevation)
+    }
     return rows if artifact is None else {**rows, "artifact": artifact}
 
 
@@ -333,11 +388,13 @@ def _print_fit(calibration: Calibration) -> None:
 
     for recording, place_quantities in zip(calibration.recordings, calibration.places, strict=True):
         fitted = ", ".join(
-            f"{row['name']} {row['interval']} {row['unit']}".strip() for row in map(shown, place_quantities)
+            f"{row['name']} {row['interval']} {row['unit']}".strip()
+            for row in map(shown, place_quantities)
         )
         say(f"  {recording.observed.name}: {fitted}")
     check = calibration.check
     say(
-        f"  intervals of {check.contained} of {check.count} simulations left out contain their weight, median error "
+        f"  intervals of {check.contained} of {check.count} simulations left out contain their "
+        "weight, median error "
         f"{check.error:.1%}"
     )

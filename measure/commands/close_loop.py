@@ -30,7 +30,19 @@ if TYPE_CHECKING:
 
 MARKERS, WIND = "Markers and meshes", "The wind beside markers"
 _RECIPE = ".toml"
-_OF_SOURCES = ("winds", "axis", "north", "clock_offset", "sensor", "zone", "accept", "rate", "unit", "noise", "up")
+_OF_SOURCES = (
+    "winds",
+    "axis",
+    "north",
+    "clock_offset",
+    "sensor",
+    "zone",
+    "accept",
+    "rate",
+    "unit",
+    "noise",
+    "up",
+)
 """Options that say how sources of the command line are read."""
 
 
@@ -38,15 +50,19 @@ _OF_SOURCES = ("winds", "axis", "north", "clock_offset", "sensor", "zone", "acce
 class CloseLoopCommand(AsJson, JudgingFilms, NamedLake, OnBranch):
     """How recordings of one cloth are read and judged, and what is written."""
 
-    sources: tuple[str, ...] = argument("Recordings of one cloth.", "SOURCE...", default=(), was=("--recipe",))
+    sources: tuple[str, ...] = argument(
+        "Recordings of one cloth.", "SOURCE...", default=(), was=("--recipe",)
+    )
     verbose: bool = option(
-        "Print all that was weighed, the errors before and after, and what was assumed; by default the conclusion "
+        "Print all that was weighed, the errors before and after, and what was assumed; by default "
+        "the conclusion "
         "alone.",
         default=False,
         section=WRITTEN,
     )
     draft: Path | None = option(
-        "Write a recipe of the cloth and the recordings as the command line states them, to be completed, and judge "
+        "Write a recipe of the cloth and the recordings as the command line states them, to be "
+        "completed, and judge "
         "nothing.",
         default=None,
         section=MARKERS,
@@ -67,7 +83,11 @@ class CloseLoopCommand(AsJson, JudgingFilms, NamedLake, OnBranch):
         type=click.FloatRange(min=0, min_open=True),
     )
     unit: str = option("Unit of the positions.", default="m", section=MARKERS)
-    up: str = option("Axis of the recordings that points up: z, y, x, -z, -y or -x.", default="z", section=MARKERS)
+    up: str = option(
+        "Axis of the recordings that points up: z, y, x, -z, -y or -x.",
+        default="z",
+        section=MARKERS,
+    )
     noise: float | None = option(
         "Standard deviation of a marker's coordinate [m]; by default it is estimated.",
         default=None,
@@ -82,7 +102,10 @@ class CloseLoopCommand(AsJson, JudgingFilms, NamedLake, OnBranch):
         metavar="M/S|LOG|ID",
     )
     axis: str = option(
-        "Direction towards which a wind given as a speed blows.", default="1,0,0", section=WIND, metavar="X,Y,Z"
+        "Direction towards which a wind given as a speed blows.",
+        default="1,0,0",
+        section=WIND,
+        metavar="X,Y,Z",
     )
     north: float | None = option(
         "Where north lies, as an angle from +x towards +y, for a log that has directions.",
@@ -91,7 +114,8 @@ class CloseLoopCommand(AsJson, JudgingFilms, NamedLake, OnBranch):
         metavar="DEG",
     )
     clock_offset: Stated | None = option(
-        "Seconds added to the clock of the recordings to reach the log's: of markers one number, counted from the "
+        "Seconds added to the clock of the recordings to reach the log's: of markers one number, "
+        "counted from the "
         "first sample of the log; of tables as in 0.3±0.1, by default estimated.",
         default=None,
         section=WIND,
@@ -105,7 +129,9 @@ class CloseLoopCommand(AsJson, JudgingFilms, NamedLake, OnBranch):
         section=WIND,
         metavar="NAME|FILE.toml",
     )
-    zone: str | None = option("Time zone of the stamps of a log: +02:00, or an IANA name.", default=None, section=WIND)
+    zone: str | None = option(
+        "Time zone of the stamps of a log: +02:00, or an IANA name.", default=None, section=WIND
+    )
     accept: str | None = option(
         "Confirms how a log without a recipe is read, by the hash of its refusal.",
         default=None,
@@ -136,7 +162,9 @@ class CloseLoopCommand(AsJson, JudgingFilms, NamedLake, OnBranch):
         """
         recipes = [source for source in self.sources if source.lower().endswith(_RECIPE)]
         if len(recipes) > 1:
-            raise UsageError(f"the sources name {len(recipes)} recipes", where=recipes[1], fix="name one")
+            raise UsageError(
+                f"the sources name {len(recipes)} recipes", where=recipes[1], fix="name one"
+            )
         return Path(recipes[0]) if recipes else None
 
     @property
@@ -149,25 +177,26 @@ class CloseLoopCommand(AsJson, JudgingFilms, NamedLake, OnBranch):
 def close_loop(chosen: CloseLoopCommand) -> None:
     """Find what the model of a cloth lacks, name it, and say what adding it changes on unseen data.
 
-    SOURCE is the output folder of an ArcSim run, a table of tracked markers (CSV or Parquet with the columns frame or
-    time, marker, u, v, x, y, z, and recording if there are several), or a mesh sequence or markers of --lake by id.
-    Several are recordings of one cloth, best in different winds. With --lake the verdict and both models become
-    artifacts; `flagdata simulate` runs a model by its name.
+    SOURCE is the output folder of an ArcSim run, a table of tracked markers (CSV or Parquet with
+    the columns frame or time, marker, u, v, x, y, z, and recording if there are several), or a mesh
+    sequence or markers of --lake by id. Several are recordings of one cloth, best in different
+    winds. With --lake the verdict and both models become artifacts; `flagdata simulate` runs a
+    model by its name.
 
-    Or SOURCE is a film with its log, a recording of --lake by its name or id, or a table of observables as `flagdata
-    calibrate` takes it: then what a flag shows in windows of 2.5 s is compared, and --flag-size is needed; the options
-    of flag, camera, film and tables are about these. Films beside markers of the same cloth are judged together: each
-    kind at half of the level, with one joint answer; --flag-size, --attachment and --clock-offset are about the films
-    then, and a recipe states those of the markers.
+    Or SOURCE is a film with its log, a recording of --lake by its name or id, or a table of
+    observables as `flagdata
+    calibrate` takes it: then what a flag shows in windows of 2.5 s is compared, and --flag-size is
+    needed; the options of flag, camera, film and tables are about these. Films beside markers of
+    the same cloth are judged together: each kind at half of the level, with one joint answer;
+    --flag-size, --attachment and --clock-offset are about the films then, and a recipe states those
+    of the markers.
 
-    A SOURCE that ends in .toml is a recipe of cloth, pins, wind and test, which may name the recordings of markers and
-    meshes as well; --draft writes one.
+    A SOURCE that ends in .toml is a recipe of cloth, pins, wind and test, which may name the
+    recordings of markers and meshes as well; --draft writes one.
 
-    \b
-      flagdata close-loop run-4ms/ run-8ms/ --wind 4 --wind 8
-      flagdata close-loop tracks.csv --wind anemometer.csv --material camel-ponte-roma --attachment corners
-      flagdata close-loop run-4ms/ run-8ms/ --wind 4 --wind 8 --draft flag.toml
-      flagdata close-loop flag.toml --lake lake
+    \b flagdata close-loop run-4ms/ run-8ms/ --wind 4 --wind 8 flagdata close-loop tracks.csv --wind
+      anemometer.csv --material camel-ponte-roma --attachment corners flagdata close-loop run-4ms/
+      run-8ms/ --wind 4 --wind 8 --draft flag.toml flagdata close-loop flag.toml --lake lake
       flagdata close-loop monday tuesday --lake lake --flag-size 1.5x1.0 --azimuth 70±7
     """
     from flagdata.core.files.outputs import check_files
@@ -187,12 +216,20 @@ def close_loop(chosen: CloseLoopCommand) -> None:
     recipe = None if chosen.recipe is None else recipes.parse(chosen.recipe)
     in_recipe = recipe is not None and bool(recipe.recordings)
     if not in_recipe and not chosen.recordings:
-        raise UsageError("no recordings are given", where="SOURCE", fix="name them, or a recipe that does")
+        raise UsageError(
+            "no recordings are given", where="SOURCE", fix="name them, or a recipe that does"
+        )
     check_files(chosen.out, *dict.fromkeys((*FILES, *JOINT)), command="close-loop")
     lake, branch, name, out = lake_of(chosen.lake), chosen.branch, chosen.name, chosen.out
     if lake is not None:
         lake.check_writable()
-    films = films_among(chosen.recordings, lake=lake, at=branch, sized=chosen.flag_size is not None, tracked=in_recipe)
+    films = films_among(
+        chosen.recordings,
+        lake=lake,
+        at=branch,
+        sized=chosen.flag_size is not None,
+        tracked=in_recipe,
+    )
     tracked = tuple(source for source in chosen.recordings if source not in films)
     if in_recipe:
         _refuse_beside(chosen, tracked, films=bool(films))
@@ -219,7 +256,9 @@ def close_loop(chosen: CloseLoopCommand) -> None:
         _draft(chosen, tracked, lake)
         return
 
-    delivery = Delivery(out=out, lake=lake, branch=branch, as_json=chosen.as_json, verbose=chosen.verbose)
+    delivery = Delivery(
+        out=out, lake=lake, branch=branch, as_json=chosen.as_json, verbose=chosen.verbose
+    )
 
     def of_markers(level: float | None) -> tuple[VerdictAnswer, Material]:
         """Returns the answer by markers, and the cloth's nominal material."""
@@ -230,7 +269,9 @@ def close_loop(chosen: CloseLoopCommand) -> None:
             most_nulls=chosen.most_nulls,
             workers=chosen.processes,
             scheduler=chosen.scheduler,
-            suspected=None if chosen.suspect is None else Suspicion.parse(chosen.suspect, on_markers()),
+            suspected=None
+            if chosen.suspect is None
+            else Suspicion.parse(chosen.suspect, on_markers()),
             **null_options,
         )
         setup = _setup(Setup() if recipe is None else recipe.setup, chosen, joint=two_kinds)
@@ -258,7 +299,9 @@ def close_loop(chosen: CloseLoopCommand) -> None:
     def of_films(level: float | None) -> VerdictAnswer:
         from measure.cloth.close_films import close_films
 
-        return close_films(films, chosen, lake=lake, branch=branch, name=names["films"], level=level)
+        return close_films(
+            films, chosen, lake=lake, branch=branch, name=names["films"], level=level
+        )
 
     if not two_kinds:
         answer = of_films(chosen.level) if films else of_markers(chosen.level)[0]
@@ -283,16 +326,24 @@ def close_loop(chosen: CloseLoopCommand) -> None:
 def _refuse_beside(chosen: CloseLoopCommand, sources: tuple[str, ...], *, films: bool) -> None:
     """Options that would be ignored beside a recipe that names its recordings."""
     if sources:
-        raise UsageError("the recipe names its recordings", where="SOURCE", fix="leave SOURCE or [[recording]] out")
+        raise UsageError(
+            "the recipe names its recordings",
+            where="SOURCE",
+            fix="leave SOURCE or [[recording]] out",
+        )
     for name in _OF_SOURCES:
         if name in typed_names(chosen) and not (films and name == "clock_offset"):
             spelled = "wind" if name == "winds" else name.replace("_", "-")
             raise UsageError(
-                "the recipe says how its recordings are read", where=f"--{spelled}", fix="write it into the recipe"
+                "the recipe says how its recordings are read",
+                where=f"--{spelled}",
+                fix="write it into the recipe",
             )
 
 
-def _reading(chosen: CloseLoopCommand, recipe: ExperimentRecipe | None, *, joint: bool = False) -> SourceOptions:
+def _reading(
+    chosen: CloseLoopCommand, recipe: ExperimentRecipe | None, *, joint: bool = False
+) -> SourceOptions:
     """Returns how sources of the command line are read."""
     from measure.closing.verdict_sources import SourceOptions
 
@@ -320,7 +371,9 @@ def _seconds(offset: Stated | None) -> float | None:
         return None
     if not offset.exact:
         raise UsageError(
-            f"the clock offset {offset.text} s of markers is not one number", where="--clock-offset", fix="give 2.5"
+            f"the clock offset {offset.text} s of markers is not one number",
+            where="--clock-offset",
+            fix="give 2.5",
         )
     return offset.low
 
@@ -338,18 +391,30 @@ def _draft(chosen: CloseLoopCommand, sources: tuple[str, ...], lake: Lake | None
 
     if chosen.recipe is not None or chosen.draft is None or not sources:
         raise UsageError(
-            "a draft is made of recordings of markers and meshes", where="--draft", fix="name these and no recipe"
+            "a draft is made of recordings of markers and meshes",
+            where="--draft",
+            fix="name these and no recipe",
         )
     setup = _setup(Setup(), chosen)
     size = () if setup.outline is None else setup.outline.max(axis=0).tolist()
-    pins = {} if setup.pins is None else {"points" if isinstance(setup.pins, tuple) else "at": setup.pins}
+    pins = (
+        {}
+        if setup.pins is None
+        else {"points" if isinstance(setup.pins, tuple) else "at": setup.pins}
+    )
     content = {
         "title": chosen.name or chosen.draft.stem,
         "test": {"level": chosen.level, "nulls": chosen.nulls},
         "cloth": dict(zip(("width", "height"), size, strict=False)),
         "material": {"name": chosen.material, "area_weight": _weight(setup, chosen)},
         "attachment": pins,
-        **draft_recordings(sources, chosen.winds, _reading(chosen, None), lake, folder=chosen.draft.resolve().parent),
+        **draft_recordings(
+            sources,
+            chosen.winds,
+            _reading(chosen, None),
+            lake,
+            folder=chosen.draft.resolve().parent,
+        ),
     }
     write_file(chosen.draft, to_toml(filled_entries(content)))
     if chosen.as_json:
@@ -369,7 +434,8 @@ def _weight(setup: Setup, chosen: CloseLoopCommand) -> str | None:
 
 
 def _name(recording: str, sources: tuple[str, ...], recipe: ExperimentRecipe | None) -> str:
-    """Returns the name of the first source that is a file, of the recipe, or of the first recording."""
+    """Returns the name of the first source that is a file, of the recipe, or of the first
+    recording."""
     if sources and Path(sources[0]).exists():
         return Path(sources[0]).resolve().stem
     return recording if recipe is None or sources else recipe.title
@@ -380,14 +446,20 @@ def _axis(chosen: CloseLoopCommand) -> tuple[float, float, float] | None:
     text = chosen.axis
     if chosen.north is not None:
         if "axis" in typed_names(chosen):
-            raise UsageError("both --axis and --north are given", where="--north", fix="keep one of them")
+            raise UsageError(
+                "both --axis and --north are given", where="--north", fix="keep one of them"
+            )
         return None
     try:
         x, y, z = (float(part) for part in text.split(","))
     except ValueError as error:
-        raise UsageError(f"{text!r} is not three numbers", where="--axis", fix="give x,y,z") from error
+        raise UsageError(
+            f"{text!r} is not three numbers", where="--axis", fix="give x,y,z"
+        ) from error
     if not 0 < math.hypot(x, y, z) < math.inf:
-        raise UsageError(f"{text!r} has no direction", where="--axis", fix="give x,y,z, not all of them 0")
+        raise UsageError(
+            f"{text!r} has no direction", where="--axis", fix="give x,y,z, not all of them 0"
+        )
     return x, y, z
 
 
@@ -408,7 +480,9 @@ def _setup(setup: Setup, chosen: CloseLoopCommand, *, joint: bool = False) -> Se
 
     if chosen.material is not None:
         if chosen.material not in MATERIALS.names():
-            raise UnknownNameError.of("material", chosen.material, MATERIALS.names(), where="--material")
+            raise UnknownNameError.of(
+                "material", chosen.material, MATERIALS.names(), where="--material"
+            )
         setup = replace(setup, material=named_material(chosen.material))
     setup = setup.state_weight(None if joint else chosen.area_weight, chosen.density_uncertainty)
     if chosen.flag_size is not None and not joint:
@@ -439,7 +513,9 @@ def _places(text: str) -> tuple[tuple[float, float], ...]:
             u, v = (float(value) for value in part.split(","))
         except ValueError as error:
             raise UsageError(
-                f"{part!r} is no place on the cloth", where="--attachment", fix="give corners, or u,v;u,v in metres"
+                f"{part!r} is no place on the cloth",
+                where="--attachment",
+                fix="give corners, or u,v;u,v in metres",
             ) from error
         places.append((u, v))
     return tuple(places)

@@ -11,7 +11,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flagdata.api.measuring_verbs import Measuring
-from flagdata.core.console import LocalPath, csv_rows, document, echo, following, progress, say, say_finding
+from flagdata.core.console import (
+    LocalPath,
+    csv_rows,
+    document,
+    echo,
+    following,
+    progress,
+    say,
+    say_finding,
+)
 from flagdata.core.findings import Finding, Severity
 from flagdata.core.printable import SHORT
 from flagdata.errors import RefusedError, UsageError
@@ -32,7 +41,8 @@ if TYPE_CHECKING:
 
 @options
 class MeasureCommand(AsJson, Measuring, Keeping):
-    """The same on the command line: which of a lake's clips, what is refined, and what is written."""
+    """The same on the command line: which of a lake's clips, what is refined, and what is
+    written."""
 
     source: str | None = argument(  # pyright: ignore[reportIncompatibleVariableOverride]  or a query
         "The film; see `flagdata.measure`.", "[SOURCE]", default=None
@@ -58,7 +68,11 @@ class MeasureCommand(AsJson, Measuring, Keeping):
         metavar="FOLDER",
     )
     report: Path | None = option(
-        "Write a page that needs no other.", default=None, section=WRITTEN, type=LocalPath(), metavar="FILE.html"
+        "Write a page that needs no other.",
+        default=None,
+        section=WRITTEN,
+        type=LocalPath(),
+        metavar="FILE.html",
     )
     zarr: Path | None = option(
         "Write draws and series as a Zarr data set.",
@@ -67,18 +81,21 @@ class MeasureCommand(AsJson, Measuring, Keeping):
         type=LocalPath(),
         metavar="FOLDER",
     )
-    as_csv: bool = option("The windows as comma-separated values on stdout.", "--csv", default=False, section=WRITTEN)
+    as_csv: bool = option(
+        "The windows as comma-separated values on stdout.", "--csv", default=False, section=WRITTEN
+    )
 
 
 @command(MeasureCommand)
 def measure(chosen: MeasureCommand) -> None:
     """Measure wind and area weight from a film of a flag, with intervals.
 
-    SOURCE is a video file, a folder of images, a recording, clip or camera of --lake by its name or id, or the film
-    that comes with the package, example:flag, whose truth is printed beside. A gate looks first: a film unlike
-    those the network was trained on is refused with the reason, exit code 3, and nothing estimated is shown. The
-    windows of a longer film count as one gusty wind: the answer states the gusts' intensity, standard deviation over
-    mean, too. With --lake the measurement becomes an artifact; the same one by the same code again adds nothing.
+    SOURCE is a video file, a folder of images, a recording, clip or camera of --lake by its name or
+    id, or the film that comes with the package, example:flag, whose truth is printed beside. A gate
+    looks first: a film unlike those the network was trained on is refused with the reason, exit
+    code 3, and nothing estimated is shown. The windows of a longer film count as one gusty wind:
+    the answer states the gusts' intensity, standard deviation over mean, too. With --lake the
+    measurement becomes an artifact; the same one by the same code again adds nothing.
 
     \b
       flagdata measure example:flag
@@ -87,7 +104,9 @@ def measure(chosen: MeasureCommand) -> None:
       flagdata measure --lake lake --query "wind between 3 and 6" --json
     """
     if chosen.as_json and chosen.as_csv:
-        raise UsageError("more than one form of output is given", fix="choose one of --json and --csv")
+        raise UsageError(
+            "more than one form of output is given", fix="choose one of --json and --csv"
+        )
     if chosen.cache is not None and chosen.refine is None:
         raise UsageError("--cache needs --refine", fix="give --refine N, or leave --cache out")
     from flagdata.core.files.outputs import check_file, check_folder
@@ -108,11 +127,23 @@ def measure(chosen: MeasureCommand) -> None:
     if weight is not None and request.origin is not None:
         say(f"area weight {weight.text} kg/m² of {chosen.material}: {request.origin}")
     clips = subjects(chosen.source, query=chosen.query, lake=lake, at=at, reading=request.reading)
-    job = _Job(chosen=chosen, request=request, network=network(chosen.model, lake=lake, at=at), lake=lake, at=at)
+    job = _Job(
+        chosen=chosen,
+        request=request,
+        network=network(chosen.model, lake=lake, at=at),
+        lake=lake,
+        at=at,
+    )
     if chosen.query is not None:
-        if chosen.report is not None or chosen.zarr is not None or chosen.as_csv or chosen.refine is not None:
+        if (
+            chosen.report is not None
+            or chosen.zarr is not None
+            or chosen.as_csv
+            or chosen.refine is not None
+        ):
             raise UsageError(
-                "a page, a Zarr, a CSV or a refinement is of one film", fix="measure one clip by its id, or use --json"
+                "a page, a Zarr, a CSV or a refinement is of one film",
+                fix="measure one clip by its id, or use --json",
             )
         _several(job, clips)
         return
@@ -146,7 +177,8 @@ class _Done:
             "refinement": None if self.refinement is None else self.refinement.as_dict(),
             "wind_elsewhere": None if self.elsewhere is None else self.elsewhere.as_dict(),
             "conditioning": self.subject.film.as_dict(),
-            "simulated_with": {name: truths[name] for name in self.measured.names if name in truths} or None,
+            "simulated_with": {name: truths[name] for name in self.measured.names if name in truths}
+            or None,
         }
 
 
@@ -170,7 +202,10 @@ class _Job:
         from measure.estimate.wind_by_window import beside
 
         estimator = self.network.estimator
-        with _advancing(("search", "frame"), ("measure", "window")) as (subject.film.searched, advance):
+        with _advancing(("search", "frame"), ("measure", "window")) as (
+            subject.film.searched,
+            advance,
+        ):
             measured = run(subject, self.network, self.request.options, advance=advance)
         subject.film.searched = None
         wind = None if subject.record is None else subject.record.wind()
@@ -182,7 +217,11 @@ class _Job:
             from measure.estimate.refined import refine_window
 
             refinement = refine_window(
-                measured, subject, estimator, budget=self.request.options.refine, cache=self.chosen.cache
+                measured,
+                subject,
+                estimator,
+                budget=self.request.options.refine,
+                cache=self.chosen.cache,
             )
             _warn(refinement.findings)
         refinement_values = None if refinement is None else refinement.as_dict()
@@ -211,7 +250,11 @@ class _Job:
             say(f"{artifact[:SHORT]}  measurement, {placed_row.sentence}")
 
         def writing(written: str) -> AbstractContextManager[None]:
-            return following(f"the measurement {artifact}", f"writing {written}") if published else nullcontext()
+            return (
+                following(f"the measurement {artifact}", f"writing {written}")
+                if published
+                else nullcontext()
+            )
 
         if self.chosen.zarr is not None and reported:
             with writing("its Zarr folder"), fresh_folder(self.chosen.zarr) as scratch:
@@ -231,11 +274,14 @@ class _Job:
 
     def refuse(self, done: _Done) -> None:
         """Raises:
-        RefusedError: the gate refused the film, and it is not to be shown anyway or there is nothing to measure.
+        RefusedError: the gate refused the film, and it is not to be shown anyway or there is
+        nothing to measure.
         """
         verdict = done.measured.verdict
         if not done.measured.shown(anyway=self.chosen.anyway):
-            where = done.measured.film + (f", see {self.chosen.report}" if self.chosen.report is not None else "")
+            where = done.measured.film + (
+                f", see {self.chosen.report}" if self.chosen.report is not None else ""
+            )
             for reason in verdict.reasons[1:]:
                 say(f"also: {reason.what}")
             raise RefusedError(
@@ -288,7 +334,11 @@ class _Job:
         )
         sections = ()
         if refinement is not None:
-            sections = (Section(anchor="refinement", title="Refined by simulation", body=section(refinement)),)
+            sections = (
+                Section(
+                    anchor="refinement", title="Refined by simulation", body=section(refinement)
+                ),
+            )
         return page(measured, series, context, anyway=self.chosen.anyway, sections=sections)
 
     def _provenance(self, subject: Subject, artifact: str | None) -> Mapping[str, str]:
@@ -296,9 +346,13 @@ class _Job:
         source = subject.content_hash() if subject.artifact is None else subject.artifact.id
         rows = {
             "film": f"{film.name}, {film.duration:.2f} s at {film.rate:.4g} frames a second",
-            "source": f"SHA-256 {source}" if subject.artifact is None else f"{subject.artifact.kind} {source}",
+            "source": f"SHA-256 {source}"
+            if subject.artifact is None
+            else f"{subject.artifact.kind} {source}",
             "network": self.network.described,
-            "options": ", ".join(f"{k} {v}" for k, v in _given(self.request.options, self.request.reading).items()),
+            "options": ", ".join(
+                f"{k} {v}" for k, v in _given(self.request.options, self.request.reading).items()
+            ),
             "seed": str(self.request.options.seed),
         }
         return rows if artifact is None else {**rows, "artifact": artifact}
@@ -312,11 +366,22 @@ def _several(job: _Job, clips: Sequence[Subject]) -> None:
     done = [job.do(subject) for subject in clips]
     reported = [result for result in done if result.measured.shown(anyway=job.chosen.anyway)]
     if job.chosen.as_json:
-        document("measurements", {"measurements": [result.as_dict(anyway=job.chosen.anyway) for result in done]})
+        document(
+            "measurements",
+            {"measurements": [result.as_dict(anyway=job.chosen.anyway) for result in done]},
+        )
     else:
         for result in done:
-            source = result.subject.artifact.id[:SHORT] if result.subject.artifact is not None else result.measured.film
-            answer = result.measured.sentence if result in reported else f"refused: {result.measured.verdict.sentence}"
+            source = (
+                result.subject.artifact.id[:SHORT]
+                if result.subject.artifact is not None
+                else result.measured.film
+            )
+            answer = (
+                result.measured.sentence
+                if result in reported
+                else f"refused: {result.measured.verdict.sentence}"
+            )
             echo(f"{source}  {answer}")
     if not reported:
         raise RefusedError(
@@ -340,11 +405,17 @@ def _report(done: _Done, *, series: bool) -> None:
     echo(mark + measured.sentence)
     if measured.gusts is not None:
         echo(f"  {measured.gusts.sentence}")
-    left_out = "" if measured.combined == len(measured.verdict.window_p) else "; the others look unfamiliar or overlap"
+    left_out = (
+        ""
+        if measured.combined == len(measured.verdict.window_p)
+        else "; the others look unfamiliar or overlap"
+    )
     say(f"  {measured.verdict.sentence}; the answer combines {measured.combined}{left_out}")
     truths = done.subject.known or {}
     if simulated_with := [
-        f"{SHORT[q.name]} {truths[q.name]:.3g} {q.unit}" for q in measured.quantities if q.name in truths
+        f"{SHORT[q.name]} {truths[q.name]:.3g} {q.unit}"
+        for q in measured.quantities
+        if q.name in truths
     ]:
         say(f"  simulated with {', '.join(simulated_with)}")
     for finding in measured.bounds:
@@ -370,8 +441,8 @@ def _report(done: _Done, *, series: bool) -> None:
 
 @contextmanager
 def _advancing(*bars: tuple[str, str]) -> Iterator[list[Callable[[int, int], None]]]:
-    """Shows progress bars, each a label and a unit, one after another: each begins with its first step, which gives its
-    length, and ends the one before."""
+    """Shows progress bars, each a label and a unit, one after another: each begins with its first
+    step, which gives its length, and ends the one before."""
     with ExitStack() as stack:
         current: dict[str, Callable[[int], None]] = {}
 

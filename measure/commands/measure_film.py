@@ -28,10 +28,14 @@ from measure.film.film_source import FilmReading, Subject, size_of, subjects
 
 @one_thread()
 def run(
-    subject: Subject, network: Network, options: Options, *, advance: Callable[[int, int], None] | None = None
+    subject: Subject,
+    network: Network,
+    options: Options,
+    *,
+    advance: Callable[[int, int], None] | None = None,
 ) -> Measurement:
-    """Measure one film by a network, with the gate and the dependence of windows that belong to it, or by a reading
-    model.
+    """Measure one film by a network, with the gate and the dependence of windows that belong to it,
+    or by a reading model.
 
     Args:
         advance: called after each window with how many there are and 1.
@@ -41,7 +45,12 @@ def run(
     """
     if network.reading is not None and network.artifact is not None:
         return measure_by(
-            subject.film, network.reading, network.estimator, options, name=network.artifact.name, advance=advance
+            subject.film,
+            network.reading,
+            network.estimator,
+            options,
+            name=network.artifact.name,
+            advance=advance,
         )
     gate = gate_beside(network, false_alarm=options.false_alarm)
     return measure(
@@ -57,14 +66,17 @@ def run(
 def weight(
     area_weight: Stated | None, material: str | None, *, lake: Lake | None, at: str | None
 ) -> tuple[Stated | None, str | None]:
-    """Returns the area weight that was given, by itself or by a material's name, and where the latter is from.
+    """Returns the area weight that was given, by itself or by a material's name, and where the
+    latter is from.
 
     Raises:
         UsageError: both were given.
         UnknownNameError: no such material.
     """
     if area_weight is not None and material is not None:
-        raise UsageError("the area weight is given twice", fix="choose one of --area-weight and --material")
+        raise UsageError(
+            "the area weight is given twice", fix="choose one of --area-weight and --material"
+        )
     return (area_weight, None) if material is None else weight_of(material, lake=lake, at=at)
 
 
@@ -83,7 +95,9 @@ class Request:
     origin: str | None
 
     @classmethod
-    def of(cls, chosen: Measuring, *, lake: Lake | None, at: str | None, refine: int | None = None) -> Request:
+    def of(
+        cls, chosen: Measuring, *, lake: Lake | None, at: str | None, refine: int | None = None
+    ) -> Request:
         """Reads the options.
 
         Args:
@@ -145,7 +159,8 @@ def measure_one(chosen: Measuring) -> Measured:
 
 
 def wind_elsewhere(measurement: Measurement, chosen: Measuring) -> WindComparison | None:
-    """Compares the measured wind with the one that was stated beside it; None where none was, or nothing is shown."""
+    """Compares the measured wind with the one that was stated beside it; None where none was, or
+    nothing is shown."""
     if chosen.wind is None or not measurement.shown(anyway=chosen.anyway):
         return None
     (wind,) = (quantity for quantity in measurement.quantities if quantity.name == "wind_speed")
@@ -158,12 +173,16 @@ def wind_elsewhere(measurement: Measurement, chosen: Measuring) -> WindCompariso
     )
 
 
-def _subjects(source: Path | str | Frames, *, lake: Lake | None, at: str | None, reading: FilmReading) -> list[Subject]:
+def _subjects(
+    source: Path | str | Frames, *, lake: Lake | None, at: str | None, reading: FilmReading
+) -> list[Subject]:
     if not isinstance(source, Frames):
         return subjects(str(source), query=None, lake=lake, at=at, reading=reading)
     if reading.true_fps is not None or reading.sequence_fps is not None:
         raise UsageError(
-            "frames of an array have their times", where="true_fps, sequence_fps", fix="leave the options out"
+            "frames of an array have their times",
+            where="true_fps, sequence_fps",
+            fix="leave the options out",
         )
     return [Subject(film=reading.conditioned(source))]
 
@@ -171,14 +190,18 @@ def _subjects(source: Path | str | Frames, *, lake: Lake | None, at: str | None,
 def answer_of(measurement: Measurement) -> Answer:
     """Returns what a film says, as arrays."""
     quantities = {quantity.name: quantity for quantity in measurement.quantities}
-    rows = {name: [window.quantity(name) for window in measurement.windows] for name in measurement.names}
+    rows = {
+        name: [window.quantity(name) for window in measurement.windows]
+        for name in measurement.names
+    }
     nan = float("nan")
     windows = Windows(
         start=np.array([window.start for window in measurement.windows]),
         end=np.array([window.end for window in measurement.windows]),
         p=np.array([window.p for window in measurement.windows]),
         value={
-            name: np.array([nan if q.value is None else q.value for q in by_window]) for name, by_window in rows.items()
+            name: np.array([nan if q.value is None else q.value for q in by_window])
+            for name, by_window in rows.items()
         },
         low={name: np.array([q.span.low for q in by_window]) for name, by_window in rows.items()},
         high={name: np.array([q.span.high for q in by_window]) for name, by_window in rows.items()},

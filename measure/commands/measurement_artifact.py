@@ -1,7 +1,8 @@
 """A measurement in the lake: the estimates, the film, the network.
 
-Its identity is a hash of what went in: the film's artifact or content, the network, the options and the seed. Its
-object is a Zarr folder with the posterior's draws, the windows' series and the whole answer as JSON.
+Its identity is a hash of what went in: the film's artifact or content, the network, the options and
+the seed. Its object is a Zarr folder with the posterior's draws, the windows' series and the whole
+answer as JSON.
 """
 
 from __future__ import annotations
@@ -28,15 +29,17 @@ from measure.film.film_source import FilmReading, Subject
 
 _FORMAT = 1
 _ANSWER = 4
-"""Raised when the same film, network and options get another answer, which is then another measurement. 2: bounds at
-the ends of the range, and sizes that are judged one by one. 3: a stated weight is conditioned on exactly. 4: windows
-of a film are one gusty series."""
+"""Raised when the same film, network and options get another answer, which is then another
+measurement. 2: bounds at the ends of the range, and sizes that are judged one by one. 3: a stated
+weight is conditioned on exactly. 4: windows of a film are one gusty series."""
 _HEAD = "flagdata_estimate"
 REFUSED = "refused-by-gate"
 """Quality flag of what was kept although the gate refused it."""
 
 
-def artifact(measured: Measurement, subject: Subject, network: Network, reading: FilmReading) -> Artifact:
+def artifact(
+    measured: Measurement, subject: Subject, network: Network, reading: FilmReading
+) -> Artifact:
     """Builds the row of a measurement, without its object."""
     parents = [] if subject.artifact is None else [subject.artifact.id]
     parents += [] if network.artifact is None else [network.artifact.id]
@@ -71,7 +74,8 @@ def artifact(measured: Measurement, subject: Subject, network: Network, reading:
 
 
 def _series(network: Network) -> Mapping[str, Any]:
-    """Returns how the network errs in a series of windows; nothing of one whose card does not say."""
+    """Returns how the network errs in a series of windows; nothing of one whose card does not
+    say."""
     entry = network.estimator.card.get(SERIES_KEY)
     return {} if entry is None or network.reading is not None else {SERIES_KEY: entry}
 
@@ -117,8 +121,11 @@ def keep(
     )
 
 
-def write(path: Path, measured: Measurement, series: Beside, refinement: Mapping[str, Any] | None = None) -> None:
-    """Writes a new Zarr folder: `draws` (draw, target) and the columns of the wind series, each over `time`.
+def write(
+    path: Path, measured: Measurement, series: Beside, refinement: Mapping[str, Any] | None = None
+) -> None:
+    """Writes a new Zarr folder: `draws` (draw, target) and the columns of the wind series, each
+    over `time`.
 
     Dimensions are named, so that xarray opens it as a data set.
     """
@@ -136,7 +143,9 @@ def write(path: Path, measured: Measurement, series: Beside, refinement: Mapping
     )
     write_plain(group, "draws", measured.draws.astype(np.float32), ("draw", "target"))
     for name, values in {**series.columns(), "time": series.time}.items():
-        write_plain(group, name, values.astype(np.float64 if name == "time" else np.float32), ("time",))
+        write_plain(
+            group, name, values.astype(np.float64 if name == "time" else np.float32), ("time",)
+        )
 
 
 def read(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:

@@ -26,10 +26,18 @@ class ObserveCommand(AsJson, Observing, Keeping):
     """The same on the command line, and what is written."""
 
     parquet: Path | None = option(
-        "Write the table as Parquet.", default=None, section=WRITTEN, type=LocalPath(), metavar="FILE.parquet"
+        "Write the table as Parquet.",
+        default=None,
+        section=WRITTEN,
+        type=LocalPath(),
+        metavar="FILE.parquet",
     )
     zarr: Path | None = option(
-        "Write the table as a Zarr data set.", default=None, section=WRITTEN, type=LocalPath(), metavar="FOLDER"
+        "Write the table as a Zarr data set.",
+        default=None,
+        section=WRITTEN,
+        type=LocalPath(),
+        metavar="FOLDER",
     )
     picture: Path | None = option(
         "Draw each observable against time, and against the log's wind where the recording has one.",
@@ -44,9 +52,9 @@ class ObserveCommand(AsJson, Observing, Keeping):
 def observe(chosen: ObserveCommand) -> None:
     """Read observables off a film: droop, extension, speeds, frequency, amplitudes, wave, area.
 
-    SOURCE is a video file, a folder of images, or a recording, clip or camera of --lake by its name or id. Each window
-    gives a value with its unit, or the reason why it shows none. With --lake the table becomes an artifact.
-    docs/method/films.md defines each observable and states its error.
+    SOURCE is a video file, a folder of images, or a recording, clip or camera of --lake by its name
+    or id. Each window gives a value with its unit, or the reason why it shows none. With --lake the
+    table becomes an artifact. docs/method/films.md defines each observable and states its error.
 
     \b
       flagdata observe clip.mp4 --flag-size 1.5x1.0 --parquet clip.parquet --picture clip.png
@@ -74,7 +82,9 @@ def observe(chosen: ObserveCommand) -> None:
     identity = None
     if lake is not None and not chosen.read_only:
         part = [chosen.start, chosen.end]
-        placed = keep(lake, table, subject, {**reading.recipe(), "part": part}, branch=chosen.branch)
+        placed = keep(
+            lake, table, subject, {**reading.recipe(), "part": part}, branch=chosen.branch
+        )
         identity = placed.artifact.id
         say(f"{identity[:SHORT]}  measurement, {placed.sentence}")
     if chosen.parquet is not None:
@@ -106,7 +116,9 @@ def observe_film(chosen: Observing) -> Rows:
 
 
 @one_thread()
-def _table(chosen: Observing, lake: Lake | None, *, at: str | None) -> tuple[ObservableTable, Subject, FilmReading]:
+def _table(
+    chosen: Observing, lake: Lake | None, *, at: str | None
+) -> tuple[ObservableTable, Subject, FilmReading]:
     """Returns the observables of a film, with where it is from and how it was read."""
     from measure.film.film_source import FilmReading, subjects
     from measure.film.similarity import FlagSize
@@ -114,7 +126,11 @@ def _table(chosen: Observing, lake: Lake | None, *, at: str | None) -> tuple[Obs
     from measure.observables.watching import count_of, watch_film
 
     if chosen.window < 1.0:
-        raise UsageError(f"windows of {chosen.window:g} s", where="--window", fix="give 1s or more: a flutter's period")
+        raise UsageError(
+            f"windows of {chosen.window:g} s",
+            where="--window",
+            fix="give 1s or more: a flutter's period",
+        )
     size = FlagSize.of(chosen.flag_size)
     reading = FilmReading.of(chosen, size)
     (subject,) = subjects(str(chosen.source), query=None, lake=lake, at=at, reading=reading)
@@ -138,7 +154,8 @@ def _check_shown(table: ObservableTable, subject: Subject) -> None:
     """
     if table.empty:
         raise RefusedError(
-            f"none of {len(table.time)} windows shows the cloth: its outline or its hoist was not found",
+            f"none of {len(table.time)} windows shows the cloth: its outline or its hoist was not "
+            "found",
             where=subject.film.name,
             fix="give --crop around one whole flag on its pole, or another film",
         )

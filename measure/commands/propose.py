@@ -1,4 +1,5 @@
-"""`flagdata propose`: recordings that the library does not explain in; an effect file, kept or rejected, out."""
+"""`flagdata propose`: recordings that the library does not explain in; an effect file, kept or
+rejected, out."""
 
 from __future__ import annotations
 
@@ -13,13 +14,15 @@ from measure.closing.null_options import nulls_given, refuse, stage_bars
 
 @verb(Proposing, example='flagdata.propose("flag.toml", known=("lift.coefficient",))')
 def propose(chosen: Proposing) -> Iterator[Result]:
-    """Propose an effect that the library lacks, test it on recordings it was not made from, keep or reject it.
+    """Propose an effect that the library lacks, test it on recordings it was not made from, keep or
+    reject it.
 
-    RECIPE.toml is one of `flagdata close-loop` that names its recordings. Terms are sought in a part of them;
-    up to three become an effect, written as a module with its contract tests; the rest of the recordings decide: errors
-    must fall, and below those of as many terms of another direction. proposal/proposals.json records what was tried.
-    Run it where close-loop says "none of the library"; where it says "partly explained", name what it found with
-    --known. --effect tests such a file on other recordings, beside the terms as controls.
+    RECIPE.toml is one of `flagdata close-loop` that names its recordings. Terms are sought in a
+    part of them; up to three become an effect, written as a module with its contract tests; the
+    rest of the recordings decide: errors must fall, and below those of as many terms of another
+    direction. proposal/proposals.json records what was tried. Run it where close-loop says "none of
+    the library"; where it says "partly explained", name what it found with --known. --effect tests
+    such a file on other recordings, beside the terms as controls.
 
     \b
       flagdata propose flag.toml
@@ -49,7 +52,9 @@ def propose(chosen: Proposing) -> Iterator[Result]:
         **null_options,
     )
     tried, controls = (
-        (dictionary(), ()) if chosen.effect is None else (candidates.from_file(chosen.effect), dictionary())
+        (dictionary(), ())
+        if chosen.effect is None
+        else (candidates.from_file(chosen.effect), dictionary())
     )
     observed = recipes.read(recipe, lake_of(chosen.lake))
     refuse(observed.findings)

@@ -1,4 +1,5 @@
-"""The demonstration: a field recording made here, taken through the whole tool to a page one can open."""
+"""The demonstration: a field recording made here, taken through the whole tool to a page one can
+open."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""`flagdata demo`: the main job end to end on data made on the spot, by the same commands a user types.
+"""`flagdata demo`: the main job end to end on data made on the spot, by the same commands a user
+types.
 
 The demonstration's first page: a card a step, and the truth beside what was found.
 """
@@ -53,23 +54,29 @@ class Showing(AsJson):
     """What is shown, and where the pages go."""
 
     out: Path = option(
-        "Folder for the pages and the data. What an earlier demonstration wrote there is replaced, unless it was "
+        "Folder for the pages and the data. What an earlier demonstration wrote there is replaced, "
+        "unless it was "
         "changed or anything else lies beside it.",
         default=Path("out/demo"),
         type=LocalPath(),
     )
     seed: int = option("Seed of all that is random.", default=2026, type=click.IntRange(min=0))
     full: bool = option(
-        "Then weigh the cloth and find what its model lacks, from the same film; 10 minutes at most.", default=False
+        "Then weigh the cloth and find what its model lacks, from the same film; 10 minutes at "
+        "most.",
+        default=False,
     )
     markers: bool = option(
-        "Instead find what the model of another flag lacks, from tracked markers; 5 minutes at most.", default=False
+        "Instead find what the model of another flag lacks, from tracked markers; 5 minutes at "
+        "most.",
+        default=False,
     )
 
     def __post_init__(self) -> None:
         if self.full and self.markers:
             raise UsageError(
-                "--full cannot be combined with --markers", fix="show one after the other, each in a folder of its own"
+                "--full cannot be combined with --markers",
+                fix="show one after the other, each in a folder of its own",
             )
 
     @property
@@ -80,11 +87,11 @@ class Showing(AsJson):
 
 @command(Showing)
 def demo(chosen: Showing) -> None:
-    """Film a simulated flag beside an anemometer, on which something acts that no file states, and take the two files
-    through the steps of a recording of one's own, to pages to open.
+    """Film a simulated flag beside an anemometer, on which something acts that no file states, and
+    take the two files through the steps of a recording of one's own, to pages to open.
 
-    The folder appears with the last of its files; its manifest.json lists them all. Running the demonstration again
-    removes exactly what is listed there and is as it was written.
+    The folder appears with the last of its files; its manifest.json lists them all. Running the
+    demonstration again removes exactly what is listed there and is as it was written.
     """
     from flagdata.core.files.outputs import fresh_folder
 

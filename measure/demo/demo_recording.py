@@ -1,8 +1,9 @@
-"""A recording as a user would bring it: a camera's film of a flag in gusty wind, and a cup anemometer's log beside it.
+"""A recording as a user would bring it: a camera's film of a flag in gusty wind, and a cup
+anemometer's log beside it.
 
-The flag is simulated on a mesh and in steps that no fit uses. What acts on it beside the base model, what its cloth
-weighs and by how much the two clocks differ are drawn from the seed and written nowhere but into the returned
-`Recording`, so that results can be compared with them.
+The flag is simulated on a mesh and in steps that no fit uses. What acts on it beside the base
+model, what its cloth weighs and by how much the two clocks differ are drawn from the seed and
+written nowhere but into the returned `Recording`, so that results can be compared with them.
 """
 
 from __future__ import annotations
@@ -61,7 +62,8 @@ _SURVEYED = {
     "clock": CLOCK_SIGMA,
     "area_weight": SCALE_SIGMA,
 }
-"""Standard errors with which a person notes down where the camera stood, by compass and tape, clocks and cloth."""
+"""Standard errors with which a person notes down where the camera stood, by compass and tape,
+clocks and cloth."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,12 +83,14 @@ class Acting:
     def sentence(self) -> str:
         """Effect, parameter and strength with its unit."""
         unit = EFFECTS[self.effect].parameters()[self.parameter].unit
-        return f"{self.effect}, {self.parameter} {self.strength:g}" + ("" if unit == "1" else f" {unit}")
+        return f"{self.effect}, {self.parameter} {self.strength:g}" + (
+            "" if unit == "1" else f" {unit}"
+        )
 
 
 HIDDEN = (Acting(effect="hem-mass", parameter="line_density", strength=0.06),)
-"""Of which the seed draws one: a rope in the hem weighs as much as the cloth. The flag moves more in stronger wind
-all the same, so that its motion shows how the clocks differ."""
+"""Of which the seed draws one: a rope in the hem weighs as much as the cloth. The flag moves more
+in stronger wind all the same, so that its motion shows how the clocks differ."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,7 +149,13 @@ class RecordingRecipe:
     def mesh(self) -> Mesh:
         """Of the flag: another one than any fit's."""
         rows = max(2, round(self.columns * self.height / self.length))
-        return grid(width=self.length, height=self.height, columns=self.columns, rows=rows, diagonals=Diagonals.FORWARD)
+        return grid(
+            width=self.length,
+            height=self.height,
+            columns=self.columns,
+            rows=rows,
+            diagonals=Diagonals.FORWARD,
+        )
 
     @property
     def acting(self) -> Acting | None:
@@ -157,7 +167,8 @@ class RecordingRecipe:
 
 @dataclass(frozen=True, kw_only=True)
 class Noted:
-    """Where the camera stood, how the clocks differed and what the cloth weighed, as a person notes it down.
+    """Where the camera stood, how the clocks differed and what the cloth weighed, as a person notes
+    it down.
 
     Attributes:
         azimuth: of its axis to the wind, 90° from the side [rad].
@@ -182,7 +193,8 @@ class Recording:
         video, log, sensor: the files.
         noted: where the camera stood, by compass and tape, and what a scale showed.
         clock_offset: what must be added to the camera's clock to reach the anemometer's [s].
-        wind: true horizontal speed at the flag [m/s] at 10 Hz, from `BEFORE` seconds before the first frame on.
+        wind: true horizontal speed at the flag [m/s] at 10 Hz, from `BEFORE` seconds before the
+            first frame on.
         area_weight, damping: of the cloth [kg/m²], [s].
         acting: what acted beside the base model.
     """
@@ -240,8 +252,8 @@ def make_recording(
 
 
 def look(recipe: RecordingRecipe) -> RenderParameters:
-    """Draws how it is filmed: as in the data set `outdoor`, from 7 to 9 m away, in daylight, before the sky or hills,
-    against which the outline of a flag is found."""
+    """Draws how it is filmed: as in the data set `outdoor`, from 7 to 9 m away, in daylight, before
+    the sky or hills, against which the outline of a flag is found."""
     quantities = {
         "camera_radius": recipe.drawn("radius", 7.0, 9.0),
         "camera_height": recipe.drawn("camera", 1.4, 1.8),
@@ -252,7 +264,9 @@ def look(recipe: RecordingRecipe) -> RenderParameters:
         "width": recipe.width,
         "height": recipe.rows,
     }
-    outdoor = render_prior.named_prior("outdoor").with_quantities(quantities, source="the demonstration")
+    outdoor = render_prior.named_prior("outdoor").with_quantities(
+        quantities, source="the demonstration"
+    )
     plain = replace(outdoor, textures=("flag", "stripes"), backgrounds=("sky", "hills"))
     return plain.draw(child_seed(recipe.seed, "demo", "look"), Assets())
 
@@ -267,16 +281,23 @@ def _cloth(recipe: RecordingRecipe) -> tuple[float, float, float]:
 
 
 def _flag(recipe: RecordingRecipe) -> tuple[System, State]:
-    """Assembles the flag in its wind, `_SETTLE` before the first frame; the wind's time begins with the log."""
+    """Assembles the flag in its wind, `_SETTLE` before the first frame; the wind's time begins with
+    the log."""
     flat = recipe.mesh
     attachment = Handles(vertices=handles.corners(flat.rest))
     area_weight, bending, damping = _cloth(recipe)
     base = named_material(MATERIAL)
-    material = replace(base.scaled(bending=bending), area_weight=area_weight, damping=max(damping - recipe.step, 0.0))
+    material = replace(
+        base.scaled(bending=bending),
+        area_weight=area_weight,
+        damping=max(damping - recipe.step, 0.0),
+    )
     start = np.stack([flat.rest[:, 0], 0 * flat.rest[:, 0], flat.rest[:, 1]], axis=1)
     start = roughen_start(start, attachment, stream(recipe.seed, "demo", "start"), _ROUGH)
     speed = recipe.wind
-    scene = Scene(mesh=flat, position=start, material=material, handles=attachment, wind=(speed, 0.0, 0.0))
+    scene = Scene(
+        mesh=flat, position=start, material=material, handles=attachment, wind=(speed, 0.0, 0.0)
+    )
     gusts = Gusts(intensity=recipe.intensity).with_series(
         stream(recipe.seed, "demo", "gusts"),
         batch=1,
@@ -286,12 +307,16 @@ def _flag(recipe: RecordingRecipe) -> tuple[System, State]:
         rate=AIR_RATE,
     )
     acting = recipe.acting
-    acting_effects = [] if acting is None else [EFFECTS[acting.effect](**{acting.parameter: acting.strength})]
+    acting_effects = (
+        [] if acting is None else [EFFECTS[acting.effect](**{acting.parameter: acting.strength})]
+    )
     system, state = apply([gusts, *acting_effects], *assemble([scene], dtype=torch.float32))
     return system, replace(state, time=BEFORE - _SETTLE)
 
 
-def _flown(recipe: RecordingRecipe, system: System, state: State, advance: Callable[[int], object]) -> MeshSequence:
+def _flown(
+    recipe: RecordingRecipe, system: System, state: State, advance: Callable[[int], object]
+) -> MeshSequence:
     """Simulates the flag in each frame of the film."""
     method = BackwardEuler(step=recipe.step, tolerance=1e-3)
     batch = Batch(system=system, state=state, integrator=method, divergence=Divergence.REFUSE)
@@ -308,12 +333,15 @@ def _flown(recipe: RecordingRecipe, system: System, state: State, advance: Calla
 
 
 def _log(recipe: RecordingRecipe, path: Path, times: FloatArray, velocity: FloatArray) -> float:
-    """Write the anemometer's log; what must be added to the camera's clock to reach the logger's [s]."""
+    """Write the anemometer's log; what must be added to the camera's clock to reach the logger's
+    [s]."""
     begin = from_datetime(START) - round(BEFORE * NANOSECONDS)
     seed = child_seed(recipe.seed, "demo", "anemometer")
     series = log_of_air(CUP, times, velocity, instrument=seed, seed=seed, begin=begin).series
     offset = recipe.drawn("clock", -_LARGEST_OFFSET, _LARGEST_OFFSET)
-    first = (int(series.time[0]) - begin) / NANOSECONDS - BEFORE  # by the camera's clock, from its start
+    first = (
+        int(series.time[0]) - begin
+    ) / NANOSECONDS - BEFORE  # by the camera's clock, from its start
     stamp = START + timedelta(seconds=first + offset)
     write_log(
         path,
@@ -326,7 +354,9 @@ def _log(recipe: RecordingRecipe, path: Path, times: FloatArray, velocity: Float
     return offset
 
 
-def _note_truth(recipe: RecordingRecipe, sequence: MeshSequence, zeta: RenderParameters, offset: float) -> Noted:
+def _note_truth(
+    recipe: RecordingRecipe, sequence: MeshSequence, zeta: RenderParameters, offset: float
+) -> Noted:
     camera = stage(Meshes.flag(sequence, heading=0.0), zeta).camera
     true = {
         "azimuth": zeta.camera_angle,
@@ -337,7 +367,8 @@ def _note_truth(recipe: RecordingRecipe, sequence: MeshSequence, zeta: RenderPar
     }
     return Noted(
         **{
-            name: value + float(stream(recipe.seed, "demo", "noted", name).normal(0.0, _SURVEYED[name]))
+            name: value
+            + float(stream(recipe.seed, "demo", "noted", name).normal(0.0, _SURVEYED[name]))
             for name, value in true.items()
         }
     )

@@ -1,4 +1,5 @@
-"""The cup anemometer's log as its logger writes it: a CSV file in km/h by its own wall clock, and its sensor recipe."""
+"""The cup anemometer's log as its logger writes it: a CSV file in km/h by its own wall clock, and
+its sensor recipe."""
 
 from __future__ import annotations
 
@@ -59,9 +60,11 @@ _STUCK = 12
 """Readings that repeat the one before them."""
 
 
-def write_log(path: Path, speed: FloatArray, direction: FloatArray, *, first: datetime, quiet: int, seed: int) -> None:
-    """Writes one reading a second, in km/h and degrees, with a gap anywhere and a stretch early on at which the logger
-    stuck.
+def write_log(
+    path: Path, speed: FloatArray, direction: FloatArray, *, first: datetime, quiet: int, seed: int
+) -> None:
+    """Writes one reading a second, in km/h and degrees, with a gap anywhere and a stretch early on
+    at which the logger stuck.
 
     Args:
         speed, direction: (n,) of the readings [m/s], [rad].

@@ -1,5 +1,5 @@
-"""The page of the film and the log on one clock: wind, alignment, clips with their ground truth, findings and the
-commands, in one file."""
+"""The page of the film and the log on one clock: wind, alignment, clips with their ground truth,
+findings and the commands, in one file."""
 
 from __future__ import annotations
 
@@ -49,15 +49,23 @@ class Recovered:
 
 
 def write_page(
-    folder: Path, *, recording: Recording, at: str, transcript: Sequence[tuple[str, str]], seconds: float
+    folder: Path,
+    *,
+    recording: Recording,
+    at: str,
+    transcript: Sequence[tuple[str, str]],
+    seconds: float,
 ) -> Path:
-    """Write `recording.html` (self-contained) into `folder` from the lake inside it; returns its path."""
+    """Write `recording.html` (self-contained) into `folder` from the lake inside it; returns its
+    path."""
     lake = Lake.open(folder / "lake")
     (row,) = lake.rows("kind = 'recording'", at=at).to_pylist()
     record = Record.open(lake.object_path(row["object"]))
     pairs = flagdata.open(folder / "lake").pairs(where="kind = 'clip'", at=at, seed=0)
     order = np.argsort([pairs[i].wind for i in range(len(pairs))])
-    samples = [pairs[int(i)] for i in order[np.linspace(0, len(order) - 1, _SHOWN).round().astype(int)]]
+    samples = [
+        pairs[int(i)] for i in order[np.linspace(0, len(order) - 1, _SHOWN).round().astype(int)]
+    ]
     wind_image, caption = _wind_plot(record, lake, at, recording)
     target = folder / "recording.html"
     values = {
@@ -84,7 +92,8 @@ def write_page(
 
 
 def compare_clock(recording: dict[str, Any], truth: float) -> Recovered:
-    """Compares the recording's clock at mid-recording with the true offset [s] that the generator kept."""
+    """Compares the recording's clock at mid-recording with the true offset [s] that the generator
+    kept."""
     clock = ClockModel.from_json(recording["clock_model"])
     middle = (recording["start"] + recording["end"]) // 2
     device = middle - round(recording["clock_offset"] * NANOSECONDS)
@@ -111,8 +120,8 @@ def _clip_card(sample: Sample) -> dict[str, Any]:
 
 
 def dominant_frequency(clip: torch.Tensor) -> float:
-    """Computes the peak frequency [Hz] of a (1, time, height, width) clip, weighted by power over a four times coarser
-    picture."""
+    """Computes the peak frequency [Hz] of a (1, time, height, width) clip, weighted by power over a
+    four times coarser picture."""
     coarse = torch.nn.functional.avg_pool2d(clip.float(), 4)
     power, frequency = SpectralDecomposition(rate=FRAME_RATE)(coarse[None])[0]
     return float((power * frequency).sum() / power.sum())
@@ -134,16 +143,30 @@ def _wind_plot(record: Record, lake: Lake, at: str, recording: Recording) -> tup
     truth = np.arange(len(recording.wind)) / AIR_RATE - BEFORE
     axes.plot(truth, recording.wind, color="0.82", linewidth=0.6, label="true wind at the flag")
     axes.plot(
-        (logged.time - zero) / NANOSECONDS, logged.speed, color="#2b6f8f", linewidth=0.8, label="anemometer, 1 Hz"
+        (logged.time - zero) / NANOSECONDS,
+        logged.speed,
+        color="#2b6f8f",
+        linewidth=0.8,
+        label="anemometer, 1 Hz",
     )
     axes.fill_between(ends, wind - sigma, wind + sigma, color="#c4622d", alpha=0.35, linewidth=0)
-    axes.plot(ends, wind, color="#c4622d", linewidth=1.4, label="ground truth of the clips (minute mean ± σ)")
+    axes.plot(
+        ends,
+        wind,
+        color="#c4622d",
+        linewidth=1.4,
+        label="ground truth of the clips (minute mean ± σ)",
+    )
     axes.set(
-        xlabel="time since the first frame [s]", ylabel="wind speed [m/s]", xlim=(truth[0], truth[-1]), ylim=(0, None)
+        xlabel="time since the first frame [s]",
+        ylabel="wind speed [m/s]",
+        xlim=(truth[0], truth[-1]),
+        ylim=(0, None),
     )
     axes.legend(loc="lower right", fontsize=8, ncols=3)
     caption = (
-        f"{len(logged.time)} one-second means on the common clock; the gap and the stretch that stuck are left out of "
+        f"{len(logged.time)} one-second means on the common clock; the gap and the stretch that "
+        "stuck are left out of "
         f"the averages. {len(clips)} clips of {CLIP_FRAMES} frames."
     )
     return figure_url(figure, dpi=130), caption
@@ -151,7 +174,9 @@ def _wind_plot(record: Record, lake: Lake, at: str, recording: Recording) -> tup
 
 def _findings(lake: Lake, at: str) -> list[dict[str, Any]]:
     findings = []
-    for row in lake.rows("kind in ('camera', 'wind')", at=at, columns=["source_name", "report"]).to_pylist():
+    for row in lake.rows(
+        "kind in ('camera', 'wind')", at=at, columns=["source_name", "report"]
+    ).to_pylist():
         report = json.loads(row["report"])
         findings += [{"source": row["source_name"], **finding} for finding in report["findings"]]
     return findings

@@ -41,7 +41,8 @@ SIMULATIONS = 64
 WEIGHED = 40.0
 """s of the film that the cloth is weighed on, and the loop closed."""
 KINDS = 20
-"""Kinds of numerics among the null experiments: the fewest that a level of 0.05 can be tested by, and one more."""
+"""Kinds of numerics among the null experiments: the fewest that a level of 0.05 can be tested by,
+and one more."""
 _REFUSED = (
     "The estimate from motion and gusts was refused, for the reason above the picture.\n"
     "So the difference was given that somebody read off the two displays:\n"
@@ -51,22 +52,38 @@ _CLIPS = 2.4  # s from one window of the wind series to the next
 
 
 def field_steps(shell: Transcript, seed: int) -> Recording:
-    """Goes from nothing to a film and a log on one clock, pairs of them, and the wind estimated from the film."""
+    """Goes from nothing to a film and a log on one clock, pairs of them, and the wind estimated
+    from the film."""
     recording = _film(shell, RecordingRecipe(seed=seed))
     began = time.monotonic()
     done = "Each file was identified, with the reason; for the log a sensor recipe was drafted."
     with _Step(shell, "What are these files?", done) as step:
         step.found = _head(shell.show("ingest", "--sniff", "flag.mp4", "anemometer.csv"), 6)
-    done = "Film and log became artifacts, each on its own clock. Units and zones are settled here; doubts are listed."
+    done = (
+        "Film and log became artifacts, each on its own clock. Units and zones are settled here; "
+        "doubts are listed."
+    )
     with _Step(shell, "Into the lake", done) as step:
         for arguments in (
             ("flag.mp4", "--session", "demo"),
-            ("anemometer.csv", "--sensor", "cup-logger.toml", "--zone", "+02:00", "--session", "demo"),
+            (
+                "anemometer.csv",
+                "--sensor",
+                "cup-logger.toml",
+                "--zone",
+                "+02:00",
+                "--session",
+                "demo",
+            ),
         ):
             step.found += _head(shell.show("ingest", *arguments, "--lake", "lake"), 6)
     _align_step(shell, recording)
     page = write_page(
-        shell.folder, recording=recording, at="demo", transcript=tuple(shell.entries), seconds=time.monotonic() - began
+        shell.folder,
+        recording=recording,
+        at="demo",
+        transcript=tuple(shell.entries),
+        seconds=time.monotonic() - began,
     )
     shell.cards[-1] = replace(shell.cards[-1], page=page.name)
     _measure_step(shell, recording)
@@ -77,13 +94,20 @@ def weighing_step(shell: Transcript, recording: Recording) -> None:
     """Weighs the cloth with the log beside the film."""
     noted = recording.noted
     done = (
-        f"The flag's motion in {WEIGHED:g} s of the film was compared with that of {SIMULATIONS} simulated flags in "
-        "the logged wind, which are few and a short time: more of both narrow the interval. What acts on "
+        f"The flag's motion in {WEIGHED:g} s of the film was compared with that of {SIMULATIONS} "
+        "simulated flags in "
+        "the logged wind, which are few and a short time: more of both narrow the interval. What "
+        "acts on "
         "the flag and is not in the model changes the weight. By compass and tape the camera stood "
-        f"{math.degrees(noted.azimuth):.0f}° from the wind's direction and {noted.distance:.1f} m away."
+        f"{math.degrees(noted.azimuth):.0f}° from the wind's direction and {noted.distance:.1f} m "
+        "away."
     )
     with _Step(shell, "What the cloth weighs", done, page="weighed.html") as step:
-        step.took(shell.attempt("calibrate", "flag", *_film_options(recording), "--report", "weighed.html"))
+        step.took(
+            shell.attempt(
+                "calibrate", "flag", *_film_options(recording), "--report", "weighed.html"
+            )
+        )
         step.beside(
             "area weight, by the model without what acts",
             f"{recording.area_weight:.3f} kg/m²",
@@ -95,8 +119,10 @@ def loop_step(shell: Transcript, recording: Recording) -> None:
     """Tests what the model of the filmed flag lacks."""
     scale_weight = f"{recording.noted.area_weight:.3f}±{SCALE_SIGMA:g}"
     done = (
-        f"The same {WEIGHED:g} s were compared with flags on which each of the library's effects acts, and with flags "
-        f"of {KINDS} other meshes and time steps on which nothing undeclared does. The weight that the motion asked "
+        f"The same {WEIGHED:g} s were compared with flags on which each of the library's effects "
+        "acts, and with flags "
+        f"of {KINDS} other meshes and time steps on which nothing undeclared does. The weight that "
+        "the motion asked "
         f"for was set aside: on a scale the cloth weighed {scale_weight} kg/m² before it was sewn."
     )
     with _Step(shell, "What the model of the flag lacks", done, page="loop/report.html") as step:
@@ -113,8 +139,14 @@ def loop_step(shell: Transcript, recording: Recording) -> None:
         )
         step.took(None if printed is None else _verdict(printed))
         if recording.acting is not None:
-            document = None if printed is None else (shell.folder / "loop" / "verdict.json").read_text(encoding="utf-8")
-            _beside_what_acts(step, recording.acting, None if document is None else json.loads(document))
+            document = (
+                None
+                if printed is None
+                else (shell.folder / "loop" / "verdict.json").read_text(encoding="utf-8")
+            )
+            _beside_what_acts(
+                step, recording.acting, None if document is None else json.loads(document)
+            )
 
 
 def _beside_what_acts(step: _Step, acting: Acting, verdict: dict[str, Any] | None) -> None:
@@ -129,11 +161,14 @@ def _beside_what_acts(step: _Step, acting: Acting, verdict: dict[str, Any] | Non
     else:
         rank = named.index(acting.effect) + 1
         several = f"one of {len(named)} effects; it is number {rank} of them by probability"
-        step.beside(subject, acting.sentence, Judgement.RIGHT, inferred=several if len(named) > 1 else "")
+        step.beside(
+            subject, acting.sentence, Judgement.RIGHT, inferred=several if len(named) > 1 else ""
+        )
 
 
 def _film_options(recording: Recording) -> tuple[str, ...]:
-    """Returns options of the film that weighing and the loop have in common, so that they share simulations."""
+    """Returns options of the film that weighing and the loop have in common, so that they share
+    simulations."""
     noted = recording.noted
     return (
         "--flag-size",
@@ -164,7 +199,8 @@ def markers_step(shell: Transcript, seed: int) -> None:
     recipe = TrackedRecipe(seed=seed)
     winds = ", ".join(f"{speed:g}" for speed in recipe.speeds)
     done = (
-        f"Markers of another flag were tracked in winds of {winds} m/s; something acts on it that no file states. The "
+        f"Markers of another flag were tracked in winds of {winds} m/s; something acts on it that "
+        "no file states. The "
         "model of its cloth was tested against simulations in which nothing undeclared acts."
     )
     with _Step(shell, "What the model of a cloth lacks", done, page="loop/report.html") as step:
@@ -172,7 +208,10 @@ def markers_step(shell: Transcript, seed: int) -> None:
         with progress(frames, label="tracking", unit="frame") as advance:
             tracks = make_tracks(recipe, shell.folder, advance=advance)
         step.found = shell.show("close-loop", tracks.recipe.name, "--lake", "lake", "--out", "loop")
-        models = [row["name"] for row in shell.read("ls", "--kind", "model", "--lake", "lake")["artifacts"]]
+        models = [
+            row["name"]
+            for row in shell.read("ls", "--kind", "model", "--lake", "lake")["artifacts"]
+        ]
         with_effects = [name for name in models if not name.endswith("-base")]
         shell.show("simulate", (with_effects or models)[0], "--lake", "lake")
         unit = "" if tracks.unit == "1" else f" {tracks.unit}"
@@ -188,7 +227,9 @@ class _Step:
         picture: a data URL.
     """
 
-    def __init__(self, shell: Transcript, title: str, done: str, *, alt: str = "", page: str = "") -> None:
+    def __init__(
+        self, shell: Transcript, title: str, done: str, *, alt: str = "", page: str = ""
+    ) -> None:
         self._shell, self._title, self._done, self._alt, self._page = shell, title, done, alt, page
         self._began, self._typed = time.monotonic(), len(shell.entries)
         self.found, self.picture = "", ""
@@ -196,12 +237,19 @@ class _Step:
 
     def took(self, printed: str | None) -> None:
         """Takes what the step's command printed; None where it refused, and left no page."""
-        self.found = printed or "Refused: the film does not pass a check of this command, which says which.\n"
+        self.found = (
+            printed
+            or "Refused: the film does not pass a check of this command, which says which.\n"
+        )
         self._page = "" if printed is None else self._page
 
     def beside(self, subject: str, true: str, judgement: Judgement, *, inferred: str = "") -> None:
         """Puts a truth beside what the step found: the first line of it, or `inferred`."""
-        self._truths.append(Truth(what=subject, true=true, found=inferred or _first(self.found), judgement=judgement))
+        self._truths.append(
+            Truth(
+                what=subject, true=true, found=inferred or _first(self.found), judgement=judgement
+            )
+        )
 
     def __enter__(self) -> _Step:
         say("")
@@ -228,12 +276,16 @@ class _Step:
 
 def _film(shell: Transcript, recipe: RecordingRecipe) -> Recording:
     done = (
-        f"A flag of {SIZE.replace('x', ' m × ')} m was simulated for {recipe.duration:g} s in gusts about "
-        f"{recipe.wind:.1f} m/s and filmed at {recipe.rate} frames a second into an H.264 file; a cup anemometer's log "
+        f"A flag of {SIZE.replace('x', ' m × ')} m was simulated for {recipe.duration:g} s in "
+        "gusts about "
+        f"{recipe.wind:.1f} m/s and filmed at {recipe.rate} frames a second into an H.264 file; a "
+        "cup anemometer's log "
         "is a CSV file in km/h."
     )
     with _Step(shell, "A film and a log", done, alt="The film") as step:
-        with progress(2 * round(recipe.duration * recipe.rate), label="film", unit="frame") as advance:
+        with progress(
+            2 * round(recipe.duration * recipe.rate), label="film", unit="frame"
+        ) as advance:
             recording = make_recording(recipe, shell.folder, workers=cores(), advance=advance)
         step.picture = _moving(recording.video, recipe.rate)
     return recording
@@ -241,11 +293,17 @@ def _film(shell: Transcript, recipe: RecordingRecipe) -> Recording:
 
 def _align_step(shell: Transcript, recording: Recording) -> None:
     done = (
-        "The flag moves more in a stronger wind, a moment later. So the gusts in the log and the motion in the film "
-        "give the offset of the two clocks, if they agree clearly enough; with it, each clip of the film has its wind."
+        "The flag moves more in a stronger wind, a moment later. So the gusts in the log and the "
+        "motion in the film "
+        "give the offset of the two clocks, if they agree clearly enough; with it, each clip of "
+        "the film has its wind."
     )
-    with _Step(shell, "On one clock, in pairs", done, alt="Motion and wind on one clock, and the evidence") as step:
-        artifacts = {row["kind"]: row["artifact"] for row in shell.read("ls", "--lake", "lake")["artifacts"]}
+    with _Step(
+        shell, "On one clock, in pairs", done, alt="Motion and wind on one clock, and the evidence"
+    ) as step:
+        artifacts = {
+            row["kind"]: row["artifact"] for row in shell.read("ls", "--lake", "lake")["artifacts"]
+        }
         pair = ("align", artifacts["camera"][:10], artifacts["wind"][:10], "--lake", "lake")
         estimated = shell.attempt(*pair, "--search", "60", "--plot", "alignment.png")
         step.found = estimated or _REFUSED + shell.show(
@@ -313,7 +371,13 @@ def _series(lake_path: Path, recording: Recording) -> str:
     figure = Figure(figsize=(9.5, 3.2), layout="constrained")
     axes = figure.subplots()
     wind = _wind_of_film(recording)
-    axes.plot(np.arange(len(wind)) / AIR_RATE, wind, color="0.75", linewidth=0.8, label="true wind at the flag")
+    axes.plot(
+        np.arange(len(wind)) / AIR_RATE,
+        wind,
+        color="0.75",
+        linewidth=0.8,
+        label="true wind at the flag",
+    )
     axes.errorbar(
         time_,
         value,
@@ -341,7 +405,8 @@ def _moving(video: Path, rate: int) -> str:
 
 
 def _judgement(text: str, true: float) -> Judgement:
-    """Judges the first interval or bound of a text by a true value; a text without one is a refusal."""
+    """Judges the first interval or bound of a text by a true value; a text without one is a
+    refusal."""
     ends = re.search(r"\[([\d.]+), ([\d.]+)\]|at least ([\d.]+)|at most ([\d.]+)", text)
     if ends is None:
         return Judgement.REFUSED

@@ -1,7 +1,9 @@
-"""A tracked flag as a user would bring it: a table of markers from three winds, and a recipe that says what is known.
+"""A tracked flag as a user would bring it: a table of markers from three winds, and a recipe that
+says what is known.
 
-What acts on the cloth beside the base model is drawn here and written nowhere but into the returned `Tracks`, so that
-closing the loop can be compared with it. Mesh, step and method are none of those that the fit uses.
+What acts on the cloth beside the base model is drawn here and written nowhere but into the returned
+`Tracks`, so that closing the loop can be compared with it. Mesh, step and method are none of those
+that the fit uses.
 """
 
 from __future__ import annotations
@@ -120,10 +122,14 @@ def make_tracks(recipe: TrackedRecipe, folder: Path, *, advance: Callable[[int],
     Args:
         advance: called with the number of frames done.
     """
-    flat = grid(width=recipe.width, height=recipe.height, columns=17, rows=11, diagonals=Diagonals.FORWARD)
+    flat = grid(
+        width=recipe.width, height=recipe.height, columns=17, rows=11, diagonals=Diagonals.FORWARD
+    )
     markers = grid(width=recipe.width, height=recipe.height, columns=9, rows=6).rest
     observed = np.einsum("mv,fvcb->bfmc", onto(flat.rest, markers), _flight(recipe, flat, advance))
-    observed = observed + recipe.noise * stream(recipe.seed, "tracked", "noise").standard_normal(observed.shape)
+    observed = observed + recipe.noise * stream(recipe.seed, "tracked", "noise").standard_normal(
+        observed.shape
+    )
     names = [f"{speed:g} m-s" for speed in recipe.speeds]
     table, recipe_file = folder / "tracks.csv", folder / "tracked.toml"
     with table.open("w", newline="", encoding="utf-8") as file:
@@ -133,7 +139,16 @@ def make_tracks(recipe: TrackedRecipe, folder: Path, *, advance: Callable[[int],
             for frame, at in enumerate(positions):
                 for marker, ((u, v), (x, y, z)) in enumerate(zip(markers, at, strict=True)):
                     writer.writerow(
-                        [name, frame, f"m{marker:02d}", f"{u:.4f}", f"{v:.4f}", f"{x:.5f}", f"{y:.5f}", f"{z:.5f}"]
+                        [
+                            name,
+                            frame,
+                            f"m{marker:02d}",
+                            f"{u:.4f}",
+                            f"{v:.4f}",
+                            f"{x:.5f}",
+                            f"{y:.5f}",
+                            f"{z:.5f}",
+                        ]
                     )
     recordings = "".join(
         _RECORDING.format(name=name, rate=recipe.rate, noise=recipe.noise, speed=speed)
@@ -163,13 +178,26 @@ def make_tracks(recipe: TrackedRecipe, folder: Path, *, advance: Callable[[int],
 def _flight(recipe: TrackedRecipe, flat: Mesh, advance: Callable[[int], object]) -> FloatArray:
     """Simulates positions (frame, vertex, 3, recording) [m]."""
     nominal = named_material(MATERIAL)
-    material = replace(nominal.scaled(area_weight=recipe.area_weight, bending=recipe.bending), damping=recipe.damping)
+    material = replace(
+        nominal.scaled(area_weight=recipe.area_weight, bending=recipe.bending),
+        damping=recipe.damping,
+    )
     attachment = Handles(vertices=handles.corners(flat.rest))
     scenes = []
     for index, speed in enumerate(recipe.speeds):
         start = np.stack([flat.rest[:, 0], 0 * flat.rest[:, 0], flat.rest[:, 1]], axis=1)
-        start = roughen_start(start, attachment, stream(recipe.seed, "tracked", "start", index), _ROUGH)
-        scenes.append(Scene(mesh=flat, position=start, material=material, handles=attachment, wind=(speed, 0.0, 0.0)))
+        start = roughen_start(
+            start, attachment, stream(recipe.seed, "tracked", "start", index), _ROUGH
+        )
+        scenes.append(
+            Scene(
+                mesh=flat,
+                position=start,
+                material=material,
+                handles=attachment,
+                wind=(speed, 0.0, 0.0),
+            )
+        )
     effect = EFFECTS[recipe.effect](**{recipe.parameter: recipe.strength})
     method = Symplectic(outer=_OUTER)
     system, state = apply([effect], *assemble(scenes))

@@ -27,7 +27,8 @@ class Transcript:
     cards: list[Card] = field(default_factory=list)
 
     def run(self, *arguments: str) -> str:
-        """Run `flagdata ARGUMENTS` in the folder; its stdout. What it says on stderr passes through.
+        """Run `flagdata ARGUMENTS` in the folder; its stdout. What it says on stderr passes
+        through.
 
         Raises:
             FlagdataError: when it does not exit with 0.
@@ -35,12 +36,15 @@ class Transcript:
         printed, code = self._type_command(arguments)
         if code:
             raise FlagdataError(
-                f"`{self.entries[-1][0]}` ended with {code}", where="the demonstration", fix="see its message above"
+                f"`{self.entries[-1][0]}` ended with {code}",
+                where="the demonstration",
+                fix="see its message above",
             )
         return printed
 
     def attempt(self, *arguments: str) -> str | None:
-        """Runs `show`; returns None where the command refuses because the data fail a quality check.
+        """Runs `show`; returns None where the command refuses because the data fail a quality
+        check.
 
         Raises:
             FlagdataError: when it ends with anything but 0 and 3.
@@ -49,7 +53,9 @@ class Transcript:
         echo_lines(printed, aside=self.aside)
         if code not in (0, RefusedError.exit_code):
             raise FlagdataError(
-                f"`{self.entries[-1][0]}` ended with {code}", where="the demonstration", fix="see its message above"
+                f"`{self.entries[-1][0]}` ended with {code}",
+                where="the demonstration",
+                fix="see its message above",
             )
         return None if code else printed
 
@@ -76,14 +82,16 @@ class Transcript:
         return printed
 
     def read(self, *arguments: str) -> dict[str, Any]:
-        """Runs a command with --json and decodes it; left out of the transcript, which is for people."""
+        """Runs a command with --json and decodes it; left out of the transcript, which is for
+        people."""
         printed = json.loads(self.run(*arguments, "--json"))
         self.entries.pop()
         return printed
 
 
 def _word(argument: str) -> str:
-    """Quotes an argument as a person types it for a shell: in double quotes where it holds single ones, as SQL does."""
+    """Quotes an argument as a person types it for a shell: in double quotes where it holds single
+    ones, as SQL does."""
     if "'" in argument and not set(argument) & set('"$`\\!'):
         return f'"{argument}"'
     return shlex.quote(argument)

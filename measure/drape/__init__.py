@@ -1,4 +1,5 @@
-"""The cloth of a drape test: scans of discs over a pedestal, simulated drapes, and the bending that fits."""
+"""The cloth of a drape test: scans of discs over a pedestal, simulated drapes, and the bending that
+fits."""
 
 from __future__ import annotations
 

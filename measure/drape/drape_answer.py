@@ -42,7 +42,8 @@ class Draped:
         area_weight: as it was stated [kg/m²].
         faces: the drapes of one face, or of two.
         fit: of all of them as of one cloth.
-        cloth: bending length and bending of the mean of warp and weft, their ratio's logarithm, shear over weight.
+        cloth: bending length and bending of the mean of warp and weft, their ratio's logarithm,
+            shear over weight.
         draws: name → (n,) of the posterior.
         findings: what a reader has to know.
         level: of the intervals.
@@ -66,7 +67,8 @@ class Draped:
             return f"bending length {phrase}, {length.span.percent}, n = {count} drapes"
         low, high = bending.interval
         return (
-            f"bending {bending.value:.3g} N·m [{low:.3g}, {high:.3g}] {self.level * 100:.3g} %, n = {count} drapes "
+            f"bending {bending.value:.3g} N·m [{low:.3g}, {high:.3g}] {self.level * 100:.3g} %, n "
+            f"= {count} drapes "
             f"at {self.area_weight.text} kg/m²"
         )
 
@@ -105,7 +107,9 @@ def face_of(folder: Path, *, first: int = 0) -> Face:
     files = sorted(path for path in folder.iterdir() if path.suffix.lower() == ".obj")
     if not files:
         raise NotFoundError(
-            "there are no .obj files", where=str(folder), fix="name the folder with the scans of the drapes"
+            "there are no .obj files",
+            where=str(folder),
+            fix="name the folder with the scans of the drapes",
         )
     shapes = []
     for path in files:
@@ -121,8 +125,11 @@ def face_of(folder: Path, *, first: int = 0) -> Face:
     return Face(shapes=np.stack(shapes), specimen=first + np.arange(len(files)))
 
 
-def read_drapes(chosen: Calibrating, *, workers: int, advance: Callable[[int], object] | None = None) -> Draped:
-    """Finds the cloth of the drapes in a folder, or in two, the second of drapes with the other face up.
+def read_drapes(
+    chosen: Calibrating, *, workers: int, advance: Callable[[int], object] | None = None
+) -> Draped:
+    """Finds the cloth of the drapes in a folder, or in two, the second of drapes with the other
+    face up.
 
     Args:
         workers: processes that simulate.
@@ -139,19 +146,24 @@ def read_drapes(chosen: Calibrating, *, workers: int, advance: Callable[[int], o
     strange = [str(folder) for folder in folders if not folder.is_dir()]
     if strange or len(folders) < len(several):
         raise UsageError(
-            f"{strange[0] if strange else 'a table'} is no folder of drapes, and a weight is stated of drapes alone",
+            f"{strange[0] if strange else 'a table'} is no folder of drapes, and a weight is "
+            "stated of drapes alone",
             where="--area-weight",
             fix="name folders of .obj files, or leave --area-weight out: a flag is weighed",
         )
     if len(folders) > 2:
         raise UsageError(
-            f"{len(folders)} folders of drapes", where="RECORDING", fix="give one, or two: the second of the other face"
+            f"{len(folders)} folders of drapes",
+            where="RECORDING",
+            fix="give one, or two: the second of the other face",
         )
     faces: list[Face] = []
     for folder in folders:
         faces.append(face_of(folder, first=sum(len(face.specimen) for face in faces)))
     kept = folder_of(chosen)
-    found = simulated_drapes(chosen.simulations, seed=chosen.seed, folder=kept, workers=workers, advance=advance)
+    found = simulated_drapes(
+        chosen.simulations, seed=chosen.seed, folder=kept, workers=workers, advance=advance
+    )
     weight = Stated.of(chosen.area_weight or 0.0)
     return answer_of(Surface.fit(*found), faces, weight, level=chosen.level, seed=chosen.seed)
 
@@ -175,7 +187,9 @@ def calibrate_drapes(chosen: Calibrating) -> Calibrated:
     )
 
 
-def answer_of(surface: Surface, faces: Sequence[Face], area_weight: Stated, *, level: float, seed: int) -> Draped:
+def answer_of(
+    surface: Surface, faces: Sequence[Face], area_weight: Stated, *, level: float, seed: int
+) -> Draped:
     """Returns the answer from measured drapes.
 
     Raises:
@@ -185,17 +199,21 @@ def answer_of(surface: Surface, faces: Sequence[Face], area_weight: Stated, *, l
     """
     if area_weight.low <= 0:
         raise UsageError(
-            f"the area weight is {area_weight.text} kg/m²", where="--area-weight", fix="give kg/m² above 0, as in 0.192"
+            f"the area weight is {area_weight.text} kg/m²",
+            where="--area-weight",
+            fix="give kg/m² above 0, as in 0.192",
         )
     fit = fit_drapes(surface, [together(faces)], model=Model.BASE, seed=seed)
     if fit.tail < UNLIKE:
         shown = fit.predicted[:, 0, 0]
         raise RefusedError(
             f"no simulated cloth drapes as these scans do: their drape coefficient is "
-            f"{together(faces).shapes[:, 0].mean():.3f}, the nearest simulated ones have {np.median(shown):.3f} "
+            f"{together(faces).shapes[:, 0].mean():.3f}, the nearest simulated ones have "
+            f"{np.median(shown):.3f} "
             f"(p = {fit.tail:.2g})",
             where="drapes",
-            fix="look at the scans; cloth with a bending length below 10 mm is too limp for this model",
+            fix="look at the scans; cloth with a bending length below 10 mm is too limp for this "
+            "model",
         )
     weight = _drawn(area_weight, len(fit.predicted), seed=seed)
     length = fit.cloth[BENDING_LENGTH.name]
@@ -225,7 +243,9 @@ def _drawn(area_weight: Stated, count: int, *, seed: int) -> FloatArray:
     rng = stream(seed, "drape", "weight")
     if area_weight.low < area_weight.high:
         return rng.uniform(area_weight.low, area_weight.high, count)
-    return np.maximum(area_weight.low + area_weight.sigma * rng.standard_normal(count), 1e-3 * area_weight.low)
+    return np.maximum(
+        area_weight.low + area_weight.sigma * rng.standard_normal(count), 1e-3 * area_weight.low
+    )
 
 
 def _lost(faces: Sequence[Face]) -> tuple[Finding, ...]:
@@ -236,7 +256,8 @@ def _lost(faces: Sequence[Face]) -> tuple[Finding, ...]:
         Finding(
             kind="scans-lose-area",
             severity=Severity.WARNING,
-            what=f"the scans' area differs from the flat cloth's by {lost:.1%}; the interval allows for it",
+            what=f"the scans' area differs from the flat cloth's by {lost:.1%}; the interval "
+            "allows for it",
             value=lost,
             fix="scan the insides of the folds as well",
         ),
@@ -262,7 +283,8 @@ def _differ(surface: Surface, faces: Sequence[Face], *, seed: int) -> tuple[Find
     if len(faces) < 2:
         return ()
     base, curled, sided = (
-        fit_drapes(surface, faces, model=m, seed=seed) for m in (Model.BASE, Model.CURLED, Model.SIDED)
+        fit_drapes(surface, faces, model=m, seed=seed)
+        for m in (Model.BASE, Model.CURLED, Model.SIDED)
     )
     gain, rival = curled.evidence - base.evidence, sided.evidence - base.evidence
     if max(gain, rival) < 3:
@@ -271,7 +293,8 @@ def _differ(surface: Surface, faces: Sequence[Face], *, seed: int) -> tuple[Find
     cause = (
         f"rest curvature explains it (evidence {gain:+.1f} nat)"
         if gain >= rival
-        else f"rest curvature does not explain it (evidence {gain:+.1f} nat, of bending by face {rival:+.1f})"
+        else f"rest curvature does not explain it (evidence {gain:+.1f} nat, of bending by face "
+        f"{rival:+.1f})"
     )
     return (
         Finding(

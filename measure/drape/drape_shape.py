@@ -1,8 +1,10 @@
 """What a drape shows: drape coefficient, folds and lobes of its rim, from a registered mesh.
 
-The drape coefficient is the area of the rim's projection beyond the pedestal over that of the flat border (Cusick, J.
-Text. Inst. 59:253, 1968; ISO 9073-9). The rim's distance from the axis, R(φ) at the angle φ that a vertex has in the
-flat cloth, is a Fourier series: order 2 shows cloth that is stiffer along one thread, the higher ones are folds.
+The drape coefficient is the area of the rim's projection beyond the pedestal over that of the flat
+border (Cusick, J. Text. Inst. 59:253, 1968; ISO 9073-9). The rim's distance from the axis, R(φ) at
+the angle φ that a vertex has in the
+flat cloth, is a Fourier series: order 2 shows cloth that is stiffer along one thread, the higher
+ones are folds.
 """
 
 from __future__ import annotations
@@ -27,12 +29,13 @@ class Shape:
 
     Attributes:
         coefficient: drape coefficient.
-        lobe: amplitude of order 2 of the rim's distance from the axis, over the disc's radius: complex, its phase is
-            twice the direction of the wider lobe.
+        lobe: amplitude of order 2 of the rim's distance from the axis, over the disc's radius:
+            complex, its phase is twice the direction of the wider lobe.
         folding: root mean square of the orders 3 to 14, over the disc's radius.
         folds: the strongest of these orders.
         height: mean height of the rim over the pedestal's top [m].
-        area: of the mesh over that of the flat cloth; 1 of a cloth that does not stretch and a scan that loses nothing.
+        area: of the mesh over that of the flat cloth; 1 of a cloth that does not stretch and a scan
+            that loses nothing.
     """
 
     coefficient: float
@@ -43,7 +46,8 @@ class Shape:
     area: float
 
     def numbers(self) -> FloatArray:
-        """Returns (7,) coefficient, real and imaginary part of the lobe, folding, folds, height, area."""
+        """Returns (7,) coefficient, real and imaginary part of the lobe, folding, folds, height,
+        area."""
         coefficient, lobe, *others = astuple(self)
         return np.array([coefficient, lobe.real, lobe.imag, *others])
 
@@ -90,9 +94,15 @@ def shape_of(
 
 
 def place_scan(
-    rest: FloatArray, position: FloatArray, *, where: str, radius: float = DISC, pedestal: float = PEDESTAL
+    rest: FloatArray,
+    position: FloatArray,
+    *,
+    where: str,
+    radius: float = DISC,
+    pedestal: float = PEDESTAL,
 ) -> tuple[FloatArray, FloatArray]:
-    """Moves a scan's axis to the origin and the pedestal's top to z = 0, and scales its flat cloth to metres.
+    """Moves a scan's axis to the origin and the pedestal's top to z = 0, and scales its flat cloth
+    to metres.
 
     Args:
         rest: (vertex, 2) in any unit, of a disc around any centre.
@@ -116,7 +126,8 @@ def place_scan(
         raise InputError(
             "the cloth on the pedestal is not level to 10 mm",
             where=where,
-            fix=f"export positions in metres with z upwards, of a drape over a pedestal of {pedestal:g} m radius",
+            fix="export positions in metres with z upwards, of a drape over a pedestal of "
+            f"{pedestal:g} m radius",
         )
     # Of a rigid move: flat places on the pedestal go to where the scan has them.
     axis = position[top, :2].mean(axis=0) - flat[top].mean(axis=0)

@@ -1,8 +1,10 @@
-"""Simulated drapes over the range of cloths, once for all fabrics: rest depends on stiffness over weight alone.
+"""Simulated drapes over the range of cloths, once for all fabrics: rest depends on stiffness over
+weight alone.
 
-The cloth is in its simplest form: stretching and shear of constant stiffness, and bending that differs between warp and
-weft. What bends it is the tables' rows for edges along u, between, and along v; on a mesh of nearly equilateral
-triangles without a preferred direction the cloth then bends as a plate with a quarter of them (see `ratio`).
+The cloth is in its simplest form: stretching and shear of constant stiffness, and bending that
+differs between warp and weft. What bends it is the tables' rows for edges along u, between, and
+along v; on a mesh of nearly equilateral triangles without a preferred direction the cloth then
+bends as a plate with a quarter of them (see `ratio`).
 """
 
 from __future__ import annotations
@@ -38,7 +40,8 @@ LIMIT = 0.9
 AREA_WEIGHT = 0.2
 """Of all simulated cloths [kg/m²]: rest depends on ratios to it."""
 _STRETCHING = 1500.0
-"""Stretching over weight, Y h/ρ [m²/s²]: 300 N/m at 0.2 kg/m², so that its weight strains a drape by 0.0004."""
+"""Stretching over weight, Y h/ρ [m²/s²]: 300 N/m at 0.2 kg/m², so that its weight strains a drape
+by 0.0004."""
 _DAMPING = 0.01
 _BATCH = 16
 
@@ -46,7 +49,8 @@ BENDING_LENGTH = Uncertain(
     name="bending_length",
     unit="m",
     prior=Range(low=0.008, high=0.032, scale=Scale.LOG),
-    source="(B/(ρ g))^(1/3) (Peirce 1930) of B, the geometric mean of warp and weft; below it folds are narrower than "
+    source="(B/(ρ g))^(1/3) (Peirce 1930) of B, the geometric mean of warp and weft; below it "
+    "folds are narrower than "
     "the mesh, above it a disc of 0.3 m hardly drapes",
     limits=(0.0, np.inf),
 )
@@ -54,13 +58,15 @@ ANISOTROPY = Uncertain(
     name="anisotropy",
     unit="1",
     prior=Range(low=-1.2, high=1.2),
-    source="half the logarithm of the rows for edges across over along u: warp and weft by a factor of up to 3.3",
+    source="half the logarithm of the rows for edges across over along u: warp and weft by a "
+    "factor of up to 3.3",
 )
 SHEAR = Uncertain(
     name="shear",
     unit="m²/s²",
     prior=Range(low=50.0, high=3000.0, scale=Scale.LOG),
-    source="k3 over weight: 10 to 600 N/m at 0.2 kg/m²; fabrics shear with 30 to 170 N/m, k3 is twice that",
+    source="k3 over weight: 10 to 600 N/m at 0.2 kg/m²; fabrics shear with 30 to 170 N/m, k3 is "
+    "twice that",
     limits=(0.0, np.inf),
 )
 CURVATURE = Uncertain(
@@ -89,8 +95,9 @@ def material(bending_length: float, anisotropy: float, shear: float) -> Material
 
 
 def _shares(anisotropy: float) -> tuple[float, float]:
-    """Computes 4 B/k of bending along u and along v, for the row in between k = 1: 3 ⟨k(φ) (4/3 cos²ψ − 1/3)²⟩ over
-    edges of all directions φ, ψ being the angle of their normal to the bent direction."""
+    """Computes 4 B/k of bending along u and along v, for the row in between k = 1: 3 ⟨k(φ) (4/3
+    cos²ψ − 1/3)²⟩ over edges of all directions φ, ψ being the angle of their normal to the bent
+    direction."""
     edges = (np.arange(720) + 0.5) * np.pi / 720
     folded = np.minimum(edges, np.pi - edges)
     k = direction_rows(folded) @ np.exp(np.array([-anisotropy, 0.0, anisotropy]))
@@ -160,7 +167,9 @@ class DrapeBatch:
         """Simulates and measures them: (drape, 7), see `Shape.numbers`."""
         made, rim = mesh(self.rows)
         positions = self.positions()
-        return np.stack([shape_of(made, positions[..., i], rim=rim).numbers() for i in range(len(self.seeds))])
+        return np.stack(
+            [shape_of(made, positions[..., i], rim=rim).numbers() for i in range(len(self.seeds))]
+        )
 
 
 def batches(count: int, *, seed: int) -> list[DrapeBatch]:
@@ -176,14 +185,21 @@ def batches(count: int, *, seed: int) -> list[DrapeBatch]:
 
 
 def simulated_drapes(
-    count: int, *, seed: int, folder: Path, workers: int = 1, advance: Callable[[int], object] | None = None
+    count: int,
+    *,
+    seed: int,
+    folder: Path,
+    workers: int = 1,
+    advance: Callable[[int], object] | None = None,
 ) -> tuple[Mapping[str, FloatArray], FloatArray]:
-    """Returns the values, name → (drape,), and the shapes (drape, 7) of simulated drapes; those that the folder lacks
-    are simulated, as in `measure.cloth.design`.
+    """Returns the values, name → (drape,), and the shapes (drape, 7) of simulated drapes; those
+    that the folder lacks are simulated, as in `measure.cloth.design`.
 
     Args:
         advance: called with the number of drapes that were simulated or found.
     """
     several = batches(count, seed=seed)
     shapes = readings_of(several, folder=folder, workers=workers, advance=advance)
-    return {about.name: np.concatenate([b.values[about.name] for b in several]) for about in CLOTH}, shapes
+    return {
+        about.name: np.concatenate([b.values[about.name] for b in several]) for about in CLOTH
+    }, shapes

@@ -1,12 +1,14 @@
-"""Bending over weight from drapes: a response surface of simulated ones, and the cloths under which it shows the same.
+"""Bending over weight from drapes: a response surface of simulated ones, and the cloths under which
+it shows the same.
 
-Each figure of a drape is a quadratic polynomial of the logarithms of bending length and shear, of anisotropy and of
-rest curvature, fitted to simulated drapes by least squares; their scatter about it is that of the resting shapes that
-one cloth has. What is compared are means over drapes of one face. A lobe of the rim has the direction of the stiffer
-thread, so that lobes are taken along their common direction; the threads that the cloth curls along may be either.
+Each figure of a drape is a quadratic polynomial of the logarithms of bending length and shear, of
+anisotropy and of rest curvature, fitted to simulated drapes by least squares; their scatter about
+it is that of the resting shapes that one cloth has. What is compared are means over drapes of one
+face. A lobe of the rim has the direction of the stiffer thread, so that lobes are taken along their
+common direction; the threads that the cloth curls along may be either.
 
-Posterior draws are weighted draws of the prior, at first of all of it, then of the ranges in which cloths were near.
-Evidences of models follow as mean weights.
+Posterior draws are weighted draws of the prior, at first of all of it, then of the ranges in which
+cloths were near. Evidences of models follow as mean weights.
 """
 
 from __future__ import annotations
@@ -28,10 +30,11 @@ from sim.run.cusick_drape import DISC, PEDESTAL
 
 COEFFICIENT, LOBE = 0, 1
 NUMERICS = (0.01, 0.004)
-"""What a finer mesh changes of drape coefficient and lobe, as standard deviations: the means of twelve drapes on meshes
-of 6, 9 and 12 rows differ by less."""
+"""What a finer mesh changes of drape coefficient and lobe, as standard deviations: the means of
+twelve drapes on meshes of 6, 9 and 12 rows differ by less."""
 UNLIKE = 0.01
-"""Tail probability of the misfit below which no simulated cloth drapes as the scans do, as for films."""
+"""Tail probability of the misfit below which no simulated cloth drapes as the scans do, as for
+films."""
 WET_MASS = Uncertain(
     name="wet_mass",
     unit="1",
@@ -43,7 +46,8 @@ SIDEDNESS = Uncertain(
     name="sidedness",
     unit="1",
     prior=Range(low=-0.2, high=0.2),
-    source="logarithm of the bending length with the first face up over that of the mean: bending by up to 3 to 1",
+    source="logarithm of the bending length with the first face up over that of the mean: bending "
+    "by up to 3 to 1",
 )
 _DRAWS = 1 << 16
 _ROUNDS = 2
@@ -64,7 +68,8 @@ class Model(StrEnum):
     WET = "wet-mass"
     """More weight than was stated, on both faces."""
     SIDED = "bending by face"
-    """Bending length that is larger with one face up and smaller with the other: of no effect in the library."""
+    """Bending length that is larger with one face up and smaller with the other: of no effect in
+    the library."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,7 +78,8 @@ class Face:
 
     Attributes:
         shapes: (drape, 7), see `Shape.numbers`.
-        specimen: (drape,) number of the piece of cloth that each is of; drapes of one are no independent ones.
+        specimen: (drape,) number of the piece of cloth that each is of; drapes of one are no
+            independent ones.
     """
 
     shapes: FloatArray
@@ -88,12 +94,14 @@ class Face:
         """Computes (specimen, 2) mean drape coefficient and lobe along a direction [rad]."""
         lobe = (self.shapes[:, 1] + 1j * self.shapes[:, 2]) * np.exp(-2j * direction)
         figures = np.stack([self.shapes[:, 0], lobe.real], axis=1)
-        return np.stack([figures[self.specimen == number].mean(axis=0) for number in np.unique(self.specimen)])
+        return np.stack(
+            [figures[self.specimen == number].mean(axis=0) for number in np.unique(self.specimen)]
+        )
 
     @property
     def scatter(self) -> float:
-        """Returns the standard deviation of drape coefficients about the mean of their specimen; NaN without
-        repeats."""
+        """Returns the standard deviation of drape coefficients about the mean of their specimen;
+        NaN without repeats."""
         groups = [self.shapes[self.specimen == number, 0] for number in np.unique(self.specimen)]
         freedom = sum(len(group) - 1 for group in groups)
         squares = sum(float(np.square(group - group.mean()).sum()) for group in groups)
@@ -101,14 +109,16 @@ class Face:
 
     @property
     def lost(self) -> float:
-        """Returns the share of the area that the scans lack in the mean, below 0 where they have too much."""
+        """Returns the share of the area that the scans lack in the mean, below 0 where they have
+        too much."""
         return 1 - float(self.shapes[:, 6].mean())
 
 
 def together(faces: Sequence[Face]) -> Face:
     """Joins drapes of both faces."""
     return Face(
-        shapes=np.concatenate([face.shapes for face in faces]), specimen=np.concatenate([f.specimen for f in faces])
+        shapes=np.concatenate([face.shapes for face in faces]),
+        specimen=np.concatenate([f.specimen for f in faces]),
     )
 
 
@@ -143,13 +153,19 @@ class Surface:
         count, several = terms.shape
         if count < 2 * several:
             raise InputError(
-                f"{count} simulated drapes are too few for {several} terms", where="drapes", fix=f"give {2 * several}"
+                f"{count} simulated drapes are too few for {several} terms",
+                where="drapes",
+                fix=f"give {2 * several}",
             )
         inverse = np.asarray(np.linalg.inv(terms.T @ terms), dtype=np.float64)
         figures = shapes[:, [COEFFICIENT, LOBE]]
         coefficients = inverse @ terms.T @ figures
         squares = np.square(figures - terms @ coefficients).sum(axis=0)
-        return cls(coefficients=coefficients, inverse=inverse, residual=np.sqrt(squares / (count - several)))
+        return cls(
+            coefficients=coefficients,
+            inverse=inverse,
+            residual=np.sqrt(squares / (count - several)),
+        )
 
     def at(self, values: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
         """Computes the mean figures (cloth, 2) and the variances of these means."""
@@ -159,7 +175,8 @@ class Surface:
 
 
 def _terms(values: Mapping[str, FloatArray]) -> FloatArray:
-    """Computes (cloth, term): all products of up to two scaled quantities, and the cube of the bending length's."""
+    """Computes (cloth, term): all products of up to two scaled quantities, and the cube of the
+    bending length's."""
     scaled = []
     for about in CLOTH:
         low, high = about.at(np.array([0.0, 1.0]))
@@ -178,7 +195,8 @@ class Fit:
 
     Attributes:
         model: what was let differ.
-        cloth: name → (n,) posterior draws; anisotropy of the direction of the lobes over that across it.
+        cloth: name → (n,) posterior draws; anisotropy of the direction of the lobes over that
+            across it.
         across: (n,) whether the cloth curls across that direction.
         predicted: (n, face, 2) mean drape coefficient and lobe of each draw.
         direction: of the lobes [rad].
@@ -201,13 +219,16 @@ def fit_drapes(surface: Surface, faces: Sequence[Face], *, model: Model, seed: i
     """Finds the cloths that drape as scans of one face do, or of two.
 
     Raises:
-        InputError: no face, more than two, a face of less than two specimens, or one face where faces are to differ.
+        InputError: no face, more than two, a face of less than two specimens, or one face where
+            faces are to differ.
     """
     if not 1 <= len(faces) <= 2 or any(len(np.unique(face.specimen)) < 2 for face in faces):
         raise InputError(
-            f"{len(faces)} sets of drapes, the smallest of {min((len(f.specimen) for f in faces), default=0)} pieces",
+            f"{len(faces)} sets of drapes, the smallest of "
+            f"{min((len(f.specimen) for f in faces), default=0)} pieces",
             where="drapes",
-            fix="give one folder of drapes, or two for two faces, with two pieces of cloth or more in each",
+            fix="give one folder of drapes, or two for two faces, with two pieces of cloth or more "
+            "in each",
         )
     direction = direction_of(faces)
     quantities = (*CLOTH, WET_MASS, SIDEDNESS)
@@ -217,7 +238,9 @@ def fit_drapes(surface: Surface, faces: Sequence[Face], *, model: Model, seed: i
         near = drawn.log_weight > drawn.log_weight.max() - _NEAR
         narrowed = tuple(_narrow_range(about, drawn.values[about.name][near]) for about in narrowed)
         drawn = _weigh_draws(surface, faces, direction, model, narrowed, seed=seed)
-    volume = sum(_log_share(about, within) for about, within in zip(quantities, narrowed, strict=True))
+    volume = sum(
+        _log_share(about, within) for about, within in zip(quantities, narrowed, strict=True)
+    )
     best = drawn.log_weight.max()
     weight = np.exp(drawn.log_weight - best)
     chosen = stream(seed, "drape", "resample").choice(_DRAWS, _KEPT, p=weight / weight.sum())
@@ -240,7 +263,8 @@ class _Weighed:
     """Draws of cloths and how well they drape as the scans do.
 
     Attributes:
-        values: name → (n,), with anisotropy of the thread that the cloth curls along over the other.
+        values: name → (n,), with anisotropy of the thread that the cloth curls along over the
+            other.
         across: (n,) whether it curls across the lobes' direction.
         predicted: (n, face, 2).
         log_weight: (n,) logarithms of their likelihood.
@@ -273,20 +297,29 @@ def _weigh_draws(
         figures, variance = surface.at(_of_face(values, model, number))
         figures[:, LOBE] = np.where(across, -figures[:, LOBE], figures[:, LOBE])
         means = face.means(direction)
-        measured[number], repeats[number] = means.mean(axis=0), means.var(axis=0, ddof=1) / len(means)
-        lost[number, COEFFICIENT] = face.lost * DISC**2 / (DISC**2 - PEDESTAL**2) * measured[number, COEFFICIENT]
+        measured[number], repeats[number] = (
+            means.mean(axis=0),
+            means.var(axis=0, ddof=1) / len(means),
+        )
+        lost[number, COEFFICIENT] = (
+            face.lost * DISC**2 / (DISC**2 - PEDESTAL**2) * measured[number, COEFFICIENT]
+        )
         predicted[:, number], deviation[:, number] = figures, np.sqrt(variance)
     misfit, determinant = np.zeros((2, _DRAWS))
     for figure in (COEFFICIENT, LOBE):
         # The surface, the mesh and lost area err alike on both faces; repeats do not.
         alike = deviation[:, :, figure]
         covariance = alike[:, :, None] * alike[:, None, :] + NUMERICS[figure] ** 2
-        covariance = covariance + np.outer(lost[:, figure], lost[:, figure]) + np.diag(repeats[:, figure])
+        covariance = (
+            covariance + np.outer(lost[:, figure], lost[:, figure]) + np.diag(repeats[:, figure])
+        )
         apart = (measured - predicted)[:, :, figure, None]
         misfit += (apart * np.linalg.solve(covariance, apart)).sum(axis=(1, 2))
         determinant += np.linalg.slogdet(2 * np.pi * covariance)[1]
     log_weight = -(misfit + determinant) / 2
-    return _Weighed(values=values, across=across, predicted=predicted, log_weight=log_weight, misfit=misfit)
+    return _Weighed(
+        values=values, across=across, predicted=predicted, log_weight=log_weight, misfit=misfit
+    )
 
 
 def _narrow_range(about: Uncertain, near: FloatArray) -> Uncertain:
@@ -307,7 +340,9 @@ def _log_share(about: Uncertain, within: Uncertain) -> float:
     return float(np.log(np.diff(part) / np.diff(whole))[0])
 
 
-def _of_face(prior: Mapping[str, FloatArray], model: Model, number: int) -> Mapping[str, FloatArray]:
+def _of_face(
+    prior: Mapping[str, FloatArray], model: Model, number: int
+) -> Mapping[str, FloatArray]:
     """Returns the cloths as they drape with a face up: 0 the first, 1 the other."""
     values = dict(prior)
     sign = {Model.CURLED: (1.0, -1.0), Model.ALIKE: (1.0, 1.0)}.get(model, (0.0, 0.0))[number]
@@ -315,5 +350,7 @@ def _of_face(prior: Mapping[str, FloatArray], model: Model, number: int) -> Mapp
     if model is Model.WET:
         values[BENDING_LENGTH.name] = prior[BENDING_LENGTH.name] / np.cbrt(1 + prior[WET_MASS.name])
     if model is Model.SIDED:
-        values[BENDING_LENGTH.name] = prior[BENDING_LENGTH.name] * np.exp((1 - 2 * number) * prior[SIDEDNESS.name])
+        values[BENDING_LENGTH.name] = prior[BENDING_LENGTH.name] * np.exp(
+            (1 - 2 * number) * prior[SIDEDNESS.name]
+        )
     return values

@@ -1,4 +1,5 @@
-"""Wind and cloth of one recording, with intervals, or the reason why not: what `flagdata measure` does."""
+"""Wind and cloth of one recording, with intervals, or the reason why not: what `flagdata measure`
+does."""
 
 from __future__ import annotations
 
@@ -7,7 +8,14 @@ from typing import TYPE_CHECKING
 from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from measure.estimate.combine import CARD_KEY, OWN, UNKNOWN, Dependence, combine_windows, of_model
+    from measure.estimate.combine import (
+        CARD_KEY,
+        OWN,
+        UNKNOWN,
+        Dependence,
+        combine_windows,
+        of_model,
+    )
     from measure.estimate.film_answer import LEAST_INFORMATION, SHORT, information
     from measure.estimate.film_measuring import Measurement, measure
     from measure.estimate.film_posterior import DRAWS, FilmAnswer

@@ -1,4 +1,5 @@
-"""Entries of a model's card that a study measured: read here, in one way, wherever they are used."""
+"""Entries of a model's card that a study measured: read here, in one way, wherever they are
+used."""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ def card_entry(
 
     Args:
         key: of the entry.
-        of_entry: makes it of the card's values; raises KeyError, TypeError, ValueError or InputError where it cannot.
+        of_entry: makes it of the card's values; raises KeyError, TypeError, ValueError or
+            InputError where it cannot.
         study: that measures it, as in `python -m tests.studies STUDY`.
 
     Raises:
@@ -36,5 +38,6 @@ def card_entry(
         raise CorruptError(
             f"the card's {key} cannot be used: {error}",
             where=f"model {model.name!r}",
-            fix="measure it anew, in a checkout of flagdata: " + command_line("python", "-m", "tests.studies", study),
+            fix="measure it anew, in a checkout of flagdata: "
+            + command_line("python", "-m", "tests.studies", study),
         ) from None

@@ -1,24 +1,28 @@
-"""Several windows of one recording as one answer: the cloth is one and the same, each window has its own wind.
+"""Several windows of one recording as one answer: the cloth is one and the same, each window has
+its own wind.
 
 *Cloth.* If windows were independent given θ, their likelihoods would multiply:
 
     p(θ | x_1 … x_K) ∝ p(θ) Π_k [p(θ | x_k) / p(θ)].
 
-They are not: windows of one film share its view, light and scale, and so the errors these cause. With a correlation ρ
-of the errors of two windows, the mean of K estimates has the variance σ² (1 + (K − 1) ρ)/K of
+They are not: windows of one film share its view, light and scale, and so the errors these cause.
+With a correlation ρ of the errors of two windows, the mean of K estimates has the variance σ² (1 +
+(K − 1) ρ)/K of
 
     K_eff = K / (1 + (K − 1) ρ)
 
-independent ones, which is never more than 1/ρ (Kish, Survey Sampling, 1965, section 5.4). The likelihood is therefore
-tempered by K_eff/K. Means and covariances are those of Gaussians on the targets' logits, on which models are trained.
-In coordinates in which the prior is a standard normal distribution, window k contributes the precision Λ_k = S_k⁻¹ − 1,
-from which directions that are less precise than the prior are left out, and the information S_k⁻¹ m_k along the others.
-The shape is not made Gaussian: the draws are the windows' own, each less its window's mean and over the square root of
-its covariance, at the mean and with the covariance of the product.
+independent ones, which is never more than 1/ρ (Kish, Survey Sampling, 1965, section 5.4). The
+likelihood is therefore tempered by K_eff/K. Means and covariances are those of Gaussians on the
+targets' logits, on which models are trained. In coordinates in which the prior is a standard normal
+distribution, window k contributes the precision Λ_k = S_k⁻¹ − 1, from which directions that are
+less precise than the prior are left out, and the information S_k⁻¹ m_k along the others.
+The shape is not made Gaussian: the draws are the windows' own, each less its window's mean and over
+the square root of its covariance, at the mean and with the covariance of the product.
 
-*Wind.* The wind of window k given the cloth is its residual r_k about the regression on cloth, w_k = r_k + B_k θ, at
-the cloth that all windows agree on (Matheron's rule). The residuals keep each window's own distribution; among windows
-they are drawn with the correlation ρ of a Gaussian copula. The recording's wind is the mean over its windows.
+*Wind.* The wind of window k given the cloth is its residual r_k about the regression on cloth, w_k
+= r_k + B_k θ, at the cloth that all windows agree on (Matheron's rule). The residuals keep each
+window's own distribution; among windows they are drawn with the correlation ρ of a Gaussian copula.
+The recording's wind is the mean over its windows.
 
 One window is left as it is.
 """
@@ -63,7 +67,9 @@ class Dependence:
 
     def __post_init__(self) -> None:
         if not (0 <= self.wind <= 1 and 0 <= self.cloth <= 1):
-            raise InputError(f"correlations {self.wind:g} and {self.cloth:g}", fix="give numbers from 0 to 1")
+            raise InputError(
+                f"correlations {self.wind:g} and {self.cloth:g}", fix="give numbers from 0 to 1"
+            )
 
     @classmethod
     def of_entry(cls, entry: Mapping[str, Any]) -> Dependence:
@@ -72,13 +78,16 @@ class Dependence:
         Raises:
             KeyError, TypeError, ValueError, InputError: it is damaged.
         """
-        return cls(wind=float(entry["wind"]), cloth=float(entry["cloth"]), source=str(entry["source"]))
+        return cls(
+            wind=float(entry["wind"]), cloth=float(entry["cloth"]), source=str(entry["source"])
+        )
 
 
 UNKNOWN = Dependence(
     wind=1.0,
     cloth=1.0,
-    source="not measured for this model, so that windows count as repetitions of one and narrow no interval",
+    source="not measured for this model, so that windows count as repetitions of one and narrow no "
+    "interval",
 )
 CARD_KEY = "window_correlation"
 """Where a model's card states its `Dependence`."""
@@ -95,7 +104,8 @@ def of_model(model: Estimator) -> Dependence:
 
 
 def effective(count: int, correlation: float) -> float:
-    """Computes K_eff: the number of independent estimates that so many correlated ones are worth."""
+    """Computes K_eff: the number of independent estimates that so many correlated ones are
+    worth."""
     return count / (1 + (count - 1) * correlation)
 
 
@@ -119,7 +129,8 @@ def combine_windows(
         exact: targets of the cloth whose values were stated, draw by draw the same in all windows.
 
     Returns:
-        (k, n, own) logits of the targets that each window has its own of, draw by draw in the given correlation, and
+        (k, n, own) logits of the targets that each window has its own of, draw by draw in the given
+            correlation, and
         (n, cloth) of the cloth; both in the order of `names`.
 
     Raises:
@@ -127,7 +138,10 @@ def combine_windows(
     """
     draws = np.asarray(logits, dtype=np.float64)
     if draws.ndim != 3 or not draws.shape[0]:
-        raise InputError(f"draws of shape {draws.shape}", fix="give (window, draw, target) of at least one window")
+        raise InputError(
+            f"draws of shape {draws.shape}",
+            fix="give (window, draw, target) of at least one window",
+        )
     wind_columns = [column for column, name in enumerate(names) if name in OWN]
     cloth_columns = [column for column, name in enumerate(names) if name not in OWN]
     if len(draws) == 1:
@@ -138,12 +152,15 @@ def combine_windows(
         (draws[:, :, free_columns] - centre[free_columns]) / spread[free_columns], dependence.cloth
     )
     shared = joint[:, cloth_columns]
-    winds = _winds(draws[:, :, wind_columns], draws[:, :, cloth_columns], shared, dependence.wind, generator)
+    winds = _winds(
+        draws[:, :, wind_columns], draws[:, :, cloth_columns], shared, dependence.wind, generator
+    )
     return winds, shared
 
 
 def _cloth(white: FloatArray, correlation: float) -> FloatArray:
-    """Draws from the tempered product of posteriors (k, n, cloth), in units of the prior: (n, cloth)."""
+    """Draws from the tempered product of posteriors (k, n, cloth), in units of the prior: (n,
+    cloth)."""
     count, n, size = white.shape
     if not size:
         return np.zeros((n, 0))
@@ -156,7 +173,11 @@ def _cloth(white: FloatArray, correlation: float) -> FloatArray:
         constrained = values < 1
         gain = vectors[:, constrained] * (1 / values[constrained] - 1)
         precision += tempered * gain @ vectors[:, constrained].T
-        information += tempered * (vectors[:, constrained] / values[constrained]) @ (vectors[:, constrained].T @ mean)
+        information += (
+            tempered
+            * (vectors[:, constrained] / values[constrained])
+            @ (vectors[:, constrained].T @ mean)
+        )
         shapes[k] = (window - mean) @ (vectors / np.sqrt(values)) @ vectors.T
     values, vectors = np.linalg.eigh(precision)
     shape = shapes[np.arange(n) % count, np.arange(n)]
@@ -175,7 +196,9 @@ def _winds(
     common = generator.standard_normal(n)
     out = np.empty_like(winds)
     for k in range(count):
-        score = math.sqrt(correlation) * common + math.sqrt(1 - correlation) * generator.standard_normal(n)
+        score = math.sqrt(correlation) * common + math.sqrt(
+            1 - correlation
+        ) * generator.standard_normal(n)
         rank = ndtr(score)
         for column in range(winds.shape[2]):
             slope = _regression(cloths[k], winds[k, :, column])

@@ -1,4 +1,5 @@
-"""The measurement of each quantity: a value with its interval, a bound, or "not constrained by this clip"."""
+"""The measurement of each quantity: a value with its interval, a bound, or "not constrained by this
+clip"."""
 
 from __future__ import annotations
 
@@ -14,8 +15,10 @@ from measure.posterior_ends import PILED, WITHIN, limits_of, span
 from models.networks.targets import ASPECT, TARGETS
 
 LEAST_INFORMATION = 0.05
-"""Information of a posterior over its prior, Kullback–Leibler of Gaussians of the same moments [nat]. Below it the film
-did not constrain it: a posterior of the same mean then has 78 % of the prior's standard deviation or more."""
+"""Information of a posterior over its prior, Kullback–Leibler of Gaussians of the same moments
+[nat]. Below it the film
+did not constrain it: a posterior of the same mean then has 78 % of the prior's standard deviation
+or more."""
 SHORT = {
     "wind_speed": "wind",
     "area_weight": "area weight",
@@ -47,21 +50,24 @@ def phrase(quantity: Quantity, *, first: bool) -> str:
     digits = _digits_of(quantity)
     if span.bound is None:
         interval = span.phrase(digits)
-        return f"{short} {_number(quantity, quantity.value)}{suffix} {interval}" + (f" {span.percent}" if first else "")
+        return f"{short} {_number(quantity, quantity.value)}{suffix} {interval}" + (
+            f" {span.percent}" if first else ""
+        )
     why = "" if quantity.value is not None else f" ({_beyond(quantity)})"
     return f"{short} {span.phrase(digits, suffix)}, {span.percent}{why}"
 
 
 def explain_bound(quantity: Quantity) -> Finding | None:
-    """Reports why a quantity has a bound on one side only; None where it has not, or where nothing lies beyond the
-    end."""
+    """Reports why a quantity has a bound on one side only; None where it has not, or where nothing
+    lies beyond the end."""
     if quantity.value is not None or not quantity.constrained:
         return None
     beyond = "more" if quantity.bound is Bound.LEAST else "less"
     return Finding(
         kind=f"{quantity.name.replace('_', '-')}-at-end",
         severity=Severity.WARNING,
-        what=f"{SHORT[quantity.name]}: {_beyond(quantity)}, and {PILED:.0%} of the draws or more lie within "
+        what=f"{SHORT[quantity.name]}: {_beyond(quantity)}, and {PILED:.0%} of the draws or more "
+        "lie within "
         f"{WITHIN:.0%} of that end; {beyond} would look the same, so that only a bound is given",
         fix="check --flag-size, with which the range grows",
     )
@@ -74,7 +80,11 @@ def _beyond(quantity: Quantity) -> str:
 
 
 def _digits_of(quantity: Quantity) -> int:
-    small = quantity.name == "area_weight" and quantity.assumed is not None and quantity.assumed[1] < 0.1  # of a flag
+    small = (
+        quantity.name == "area_weight"
+        and quantity.assumed is not None
+        and quantity.assumed[1] < 0.1
+    )  # of a flag
     return _DIGITS[quantity.name] + small
 
 
@@ -100,7 +110,8 @@ def quantities(
         names: of the targets.
         level: share of each central interval.
         assumed: (target, 2) range of the simulations, for this size of flag.
-        places: (k, target) of the draws in the range that the model learned, 0 to 1; of means, those of their parts.
+        places: (k, target) of the draws in the range that the model learned, 0 to 1; of means,
+            those of their parts.
         stated_values: name → what the user states of the quantity.
 
     Raises:
@@ -108,7 +119,9 @@ def quantities(
     """
     if not 0 < level < 1:
         raise InputError(
-            f"the level of an interval is {level:g}", where="--level", fix="give a share between 0 and 1, as in 0.9"
+            f"the level of an interval is {level:g}",
+            where="--level",
+            fix="give a share between 0 and 1, as in 0.9",
         )
     answers = []
     for k, name in enumerate(names):
@@ -154,8 +167,8 @@ def _exact(name: str, value: float, *, level: float) -> Quantity:
 
 
 def information(posterior: FloatArray, prior: FloatArray) -> float:
-    """Computes the Kullback–Leibler divergence of two samples' Gaussians, posterior from prior [nat]: ½ (σ²/τ² − 1 − ln
-    σ²/τ² + (m − μ)²/τ²)."""
+    """Computes the Kullback–Leibler divergence of two samples' Gaussians, posterior from prior
+    [nat]: ½ (σ²/τ² − 1 − ln σ²/τ² + (m − μ)²/τ²)."""
     variance = float(prior.var())
     ratio = max(float(posterior.var()) / variance, 1e-12)
     shift = float(posterior.mean() - prior.mean())

@@ -1,4 +1,5 @@
-"""From a film to a measurement: windows, what the model says of each, the gate, one answer for all."""
+"""From a film to a measurement: windows, what the model says of each, the gate, one answer for
+all."""
 
 from __future__ import annotations
 
@@ -18,7 +19,15 @@ from flagdata.errors import FlagdataError, RefusedError, UsageError
 from flagdata.ingest.films.film import Film
 from measure.estimate.combine import OWN, Dependence
 from measure.estimate.film_answer import explain_bound, sentence
-from measure.estimate.film_posterior import DRAWS, WEIGHT, WIND, Among, FilmAnswer, Look, WindowAnswer
+from measure.estimate.film_posterior import (
+    DRAWS,
+    WEIGHT,
+    WIND,
+    Among,
+    FilmAnswer,
+    Look,
+    WindowAnswer,
+)
 from measure.estimate.gusty_series import Gusts, SeriesErrors, errors_of_model
 from measure.estimate.measuring_options import Options
 from measure.film.similarity import RATE_SLACK, Sizes, Trained, length_first, sizes, trained_on
@@ -31,20 +40,22 @@ from models.networks.targets import ASPECT, Cloth
 from models.trained.estimator import Estimator
 
 CONTRADICTION = 1 / 150
-"""Bayes factor of the area weight that was stated, below which a warning is due: very strong evidence against it (Kass
-and Raftery, Journal of the American Statistical Association 90, 1995, section 3.2)."""
+"""Bayes factor of the area weight that was stated, below which a warning is due: very strong
+evidence against it (Kass and Raftery, Journal of the American Statistical Association 90, 1995,
+section 3.2)."""
 
 EXCLUDED = 0.05
-"""Share of the sizes that are possible without the area weight that was given, and not with it, above which a warning
-is due."""
+"""Share of the sizes that are possible without the area weight that was given, and not with it,
+above which a warning is due."""
 
 _REPEATING = 0.1
-"""Share of frames that repeat the one before, above which they are the reason where no window is whole. Lower says so
-of films that lack windows for another reason; of films made with half of the frames a second it is a half."""
+"""Share of frames that repeat the one before, above which they are the reason where no window is
+whole. Lower says so of films that lack windows for another reason; of films made with half of the
+frames a second it is a half."""
 
 _PART = 1 / 3
-"""Share of the film's windows on which an answer rests at least. Lower answers films of which most shows no whole flag,
-or lacks frames; higher refuses films that a flag leaves for a while."""
+"""Share of the film's windows on which an answer rests at least. Lower answers films of which most
+shows no whole flag, or lacks frames; higher refuses films that a flag leaves for a while."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,12 +75,14 @@ class Measurement:
         dependence: of their errors.
         gusts: how strong they are; None where the windows are not taken as one series.
         verdict: of the gate.
-        sizes: of flags at which the gate does not refuse it; all that were considered where it is refused.
+        sizes: of flags at which the gate does not refuse it; all that were considered where it is
+            refused.
         summary: (dimension,) of the window of median p.
-        clip: (frames, height, width) of the first window that counts, at the size at which the film is least strange.
+        clip: (frames, height, width) of the first window that counts, at the size at which the film
+            is least strange.
         findings: on film, size and windows.
-        bounds: why quantities are bounded on one side only, and how the wind depends on a weight that is open: parts
-            of the answer.
+        bounds: why quantities are bounded on one side only, and how the wind depends on a weight
+            that is open: parts of the answer.
     """
 
     film: str
@@ -97,7 +110,8 @@ class Measurement:
         return sentence(self.quantities)
 
     def shown(self, *, anyway: bool) -> bool:
-        """Returns whether it is reported: a refused film only `anyway`, one with nothing to measure never."""
+        """Returns whether it is reported: a refused film only `anyway`, one with nothing to measure
+        never."""
         return self.verdict.measurable and (anyway or not self.verdict.refused)
 
     def notices(self, *, anyway: bool) -> tuple[Finding, ...]:
@@ -145,9 +159,11 @@ def measure(
         advance: called after each window with how many there are and 1.
 
     Raises:
-        UsageError: a model without distributions, a part that the film does not have, or gaps in every window.
+        UsageError: a model without distributions, a part that the film does not have, or gaps in
+            every window.
         InputError: a film that is too short.
-        RefusedError: a film whose frames are too few a second, or repeat too often, so that no window is whole.
+        RefusedError: a film whose frames are too few a second, or repeat too often, so that no
+            window is whole.
     """
     if model.learners[0].objective is not Loss.POSTERIOR:
         raise UsageError(
@@ -155,7 +171,8 @@ def measure(
             where="--model",
             fix="name a model that was trained for a posterior, as the shipped one",
         )
-    # Sizes of flag at which the film is looked at: one where the user states it, else a few of the prior.
+    # Sizes of flag at which the film is looked at: one where the user states it, else a few of the
+    # prior.
     considered = sizes(
         options.size,
         rate=film.rate,
@@ -166,27 +183,42 @@ def measure(
     )
     joint = FilmAnswer(model=model, sizes=considered, options=options)
     scales = considered.scale.tolist()
-    reader = WindowReader(film, model, scales, step=options.step, first=options.first, last=options.last)
+    reader = WindowReader(
+        film, model, scales, step=options.step, first=options.first, last=options.last
+    )
     layout, distinct = reader.layout, reader.distinct
     # The network and the gate look at every window, at every size.
     looks: list[Look] = []
-    clips: UInt8Array | None = None  # of the first window that counts, else of the first with something to measure
+    clips: UInt8Array | None = (
+        None  # of the first window that counts, else of the first with something to measure
+    )
     interpolated, best = 0, -1
     familiar = window_rate(layout.count, options.false_alarm)
     for window in reader.windows(advance):
         look = _look(window, gate, joint)
-        fitness = 0 if look.blank else 1 + any((reasons[0].p or 0.0) > familiar for reasons in look.reasons)
+        fitness = (
+            0
+            if look.blank
+            else 1 + any((reasons[0].p or 0.0) > familiar for reasons in look.reasons)
+        )
         if fitness > best:
             clips, best = window.clips, fitness
         looks.append(look)
         interpolated += window.interpolated
     # The gate judges the film; sizes at which it is unlike the training are dropped.
-    of_film = tuple(finding for finding in film.findings() if model.cloth is Cloth.FLAG or not _of_flags(finding))
+    of_film = tuple(
+        finding
+        for finding in film.findings()
+        if model.cloth is Cloth.FLAG or not _of_flags(finding)
+    )
     faults = [finding for finding in of_film if finding.kind in REASONS]
     if clips is None:
         raise _without_windows(film, reader, faults, considered, trained_on(model.targets))
     gate_verdict = verdict(
-        [look.reasons for look in looks], false_alarm=options.false_alarm, level=gate.level, faults=faults
+        [look.reasons for look in looks],
+        false_alarm=options.false_alarm,
+        level=gate.level,
+        faults=faults,
     )
     if (few := _few_windows(gate_verdict, layout)) is not None:
         gate_verdict = replace(gate_verdict, faults=(*gate_verdict.faults, few))
@@ -194,7 +226,10 @@ def measure(
     answer = FilmAnswer(model=model, sizes=sizes_kept, options=options)
     kept_looks = [look.only(gate_verdict.sizes) for look in looks]
     # One answer of the windows that count, its draws shared by cloth, its winds one gusty series.
-    alone = [answer.window(look, layout, p) for look, p in zip(kept_looks, gate_verdict.window_p, strict=True)]
+    alone = [
+        answer.window(look, layout, p)
+        for look, p in zip(kept_looks, gate_verdict.window_p, strict=True)
+    ]
     counted = _counted_windows(gate_verdict)
     errors = errors_of_model(model)
     apart = _why_apart([alone[k] for k in counted], errors, model.name)
@@ -207,10 +242,16 @@ def measure(
     found = answer.joint([kept_looks[k] for k in used], dependence, among)
     middle = looks[int(np.argsort(gate_verdict.window_p, kind="stable")[len(looks) // 2])]
     of_reading = findings_of(
-        layout, windows_read=len(looks), interpolated=interpolated, frames=distinct.frames, repeated=distinct.repeated
+        layout,
+        windows_read=len(looks),
+        interpolated=interpolated,
+        frames=distinct.frames,
+        repeated=distinct.repeated,
     )
     windows = tuple(
-        answer.window(look, layout, p, found.wind(counted.index(k))) if k in counted and among is not None else own
+        answer.window(look, layout, p, found.wind(counted.index(k)))
+        if k in counted and among is not None
+        else own
         for k, (look, own, p, blank) in enumerate(
             zip(kept_looks, alone, gate_verdict.window_p, gate_verdict.blank, strict=True)
         )
@@ -225,7 +266,9 @@ def measure(
         found.draws,
         series=None
         if errors is None or among is None
-        else lambda at_weight, looks_at: at_weight.series(looks_at, layout, errors, apart=range(len(looks_at))),
+        else lambda at_weight, looks_at: at_weight.series(
+            looks_at, layout, errors, apart=range(len(looks_at))
+        ),
     )
     intensity = found.intensity
     return Measurement(
@@ -240,7 +283,9 @@ def measure(
         windows=windows,
         combined=len(used),
         dependence=dependence,
-        gusts=None if intensity is None else Gusts.of(intensity, level=options.level, windows=len(used)),
+        gusts=None
+        if intensity is None
+        else Gusts.of(intensity, level=options.level, windows=len(used)),
         verdict=gate_verdict,
         sizes=sizes_kept,
         summary=middle.summaries[gate_verdict.size],
@@ -274,7 +319,9 @@ def _look(window: Window, gate: WindowGate, joint: FilmAnswer) -> Look:
         logits = model.logits(embeddings, seed=seed, draws=DRAWS)[:, :DRAWS].double().cpu().numpy()
         log_factor = np.zeros(logits.shape[:2])
     summaries = embeddings[0].cpu().numpy().astype(np.float32)
-    reasons = tuple(gate.judge(clip, summary) for clip, summary in zip(window.clips, summaries, strict=True))
+    reasons = tuple(
+        gate.judge(clip, summary) for clip, summary in zip(window.clips, summaries, strict=True)
+    )
     return Look(
         start=window.start,
         posterior=posterior,
@@ -293,30 +340,37 @@ def _of_flags(finding: Finding) -> bool:
 def _contradiction_finding(stated: Sequence[str], factor: float) -> Finding:
     """Reports that the film speaks against what the user gave, by this Bayes factor."""
     words = (
-        f"the film much less probable (Bayes factor {factor:.2g}): either that is wrong, or the model errs on this film"
+        f"the film much less probable (Bayes factor {factor:.2g}): either that is wrong, or the "
+        "model errs on this film"
     )
     shape = "the shape of the flag by its size"
     if WEIGHT not in stated:
         what = f"{shape}, which was given, makes {words}"
         return Finding.of("flag-size-contradicted", what, value=factor, fix="check --flag-size")
     given = (
-        f"the area weight and {shape}, which were given, make" if ASPECT in stated else "the area weight given makes"
+        f"the area weight and {shape}, which were given, make"
+        if ASPECT in stated
+        else "the area weight given makes"
     )
     return Finding.of(
-        "area-weight-contradicted", f"{given} {words}", value=factor, fix="check --area-weight and --flag-size"
+        "area-weight-contradicted",
+        f"{given} {words}",
+        value=factor,
+        fix="check --area-weight and --flag-size",
     )
 
 
 def _few_windows(gate_verdict: Verdict, layout: WindowLayout) -> Reason | None:
-    """Refuses an answer that would rest on too few of the film's windows, whatever the reason is that others do not
-    count."""
+    """Refuses an answer that would rest on too few of the film's windows, whatever the reason is
+    that others do not count."""
     counting = int(np.count_nonzero(~(np.array(gate_verdict.blank) | gate_verdict.strange)))
     if gate_verdict.unlike or not gate_verdict.measurable or counting >= _PART * layout.count:
         return None
     fault = REASONS["few-windows"]
     return Reason(
         kind="few-windows",
-        what=f"{fault.sentence}: on {counting} of {layout.count} windows, a third at least is needed",
+        what=f"{fault.sentence}: on {counting} of {layout.count} windows, a third at least is "
+        "needed",
         p=None,
         fix=fault.fix,
         value=counting / layout.count,
@@ -329,17 +383,24 @@ def _without_windows(
     """Explains why no window of a film is complete."""
     distinct = reader.distinct
     start, lack = next(iter(reader.lacks.items()))
-    windows = f"none of {reader.layout.count} windows has all its frames: in the one at {start:.2f} s {lack}"
+    windows = (
+        f"none of {reader.layout.count} windows has all its frames: in the one at {start:.2f} s "
+        f"{lack}"
+    )
     still = [fault for fault in faults if fault.kind == "no-motion"]
     if distinct.share > _REPEATING and not still:
         share = f"{distinct.share:.0%} of {distinct.frames}"
         scale = float(considered.scale.max())
         left, needed = (1 - distinct.share) * film.rate, RATE_SLACK / max(reader.layout.spacings)
-        if needed * math.sqrt(scale) <= left < needed:  # enough of a flag as large as those of the training
+        if (
+            needed * math.sqrt(scale) <= left < needed
+        ):  # enough of a flag as large as those of the training
             length = trained.length * scale
             return RefusedError(
-                f"{REASONS['low-frame-rate'].sentence}: {share} frames repeat the one before, {left:.3g} different "
-                f"ones a second are left, a {trained.noun} of {length:.3g} m needs {needed:.3g}, and {windows}",
+                f"{REASONS['low-frame-rate'].sentence}: {share} frames repeat the one before, "
+                f"{left:.3g} different "
+                f"ones a second are left, a {trained.noun} of {length:.3g} m needs {needed:.3g}, "
+                f"and {windows}",
                 where=film.name,
                 fix=f"film at {needed:.3g} frames a second or more that are all different"
                 + length_first(considered.given),
@@ -351,7 +412,9 @@ def _without_windows(
             fix=repeated.fix,
         )
     if faults:
-        return RefusedError(faults[0].what, where=film.name, fix=faults[0].fix or "give another film")
+        return RefusedError(
+            faults[0].what, where=film.name, fix=faults[0].fix or "give another film"
+        )
     return UsageError(
         windows,
         where=film.name,
@@ -360,26 +423,32 @@ def _without_windows(
 
 
 def _counted_windows(gate_verdict: Verdict) -> list[int]:
-    """Selects windows that show something to measure where others do, of a familiar recording none that are strange."""
+    """Selects windows that show something to measure where others do, of a familiar recording none
+    that are strange."""
     left_out = np.array(gate_verdict.blank) & gate_verdict.measurable
     if not gate_verdict.refused:
         left_out |= gate_verdict.strange
     return np.flatnonzero(~left_out).tolist()
 
 
-def _why_apart(windows: Sequence[WindowAnswer], errors: SeriesErrors | None, model: str) -> Finding | None:
-    """Reports why the windows are not taken as one gusty series; None where nothing speaks against it."""
+def _why_apart(
+    windows: Sequence[WindowAnswer], errors: SeriesErrors | None, model: str
+) -> Finding | None:
+    """Reports why the windows are not taken as one gusty series; None where nothing speaks against
+    it."""
     if errors is None:
         return Finding.of(
             "windows-apart",
-            f"each window has the interval that it gives by itself: how the model {model} errs in windows of one film "
+            f"each window has the interval that it gives by itself: how the model {model} errs in "
+            "windows of one film "
             "was not measured",
         )
     bounded = sum(window.quantity(WIND).span.bound is not None for window in windows)
     if bounded:
         return Finding.of(
             "windows-apart",
-            f"each window has the interval that it gives by itself: {bounded} of {len(windows)} bound the wind on one "
+            f"each window has the interval that it gives by itself: {bounded} of {len(windows)} "
+            "bound the wind on one "
             "side only, and a series of gusts needs values",
             count=bounded,
         )
@@ -420,7 +489,8 @@ def _about_windows(
         findings.append(
             Finding.of(
                 "sizes-excluded-by-weight",
-                f"{excluded:.0%} of the sizes that were taken as possible were left out: of a flag of these the "
+                f"{excluded:.0%} of the sizes that were taken as possible were left out: of a flag "
+                "of these the "
                 "network does not know the area weight that was given",
                 value=excluded,
                 fix="give --flag-size LENGTHxHEIGHT",
@@ -431,8 +501,10 @@ def _about_windows(
         findings.append(
             Finding.of(
                 "strange-windows",
-                f"{strange} of {len(looks)} windows are unlike what the network was trained on, p at most "
-                f"{gate_verdict.level:.2g}, and were left out of the answer; {gate_verdict.refusing} would refuse the "
+                f"{strange} of {len(looks)} windows are unlike what the network was trained on, p "
+                "at most "
+                f"{gate_verdict.level:.2g}, and were left out of the answer; "
+                f"{gate_verdict.refusing} would refuse the "
                 "film",
                 count=strange,
                 fix="choose a part of the film without them by --start and --end",
@@ -442,7 +514,8 @@ def _about_windows(
         findings.append(
             Finding.of(
                 "windows-combined",
-                f"the answer combines {len(used)} windows of one cloth and one gusty wind; their errors count as those "
+                f"the answer combines {len(used)} windows of one cloth and one gusty wind; their "
+                "errors count as those "
                 f"of {errors.source} in wind, and as correlated by {dependence.cloth:.2f} in cloth "
                 f"({dependence.source})",
                 count=len(used),
@@ -452,8 +525,10 @@ def _about_windows(
         findings.append(
             Finding.of(
                 "windows-combined",
-                f"the answer combines {len(used)} windows of one cloth, each with its own wind; their errors "
-                f"count as correlated by {dependence.wind:.2f} in wind and {dependence.cloth:.2f} in cloth "
+                f"the answer combines {len(used)} windows of one cloth, each with its own wind; "
+                "their errors "
+                f"count as correlated by {dependence.wind:.2f} in wind and {dependence.cloth:.2f} "
+                "in cloth "
                 f"({dependence.source})",
                 count=len(used),
             )
@@ -462,14 +537,20 @@ def _about_windows(
 
 
 def _at_ends(quantities: Sequence[Quantity], windows: Sequence[WindowAnswer]) -> list[Finding]:
-    """Reports quantities bounded on one side only, and how many windows bound the wind where the answer does not."""
-    findings = [finding for quantity in quantities if (finding := explain_bound(quantity)) is not None]
+    """Reports quantities bounded on one side only, and how many windows bound the wind where the
+    answer does not."""
+    findings = [
+        finding for quantity in quantities if (finding := explain_bound(quantity)) is not None
+    ]
     bounded = [window.quantity(name).value is None for window in windows for name in OWN]
-    if any(bounded) and not any(quantity.value is None for quantity in quantities if quantity.name in OWN):
+    if any(bounded) and not any(
+        quantity.value is None for quantity in quantities if quantity.name in OWN
+    ):
         findings.append(
             Finding.of(
                 "windows-at-end",
-                f"{sum(bounded)} of {len(windows)} windows bound the wind on one side only: theirs may lie beyond "
+                f"{sum(bounded)} of {len(windows)} windows bound the wind on one side only: theirs "
+                "may lie beyond "
                 "what the model knows, and so may the mean over all windows lie beyond its interval",
                 count=sum(bounded),
                 fix="give the wind of single windows by --windows",

@@ -1,5 +1,5 @@
-"""From the network's draws for each window to the film's answer: posterior draws in SI units, combined over windows and
-over the flag sizes considered."""
+"""From the network's draws for each window to the film's answer: posterior draws in SI units,
+combined over windows and over the flag sizes considered."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ from models.trained.estimator import Estimator
 from models.trained.restriction import Known, Restricted
 
 DRAWS = 2000
-"""How many draws there are of each window's posterior, for each size of flag. The draws place an end of a 90 % interval
-to about a twentieth of the posterior's standard deviation."""
+"""How many draws there are of each window's posterior, for each size of flag. The draws place an
+end of a 90 % interval to about a twentieth of the posterior's standard deviation."""
 WIND, WEIGHT = "wind_speed", "area_weight"
 _LIGHT_AND_HEAVY = (0.1, 0.9)
 """Quantiles of the answer's area weights at which the wind is given where the weight is open."""
@@ -46,7 +46,8 @@ class WindowAnswer:
     """What one window said by itself.
 
     Attributes:
-        start, end: of its frames, at the smallest and largest size considered [s from the film's first frame].
+        start, end: of its frames, at the smallest and largest size considered [s from the film's
+            first frame].
         quantities: with their intervals.
         p: probability that a familiar clip is at least as strange.
     """
@@ -139,7 +140,11 @@ class JointDraws:
 
     def wind(self, place: int) -> WindowWind | None:
         """Returns the wind of the window at a place in the series; None without one."""
-        return None if self.series is None else WindowWind(winds=self.series.winds[:, place], rows=self.rows)
+        return (
+            None
+            if self.series is None
+            else WindowWind(winds=self.series.winds[:, place], rows=self.rows)
+        )
 
     @property
     def intensity(self) -> FloatArray | None:
@@ -181,13 +186,19 @@ class FilmAnswer:
     def _before(self) -> Restricted:
         """Restricts the prior to what is known before the film."""
         prior_seed = child_seed(self.options.seed, "prior")
-        return self.model.given(self.model.prior(len(self.sizes.scale)), self.known, seed=prior_seed, draws=DRAWS)
+        return self.model.given(
+            self.model.prior(len(self.sizes.scale)), self.known, seed=prior_seed, draws=DRAWS
+        )
 
     def given(self, posterior: Mixture, *, seed: int) -> tuple[FloatArray, FloatArray]:
-        """Draws logits (i, n, target) of a window's posterior given what is known, and their log Bayes factors (i,
-        n)."""
+        """Draws logits (i, n, target) of a window's posterior given what is known, and their log
+        Bayes factors (i, n)."""
         restricted = self.model.given(posterior, self.known, seed=seed, draws=DRAWS)
-        factor = torch.where(restricted.log_mass > -torch.inf, restricted.log_mass - self._before.log_mass, -torch.inf)
+        factor = torch.where(
+            restricted.log_mass > -torch.inf,
+            restricted.log_mass - self._before.log_mass,
+            -torch.inf,
+        )
         return restricted.logits.cpu().numpy(), factor.cpu().numpy()
 
     def by_weight(
@@ -198,8 +209,9 @@ class FilmAnswer:
         draws: FloatArray,
         series: Callable[[FilmAnswer, Sequence[Look]], Gusty] | None = None,
     ) -> Finding | None:
-        """Reports how the wind would change with the area weight, where that is open and matters: the answers for a
-        light and a heavy cloth of those that the answer leaves possible; None where it does not.
+        """Reports how the wind would change with the area weight, where that is open and matters:
+        the answers for a light and a heavy cloth of those that the answer leaves possible; None
+        where it does not.
 
         Args:
             quantities: the answer's quantities.
@@ -222,7 +234,9 @@ class FilmAnswer:
             at_weight = replace(self, options=replace(self.options, area_weight=Stated.of(weight)))
             reweighted = []
             for number, look in enumerate(looks):
-                logits, log_factor = at_weight.given(look.posterior, seed=child_seed(self.options.seed, WEIGHT, number))
+                logits, log_factor = at_weight.given(
+                    look.posterior, seed=child_seed(self.options.seed, WEIGHT, number)
+                )
                 reweighted.append(replace(look, logits=logits, log_factor=log_factor))
             among = None
             if series is not None:
@@ -232,7 +246,8 @@ class FilmAnswer:
         if abs(winds[1] - winds[0]) < _MATTERS * (wind.span.high - wind.span.low):
             return None
         light, heavy = (
-            f"at {weight:.2g} kg/m² {wind_speed:.1f} m/s" for weight, wind_speed in zip(weights, winds, strict=True)
+            f"at {weight:.2g} kg/m² {wind_speed:.1f} m/s"
+            for weight, wind_speed in zip(weights, winds, strict=True)
         )
         return Finding.of(
             "weight-open",
@@ -241,11 +256,14 @@ class FilmAnswer:
             fix="weigh the cloth and give --area-weight",
         )
 
-    def joint(self, looks: Sequence[Look], dependence: Dependence, among: Among | None = None) -> JointDraws:
+    def joint(
+        self, looks: Sequence[Look], dependence: Dependence, among: Among | None = None
+    ) -> JointDraws:
         """Combines all windows.
 
         Args:
-            among: the gusty series that the windows belong to; None where each has the wind that it says by itself.
+            among: the gusty series that the windows belong to; None where each has the wind that it
+                says by itself.
         """
         wind_columns = [column for column, name in enumerate(self.names) if name in OWN]
         cloth_columns = [column for column, name in enumerate(self.names) if name not in OWN]
@@ -266,10 +284,16 @@ class FilmAnswer:
             logits[..., cloth_columns] = shared
             values = self._values(logits)
             if among is not None:
-                # The series has no cloth: its draws go with the cloth's in the order of the winds that have one.
-                column, of_windows = self.names.index(WIND), among.series.winds[stratum][list(among.places)]
+                # The series has no cloth: its draws go with the cloth's in the order of the winds
+                # that have one.
+                column, of_windows = (
+                    self.names.index(WIND),
+                    among.series.winds[stratum][list(among.places)],
+                )
                 order = np.empty(len(shared), dtype=np.intp)
-                order[np.argsort(values[..., column].mean(axis=0))] = np.argsort(of_windows.mean(axis=0))
+                order[np.argsort(values[..., column].mean(axis=0))] = np.argsort(
+                    of_windows.mean(axis=0)
+                )
                 values[..., column] = of_windows[:, order]
                 orders.append(order)
             parts.append(scaled_back(values.mean(axis=0), self.names, self.sizes.draws[stratum]))
@@ -277,7 +301,9 @@ class FilmAnswer:
         rows = self._film_rows(looks, dependence)
         draws = np.concatenate(parts)[rows]
         for name, stated_value in self.options.stated(self.model).items():
-            if not stated_value.sigma:  # combining windows moves draws a little, some out of the range
+            if (
+                not stated_value.sigma
+            ):  # combining windows moves draws a little, some out of the range
                 column = self.names.index(name)
                 draws[:, column] = np.clip(draws[:, column], stated_value.low, stated_value.high)
         return JointDraws(
@@ -292,7 +318,9 @@ class FilmAnswer:
         tempered = effective(len(looks), dependence.cloth) / len(looks)
         return self._rows(tempered * np.sum([look.log_factor for look in looks], axis=0), "answer")
 
-    def window(self, look: Look, layout: WindowLayout, p: float, wind: WindowWind | None = None) -> WindowAnswer:
+    def window(
+        self, look: Look, layout: WindowLayout, p: float, wind: WindowWind | None = None
+    ) -> WindowAnswer:
         """Gives a window's own answer.
 
         Args:
@@ -307,18 +335,32 @@ class FilmAnswer:
             for of_size, winds in zip(values, wind.winds, strict=True):
                 of_size[:, column] = winds
             series_draws, series_places = self._placed_draws(values)
-            draws[:, column], places[:, column] = series_draws[wind.rows, column], series_places[wind.rows, column]
+            draws[:, column], places[:, column] = (
+                series_draws[wind.rows, column],
+                series_places[wind.rows, column],
+            )
         return WindowAnswer(
-            start=look.start, end=look.start + layout.length, quantities=self.quantities(draws, places), p=p
+            start=look.start,
+            end=look.start + layout.length,
+            quantities=self.quantities(draws, places),
+            p=p,
         )
 
     def _placed_draws(self, values: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
-        """Returns draws of all sizes in a row, at the flag's own size [SI], and their places in the network's range."""
-        draws = [scaled_back(v, self.names, s) for v, s in zip(values, self.sizes.draws, strict=True)]
+        """Returns draws of all sizes in a row, at the flag's own size [SI], and their places in the
+        network's range."""
+        draws = [
+            scaled_back(v, self.names, s) for v, s in zip(values, self.sizes.draws, strict=True)
+        ]
         return np.concatenate(draws), np.concatenate([self._places(v) for v in values])
 
     def series(
-        self, looks: Sequence[Look], layout: WindowLayout, errors: SeriesErrors, *, apart: Sequence[int]
+        self,
+        looks: Sequence[Look],
+        layout: WindowLayout,
+        errors: SeriesErrors,
+        *,
+        apart: Sequence[int],
     ) -> Gusty:
         """Takes the windows as one gusty series, at each size considered.
 
@@ -349,17 +391,18 @@ class FilmAnswer:
         return Gusty(winds=np.array(winds), intensity=np.array(intensity))
 
     def _winds(self, logits: FloatArray) -> FloatArray:
-        """Returns winds (n,) of draws of logits (n, target), of a flag of the network's own size [m/s]."""
+        """Returns winds (n,) of draws of logits (n, target), of a flag of the network's own size
+        [m/s]."""
         return self._values(logits)[:, self.names.index(WIND)]
 
     def _rows(self, log_factor: FloatArray, *names: str) -> NDArray[np.intp]:
-        """Selects the draws, those of all sizes in a row, that make the answer: each as often as the Bayes factor (i,
-        n) of what is known makes its size probable, by systematic resampling.
+        """Selects the draws, those of all sizes in a row, that make the answer: each as often as
+        the Bayes factor (i, n) of what is known makes its size probable, by systematic resampling.
 
-        A size s is as probable before as the prior of sizes has it, and a statement about the cloth says nothing of it.
-        With the film x_s, which the network looks at as that of a flag of this size, and with p(x_s) alike for all
-        sizes, as where nothing is known, p(s | x, L) ∝ p(s) p(x_s | L, s)/p(x_s) = p(s) Z/Z_π
-        (`models.trained.restriction`).
+        A size s is as probable before as the prior of sizes has it, and a statement about the cloth
+        says nothing of it. With the film x_s, which the network looks at as that of a flag of this
+        size, and with p(x_s) alike for all sizes, as where nothing is known, p(s | x, L) ∝ p(s)
+        p(x_s | L, s)/p(x_s) = p(s) Z/Z_π (`models.trained.restriction`).
         """
         total = log_factor.ravel()
         if np.ptp(total) == 0:
@@ -380,7 +423,8 @@ class FilmAnswer:
         )
 
     def _places(self, values: FloatArray) -> FloatArray:
-        """Places of values (…, target) in the network's range, 0 to 1: the range moves with the flag's size."""
+        """Places of values (…, target) in the network's range, 0 to 1: the range moves with the
+        flag's size."""
         low, high = self._ends
         return (values - low) / (high - low)
 
@@ -393,7 +437,9 @@ class FilmAnswer:
     def prior(self) -> FloatArray:
         """(n, target) draws of what is assumed of a flag of these sizes."""
         logits = self.prior_logits
-        return scaled_back(self._values(logits.reshape(-1, len(self.names))), self.names, self.sizes.draws.ravel())
+        return scaled_back(
+            self._values(logits.reshape(-1, len(self.names))), self.names, self.sizes.draws.ravel()
+        )
 
     @cached_property
     def prior_logits(self) -> FloatArray:
@@ -402,16 +448,24 @@ class FilmAnswer:
         if self.known:
             return self._before.logits.cpu().numpy()
         normal = stream(self.options.seed, "prior").standard_normal((*shape, len(self.names)))
-        return learner.centre.double().cpu().numpy() + learner.spread.double().cpu().numpy() * normal
+        return (
+            learner.centre.double().cpu().numpy() + learner.spread.double().cpu().numpy() * normal
+        )
 
     @cached_property
     def assumed(self) -> FloatArray:
-        """Returns the range (target, 2) that was simulated, at these sizes; where not simulated evenly, 90 % of it."""
+        """Returns the range (target, 2) that was simulated, at these sizes; where not simulated
+        evenly, 90 % of it."""
         ends = self._ends
         smallest, largest = np.quantile(self.sizes.draws, [0.05, 0.95])
-        low, high = scaled_back(ends[0], self.names, smallest), scaled_back(ends[1], self.names, largest)
+        low, high = (
+            scaled_back(ends[0], self.names, smallest),
+            scaled_back(ends[1], self.names, largest),
+        )
         even = np.array([name in POWERS for name in self.names])[:, None]
-        ranges = np.where(even, np.stack([low, high], axis=1), np.quantile(self.prior, [0.05, 0.95], axis=0).T)
+        ranges = np.where(
+            even, np.stack([low, high], axis=1), np.quantile(self.prior, [0.05, 0.95], axis=0).T
+        )
         for name, stated_value in self.options.stated(self.model).items():
             column = self.names.index(name)
             within = np.array(stated_value.within(_NORMAL))
@@ -421,7 +475,11 @@ class FilmAnswer:
     @property
     def stated_exactly(self) -> tuple[str, ...]:
         """Returns the targets whose value was given."""
-        return tuple(name for name, stated_value in self.options.stated(self.model).items() if stated_value.exact)
+        return tuple(
+            name
+            for name, stated_value in self.options.stated(self.model).items()
+            if stated_value.exact
+        )
 
     def _values(self, logits: FloatArray) -> FloatArray:
         return self.model.learners[0].scaling.values(torch.from_numpy(logits)).numpy()

@@ -1,31 +1,37 @@
-"""The windows of one film as one gusty series: each window's wind, the film's mean and how strong the gusts are.
+"""The windows of one film as one gusty series: each window's wind, the film's mean and how strong
+the gusts are.
 
-What the network says of window w is its posterior of the wind there. m_w and s_w are the mean and the standard
-deviation of the logarithm of a log-normal distribution of the same moments (`log_moments`): a draw near calm air, or
-the little below it that a network's outputs reach, has no say of its own. With u_w the logarithm of the true wind,
+What the network says of window w is its posterior of the wind there. m_w and s_w are the mean and
+the standard deviation of the logarithm of a log-normal distribution of the same moments
+(`log_moments`): a draw near calm air, or the little below it that a network's outputs reach, has no
+say of its own. With u_w the logarithm of the true wind,
 
     m_w = u_w + b + e_w,     u_w = μ + g_w.
 
-- *b*, of standard deviation σ_b s, s the root mean square of the film's s_w, is common to all windows: the cloth, the
-  flag's look and the view are those of the film.
-- *e_w*, of standard deviation σ_e s_w, is the window's own. That of two windows is correlated by 1 where they are the
-  same, by ρ_½ where they share a half, by ρ_1 where one ends as the other begins, by 0 from two lengths on, and
-  linearly between. Where this is convex it is a correlation (Pólya, Proc. Berkeley Symposium, 1949).
-- *g*, the gusts, are an Ornstein–Uhlenbeck process of standard deviation I and integral time L/U, averaged over each
-  window. Of the logarithm, I is the intensity of the turbulence, σ_u/U.
+- *b*, of standard deviation σ_b s, s the root mean square of the film's s_w, is common to all
+  windows: the cloth, the flag's look and the view are those of the film.
+- *e_w*, of standard deviation σ_e s_w, is the window's own. That of two windows is correlated by 1
+  where they are the same, by ρ_½ where they share a half, by ρ_1 where one ends as the other
+  begins, by 0 from two lengths on, and linearly between. Where this is convex it is a correlation
+  (Pólya, Proc. Berkeley Symposium, 1949).
+- *g*, the gusts, are an Ornstein–Uhlenbeck process of standard deviation I and integral time L/U,
+  averaged over each window. Of the logarithm, I is the intensity of the turbulence, σ_u/U.
 - *μ* has a flat prior.
 
-Given I and L all is linear and Gaussian, and solved exactly. The two are summed over a grid, weighted by their priors
-and by the likelihood of windows that do not overlap, which asks least of the errors' correlation:
+Given I and L all is linear and Gaussian, and solved exactly. The two are summed over a grid,
+weighted by their priors and by the likelihood of windows that do not overlap, which asks least of
+the errors' correlation:
 
-- I is uniform from 0 to `MOST_INTENSE`. A uniform standard deviation does not draw the windows together where there are
-  few of them, as an inverse gamma or a uniform logarithm would (Gelman, Bayesian Analysis 1, 2006, section 7).
-- L has an even logarithm over the integral lengths 8.1 Λ₁ of the Kaimal spectrum of IEC 61400-1:2019, annex C, with Λ₁
-  of 0.7 times the height up to 60 m and 42 m above: 57 m at a height of 10 m to 340 m from 60 m on. The lower end is
-  rounded to 50 m.
+- I is uniform from 0 to `MOST_INTENSE`. A uniform standard deviation does not draw the windows
+  together where there are few of them, as an inverse gamma or a uniform logarithm would (Gelman,
+  Bayesian Analysis 1, 2006, section 7).
+- L has an even logarithm over the integral lengths 8.1 Λ₁ of the Kaimal spectrum of IEC
+  61400-1:2019, annex C, with Λ₁ of 0.7 times the height up to 60 m and 42 m above: 57 m at a height
+  of 10 m to 340 m from 60 m on. The lower end is rounded to 50 m.
 
-σ_b, σ_e, ρ_½ and ρ_1 belong to a model, the first two also to whether the weight was stated. `python -m tests.studies
-series-errors` measures them and writes them into the model's card, where `errors_of_model` finds them.
+σ_b, σ_e, ρ_½ and ρ_1 belong to a model, the first two also to whether the weight was stated.
+`python -m tests.studies series-errors` measures them and writes them into the model's card, where
+`errors_of_model` finds them.
 """
 
 from __future__ import annotations
@@ -56,8 +62,9 @@ LENGTHS = (50.0, 340.0)
 """Least and largest integral length that is considered [m]."""
 _LENGTHS = 4
 LEAST_NARROWED = 0.8
-"""Standard deviation of the posterior of the intensity over that of the prior, above which the film says nothing of it;
-about where `measure.estimate.film_answer.LEAST_INFORMATION` puts the same for quantities."""
+"""Standard deviation of the posterior of the intensity over that of the prior, above which the film
+says nothing of it; about where `measure.estimate.film_answer.LEAST_INFORMATION` puts the same for
+quantities."""
 _NEGLIGIBLE = 1e-6
 """Share of the posterior below which a point of the grid is left out."""
 _LEAST_SPEED = 0.1
@@ -94,8 +101,8 @@ class SeriesErrors:
     Attributes:
         opened: where the weight of the cloth is not stated exactly.
         stated: where it is.
-        halves, neighbours: correlations of the own errors of two windows that share a half, and of which one ends as
-            the other begins.
+        halves, neighbours: correlations of the own errors of two windows that share a half, and of
+            which one ends as the other begins.
         source: where they are from, in words.
 
     Raises:
@@ -202,8 +209,12 @@ class Gusty:
     def reorder_draws(self, orders: Sequence[NDArray[np.intp]]) -> Gusty:
         """Returns the draws of each size in another order, (i, n) their places."""
         return Gusty(
-            winds=np.stack([winds[:, order] for winds, order in zip(self.winds, orders, strict=True)]),
-            intensity=np.stack([values[order] for values, order in zip(self.intensity, orders, strict=True)]),
+            winds=np.stack(
+                [winds[:, order] for winds, order in zip(self.winds, orders, strict=True)]
+            ),
+            intensity=np.stack(
+                [values[order] for values, order in zip(self.intensity, orders, strict=True)]
+            ),
         )
 
 
@@ -221,8 +232,8 @@ class Gusts:
 
     @classmethod
     def of(cls, draws: FloatArray, *, level: float, windows: int) -> Gusts:
-        """Summarises draws (n,) of the intensity. The film says something of it where the posterior is narrower than
-        the uniform prior."""
+        """Summarises draws (n,) of the intensity. The film says something of it where the posterior
+        is narrower than the uniform prior."""
         low, high = (float(end) for end in np.quantile(draws, [(1 - level) / 2, (1 + level) / 2]))
         sigma = float(draws.std())
         intensity = Quantity(
@@ -238,11 +249,15 @@ class Gusts:
 
     @property
     def sentence(self) -> str:
-        """Phrases them, "gusts of 14 % [9, 21]" with the level; without a value where the film narrows nothing."""
+        """Phrases them, "gusts of 14 % [9, 21]" with the level; without a value where the film
+        narrows nothing."""
         if not self.intensity.constrained or self.intensity.value is None:
             return f"gusts: {self.windows} windows do not constrain how strong they are"
         interval = self.intensity.span.word(lambda share: f"{100 * share:.0f}")
-        return f"gusts of {100 * self.intensity.value:.0f} % {interval} of the wind, {self.intensity.span.percent}"
+        return (
+            f"gusts of {100 * self.intensity.value:.0f} % {interval} of the wind, "
+            f"{self.intensity.span.percent}"
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """Returns JSON values."""
@@ -257,24 +272,29 @@ class Gusts:
 
 
 def log_moments(winds: FloatArray) -> tuple[float, float]:
-    """Computes mean and standard deviation of the logarithm of a log-normal distribution with the mean M and the
-    standard deviation S of draws (n,) of a wind [m/s]: s² = ln(1 + S²/M²), ln M − s²/2.
+    """Computes mean and standard deviation of the logarithm of a log-normal distribution with the
+    mean M and the standard deviation S of draws (n,) of a wind [m/s]: s² = ln(1 + S²/M²), ln M −
+    s²/2.
 
     Raises:
         InputError: a mean that is not above 0.
     """
     mean = float(winds.mean())
     if not mean > 0:
-        raise InputError(f"winds of a mean of {mean:g} m/s", fix="give draws of a wind above calm air")
+        raise InputError(
+            f"winds of a mean of {mean:g} m/s", fix="give draws of a wind above calm air"
+        )
     variance = math.log1p(float(winds.var()) / mean**2)
     return math.log(mean) - variance / 2, math.sqrt(variance)
 
 
-def gust_covariance(starts: FloatArray, *, window: float, intensity: float, time: float) -> FloatArray:
+def gust_covariance(
+    starts: FloatArray, *, window: float, intensity: float, time: float
+) -> FloatArray:
     """Computes the covariance (k, k) of an Ornstein–Uhlenbeck process averaged over windows.
 
-    With R(t) = e^(−|t|/T) and G″ = R, the covariance of the means over two windows of length w that begin d apart is
-    I² [G(d + w) + G(d − w) − 2 G(d)]/w², G(t) = T² e^(−|t|/T) + T |t|.
+    With R(t) = e^(−|t|/T) and G″ = R, the covariance of the means over two windows of length w that
+    begin d apart is I² [G(d + w) + G(d − w) − 2 G(d)]/w², G(t) = T² e^(−|t|/T) + T |t|.
 
     Args:
         starts: (k,) of the windows [s].
@@ -287,10 +307,16 @@ def gust_covariance(starts: FloatArray, *, window: float, intensity: float, time
     def twice(t: FloatArray) -> FloatArray:
         return time**2 * np.exp(-np.abs(t) / time) + time * np.abs(t)
 
-    return intensity**2 * (twice(apart + window) + twice(apart - window) - 2 * twice(apart)) / window**2
+    return (
+        intensity**2
+        * (twice(apart + window) + twice(apart - window) - 2 * twice(apart))
+        / window**2
+    )
 
 
-def error_correlation(starts: FloatArray, *, window: float, halves: float, neighbours: float) -> FloatArray:
+def error_correlation(
+    starts: FloatArray, *, window: float, halves: float, neighbours: float
+) -> FloatArray:
     """Computes the correlation (k, k) of the windows' own errors, as the module's text has it."""
     apart = np.abs(starts[:, None] - starts[None, :]) / window
     return np.interp(apart, [0.0, 0.5, 1.0, 2.0], [1.0, halves, neighbours, 0.0])
@@ -327,7 +353,10 @@ class Course:
     def __post_init__(self) -> None:
         shapes = {np.shape(self.logs), np.shape(self.sigmas), np.shape(self.starts)}
         if len(shapes) != 1 or len(self.logs) < 2:
-            raise InputError(f"windows of shapes {shapes}", fix="give two windows or more, each with all its numbers")
+            raise InputError(
+                f"windows of shapes {shapes}",
+                fix="give two windows or more, each with all its numbers",
+            )
 
     @property
     def speed(self) -> float:
@@ -337,7 +366,9 @@ class Course:
     @cached_property
     def own(self) -> FloatArray:
         """(k, k) covariance of the windows' own errors."""
-        correlation = error_correlation(self.starts, window=self.window, halves=self.halves, neighbours=self.neighbours)
+        correlation = error_correlation(
+            self.starts, window=self.window, halves=self.halves, neighbours=self.neighbours
+        )
         return self.pair.own**2 * np.outer(self.sigmas, self.sigmas) * correlation
 
     @property
@@ -347,22 +378,30 @@ class Course:
 
     def gusts(self, intensity: float, length: float) -> FloatArray:
         """(k, k) covariance of the windows' gusts."""
-        return gust_covariance(self.starts, window=self.window, intensity=intensity, time=length / self.speed)
+        return gust_covariance(
+            self.starts, window=self.window, intensity=intensity, time=length / self.speed
+        )
 
     @cached_property
     def points(self) -> tuple[tuple[float, float], ...]:
         """(intensity, length) of the grid."""
-        return tuple((i, length) for i in self.prior.intensity.tolist() for length in self.prior.length.tolist())
+        return tuple(
+            (i, length)
+            for i in self.prior.intensity.tolist()
+            for length in self.prior.length.tolist()
+        )
 
     @cached_property
     def weights(self) -> FloatArray:
         """(g,) probabilities of the grid's points given the film.
 
-        With a flat mean the likelihood of Σ is |Σ|^(−½) (1ᵀΣ⁻¹1)^(−½) exp(−½ rᵀΣ⁻¹r), r about the generalised mean. The
-        shared error moves all windows alike and has no part in it.
+        With a flat mean the likelihood of Σ is |Σ|^(−½) (1ᵀΣ⁻¹1)^(−½) exp(−½ rᵀΣ⁻¹r), r about the
+        generalised mean. The shared error moves all windows alike and has no part in it.
         """
         chosen = np.ix_(list(self.apart), list(self.apart))
-        log = np.array([self._log_likelihood((self.gusts(*point) + self.own)[chosen]) for point in self.points])
+        log = np.array(
+            [self._log_likelihood((self.gusts(*point) + self.own)[chosen]) for point in self.points]
+        )
         share = np.exp(log - log.max())
         return share / share.sum()
 
@@ -377,8 +416,8 @@ class Course:
         return -float(np.log(np.diag(factor[0])).sum()) - 0.5 * math.log(information) - 0.5 * misfit
 
     def given(self, intensity: float, length: float) -> tuple[FloatArray, FloatArray]:
-        """Computes mean (k,) and covariance (k, k) of the logarithms of the winds given the gusts' two numbers: with
-        K of the gusts, Σ = K + that of own errors and a = 1 − KΣ⁻¹1,
+        """Computes mean (k,) and covariance (k, k) of the logarithms of the winds given the gusts'
+        two numbers: with K of the gusts, Σ = K + that of own errors and a = 1 − KΣ⁻¹1,
 
             μ̂ 1 + KΣ⁻¹(m − μ̂ 1),     K − KΣ⁻¹K + a aᵀ/(1ᵀΣ⁻¹1) + σ² 11ᵀ,     σ of the shared error.
         """
@@ -389,15 +428,19 @@ class Course:
         mean = float(whitened[:, 1].sum()) / information
         gain = whitened[:, 2:].T  # KΣ⁻¹
         unexplained = ones - gain @ ones
-        covariance = gusts - gain @ gusts + np.outer(unexplained, unexplained) / information + self.shared**2
+        covariance = (
+            gusts - gain @ gusts + np.outer(unexplained, unexplained) / information + self.shared**2
+        )
         return mean + gain @ (self.logs - mean), 0.5 * (covariance + covariance.T)
 
     def draws(self, count: int, generator: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-        """Draws winds (k, count) [m/s] of all windows together, and the gusts' intensity (count,) of each draw."""
+        """Draws winds (k, count) [m/s] of all windows together, and the gusts' intensity (count,)
+        of each draw."""
         kept = np.flatnonzero(self.weights >= _NEGLIGIBLE * self.weights.max())
         ends = np.cumsum(self.weights[kept]) / self.weights[kept].sum()
         place = np.minimum(
-            np.searchsorted(ends, (np.arange(count) + generator.uniform()) / count, side="right"), len(kept) - 1
+            np.searchsorted(ends, (np.arange(count) + generator.uniform()) / count, side="right"),
+            len(kept) - 1,
         )
         normal = generator.standard_normal((len(self.logs), count))
         jitter = generator.uniform(-0.5, 0.5, count) * self.prior.cell

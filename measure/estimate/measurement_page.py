@@ -47,7 +47,8 @@ class Context:
         rate: of the network's frames [Hz].
         steps: picture of how the film was made fit, as a URL; None where it was too short for it.
         figures: what was measured for that, in sentences.
-        elsewhere: the comparison with a wind from elsewhere; None where none was stated or no estimate is shown.
+        elsewhere: the comparison with a wind from elsewhere; None where none was stated or no
+            estimate is shown.
     """
 
     provenance: Mapping[str, str]
@@ -61,13 +62,18 @@ class Context:
 
 
 def page(
-    measured: Measurement, series: Beside, context: Context, *, anyway: bool, sections: Sequence[Section] = ()
+    measured: Measurement,
+    series: Beside,
+    context: Context,
+    *,
+    anyway: bool,
+    sections: Sequence[Section] = (),
 ) -> str:
     """Renders the page.
 
     Args:
-        anyway: whether estimates are shown although the gate refused the film; they are marked then. Where there is
-            nothing to measure, none are shown.
+        anyway: whether estimates are shown although the gate refused the film; they are marked
+            then. Where there is nothing to measure, none are shown.
         sections: what comes between the answer and its provenance, each under its own heading.
     """
     shown, noticed = measured.shown(anyway=anyway), measured.notices(anyway=anyway)
@@ -83,7 +89,9 @@ def page(
         "answer": measured.sentence,
         "rows": rows,
         "unconstrained": [row for row in rows if not row["constrained"]],
-        "wind": next((row for row in rows if row["name"] == SHORT["wind_speed"] and row["constrained"]), None),
+        "wind": next(
+            (row for row in rows if row["name"] == SHORT["wind_speed"] and row["constrained"]), None
+        ),
         "simulated": bool(context.known),
         "level": f"{measured.options.level * 100:.3g} %",
         "clip": moving(measured.clip, rate=clip_rate, side=_SIDE),
@@ -96,9 +104,14 @@ def page(
         "series": measurement_pictures.series(series, level=measured.verdict.level)
         if shown and len(series.time) > 1
         else None,
-        "spectra": None if series.spectrum is None or not shown else measurement_pictures.spectra(series.spectrum),
+        "spectra": None
+        if series.spectrum is None or not shown
+        else measurement_pictures.spectra(series.spectrum),
         "coherence": None if series.spectrum is None or not shown else series.spectrum.sentence,
-        "agreement": [_agreement("over the window", series.window), _agreement("minute mean", series.of_minute)]
+        "agreement": [
+            _agreement("over the window", series.window),
+            _agreement("minute mean", series.of_minute),
+        ]
         if series.logged is not None and shown
         else [],
         "delay": _delay(series) if shown else None,
@@ -156,6 +169,12 @@ def _delay(series: Beside) -> str | None:
     if series.delay is None:
         return None
     if series.delay.offset is None or series.delay.reasons:
-        return f"no delay between film and anemometer could be estimated: {'; '.join(series.delay.reasons)}"
+        return (
+            "no delay between film and anemometer could be estimated: "
+            f"{'; '.join(series.delay.reasons)}"
+        )
     sigma = "" if series.delay.sigma is None else f" ± {series.delay.sigma:.2f} s (1 σ)"
-    return f"{series.delay.offset:+.2f} s{sigma} are to be added to the film's clock to reach the anemometer's"
+    return (
+        f"{series.delay.offset:+.2f} s{sigma} are to be added to the film's clock to reach the "
+        "anemometer's"
+    )

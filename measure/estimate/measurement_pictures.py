@@ -24,8 +24,8 @@ _SHOWN = 640
 
 
 def steps(film: ConditionedFilm) -> str | None:
-    """Draws the reference frame with all moving cloths, numbered, the outline of what is not frozen, and the square
-    that is judged; None before the film was read."""
+    """Draws the reference frame with all moving cloths, numbered, the outline of what is not
+    frozen, and the square that is judged; None before the film was read."""
     detection, reference = film.found, film.reference
     if detection is None or reference is None:
         return None
@@ -34,8 +34,12 @@ def steps(film: ConditionedFilm) -> str | None:
     left, top = min(0, square.x), min(0, square.y)
     right, bottom = max(width, square.x + square.side), max(height, square.y + square.side)
     scale = _SHOWN / max(right - left, bottom - top)
-    picture = Image.new("RGB", (round((right - left) * scale), round((bottom - top) * scale)), _BEYOND)
-    frame = Image.fromarray(reference).resize((round(width * scale), round(height * scale)), Image.Resampling.HAMMING)
+    picture = Image.new(
+        "RGB", (round((right - left) * scale), round((bottom - top) * scale)), _BEYOND
+    )
+    frame = Image.fromarray(reference).resize(
+        (round(width * scale), round(height * scale)), Image.Resampling.HAMMING
+    )
     picture.paste(frame.convert("RGB"), (round(-left * scale), round(-top * scale)))
     pen = ImageDraw.Draw(picture)
 
@@ -44,14 +48,18 @@ def steps(film: ConditionedFilm) -> str | None:
 
     for number, region in enumerate(detection.regions, start=1):
         colour = _RUST if number == detection.chosen + 1 else _BLUE
-        lines, _ = cv2.findContours(region.mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+        lines, _ = cv2.findContours(
+            region.mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE
+        )
         for line in lines:
             points = [at(*vertex) for vertex in (line.reshape(-1, 2) / detection.scale).tolist()]
             pen.line([*points, points[0]], fill=colour, width=2)
         corner = at(region.box[0] / detection.scale, region.box[1] / detection.scale)
         pen.text((corner[0] + 3, corner[1] + 3), str(number), fill=colour, font_size=22)
     pen.rectangle(
-        (*at(square.x, square.y), *at(square.x + square.side - 1, square.y + square.side - 1)), outline=_CROP, width=2
+        (*at(square.x, square.y), *at(square.x + square.side - 1, square.y + square.side - 1)),
+        outline=_CROP,
+        width=2,
     )
     return still(picture)
 
@@ -79,8 +87,17 @@ def corner(measured: Measurement) -> str:
             axes = figure.add_subplot(grid[row, column])
             if row == column:
                 quantity = measured.quantities[row]
-                axes.hist(draws[:, row], bins=40, color=_BLUE if quantity.constrained else _GRAY, histtype="stepfilled")
-                low, high = np.clip([quantity.span.low, quantity.span.high], draws[:, row].min(), draws[:, row].max())
+                axes.hist(
+                    draws[:, row],
+                    bins=40,
+                    color=_BLUE if quantity.constrained else _GRAY,
+                    histtype="stepfilled",
+                )
+                low, high = np.clip(
+                    [quantity.span.low, quantity.span.high],
+                    draws[:, row].min(),
+                    draws[:, row].max(),
+                )
                 axes.axvspan(low, high, color=_RUST, alpha=0.15, linewidth=0)
                 axes.set_yticks([])
             else:
@@ -99,14 +116,20 @@ def _label(measured: Measurement, index: int) -> str:
 
 
 def series(wind_series: Beside, *, level: float) -> str:
-    """Draws the wind by window with its intervals, beside the anemometer where there is one; hollow where p ≤ `level`,
-    an arrow where a window gives a bound instead of a value."""
+    """Draws the wind by window with its intervals, beside the anemometer where there is one; hollow
+    where p ≤ `level`, an arrow where a window gives a bound instead of a value."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(9.5, 3.0), layout="constrained")
     axes = figure.subplots()
     if wind_series.logged is not None and wind_series.minute is not None:
-        axes.plot(wind_series.time, wind_series.logged, color=_BLUE, linewidth=1.0, label="anemometer, over the window")
+        axes.plot(
+            wind_series.time,
+            wind_series.logged,
+            color=_BLUE,
+            linewidth=1.0,
+            label="anemometer, over the window",
+        )
         axes.plot(
             wind_series.time,
             wind_series.minute,
@@ -126,9 +149,17 @@ def series(wind_series: Beside, *, level: float) -> str:
     )
     if bounded.any():
         axes.plot(
-            wind_series.time[bounded], wind_series.low[bounded], "^", markersize=5, color=_RUST, label="film, at least"
+            wind_series.time[bounded],
+            wind_series.low[bounded],
+            "^",
+            markersize=5,
+            color=_RUST,
+            label="film, at least",
         )
-    for strange, label in ((False, "film, with its interval"), (True, "film, window unlike the training data")):
+    for strange, label in (
+        (False, "film, with its interval"),
+        (True, "film, window unlike the training data"),
+    ):
         selected = ~bounded & ((wind_series.p <= level) == strange)
         if selected.any():
             face = "none" if strange else _RUST
@@ -159,7 +190,9 @@ def spectra(spectrum: Spectrum) -> str:
     power.set_title("Power of the wind's changes", fontsize=11)
     power.legend(fontsize=9)
     coherent.semilogx(spectrum.frequency, spectrum.coherence, color=_RUST)
-    coherent.axhline(spectrum.chance, color=_GRAY, linestyle=":", label="of unrelated series, 1 in 20")
+    coherent.axhline(
+        spectrum.chance, color=_GRAY, linestyle=":", label="of unrelated series, 1 in 20"
+    )
     coherent.set(xlabel="frequency [Hz]", ylabel="coherence", ylim=(0, 1))
     coherent.set_title("Coherence of film and anemometer", fontsize=11)
     coherent.legend(fontsize=9)

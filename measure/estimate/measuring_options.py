@@ -63,10 +63,12 @@ class Options:
         }
 
     def stated(self, model: Estimator) -> Mapping[str, Stated]:
-        """Returns what is stated about quantities, by name: the area weight, and for a model that estimates a flag's
-        aspect that of the stated size, where the model knows it."""
+        """Returns what is stated about quantities, by name: the area weight, and for a model that
+        estimates a flag's aspect that of the stated size, where the model knows it."""
         stated_values = {} if self.area_weight is None else {"area_weight": self.area_weight}
-        if self.size is not None and (aspect := usable_aspect(model.targets, self.size.length, self.size.height)):
+        if self.size is not None and (
+            aspect := usable_aspect(model.targets, self.size.length, self.size.height)
+        ):
             stated_values[ASPECT] = aspect
         return stated_values
 
@@ -74,7 +76,8 @@ class Options:
         """Returns the same at each size considered, as of a flag of the network's own size.
 
         Raises:
-            UsageError: a quantity that the model does not estimate, or a statement beyond what it knows at any size.
+            UsageError: a quantity that the model does not estimate, or a statement beyond what it
+                knows at any size.
         """
         constraints = []
         for name, stated_value in self.stated(model).items():
@@ -87,12 +90,16 @@ class Options:
                 )
             power = POWERS.get(name, 0.0)  # an aspect has none
             least, most = (end * sizes.scale**power for end in (target.low, target.high))
-            if not ((least * (1 - 1e-9) <= stated_value.low) & (stated_value.high <= most * (1 + 1e-9))).any():
+            if not (
+                (least * (1 - 1e-9) <= stated_value.low) & (stated_value.high <= most * (1 + 1e-9))
+            ).any():
                 raise UsageError(
-                    f"an {target.about} of {stated_value.text} {target.unit}; of a flag of this size the model knows "
+                    f"an {target.about} of {stated_value.text} {target.unit}; of a flag of this "
+                    "size the model knows "
                     f"{least.min():.3g} to {most.max():.3g}",
                     where="--area-weight",
-                    fix="give kg/m² within that (100 g/m² is 0.1)" + ("" if sizes.given else ", and --flag-size"),
+                    fix="give kg/m² within that (100 g/m² is 0.1)"
+                    + ("" if sizes.given else ", and --flag-size"),
                 )
             scale = sizes.draws if sizes.given is None else sizes.scale[:, None]
             constraints.append(Known.stated(name, stated_value, scale=scale**power))

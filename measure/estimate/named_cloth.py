@@ -1,4 +1,5 @@
-"""The area weight of a cloth by its name: a material of the catalog, or a fabric that a lake's films declare."""
+"""The area weight of a cloth by its name: a material of the catalog, or a fabric that a lake's
+films declare."""
 
 from __future__ import annotations
 
@@ -16,11 +17,12 @@ from sim.cloth.material import MATERIALS, named_material
 def weight_of(name: str, *, lake: Lake | None, at: str | None) -> tuple[Stated, str]:
     """Returns the area weight of a material [kg/m²] and its source in words.
 
-    Nothing else of the material is used: its stiffness stays what the film and the network's prior say.
+    Nothing else of the material is used: its stiffness stays what the film and the network's prior
+    say.
 
     Args:
-        lake: whose declared cloths (`flagdata declare-cloths`) are looked at where the catalog has no such material;
-            None for none.
+        lake: whose declared cloths (`flagdata declare-cloths`) are looked at where the catalog has
+            no such material; None for none.
         at: tag, branch or version of the lake.
 
     Raises:
@@ -33,10 +35,13 @@ def weight_of(name: str, *, lake: Lake | None, at: str | None) -> tuple[Stated, 
     fabrics = {} if lake is None else _declared_weights(lake, at)
     weights = fabrics.get(name, set())
     if not weights:
-        raise UnknownNameError.of("material", name, {*MATERIALS.names(), *fabrics}, where="--material")
+        raise UnknownNameError.of(
+            "material", name, {*MATERIALS.names(), *fabrics}, where="--material"
+        )
     if len(weights) > 1:
         raise UsageError(
-            f"films of {name!r} declare {len(weights)} area weights, {min(weights):g} to {max(weights):g} kg/m²",
+            f"films of {name!r} declare {len(weights)} area weights, {min(weights):g} to "
+            f"{max(weights):g} kg/m²",
             where="--material",
             fix="give --area-weight",
         )

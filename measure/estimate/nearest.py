@@ -1,6 +1,7 @@
 """The simulated clips of a lake that a model finds most like a film, to look at beside it.
 
-The film's summary is that of conditioned pictures (`models.conditioning`), so these clips are conditioned likewise.
+The film's summary is that of conditioned pictures (`models.conditioning`), so these clips are
+conditioned likewise.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ from models.training.conditioned_clips import FitFilm
 from models.training.timed_film import LEAST_RATE
 
 COMPARED = 48
-"""Clips of the lake that are looked at, drawn at random: each costs a third of a second, most of it conditioning."""
+"""Clips of the lake that are looked at, drawn at random: each costs a third of a second, most of it
+conditioning."""
 SHOWN = 3
 
 
@@ -57,7 +59,8 @@ def nearest(
     seed: int,
     advance: Callable[[int, int], None] | None = None,
 ) -> tuple[tuple[Neighbour, ...], int]:
-    """Finds the `SHOWN` nearest of `COMPARED` simulated clips; also counts those compared, 0 where the lake has none.
+    """Finds the `SHOWN` nearest of `COMPARED` simulated clips; also counts those compared, 0 where
+    the lake has none.
 
     Args:
         summary: (dimension,) of the film, conditioned.
@@ -80,17 +83,23 @@ def nearest(
             embedding = model.summaries(model.inputs(frames[None]))[0].cpu().numpy()
             distance = float(np.linalg.norm(whitening @ (embedding.astype(np.float64) - summary)))
             found = Neighbour(
-                artifact=row["artifact"], name=row["name"], frames=frames, distance=distance, known=record.truth or {}
+                artifact=row["artifact"],
+                name=row["name"],
+                frames=frames,
+                distance=distance,
+                known=record.truth or {},
             )
-            neighbours = sorted([*neighbours, found], key=lambda neighbour: neighbour.distance)[:SHOWN]
+            neighbours = sorted([*neighbours, found], key=lambda neighbour: neighbour.distance)[
+                :SHOWN
+            ]
         if advance is not None:
             advance(len(chosen), 1)
     return tuple(neighbours), compared
 
 
 def _clip(record: Record, first: int, front_end: FrontEnd) -> UInt8Array | None:
-    """Conditions the clip that a front end takes from a frame of a record on, or from as early as the film has to be
-    entered; None where the film is shorter or slower than that."""
+    """Conditions the clip that a front end takes from a frame of a record on, or from as early as
+    the film has to be entered; None where the film is shorter or slower than that."""
     times = (record.frame_times - record.frame_times[0]) / NANOSECONDS
     lasting = (front_end.frames - 1) / front_end.rate
     latest = int(np.searchsorted(times, times[-1] - lasting + 1e-6, side="right")) - 1

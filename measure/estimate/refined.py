@@ -1,7 +1,8 @@
 """A measurement refined by simulation: `measure.refine` at the flag's own size.
 
-Refinement simulates flags of the size that the models are trained on. The film's frames were taken at the instants at
-which a flag of its own size looks like one of those (`measure.film.similarity`), so what is found scales back like
+Refinement simulates flags of the size that the models are trained on. The film's frames were taken
+at the instants at which a flag of its own size looks like one of those (`measure.film.similarity`),
+so what is found scales back like
 what the model says: wind by √s, area weight by s, bending stiffness by s⁴.
 """
 
@@ -27,8 +28,9 @@ def refine_window(
 ) -> Refinement:
     """Refines the first window that counts of a film of a flag whose size is known.
 
-    Where the film's record states how it was simulated and filmed, the simulated clips are filmed likewise. Both are
-    conditioned after that, so it does not matter which square of the picture is judged.
+    Where the film's record states how it was simulated and filmed, the simulated clips are filmed
+    likewise. Both are conditioned after that, so it does not matter which square of the picture is
+    judged.
 
     Args:
         budget: simulated clips.
@@ -56,14 +58,17 @@ def refine_window(
         level=options.level,
         cache=cache,
         area_weight=None if area_weight is None else _searched_range(area_weight, s),
-        aspect=None if options.size is None or ASPECT not in options.stated(model) else options.size.aspect,
+        aspect=None
+        if options.size is None or ASPECT not in options.stated(model)
+        else options.size.aspect,
     )
     return scale_refinement(refinement, s)
 
 
 def _searched_range(area_weight: Stated, s: float) -> tuple[float, float]:
-    """Returns the range of area weights searched for a flag of s times the size [kg/m²]: two standard deviations either
-    way of what was stated, or 1 % either way of an exact value, since a search needs a width."""
+    """Returns the range of area weights searched for a flag of s times the size [kg/m²]: two
+    standard deviations either way of what was stated, or 1 % either way of an exact value, since a
+    search needs a width."""
     low, high = area_weight.within(2.0)
     slack = 0.01 * low if low == high else 0.0
     return (low - slack) / s, (high + slack) / s
@@ -78,7 +83,10 @@ def scale_refinement(refinement: Refinement, s: float) -> Refinement:
         intervals=_all_scaled(refinement.intervals, s),
         amortised=_all_scaled(refinement.amortised, s),
         bending=refinement.bending * s**4,
-        rounds=tuple(replace(round_, intervals=_all_scaled(round_.intervals, s)) for round_ in refinement.rounds),
+        rounds=tuple(
+            replace(round_, intervals=_all_scaled(round_.intervals, s))
+            for round_ in refinement.rounds
+        ),
         scale=s,
     )
 
@@ -92,8 +100,12 @@ def _scale_interval(interval: Interval, s: float) -> Interval:
     factor = s ** POWERS.get(name, 0.0)
     shift = LOGARITHMS.get(name, 0.0) * math.log10(s)
     scaled_span = replace(
-        interval.span, low=interval.span.low * factor + shift, high=interval.span.high * factor + shift
+        interval.span,
+        low=interval.span.low * factor + shift,
+        high=interval.span.high * factor + shift,
     )
     return replace(
-        interval, median=None if interval.median is None else interval.median * factor + shift, span=scaled_span
+        interval,
+        median=None if interval.median is None else interval.median * factor + shift,
+        span=scaled_span,
     )

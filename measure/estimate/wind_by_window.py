@@ -1,18 +1,21 @@
-"""Wind by window, beside an anemometer's: how far off, at which frequencies they agree, and how much later one is.
+"""Wind by window, beside an anemometer's: how far off, at which frequencies they agree, and how
+much later one is.
 
-Two references are taken from the anemometer. *Window*: its mean over the window's own time, what the film should show.
-*Minute*: its mean over the minute before the window's end, the ground truth of Runia et al. 2020, section 5, of which a
-window is a sample; gusts within the minute count as errors against it.
+Two references are taken from the anemometer. *Window*: its mean over the window's own time, what
+the film should show.
+*Minute*: its mean over the minute before the window's end, the ground truth of Runia et al. 2020,
+section 5, of which a window is a sample; gusts within the minute count as errors against it.
 
-Spectra are Welch's and the coherence is the magnitude-squared one (`scipy.signal`), with Hann segments of a quarter of
-the longest run of windows without gaps, that overlap by a half. With k such segments independent series exceed the
-coherence 1 − 0.05^(1/(k − 1)) at one frequency in twenty (Carter, Knapp and Nuttall, IEEE Trans. AU 21, 1973), where
-the overlap is not counted. The delay is found as `flagdata.align` finds a clock's offset, with the wind off the film in
-place of the motion.
+Spectra are Welch's and the coherence is the magnitude-squared one (`scipy.signal`), with Hann
+segments of a quarter of the longest run of windows without gaps, that overlap by a half. With k
+such segments independent series exceed the coherence 1 − 0.05^(1/(k − 1)) at one frequency in
+twenty (Carter, Knapp and Nuttall, IEEE Trans. AU 21, 1973), where the overlap is not counted. The
+delay is found as `flagdata.align` finds a clock's offset, with the wind off the film in place of
+the motion.
 
-A window whose wind is bounded on one side only (`measure.posterior_ends`) has no value, and an interval that ends at
-infinity. It counts where intervals are compared with the anemometer, and not among the errors, spectra and delays of
-values.
+A window whose wind is bounded on one side only (`measure.posterior_ends`) has no value, and an
+interval that ends at infinity. It counts where intervals are compared with the anemometer, and not
+among the errors, spectra and delays of values.
 """
 
 from __future__ import annotations
@@ -39,12 +42,17 @@ LEAST_SPECTRUM = 32
 _SEGMENTS = 4
 _SEARCHED = 30.0  # s either way
 _SHORTEST_DELAY = 120.0  # s that film and anemometer must share
-_RESPONSE = (0.0, 0.3)  # s: the network's windows are centred; the flag follows the wind by about L/U, of either sign
+_RESPONSE = (
+    0.0,
+    0.3,
+)  # s: the network's windows are centred; the flag follows the wind by about L/U, of either sign
 _RESAMPLES = 1000
 _BLOCK = 12.0
-"""Time over which windows are resampled together [s]: ten windows of a flag of 1.5 m. Neighbours err alike."""
+"""Time over which windows are resampled together [s]: ten windows of a flag of 1.5 m. Neighbours
+err alike."""
 _FEWEST = 5
-"""Blocks below which the RMSE has no interval: resampling two or three says nothing of how it scatters."""
+"""Blocks below which the RMSE has no interval: resampling two or three says nothing of how it
+scatters."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +64,8 @@ class Agreement:
         bounded: of these, windows with a bound instead of a value.
         bias: mean difference of the others [m/s]; None where there are none.
         rmse: root mean square of the same [m/s], likewise.
-        interval: 90 % of the RMSE, by resampling blocks of `_BLOCK` [m/s]; None where there are fewer than `_FEWEST`.
+        interval: 90 % of the RMSE, by resampling blocks of `_BLOCK` [m/s]; None where there are
+            fewer than `_FEWEST`.
         covered: share of all windows compared whose interval contains the reference.
     """
 
@@ -114,8 +123,9 @@ class Spectrum:
 
     @property
     def shared(self) -> float:
-        """Frequency below which the series have more in common than chance gives [Hz]: that of the first of two
-        neighbouring coherences at or below `chance`; infinite where there are none, 0 where they are the lowest."""
+        """Frequency below which the series have more in common than chance gives [Hz]: that of the
+        first of two neighbouring coherences at or below `chance`; infinite where there are none, 0
+        where they are the lowest."""
         by_chance = self.coherence <= self.chance
         first = np.flatnonzero(by_chance[:-1] & by_chance[1:])
         if not len(first):
@@ -126,14 +136,22 @@ class Spectrum:
     def sentence(self) -> str:
         """Phrases the coherence."""
         if self.shared == 0:
-            return "The film's wind and the anemometer's are found to have nothing in common at any frequency"
+            return (
+                "The film's wind and the anemometer's are found to have nothing in common at any "
+                "frequency"
+            )
         common = self.coherence[self.frequency < self.shared].mean()
         if math.isinf(self.shared):
             last = self.frequency[-1]
-            return f"The film's wind follows the anemometer's up to {last:.2g} Hz (mean coherence {common:.2f})"
+            return (
+                f"The film's wind follows the anemometer's up to {last:.2g} Hz (mean coherence "
+                f"{common:.2f})"
+            )
         return (
-            f"Below {self.shared:.2g} Hz, in gusts of more than {1 / self.shared:.2g} s, the film's wind follows the "
-            f"anemometer's (mean coherence {common:.2f}); above, they are found to have nothing in common"
+            f"Below {self.shared:.2g} Hz, in gusts of more than {1 / self.shared:.2g} s, the "
+            "film's wind follows the "
+            f"anemometer's (mean coherence {common:.2f}); above, they are found to have nothing in "
+            "common"
         )
 
     def as_dict(self) -> dict[str, Any]:
@@ -176,7 +194,8 @@ class Beside:
         wind: (n,) estimated [m/s]; NaN where it is bounded on one side only.
         low, high: (n,) its interval [m/s]; infinite at an end that nothing bounds.
         p: (n,) of the gate.
-        logged, minute: (n,) references [m/s]; NaN where the anemometer was silent. None without an anemometer.
+        logged, minute: (n,) references [m/s]; NaN where the anemometer was silent. None without an
+            anemometer.
         window, of_minute: agreement with them.
         spectrum: None where the series is too short.
         delay: None without an anemometer.
@@ -196,13 +215,20 @@ class Beside:
 
     def columns(self) -> dict[str, FloatArray]:
         """Name → (n,), as they are written to tables."""
-        out = {"time": self.time, "wind": self.wind, "low": self.low, "high": self.high, "p": self.p}
+        out = {
+            "time": self.time,
+            "wind": self.wind,
+            "low": self.low,
+            "high": self.high,
+            "p": self.p,
+        }
         if self.logged is not None and self.minute is not None:
             out |= {"anemometer": self.logged, "anemometer_minute": self.minute}
         return out
 
     def rows(self) -> Iterator[Sequence[str]]:
-        """Lines of a table, its header first; unknown values are empty, an end that nothing bounds is "inf"."""
+        """Lines of a table, its header first; unknown values are empty, an end that nothing bounds
+        is "inf"."""
         columns = self.columns()
         yield list(columns)
         for values in zip(*columns.values(), strict=True):
@@ -210,7 +236,12 @@ class Beside:
 
     def as_dict(self) -> dict[str, Any]:
         """Returns JSON values of what is concluded; the columns are elsewhere."""
-        parts = {"window": self.window, "minute": self.of_minute, "spectrum": self.spectrum, "delay": self.delay}
+        parts = {
+            "window": self.window,
+            "minute": self.of_minute,
+            "spectrum": self.spectrum,
+            "delay": self.delay,
+        }
         return {name: None if part is None else part.as_dict() for name, part in parts.items()}
 
 
@@ -218,13 +249,16 @@ def beside(measured: Measurement, *, start: int | None, wind: WindSeries | None)
     """Places the windows of a measurement as a series beside an anemometer on the film's clock.
 
     Args:
-        start: instant of the film's first frame [UTC ns]; None where nobody said, and nothing is compared.
+        start: instant of the film's first frame [UTC ns]; None where nobody said, and nothing is
+            compared.
         wind: of the anemometer; None if there is none.
     """
     quantities = [window.quantity(WIND) for window in measured.windows]
     series = Beside(
         time=np.array([(window.start + window.end) / 2 for window in measured.windows]),
-        wind=np.array([math.nan if quantity.value is None else quantity.value for quantity in quantities]),
+        wind=np.array(
+            [math.nan if quantity.value is None else quantity.value for quantity in quantities]
+        ),
         low=np.array([quantity.span.low for quantity in quantities]),
         high=np.array([quantity.span.high for quantity in quantities]),
         p=np.array([window.p for window in measured.windows]),
@@ -234,7 +268,8 @@ def beside(measured: Measurement, *, start: int | None, wind: WindSeries | None)
     truth = TruthSeries.of(wind)
     ends = [start + round(window.end * NANOSECONDS) for window in measured.windows]
     length = measured.windows[0].end - measured.windows[0].start
-    # A slow logger's window holds no sample of its own, so it is as long as its sampling period at least.
+    # A slow logger's window holds no sample of its own, so it is as long as its sampling period at
+    # least.
     logged = np.array([truth.before(end, window=max(length, truth.period)).wind for end in ends])
     minute = np.array([truth.before(end, window=TRUTH_WINDOW).wind for end in ends])
     return Beside(
@@ -260,7 +295,9 @@ def agreement(series: Beside, reference: FloatArray, *, seed: int) -> Agreement 
         return None
     both = covered & np.isfinite(series.wind)
     off = (series.wind - reference)[both]
-    inside = (series.low[covered] <= reference[covered]) & (reference[covered] <= series.high[covered])
+    inside = (series.low[covered] <= reference[covered]) & (
+        reference[covered] <= series.high[covered]
+    )
     valued = bool(len(off))
     return Agreement(
         count=count,
@@ -287,15 +324,20 @@ def _rmse_interval(off: FloatArray, time: FloatArray, seed: int) -> tuple[float,
 
 
 def spectrum(time: FloatArray, estimated: FloatArray, logged: FloatArray) -> Spectrum | None:
-    """Computes spectra over the longest run of windows one step apart, all estimated and logged; None where it is
-    shorter than `LEAST_SPECTRUM`, or where one of the series does not vary."""
+    """Computes spectra over the longest run of windows one step apart, all estimated and logged;
+    None where it is shorter than `LEAST_SPECTRUM`, or where one of the series does not vary."""
     if len(time) < LEAST_SPECTRUM:
         return None
     from scipy import signal
 
     step = float(np.median(np.diff(time)))
     both_valid = np.isfinite(estimated + logged)
-    broken = np.flatnonzero((np.abs(np.diff(time) - step) > 0.01 * step) | ~(both_valid[1:] & both_valid[:-1])) + 1
+    broken = (
+        np.flatnonzero(
+            (np.abs(np.diff(time) - step) > 0.01 * step) | ~(both_valid[1:] & both_valid[:-1])
+        )
+        + 1
+    )
     runs = np.split(np.arange(len(time)), broken)
     run = max(runs, key=len)
     if len(run) < LEAST_SPECTRUM:
@@ -319,9 +361,14 @@ def spectrum(time: FloatArray, estimated: FloatArray, logged: FloatArray) -> Spe
 
 def _delay(series: Beside, start: int, wind: WindSeries, seed: int) -> Delay:
     if series.time[-1] - series.time[0] < _SHORTEST_DELAY:
-        return Delay(offset=None, sigma=None, reasons=(f"the film is shorter than {_SHORTEST_DELAY:.0f} s",))
+        return Delay(
+            offset=None, sigma=None, reasons=(f"the film is shorter than {_SHORTEST_DELAY:.0f} s",)
+        )
     from flagdata.align.film_motion import MotionSeries
-    from flagdata.align.lag import LagSearch, estimate_offset  # only now: few films have an anemometer beside them
+    from flagdata.align.lag import (
+        LagSearch,
+        estimate_offset,
+    )  # only now: few films have an anemometer beside them
     from flagdata.align.windbins import wind_bins
 
     step = float(np.median(np.diff(series.time)))
@@ -332,7 +379,10 @@ def _delay(series: Beside, start: int, wind: WindSeries, seed: int) -> Delay:
             MotionSeries(time=instants, energy=np.maximum(series.wind, 0.0)),
             bins.average,
             search=LagSearch(
-                window=_SEARCHED, response=_RESPONSE[0], response_sigma=_RESPONSE[1], stamp_sigma=bins.sigma
+                window=_SEARCHED,
+                response=_RESPONSE[0],
+                response_sigma=_RESPONSE[1],
+                stamp_sigma=bins.sigma,
             ),
             generator=stream(seed, "delay"),
         )

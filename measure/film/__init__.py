@@ -1,4 +1,5 @@
-"""The film that is measured: which one it is, its frames made fit, its windows, and the size of its flag."""
+"""The film that is measured: which one it is, its frames made fit, its windows, and the size of its
+flag."""
 
 from __future__ import annotations
 

@@ -1,6 +1,8 @@
-"""A film that is made fit while it is read: steadied, cropped to its flag, all else frozen (`models.conditioning`).
+"""A film that is made fit while it is read: steadied, cropped to its flag, all else frozen
+(`models.conditioning`).
 
-Parts of a film in which the picture's edge cuts the flag off: left out, where enough is left without them.
+Parts of a film in which the picture's edge cuts the flag off: left out, where enough is left
+without them.
 """
 
 from __future__ import annotations
@@ -39,7 +41,8 @@ class CutOff:
     Attributes:
         times: (n,) of a sample of the film's frames [s].
         cut: (n, 4) whether the edge on each of `SIDES` cuts the flag off.
-        enough: time with the whole flag, in one piece, that a film must have for the rest to be left out [s].
+        enough: time with the whole flag, in one piece, that a film must have for the rest to be
+            left out [s].
     """
 
     times: FloatArray
@@ -58,12 +61,16 @@ class CutOff:
 
     @property
     def _longest(self) -> float:
-        """Longest time from the first to the last of frames in a row that are whole [s]; 0 without any."""
+        """Longest time from the first to the last of frames in a row that are whole [s]; 0 without
+        any."""
         whole = np.split(np.arange(len(self.times)), np.flatnonzero(np.diff(self.any)) + 1)
-        return max((float(np.ptp(self.times[run])) for run in whole if not self.any[run[0]]), default=0.0)
+        return max(
+            (float(np.ptp(self.times[run])) for run in whole if not self.any[run[0]]), default=0.0
+        )
 
     def left_out(self, time: float) -> bool:
-        """Returns whether the frame of a time [s] is: next to a frame of the sample that is cut off."""
+        """Returns whether the frame of a time [s] is: next to a frame of the sample that is cut
+        off."""
         if not self.partly:
             return False
         after = int(np.searchsorted(self.times, time))
@@ -91,14 +98,14 @@ class CutOff:
 
 
 _HELD = 640_000_000
-"""Bytes of frames up to which a film is held, so that it is decoded once: ten seconds of 1080p. Longer ones are decoded
-twice and hold a sample."""
+"""Bytes of frames up to which a film is held, so that it is decoded once: ten seconds of 1080p.
+Longer ones are decoded twice and hold a sample."""
 _LOST = 0.05
 """Share of frames without the background's features from which on a warning is due."""
 _ENLARGED = 2.0
 _LONGER = 1.15
-"""By how much an outline may be longer, for its height at the hoist, than the flag that was given: it is foreshortened,
-droops and flutters, all of which make it shorter."""
+"""By how much an outline may be longer, for its height at the hoist, than the flag that was given:
+it is foreshortened, droops and flutters, all of which make it shorter."""
 
 
 class WholeFilm(Film, Protocol):
@@ -125,20 +132,29 @@ class ConditionedFilm:
         aspect: length over height of the flag as the user gave it; None where it was not given.
 
     Attributes:
-        found: what the last reading found; None before the first, and of fewer frames than a search takes.
+        found: what the last reading found; None before the first, and of fewer frames than a search
+            takes.
         reference: (height, width) the frame that all others are registered to; None likewise.
-        piece: time with the whole flag, in one piece, that is enough where the rest is cut off [s]: two windows of a
-            flag of 1.5 m, unless a reader of other windows sets it.
-        searched: called after each frame in which camera and flag are sought, with about how many there are and 1.
+        piece: time with the whole flag, in one piece, that is enough where the rest is cut off [s]:
+            two windows of a flag of 1.5 m, unless a reader of other windows sets it.
+        searched: called after each frame in which camera and flag are sought, with about how many
+            there are and 1.
 
     Raises:
         UsageError: a crop beyond the picture.
     """
 
     def __init__(
-        self, film: WholeFilm, *, crop: CropBox | None = None, flag: int | None = None, aspect: float | None = None
+        self,
+        film: WholeFilm,
+        *,
+        crop: CropBox | None = None,
+        flag: int | None = None,
+        aspect: float | None = None,
     ) -> None:
-        if crop is not None and (crop.x + crop.width > film.width or crop.y + crop.height > film.height):
+        if crop is not None and (
+            crop.x + crop.width > film.width or crop.y + crop.height > film.height
+        ):
             raise UsageError(
                 f"the crop {crop} reaches beyond the picture of {film.width} × {film.height} px",
                 where="--crop",
@@ -201,7 +217,10 @@ class ConditionedFilm:
         times = np.array([time for time, _ in sample])
         self._cut = cut = CutOff(times=times, cut=self.found.cut > CUT, enough=self.piece)
         del sample, pictures
-        self._follower, self._watch = follower, watch = Follower(self.found), FilmWatch(rate=self.rate)
+        self._follower, self._watch = follower, watch = (
+            Follower(self.found),
+            FilmWatch(rate=self.rate),
+        )
         for time, picture in source:
             watch.look(time, picture)
             fit_frame = follower.show(picture)
@@ -269,8 +288,8 @@ class ConditionedFilm:
 
 
 def _chosen(rate: float, duration: float) -> Callable[[int], bool]:
-    """Selects the frames of a sample of some `SAMPLE`: evenly spread; of a long film in pairs, the frames of
-    each `MOMENT` apart at most.
+    """Selects the frames of a sample of some `SAMPLE`: evenly spread; of a long film in pairs, the
+    frames of each `MOMENT` apart at most.
 
     Args:
         rate: of the film [Hz].
@@ -286,7 +305,10 @@ def _chosen(rate: float, duration: float) -> Callable[[int], bool]:
 def _of_camera(conditioning: Conditioning, follower: Follower) -> list[Finding]:
     if not conditioning.camera.known:
         return [
-            Finding.of("camera-unknown", "no feature of the background shows the camera's motion; no frame was moved")
+            Finding.of(
+                "camera-unknown",
+                "no feature of the background shows the camera's motion; no frame was moved",
+            )
         ]
     if not conditioning.camera.moves:
         return [
@@ -300,7 +322,8 @@ def _of_camera(conditioning: Conditioning, follower: Follower) -> list[Finding]:
     notes = [
         Finding.of(
             "camera-moves",
-            f"the camera drifts {motion['drift']:.1f} px and shakes {motion['shake']:.2f} px from frame to frame, "
+            f"the camera drifts {motion['drift']:.1f} px and shakes {motion['shake']:.2f} px from "
+            "frame to frame, "
             f"by {conditioning.camera.evidence}; the frames were moved back",
             value=motion["drift"],
             count=conditioning.camera.support,
@@ -311,7 +334,8 @@ def _of_camera(conditioning: Conditioning, follower: Follower) -> list[Finding]:
         notes.append(
             Finding.of(
                 "camera-lost",
-                f"in {follower.lost} of {total} frames the background's features were not found, and the place of "
+                f"in {follower.lost} of {total} frames the background's features were not found, "
+                "and the place of "
                 "the frame before was used",
                 count=follower.lost,
                 value=follower.lost / total,
@@ -321,20 +345,30 @@ def _of_camera(conditioning: Conditioning, follower: Follower) -> list[Finding]:
     return notes
 
 
-def _of_flag(conditioning: Conditioning, reference: UInt8Array | None, *, number_given: bool) -> list[Finding]:
+def _of_flag(
+    conditioning: Conditioning, reference: UInt8Array | None, *, number_given: bool
+) -> list[Finding]:
     """Reports what was found of the flag; several are no matter where its number was given."""
     if conditioning.region is None or reference is None:
         return []
     height, width = reference.shape
-    left, top, right, bottom = (round(edge / conditioning.scale) for edge in conditioning.region.box)
+    left, top, right, bottom = (
+        round(edge / conditioning.scale) for edge in conditioning.region.box
+    )
     square, beyond = conditioning.square, conditioning.square.beyond(width, height)
     notes = [
         Finding.of(
             "flag-found",
-            f"{len(conditioning.regions)} moving {'cloths' if len(conditioning.regions) > 1 else 'cloth'}; number "
-            f"{conditioning.chosen + 1} visits {right - left} × {bottom - top} px and is shown in a square of "
+            f"{len(conditioning.regions)} moving "
+            f"{'cloths' if len(conditioning.regions) > 1 else 'cloth'}; number "
+            f"{conditioning.chosen + 1} visits {right - left} × {bottom - top} px and is shown in "
+            "a square of "
             f"{square.side} px"
-            + (f", {beyond:.0%} of which lie beyond the picture and were padded" if beyond > 0 else ""),
+            + (
+                f", {beyond:.0%} of which lie beyond the picture and were padded"
+                if beyond > 0
+                else ""
+            ),
             count=len(conditioning.regions),
             value=conditioning.region.share,
         )
@@ -343,7 +377,8 @@ def _of_flag(conditioning: Conditioning, reference: UInt8Array | None, *, number
         notes.append(
             Finding.of(
                 "several-flags-found",
-                f"{len(conditioning.regions)} regions move like cloth; number {conditioning.chosen + 1} was measured, "
+                f"{len(conditioning.regions)} regions move like cloth; number "
+                f"{conditioning.chosen + 1} was measured, "
                 "with "
                 f"{conditioning.region.share:.0%} of the motion",
                 count=len(conditioning.regions),
@@ -356,7 +391,8 @@ def _of_flag(conditioning: Conditioning, reference: UInt8Array | None, *, number
                 kind="enlarged",
                 severity=Severity.WARNING,
                 value=conditioning.size / square.side,
-                what=f"the flag fills {square.side} px of the picture and the network takes {conditioning.size} px: "
+                what=f"the flag fills {square.side} px of the picture and the network takes "
+                f"{conditioning.size} px: "
                 "it was "
                 f"enlarged {conditioning.size / square.side:.3g}-fold",
             )
@@ -367,13 +403,16 @@ def _of_flag(conditioning: Conditioning, reference: UInt8Array | None, *, number
 def _of_second_pole(conditioning: Conditioning) -> list[Finding]:
     if conditioning.region is None:
         return []
-    height = conditioning.standing.inside(conditioning.framed_box(conditioning.region), conditioning.places).height
+    height = conditioning.standing.inside(
+        conditioning.framed_box(conditioning.region), conditioning.places
+    ).height
     if height < SUSPECTED:
         return []
     return [
         Finding.of(
             "second-pole-suspected",
-            f"an upright edge stands still inside what moves, along {height:.0%} of its height: a stripe of the cloth, "
+            f"an upright edge stands still inside what moves, along {height:.0%} of its height: a "
+            "stripe of the cloth, "
             "or the pole of a second flag",
             value=height,
             fix="look whether two flags overlap in the picture; if so, film from where they do not",
@@ -383,12 +422,18 @@ def _of_second_pole(conditioning: Conditioning) -> list[Finding]:
 
 def _of_aspect(conditioning: Conditioning, stated_aspect: float | None) -> list[Finding]:
     region = conditioning.region
-    if stated_aspect is None or region is None or region.hoist == "top" or region.aspect <= _LONGER * stated_aspect:
+    if (
+        stated_aspect is None
+        or region is None
+        or region.hoist == "top"
+        or region.aspect <= _LONGER * stated_aspect
+    ):
         return []
     return [
         Finding.of(
             "flag-size-contradicted",
-            f"the flag's outline is {region.aspect:.2f} times as long as high at the hoist; a flag of the size "
+            f"the flag's outline is {region.aspect:.2f} times as long as high at the hoist; a flag "
+            "of the size "
             f"given would be at most {stated_aspect:.2f} times",
             value=region.aspect,
             fix=REASONS["another-shape"].fix,

@@ -1,4 +1,5 @@
-"""What SOURCE names: a video file or folder of images, an artifact of a lake, or the clips of a query."""
+"""What SOURCE names: a video file or folder of images, an artifact of a lake, or the clips of a
+query."""
 
 from __future__ import annotations
 
@@ -48,8 +49,17 @@ class FilmReading:
         Raises:
             UsageError: a region that is not x,y,width,height.
         """
-        rates = {"true_fps": chosen.true_fps, "sequence_fps": chosen.sequence_fps} if isinstance(chosen, OfFilm) else {}
-        return cls(crop=box_of(chosen.crop), flag=chosen.flag, aspect=None if size is None else size.aspect, **rates)
+        rates = (
+            {"true_fps": chosen.true_fps, "sequence_fps": chosen.sequence_fps}
+            if isinstance(chosen, OfFilm)
+            else {}
+        )
+        return cls(
+            crop=box_of(chosen.crop),
+            flag=chosen.flag,
+            aspect=None if size is None else size.aspect,
+            **rates,
+        )
 
     def conditioned(self, film: WholeFilm) -> ConditionedFilm:
         """Makes a film fit."""
@@ -58,7 +68,12 @@ class FilmReading:
     def recipe(self) -> dict[str, Any]:
         """Returns JSON values."""
         crop = None if self.crop is None else str(self.crop)
-        return {"crop": crop, "flag": self.flag, "true_fps": self.true_fps, "sequence_fps": self.sequence_fps}
+        return {
+            "crop": crop,
+            "flag": self.flag,
+            "true_fps": self.true_fps,
+            "sequence_fps": self.sequence_fps,
+        }
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -97,7 +112,8 @@ class Subject:
         return str(self.content_hash()) if self.artifact is None else self.artifact.id
 
     def content_hash(self) -> str | None:
-        """Hashes a plain file, or the names and hashes of a folder's files (SHA-256); None of an artifact."""
+        """Hashes a plain file, or the names and hashes of a folder's files (SHA-256); None of an
+        artifact."""
         if self.path is None:
             return None
         if self.path.is_file():
@@ -125,12 +141,19 @@ def box_of(crop: tuple[int, int, int, int] | str | None) -> CropBox | None:
         return CropBox(x=crop[0], y=crop[1], width=crop[2], height=crop[3])
     box = None if crop is None else parse_crop(crop)
     if not (box is None or isinstance(box, CropBox)):
-        raise UsageError(f"the crop {crop!r} is not a box", where="--crop", fix="give x,y,width,height in pixels")
+        raise UsageError(
+            f"the crop {crop!r} is not a box", where="--crop", fix="give x,y,width,height in pixels"
+        )
     return box
 
 
 def subjects(
-    source: str | None, *, query: str | None, lake: Lake | None, at: str | None, reading: FilmReading
+    source: str | None,
+    *,
+    query: str | None,
+    lake: Lake | None,
+    at: str | None,
+    reading: FilmReading,
 ) -> list[Subject]:
     """Opens the films that a source or a query names.
 
@@ -141,18 +164,29 @@ def subjects(
         at: tag, branch or version to look at.
 
     Raises:
-        UsageError: neither a source nor a query, or both; artifacts without a lake; options of files for artifacts.
+        UsageError: neither a source nor a query, or both; artifacts without a lake; options of
+            files for artifacts.
         NotFoundError: nothing of that name, or no clip matches.
         FlagdataError: a file that is no film.
     """
     if (source is None) == (query is None):
-        raise UsageError("name a film or give a query over clips, one of them", fix="see flagdata measure --help")
+        raise UsageError(
+            "name a film or give a query over clips, one of them", fix="see flagdata measure --help"
+        )
     if source is not None:
-        film, location = film_at(source, lake=lake, at=at, true_fps=reading.true_fps, sequence_fps=reading.sequence_fps)
+        film, location = film_at(
+            source, lake=lake, at=at, true_fps=reading.true_fps, sequence_fps=reading.sequence_fps
+        )
         fit = reading.conditioned(film)
         if isinstance(location, Path):
             return [Subject(film=fit, path=location, example=example_of(source))]
-        return [Subject(film=fit, artifact=location, record=film.record if isinstance(film, RecordFilm) else None)]
+        return [
+            Subject(
+                film=fit,
+                artifact=location,
+                record=film.record if isinstance(film, RecordFilm) else None,
+            )
+        ]
     if lake is None:
         raise NotFoundError("a query needs a lake", fix="name the lake by --lake")
     if reading.true_fps is not None or reading.sequence_fps is not None:

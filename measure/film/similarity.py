@@ -1,25 +1,28 @@
-"""Flags of another size, by dynamic similarity: what a model of a 1.5 m flag says of a flag of any length.
+"""Flags of another size, by dynamic similarity: what a model of a 1.5 m flag says of a flag of any
+length.
 
-The equation of motion of a cloth with area weight ρ_s and bending stiffness B in air of density ρ_a at speed U is, in
-terms of the orders of its parts,
+The equation of motion of a cloth with area weight ρ_s and bending stiffness B in air of density ρ_a
+at speed U is, in terms of the orders of its parts,
 
     ρ_s ẍ  =  ρ_a U² f(shape, ẋ/U)  +  B ∂⁴x  +  E ∂²x (stretching)  +  ρ_s g.
 
-Lengths are measured in L, times in √(L/g), speeds in √(gL), and everything is divided by ρ_s g. What is left are the
-numbers
+Lengths are measured in L, times in √(L/g), speeds in √(gL), and everything is divided by ρ_s g.
+What is left are the numbers
 
     U²/(gL)  (Froude),   ρ_s/(ρ_a L)  (mass ratio),   B/(ρ_s g L³),   E/(ρ_s g L).
 
-Two flags that agree in these, in the shape and in the way they are held move alike: x(t)/L is the same function of
-t√(g/L). Gravity and air are the same for both. So a flag that is s times as long as another moves like it if
+Two flags that agree in these, in the shape and in the way they are held move alike: x(t)/L is the
+same function of t√(g/L). Gravity and air are the same for both. So a flag that is s times as long
+as another moves like it if
 
     U ∝ √s,   t ∝ √s,   ρ_s ∝ s,   B ∝ ρ_s L³ ∝ s⁴,   E ∝ ρ_s L ∝ s²,   internal damping time ∝ √s.
 
-A flag of length s · 1.5 m is therefore shown to the model in frames √s/25 s apart, and wind, area weight and bending
-stiffness are scaled back by √s, s and s⁴; ratios of stiffnesses stay. Two things do not follow the rule: a fabric's
-stretching stiffness E does not grow with the flag, which matters little as long as the cloth hardly stretches, and its
-bending table changes at curvatures of 5, 10, 15 and 20 1/m, not at multiples of 1/L. The Reynolds number, on which the
-simulated air's force does not depend, is another.
+A flag of length s · 1.5 m is therefore shown to the model in frames √s/25 s apart, and wind, area
+weight and bending stiffness are scaled back by √s, s and s⁴; ratios of stiffnesses stay. Two things
+do not follow the rule: a fabric's stretching stiffness E does not grow with the flag, which matters
+little as long as the cloth hardly stretches, and its bending table changes at curvatures of 5, 10,
+15 and 20 1/m, not at multiples of 1/L. The Reynolds number, on which the simulated air's force does
+not depend, is another.
 """
 
 from __future__ import annotations
@@ -43,7 +46,8 @@ from models.networks.targets import ASPECT, Cloth, Target
 
 @dataclass(frozen=True, kw_only=True)
 class Trained:
-    """The cloths that a model is trained on: all of one size, and of one shape or of shapes that it knows of.
+    """The cloths that a model is trained on: all of one size, and of one shape or of shapes that it
+    knows of.
 
     Attributes:
         noun: what they are called.
@@ -64,9 +68,12 @@ FLAG = TRAINED[Cloth.FLAG]
 
 
 def trained_on(targets: Sequence[Target]) -> Trained:
-    """Returns the cloths that a model with these targets is trained on; one that estimates the aspect knows several."""
+    """Returns the cloths that a model with these targets is trained on; one that estimates the
+    aspect knows several."""
     trained = TRAINED[targets[0].cloth]
-    ends = [(math.exp(target.low), math.exp(target.high)) for target in targets if target.name == ASPECT]
+    ends = [
+        (math.exp(target.low), math.exp(target.high)) for target in targets if target.name == ASPECT
+    ]
     return replace(trained, aspects=ends[0]) if ends else trained
 
 
@@ -77,7 +84,8 @@ _SIZE = re.compile(r"\s*(\d+(?:\.\d*)?|\.\d+)\s*[x×]\s*(\d+(?:\.\d*)?|\.\d+)\s*
 POWERS: dict[str, float] = {"wind_speed": 0.5, "area_weight": 1.0}
 """Powers of s by which quantities grow."""
 LOGARITHMS: dict[str, float] = {"bending_scale": 4.0, "anisotropy": 0.0, "log_aspect": 0.0}
-"""The same of quantities known by their logarithm, base 10 (an aspect, which does not scale, by the natural one)."""
+"""The same of quantities known by their logarithm, base 10 (an aspect, which does not scale, by the
+natural one)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +101,8 @@ class FlagSize:
 
     @classmethod
     def of(cls, sides: FlagSize | tuple[float, float] | str) -> FlagSize:
-        """Returns the size that its two sides are, length and height [m], or a text such as "1.5x1.0".
+        """Returns the size that its two sides are, length and height [m], or a text such as
+        "1.5x1.0".
 
         Raises:
             UsageError: another text.
@@ -116,7 +125,8 @@ class FlagSize:
             raise UsageError(
                 f"the flag is {self.length:g} m × {self.height:g} m",
                 where="--flag-size",
-                fix=f"give length x height in metres, each from {_SHORTEST:g} to {_LONGEST:g}, as in 1.5x1.0",
+                fix=f"give length x height in metres, each from {_SHORTEST:g} to {_LONGEST:g}, as "
+                "in 1.5x1.0",
             )
 
     @property
@@ -137,9 +147,11 @@ class FlagSize:
         return (
             Finding.of(
                 "aspect-ratio",
-                f"the {trained.noun} is {aspect:.2f} times as long as it is high, those of the training "
+                f"the {trained.noun} is {aspect:.2f} times as long as it is high, those of the "
+                "training "
                 + (f"{least:.2f}" if least == most else f"{least:.2f} to {most:.2f}")
-                + " times: similarity is exact for one shape only, so that intervals may be too narrow",
+                + " times: similarity is exact for one shape only, so that intervals may be too "
+                "narrow",
                 value=aspect,
             ),
         )
@@ -149,9 +161,9 @@ class FlagSize:
 class SizePrior:
     """What is assumed of a flag's length where nobody states it: a log-normal distribution.
 
-    A flag's median is the 1.5 m × 1.0 m (5 ft × 3 ft) flag, the most common size on house and club poles; a factor of
-    1.3 for one standard deviation puts 90 % of the flags between 0.97 m and 2.31 m. It is a choice of this project, not
-    a measured distribution.
+    A flag's median is the 1.5 m × 1.0 m (5 ft × 3 ft) flag, the most common size on house and club
+    poles; a factor of 1.3 for one standard deviation puts 90 % of the flags between 0.97 m and 2.31
+    m. It is a choice of this project, not a measured distribution.
 
     Attributes:
         median: [m].
@@ -171,13 +183,13 @@ class SizePrior:
 
 
 STRATA = 3
-"""Parts of equal probability that a distribution of sizes is cut into; the model looks at the middle of each. More
-follow the size's uncertainty better and take time in proportion."""
+"""Parts of equal probability that a distribution of sizes is cut into; the model looks at the
+middle of each. More follow the size's uncertainty better and take time in proportion."""
 LEAST_SHARE = 0.5
 """Share of the prior that the frame rate must admit."""
 RATE_SLACK = 0.95
-"""A film may be this much slower than the network's frames: one frame in twenty is then shown twice. It admits films of
-24 frames a second for a model of 25."""
+"""A film may be this much slower than the network's frames: one frame in twenty is then shown
+twice. It admits films of 24 frames a second for a model of 25."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -187,7 +199,8 @@ class Sizes:
     Attributes:
         given: the size that was stated; None where it was not.
         scale: (i,) s at which the model looks at the film.
-        draws: (i, n) s of each draw of the posterior at that stratum; all equal where the size is given.
+        draws: (i, n) s of each draw of the posterior at that stratum; all equal where the size is
+            given.
         findings: on the size.
     """
 
@@ -206,11 +219,17 @@ class Sizes:
             "sizes-left-out",
             f"{len(left_out)} of {len(self.scale)} sizes of flag were left out of the answer: at "
             + " and ".join(f"{self.scale[index]:.2f}" for index in left_out)
-            + " times the size of the training's flags the film is unlike what the network was trained on",
+            + " times the size of the training's flags the film is unlike what the network was "
+            "trained on",
             count=len(left_out),
             fix="give --flag-size LENGTHxHEIGHT",
         )
-        return replace(self, scale=self.scale[chosen], draws=self.draws[chosen], findings=(*self.findings, finding))
+        return replace(
+            self,
+            scale=self.scale[chosen],
+            draws=self.draws[chosen],
+            findings=(*self.findings, finding),
+        )
 
 
 def sizes(
@@ -225,9 +244,9 @@ def sizes(
 ) -> Sizes:
     """Chooses the lengths to consider for a film.
 
-    Of an unknown size the prior is cut into `STRATA` parts of equal probability. The model looks at the film as that
-    of a flag of each part's median length; what it says in scaled units, which changes slowly with s, is scaled back by
-    lengths drawn within the part.
+    Of an unknown size the prior is cut into `STRATA` parts of equal probability. The model looks at
+    the film as that of a flag of each part's median length; what it says in scaled units, which
+    changes slowly with s, is scaled back by lengths drawn within the part.
 
     Args:
         stated_size: None if unknown.
@@ -239,7 +258,8 @@ def sizes(
         trained: the cloths that the model is trained on.
 
     Raises:
-        RefusedError: the film is too slow for the flag's size, or for half of what is likely where that is unknown.
+        RefusedError: the film is too slow for the flag's size, or for half of what is likely where
+            that is unknown.
     """
     prior = prior if prior is not None else SizePrior(median=trained.length)
     if stated_size is not None:
@@ -247,11 +267,13 @@ def sizes(
         needed = RATE_SLACK * frames_rate / math.sqrt(scale)
         if rate < needed:
             raise RefusedError(
-                f"{REASONS['low-frame-rate'].sentence}: {rate:.4g}, and a {trained.noun} of {stated_size.length:g} m "
+                f"{REASONS['low-frame-rate'].sentence}: {rate:.4g}, and a {trained.noun} of "
+                f"{stated_size.length:g} m "
                 "needs "
                 f"{needed:.4g}",
                 where="frame rate",
-                fix=f"film at {math.ceil(10 * needed) / 10:g} frames a second or more" + length_first(stated_size),
+                fix=f"film at {math.ceil(10 * needed) / 10:g} frames a second or more"
+                + length_first(stated_size),
             )
         return Sizes(
             given=stated_size,
@@ -264,20 +286,25 @@ def sizes(
     if admitted < LEAST_SHARE:
         enough = RATE_SLACK * frames_rate * math.sqrt(trained.length / prior.median)
         raise RefusedError(
-            f"{REASONS['low-frame-rate'].sentence}: {rate:.4g}, not enough for a {trained.noun} shorter than "
+            f"{REASONS['low-frame-rate'].sentence}: {rate:.4g}, not enough for a {trained.noun} "
+            "shorter than "
             f"{least:.2f} m, and its size was not given",
             where="frame rate",
-            fix=f"give --flag-size if the {trained.noun} is larger, or film at {enough:.3g} Hz or more",
+            fix=f"give --flag-size if the {trained.noun} is larger, or film at {enough:.3g} Hz or "
+            "more",
         )
     below = 1 - admitted
     edges = below + admitted * np.arange(STRATA + 1) / STRATA
     middles = (edges[:-1] + edges[1:]) / 2
-    within = edges[:-1, None] + (edges[1:] - edges[:-1])[:, None] * generator.uniform(size=(STRATA, draws))
+    within = edges[:-1, None] + (edges[1:] - edges[:-1])[:, None] * generator.uniform(
+        size=(STRATA, draws)
+    )
     low, high = prior.quantile(np.array([below + 0.05 * admitted, 1 - 0.05 * admitted]))
     findings = [
         Finding.of(
             "size-assumed",
-            f"the {trained.noun}'s size was not given: lengths from {low:.2f} to {high:.2f} m (90 %) were taken "
+            f"the {trained.noun}'s size was not given: lengths from {low:.2f} to {high:.2f} m (90 "
+            "%) were taken "
             "as possible and widen the intervals",
             value=prior.median,
             fix="give --flag-size LENGTHxHEIGHT",
@@ -287,7 +314,8 @@ def sizes(
         findings.append(
             Finding.of(
                 "small-sizes-left-out",
-                f"at {rate:.4g} frames a second {trained.noun}s shorter than {least:.2f} m cannot be judged; "
+                f"at {rate:.4g} frames a second {trained.noun}s shorter than {least:.2f} m cannot "
+                "be judged; "
                 f"{below:.0%} of what was assumed of the size was left out",
                 value=below,
                 fix="give --flag-size, or film faster",
@@ -302,22 +330,26 @@ def sizes(
 
 
 def length_first(stated_size: FlagSize | None) -> str:
-    """Returns what a remedy adds where a flag is stated higher than long, as one whose height was typed first: the
-    size in the other order."""
+    """Returns what a remedy adds where a flag is stated higher than long, as one whose height was
+    typed first: the size in the other order."""
     if stated_size is None or stated_size.length >= stated_size.height:
         return ""
     return (
-        f"; the length comes first: of a flag {stated_size.length:g} m high and {stated_size.height:g} m long give "
+        f"; the length comes first: of a flag {stated_size.length:g} m high and "
+        f"{stated_size.height:g} m long give "
         + command_line("--flag-size", f"{stated_size.height:g}x{stated_size.length:g}")
     )
 
 
 def spacing(scale: float, *, rate: float) -> float:
-    """Returns the time between frames at which a flag of scale s looks like the model's at `rate` [s]."""
+    """Returns the time between frames at which a flag of scale s looks like the model's at `rate`
+    [s]."""
     return math.sqrt(scale) / rate
 
 
-def scaled_back(values: NDArray[np.floating], names: Sequence[str], scale: FloatArray | float) -> FloatArray:
+def scaled_back(
+    values: NDArray[np.floating], names: Sequence[str], scale: FloatArray | float
+) -> FloatArray:
     """Converts what a model said of a flag of scale s to that flag's own.
 
     Args:

@@ -1,9 +1,9 @@
 """A film cut into windows of the network's length, once for each size of flag that is considered.
 
-A window starts on a frame. Where no frame is near an instant of the network, its picture is interpolated between the
-two frames about it (`models.conditioning.frame_interpolation`); frames that repeat the one before are left out first. A
-window in which frames are missing is left out. Where a film's coding left no noise, some is given back
-(`models.conditioning.grain`).
+A window starts on a frame. Where no frame is near an instant of the network, its picture is
+interpolated between the two frames about it (`models.conditioning.frame_interpolation`); frames
+that repeat the one before are left out first. A window in which frames are missing is left out.
+Where a film's coding left no noise, some is given back (`models.conditioning.grain`).
 """
 
 from __future__ import annotations
@@ -26,14 +26,16 @@ from models.conditioning.repeats import Distinct
 from models.trained.estimator import Estimator
 
 _BEYOND = 0.05
-"""Share of the time between two frames by which an instant may lie beyond the film's last: stamps are rounded to
-milliseconds."""
+"""Share of the time between two frames by which an instant may lie beyond the film's last: stamps
+are rounded to milliseconds."""
 _FEWEST = 0.8
-"""Share of the network's frames that a window must have of its own, so that most of its pictures were taken. Lower lets
-interpolated pictures make up most of a window; higher drops windows with a few lost frames."""
+"""Share of the network's frames that a window must have of its own, so that most of its pictures
+were taken. Lower lets interpolated pictures make up most of a window; higher drops windows with a
+few lost frames."""
 _LONGEST = 1.75
-"""Longest time between two frames that is interpolated, in periods of the film or of the network's frames at the
-largest size considered, whichever is longer: a repeated frame at 30 Hz, but none that is missing at 25 Hz."""
+"""Longest time between two frames that is interpolated, in periods of the film or of the network's
+frames at the largest size considered, whichever is longer: a repeated frame at 30 Hz, but none that
+is missing at 25 Hz."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +65,14 @@ class WindowLayout:
     @property
     def count(self) -> int:
         """How many windows there are."""
-        return int(np.floor((self.last - self.first - self.length + 0.5 * self.period) / self.step + 1e-9)) + 1
+        return (
+            int(
+                np.floor(
+                    (self.last - self.first - self.length + 0.5 * self.period) / self.step + 1e-9
+                )
+            )
+            + 1
+        )
 
     def start(self, index: int) -> float:
         """Start of window `index` [s from the film's first frame]."""
@@ -106,30 +115,35 @@ def lay_out(
         first, last: the part of the film to use [s]; by default all.
 
     Raises:
-        UsageError: a part that the film does not have, or a step that is not above 0, shorter than the time between two
-            frames or longer than the part.
+        UsageError: a part that the film does not have, or a step that is not above 0, shorter than
+            the time between two frames or longer than the part.
         InputError: the film is shorter than one window.
     """
     begin, end = first if first is not None else 0.0, last if last is not None else duration
     if not 0 <= begin < end or begin >= duration:
         raise UsageError(
-            f"the part from {begin:g} s to {end:g} s is not in the film, which lasts {duration:.2f} s",
+            f"the part from {begin:g} s to {end:g} s is not in the film, which lasts "
+            f"{duration:.2f} s",
             where="--start, --end",
             fix="give a part that it has",
         )
     if step is not None and not step > 0:
         raise UsageError(
-            f"the time between windows is {step:g} s", where="--windows", fix="give a time above 0, as in 1.2s"
+            f"the time between windows is {step:g} s",
+            where="--windows",
+            fix="give a time above 0, as in 1.2s",
         )
     if step is not None and step * rate < 1 - 1e-6:
         raise UsageError(
-            f"the time between windows is {step:g} s, and that between the film's frames {1 / rate:.3g} s",
+            f"the time between windows is {step:g} s, and that between the film's frames "
+            f"{1 / rate:.3g} s",
             where="--windows",
             fix=f"give {1 / rate:.3g} s or more, so that each window begins on a frame of its own",
         )
     if step is not None and step > min(end, duration) - begin:
         raise UsageError(
-            f"the time between windows is {step:g} s, and {min(end, duration) - begin:.2f} s of film are used",
+            f"the time between windows is {step:g} s, and {min(end, duration) - begin:.2f} s of "
+            "film are used",
             where="--windows",
             fix="give less than that, as in 1.2s; without it windows follow each other",
         )
@@ -146,7 +160,8 @@ def lay_out(
         raise InputError(
             f"{layout.last - layout.first:.2f} s of film, a measurement takes {layout.length:.2f} s",
             where="length of the film",
-            fix=f"give at least {layout.length:.2f} s, {frames} frames at {1 / max(spacings):.3g} Hz; "
+            fix=f"give at least {layout.length:.2f} s, {frames} frames at {1 / max(spacings):.3g} "
+            "Hz; "
             "if the film lasts longer, check the rate that was given",
         )
     return layout
@@ -159,7 +174,8 @@ class WindowReader:
         layout: of the windows.
         distinct: the frames, with how many were read and how many repeat the one before.
         lacks: start of a window that was left out [s] → what it lacks.
-        look: called with each frame and its time before the windows are cut, where someone else looks as well.
+        look: called with each frame and its time before the windows are cut, where someone else
+            looks as well.
     """
 
     def __init__(
@@ -189,11 +205,15 @@ class WindowReader:
             last=last,
         )
         if isinstance(film, ConditionedFilm):
-            film.piece = self.layout.length + self.layout.step  # wherever it begins, a window lies in it
+            film.piece = (
+                self.layout.length + self.layout.step
+            )  # wherever it begins, a window lies in it
         self.lacks: dict[float, str] = {}
         self.look: Callable[[float, UInt8Array], object] | None = None
         margin = 2 * self.layout.period
-        self.distinct = Distinct(self._shown(film.frames(self.layout.first - margin, self.layout.last + margin)))
+        self.distinct = Distinct(
+            self._shown(film.frames(self.layout.first - margin, self.layout.last + margin))
+        )
 
     def windows(self, advance: Callable[[int, int], None] | None = None) -> Iterator[Window]:
         """Yields the windows, in order; one in which frames are missing is left out.
@@ -219,7 +239,8 @@ def cut(
     """Cuts out the windows of a film, in order; one in which frames are missing is left out.
 
     Args:
-        frames: (time from the film's first frame [s], picture), in order; at most a window of them is held.
+        frames: (time from the film's first frame [s], picture), in order; at most a window of them
+            is held.
         lacks: takes start → what it lacks of each window that is left out.
     """
     buffer: deque[TimedFrame] = deque()
@@ -243,7 +264,9 @@ def cut(
             lacks[start] = window
 
 
-def _window(buffer: deque[TimedFrame], layout: WindowLayout, index: int, interpolator: Interpolator) -> Window | str:
+def _window(
+    buffer: deque[TimedFrame], layout: WindowLayout, index: int, interpolator: Interpolator
+) -> Window | str:
     """Returns a window, or what it lacks."""
     if len(buffer) < 2:
         return "there are no frames"
@@ -262,13 +285,19 @@ def _window(buffer: deque[TimedFrame], layout: WindowLayout, index: int, interpo
             return "the frames end before it does"
         if gaps.max() > allowed:
             return (
-                f"{gaps.max() * 1e3:.0f} ms lie between two pictures, and at most {allowed * 1e3:.0f} ms can be "
+                f"{gaps.max() * 1e3:.0f} ms lie between two pictures, and at most "
+                f"{allowed * 1e3:.0f} ms can be "
                 "interpolated"
             )
         within = np.count_nonzero((times >= start - 1e-6) & (times < instants[-1]))
         if within < _FEWEST * (layout.frames - 1):
-            return f"{within} pictures were taken in it, of {layout.frames - 1} at least {_FEWEST:.0%} must be"
-        clip, between = at_instants(buffer, instants, period=layout.period, interpolator=interpolator)
+            return (
+                f"{within} pictures were taken in it, of {layout.frames - 1} at least "
+                f"{_FEWEST:.0%} must be"
+            )
+        clip, between = at_instants(
+            buffer, instants, period=layout.period, interpolator=interpolator
+        )
         clips.append(add_grain(clip, seed=index))
         interpolated += between
     return Window(index=index, start=start, clips=np.stack(clips), interpolated=interpolated)
@@ -291,7 +320,8 @@ def findings_of(
             "resampled",
             f"windows of {layout.frames} frames, "
             + " or ".join(f"{spacing * 1e3:.1f}" for spacing in layout.spacings)
-            + f" ms apart, out of a film of {1 / layout.period:.4g} frames a second; {interpolated} of {frames_made} "
+            + f" ms apart, out of a film of {1 / layout.period:.4g} frames a second; "
+            f"{interpolated} of {frames_made} "
             "lie "
             "between two frames and were interpolated by the motion of the picture",
             value=interpolated / max(frames_made, 1),
@@ -302,7 +332,8 @@ def findings_of(
         notes.append(
             Finding.of(
                 "windows-left-out",
-                f"{layout.count - windows_read} of {layout.count} windows lack frames and were left out",
+                f"{layout.count - windows_read} of {layout.count} windows lack frames and were "
+                "left out",
                 count=layout.count - windows_read,
             )
         )
@@ -310,8 +341,10 @@ def findings_of(
         notes.append(
             Finding.of(
                 "frames-repeated",
-                f"{repeated} of {frames} frames ({repeated / frames:.0%}) repeat the one before and were left "
-                f"out: {(1 - repeated / frames) / layout.period:.3g} different pictures a second are left",
+                f"{repeated} of {frames} frames ({repeated / frames:.0%}) repeat the one before "
+                "and were left "
+                f"out: {(1 - repeated / frames) / layout.period:.3g} different pictures a second "
+                "are left",
                 count=repeated,
                 value=repeated / frames,
             )

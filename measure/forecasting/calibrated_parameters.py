@@ -1,5 +1,5 @@
-"""The calibrated parameters of the base model: area weight, bending and internal damping, with bounds, steps,
-priors."""
+"""The calibrated parameters of the base model: area weight, bending and internal damping, with
+bounds, steps, priors."""
 
 from __future__ import annotations
 
@@ -48,25 +48,35 @@ class Calibration:
     def at_bounds(self) -> tuple[str, ...]:
         """Names of the parameters at a bound of the model: the data would take them beyond."""
         bounds = {"area_weight": _AREA_WEIGHT, "bending": _BENDING, "damping": _DAMPING}
-        return tuple(name for name, span in bounds.items() if not span[0] < getattr(self, name) < span[1])
+        return tuple(
+            name for name, span in bounds.items() if not span[0] < getattr(self, name) < span[1]
+        )
 
 
 _AREA_WEIGHT = (0.2, 5.0)
 _BENDING = (0.02, 50.0)
 _DAMPING = (0.25e-3, 0.2)  # s; with less, the motion of a flag does not converge in the mesh
 
-THETA: tuple[tuple[str, str, float], ...] = (("area_weight", "ln", 0.1), ("bending", "ln", 0.7), ("damping", "ln", 0.7))
-"""Name, unit and step of the calibrated parameters: natural logarithms of factors, and of the damping's time."""
+THETA: tuple[tuple[str, str, float], ...] = (
+    ("area_weight", "ln", 0.1),
+    ("bending", "ln", 0.7),
+    ("damping", "ln", 0.7),
+)
+"""Name, unit and step of the calibrated parameters: natural logarithms of factors, and of the
+damping's time."""
 
 DAMPING = [name for name, *_ in THETA].index("damping")
 """Place of the damping among `THETA`."""
 
 
 def prior(area_weight_uncertainty: float) -> FloatArray:
-    """Returns standard deviations of the calibrated parameters about the nominal ones, in the units of `THETA`.
+    """Returns standard deviations of the calibrated parameters about the nominal ones, in the units
+    of `THETA`.
 
-    Bending is known within a factor of e (the spread of one kind of cloth: Wang et al. 2011). Damping is hardly ever
-    measured: within a factor of 4.5 about 2.5 ms, so that 0.25 to 30 ms are within 1.7 standard deviations.
+    Bending is known within a factor of e (the spread of one kind of cloth: Wang et al. 2011).
+    Damping is hardly ever
+    measured: within a factor of 4.5 about 2.5 ms, so that 0.25 to 30 ms are within 1.7 standard
+    deviations.
 
     Args:
         area_weight_uncertainty: relative standard uncertainty of the area weight.
@@ -78,4 +88,5 @@ PRIOR = prior(AREA_WEIGHT_UNCERTAINTY)
 """Where nobody says how well the area weight is known."""
 
 PRIOR_WITHOUT_MASS = prior(1.0)
-"""Of a cloth that was not weighed and whose material is a guess: its area weight within a factor of e."""
+"""Of a cloth that was not weighed and whose material is a guess: its area weight within a factor of
+e."""

@@ -1,8 +1,9 @@
 """What is varied about the model, one column each: effects of the library, forces, the wind.
 
-A column is a direction in the space of models, known by the change of the predictions along it, its sensitivity. Those
-of parameters, of effects, of the corrective field and of the wind are found by simulation: `StepColumn.system` gives
-the batch with a small step taken. Forces along the motion and across it, which are only looked along, are written down.
+A column is a direction in the space of models, known by the change of the predictions along it, its
+sensitivity. Those of parameters, of effects, of the corrective field and of the wind are found by
+simulation: `StepColumn.system` gives the batch with a small step taken. Forces along the motion and
+across it, which are only looked along, are written down.
 """
 
 from __future__ import annotations
@@ -89,13 +90,18 @@ class EffectColumn(StepColumn):
     def system(self, system: System, state: State) -> tuple[System, State]:
         return self.apply_strength(self.step, system, state)
 
-    def apply_strength(self, coefficient: float, system: System, state: State) -> tuple[System, State]:
+    def apply_strength(
+        self, coefficient: float, system: System, state: State
+    ) -> tuple[System, State]:
         """Applies the effect to the batch at a strength `coefficient` beyond its null value."""
         return apply([self.at(coefficient)], system, state)
 
     def at(self, coefficient: float | Tensor) -> Effect:
-        """Makes the effect at a strength `coefficient` beyond its null value, or one for each member (batch,)."""
-        return EFFECTS[self.effect](**dict(self.shapes), **{self.parameter: self.described.null + coefficient})
+        """Makes the effect at a strength `coefficient` beyond its null value, or one for each
+        member (batch,)."""
+        return EFFECTS[self.effect](
+            **dict(self.shapes), **{self.parameter: self.described.null + coefficient}
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -108,13 +114,16 @@ class SteadyField(ForceEffect):
 
     acceleration: Tensor
 
-    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+    def force(
+        self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor
+    ) -> Tensor:
         return self.acceleration.to(dtype=cloth.dtype, device=cloth.device) * cloth.mass[:, None]
 
 
 @dataclass(frozen=True, kw_only=True)
 class FieldColumn(StepColumn):
-    """A mode b cos(π i u/W) cos(π j v/H) of the corrective field, a force per mass along an axis of the world.
+    """A mode b cos(π i u/W) cos(π j v/H) of the corrective field, a force per mass along an axis of
+    the world.
 
     Attributes:
         axis: 0, 1 or 2.
@@ -134,13 +143,16 @@ class FieldColumn(StepColumn):
         return "m/s²"
 
     def acceleration(self, rest: FloatArray) -> Tensor:
-        """Computes the acceleration (vertex, 3, 1) of a step, at rest coordinates (vertex, 2) [m/s²]."""
+        """Computes the acceleration (vertex, 3, 1) of a step, at rest coordinates (vertex, 2)
+        [m/s²]."""
         field = torch.zeros((len(rest), 3, 1), dtype=torch.float64)
         field[:, self.axis, 0] = self.step * torch.as_tensor(cosine(self.mode, rest, rest))
         return field
 
     def system(self, system: System, state: State) -> tuple[System, State]:
-        return SteadyField(acceleration=self.acceleration(system.cloth.mesh.rest)).apply(system, state)
+        return SteadyField(acceleration=self.acceleration(system.cloth.mesh.rest)).apply(
+            system, state
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -172,7 +184,8 @@ class WindColumn(StepColumn):
 
 
 def blown(shares: Tensor, system: System, state: State) -> tuple[System, State]:
-    """Makes the batch's wind stronger, turned and rising by (part, batch) or (part, 1) shares of its mean."""
+    """Makes the batch's wind stronger, turned and rising by (part, batch) or (part, 1) shares of
+    its mean."""
     samples = shares[None].expand(2, -1, -1)
     return apply([Gusts(intensity=1.0, lateral=1.0, vertical=1.0, samples=samples)], system, state)
 
@@ -180,9 +193,9 @@ def blown(shares: Tensor, system: System, state: State) -> tuple[System, State]:
 class WrittenColumn(Column):
     """A force per mass b f cos(π i u/W) cos(π j v/H), f seen in the motion.
 
-    Its change of the predictions is written down, not simulated: T² times the force, T their horizon, what it does to a
-    point that is free. As a direction to look along, where only nulls say what is usual, it need not be what cloth
-    does.
+    Its change of the predictions is written down, not simulated: T² times the force, T their
+    horizon, what it does to a point that is free. As a direction to look along, where only nulls
+    say what is usual, it need not be what cloth does.
 
     Attributes:
         mode: (i, j).
@@ -190,16 +203,20 @@ class WrittenColumn(Column):
 
     mode: tuple[int, int]
 
-    def sensitivity(self, markers: FloatArray, rest: FloatArray, observed: Tensor, period: float) -> Tensor:
-        """Computes the sensitivity (frame − 2, marker, 3, segment) [m per unit] of observed markers (frame, marker, 3,
-        segment), from the third frame on.
+    def sensitivity(
+        self, markers: FloatArray, rest: FloatArray, observed: Tensor, period: float
+    ) -> Tensor:
+        """Computes the sensitivity (frame − 2, marker, 3, segment) [m per unit] of observed markers
+        (frame, marker, 3, segment), from the third frame on.
 
         Args:
             markers: (marker, 2) [m].
             rest: (vertex, 2) of the cloth [m].
             period: between the frames [s].
         """
-        shape = torch.as_tensor(cosine(self.mode, markers, rest), dtype=observed.dtype, device=observed.device)
+        shape = torch.as_tensor(
+            cosine(self.mode, markers, rest), dtype=observed.dtype, device=observed.device
+        )
         return self._move(observed, period) * shape[None, :, None, None]
 
     @abstractmethod
@@ -227,15 +244,20 @@ class MotionColumn(WrittenColumn):
         return ("1/s", "1")[self.derivative - 1]
 
     def _move(self, observed: Tensor, period: float) -> Tensor:
-        return _travel(observed) * period if self.derivative == 1 else observed[2:] - 2 * observed[1:-1] + observed[:-2]
+        return (
+            _travel(observed) * period
+            if self.derivative == 1
+            else observed[2:] - 2 * observed[1:-1] + observed[:-2]
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
 class AcrossColumn(WrittenColumn):
-    """Across the observed velocity v, horizontally: z × v, as of a frame that turns about the vertical.
+    """Across the observed velocity v, horizontally: z × v, as of a frame that turns about the
+    vertical.
 
-    Mirrored in the plane of wind and gravity it changes its sign, and what the base model does hardly changes (ArcSim's
-    bending alone knows the faces of a cloth).
+    Mirrored in the plane of wind and gravity it changes its sign, and what the base model does
+    hardly changes (ArcSim's bending alone knows the faces of a cloth).
     """
 
     mode: tuple[int, int]
@@ -253,19 +275,21 @@ class AcrossColumn(WrittenColumn):
 
 
 def _travel(observed: Tensor) -> Tensor:
-    """Computes what the velocity makes of a period between frames, (frame − 2, …), by central differences of (frame, …)
-    [m]."""
+    """Computes what the velocity makes of a period between frames, (frame − 2, …), by central
+    differences of (frame, …) [m]."""
     return (observed[2:] - observed[:-2]) / 2
 
 
 def cosine(mode: tuple[int, int], places: FloatArray, rest: FloatArray) -> FloatArray:
-    """Computes cos(π i u/W) cos(π j v/H) at rest coordinates (place, 2) of a cloth (vertex, 2) [m], (place,)."""
+    """Computes cos(π i u/W) cos(π j v/H) at rest coordinates (place, 2) of a cloth (vertex, 2) [m],
+    (place,)."""
     low = rest.min(axis=0)
     share = (places - low) / (rest.max(axis=0) - low)
     return np.cos(np.pi * mode[0] * share[:, 0]) * np.cos(np.pi * mode[1] * share[:, 1])
 
 
-# Step of every strength that is weighed: some tenths of its expected range, where predictions are near linear.
+# Step of every strength that is weighed: some tenths of its expected range, where predictions are
+# near linear.
 _STEPS: tuple[tuple[str, str, float], ...] = (
     ("power-law-drag", "exponent", 0.2),
     ("tangential-linear-drag", "coefficient", 0.05),
@@ -289,15 +313,23 @@ _STEPS: tuple[tuple[str, str, float], ...] = (
     ("direction-change", "angle", 0.05),
     ("wet-mass", "uptake", 0.1),
 )
-SHAPES: dict[str, tuple[tuple[str, float], ...]] = {"direction-change": (("start", -1.0), ("duration", 1e-3))}
-"""Of effects whose usual shape is another than what is weighed: a wind that has turned before the recording begins."""
+SHAPES: dict[str, tuple[tuple[str, float], ...]] = {
+    "direction-change": (("start", -1.0), ("duration", 1e-3))
+}
+"""Of effects whose usual shape is another than what is weighed: a wind that has turned before the
+recording begins."""
 TURNED = "direction-change.angle"
-"""The column of what the log's direction is off by, which is fitted within its tolerance in every comparison."""
-DOUBLE = frozenset({"bending", "hem-stiffness.ratio", "hysteresis.couple", "rest-curvature.curvature"})
-"""Directions whose steps are simulated in double precision: those of how cloth bends. In single precision a prediction
-of 40 ms rounds to 0.2 to 1.6 µm, and these move predictions by 3 to 80 µm a step, less where cloth is soft, heavy or
-damped: their sensitivities were rounding to 1, 0.3, 4 and 36 %, all others' to 0.4 % or less (ArcSim's flag with 0.5 ms
-of damping). Longer steps are no way out: where rounding is below 0.5 %, what is not linear in the step is above."""
+"""The column of what the log's direction is off by, which is fitted within its tolerance in every
+comparison."""
+DOUBLE = frozenset(
+    {"bending", "hem-stiffness.ratio", "hysteresis.couple", "rest-curvature.curvature"}
+)
+"""Directions whose steps are simulated in double precision: those of how cloth bends. In single
+precision a prediction of 40 ms rounds to 0.2 to 1.6 µm, and these move predictions by 3 to 80 µm a
+step, less where cloth is soft, heavy or
+damped: their sensitivities were rounding to 1, 0.3, 4 and 36 %, all others' to 0.4 % or less
+(ArcSim's flag with 0.5 ms of damping). Longer steps are no way out: where rounding is below 0.5 %,
+what is not linear in the step is above."""
 
 _MODES = ((0, 0), (1, 0), (0, 1), (1, 1), (2, 0))
 _MOTIONS = ((0, 0), (1, 0), (2, 0), (3, 0), (0, 1), (1, 1), (0, 2))
@@ -316,7 +348,9 @@ def library() -> tuple[EffectColumn, ...]:
     for column in columns:
         if column.parameter not in EFFECTS[column.effect].strengths():
             raise UsageError(
-                f"{column.effect} has no strength {column.parameter!r}", where="columns", fix="correct the table"
+                f"{column.effect} has no strength {column.parameter!r}",
+                where="columns",
+                fix="correct the table",
             )
     return columns
 
@@ -333,13 +367,15 @@ def winds() -> tuple[WindColumn, ...]:
 
 def motions() -> tuple[WrittenColumn, ...]:
     """Forces along the observed motion, and across it."""
-    along = (MotionColumn(derivative=derivative, mode=mode) for derivative in (1, 2) for mode in _MOTIONS)
+    along = (
+        MotionColumn(derivative=derivative, mode=mode) for derivative in (1, 2) for mode in _MOTIONS
+    )
     return (*along, AcrossColumn(mode=(0, 0)))
 
 
 def columns() -> tuple[Column, ...]:
-    """Lists what is weighed beside the calibrated parameters: the library's strengths, then forces along and across the
-    motion."""
+    """Lists what is weighed beside the calibrated parameters: the library's strengths, then forces
+    along and across the motion."""
     return (*library(), *motions())
 
 

@@ -41,8 +41,8 @@ class Cut:
 
     @classmethod
     def of(cls, rate: float, frames: int) -> Cut:
-        """Chooses how recordings of so many frames or more are cut: frames about a horizon apart, segments of 2 s, or
-        half of what there is.
+        """Chooses how recordings of so many frames or more are cut: frames about a horizon apart,
+        segments of 2 s, or half of what there is.
 
         Args:
             rate: [Hz].
@@ -108,13 +108,14 @@ class Segments:
 
     @classmethod
     def of(cls, recordings: Sequence[Trajectory]) -> Segments:
-        """Cuts recordings into segments; frames are thinned to about 40 ms apart; a remainder too short for a segment
-        is left out.
+        """Cuts recordings into segments; frames are thinned to about 40 ms apart; a remainder too
+        short for a segment is left out.
 
         Segments last 2 s, or half of what the shortest recording allows.
 
         Raises:
-            InputError: recordings of different markers or rates, untracked points, or shorter than a segment.
+            InputError: recordings of different markers or rates, untracked points, or shorter than
+                a segment.
         """
         first = recordings[0]
         cut = Cut.of(first.rate, min(len(r.positions) for r in recordings))
@@ -135,7 +136,9 @@ class Segments:
                 )
             frames = recording.positions[:: cut.stride]
             tracked = None if recording.seen is None else recording.seen[:: cut.stride]
-            attachments = None if recording.attachments is None else recording.attachments[:: cut.stride]
+            attachments = (
+                None if recording.attachments is None else recording.attachments[:: cut.stride]
+            )
             if not cut.enough:
                 needed = 2 * _SHORTEST + (cut.warm + 2) * period
                 raise InputError(
@@ -153,19 +156,23 @@ class Segments:
                         noise=recording.noise,
                         positions=frames[begin : begin + span],
                         seen=None if tracked is None else tracked[begin : begin + span],
-                        attachments=None if attachments is None else attachments[begin : begin + span],
+                        attachments=None
+                        if attachments is None
+                        else attachments[begin : begin + span],
                         anchors=None if attachments is None else attachments[begin],
                     )
                 )
         return cls(items=tuple(items), markers=first.markers, cut=cut)
 
     def tied(self, anchors: Sequence[FloatArray]) -> Segments:
-        """Sets the anchors (held, 3) [m] of each segment to those of its recording, except of segments whose
-        attachments move."""
+        """Sets the anchors (held, 3) [m] of each segment to those of its recording, except of
+        segments whose attachments move."""
         return replace(
             self,
             items=tuple(
-                item if item.attachments is not None else replace(item, anchors=anchors[item.recording])
+                item
+                if item.attachments is not None
+                else replace(item, anchors=anchors[item.recording])
                 for item in self.items
             ),
         )
@@ -191,19 +198,23 @@ class Segments:
 
     @cached_property
     def seen(self) -> BoolArray | None:
-        """Returns whether each position was tracked, warm-up included, (frame, marker, segment); None where all
-        were."""
+        """Returns whether each position was tracked, warm-up included, (frame, marker, segment);
+        None where all were."""
         if all(item.seen is None for item in self.items):
             return None
         all_tracked = np.ones(self.items[0].positions.shape[:2], dtype=bool)
-        return np.stack([all_tracked if item.seen is None else item.seen for item in self.items], axis=-1)
+        return np.stack(
+            [all_tracked if item.seen is None else item.seen for item in self.items], axis=-1
+        )
 
     @cached_property
     def counted(self) -> BoolArray | None:
-        """(frame, marker, segment) whether a prediction is compared, in the frames that count; None where all are.
+        """(frame, marker, segment) whether a prediction is compared, in the frames that count; None
+        where all are.
 
-        It is where the marker was tracked in that frame and in the two before, from which the model has its position
-        and velocity. Where it was not, the prediction reaches back farther than one horizon, to before the gap.
+        It is where the marker was tracked in that frame and in the two before, from which the model
+        has its position and velocity. Where it was not, the prediction reaches back farther than
+        one horizon, to before the gap.
         """
         if self.seen is None:
             return None

@@ -41,7 +41,8 @@ class Setting:
     """An experiment made ready: in one frame, cut into segments, with the model that predicts them.
 
     Attributes:
-        calibration: of the base model that statistics are taken at: the nominal one, then the fitted one.
+        calibration: of the base model that statistics are taken at: the nominal one, then the
+            fitted one.
     """
 
     experiment: Experiment
@@ -59,9 +60,14 @@ class Setting:
         turned = align_experiment(experiment)
         segments = Segments.of(turned.recordings)
         forecaster = Forecaster(
-            specimen=turned.specimen, markers=segments.markers, integrator=SplitEuler(), workers=workers
+            specimen=turned.specimen,
+            markers=segments.markers,
+            integrator=SplitEuler(),
+            workers=workers,
         )
-        return cls(experiment=turned, segments=segments, forecaster=forecaster, calibration=Calibration())
+        return cls(
+            experiment=turned, segments=segments, forecaster=forecaster, calibration=Calibration()
+        )
 
     @property
     def speeds(self) -> FloatArray:
@@ -70,7 +76,8 @@ class Setting:
 
     @property
     def tolerance(self) -> float:
-        """Standard deviation that the direction of the wind's logs is declared with, the largest of them [rad]."""
+        """Standard deviation that the direction of the wind's logs is declared with, the largest of
+        them [rad]."""
         return max(r.wind.direction for r in self.experiment.recordings)
 
     @property
@@ -89,7 +96,9 @@ class Setting:
             replace(recording, wind=recording.wind.later(lag))
             for recording, lag in zip(self.experiment.recordings, lags, strict=True)
         )
-        items = tuple(replace(item, wind=recordings[item.recording].wind) for item in self.segments.items)
+        items = tuple(
+            replace(item, wind=recordings[item.recording].wind) for item in self.segments.items
+        )
         return replace(
             self,
             experiment=replace(self.experiment, recordings=recordings),
@@ -100,7 +109,9 @@ class Setting:
     def prior(self) -> FloatArray:
         """(theta,) standard deviations of the calibrated parameters."""
         specimen = self.experiment.specimen
-        return prior(specimen.area_weight_uncertainty) if specimen.mass_known else PRIOR_WITHOUT_MASS
+        return (
+            prior(specimen.area_weight_uncertainty) if specimen.mass_known else PRIOR_WITHOUT_MASS
+        )
 
     @property
     def recording(self) -> IntArray:

@@ -1,11 +1,12 @@
-"""How strong the library's effects may be, and an effect that is suspected before recordings are looked at.
+"""How strong the library's effects may be, and an effect that is suspected before recordings are
+looked at.
 
-The strengths are a prior: log-uniform where an effect has one sign, from what a minute of film hardly shows to beyond
-what is expected in the field; uniform where it has two. They were fixed before any verdict on a film was made,
-that of `finite-span-loading` later, from its prior, before any was made with it. Verdicts on markers state their power
-at the same strengths.
-Not among them: a wind that is turned from its log, which has a tolerance of its own or looks like another view;
-internal damping, which is calibrated; gusts, whose course is looked at by itself.
+The strengths are a prior: log-uniform where an effect has one sign, from what a minute of film
+hardly shows to beyond what is expected in the field; uniform where it has two. They were fixed
+before any verdict on a film was made, that of `finite-span-loading` later, from its prior, before
+any was made with it. Verdicts on markers state their power at the same strengths.
+Not among them: a wind that is turned from its log, which has a tolerance of its own or looks like
+another view; internal damping, which is calibrated; gusts, whose course is looked at by itself.
 """
 
 from __future__ import annotations
@@ -79,7 +80,9 @@ class Strengths:
 def all_strengths() -> tuple[Strengths, ...]:
     """Lists the strengths of all effects that have any."""
     columns = {column.name: column for column in (*library(), _SLACK)}
-    return tuple(Strengths(column=columns[name], low=low, high=high) for name, (low, high) in _RANGES.items())
+    return tuple(
+        Strengths(column=columns[name], low=low, high=high) for name, (low, high) in _RANGES.items()
+    )
 
 
 def on_markers() -> tuple[Strengths, ...]:
@@ -111,22 +114,36 @@ class Suspicion:
 
         Raises:
             UnknownNameError: none of them.
-            UsageError: an effect of several strengths, or of two signs without one, or one that has no such sign.
+            UsageError: an effect of several strengths, or of two signs without one, or one that has
+                no such sign.
         """
         sign = {"+": 1, "-": -1}.get(text[-1:], 0)
         wanted = text[:-1] if sign else text
-        matching = [strengths for strengths in candidates if wanted in (strengths.name, strengths.column.effect)]
+        matching = [
+            strengths
+            for strengths in candidates
+            if wanted in (strengths.name, strengths.column.effect)
+        ]
         if not matching:
             effects = dict.fromkeys(strengths.column.effect for strengths in candidates)
             raise UnknownNameError.of(
-                "effect", wanted, [*effects, *(strengths.name for strengths in candidates)], where=WHERE
+                "effect",
+                wanted,
+                [*effects, *(strengths.name for strengths in candidates)],
+                where=WHERE,
             )
         if len(matching) > 1:
             names = " or ".join(strengths.name for strengths in matching)
-            raise UsageError(f"{wanted} has several strengths", where=WHERE, fix=f"suspect one of them: {names}")
+            raise UsageError(
+                f"{wanted} has several strengths", where=WHERE, fix=f"suspect one of them: {names}"
+            )
         (strengths,) = matching
         if strengths.low > 0 and sign < 0:
-            raise UsageError(f"{wanted} cannot be less than none", where=WHERE, fix=f"give {wanted} without the sign")
+            raise UsageError(
+                f"{wanted} cannot be less than none",
+                where=WHERE,
+                fix=f"give {wanted} without the sign",
+            )
         if strengths.low < 0 and not sign:
             raise UsageError(
                 f"{wanted} may be above or below {strengths.column.described.null:g}",

@@ -1,4 +1,5 @@
-"""Whether a clip is like what a model was trained on, and if not, why: asked before any interval is shown."""
+"""Whether a clip is like what a model was trained on, and if not, why: asked before any interval is
+shown."""
 
 from __future__ import annotations
 

@@ -1,10 +1,12 @@
-"""The image statistics that the gate looks at, and in which direction each is suspicious, by an explicit table.
+"""The image statistics that the gate looks at, and in which direction each is suspicious, by an
+explicit table.
 
 Light: how bright a clip is, what contrast it has, and how much of it is noise.
 
 Frames in time: repeated ones, loops, and a motion that stops.
 
-Whether the camera moves: shifts of the picture's rim, where the trained clips show background that stands still.
+Whether the camera moves: shifts of the picture's rim, where the trained clips show background that
+stands still.
 """
 
 from __future__ import annotations
@@ -25,21 +27,23 @@ _STEPS = (3, 8, 15, 29)
 
 
 def shift(clip: ClipStatistics) -> float:
-    """Computes the common logarithm of the shift of the rim [px]: the largest over frames of the tiles' median.
+    """Computes the common logarithm of the shift of the rim [px]: the largest over frames of the
+    tiles' median.
 
-    A tile's shift is the peak of its phase correlation with the first frame (Kuglin and Hines, 1975). The spectrum is
-    divided by its modulus plus the noise's, so that a tile without texture gives no shift; the peak is refined by a
-    parabola.
+    A tile's shift is the peak of its phase correlation with the first frame (Kuglin and Hines,
+    1975). The spectrum is divided by its modulus plus the noise's, so that a tile without texture
+    gives no shift; the peak is refined by a parabola.
     """
     shifts = [_median_shift(clip, frame) for frame in _STEPS if frame < len(clip.gray)]
     return float(np.log10(max(max(shifts), 0.01)))
 
 
 def sway(clip: ClipStatistics) -> float:
-    """Computes the common logarithm of the root mean square translation of the rim from one frame to the next
-    [px/frame].
+    """Computes the common logarithm of the root mean square translation of the rim from one frame
+    to the next [px/frame].
 
-    The translation is that of least squares between slopes and changes (Lucas and Kanade, 1981) over the rim's pixels.
+    The translation is that of least squares between slopes and changes (Lucas and Kanade, 1981)
+    over the rim's pixels.
     """
     mask = np.ones((SIDE, SIDE), dtype=np.bool_)
     rim = SIDE // 6
@@ -61,11 +65,15 @@ def _median_shift(clip: ClipStatistics, frame: int) -> float:
     return float(np.hypot(*np.median(shifts, axis=0)))
 
 
-def _phase_shift(first_tile: Float32Array, second_tile: Float32Array, noise: float) -> tuple[float, float]:
+def _phase_shift(
+    first_tile: Float32Array, second_tile: Float32Array, noise: float
+) -> tuple[float, float]:
     """Estimates how far the second picture lies below and right of the first [px]."""
     hann = np.hanning(_TILE)
     window = np.outer(hann, hann)
-    first, second = (np.fft.rfft2((picture - picture.mean()) * window) for picture in (first_tile, second_tile))
+    first, second = (
+        np.fft.rfft2((picture - picture.mean()) * window) for picture in (first_tile, second_tile)
+    )
     cross = second * np.conj(first)
     floor = (1.0 + noise**2) * np.square(window).sum()
     surface = np.fft.irfft2(cross / (np.abs(cross) + floor), s=(_TILE, _TILE))
@@ -74,7 +82,8 @@ def _phase_shift(first_tile: Float32Array, second_tile: Float32Array, noise: flo
 
 
 def _refined_peak(line: FloatArray, index: int) -> float:
-    """Refines a periodic line's peak by the parabola through three values; returns it as a signed shift."""
+    """Refines a periodic line's peak by the parabola through three values; returns it as a signed
+    shift."""
     before, peak, after = line[index - 1], line[index], line[(index + 1) % len(line)]
     bend = before - 2 * peak + after
     fine = index + (0.5 * (before - after) / bend if bend < 0 else 0.0)
@@ -87,16 +96,19 @@ _SHORTEST_LOOP = 4
 
 
 def held(clip: ClipStatistics) -> float:
-    """Computes the common logarithm of the lower quartile of the changes from frame to frame over their 90 % quantile.
+    """Computes the common logarithm of the lower quartile of the changes from frame to frame over
+    their 90 % quantile.
 
-    Near 0 where each frame differs from the last; very low where at least a quarter of them repeat it.
+    Near 0 where each frame differs from the last; very low where at least a quarter of them repeat
+    it.
     """
     low, high = np.quantile(_changes(clip), (0.25, 0.9))
     return float(np.log10((low + _LEAST) / (high + _LEAST)))
 
 
 def uneven(clip: ClipStatistics) -> float:
-    """Computes how far each change is from the mean of its neighbours, over the mean change: 0 for smooth motion."""
+    """Computes how far each change is from the mean of its neighbours, over the mean change: 0 for
+    smooth motion."""
     change = _changes(clip)
     if len(change) < 3:
         return 0.0
@@ -105,18 +117,25 @@ def uneven(clip: ClipStatistics) -> float:
 
 
 def stopping_ratio(clip: ClipStatistics) -> float:
-    """Computes the common logarithm of the mean change over the last third of the clip over that of the whole clip."""
+    """Computes the common logarithm of the mean change over the last third of the clip over that of
+    the whole clip."""
     change = _changes(clip)
-    return float(np.log10((change[-(len(change) // 3) :].mean() + _LEAST) / (change.mean() + _LEAST)))
+    return float(
+        np.log10((change[-(len(change) // 3) :].mean() + _LEAST) / (change.mean() + _LEAST))
+    )
 
 
 def loop(clip: ClipStatistics) -> float:
-    """Computes the common logarithm of the smallest mean difference of frames a lag apart over the median lag's.
+    """Computes the common logarithm of the smallest mean difference of frames a lag apart over the
+    median lag's.
 
-    Lags are 4 frames to two thirds of the clip. Flutter comes near its shape of a period ago, a loop repeats it.
+    Lags are 4 frames to two thirds of the clip. Flutter comes near its shape of a period ago, a
+    loop repeats it.
     """
     lags = range(_SHORTEST_LOOP, 2 * len(clip.gray) // 3)
-    pixels = clip.gray[:, clip.moving] if clip.moving.any() else clip.gray.reshape(len(clip.gray), -1)
+    pixels = (
+        clip.gray[:, clip.moving] if clip.moving.any() else clip.gray.reshape(len(clip.gray), -1)
+    )
     if not lags:
         return 0.0
     differences = np.array([np.abs(pixels[lag:] - pixels[:-lag]).mean() for lag in lags])
@@ -124,9 +143,11 @@ def loop(clip: ClipStatistics) -> float:
 
 
 def _changes(clip: ClipStatistics) -> FloatArray:
-    """Computes mean absolute changes from frame to frame over the moving pixels, or over all if none moves, (n −
-    1,)."""
-    pixels = clip.gray[:, clip.moving] if clip.moving.any() else clip.gray.reshape(len(clip.gray), -1)
+    """Computes mean absolute changes from frame to frame over the moving pixels, or over all if
+    none moves, (n − 1,)."""
+    pixels = (
+        clip.gray[:, clip.moving] if clip.moving.any() else clip.gray.reshape(len(clip.gray), -1)
+    )
     return np.abs(np.diff(pixels, axis=0)).mean(axis=1).astype(np.float64)
 
 
@@ -146,7 +167,8 @@ def contrast(clip: ClipStatistics) -> float:
 
 
 def noise(clip: ClipStatistics) -> float:
-    """Computes the common logarithm of the noise's deviation over the contrast of the mean picture."""
+    """Computes the common logarithm of the noise's deviation over the contrast of the mean
+    picture."""
     return float(np.log10(max(clip.still, 1e-2) / max(clip.contrast, 1e-2)))
 
 
@@ -160,8 +182,8 @@ class Check:
     Attributes:
         measure: it.
         what: its name in words, with its unit.
-        high, low: kinds of `measure.gate.reasons` for values that are too high and too low; None where that direction
-            is no fault.
+        high, low: kinds of `measure.gate.reasons` for values that are too high and too low; None
+            where that direction is no fault.
         resolution: difference below which two clips are called alike.
         logarithm: whether the figure shown is ten to the power of the statistic.
     """
@@ -180,9 +202,19 @@ class Check:
 
 CHECKS: dict[str, Check] = {
     "level": Check(measure=level, what="mean gray level of 255", low="too-dark", resolution=5.0),
-    "highlights": Check(measure=highlights, what="gray level of the brightest 1 %", low="too-dark", resolution=5.0),
-    "contrast": Check(measure=contrast, what="contrast [gray levels]", low="too-dark", resolution=0.03, logarithm=True),
-    "noise": Check(measure=noise, what="noise over contrast", high="too-dark", resolution=0.05, logarithm=True),
+    "highlights": Check(
+        measure=highlights, what="gray level of the brightest 1 %", low="too-dark", resolution=5.0
+    ),
+    "contrast": Check(
+        measure=contrast,
+        what="contrast [gray levels]",
+        low="too-dark",
+        resolution=0.03,
+        logarithm=True,
+    ),
+    "noise": Check(
+        measure=noise, what="noise over contrast", high="too-dark", resolution=0.05, logarithm=True
+    ),
     "area": Check(
         measure=clip_motion.area,
         what="share of the picture that moves",
@@ -211,16 +243,30 @@ CHECKS: dict[str, Check] = {
         resolution=0.05,
     ),
     "around": Check(
-        measure=clip_motion.around, what="share of the picture's rim that moves", high="moving-camera", resolution=0.05
+        measure=clip_motion.around,
+        what="share of the picture's rim that moves",
+        high="moving-camera",
+        resolution=0.05,
     ),
     "off-centre": Check(
-        measure=clip_motion.off_centre, what="distance of the motion from the middle", high="cut-off", resolution=0.02
+        measure=clip_motion.off_centre,
+        what="distance of the motion from the middle",
+        high="cut-off",
+        resolution=0.02,
     ),
     "width": Check(
-        measure=clip_motion.width, what="width of what moves [sides]", high="scale", low="scale", resolution=0.03
+        measure=clip_motion.width,
+        what="width of what moves [sides]",
+        high="scale",
+        low="scale",
+        resolution=0.03,
     ),
     "height": Check(
-        measure=clip_motion.height, what="height of what moves [sides]", high="scale", low="scale", resolution=0.03
+        measure=clip_motion.height,
+        what="height of what moves [sides]",
+        high="scale",
+        low="scale",
+        resolution=0.03,
     ),
     "second-region": Check(
         measure=clip_motion.second_region,
@@ -235,7 +281,10 @@ CHECKS: dict[str, Check] = {
         resolution=0.03,
     ),
     "edges-moving": Check(
-        measure=clip_motion.edges_moving, what="share of edges that move", high="moving-camera", resolution=0.03
+        measure=clip_motion.edges_moving,
+        what="share of edges that move",
+        high="moving-camera",
+        resolution=0.03,
     ),
     "shift": Check(
         measure=shift,
@@ -282,7 +331,8 @@ CHECKS: dict[str, Check] = {
 
 
 def measure_statistics(frames: UInt8Array) -> FloatArray:
-    """Computes the statistics (len(CHECKS),) of frames (n, height, width) in the order of the table.
+    """Computes the statistics (len(CHECKS),) of frames (n, height, width) in the order of the
+    table.
 
     Raises:
         InputError: see `ClipStatistics.of`.

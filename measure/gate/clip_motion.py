@@ -1,4 +1,5 @@
-"""What moves in a clip: how much, where, in how many places, and whether the picture's edge cuts it."""
+"""What moves in a clip: how much, where, in how many places, and whether the picture's edge cuts
+it."""
 
 from __future__ import annotations
 
@@ -13,11 +14,11 @@ from measure.gate.clip_statistics import SIDE, ClipStatistics
 _EDGE = 3
 """Width [px] of the strip along a side in which motion is called cut off."""
 _SMOOTHING = 3.0
-"""σ [px] by which the motion is smoothed before its regions are separated: folds of one flag are one region. Less takes
-folds for regions; more joins two flags to one."""
+"""σ [px] by which the motion is smoothed before its regions are separated: folds of one flag are
+one region. Less takes folds for regions; more joins two flags to one."""
 _REGION = 0.15
-"""Share of the strongest smoothed motion above which a pixel belongs to a region. Lower joins what moves faintly to the
-flag; higher breaks a flag with a calm part in two."""
+"""Share of the strongest smoothed motion above which a pixel belongs to a region. Lower joins what
+moves faintly to the flag; higher breaks a flag with a calm part in two."""
 LEAST_AREA = 1 / SIDE**2
 
 
@@ -27,18 +28,22 @@ def area(clip: ClipStatistics) -> float:
 
 
 def energy(clip: ClipStatistics) -> float:
-    """Computes the common logarithm of the mean variance in time beyond noise over the variance of the mean picture."""
+    """Computes the common logarithm of the mean variance in time beyond noise over the variance of
+    the mean picture."""
     return float(np.log10(max(float(clip.excess.mean()), 1e-4) / max(clip.contrast, 1e-2) ** 2))
 
 
 def strength(clip: ClipStatistics) -> float:
-    """Computes the common logarithm of the strongest deviation in time (99.5 % of the pixels' lie below) over the
-    noise's."""
-    return float(np.log10(max(float(np.quantile(clip.deviation, 0.995)), 1e-2) / max(clip.still, 0.1)))
+    """Computes the common logarithm of the strongest deviation in time (99.5 % of the pixels' lie
+    below) over the noise's."""
+    return float(
+        np.log10(max(float(np.quantile(clip.deviation, 0.995)), 1e-2) / max(clip.still, 0.1))
+    )
 
 
 def at_edge(clip: ClipStatistics) -> float:
-    """Computes the root mean deviation in a strip along the side where it is largest, over that of the moving part."""
+    """Computes the root mean deviation in a strip along the side where it is largest, over that of
+    the moving part."""
     if not clip.moving.any():
         return 0.0
     inside = float(clip.excess[clip.moving].mean())
@@ -56,7 +61,8 @@ def around(clip: ClipStatistics) -> float:
 
 
 def off_centre(clip: ClipStatistics) -> float:
-    """Computes the distance of the motion's centre of mass from the picture's middle, in sides of the picture."""
+    """Computes the distance of the motion's centre of mass from the picture's middle, in sides of
+    the picture."""
     if not clip.moving.any():
         return 0.0
     amplitude = np.sqrt(clip.excess)
@@ -76,8 +82,11 @@ def height(clip: ClipStatistics) -> float:
 
 
 def second_region(clip: ClipStatistics) -> float:
-    """Computes the motion of the second strongest separate region over that of the strongest, 0 to 1."""
-    amplitude = np.asarray(ndimage.gaussian_filter(np.sqrt(clip.excess), _SMOOTHING), dtype=np.float32)
+    """Computes the motion of the second strongest separate region over that of the strongest, 0 to
+    1."""
+    amplitude = np.asarray(
+        ndimage.gaussian_filter(np.sqrt(clip.excess), _SMOOTHING), dtype=np.float32
+    )
     if amplitude.max() <= 0:
         return 0.0
     masses = _masses(amplitude > _REGION * amplitude.max(), amplitude)
@@ -85,14 +94,15 @@ def second_region(clip: ClipStatistics) -> float:
 
 
 def scatter(clip: ClipStatistics) -> float:
-    """Computes the share of the motion outside of the largest region of moving pixels that touch."""
+    """Computes the share of the motion outside of the largest region of moving pixels that
+    touch."""
     masses = _masses(clip.moving, np.sqrt(clip.excess))
     return 1 - float(masses[-1] / masses.sum()) if len(masses) else 0.0
 
 
 def edges_moving(clip: ClipStatistics) -> float:
-    """Computes the share of the mean picture's edges, its steepest tenth, that move: all of them where the camera
-    does."""
+    """Computes the share of the mean picture's edges, its steepest tenth, that move: all of them
+    where the camera does."""
     steep = clip.slope >= np.quantile(clip.slope, 0.9)
     return float(clip.moving[steep].mean())
 
@@ -101,7 +111,9 @@ def _masses(inside: BoolArray, amplitude: Float32Array) -> FloatArray:
     """Sums the amplitude over the connected regions, ascending."""
     labelling: Any = ndimage.label(inside)
     labels, count = labelling
-    return np.sort(np.asarray(ndimage.sum_labels(amplitude, labels, np.arange(1, count + 1)), dtype=np.float64))
+    return np.sort(
+        np.asarray(ndimage.sum_labels(amplitude, labels, np.arange(1, count + 1)), dtype=np.float64)
+    )
 
 
 def _extent(profile: Float32Array) -> float:

@@ -1,4 +1,5 @@
-"""The input of the checks: a clip's central square, averaged down, with moving and still parts separated."""
+"""The input of the checks: a clip's central square, averaged down, with moving and still parts
+separated."""
 
 from __future__ import annotations
 
@@ -14,11 +15,12 @@ from flagdata.core.arrays import BoolArray, Float32Array, UInt8Array
 from flagdata.errors import InputError
 
 SIDE = 112
-"""Height and width [px] that pictures are averaged down to; in px of this grid all lengths are given."""
+"""Height and width [px] that pictures are averaged down to; in px of this grid all lengths are
+given."""
 LEAST_FRAMES = 3
 _NOISES = 4.0
-"""Deviations of the noise that a pixel's must have to be called moving. Higher misses faint motion; lower calls noise
-motion."""
+"""Deviations of the noise that a pixel's must have to be called moving. Higher misses faint motion;
+lower calls noise motion."""
 LEAST_DEVIATION = 1.5
 """Gray levels below which no deviation is called motion: rounding and coding leave up to one."""
 _ROUGH = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], dtype=np.float32)
@@ -44,7 +46,12 @@ class ClipStatistics:
         Raises:
             InputError: frames of another shape or type, or fewer than `LEAST_FRAMES`.
         """
-        if frames.ndim != 3 or frames.dtype != np.uint8 or len(frames) < LEAST_FRAMES or min(frames.shape[1:]) < 16:
+        if (
+            frames.ndim != 3
+            or frames.dtype != np.uint8
+            or len(frames) < LEAST_FRAMES
+            or min(frames.shape[1:]) < 16
+        ):
             raise InputError(
                 f"frames of shape {frames.shape} and type {frames.dtype}",
                 fix=f"give uint8 (frame, height, width), at least {LEAST_FRAMES} frames of 16 px",
@@ -71,8 +78,9 @@ class ClipStatistics:
     def still(self) -> float:
         """Standard deviation of the noise [gray levels].
 
-        Immerkær's filter (Computer Vision and Image Understanding 64, 1996), which smooth pictures pass not, over the
-        changes from frame to frame, by the median: neither texture nor what moves counts as noise.
+        Immerkær's filter (Computer Vision and Image Understanding 64, 1996), which smooth pictures
+        pass not, over the changes from frame to frame, by the median: neither texture nor what
+        moves counts as noise.
         """
         rough = ndimage.convolve(np.diff(self.gray, axis=0), _ROUGH[None], mode="nearest")
         return float(np.median(np.abs(rough[:, 1:-1, 1:-1]))) / (_MEDIAN * 6 * np.sqrt(2))

@@ -1,6 +1,8 @@
-"""Why a film cannot be measured, by what was counted while it was made fit: each reason with a figure to be checked.
+"""Why a film cannot be measured, by what was counted while it was made fit: each reason with a
+figure to be checked.
 
-The reasons are in the order of `REASONS`: a fault of the recording comes before the faults that it brings about.
+The reasons are in the order of `REASONS`: a fault of the recording comes before the faults that it
+brings about.
 """
 
 from __future__ import annotations
@@ -18,58 +20,75 @@ from models.conditioning.outline import CERTAIN, UPRIGHT, Hoist
 from models.conditioning.standing import Box, Inside, Line
 from models.conditioning.stills import HALVED
 
-COUNTED = frozenset({"scene-cut", "low-frame-rate", "repeated-frames", "too-dark", "moving-camera", "cut-off", "scale"})
-"""Kinds of faults that are counted here, and while the frames are read: no statistic of a window need look for them."""
+COUNTED = frozenset(
+    {
+        "scene-cut",
+        "low-frame-rate",
+        "repeated-frames",
+        "too-dark",
+        "moving-camera",
+        "cut-off",
+        "scale",
+    }
+)
+"""Kinds of faults that are counted here, and while the frames are read: no statistic of a window
+need look for them."""
 _REPEATED = 0.5
-"""Share of frames that look like an earlier one, above which a film loops or stands still. Lower refuses flags that
-swing in a regular way."""
+"""Share of frames that look like an earlier one, above which a film loops or stands still. Lower
+refuses flags that swing in a regular way."""
 _DARK, _FLAT = 35.0, 4.0
-"""Gray levels: of the brightest hundredth of the picture, and of the contrast, below which it is too dark."""
+"""Gray levels: of the brightest hundredth of the picture, and of the contrast, below which it is
+too dark."""
 _NOISY = 0.35
-"""Noise of a pixel over the picture's contrast, above which cloth is lost in it. Higher lets films through whose cloth
-cannot be separated from noise; lower refuses films in dim light."""
+"""Noise of a pixel over the picture's contrast, above which cloth is lost in it. Higher lets films
+through whose cloth cannot be separated from noise; lower refuses films in dim light."""
 _LOST = 0.1
-"""Share of frames in which the background is not found, above which the camera's motion is unknown."""
+"""Share of frames in which the background is not found, above which the camera's motion is
+unknown."""
 _RESTING = 100
-"""Pixels of the small copies with an edge at rest, below which nothing in the picture stands still."""
+"""Pixels of the small copies with an edge at rest, below which nothing in the picture stands
+still."""
 _AT_EDGE = 0.08
-"""Share of the film in which one edge of the picture cuts the cloth off, above which it cannot be measured. Higher
-measures flags of which a part is missing."""
+"""Share of the film in which one edge of the picture cuts the cloth off, above which it cannot be
+measured. Higher measures flags of which a part is missing."""
 _GRAIN = 0.38
 """See `FilmWatch.grain`: of nine films of whole flags the least was 0.51, of a tree 0.28."""
 _SMALL = 40.0
 """Pixels of the film that the cloth's places span at least."""
 _POLE = 0.5
-"""Height of an upright line of edges at rest beside the cloth's places, in heights of them, below which there is no
-pole: a hoist is as long as its flag is high, and a flag visits places of twice its height at most. Of 49 films of flags
-the least was 0.67, of water 0.46, of wind turbines 0.27."""
+"""Height of an upright line of edges at rest beside the cloth's places, in heights of them, below
+which there is no
+pole: a hoist is as long as its flag is high, and a flag visits places of twice its height at most.
+Of 49 films of flags the least was 0.67, of water 0.46, of wind turbines 0.27."""
 _BAR, _OVER = 1.0, 1.5
-"""Length of a level line along the cloth's top, in widths of its places, and the same over the height of the pole, from
-both of which on it hangs from a bar; along its bottom, from which on the film lies on its side. Of these films none had
-more than 1.0 and more than 0.71 together, a flag that hangs from a line had 1.23 and 2.4."""
+"""Length of a level line along the cloth's top, in widths of its places, and the same over the
+height of the pole, from both of which on it hangs from a bar; along its bottom, from which on the
+film lies on its side. Of these films none had more than 1.0 and more than 0.71 together, a flag
+that hangs from a line had 1.23 and 2.4."""
 _SECOND, SUSPECTED = 0.5, 1 / 3
-"""Height of what moves along which an upright line inside it is at rest, in heights of it: of one that goes on below
-what moves, from which on it is a second pole, and of any, from which on it may be one. Of 37 films of one flag the
-first was 0.26 at most; the second was 0.30 at most but for upright stripes. Lower refuses flags that now and then sink
-before an upright edge of the background."""
+"""Height of what moves along which an upright line inside it is at rest, in heights of it: of one
+that goes on below what moves, from which on it is a second pole, and of any, from which on it may
+be one. Of 37 films of one flag the first was 0.26 at most; the second was 0.30 at most but for
+upright stripes. Lower refuses flags that now and then sink before an upright edge of the
+background."""
 _HELD = 0.7
-"""Share of the hoist that has cloth beside it, below which nothing is attached to it. Of 69 films of flags the least
-was 0.82, of fire, birds and cars beside a post 0.41 to 0.57."""
+"""Share of the hoist that has cloth beside it, below which nothing is attached to it. Of 69 films
+of flags the least was 0.82, of fire, birds and cars beside a post 0.41 to 0.57."""
 _SHORT, _LONG = 0.35, 1.1
-"""Heights of the hoist over that of what moves: the places of a flag are as high as its hoist at least, and a limp one
-of 2:1 hangs down by its length too. Of these films it was 0.38 to 0.89, of palms 0.31 and 0.33, of crowds 1.28 and
-1.71."""
+"""Heights of the hoist over that of what moves: the places of a flag are as high as its hoist at
+least, and a limp one of 2:1 hangs down by its length too. Of these films it was 0.38 to 0.89, of
+palms 0.31 and 0.33, of crowds 1.28 and 1.71."""
 _UP = math.radians(2.0)
 """Angle by which the free end is higher than the hoist, from which on the cloth droops upwards."""
 _REACHES, _ENDS = 0.15, 0.15
-"""How far the pole of a film that is upside down reaches above what moves at least, and below it at most, in heights of
-it."""
+"""How far the pole of a film that is upside down reaches above what moves at least, and below it at
+most, in heights of it."""
 _PADDED = 1 / 3
-"""Share of the square about the cloth that lies beyond the picture, above which too little but cloth is shown. Of films
-of whole flags the most was 0.2."""
+"""Share of the square about the cloth that lies beyond the picture, above which too little but
+cloth is shown. Of films of whole flags the most was 0.2."""
 _STRETCHED = 1.3
-"""Width over height of the cloth's places, in the stated length over height, above which it is no flag of this shape:
-folds, slack and a slanting view all make a flag shorter."""
+"""Width over height of the cloth's places, in the stated length over height, above which it is no
+flag of this shape: folds, slack and a slanting view all make a flag shorter."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,9 +102,12 @@ class _Film:
 
     @cached_property
     def pole(self) -> float:
-        """Returns the height of an upright edge at rest beside the cloth's places, in heights of them; see `_POLE`."""
+        """Returns the height of an upright edge at rest beside the cloth's places, in heights of
+        them; see `_POLE`."""
         region, standing = self.conditioning.region, self.conditioning.standing
-        return 0.0 if region is None else standing.beside(self.conditioning.framed_box(region)).length
+        return (
+            0.0 if region is None else standing.beside(self.conditioning.framed_box(region)).length
+        )
 
     @cached_property
     def inside(self) -> Inside:
@@ -97,7 +119,8 @@ class _Film:
 
     @property
     def box(self) -> tuple[float, float, float, float]:
-        """Returns left, top, right and bottom of the cloth's places [px of the film]; zeros where none was found."""
+        """Returns left, top, right and bottom of the cloth's places [px of the film]; zeros where
+        none was found."""
         region = self.conditioning.region
         if region is None:
             return 0.0, 0.0, 0.0, 0.0
@@ -123,7 +146,10 @@ def _dark(film: _Film) -> Figure | None:
     brightness, contrast = film.watch.brightness, film.watch.contrast
     if not (brightness < _DARK or contrast < _FLAT):
         return None
-    words = f"its brightest hundredth has gray level {brightness:.0f} of 255, its contrast is {contrast:.1f}"
+    words = (
+        f"its brightest hundredth has gray level {brightness:.0f} of 255, its contrast is "
+        f"{contrast:.1f}"
+    )
     return brightness, words
 
 
@@ -136,7 +162,11 @@ def _noisy(film: _Film) -> Figure | None:
 
 def _spot(film: _Film) -> Figure | None:
     spot = film.watch.spot()
-    return (spot, f"what moves spans {spot:.0f} px, {_SMALL:.0f} are needed") if 0 < spot < _SMALL else None
+    return (
+        (spot, f"what moves spans {spot:.0f} px, {_SMALL:.0f} are needed")
+        if 0 < spot < _SMALL
+        else None
+    )
 
 
 def _still(film: _Film) -> Figure | None:
@@ -146,8 +176,12 @@ def _still(film: _Film) -> Figure | None:
 def _twins(film: _Film) -> Figure | None:
     height, width = film.watch.shape
     left, top, right, bottom = film.box
-    twins = film.watch.twins((left / width, top / height, min(right / width, 1.0), min(bottom / height, 1.0)))
-    return (twins, f"{twins:.0%} of the frames look like another one") if twins > _REPEATED else None
+    twins = film.watch.twins(
+        (left / width, top / height, min(right / width, 1.0), min(bottom / height, 1.0))
+    )
+    return (
+        (twins, f"{twins:.0%} of the frames look like another one") if twins > _REPEATED else None
+    )
 
 
 def _lost(film: _Film) -> Figure | None:
@@ -183,14 +217,22 @@ def _fine(film: _Film) -> Figure | None:
     grain = math.inf if region is None else film.watch.grain(region.mask)
     if not grain < _GRAIN:
         return None
-    words = f"averaged over a fortieth of the picture, {_below(grain)} of it is left, of cloth {_GRAIN:.0%} or more"
+    words = (
+        f"averaged over a fortieth of the picture, {_below(grain)} of it is left, of cloth "
+        f"{_GRAIN:.0%} or more"
+    )
     return grain, words
 
 
 def _no_pole(film: _Film) -> Figure | None:
-    if _restless(film) is not None or not film.pole < _POLE:  # where nothing stands still, a pole is no exception
+    if (
+        _restless(film) is not None or not film.pole < _POLE
+    ):  # where nothing stands still, a pole is no exception
         return None
-    return film.pole, f"the longest is {_below(film.pole)} as high as what moves, of flags {_POLE:.0%} or more"
+    return (
+        film.pole,
+        f"the longest is {_below(film.pole)} as high as what moves, of flags {_POLE:.0%} or more",
+    )
 
 
 def _level(film: _Film, longest: Callable[[Box], Line]) -> Figure | None:
@@ -220,10 +262,15 @@ def _upside_down(film: _Film) -> Figure | None:
     box = film.conditioning.framed_box(region)
     pole = film.conditioning.standing.beside(box, (region.hoist,))
     room = (film.conditioning.size - box[3]) / (box[3] - box[1])
-    if not (pole.length >= _POLE and pole.above >= _REACHES and pole.below <= _ENDS and room >= _REACHES):
+    if not (
+        pole.length >= _POLE and pole.above >= _REACHES and pole.below <= _ENDS and room >= _REACHES
+    ):
         return None
     up = -math.degrees(region.droop)
-    return up, f"by {up:.1f}°, and the edge reaches {pole.above:.2f} of the height of what moves above it"
+    return (
+        up,
+        f"by {up:.1f}°, and the edge reaches {pole.above:.2f} of the height of what moves above it",
+    )
 
 
 def _second(film: _Film) -> Figure | None:
@@ -232,7 +279,8 @@ def _second(film: _Film) -> Figure | None:
         return None
     return (
         found.going_on,
-        f"it runs along {found.going_on:.0%} of its height, in one flag along less than {_SECOND:.0%}",
+        f"it runs along {found.going_on:.0%} of its height, in one flag along less than "
+        f"{_SECOND:.0%}",
     )
 
 
@@ -251,14 +299,18 @@ def _no_flags_hoist(hoist: Hoist, *, height: float) -> Figure | None:
     """States what is wrong with a hoist for what moves through so much of the picture [px]."""
     if hoist.certainty < CERTAIN:
         limits = f"of flags {CERTAIN:.0%} or more"
-        return hoist.certainty, f"one of its ends is placed with a certainty of {_below(hoist.certainty)}, {limits}"
+        return (
+            hoist.certainty,
+            f"one of its ends is placed with a certainty of {_below(hoist.certainty)}, {limits}",
+        )
     if hoist.lean > UPRIGHT:
         lean, most = math.degrees(hoist.lean), math.degrees(UPRIGHT)
         return lean, f"what is most like one leans by {lean:.0f}°, of flags by {most:.0f}° at most"
     if hoist.held < _HELD:
         return (
             hoist.held,
-            f"cloth is beside {_below(hoist.held)} of what is most like one, of flags {_HELD:.0%} or more",
+            f"cloth is beside {_below(hoist.held)} of what is most like one, of flags {_HELD:.0%} "
+            "or more",
         )
     share = HALVED * hoist.length / height
     if not _SHORT <= share <= _LONG:
@@ -272,7 +324,11 @@ def _padding_figure(film: _Film) -> Figure | None:
     beyond = film.conditioning.square.beyond(width, height)
     if not beyond > _PADDED:
         return None
-    return beyond, f"{beyond:.0%} of the square about it lie beyond the picture, {_PADDED:.0%} at most can be measured"
+    return (
+        beyond,
+        f"{beyond:.0%} of the square about it lie beyond the picture, {_PADDED:.0%} at most can be "
+        "measured",
+    )
 
 
 def _stretching_figure(film: _Film) -> Figure | None:
@@ -280,7 +336,10 @@ def _stretching_figure(film: _Film) -> Figure | None:
     if film.aspect is None or not right - left > _STRETCHED * film.aspect * (bottom - top):
         return None
     shape = (right - left) / (bottom - top)
-    words = f"it is {shape:.2f} times as wide as high, of the flag that was given {film.aspect:.2f} times at most"
+    words = (
+        f"it is {shape:.2f} times as wide as high, of the flag that was given {film.aspect:.2f} "
+        "times at most"
+    )
     return shape, words
 
 
@@ -291,17 +350,31 @@ def _below(share: float) -> str:
 
 _UNLIT: tuple[Rule, ...] = (("too-dark", _dark), ("too-dark", _noisy))
 OF_PICTURES: tuple[tuple[Rule, ...], ...] = ((("scene-cut", _cuts),), _UNLIT)
-"""Rules for every film. Of each row the first that finds its fault holds, since that hides or brings about the next."""
-_HIDING: tuple[Rule, ...] = (("scene-cut", _cuts), *_UNLIT, ("moving-camera", _lost), ("scale", _small))
+"""Rules for every film. Of each row the first that finds its fault holds, since that hides or
+brings about the next."""
+_HIDING: tuple[Rule, ...] = (
+    ("scene-cut", _cuts),
+    *_UNLIT,
+    ("moving-camera", _lost),
+    ("scale", _small),
+)
 """Each of these hides what stands still."""
 WITHOUT_CLOTH: tuple[tuple[Rule, ...], ...] = ((("scale", _spot), ("no-motion", _still)),)
 """The same for films in which no cloth was found."""
 OF_CLOTH: tuple[tuple[Rule, ...], ...] = (
     (("repeated-frames", _twins),),
-    (("cut-off", _cut_off), ("moving-camera", _restless)),  # cloth that is cut off hides what stands still
+    (
+        ("cut-off", _cut_off),
+        ("moving-camera", _restless),
+    ),  # cloth that is cut off hides what stands still
     (
         *_HIDING,
-        *(("on-its-side", _on_its_side), ("no-pole", _no_pole), ("hangs-from-above", _hung), ("second-pole", _second)),
+        *(
+            ("on-its-side", _on_its_side),
+            ("no-pole", _no_pole),
+            ("hangs-from-above", _hung),
+            ("second-pole", _second),
+        ),
         ("no-hoist", _without_hoist),
     ),
     (*_HIDING, ("upside-down", _upside_down)),
@@ -334,5 +407,11 @@ def _faults(film: _Film) -> Iterator[Finding]:
             if (figure := look(film)) is not None:
                 value, words = figure
                 what = f"{REASONS[kind].sentence}: {words}"
-                yield Finding(kind=kind, severity=Severity.ERROR, what=what, value=float(value), fix=REASONS[kind].fix)
+                yield Finding(
+                    kind=kind,
+                    severity=Severity.ERROR,
+                    what=what,
+                    value=float(value),
+                    fix=REASONS[kind].fix,
+                )
                 break

@@ -1,8 +1,11 @@
-"""Known distortions of simulated films, by which the gate learns what clips look like that are not like them.
+"""Known distortions of simulated films, by which the gate learns what clips look like that are not
+like them.
 
-Anau Montel, Alvey and Weniger (Phys. Rev. D 111, 083013, 2025; arXiv 2412.15100) test a simulator against many stated
-distortions of it: each has a classifier of distorted against plain simulations, whose log-likelihood ratio is the
-test's statistic. The strengths are drawn anew for each clip, from hardly visible to gross.
+Anau Montel, Alvey and Weniger (Phys. Rev. D 111, 083013, 2025; arXiv 2412.15100) test a simulator
+against many stated
+distortions of it: each has a classifier of distorted against plain simulations, whose
+log-likelihood ratio is the test's statistic. The strengths are drawn anew for each clip, from
+hardly visible to gross.
 """
 
 from __future__ import annotations
@@ -18,7 +21,8 @@ from measure.gate.clip_statistics import SIDE, ClipStatistics
 
 Film = UInt8Array
 Distort = Callable[[Film, Film, np.random.Generator, int], Film]
-"""A film (n, height, width), another one, a source of randomness, the frames wanted → a clip of so many frames."""
+"""A film (n, height, width), another one, a source of randomness, the frames wanted → a clip of so
+many frames."""
 Pixels = Float32Array | FloatArray
 
 
@@ -54,7 +58,11 @@ def _cut(film: Film, second: Film, rng: np.random.Generator, count: int) -> Film
     left, top = rng.choice([x, x - size]), rng.choice([y, y - size])
     if rng.random() < 0.5:
         middle = int(np.clip(y - size // 2, 0, side - size))
-        left, top = (left, middle) if rng.random() < 0.5 else (int(np.clip(x - size // 2, 0, side - size)), top)
+        left, top = (
+            (left, middle)
+            if rng.random() < 0.5
+            else (int(np.clip(x - size // 2, 0, side - size)), top)
+        )
     left, top = int(np.clip(left, 0, side - size)), int(np.clip(top, 0, side - size))
     return film[:count, top : top + size, left : left + size]
 
@@ -110,9 +118,13 @@ def _pair(film: Film, second: Film, rng: np.random.Generator, count: int) -> Fil
     keep = int(side * rng.uniform(0.6, 0.95))
     low = (side - keep) // 2
     if rng.random() < 0.7:
-        joined = np.concatenate([first_square[:, :, low : low + keep], second_square[:, :, low : low + keep]], axis=2)
+        joined = np.concatenate(
+            [first_square[:, :, low : low + keep], second_square[:, :, low : low + keep]], axis=2
+        )
     else:
-        joined = np.concatenate([first_square[:, low : low + keep], second_square[:, low : low + keep]], axis=1)
+        joined = np.concatenate(
+            [first_square[:, low : low + keep], second_square[:, low : low + keep]], axis=1
+        )
     return _square_film(joined)
 
 
@@ -136,7 +148,9 @@ def _swaying(film: Film, second: Film, rng: np.random.Generator, count: int) -> 
     high, wide = picture.shape
     length = rng.uniform(0.01, 0.08) * high
     where = ndimage.gaussian_filter(rng.normal(size=picture.shape), 0.12 * high)
-    mask = ndimage.gaussian_filter((where > np.quantile(where, rng.uniform(0.3, 0.8))).astype(float), 3)
+    mask = ndimage.gaussian_filter(
+        (where > np.quantile(where, rng.uniform(0.3, 0.8))).astype(float), 3
+    )
     waves = np.zeros((2, count, high, wide))
     for _ in range(3):
         pattern = ndimage.gaussian_filter(rng.normal(size=(2, high, wide)), (0, length, length))
@@ -148,7 +162,9 @@ def _swaying(film: Film, second: Film, rng: np.random.Generator, count: int) -> 
     grid = np.mgrid[:high, :wide]
     clip = np.stack(
         [
-            ndimage.map_coordinates(picture, grid + reach * mask * waves[:, k], order=1, mode="nearest")
+            ndimage.map_coordinates(
+                picture, grid + reach * mask * waves[:, k], order=1, mode="nearest"
+            )
             for k in range(count)
         ]
     )
@@ -156,14 +172,19 @@ def _swaying(film: Film, second: Film, rng: np.random.Generator, count: int) -> 
 
 
 def _patchwork(film: Film, second: Film, rng: np.random.Generator, count: int) -> Film:
-    """Takes each patch of the film from a different instant, so that no wave travels from one to the next."""
+    """Takes each patch of the film from a different instant, so that no wave travels from one to
+    the next."""
     clip = film[:count].copy()
     size = int(rng.uniform(0.05, 0.15) * film.shape[1])
     there_and_back = np.concatenate([np.arange(len(film)), np.arange(len(film))[-2:0:-1]])
     for top in range(0, film.shape[1], size):
         for left in range(0, film.shape[2], size):
-            index = there_and_back[(int(rng.integers(len(film))) + np.arange(count)) % len(there_and_back)]
-            clip[:, top : top + size, left : left + size] = film[index, top : top + size, left : left + size]
+            index = there_and_back[
+                (int(rng.integers(len(film))) + np.arange(count)) % len(there_and_back)
+            ]
+            clip[:, top : top + size, left : left + size] = film[
+                index, top : top + size, left : left + size
+            ]
     return clip
 
 
@@ -180,7 +201,9 @@ def _square_film(clip: Film) -> Film:
     """Averages the longer sides down to the shorter one's length."""
     side = min(clip.shape[1:])
     zoom = (1, side / clip.shape[1], side / clip.shape[2])
-    blurred = ndimage.gaussian_filter(clip.astype(np.float32), (0, 0.4 * (1 / zoom[1] - 1), 0.4 * (1 / zoom[2] - 1)))
+    blurred = ndimage.gaussian_filter(
+        clip.astype(np.float32), (0, 0.4 * (1 / zoom[1] - 1), 0.4 * (1 / zoom[2] - 1))
+    )
     return np.clip(np.asarray(ndimage.zoom(blurred, zoom, order=1)), 0, 255).astype(np.uint8)
 
 

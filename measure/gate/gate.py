@@ -1,10 +1,11 @@
 """The gate: what simulated clips score on every check, and the verdict on a clip beside them.
 
-Every check is a score of which high values are suspicious: the image statistics of `checks`, the distance of the
-network's summary, how far the summary moves under changes that leave the physics as it is, the distance of all features
-together, and a log-likelihood ratio for each distortion of `distortions` (arXiv 2412.15100). Each is expressed on one
-scale by its tail over simulated clips (`tails`); the joint score is the largest of them, and the joint score alone is
-calibrated, on clips that shaped no check. So the stated false-alarm rate is that of all checks together.
+Every check is a score of which high values are suspicious: the image statistics of `checks`, the
+distance of the network's summary, how far the summary moves under changes that leave the physics as
+it is, the distance of all features together, and a log-likelihood ratio for each distortion of
+`distortions` (arXiv 2412.15100). Each is expressed on one scale by its tail over simulated clips
+(`tails`); the joint score is the largest of them, and the joint score alone is calibrated, on clips
+that shaped no check. So the stated false-alarm rate is that of all checks together.
 """
 
 from __future__ import annotations
@@ -49,13 +50,31 @@ class Score:
 
 
 SCORES: tuple[Score, ...] = (
-    *(Score(name=name, reason=kind, sign=sign, what=CHECKS[name].what) for name, _, sign, kind in _SIDED),
-    Score(name="summary", reason="unlike-cloth", sign=1.0, what="distance of the network's summary, log10"),
     *(
-        Score(name=move, reason="unlike-cloth", sign=1.0, what=f"change of the network's summary when {move}, log10")
+        Score(name=name, reason=kind, sign=sign, what=CHECKS[name].what)
+        for name, _, sign, kind in _SIDED
+    ),
+    Score(
+        name="summary",
+        reason="unlike-cloth",
+        sign=1.0,
+        what="distance of the network's summary, log10",
+    ),
+    *(
+        Score(
+            name=move,
+            reason="unlike-cloth",
+            sign=1.0,
+            what=f"change of the network's summary when {move}, log10",
+        )
         for move in MOVES
     ),
-    Score(name="all-features", reason="unlike-cloth", sign=1.0, what="distance of all features together"),
+    Score(
+        name="all-features",
+        reason="unlike-cloth",
+        sign=1.0,
+        what="distance of all features together",
+    ),
     *(
         Score(
             name=f"like-{name}",
@@ -69,11 +88,17 @@ SCORES: tuple[Score, ...] = (
 """All scores in their order."""
 
 _RESOLUTION = np.array(
-    [*(CHECKS[name].resolution for name, *_ in _SIDED), 0.02, *(0.05 for _ in MOVES), 0.2, *(0.5 for _ in DISTORTIONS)]
+    [
+        *(CHECKS[name].resolution for name, *_ in _SIDED),
+        0.02,
+        *(0.05 for _ in MOVES),
+        0.2,
+        *(0.5 for _ in DISTORTIONS),
+    ]
 )
 _LEARNING = 0.6
-"""Share of the plain clips of the fit that covariances are learned from; the others give the tails. More estimate
-directions better and leave fewer clips for the tails."""
+"""Share of the plain clips of the fit that covariances are learned from; the others give the tails.
+More estimate directions better and leave fewer clips for the tails."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -83,7 +108,8 @@ class Gate:
     Attributes:
         centre, scale: (f,) median and spread of each feature over plain clips.
         whitening: (f, f), of the standardised features of plain clips.
-        directions, offsets: (k, f) and (k,): log-likelihood ratio of distortion k = directions · z − offset.
+        directions, offsets: (k, f) and (k,): log-likelihood ratio of distortion k = directions · z
+            − offset.
         tails: of all scores.
         calibration: (n,) ascending joint scores of the calibration clips.
         statistics: (n, len(CHECKS)) of the calibration clips.
@@ -99,13 +125,16 @@ class Gate:
     statistics: FloatArray
 
     @classmethod
-    def of(cls, plain: FloatArray, distorted: Mapping[str, FloatArray], calibration: FloatArray) -> Gate:
+    def of(
+        cls, plain: FloatArray, distorted: Mapping[str, FloatArray], calibration: FloatArray
+    ) -> Gate:
         """Learns the gate from feature vectors (see `Features.vector`).
 
         Args:
             plain: (n, f) of simulated clips, one of a simulation, from the training side.
             distorted: name of `DISTORTIONS` → (m, f) of clips of other simulations.
-            calibration: (k, f) of simulated clips that are in none of these and that the network was not trained on.
+            calibration: (k, f) of simulated clips that are in none of these and that the network
+                was not trained on.
 
         Raises:
             InputError: distortions that are missing, or too few clips.
@@ -113,7 +142,8 @@ class Gate:
         missing = DISTORTIONS.keys() - distorted.keys()
         if missing:
             raise InputError(
-                f"there are no clips of {', '.join(sorted(missing))}", fix="make them by measure.gate.distortions"
+                f"there are no clips of {', '.join(sorted(missing))}",
+                fix="make them by measure.gate.distortions",
             )
         # Centre and scale of each feature, robust, by one part of the plain clips.
         learned = round(_LEARNING * len(plain))
@@ -126,7 +156,9 @@ class Gate:
         z_centred = z - z.mean(axis=0)
         for name in DISTORTIONS:
             z_distorted = squash_tails(distorted[name], centre, scale)
-            pooled, _ = shrunk_covariance(np.concatenate([z_centred, z_distorted - z_distorted.mean(axis=0)]))
+            pooled, _ = shrunk_covariance(
+                np.concatenate([z_centred, z_distorted - z_distorted.mean(axis=0)])
+            )
             direction = np.linalg.solve(pooled, z_distorted.mean(axis=0) - z.mean(axis=0))
             directions.append(direction)
             offsets.append(direction @ (z_distorted.mean(axis=0) + z.mean(axis=0)) / 2)
@@ -153,10 +185,13 @@ class Gate:
         sided = np.stack([sign * vectors[:, index] for _, index, sign, _ in _SIDED], axis=1)
         distances = vectors[:, -1 - len(MOVES) :]
         everything = np.log10(np.linalg.norm(z @ self.whitening.T, axis=1, keepdims=True)) * 10
-        return np.concatenate([sided, distances, everything, z @ self.directions.T - self.offsets], axis=1)
+        return np.concatenate(
+            [sided, distances, everything, z @ self.directions.T - self.offsets], axis=1
+        )
 
     def surprises(self, vectors: FloatArray) -> FloatArray:
-        """Computes the scores (n, len(SCORES)) of feature vectors (n, f) on the scale of their tails."""
+        """Computes the scores (n, len(SCORES)) of feature vectors (n, f) on the scale of their
+        tails."""
         return self.tails.surprise(self.scores(vectors))
 
     def p_value(self, surprise: float) -> float:
@@ -165,5 +200,6 @@ class Gate:
 
 
 def squash_tails(vectors: FloatArray, centre: FloatArray, scale: FloatArray) -> FloatArray:
-    """Standardises feature vectors (n, f) and draws in their far tails as a logarithm does: asinh."""
+    """Standardises feature vectors (n, f) and draws in their far tails as a logarithm does:
+    asinh."""
     return np.arcsinh((vectors - centre) / scale)

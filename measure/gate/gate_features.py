@@ -1,5 +1,5 @@
-"""All that the gate measures of a clip: the picture's statistics, hand-made features, the network's summary, and how
-far the summary moves under changes that leave the physics as it is."""
+"""All that the gate measures of a clip: the picture's statistics, hand-made features, the network's
+summary, and how far the summary moves under changes that leave the physics as it is."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from models.trained.estimator import Estimator
 from models.trained.outliers import Familiarity
 
 MOVES = ("mirrored", "cropped")
-"""Changes that leave wind and cloth as they are: left and right exchanged, the middle nine tenths of the picture."""
+"""Changes that leave wind and cloth as they are: left and right exchanged, the middle nine tenths
+of the picture."""
 _KEPT = 0.9
 
 
@@ -40,13 +41,18 @@ class Features:
     moved: FloatArray
 
     def vector(self, model: Estimator) -> FloatArray:
-        """Joins all features, (f,): the summary whitened by the training clips' covariance, distances as logarithms."""
+        """Joins all features, (f,): the summary whitened by the training clips' covariance,
+        distances as logarithms."""
         cloud = _cloud(model)
         logs = np.log10(np.maximum([self.distance, *self.moved], 1e-3))
-        return np.concatenate([self.checks, self.handmade, cloud.whitening @ (self.summary - cloud.centre), logs])
+        return np.concatenate(
+            [self.checks, self.handmade, cloud.whitening @ (self.summary - cloud.centre), logs]
+        )
 
 
-def features_of(model: Estimator, frames: UInt8Array, summary: NDArray[np.floating] | None = None) -> Features:
+def features_of(
+    model: Estimator, frames: UInt8Array, summary: NDArray[np.floating] | None = None
+) -> Features:
     """Measures a clip.
 
     Args:
@@ -55,7 +61,8 @@ def features_of(model: Estimator, frames: UInt8Array, summary: NDArray[np.floati
         summary: (d,) the network's first learner's of them, where it is known already.
 
     Raises:
-        InputError: frames that do not fit the model, a clip without contrast, or a model without a cloud.
+        InputError: frames that do not fit the model, a clip without contrast, or a model without a
+            cloud.
     """
     cloud = _cloud(model)
     side = min(frames.shape[1:])
@@ -63,13 +70,22 @@ def features_of(model: Estimator, frames: UInt8Array, summary: NDArray[np.floati
     top, left = (frames.shape[1] - side) // 2, (frames.shape[2] - side) // 2
     square = frames[:, top : top + side, left : left + side]
     middle = square[:, cut : side - cut, cut : side - cut]
-    clips = [square[..., ::-1], middle] if summary is not None else [square, square[..., ::-1], middle]
-    summaries = model.summaries(torch.cat([model.inputs(clip[None]) for clip in clips])).cpu().double().numpy()
+    clips = (
+        [square[..., ::-1], middle] if summary is not None else [square, square[..., ::-1], middle]
+    )
+    summaries = (
+        model.summaries(torch.cat([model.inputs(clip[None]) for clip in clips]))
+        .cpu()
+        .double()
+        .numpy()
+    )
     embedding = summaries[0] if summary is None else np.asarray(summary, dtype=np.float64)
     moved = (summaries[-len(MOVES) :] - embedding) @ cloud.whitening.T
     return Features(
         checks=measure_statistics(frames),
-        handmade=handmade(torch.from_numpy(square.copy())[None, None], rate=model.front_end.rate)[0].double().numpy(),
+        handmade=handmade(torch.from_numpy(square.copy())[None, None], rate=model.front_end.rate)[0]
+        .double()
+        .numpy(),
         summary=embedding,
         distance=float(cloud.distance(embedding[None])[0]),
         moved=np.linalg.norm(moved, axis=1),

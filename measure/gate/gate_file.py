@@ -32,11 +32,16 @@ def fingerprint(model: Estimator) -> UInt8Array:
 def write(folder: Path, gate: Gate, model: Estimator) -> Path:
     """Store a gate in the folder of the model that it was calibrated for.
 
-    Its largest arrays, `whitening` and `directions`, are stored in single precision: distances keep seven digits, and
-    the file is half as large.
+    Its largest arrays, `whitening` and `directions`, are stored in single precision: distances keep
+    seven digits, and the file is half as large.
     """
-    tensors = {name: torch.from_numpy(np.ascontiguousarray(getattr(gate, name))) for name in _DIRECT}
-    tensors |= {"tail_start": torch.from_numpy(gate.tails.start), "tail_excess": torch.from_numpy(gate.tails.excess)}
+    tensors = {
+        name: torch.from_numpy(np.ascontiguousarray(getattr(gate, name))) for name in _DIRECT
+    }
+    tensors |= {
+        "tail_start": torch.from_numpy(gate.tails.start),
+        "tail_excess": torch.from_numpy(gate.tails.excess),
+    }
     tensors["network"] = torch.from_numpy(fingerprint(model).copy())
     tensors |= {name: tensors[name].float() for name in ("whitening", "directions")}
     renew(folder, GATE, tensor_bytes(tensors))
@@ -57,7 +62,9 @@ def read(folder: Path, model: Estimator) -> Gate:
     if missing or len(arrays["tail_start"]) != len(SCORES):
         raise CorruptError("the gate does not fit this version", where=str(path), fix=again)
     if not np.array_equal(arrays["network"], fingerprint(model)):
-        raise CorruptError("the gate was calibrated for another network", where=str(path), fix=again)
+        raise CorruptError(
+            "the gate was calibrated for another network", where=str(path), fix=again
+        )
     return Gate(
         **{name: arrays[name].astype(np.float64) for name in _DIRECT},
         tails=ExponentialTails(start=arrays["tail_start"], excess=arrays["tail_excess"]),

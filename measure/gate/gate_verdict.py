@@ -1,37 +1,43 @@
 """Whether a recording is one that the model can judge, before any interval is shown.
 
-Two kinds of reasons refuse it: faults of the film that were counted while it was made fit (`measure.gate.counted`),
-each with a figure that a person can check, and windows unlike those that the model was trained on. Faults come first.
+Two kinds of reasons refuse it: faults of the film that were counted while it was made fit
+(`measure.gate.counted`), each with a figure that a person can check, and windows unlike those that
+the model was trained on. Faults come first.
 
-A gate looks at one window and gives reasons, each with the p-value of a familiar clip being as strange. A recording has
-several windows, of which some may be strange.
+A gate looks at one window and gives reasons, each with the p-value of a familiar clip being as
+strange. A recording has several windows, of which some may be strange.
 
-A flag has one size. Where it is not given, the model looks at the film as that of each of several sizes, and each of
-them is judged as if it had been given: by the same windows, at the same level. Where the recording is refused at all of
-them it is unlike what the model was trained on: this is the test of the composite hypothesis "of one of these sizes",
-whose p-value is the largest of its parts' (Lehmann and Romano, Testing Statistical Hypotheses, 2005, section 3.1), and
-refuses a familiar recording no more often than its own size does. Where it is refused at some of them only, the size
-decides, and it is asked for. So nothing is shown without the size that would be refused with one of those sizes.
+A flag has one size. Where it is not given, the model looks at the film as that of each of several
+sizes, and each of
+them is judged as if it had been given: by the same windows, at the same level. Where the recording
+is refused at all of them it is unlike what the model was trained on: this is the test of the
+composite hypothesis "of one of these sizes", whose p-value is the largest of its parts' (Lehmann
+and Romano, Testing Statistical Hypotheses, 2005, section 3.1), and refuses a familiar recording no
+more often than its own size does. Where it is refused at some of them only, the size decides, and
+it is asked for. So nothing is shown without the size that would be refused with one of those sizes.
 
-A recording of K windows is refused if more than a `SHARE` of them, and two at least where there are two, are strange:
-with p at or below a level that is the same for all. So windows that are left out of the answer count toward the
-verdict, and a recording of which half the windows just pass is no familiar one.
+A recording of K windows is refused if more than a `SHARE` of them, and two at least where there are
+two, are strange: with p at or below a level that is the same for all. So windows that are left out
+of the answer count toward the verdict, and a recording of which half the windows just pass is no
+familiar one.
 
-Windows of one recording are alike, how much is not known. Let each have the probability a of being strange, and let
-their normal scores be jointly Gaussian with one correlation ρ from 0 to 1. With Φ the normal distribution, the share of
-the familiar recordings that are refused is
+Windows of one recording are alike, how much is not known. Let each have the probability a of being
+strange, and let their normal scores be jointly Gaussian with one correlation ρ from 0 to 1. With Φ
+the normal distribution, the share of the familiar recordings that are refused is
 
     r(a, ρ) = ∫ P(Binomial(K, q(z)) ≥ m) φ(z) dz,   q(z) = Φ((Φ⁻¹(a) − √ρ z)/√(1 − ρ)),
 
-with m the number of windows that refuse. The level is that of the largest a at which r is at most the stated rate for
-every ρ. It is below the rate, since windows that are nearly but not quite alike gather more often than they would if
-they were independent or the same: for many windows the largest r is Φ(−√(z² − c²)) with z and c the normal scores of a
-and of the share m/K, at ρ = 1 − c²/z². A quarter costs little: a = 0.038 for a rate of 0.05. A tenth would cost more
-(0.019), and a half, which is free of charge, lets a recording pass of which 48 in 100 windows are strange.
+with m the number of windows that refuse. The level is that of the largest a at which r is at most
+the stated rate for every ρ. It is below the rate, since windows that are nearly but not quite alike
+gather more often than they would if
+they were independent or the same: for many windows the largest r is Φ(−√(z² − c²)) with z and c the
+normal scores of a and of the share m/K, at ρ = 1 − c²/z². A quarter costs little: a = 0.038 for a
+rate of 0.05. A tenth would cost more (0.019), and a half, which is free of charge, lets a recording
+pass of which 48 in 100 windows are strange.
 
-Neighbouring windows are more alike than distant ones. If the correlation falls as e^(−t/τ), the rate is largest for τ
-about the length of the recording, and up to 1.14 times the largest r above (simulated for 3 to 100 windows and rates of
-0.01 to 0.2); the level leaves room for that.
+Neighbouring windows are more alike than distant ones. If the correlation falls as e^(−t/τ), the
+rate is largest for τ about the length of the recording, and up to 1.14 times the largest r above
+(simulated for 3 to 100 windows and rates of 0.01 to 0.2); the level leaves room for that.
 """
 
 from __future__ import annotations
@@ -49,8 +55,8 @@ from flagdata.core.findings import Finding
 from flagdata.errors import InputError
 
 SHARE = 0.25
-"""Share of strange windows above which a recording is refused, fixed on 2026-11-27 by the text above, before any film
-was judged by it. A choice of this project, from no publication."""
+"""Share of strange windows above which a recording is refused, fixed on 2026-11-27 by the text
+above, before any film was judged by it. A choice of this project, from no publication."""
 _MOST = 3
 """Windows of which one, or most, have to be strange: r is then at most a, at ρ = 1."""
 _FADING = 1.15
@@ -58,7 +64,10 @@ _FADING = 1.15
 _CORRELATIONS = np.concatenate([np.linspace(0.0, 0.95, 39), [0.97, 0.985]])
 _NORMAL = np.linspace(-8.0, 8.0, 801)
 _DENSITY = np.exp(-np.square(_NORMAL) / 2) / np.exp(-np.square(_NORMAL) / 2).sum()
-GIVE_SIZE = "give --flag-size, the length along the wind times the height along the pole in metres, as in 1.5x1.0"
+GIVE_SIZE = (
+    "give --flag-size, the length along the wind times the height along the pole in metres, as in "
+    "1.5x1.0"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,7 +79,8 @@ class Reason:
         what: a sentence for people, with the figure in it.
         p: probability that a familiar clip is at least as strange; None of what was counted.
         fix: what the user can do about it.
-        blank: whether there is nothing to measure in the window, so that no number is given of it in any case.
+        blank: whether there is nothing to measure in the window, so that no number is given of it
+            in any case.
         value: the figure in the sentence, in its unit; None where there is none.
         figure: the figure with its name and its usual range, without what it may mean.
         check: the score that shows it; empty for what was counted in the film.
@@ -88,17 +98,26 @@ class Reason:
     @classmethod
     def counted(cls, fault: Finding) -> Reason:
         """Converts a fault of the film to a reason."""
-        return cls(kind=fault.kind, what=fault.what, p=None, fix=fault.fix or cls.fix, value=fault.value)
+        return cls(
+            kind=fault.kind, what=fault.what, p=None, fix=fault.fix or cls.fix, value=fault.value
+        )
 
     def of(self, p: float | None) -> Reason:
-        """Returns what a recording's verdict states of it: of a statistic that the window is unlike, by its figure."""
+        """Returns what a recording's verdict states of it: of a statistic that the window is
+        unlike, by its figure."""
         if self.blank or not self.figure:
             return Reason(kind=self.kind, what=self.what, p=p, fix=self.fix, blank=self.blank)
         return Reason(kind="unlike-training", what=self.figure, p=p)
 
     def as_dict(self) -> dict[str, Any]:
         """Returns JSON values."""
-        return {"kind": self.kind, "what": self.what, "p": self.p, "value": self.value, "fix": self.fix}
+        return {
+            "kind": self.kind,
+            "what": self.what,
+            "p": self.p,
+            "value": self.value,
+            "fix": self.fix,
+        }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,7 +135,8 @@ class Verdict:
         window_p: (k,) of each window there.
         blank: (k,) whether there is nothing to measure in it, at any size.
         faults: of the film, that were counted; any of them refuses it.
-        window_reasons: of a usual window, among the strange ones where these refuse the recording; the strongest first.
+        window_reasons: of a usual window, among the strange ones where these refuse the recording;
+            the strongest first.
     """
 
     false_alarm: float
@@ -149,9 +169,17 @@ class Verdict:
     def reasons(self) -> tuple[Reason, ...]:
         """Returns all reasons, the weightiest first."""
         if self.is_undecided:
-            sentence = f"at {len(self.sizes)} of {self.considered} sizes of the flag it is, at the others it is not"
-            return (*self.faults, Reason(kind="size-needed", what=sentence, p=self.p, fix=GIVE_SIZE))
-        return self.faults if self.faults and not self.unlike else (*self.faults, *self.window_reasons)
+            sentence = (
+                f"at {len(self.sizes)} of {self.considered} sizes of the flag it is, at the others "
+                "it is not"
+            )
+            return (
+                *self.faults,
+                Reason(kind="size-needed", what=sentence, p=self.p, fix=GIVE_SIZE),
+            )
+        return (
+            self.faults if self.faults and not self.unlike else (*self.faults, *self.window_reasons)
+        )
 
     @property
     def measurable(self) -> bool:
@@ -165,7 +193,8 @@ class Verdict:
 
     @property
     def sentence(self) -> str:
-        """Phrases the verdict; of a film that is refused with the level that is applied and the rate it keeps to."""
+        """Phrases the verdict; of a film that is refused with the level that is applied and the
+        rate it keeps to."""
         strange, count = int(self.strange.sum()), len(self.window_p)
         windows = (
             f"p = {self.p:.2g} (refused from {self.level:.2g} down)"
@@ -174,20 +203,28 @@ class Verdict:
         )
         if not self.measurable:
             cause = self.window_reasons[0].what
-            return f"there is nothing to measure, so that no number is given, not even with --anyway: {cause}"
+            return (
+                "there is nothing to measure, so that no number is given, not even with --anyway: "
+                f"{cause}"
+            )
         if self.faults:
             further = len(self.reasons) - 1
-            suffix = "" if not further else f" ({further} more {'reasons' if further > 1 else 'reason'})"
+            suffix = (
+                "" if not further else f" ({further} more {'reasons' if further > 1 else 'reason'})"
+            )
             return f"the film cannot be measured: {self.faults[0].what}{suffix}"
         if self.unlike:
             return (
-                f"this is not like the films that the network was trained on: {self.reasons[0].what}; {windows}; "
-                f"a window is unfamiliar at p ≤ {self.level:.2g}, which refuses {self.false_alarm:.0%} of familiar "
+                "this is not like the films that the network was trained on: "
+                f"{self.reasons[0].what}; {windows}; "
+                f"a window is unfamiliar at p ≤ {self.level:.2g}, which refuses "
+                f"{self.false_alarm:.0%} of familiar "
                 "films at most"
             )
         if self.is_undecided:
             return (
-                "whether this is like the films that the network was trained on depends on the size: "
+                "whether this is like the films that the network was trained on depends on the "
+                "size: "
                 f"{self.reasons[0].what}"
             )
         return f"like the films that the network was trained on: {windows}"
@@ -217,10 +254,11 @@ def verdict(
     """Judges a recording.
 
     Args:
-        windows: the reasons of each window, for each size of flag considered; the first of each has a p-value.
+        windows: the reasons of each window, for each size of flag considered; the first of each has
+            a p-value.
         false_alarm: between 0 and 1.
-        level: p at or below which a window is strange, of the rate at which familiar windows may be; see
-            `measure.gate.window`.
+        level: p at or below which a window is strange, of the rate at which familiar windows may
+            be; see `measure.gate.window`.
         faults: of the film, the weightiest first.
 
     Raises:
@@ -257,19 +295,25 @@ def refusing(windows: int) -> int:
 
 
 def refused_share(strange: float, windows: int) -> float:
-    """Computes the share of familiar recordings that are refused, at the correlation at which it is largest.
+    """Computes the share of familiar recordings that are refused, at the correlation at which it is
+    largest.
 
     Args:
         strange: probability of a familiar window being strange.
         windows: of a recording.
     """
-    score = (ndtri(strange) - np.sqrt(_CORRELATIONS)[:, None] * _NORMAL) / np.sqrt(1 - _CORRELATIONS)[:, None]
-    return max(strange, float((bdtrc(refusing(windows) - 1, windows, ndtr(score)) @ _DENSITY).max()))
+    score = (ndtri(strange) - np.sqrt(_CORRELATIONS)[:, None] * _NORMAL) / np.sqrt(
+        1 - _CORRELATIONS
+    )[:, None]
+    return max(
+        strange, float((bdtrc(refusing(windows) - 1, windows, ndtr(score)) @ _DENSITY).max())
+    )
 
 
 @lru_cache(maxsize=64)
 def window_rate(windows: int, false_alarm: float) -> float:
-    """Finds the largest probability of a familiar window being strange that keeps to the stated rate of recordings.
+    """Finds the largest probability of a familiar window being strange that keeps to the stated
+    rate of recordings.
 
     Args:
         windows: of a recording.
@@ -289,5 +333,9 @@ def window_rate(windows: int, false_alarm: float) -> float:
     low, high = 0.0, false_alarm / _FADING
     while high - low > 1e-4 * high:
         middle = (low + high) / 2
-        low, high = (middle, high) if refused_share(middle, windows) <= false_alarm / _FADING else (low, middle)
+        low, high = (
+            (middle, high)
+            if refused_share(middle, windows) <= false_alarm / _FADING
+            else (low, middle)
+        )
     return low

@@ -23,12 +23,16 @@ class Fault:
 REASONS: dict[str, Fault] = {
     "scene-cut": Fault(
         sentence="the picture changes at once, as where two scenes are joined",
-        fix="choose a part of the film between two such places, three frames from each, by --start and --end",
+        fix="choose a part of the film between two such places, three frames from each, by --start "
+        "and --end",
     ),
     "too-few-frames": Fault(sentence="there are too few frames", fix="give a longer film"),
-    "low-frame-rate": Fault(sentence="there are too few frames a second", fix="film at 25 frames a second or more"),
+    "low-frame-rate": Fault(
+        sentence="there are too few frames a second", fix="film at 25 frames a second or more"
+    ),
     "repeated-frames": Fault(
-        sentence="many frames look alike, as in a film that loops, stands still or was made with fewer frames a second",
+        sentence="many frames look alike, as in a film that loops, stands still or was made with "
+        "fewer frames a second",
         fix="give a film whose frames are all different, as the camera wrote it",
     ),
     "too-dark": Fault(
@@ -40,26 +44,32 @@ REASONS: dict[str, Fault] = {
         fix="crop to the flag, or choose a part of the film in which it flies",
     ),
     "unlike-cloth": Fault(
-        sentence="what changes is finer than cloth's folds, and may be another thing, as leaves or water",
+        sentence="what changes is finer than cloth's folds, and may be another thing, as leaves or "
+        "water",
         fix="make sure that the crop shows a flag on a pole and little else that moves",
         of_motion=True,
     ),
     "upside-down": Fault(
-        sentence="the film may be upside down: the free end of what moves is higher than its hoist, and the edge that "
+        sentence="the film may be upside down: the free end of what moves is higher than its "
+        "hoist, and the edge that "
         "stands still there ends at what moves instead of going on below it",
-        fix="turn the film: ffmpeg -i FILM -vf hflip,vflip TURNED; or correct the rotation that its file states",
+        fix="turn the film: ffmpeg -i FILM -vf hflip,vflip TURNED; or correct the rotation that "
+        "its file states",
         of_motion=True,
         of_flags=True,
     ),
     "on-its-side": Fault(
-        sentence="the film may lie on its side, as a level edge stands still along the bottom of what moves",
-        fix="if so, turn the film: ffmpeg -i FILM -vf transpose=1 TURNED, with transpose=2 where it then is upside "
+        sentence="the film may lie on its side, as a level edge stands still along the bottom of "
+        "what moves",
+        fix="if so, turn the film: ffmpeg -i FILM -vf transpose=1 TURNED, with transpose=2 where "
+        "it then is upside "
         "down; or correct the rotation that its file states",
         of_motion=True,
         of_flags=True,
     ),
     "second-pole": Fault(
-        sentence="two flags may overlap in the picture, as a second upright edge stands still inside what moves and "
+        sentence="two flags may overlap in the picture, as a second upright edge stands still "
+        "inside what moves and "
         "goes on below it",
         fix="film from where no other flag or post is before or behind the flag",
         of_motion=True,
@@ -72,9 +82,11 @@ REASONS: dict[str, Fault] = {
         of_flags=True,
     ),
     "hangs-from-above": Fault(
-        sentence="what moves may hang from a bar or a line, or the film may lie on its side: a level edge stands still "
+        sentence="what moves may hang from a bar or a line, or the film may lie on its side: a "
+        "level edge stands still "
         "along its top",
-        fix="film a flag whose one side is at a pole; turn a film that lies on its side: ffmpeg -i FILM -vf "
+        fix="film a flag whose one side is at a pole; turn a film that lies on its side: ffmpeg -i "
+        "FILM -vf "
         "transpose=1 TURNED, with transpose=2 where it then is upside down",
         of_motion=True,
         of_flags=True,
@@ -105,16 +117,21 @@ REASONS: dict[str, Fault] = {
     ),
     "few-windows": Fault(
         sentence="an answer would rest on a small part of the film",
-        fix="give the part in which the whole flag flies and no frame is missing, by --start and --end",
+        fix="give the part in which the whole flag flies and no frame is missing, by --start and "
+        "--end",
     ),
     "no-hoist": Fault(
-        sentence="what moves may be no flag on a pole, as no hoist was found, the upright edge that it is attached to",
+        sentence="what moves may be no flag on a pole, as no hoist was found, the upright edge "
+        "that it is attached to",
         fix="film a flag and its pole from the side, so that the whole hoist is in the picture",
         of_motion=True,
         of_flags=True,
     ),
     "several-flags": Fault(
-        sentence="more than one region moves", fix="choose one by --flag, or crop to it", of_motion=True
+        sentence="more than one region moves",
+        fix="choose one by --flag, or crop to it",
+        of_motion=True,
     ),
 }
-"""By kind, in the order in which they are stated: what is wrong with the recording before what follows from it."""
+"""By kind, in the order in which they are stated: what is wrong with the recording before what
+follows from it."""

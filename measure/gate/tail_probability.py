@@ -11,8 +11,8 @@ from flagdata.core.arrays import FloatArray
 from flagdata.errors import InputError
 
 BODY = 0.8
-"""Share of the plain clips below the start of a tail. Higher leaves fewer clips to estimate a tail from; lower takes
-for a tail what is not yet one."""
+"""Share of the plain clips below the start of a tail. Higher leaves fewer clips to estimate a tail
+from; lower takes for a tail what is not yet one."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -42,16 +42,18 @@ class ExponentialTails:
         return cls(start=start, excess=np.maximum(excess, resolution))
 
     def surprise(self, scores: FloatArray) -> FloatArray:
-        """Returns excesses (…, c) over the start of the tail in mean excesses: each one more is e times rarer."""
+        """Returns excesses (…, c) over the start of the tail in mean excesses: each one more is e
+        times rarer."""
         return (scores - self.start) / self.excess
 
 
 def level(count: int, false_alarm: float, confidence: float) -> float:
-    """Chooses the p at or below which a clip is refused, so that the false-alarm rate keeps to what is stated.
+    """Chooses the p at or below which a clip is refused, so that the false-alarm rate keeps to what
+    is stated.
 
-    Given the calibration clips, the rate at which familiar clips have p ≤ k/(n + 1) is distributed as Beta(k,
-    n + 1 − k) (Vovk, Asian Conference on Machine Learning 2012, proposition 2a). k is the largest at which this rate
-    is at most `false_alarm` with probability `confidence`.
+    Given the calibration clips, the rate at which familiar clips have p ≤ k/(n + 1) is distributed
+    as Beta(k, n + 1 − k) (Vovk, Asian Conference on Machine Learning 2012, proposition 2a). k is
+    the largest at which this rate is at most `false_alarm` with probability `confidence`.
 
     Args:
         count: n, of the calibration clips.

@@ -1,7 +1,7 @@
 """What is counted of a film while it is read: cuts, loops, light, and what stands still.
 
-It looks at small copies of whole frames, some 25 a second, and keeps of each a thumbnail. What it counts can be checked
-by eye on the film.
+It looks at small copies of whole frames, some 25 a second, and keeps of each a thumbnail. What it
+counts can be checked by eye on the film.
 """
 
 from __future__ import annotations
@@ -23,19 +23,20 @@ _RATE = 25.0
 _THUMB = 40
 """Longer side [px] of the thumbnails."""
 _COMPARED = 500
-"""Frames at most of which each is compared with each other, for loops: the first 20 s. More find longer loops; memory
-and time grow with their square."""
+"""Frames at most of which each is compared with each other, for loops: the first 20 s. More find
+longer loops; memory and time grow with their square."""
 _APART = 4
-"""Least number of frames between two that are alike. Fewer takes slow motion for a repeated frame."""
+"""Least number of frames between two that are alike. Fewer takes slow motion for a repeated
+frame."""
 _CUT, _CUT_TIMES = 6.0, 3.0
-"""Mean change of the thumbnail [gray levels], and its ratio to the largest change about it, from which on it is a cut:
-a camera that turns changes many frames."""
+"""Mean change of the thumbnail [gray levels], and its ratio to the largest change about it, from
+which on it is a cut: a camera that turns changes many frames."""
 _ABOUT = 5
 """Changes before and after a cut that it is compared with."""
 _TWIN = 0.1
-"""Distance of a frame's nearest twin, over the median distance of frames, below which it repeats that one. Chosen on
-the films with defects of even number and the films without defects. Higher takes motion that nearly repeats for a loop;
-lower misses loops that were coded again."""
+"""Distance of a frame's nearest twin, over the median distance of frames, below which it repeats
+that one. Chosen on the films with defects of even number and the films without defects. Higher
+takes motion that nearly repeats for a loop; lower misses loops that were coded again."""
 _SAMPLED = 10
 """Every so many-th frame that is looked at is kept as it is, up to `_KEPT`."""
 _KEPT = 40
@@ -47,7 +48,8 @@ _TOGETHER = 5
 """Copies that are compared for edges at rest: two seconds."""
 
 _SPOT_NOISES, _SPOT_CHANGE = 5.0, 3.0
-"""Deviation in time, over the median one and in gray levels, from which on a pixel belongs to a spot that changes."""
+"""Deviation in time, over the median one and in gray levels, from which on a pixel belongs to a
+spot that changes."""
 
 Picture = UInt8Array
 _Gray = TypeVar("_Gray", np.uint8, np.float32)
@@ -126,7 +128,9 @@ class FilmWatch:
         """Finds instants at which the picture changes to another at once [s]."""
         if len(self._thumbs) < 3:
             return []
-        change = np.array([np.abs(b - a).mean() for a, b in zip(self._thumbs, self._thumbs[1:], strict=False)])
+        change = np.array(
+            [np.abs(b - a).mean() for a, b in zip(self._thumbs, self._thumbs[1:], strict=False)]
+        )
         instants = []
         for k, jump in enumerate(change):
             about = np.concatenate([change[max(0, k - _ABOUT) : k], change[k + 1 : k + 1 + _ABOUT]])
@@ -135,13 +139,16 @@ class FilmWatch:
         return instants
 
     def twins(self, box: tuple[float, float, float, float] | None = None) -> float:
-        """Computes the share of frames that look like another one four frames away or more, 0 to 1: a loop, or repeated
-        frames.
+        """Computes the share of frames that look like another one four frames away or more, 0 to 1:
+        a loop, or repeated frames.
 
         Args:
-            box: left, top, right and bottom of what moves, in shares of the picture; None for all of it.
+            box: left, top, right and bottom of what moves, in shares of the picture; None for all
+                of it.
         """
-        thumbs = np.stack(self._thumbs[:_COMPARED]) if self._thumbs else np.zeros((0, 1, 1), np.float32)
+        thumbs = (
+            np.stack(self._thumbs[:_COMPARED]) if self._thumbs else np.zeros((0, 1, 1), np.float32)
+        )
         if len(thumbs) < 3 * _APART:
             return 0.0
         if box is not None:
@@ -159,7 +166,8 @@ class FilmWatch:
         return float((nearest < _TWIN * usual).mean()) if usual > 0 else 1.0
 
     def grain(self, mask: BoolArray) -> float:
-        """Computes the share of the change that is left when pixels are averaged over a fortieth of the picture's
+        """Computes the share of the change that is left when pixels are averaged over a fortieth of
+        the picture's
         longer side: of cloth more than a half, of leaves less than a third.
 
         Args:
@@ -167,26 +175,39 @@ class FilmWatch:
         """
         if self._fine is None or self._coarse is None:
             return 1.0
-        fine, coarse = (float(of[_resize_mask(mask, of.shape)].mean()) for of in (self._fine, self._coarse))
+        fine, coarse = (
+            float(of[_resize_mask(mask, of.shape)].mean()) for of in (self._fine, self._coarse)
+        )
         return coarse / fine if fine > 0 else 1.0
 
     def spot(self) -> float:
-        """Measures the longer side of the largest spot that changes, in pixels of the film; 0 where none does."""
+        """Measures the longer side of the largest spot that changes, in pixels of the film; 0 where
+        none does."""
         if len(self._sample) < 3:
             return 0.0
         deviation = np.stack(self._sample).astype(np.float32).std(axis=0)
-        moving = (deviation > max(_SPOT_NOISES * float(np.median(deviation)), _SPOT_CHANGE)).astype(np.uint8)
+        moving = (deviation > max(_SPOT_NOISES * float(np.median(deviation)), _SPOT_CHANGE)).astype(
+            np.uint8
+        )
         joined = cv2.morphologyEx(moving, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
         count, _, components, _ = cv2.connectedComponentsWithStats(joined)
         if count < 2:
             return 0.0
         spot = components[1 + int(np.argmax(components[1:, cv2.CC_STAT_AREA]))]
-        return float(max(spot[cv2.CC_STAT_WIDTH], spot[cv2.CC_STAT_HEIGHT]) * max(self.shape) / max(self.small))
+        return float(
+            max(spot[cv2.CC_STAT_WIDTH], spot[cv2.CC_STAT_HEIGHT])
+            * max(self.shape)
+            / max(self.small)
+        )
 
     def resting(self) -> int:
-        """Pixels of the small copies in which an edge stays where it is for two seconds, as those of background, pole
+        """Pixels of the small copies in which an edge stays where it is for two seconds, as those
+        of background, pole
         and hoist do: the median over the film, of which a camera may drift."""
-        counts = [_resting(self._sample[k : k + _TOGETHER]) for k in range(0, len(self._sample) - 2, _TOGETHER)]
+        counts = [
+            _resting(self._sample[k : k + _TOGETHER])
+            for k in range(0, len(self._sample) - 2, _TOGETHER)
+        ]
         return int(np.median(counts)) if counts else 0
 
 
@@ -198,13 +219,17 @@ def _average_down(picture: NDArray[_Gray], side: int) -> NDArray[_Gray]:
 
 
 def _resize_mask(mask: BoolArray, shape: tuple[int, ...]) -> BoolArray:
-    return cv2.resize(mask.astype(np.uint8), shape[::-1], interpolation=cv2.INTER_NEAREST).astype(bool)
+    return cv2.resize(mask.astype(np.uint8), shape[::-1], interpolation=cv2.INTER_NEAREST).astype(
+        bool
+    )
 
 
 def _resting(sample: list[Picture]) -> int:
     """Counts pixels of pictures (height, width) in which an edge stays where it is."""
     gray = [cv2.GaussianBlur(picture.astype(np.float32), (0, 0), 1.0) for picture in sample]
-    slope = np.stack([[cv2.Sobel(smooth, cv2.CV_32F, x, 1 - x, ksize=3) / 8 for x in (1, 0)] for smooth in gray])
+    slope = np.stack(
+        [[cv2.Sobel(smooth, cv2.CV_32F, x, 1 - x, ksize=3) / 8 for x in (1, 0)] for smooth in gray]
+    )
     mean = slope.mean(axis=0)  # (2, height, width)
     length = np.hypot(*mean)
     along = (slope * (mean / np.maximum(length, 1e-6))).sum(axis=1)

@@ -1,8 +1,10 @@
-"""Gates of windows: whether one clip is like those of the training, with a p and the reasons in words.
+"""Gates of windows: whether one clip is like those of the training, with a p and the reasons in
+words.
 
-Two gates answer the same question: the distance of the network's summary, and the calibrated checks of
-`measure.gate.gate`, all of them together. Before either, clips in which nothing moves or is visible are refused: a
-network gives numbers for these as well, which say nothing of a flag and are not shown even where a gate is overruled.
+Two gates answer the same question: the distance of the network's summary, and the calibrated checks
+of `measure.gate.gate`, all of them together. Before either, clips in which nothing moves or is
+visible are refused: a network gives numbers for these as well, which say nothing of a flag and are
+not shown even where a gate is overruled.
 """
 
 from __future__ import annotations
@@ -34,12 +36,14 @@ FALSE_ALARM = 0.05
 CONFIDENCE = 0.9
 """Probability, over which clips the gate was calibrated by, that no larger share of them is."""
 _FLAT = 1.0
-"""Standard deviation of all gray levels of a clip below which nothing is visible: one step of the camera's."""
+"""Standard deviation of all gray levels of a clip below which nothing is visible: one step of the
+camera's."""
 _USUAL = (0.01, 0.99)
 _AREA = list(CHECKS).index("area")
 _LIKENESS = 0.5
-"""Weight of the likeness to a distortion beside the surprise, where reasons are put in order: chosen on development
-clips, of the training side, where 1 called still pictures repeated and 0 called dark ones still."""
+"""Weight of the likeness to a distortion beside the surprise, where reasons are put in order:
+chosen on development clips, of the training side, where 1 called still pictures repeated and 0
+called dark ones still."""
 
 
 class WindowGate(Protocol):
@@ -57,10 +61,11 @@ class WindowGate(Protocol):
         ...
 
     def level(self, false_alarm: float) -> float:
-        """Returns the p at or below which a window is strange, so that this happens to familiar ones at most so often.
+        """Returns the p at or below which a window is strange, so that this happens to familiar
+        ones at most so often.
 
-        The rate itself where p-values are exact; less where the clips that they were calibrated by are few and the rate
-        is to hold for most draws of these.
+        The rate itself where p-values are exact; less where the clips that they were calibrated by
+        are few and the rate is to hold for most draws of these.
 
         Raises:
             InputError: too few of these for such a rate: no window would be strange.
@@ -70,7 +75,8 @@ class WindowGate(Protocol):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FamiliarityGate:
-    """The distance of a window's summary to those of the training clips; see `models.trained.outliers`."""
+    """The distance of a window's summary to those of the training clips; see
+    `models.trained.outliers`."""
 
     cloud: Familiarity
 
@@ -82,7 +88,8 @@ class FamiliarityGate:
         p = float(self.cloud.p_value(summary[None])[0])
         usual = float(np.median(self.cloud.reference))
         sentence = (
-            f"its summary is {distance:.1f} standard deviations from the training clips, usual are {usual:.1f}; "
+            f"its summary is {distance:.1f} standard deviations from the training clips, usual are "
+            f"{usual:.1f}; "
             f"p = {p:.3f} among {len(self.cloud.reference)} validation clips"
         )
         return [Reason(kind="unlike-training", what=sentence, p=p)]
@@ -107,20 +114,31 @@ class CheckedGate:
     false_alarm: float
 
     def judge(self, frames: UInt8Array, summary: NDArray[np.floating]) -> list[Reason]:
-        """Judges as `WindowGate`. Of a statistic it says that the window is unlike the training clips, and in which
-        figure: faults such as a moving camera are counted in the film (`measure.gate.counted`), and are stated from
-        there."""
+        """Judges as `WindowGate`. Of a statistic it says that the window is unlike the training
+        clips, and in which
+        figure: faults such as a moving camera are counted in the film (`measure.gate.counted`), and
+        are stated from there."""
         judgement = judge(
-            frames, self.model, self.calibrated, false_alarm=self.false_alarm, summary=summary, without=COUNTED
+            frames,
+            self.model,
+            self.calibrated,
+            false_alarm=self.false_alarm,
+            summary=summary,
+            without=COUNTED,
         )
         if not judgement.reasons:
             return [
                 Reason(
-                    kind="familiar", what=f"no check is unusual, p = {judgement.p:.3f} over all checks", p=judgement.p
+                    kind="familiar",
+                    what=f"no check is unusual, p = {judgement.p:.3f} over all checks",
+                    p=judgement.p,
                 )
             ]
         # The first speaks for all checks together.
-        return [reason.of(reason.p if number else judgement.p) for number, reason in enumerate(judgement.reasons)]
+        return [
+            reason.of(reason.p if number else judgement.p)
+            for number, reason in enumerate(judgement.reasons)
+        ]
 
     def level(self, false_alarm: float) -> float:
         return level(len(self.calibrated.calibration), false_alarm, CONFIDENCE)
@@ -134,9 +152,11 @@ def gate_of(model: Estimator) -> WindowGate:
     """
     if model.cloud is None:
         raise InputError(
-            "the network has no data on its training clips, so it cannot be checked whether it applies to this film",
+            "the network has no data on its training clips, so it cannot be checked whether it "
+            "applies to this film",
             where=f"model {model.name!r}",
-            fix="ship it, in a checkout of flagdata: python -m tests.studies shipping stores its training clips",
+            fix="ship it, in a checkout of flagdata: python -m tests.studies shipping stores its "
+            "training clips",
         )
     return FamiliarityGate(cloud=model.cloud)
 
@@ -147,7 +167,8 @@ class Judgement:
 
     Attributes:
         familiar: whether intervals may be shown.
-        p: conformal p over all checks together: of so many clips like the simulated ones, one looks at least as odd.
+        p: conformal p over all checks together: of so many clips like the simulated ones, one looks
+            at least as odd.
         level: p at or below which a clip is refused.
         reasons: why it is refused, the weightiest first; none for a familiar clip.
     """
@@ -175,14 +196,16 @@ def judge(
         model: whose training it is compared with.
         gate: calibrated for this model.
         false_alarm: share of familiar clips that may be refused, by all checks together.
-        confidence: probability that no larger share of them is, over the draw of the calibration clips.
+        confidence: probability that no larger share of them is, over the draw of the calibration
+            clips.
         summary: (d,) the network's of these frames, where it is known already.
-        without: kinds of reasons whose scores are left out. The others are compared with calibration clips judged by
-            all scores, so that no more familiar clips are refused than `false_alarm` states.
+        without: kinds of reasons whose scores are left out. The others are compared with
+            calibration clips judged by all scores, so that no more familiar clips are refused than
+            `false_alarm` states.
 
     Raises:
-        InputError: more frames than the model takes, another shape or type, or a rate that the calibration clips are
-            too few for a judgement.
+        InputError: more frames than the model takes, another shape or type, or a rate that the
+            calibration clips are too few for a judgement.
     """
     at = level(len(gate.calibration), false_alarm, confidence)
     wanted = model.front_end.frames
@@ -209,16 +232,21 @@ def judge(
 def _too_few(count: int, wanted: int) -> Reason:
     row = REASONS["too-few-frames"]
     sentence = f"{row.sentence}: {count} instead of {wanted}"
-    return Reason(kind="too-few-frames", what=sentence, p=None, fix=row.fix, check="frames", value=count)
+    return Reason(
+        kind="too-few-frames", what=sentence, p=None, fix=row.fix, check="frames", value=count
+    )
 
 
-def _reasons(gate: Gate, scores: FloatArray, surprises: FloatArray, at: float, *, still: bool) -> tuple[Reason, ...]:
-    """Gives each kind once, of those whose scores would refuse the clip alone. Of a still clip none is about motion.
+def _reasons(
+    gate: Gate, scores: FloatArray, surprises: FloatArray, at: float, *, still: bool
+) -> tuple[Reason, ...]:
+    """Gives each kind once, of those whose scores would refuse the clip alone. Of a still clip none
+    is about motion.
 
-    A fault shows in many scores. The kinds are in the order of two voices: the surprise of the kind's weightiest score
-    as a share of the clip's largest, and, by `_LIKENESS`, the log-likelihood ratio of the kind's likeliest distortion
-    as a share of the largest. The figure in the message is that of the picture's weightiest statistic, where one
-    refuses.
+    A fault shows in many scores. The kinds are in the order of two voices: the surprise of the
+    kind's weightiest score as a share of the clip's largest, and, by `_LIKENESS`, the
+    log-likelihood ratio of the kind's likeliest distortion as a share of the largest. The figure in
+    the message is that of the picture's weightiest statistic, where one refuses.
     """
     weightiest: dict[str, int] = {}
     pictured: dict[str, int] = {}
@@ -233,9 +261,13 @@ def _reasons(gate: Gate, scores: FloatArray, surprises: FloatArray, at: float, *
         kind = SCORES[index].reason
         if kind in ratios:
             ratios[kind] = max(ratios[kind], float(scores[index]))
-    most, likeliest = float(surprises.max()), max(1.0, *(float(ratio) for ratio in scores[-len(DISTORTIONS) :]))
+    most, likeliest = (
+        float(surprises.max()),
+        max(1.0, *(float(ratio) for ratio in scores[-len(DISTORTIONS) :])),
+    )
     order = sorted(
-        weightiest, key=lambda kind: -surprises[weightiest[kind]] / most - _LIKENESS * ratios[kind] / likeliest
+        weightiest,
+        key=lambda kind: -surprises[weightiest[kind]] / most - _LIKENESS * ratios[kind] / likeliest,
     )
     return tuple(
         _reason(gate, index, float(scores[index]), gate.p_value(float(surprises[index])))
@@ -277,17 +309,29 @@ def blank(frames: UInt8Array) -> Reason | None:
     """
     contrast = float(frames.std())
     if contrast < _FLAT:
-        sentence = f"{REASONS['too-dark'].sentence}: all gray levels lie within {contrast:.2g} of each other"
+        sentence = (
+            f"{REASONS['too-dark'].sentence}: all gray levels lie within {contrast:.2g} of each "
+            "other"
+        )
         return _lacking("too-dark", sentence, check="contrast", value=contrast)
     most = float(ClipStatistics.of(frames).deviation.max())
     if most > LEAST_DEVIATION:
         return None
     sentence = (
-        f"no motion is found in the picture: its gray levels change by {most:.1f} at most (standard deviation in "
+        f"no motion is found in the picture: its gray levels change by {most:.1f} at most "
+        "(standard deviation in "
         f"time), and up to {LEAST_DEVIATION:g} comes of rounding and coding"
     )
     return _lacking("no-motion", sentence, check="strength", value=most)
 
 
 def _lacking(kind: str, sentence: str, *, check: str, value: float) -> Reason:
-    return Reason(kind=kind, what=sentence, p=None, fix=REASONS[kind].fix, blank=True, check=check, value=value)
+    return Reason(
+        kind=kind,
+        what=sentence,
+        p=None,
+        fix=REASONS[kind].fix,
+        blank=True,
+        check=check,
+        value=value,
+    )

@@ -1,4 +1,5 @@
-"""A coefficient that fluctuates from segment to segment: what gusts, whose course is unknown, do to the pressure."""
+"""A coefficient that fluctuates from segment to segment: what gusts, whose course is unknown, do to
+the pressure."""
 
 from __future__ import annotations
 
@@ -17,8 +18,8 @@ class Fluctuation:
     Attributes:
         deviation: its standard deviation, in units of its column.
         error: of the deviation, from the curvature of the likelihood.
-        likelihood: restricted log likelihood ratio against a constant: what pushes alike in all segments does not
-            fluctuate.
+        likelihood: restricted log likelihood ratio against a constant: what pushes alike in all
+            segments does not fluctuate.
     """
 
     deviation: float
@@ -27,7 +28,8 @@ class Fluctuation:
 
 
 def fluctuation(evidence: Evidence, column: int, along: Chosen = ()) -> Fluctuation:
-    """Estimates how much a column's coefficient fluctuates, beside the nuisances and some columns more.
+    """Estimates how much a column's coefficient fluctuates, beside the nuisances and some columns
+    more.
 
     Errors are taken to be as large as this set's are across the column.
     """
@@ -42,15 +44,18 @@ def fluctuation(evidence: Evidence, column: int, along: Chosen = ()) -> Fluctuat
     likelihood = _restricted_likelihood(grid, score, curvature)
     best = int(np.argmax(likelihood))
     deviation = float(np.sqrt(grid[best]))
-    # Of τ where information is a normal variance's: Σ h²/(1 + τ² h)²/2 for τ², 4 τ² times that for τ.
+    # Of τ where information is a normal variance's: Σ h²/(1 + τ² h)²/2 for τ², 4 τ² times that for
+    # τ.
     information = 2 * grid[best] * float((curvature**2 / (1 + grid[best] * curvature) ** 2).sum())
-    error = information**-0.5 if information > 0 else float(np.sqrt(1 / np.sqrt((curvature**2).sum())))
+    error = (
+        information**-0.5 if information > 0 else float(np.sqrt(1 / np.sqrt((curvature**2).sum())))
+    )
     return Fluctuation(deviation=deviation, error=error, likelihood=float(likelihood[best]))
 
 
 def fluctuation_gains(evidence: Evidence, column: int) -> FloatArray:
-    """Computes the log likelihood of each left-out recording's segments under the others' constant and fluctuation,
-    over their constant alone, (segment,)."""
+    """Computes the log likelihood of each left-out recording's segments under the others' constant
+    and fluctuation, over their constant alone, (segment,)."""
     folds = left_together(evidence.recording)
     result = np.zeros(len(folds))
     for index in np.unique(folds):
@@ -65,9 +70,11 @@ def fluctuation_gains(evidence: Evidence, column: int) -> FloatArray:
     return result
 
 
-def _restricted_likelihood(variances: FloatArray, score: FloatArray, curvature: FloatArray) -> FloatArray:
-    """Computes the restricted log likelihood of coefficients s/h ± 1/√h that vary by τ² about a constant, over none,
-    (variance,)."""
+def _restricted_likelihood(
+    variances: FloatArray, score: FloatArray, curvature: FloatArray
+) -> FloatArray:
+    """Computes the restricted log likelihood of coefficients s/h ± 1/√h that vary by τ² about a
+    constant, over none, (variance,)."""
     single = score / curvature
     weight = curvature / (1 + variances[:, None] * curvature)
     mean = weight @ single / weight.sum(axis=1)

@@ -1,9 +1,12 @@
-"""What numerics leave, learnt from nulls: a mean, a covariance, and a random effect of each kind of numerics.
+"""What numerics leave, learnt from nulls: a mean, a covariance, and a random effect of each kind of
+numerics.
 
-Segments of data obey r = μ(U) + R δ + ε with ε of covariance Σ. μ and Σ are learnt from null recordings, whose own
-δ is none: their statistics are taken at the calibration they were simulated with, those of data at the one that is
-fitted to them. U is the wind's speed; μ is that of the nominal cloth, as far as nulls of it show. Recordings of one
-cloth share the numerics they differ from the fit's by, and what is not linear in its calibration, so that μ has a part
+Segments of data obey r = μ(U) + R δ + ε with ε of covariance Σ. μ and Σ are learnt from null
+recordings, whose own
+δ is none: their statistics are taken at the calibration they were simulated with, those of data at
+the one that is fitted to them. U is the wind's speed; μ is that of the nominal cloth, as far as
+nulls of it show. Recordings of one cloth share the numerics they differ from the fit's by, and what
+is not linear in its calibration, so that μ has a part
 in common to an experiment: nuisance columns, learnt from the nulls as well.
 """
 
@@ -25,7 +28,8 @@ from measure.probes.segment_rows import StatisticRows
 from measure.probes.statistics import Statistics
 
 _SHIFTS = 16
-"""Number of shifts. In 112 null experiments, drops of columns fell by a fifth from 8 to 16, by a twentieth to 32."""
+"""Number of shifts. In 112 null experiments, drops of columns fell by a fifth from 8 to 16, by a
+twentieth to 32."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,10 +39,12 @@ class NullModel:
     Attributes:
         coefficients: (feature, column) of μ in 1, U, U², for the design's cloth.
         covariance: (column, column) Σ of one segment, about the mean of its experiment.
-        shifts: (shift, column) how μ moves from one experiment to another: principal directions, each as long as its
-            standard deviation. Where no null is of the design's cloth, how it moves from cloth to cloth is among them.
+        shifts: (shift, column) how μ moves from one experiment to another: principal directions,
+            each as long as its standard deviation. Where no null is of the design's cloth, how it
+            moves from cloth to cloth is among them.
         turning: the same of moments about the pole; None where they are not looked at.
-        prior: (theta,) standard deviations of the calibrated parameters about the nominal ones, in units of `THETA`.
+        prior: (theta,) standard deviations of the calibrated parameters about the nominal ones, in
+            units of `THETA`.
     """
 
     coefficients: FloatArray
@@ -51,8 +57,8 @@ class NullModel:
     def fit(cls, nulls: Nulls, design: Design) -> NullModel:
         """Fits the model to segments whose calibrations are known, for segments of a design.
 
-        What numerics leave is smoother the more the cloth is damped, so that more of it lies along the columns: all
-        of it is taken to be larger by a power of the damping.
+        What numerics leave is smoother the more the cloth is damped, so that more of it lies along
+        the columns: all of it is taken to be larger by a power of the damping.
         """
         grown = _power_of_damping(nulls)
         clean = nulls.statistics.r * np.exp(-grown * nulls.calibration[:, DAMPING])[:, None]
@@ -60,11 +66,15 @@ class NullModel:
         coefficients, *_ = np.linalg.lstsq(features, clean, rcond=None)
         residuals = clean - features @ coefficients
         experiment = nulls.experiment
-        means = np.stack([residuals[experiment == index].mean(axis=0) for index in range(experiment.max() + 1)])
+        means = np.stack(
+            [residuals[experiment == index].mean(axis=0) for index in range(experiment.max() + 1)]
+        )
         within = residuals - means[experiment]
         covariance = within.T @ within / max(len(residuals) - len(means) - features.shape[1], 1)
         covariance += np.diag(np.full(len(covariance), _UNSEEN * np.diag(covariance).mean()))
-        covariance = _shrunk(covariance * _inflation(within, nulls.statistics.recording, covariance), len(residuals))
+        covariance = _shrunk(
+            covariance * _inflation(within, nulls.statistics.recording, covariance), len(residuals)
+        )
         first = np.unique(experiment, return_index=True)[1]
         by_cloth = _by_cloth(means, nulls.numerics[first], nulls.cloth[first], covariance)
         if design.cloth in by_cloth:
@@ -75,12 +85,16 @@ class NullModel:
             coefficients=size * coefficients[:_POWERS],
             covariance=size**2 * covariance,
             shifts=size * _principal(means, covariance),
-            turning=None if turning is None else cls.fit(replace(nulls, statistics=turning), design),
+            turning=None
+            if turning is None
+            else cls.fit(replace(nulls, statistics=turning), design),
         )
 
     def under(self, prior: FloatArray) -> NullModel:
         """Replaces the prior of the calibrated parameters."""
-        return replace(self, prior=prior, turning=None if self.turning is None else self.turning.under(prior))
+        return replace(
+            self, prior=prior, turning=None if self.turning is None else self.turning.under(prior)
+        )
 
     def mean(self, speeds: FloatArray) -> FloatArray:
         """Predicts the mean (segment, column)."""
@@ -94,7 +108,8 @@ class Nulls(StatisticRows):
     Attributes:
         statistics: of the segments.
         speeds: (segment,) of the wind [m/s].
-        calibration: (segment, theta) steps from the nominal calibration to the one they were simulated with.
+        calibration: (segment, theta) steps from the nominal calibration to the one they were
+            simulated with.
         numerics: (segment,) which mesh and method.
         noise: (segment,) of a marker's coordinate [m].
         period: (segment,) between the frames used [s].
@@ -117,20 +132,27 @@ class Nulls(StatisticRows):
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Joins nulls one after another, of as many markers as all have; recordings and numerics are those of the
-        parts."""
+        """Joins nulls one after another, of as many markers as all have; recordings and numerics
+        are those of the parts."""
         least = min(part.statistics.marker_error.shape[1] for part in parts)
         return super().joined(
             [
-                replace(p, statistics=replace(p.statistics, marker_error=p.statistics.marker_error[:, :least]))
+                replace(
+                    p,
+                    statistics=replace(
+                        p.statistics, marker_error=p.statistics.marker_error[:, :least]
+                    ),
+                )
                 for p in parts
             ]
         )
 
     def beyond(self, design: Design) -> FloatArray:
-        """Computes by how much squared noise [mm²] and period [10 ms] differ from a design's, where they vary,
-        (segment, k)."""
-        beyond = np.stack([1e6 * (self.noise**2 - design.noise**2), 100 * (self.period - design.period)], axis=1)
+        """Computes by how much squared noise [mm²] and period [10 ms] differ from a design's, where
+        they vary, (segment, k)."""
+        beyond = np.stack(
+            [1e6 * (self.noise**2 - design.noise**2), 100 * (self.period - design.period)], axis=1
+        )
         return beyond[:, np.ptp(beyond, axis=0) > 0]
 
     @property
@@ -138,24 +160,31 @@ class Nulls(StatisticRows):
         """The design of the first segment: that of all, where they are of one experiment."""
         damping = Calibration().moved((0.0, 0.0, float(self.calibration[0, DAMPING]))).damping
         return Design(
-            noise=float(self.noise[0]), period=float(self.period[0]), cloth=str(self.cloth[0]), damping=damping
+            noise=float(self.noise[0]),
+            period=float(self.period[0]),
+            cloth=str(self.cloth[0]),
+            damping=damping,
         )
 
 
 _POWERS = 3
 _UNSEEN = 1e-9
-"""Share of the mean variance below which a column is unobservable, as that of an effect without a moment."""
+"""Share of the mean variance below which a column is unobservable, as that of an effect without a
+moment."""
 
 
 def _power_of_damping(nulls: Nulls) -> float:
-    """Estimates by which power of the damping r grows, about the mean of its experiment and in units of all."""
+    """Estimates by which power of the damping r grows, about the mean of its experiment and in
+    units of all."""
     _, first, experiment = np.unique(nulls.experiment, return_index=True, return_inverse=True)
     clean, features = nulls.statistics.r, _features(nulls.speeds)
     residuals = clean - features @ np.linalg.lstsq(features, clean, rcond=None)[0]
     means = np.stack([residuals[experiment == index].mean(axis=0) for index in range(len(first))])
     squared = (residuals - means[experiment]) ** 2
     total = np.maximum(squared.mean(axis=0), np.finfo(np.float64).tiny)
-    sizes = np.array([(squared[experiment == index].mean(axis=0) / total).mean() for index in range(len(first))])
+    sizes = np.array(
+        [(squared[experiment == index].mean(axis=0) / total).mean() for index in range(len(first))]
+    )
     return power(np.sqrt(sizes), nulls.calibration[first, DAMPING])
 
 
@@ -166,10 +195,12 @@ def _features(speeds: FloatArray) -> FloatArray:
 def _by_cloth(
     means: FloatArray, kinds: IntArray, cloths: NDArray[np.str_], covariance: FloatArray
 ) -> dict[str, FloatArray]:
-    """Predicts for each cloth, (column,), what the nulls of one nominal cloth have in common, beyond that of all.
+    """Predicts for each cloth, (column,), what the nulls of one nominal cloth have in common,
+    beyond that of all.
 
-    A random effect of the cloth beside one of the numerics, predicted linearly (Henderson, Biometrics 31:423, 1975).
-    Their variances are found by moments, in units of the covariance and summed over the columns. Empty where they
+    A random effect of the cloth beside one of the numerics, predicted linearly (Henderson,
+    Biometrics 31:423, 1975). Their variances are found by moments, in units of the covariance and
+    summed over the columns. Empty where they
     cannot be separated: one cloth alone, or no cloth by two numerics.
 
     Args:
@@ -177,7 +208,10 @@ def _by_cloth(
         kinds, cloths: (experiment,) its numerics and nominal cloth.
     """
     numbers, first = np.unique(kinds, return_index=True)
-    by_kind, cloth_of = np.stack([means[kinds == kind].mean(axis=0) for kind in numbers]), cloths[first]
+    by_kind, cloth_of = (
+        np.stack([means[kinds == kind].mean(axis=0) for kind in numbers]),
+        cloths[first],
+    )
     names = [str(name) for name in np.unique(cloth_of)]
     free = len(numbers) - len(names)
     if len(names) < 2 or free < 1:
@@ -185,7 +219,9 @@ def _by_cloth(
     centres = {name: by_kind[cloth_of == name].mean(axis=0) for name in names}
     counts = np.array([(cloth_of == name).sum() for name in names])
     factor = np.linalg.cholesky(covariance)
-    about = np.linalg.solve(factor, (by_kind - np.stack([centres[str(name)] for name in cloth_of])).T)
+    about = np.linalg.solve(
+        factor, (by_kind - np.stack([centres[str(name)] for name in cloth_of])).T
+    )
     of_numerics = float((about**2).sum()) / free
     between = np.linalg.solve(factor, np.stack(list(centres.values())).T).var(axis=1, ddof=1).sum()
     of_cloths = max(float(between) - of_numerics * float((1 / counts).mean()), 0.0)
@@ -194,7 +230,8 @@ def _by_cloth(
 
 
 def _principal(means: FloatArray, covariance: FloatArray) -> FloatArray:
-    """Computes directions with most of the variance of the means, in units of the covariance: (shift, column)."""
+    """Computes directions with most of the variance of the means, in units of the covariance:
+    (shift, column)."""
     factor = np.linalg.cholesky(covariance)
     whitened = np.linalg.solve(factor, (means - means.mean(axis=0)).T)
     directions, size, _ = np.linalg.svd(whitened, full_matrices=False)
@@ -204,7 +241,8 @@ def _principal(means: FloatArray, covariance: FloatArray) -> FloatArray:
 
 
 def _inflation(residuals: FloatArray, recording: IntArray, covariance: FloatArray) -> float:
-    """Computes how much more recordings' means vary than those of as many independent segments, at least 1."""
+    """Computes how much more recordings' means vary than those of as many independent segments, at
+    least 1."""
     sums = np.stack(
         [
             residuals[recording == index].sum(axis=0) / np.sqrt((recording == index).sum())
@@ -216,6 +254,7 @@ def _inflation(residuals: FloatArray, recording: IntArray, covariance: FloatArra
 
 
 def _shrunk(covariance: FloatArray, count: int) -> FloatArray:
-    """Shrinks the covariance toward its diagonal, by the share that chance correlations have at this count."""
+    """Shrinks the covariance toward its diagonal, by the share that chance correlations have at
+    this count."""
     share = min(1.0, len(covariance) / count)
     return (1 - share) * covariance + share * np.diag(np.diag(covariance))

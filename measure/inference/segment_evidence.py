@@ -1,4 +1,5 @@
-"""What the statistics of segments say beside a null model: coefficients, drops, comparison on held-out segments."""
+"""What the statistics of segments say beside a null model: coefficients, drops, comparison on
+held-out segments."""
 
 from __future__ import annotations
 
@@ -25,10 +26,11 @@ _TINY = np.finfo(np.float64).tiny
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Evidence(StatisticRows):
-    """Segments beside a null model, as quadratic forms: the misfit of coefficients δ is c − 2 g·δ + δᵀ H δ.
+    """Segments beside a null model, as quadratic forms: the misfit of coefficients δ is c − 2 g·δ +
+    δᵀ H δ.
 
-    Its columns are the statistics', then the null model's shifts, then what the log of each recording's wind may be off
-    by.
+    Its columns are the statistics', then the null model's shifts, then what the log of each
+    recording's wind may be off by.
 
     Attributes:
         recording: (segment,) index of each one's recording.
@@ -37,10 +39,12 @@ class Evidence(StatisticRows):
         energy: (segment,) c = (r − μ)ᵀ Σ⁻¹ (r − μ).
         columns: how many are the statistics' and those given beside; the nuisances follow.
         logged: how many of these, the last, are what logs may be off by.
-        lines: (segment, reduced frequency, direction) of the errors' spectra: see `lines`; None where not looked at.
+        lines: (segment, reduced frequency, direction) of the errors' spectra: see `lines`; None
+            where not looked at.
         turning: the same of moments about the pole; None where they are not looked at.
         course: of the wind, estimated from the errors; None where not asked for.
-        settled: (segment, quantity) what its recording settles at less what the model does; None where not looked at.
+        settled: (segment, quantity) what its recording settles at less what the model does; None
+            where not looked at.
         prior: of the calibrated parameters, see `NullModel`.
     """
 
@@ -60,13 +64,18 @@ class Evidence(StatisticRows):
 
     @classmethod
     def of(
-        cls, statistics: Statistics, speeds: FloatArray, null: NullModel, *, further: FloatArray | None = None
+        cls,
+        statistics: Statistics,
+        speeds: FloatArray,
+        null: NullModel,
+        *,
+        further: FloatArray | None = None,
     ) -> Evidence:
         """Computes the evidence of segments with their wind's speed (segment,) [m/s].
 
         Args:
-            further: (segment, column, k) how k coefficients more move r, along which nothing was taken: they become the
-                columns after the statistics', and moments are not looked at.
+            further: (segment, column, k) how k coefficients more move r, along which nothing was
+                taken: they become the columns after the statistics', and moments are not looked at.
 
         Raises:
             UsageError: moments of the statistics or of the nulls alone.
@@ -86,13 +95,17 @@ class Evidence(StatisticRows):
         return replace(evidence, turning=cls.of(statistics.turning, speeds, null.turning))
 
     @classmethod
-    def _of(cls, r: FloatArray, statistics: Statistics, speeds: FloatArray, null: NullModel) -> Evidence:
+    def _of(
+        cls, r: FloatArray, statistics: Statistics, speeds: FloatArray, null: NullModel
+    ) -> Evidence:
         residuals = r - null.mean(speeds)
         shifts = np.broadcast_to(null.shifts.T, (len(residuals), *null.shifts.T.shape))
         response = np.concatenate([statistics.response, shifts], axis=2)
         plain = response.shape[2]
         if statistics.log is not None:
-            response = np.concatenate([response, by_recording(statistics.log, statistics.recording)], axis=2)
+            response = np.concatenate(
+                [response, by_recording(statistics.log, statistics.recording)], axis=2
+            )
         precision = np.linalg.inv(null.covariance)
         weighted = np.einsum("sia,ij->saj", response, precision)
         return cls(
@@ -110,8 +123,8 @@ class Evidence(StatisticRows):
 
     @property
     def nuisance(self) -> list[int]:
-        """Columns that are always fitted: the calibrated parameters, the shifts of the numerics, and what the logs of
-        the wind may be off by."""
+        """Columns that are always fitted: the calibrated parameters, the shifts of the numerics,
+        and what the logs of the wind may be off by."""
         return [*range(len(THETA)), *range(self.columns, self.score.shape[1])]
 
     @property
@@ -121,8 +134,8 @@ class Evidence(StatisticRows):
 
     @property
     def settles(self) -> FloatArray | None:
-        """(quantity,) what recordings settle at less what the model does, the mean over recordings; None where it is
-        not looked at."""
+        """(quantity,) what recordings settle at less what the model does, the mean over recordings;
+        None where it is not looked at."""
         if self.settled is None:
             return None
         return self.settled[np.unique(self.recording, return_index=True)[1]].mean(axis=0)
@@ -134,11 +147,15 @@ class Evidence(StatisticRows):
         curvature[self.nuisance, self.nuisance] += prior
         return curvature, self.score.sum(axis=0), float(self.energy.sum())
 
-    def fit(self, chosen: Chosen, *, centre: Sequence[float] | FloatArray = _HERE) -> CoefficientFit:
-        """Fits the nuisance columns by generalised least squares, under their priors, and the chosen ones.
+    def fit(
+        self, chosen: Chosen, *, centre: Sequence[float] | FloatArray = _HERE
+    ) -> CoefficientFit:
+        """Fits the nuisance columns by generalised least squares, under their priors, and the
+        chosen ones.
 
         Args:
-            centre: of the calibrated parameters' prior, in steps from where the statistics were taken.
+            centre: of the calibrated parameters' prior, in steps from where the statistics were
+                taken.
         """
         active = [*self.nuisance, *chosen]
         curvature, score, energy = self._total()
@@ -148,18 +165,23 @@ class Evidence(StatisticRows):
         covariance = np.asarray(np.linalg.inv(curvature[np.ix_(active, active)]), dtype=np.float64)
         value = covariance @ score[active]
         return CoefficientFit(
-            active=tuple(active), value=value, covariance=covariance, remainder=energy - float(score[active] @ value)
+            active=tuple(active),
+            value=value,
+            covariance=covariance,
+            remainder=energy - float(score[active] @ value),
         )
 
     def freed(self, column: int) -> Evidence:
         """Frees a coefficient of a column in every segment: returns what is left across it.
 
-        Moments about the pole, the wind's course and what recordings settle at are not looked at: what fluctuates
-        within a segment moves them all the same.
+        Moments about the pole, the wind's course and what recordings settle at are not looked at:
+        what fluctuates within a segment moves them all the same.
         """
         information = np.maximum(self.curvature[:, column, column], np.finfo(np.float64).tiny)
         along, slope = self.curvature[:, column], self.score[:, column]
-        curvature = self.curvature - along[:, :, None] * along[:, None, :] / information[:, None, None]
+        curvature = (
+            self.curvature - along[:, :, None] * along[:, None, :] / information[:, None, None]
+        )
         score = self.score - along * (slope / information)[:, None]
         # Nothing is left of the column itself: it stays as one of which nothing is known.
         curvature[:, column, :] = curvature[:, :, column] = score[:, column] = 0.0
@@ -185,49 +207,65 @@ class Evidence(StatisticRows):
         return replace(self, curvature=curvature, score=score)
 
     def drops(self, along: Chosen = ()) -> FloatArray:
-        """Computes how much each column, added to the nuisances and to some more, lowers the squared distance,
-        (column,)."""
+        """Computes how much each column, added to the nuisances and to some more, lowers the
+        squared distance, (column,)."""
         return np.square(self.pulls(along))
 
     def pulls(self, along: Chosen = ()) -> FloatArray:
-        """Computes the roots of `drops`, each with the sign of the column's coefficient, (column,)."""
+        """Computes the roots of `drops`, each with the sign of the column's coefficient,
+        (column,)."""
         active = [*self.nuisance, *along]
         curvature, score, _ = self._total()
-        solved = np.linalg.solve(curvature[np.ix_(active, active)], np.c_[curvature[active], score[active]])
+        solved = np.linalg.solve(
+            curvature[np.ix_(active, active)], np.c_[curvature[active], score[active]]
+        )
         information = np.diag(curvature) - np.einsum("ai,ai->i", curvature[active], solved[:, :-1])
         slope = score - curvature[active].T @ solved[:, -1]
-        pulls = slope / np.sqrt(np.maximum(information, np.maximum(1e-9 * np.diag(curvature), _TINY)))
+        pulls = slope / np.sqrt(
+            np.maximum(information, np.maximum(1e-9 * np.diag(curvature), _TINY))
+        )
         pulls[active] = 0.0
         return pulls[: self.columns]
 
     def moved(self, column: int, coefficient: float) -> Evidence:
-        """Computes what the evidence would be if a column acted with a coefficient as well: r and moments move by their
-        response."""
+        """Computes what the evidence would be if a column acted with a coefficient as well: r and
+        moments move by their response."""
         along = self.curvature[:, :, column]
         return replace(
             self,
             score=self.score + coefficient * along,
-            energy=self.energy + 2 * coefficient * self.score[:, column] + coefficient**2 * along[:, column],
+            energy=self.energy
+            + 2 * coefficient * self.score[:, column]
+            + coefficient**2 * along[:, column],
             turning=None if self.turning is None else self.turning.moved(column, coefficient),
         )
 
-    def with_one_more(self, active: Chosen, columns: Chosen) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Computes how a fit of some columns moves with one more, for each of others: (column,) its coefficients, (all,
-        column) how all coefficients go with it, (all,) those of the fit without."""
+    def with_one_more(
+        self, active: Chosen, columns: Chosen
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Computes how a fit of some columns moves with one more, for each of others: (column,) its
+        coefficients, (all, column) how all coefficients go with it, (all,) those of the fit
+        without."""
         curvature, score, _ = self._total()
         chosen, candidates = list(active), list(columns)
         across = curvature[np.ix_(chosen, candidates)]
         solved = np.linalg.solve(curvature[np.ix_(chosen, chosen)], np.c_[across, score[chosen]])
         moved, fitted = np.zeros((len(score), len(candidates))), np.zeros(len(score))
-        moved[chosen], moved[candidates, range(len(candidates))], fitted[chosen] = -solved[:, :-1], 1.0, solved[:, -1]
+        moved[chosen], moved[candidates, range(len(candidates))], fitted[chosen] = (
+            -solved[:, :-1],
+            1.0,
+            solved[:, -1],
+        )
         total = np.diag(curvature)[candidates]
         information = total - np.einsum("ai,ai->i", across, solved[:, :-1])
-        step = (score[candidates] - across.T @ solved[:, -1]) / np.maximum(information, np.maximum(1e-9 * total, _TINY))
+        step = (score[candidates] - across.T @ solved[:, -1]) / np.maximum(
+            information, np.maximum(1e-9 * total, _TINY)
+        )
         return step, moved, fitted
 
     def left_out(self, outside: BoolArray, chosen: Chosen = ()) -> FloatArray:
-        """Computes half misfits of some segments, when the nuisances and chosen columns are fitted to the others,
-        (segment,)."""
+        """Computes half misfits of some segments, when the nuisances and chosen columns are fitted
+        to the others, (segment,)."""
         fit = self.select(~outside).fit(chosen)
         return self.select(outside).misfit(fit.active, fit.value) / 2
 
@@ -240,7 +278,8 @@ class Evidence(StatisticRows):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CoefficientFit:
-    """Coefficients of some columns, with their covariance, and the squared distance they leave, prior included."""
+    """Coefficients of some columns, with their covariance, and the squared distance they leave,
+    prior included."""
 
     active: tuple[int, ...]
     value: FloatArray
@@ -258,17 +297,20 @@ class CoefficientFit:
 
 
 def left_together(recording: IntArray) -> IntArray:
-    """Numbers the segments by what is left out together, (segment,): a recording, or each half of a single one."""
+    """Numbers the segments by what is left out together, (segment,): a recording, or each half of a
+    single one."""
     if len(np.unique(recording)) > 1:
         return recording
     return (np.arange(len(recording)) >= len(recording) / 2).astype(np.int64)
 
 
 def gains(evidence: Evidence, choices: Sequence[Chosen]) -> FloatArray:
-    """Computes how much better each choice of columns predicts segments it was not fitted to: (choice, segment).
+    """Computes how much better each choice of columns predicts segments it was not fitted to:
+    (choice, segment).
 
-    Each recording is left out in turn (of a single recording, each half), the model is fitted to the others, and the
-    left-out segments' half misfits are compared with the base model's, fitted to the same.
+    Each recording is left out in turn (of a single recording, each half), the model is fitted to
+    the others, and the left-out segments' half misfits are compared with the base model's, fitted
+    to the same.
     """
     folds = left_together(evidence.recording)
     result = np.zeros((len(choices), len(folds)))
@@ -283,7 +325,8 @@ def gains(evidence: Evidence, choices: Sequence[Chosen]) -> FloatArray:
 
 
 def best_gain(evidence: Evidence, along: Chosen = (), *, without: Chosen = ()) -> float:
-    """Computes the largest held-out gain that one more column brings, over that of some columns alone: see `gains`.
+    """Computes the largest held-out gain that one more column brings, over that of some columns
+    alone: see `gains`.
 
     Args:
         without: columns whose gains do not count.

@@ -1,4 +1,5 @@
-"""From an experiment to the numbers of a verdict: fits beyond the linear, selection of effects, validation.
+"""From an experiment to the numbers of a verdict: fits beyond the linear, selection of effects,
+validation.
 
 It may import `measure.nulls` and what that may import. `measure.report` writes the sentences.
 """
@@ -11,7 +12,13 @@ from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from measure.loop.corrective_field import Mode
-    from measure.loop.effect_selection import GUST_COLUMN, LibraryJudgement, estimate, finalists, judge
+    from measure.loop.effect_selection import (
+        GUST_COLUMN,
+        LibraryJudgement,
+        estimate,
+        finalists,
+        judge,
+    )
     from measure.loop.run import LoopOptions, LoopOutcome, solve
     from measure.loop.set_up import HOIST
     from measure.loop.validation import folds, paired_difference, total_error

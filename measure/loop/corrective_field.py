@@ -1,7 +1,8 @@
-"""The corrective field: the smooth steady force that fits best, where the library has no answer, or half of one.
+"""The corrective field: the smooth steady force that fits best, where the library has no answer, or
+half of one.
 
-It is looked for last and only then: its modes are simulated along the data alone, and fitted to the errors along the
-directions that the nulls know.
+It is looked for last and only then: its modes are simulated along the data alone, and fitted to the
+errors along the directions that the nulls know.
 """
 
 from __future__ import annotations
@@ -33,12 +34,17 @@ class Mode:
 
 
 def corrective_field(
-    setting: Setting, whitened: WhitenedMisfit, *, errors: Tensor | None = None, along: Sequence[int] = ()
+    setting: Setting,
+    whitened: WhitenedMisfit,
+    *,
+    errors: Tensor | None = None,
+    along: Sequence[int] = (),
 ) -> tuple[Mode, ...]:
     """Fits the modes of the corrective field together.
 
     Args:
-        errors: (frame, marker, 3, segment) errors of a larger model [m]; None for those of the nominal one.
+        errors: (frame, marker, 3, segment) errors of a larger model [m]; None for those of the
+            nominal one.
         along: columns of that model, whose strengths are fitted with the field.
     """
     forecaster, segments, modes = setting.forecaster, setting.segments, fields()
@@ -46,7 +52,9 @@ def corrective_field(
     base = forecaster.errors(*forecaster.system(segments, nominal), segments)
     changes = forecaster.sensitivities(modes, segments, nominal, base)[len(THETA) :]
     statistics = (
-        whitened.statistics if errors is None else replace(whitened.statistics, r=whitened.projection.of(errors))
+        whitened.statistics
+        if errors is None
+        else replace(whitened.statistics, r=whitened.projection.of(errors))
     )
     response = whitened.projection.response(changes)
     evidence = Evidence.of(statistics, whitened.speeds, whitened.null, further=response)

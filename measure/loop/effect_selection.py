@@ -1,9 +1,10 @@
-"""Which effect it is: models of the library compared by what they predict on recordings they were not fitted to.
+"""Which effect it is: models of the library compared by what they predict on recordings they were
+not fitted to.
 
-Detection is by the calibrated statistic. Attribution is one rule. Models whose held-out scores do not differ
-significantly from the best are the confidence set (after Hansen, Lunde and Nason, Econometrica 79:453, 2011), and of
-these the ones that pass their own predictive test are the verdict. The base model and forces that are none of the
-library compete like any other.
+Detection is by the calibrated statistic. Attribution is one rule. Models whose held-out scores do
+not differ significantly from the best are the confidence set (after Hansen, Lunde and Nason,
+Econometrica 79:453, 2011), and of these the ones that pass their own predictive test are the
+verdict. The base model and forces that are none of the library compete like any other.
 """
 
 from __future__ import annotations
@@ -39,8 +40,8 @@ _FIRST = len(THETA)
 
 
 def equivalent(effect: str, strength: Estimate) -> tuple[str, ...]:
-    """Effects that no recording of this kind can distinguish from a weighed one: holes in the cloth scale the dynamic
-    pressure as the air's density does, but only lower it."""
+    """Effects that no recording of this kind can distinguish from a weighed one: holes in the cloth
+    scale the dynamic pressure as the air's density does, but only lower it."""
     return ("porosity",) if effect == "air-density" and strength.value < 0 else ()
 
 
@@ -54,11 +55,13 @@ class Weighed:
         error: standard error of the strength.
         gains: (segment,) held-out gain.
         recording: (segment,) of each.
-        admissible: whether the model exists: its strength is one that the effect may have, its cloth stays one, and a
-            wind that fluctuates does it as turbulence does.
-        unlike: why such a model does not exist, beside its strength: how the wind's course differs from that of
-            turbulence, or that a log's direction is within its tolerance; empty where it does.
-        measured: the strength where it is found apart from the other columns; None where it is fitted beside them.
+        admissible: whether the model exists: its strength is one that the effect may have, its
+            cloth stays one, and a wind that fluctuates does it as turbulence does.
+        unlike: why such a model does not exist, beside its strength: how the wind's course differs
+            from that of turbulence, or that a log's direction is within its tolerance; empty where
+            it does.
+        measured: the strength where it is found apart from the other columns; None where it is
+            fitted beside them.
     """
 
     column: int
@@ -71,8 +74,8 @@ class Weighed:
     measured: Estimate | None = None
 
     def passes(self, level: float) -> bool:
-        """Returns whether the model passes its predictive test: what it leaves is what nulls leave, and its strength is
-        the same in all recordings."""
+        """Returns whether the model passes its predictive test: what it leaves is what nulls leave,
+        and its strength is the same in all recordings."""
         return self.candidate.leftover > level and not heterogeneous(self.candidate, level)
 
 
@@ -84,17 +87,19 @@ class LibraryJudgement:
         conclusion: see `Conclusion`.
         named: columns of the effects named.
         ranking: candidates, best first, each with the reason why it was not named.
-        confident: columns of the models of the library in the confidence set, best first; empty where the base model or
-            none of the library is as good as they are.
+        confident: columns of the models of the library in the confidence set, best first; empty
+            where the base model or none of the library is as good as they are.
         statistic, p_value: of the global test.
-        line: of the errors' spectra that the first of the ranking leaves, where it alone would reject the model.
-        course: how the wind varies, by the errors that the first leaves, where that alone would and it is not
-            turbulence.
-        direction: by how much the wind is turned from where its logs have it, counter-clockwise [rad]; None in still
-            air.
+        line: of the errors' spectra that the first of the ranking leaves, where it alone would
+            reject the model.
+        course: how the wind varies, by the errors that the first leaves, where that alone would and
+            it is not turbulence.
+        direction: by how much the wind is turned from where its logs have it, counter-clockwise
+            [rad]; None in still air.
         departed: columns of what the recordings show of the set-up against what was declared.
         power: of each effect that is tested for, at its expected strength.
-        open: why the base model is neither rejected nor said to suffice, sentences; empty where it is.
+        open: why the base model is neither rejected nor said to suffice, sentences; empty where it
+            is.
     """
 
     conclusion: Conclusion
@@ -123,9 +128,10 @@ def judge(
 
     Args:
         level: of the global test.
-        refits: of columns whose models were refitted, which count in place of the linear evidence; None for a cloth
-            that diverged.
-        set_up: what recordings may show of it; what they show leads the verdict, whatever the test says.
+        refits: of columns whose models were refitted, which count in place of the linear evidence;
+            None for a cloth that diverged.
+        set_up: what recordings may show of it; what they show leads the verdict, whatever the test
+            says.
     """
     refitted = refits or {}
     statistics = reference.statistics(evidence, names())
@@ -152,8 +158,13 @@ def judge(
     beyond = beyond_tolerance(direction, declared.tolerance)
     if direction is not None:
         turned_column = names().index(TURNED)
-        candidates = [_within(w, direction, declared.tolerance) if w.column == turned_column else w for w in candidates]
-    ranking = _rank_candidates([*candidates, _gusts(evidence, reference, float(statistics[len(names())]))])
+        candidates = [
+            _within(w, direction, declared.tolerance) if w.column == turned_column else w
+            for w in candidates
+        ]
+    ranking = _rank_candidates(
+        [*candidates, _gusts(evidence, reference, float(statistics[len(names())]))]
+    )
     departing = {
         names().index(name)
         for name, declared_otherwise in ((TURNED, beyond), (HOIST, declared.attached))
@@ -165,11 +176,19 @@ def judge(
     remaining = evidence if first is None else first.evidence
 
     def judgement(
-        conclusion: Conclusion, accepted: Sequence[Weighed], why: str = "", reasons: tuple[str, ...] = ()
+        conclusion: Conclusion,
+        accepted: Sequence[Weighed],
+        why: str = "",
+        reasons: tuple[str, ...] = (),
     ) -> LibraryJudgement:
         taken = {w.column for w in accepted}
         reasoned = [
-            replace(w, candidate=replace(w.candidate, why_not=_reason(ranking[0], w, why) * (w.column not in taken)))
+            replace(
+                w,
+                candidate=replace(
+                    w.candidate, why_not=_reason(ranking[0], w, why) * (w.column not in taken)
+                ),
+            )
             for w in ranking
         ]
         return LibraryJudgement(
@@ -188,9 +207,14 @@ def judge(
         )
 
     if not reference.test.tests(level):
-        return judgement(Conclusion.UNTESTED, (), "there are too few kinds of numerics to test the base model")
+        return judgement(
+            Conclusion.UNTESTED, (), "there are too few kinds of numerics to test the base model"
+        )
     if departed:
-        rest = "the recordings show that the set-up is another than the declared one, and nothing else is needed"
+        rest = (
+            "the recordings show that the set-up is another than the declared one, and nothing "
+            "else is needed"
+        )
         columns_shown = [w.column for w in departed]
         if len(departed) == 1 and first is not None:
             explained = first.leftover > level
@@ -198,14 +222,22 @@ def judge(
             explained = reference.p_left_by(remaining, names(), columns_shown) > level
         if explained:
             return judgement(Conclusion.EFFECT, departed, rest)
-        second = _second(remaining, reference, departed[0], ranking, level) if len(departed) == 1 else None
+        second = (
+            _second(remaining, reference, departed[0], ranking, level)
+            if len(departed) == 1
+            else None
+        )
         if second is not None:
             return judgement(Conclusion.EFFECT, (*departed, second))
         return judgement(Conclusion.PARTLY, departed)
     if p_value > level:
         why, shares = "the base model is not rejected", [share for _, share in power]
-        reasons = undecided_sentences(p_value, level=level, departure=_departure(evidence, reference), power=shares)
-        return judgement(Conclusion.UNDECIDED if reasons else Conclusion.SUFFICIENT, (), why, reasons)
+        reasons = undecided_sentences(
+            p_value, level=level, departure=_departure(evidence, reference), power=shares
+        )
+        return judgement(
+            Conclusion.UNDECIDED if reasons else Conclusion.SUFFICIENT, (), why, reasons
+        )
     if reference.suspected is not None and not confident:
         confident = [w for w in ranking if w.column == reference.suspected[0] and w.admissible]
     passing = [w for w in confident if w.passes(level)]
@@ -217,22 +249,35 @@ def judge(
     pulsating = _pulsating(remaining, reference, ranking, level)
     if pulsating is not None and (pulsating.candidate.leftover > level or not confident):
         ranking = [pulsating if w.column == GUST_COLUMN else w for w in ranking]
-        return judgement(Conclusion.EFFECT if pulsating.candidate.leftover > level else Conclusion.PARTLY, [pulsating])
-    return judgement(Conclusion.PARTLY, confident[:1]) if confident else judgement(Conclusion.OUTSIDE, ())
+        return judgement(
+            Conclusion.EFFECT if pulsating.candidate.leftover > level else Conclusion.PARTLY,
+            [pulsating],
+        )
+    return (
+        judgement(Conclusion.PARTLY, confident[:1])
+        if confident
+        else judgement(Conclusion.OUTSIDE, ())
+    )
 
 
 def _departure(evidence: Evidence, reference: Reference) -> float:
-    """Computes the root mean square departure of what recordings settle at from the base model run freely, in nulls'
-    scatters; 0 where it is not looked at."""
+    """Computes the root mean square departure of what recordings settle at from the base model run
+    freely, in nulls' scatters; 0 where it is not looked at."""
     settles = reference.settles(evidence)
     return 0.0 if settles is None else float(np.sqrt(np.square(settles).mean()))
 
 
 def _within(turned_wind: Weighed, direction: Estimate, tolerance: float) -> Weighed:
-    """Describes the turned wind as it was measured; no effect where the log's tolerance allows for it."""
+    """Describes the turned wind as it was measured; no effect where the log's tolerance allows for
+    it."""
     inside = tolerance > 0 and not beyond_tolerance(direction, tolerance)
-    low, high, allowed = (number(math.degrees(v), digits=2) for v in (direction.low, direction.high, tolerance))
-    unlike = f"the wind is turned by {low}° to {high}° from its log, which {allowed}° of tolerance allow for"
+    low, high, allowed = (
+        number(math.degrees(v), digits=2) for v in (direction.low, direction.high, tolerance)
+    )
+    unlike = (
+        f"the wind is turned by {low}° to {high}° from its log, which {allowed}° of tolerance "
+        "allow for"
+    )
     return replace(
         turned_wind,
         measured=direction,
@@ -243,12 +288,14 @@ def _within(turned_wind: Weighed, direction: Estimate, tolerance: float) -> Weig
 
 
 def withdrawn(judgement: LibraryJudgement) -> LibraryJudgement:
-    """Withdraws the effects that were named: with those that were, or of several that may act with the first, errors on
-    unseen recordings are larger than without."""
+    """Withdraws the effects that were named: with those that were, or of several that may act with
+    the first, errors on unseen recordings are larger than without."""
     worse = "errors on unseen recordings are larger than without"
     tried = judgement.named if judgement.conclusion is Conclusion.EFFECT else judgement.named[:1]
     why = dict.fromkeys(tried, f"with it, {worse}")
-    why |= {c: f"with the first of those that may act, {worse}" for c in judgement.named if c not in why}
+    why |= {
+        c: f"with the first of those that may act, {worse}" for c in judgement.named if c not in why
+    }
     ranking = tuple(
         replace(w, candidate=replace(w.candidate, why_not=why[w.column])) if w.column in why else w
         for w in judgement.ranking
@@ -257,21 +304,27 @@ def withdrawn(judgement: LibraryJudgement) -> LibraryJudgement:
 
 
 def _confidence_set(ranking: Sequence[Weighed], evidence: Evidence) -> list[Weighed]:
-    """Selects models of the library whose held-out scores do not differ significantly from the best, best first; none
-    where the base model, which gains nothing, is among them, or where a force that is none of the library leads them
-    all."""
+    """Selects models of the library whose held-out scores do not differ significantly from the
+    best, best first; none where the base model, which gains nothing, is among them, or where a
+    force that is none of the library leads them all."""
     able = [w for w in ranking if w.admissible]
-    forces = gains(evidence, [[i + _FIRST] for i, c in enumerate(columns()) if not isinstance(c, EffectColumn)])
+    forces = gains(
+        evidence, [[i + _FIRST] for i, c in enumerate(columns()) if not isinstance(c, EffectColumn)]
+    )
     scores = [*(w.gains for w in able), *forces]
     best = max(scores, key=lambda scores_of_model: scores_of_model.sum())
     if not _leads(best, np.zeros_like(best), evidence.recording):
         return []
-    return [w for w in able if not _leads(best, w.gains, evidence.recording) and _leads(w.gains, 0 * best, w.recording)]
+    return [
+        w
+        for w in able
+        if not _leads(best, w.gains, evidence.recording) and _leads(w.gains, 0 * best, w.recording)
+    ]
 
 
 def _leads(first: FloatArray, second: FloatArray, recording: IntArray) -> bool:
-    """Returns whether held-out scores (segment,) are better by more than `Criteria.lead` standard errors of the
-    difference."""
+    """Returns whether held-out scores (segment,) are better by more than `Criteria.lead` standard
+    errors of the difference."""
     return bool((first - second).sum() > CRITERIA.lead * total_error(first - second, recording))
 
 
@@ -287,42 +340,56 @@ def _varying(evidence: Evidence) -> Variation | None:
 
 
 def _blown(evidence: Evidence, reference: Reference, level: float) -> Variation | None:
-    """Estimates how the wind varies by the remaining errors, where that alone would reject a model and is not
-    turbulence."""
+    """Estimates how the wind varies by the remaining errors, where that alone would reject a model
+    and is not turbulence."""
     swing, variation = reference.swing(evidence), _varying(evidence)
     if swing is None or variation is None or variation.turbulent:
         return None
     return variation if reference.conformal.p(swing) <= level else None
 
 
-def _pulsating(evidence: Evidence, reference: Reference, ranking: Sequence[Weighed], level: float) -> Weighed | None:
-    """Finds gusts by the course of a wind that varies along itself alone, where that alone would reject a model:
-    what varies within segments is not found by how the pressure differs between them. None where the wind does not
-    vary so."""
+def _pulsating(
+    evidence: Evidence, reference: Reference, ranking: Sequence[Weighed], level: float
+) -> Weighed | None:
+    """Finds gusts by the course of a wind that varies along itself alone, where that alone would
+    reject a model: what varies within segments is not found by how the pressure differs between
+    them. None where the wind does not vary so."""
     variation = _blown(evidence, reference, level)
     if variation is None or not variation.alone:
         return None
     (gusts,) = (w for w in ranking if w.column == GUST_COLUMN)
-    intensities = [_intensity(evidence.select(evidence.recording == index)) for index in np.unique(evidence.recording)]
-    error = float(np.std(intensities, ddof=1) / math.sqrt(len(intensities))) if len(intensities) > 1 else 0.0
+    intensities = [
+        _intensity(evidence.select(evidence.recording == index))
+        for index in np.unique(evidence.recording)
+    ]
+    error = (
+        float(np.std(intensities, ddof=1) / math.sqrt(len(intensities)))
+        if len(intensities) > 1
+        else 0.0
+    )
     intensity = estimate(_intensity(evidence), error, gusts.candidate.strength.unit)
     return replace(
-        gusts, admissible=True, unlike="", measured=intensity, candidate=replace(gusts.candidate, strength=intensity)
+        gusts,
+        admissible=True,
+        unlike="",
+        measured=intensity,
+        candidate=replace(gusts.candidate, strength=intensity),
     )
 
 
 def _intensity(evidence: Evidence) -> float:
-    """Computes the standard deviation of the wind along itself, as a share of its mean, by its course."""
+    """Computes the standard deviation of the wind along itself, as a share of its mean, by its
+    course."""
     variation = _varying(evidence)
     return 0.0 if variation is None else math.sqrt(max(float(variation.total[ALONG]), 0.0))
 
 
 def heterogeneity(strengths: Sequence[Estimate]) -> float | None:
-    """Computes the p-value of one strength in all recordings, by Cochran's Q (Biometrics 10:101, 1954); None of fewer
-    than two.
+    """Computes the p-value of one strength in all recordings, by Cochran's Q (Biometrics 10:101,
+    1954); None of fewer than two.
 
-    A strength is that of a law in the wind: a wind that rises by so many metres a second, fitted as one that rises by
-    an angle, has a larger angle in lighter winds.
+    A strength is that of a law in the wind: a wind that rises by so many metres a second, fitted as
+    one that rises by an angle, has a larger angle in lighter winds.
 
     Args:
         strengths: of each recording alone, with normal intervals.
@@ -337,12 +404,14 @@ def heterogeneity(strengths: Sequence[Estimate]) -> float | None:
 
 
 def heterogeneous(candidate: Candidate, level: float) -> bool:
-    """Returns whether its strength is another in every recording: another law in the wind would be a better one."""
+    """Returns whether its strength is another in every recording: another law in the wind would be
+    a better one."""
     return candidate.heterogeneity is not None and candidate.heterogeneity <= level
 
 
 def finalists(judgement: LibraryJudgement) -> tuple[int, ...]:
-    """Columns that are refitted: the confidence set, the first by held-out gains, and the largest statistics."""
+    """Columns that are refitted: the confidence set, the first by held-out gains, and the largest
+    statistics."""
     able = [w for w in judgement.ranking if w.admissible and w.column != GUST_COLUMN]
     strongest = sorted(able, key=lambda w: -abs(w.candidate.z))
     first = (*able[: CRITERIA.refitted], *strongest[: CRITERIA.refitted])
@@ -351,10 +420,14 @@ def finalists(judgement: LibraryJudgement) -> tuple[int, ...]:
 
 
 def _second(
-    evidence: Evidence, reference: Reference, first: Weighed, ranking: Sequence[Weighed], level: float
+    evidence: Evidence,
+    reference: Reference,
+    first: Weighed,
+    ranking: Sequence[Weighed],
+    level: float,
 ) -> Weighed | None:
-    """Finds an effect with which the first passes its predictive test, and predicts better than alone. Beside gusts,
-    the pressure is free in every segment.
+    """Finds an effect with which the first passes its predictive test, and predicts better than
+    alone. Beside gusts, the pressure is free in every segment.
 
     Args:
         evidence: of what the first leaves, if it was refitted.
@@ -372,7 +445,11 @@ def _second(
             return None
         value, _ = evidence.fit(pair).of(second.column)
         described = EFFECTS[second.candidate.effect].parameters()[second.candidate.parameter]
-        constant = all(_homogeneous_beside(evidence, pair, w, level) for w in (first, second) if w.column in pair)
+        constant = all(
+            _homogeneous_beside(evidence, pair, w, level)
+            for w in (first, second)
+            if w.column in pair
+        )
         if (
             described.admits(described.null + value)
             and constant
@@ -382,25 +459,41 @@ def _second(
     return None
 
 
-def _homogeneous_beside(evidence: Evidence, chosen: Sequence[int], candidate: Weighed, level: float) -> bool:
-    """Returns whether a strength is the same in all recordings, where some columns are fitted to each."""
+def _homogeneous_beside(
+    evidence: Evidence, chosen: Sequence[int], candidate: Weighed, level: float
+) -> bool:
+    """Returns whether a strength is the same in all recordings, where some columns are fitted to
+    each."""
     p = heterogeneity(
         _strengths_by_recording(
-            evidence, chosen, candidate.column, about=0.0, larger=_larger(evidence, candidate), unit="1"
+            evidence,
+            chosen,
+            candidate.column,
+            about=0.0,
+            larger=_larger(evidence, candidate),
+            unit="1",
         )
     )
     return p is None or p > level
 
 
 def _larger(evidence: Evidence, candidate: Weighed) -> float:
-    """Computes by how much a strength's standard error is larger than Σ says when it is fitted alone."""
+    """Computes by how much a strength's standard error is larger than Σ says when it is fitted
+    alone."""
     return candidate.error / evidence.fit([candidate.column]).of(candidate.column)[1]
 
 
 def _strengths_by_recording(
-    evidence: Evidence, chosen: Sequence[int], column: int, *, about: float, larger: float, unit: str
+    evidence: Evidence,
+    chosen: Sequence[int],
+    column: int,
+    *,
+    about: float,
+    larger: float,
+    unit: str,
 ) -> tuple[Estimate, ...]:
-    """Estimates the strength of a column in each recording alone, where some columns are fitted to it.
+    """Estimates the strength of a column in each recording alone, where some columns are fitted to
+    it.
 
     Args:
         about: the strength in the model that the evidence is of.
@@ -430,18 +523,28 @@ def _weigh(
     statistic = float(statistics[column])
     error = abs(value) / math.sqrt(max(statistic, 1e-12))
     z = value / error if error > 0 else 0.0
-    gained, leftover = linear, refitted.leftover if refitted else reference.p_left_by(evidence, names(), [column])
+    gained, leftover = (
+        linear,
+        refitted.leftover if refitted else reference.p_left_by(evidence, names(), [column]),
+    )
     remaining, null = evidence, effect.described.null
     if refitted is not None:
         gained, value, remaining = refitted.gains, refitted.coefficient, refitted.evidence
     about = null + (value if refitted else 0.0)
     larger = error / fit.of(column)[1]
-    bounded = None if refitted is None or refitted.profile is None else refitted.profile.estimate(larger=larger)
-    # Where all strengths beyond a bound do the same, slopes at one of them say nothing of those of single recordings.
+    bounded = (
+        None
+        if refitted is None or refitted.profile is None
+        else refitted.profile.estimate(larger=larger)
+    )
+    # Where all strengths beyond a bound do the same, slopes at one of them say nothing of those of
+    # single recordings.
     by_recording = (
         ()
         if bounded is not None
-        else _strengths_by_recording(remaining, [column], column, about=about, larger=larger, unit=effect.unit)
+        else _strengths_by_recording(
+            remaining, [column], column, about=about, larger=larger, unit=effect.unit
+        )
     )
     return Weighed(
         column=column,
@@ -468,8 +571,8 @@ def _weigh(
 
 
 def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighed:
-    """Weighs gusts, whose course is unknown: a pressure that fluctuates from segment to segment, by twice their
-    intensity."""
+    """Weighs gusts, whose course is unknown: a pressure that fluctuates from segment to segment, by
+    twice their intensity."""
     pressure = names().index(GUSTS)
     gusts, gained = fluctuation(evidence, pressure), fluctuation_gains(evidence, pressure)
     described = EFFECTS["gusts"].parameters()["intensity"]
@@ -478,7 +581,9 @@ def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighe
     by_recording = []
     for index in np.unique(evidence.recording):
         in_recording = fluctuation(evidence.select(evidence.recording == index), pressure)
-        by_recording.append(estimate(in_recording.deviation / 2, in_recording.error / 2, described.unit))
+        by_recording.append(
+            estimate(in_recording.deviation / 2, in_recording.error / 2, described.unit)
+        )
     return Weighed(
         column=GUST_COLUMN,
         gains=gained,
@@ -504,17 +609,20 @@ def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighe
 
 
 def strength(null: float, coefficient: float, error: float, unit: str) -> Estimate:
-    """Estimates the strength of an effect, by its coefficient beyond null and the standard error that nulls leave.
+    """Estimates the strength of an effect, by its coefficient beyond null and the standard error
+    that nulls leave.
 
-    What the fit's mesh and a mistold cloth do to an effect is a factor, so that more of the interval lies beyond the
-    strength than between it and the null.
+    What the fit's mesh and a mistold cloth do to an effect is a factor, so that more of the
+    interval lies beyond the strength than between it and the null.
     """
     factor, reach = CRITERIA.reach * CRITERIA.strength_factor, CRITERIA.reach * error
     inward = math.hypot(coefficient * (1 - math.exp(-factor)), reach)
     outward = math.hypot(coefficient * (math.exp(factor) - 1), reach)
     low, high = (outward, inward) if coefficient < 0 else (inward, outward)
     value = null + coefficient
-    return Estimate(value=value, low=value - low, high=value + high, unit=unit, level=CRITERIA.interval)
+    return Estimate(
+        value=value, low=value - low, high=value + high, unit=unit, level=CRITERIA.interval
+    )
 
 
 def estimate(value: float, error: float, unit: str) -> Estimate:
@@ -531,7 +639,9 @@ def estimate(value: float, error: float, unit: str) -> Estimate:
 def _rank_candidates(candidates: Sequence[Weighed]) -> list[Weighed]:
     """Ranks candidates by held-out gain, those first that are admissible."""
     ordered = sorted(candidates, key=lambda w: (-w.admissible, -w.gains.sum()))
-    return [replace(w, candidate=replace(w.candidate, behind=_behind(ordered[0], w))) for w in ordered]
+    return [
+        replace(w, candidate=replace(w.candidate, behind=_behind(ordered[0], w))) for w in ordered
+    ]
 
 
 def _behind(best: Weighed, compared: Weighed) -> float:
@@ -557,5 +667,11 @@ def _reason(best: Weighed, candidate: Weighed, why: str) -> str:
     if not _leads(candidate.gains, 0 * candidate.gains, candidate.recording):
         return "it predicts unseen recordings no better than the base model"
     if _leads(best.gains, candidate.gains, candidate.recording):
-        return f"{_behind(best, candidate):.1f} standard errors behind {best.candidate.effect} on unseen recordings"
-    return "the errors that remain are larger than those of nulls, or a force outside the library predicts better"
+        return (
+            f"{_behind(best, candidate):.1f} standard errors behind {best.candidate.effect} on "
+            "unseen recordings"
+        )
+    return (
+        "the errors that remain are larger than those of nulls, or a force outside the library "
+        "predicts better"
+    )

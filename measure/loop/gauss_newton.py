@@ -1,4 +1,5 @@
-"""Models fitted beyond the linear: linearised again where the last fit led, until they stay (Gauss–Newton)."""
+"""Models fitted beyond the linear: linearised again where the last fit led, until they stay
+(Gauss–Newton)."""
 
 from __future__ import annotations
 
@@ -21,14 +22,16 @@ from measure.probes.statistics import Statistics, reduce_errors
 
 ROUNDS = 3
 _FEW = 8
-"""Shifts of the numerics that are fitted beside the few columns of a model: with 16, they take the columns' place."""
+"""Shifts of the numerics that are fitted beside the few columns of a model: with 16, they take the
+columns' place."""
 _HALVINGS = 4
 _TRIED = 4
 """Strengths across a prior of one sign from which a fit may begin."""
 STAYS = 0.3
 """Standard errors below which a step is not worth another round."""
 _LONGEST = 1.5
-"""A step of the calibrated parameters beyond so many prior standard deviations is cut: the linear model ends there."""
+"""A step of the calibrated parameters beyond so many prior standard deviations is cut: the linear
+model ends there."""
 
 
 class FitDivergedError(FlagdataError):
@@ -44,7 +47,8 @@ class Refined:
     Attributes:
         model: fitted to all segments.
         chosen: its columns beside the calibrated parameters.
-        errors: standard errors of its calibrated parameters and strengths, as Σ has them along all directions.
+        errors: standard errors of its calibrated parameters and strengths, as Σ has them along all
+            directions.
         statistics: at the model before the last step, `origin`, of all segments.
         origin: that model.
         anchor: calibration by all directions, about which the prior of the null model is.
@@ -65,7 +69,13 @@ class Refined:
 
     def without(self, outside: BoolArray) -> Model:
         """Fits the same model to the other segments alone, one step from `origin`."""
-        step, _ = _step(self.statistics.select(~outside), self.null, self.speeds[~outside], self.origin, self.anchor)
+        step, _ = _step(
+            self.statistics.select(~outside),
+            self.null,
+            self.speeds[~outside],
+            self.origin,
+            self.anchor,
+        )
         return self.origin.moved(cut(step))
 
 
@@ -77,46 +87,63 @@ def refine(
     *,
     columns: Sequence[Column],
 ) -> Refined:
-    """Fits the calibrated parameters and chosen columns to segments, from the linear fit of the statistics on; one
-    effect alone from where across its prior least is left, if that is less.
+    """Fits the calibrated parameters and chosen columns to segments, from the linear fit of the
+    statistics on; one effect alone from where across its prior least is left, if that is less.
 
-    Every round uses the errors along the fitted columns alone, with their part of the null model. These alone would
-    lead the calibrated parameters astray by what numerics leave, so that their prior is there the estimate by all
-    directions before.
+    Every round uses the errors along the fitted columns alone, with their part of the null model.
+    These alone would lead the calibrated parameters astray by what numerics leave, so that their
+    prior is there the estimate by all directions before.
 
     Args:
         columns: the columns of the statistics, but for the calibrated parameters.
 
     Raises:
-        DivergedError: the model's cloth does not stay one, at an eighth of the way from the nominal base model neither.
+        DivergedError: the model's cloth does not stay one, at an eighth of the way from the nominal
+            base model neither.
     """
-    fit = whitened.evidence(whitened.statistics).fit(chosen, centre=Calibration().steps_from(whitened.origin))
+    fit = whitened.evidence(whitened.statistics).fit(
+        chosen, centre=Calibration().steps_from(whitened.origin)
+    )
     chosen_columns = [columns[c - len(THETA)] for c in chosen]
     effects = tuple((column, 0.0) for column in chosen_columns if isinstance(column, EffectColumn))
     values = [*fit.value[: len(THETA)], *(fit.of(c)[0] for c in chosen)]
-    model = Model(calibration=whitened.origin, effects=effects).moved(cut(np.array(values, dtype=np.float64)))
+    model = Model(calibration=whitened.origin, effects=effects).moved(
+        cut(np.array(values, dtype=np.float64))
+    )
     model = _where_least_is_left(forecaster, segments, whitened, model)
     prior = np.array([fit.of(index)[1] for index in range(len(THETA))])
     part = replace(_part(whitened.null, [*range(len(THETA)), *chosen]), prior=prior)
     anchor = model.calibration
-    reached = _round(forecaster, segments, model, part, whitened.speeds, tuple(chosen), anchor=anchor)
+    reached = _round(
+        forecaster, segments, model, part, whitened.speeds, tuple(chosen), anchor=anchor
+    )
     for _ in range(ROUNDS - 1):
         if reached.stays:
             break
-        reached = _round(forecaster, segments, reached.model, part, whitened.speeds, tuple(chosen), anchor=anchor)
+        reached = _round(
+            forecaster, segments, reached.model, part, whitened.speeds, tuple(chosen), anchor=anchor
+        )
     all_segments = np.ones(len(segments), dtype=bool)
-    ((model, errors),) = finish_step(forecaster, segments, whitened, [reached.model], chosen, [all_segments])
+    ((model, errors),) = finish_step(
+        forecaster, segments, whitened, [reached.model], chosen, [all_segments]
+    )
     return replace(reached, model=model, errors=errors)
 
 
-def _where_least_is_left(forecaster: Forecaster, segments: Segments, whitened: WhitenedMisfit, model: Model) -> Model:
-    """Returns a model of one effect at the strength that leaves least, of the linear fit's and of some across what is
-    expected: an effect that soon saturates, as springs along the hoist do, is far from what its first small step
-    promises."""
+def _where_least_is_left(
+    forecaster: Forecaster, segments: Segments, whitened: WhitenedMisfit, model: Model
+) -> Model:
+    """Returns a model of one effect at the strength that leaves least, of the linear fit's and of
+    some across what is
+    expected: an effect that soon saturates, as springs along the hoist do, is far from what its
+    first small step promises."""
     if len(model.effects) != 1:
         return model
     ((column, linear),) = model.effects
-    tried = [replace(model, effects=((column, value),)) for value in (linear, *_expected_strengths(column))]
+    tried = [
+        replace(model, effects=((column, value),))
+        for value in (linear, *_expected_strengths(column))
+    ]
     misfits: list[float] = []
     for errors in errors_of(tried, forecaster, segments):
         finite = bool(errors.isfinite().all())
@@ -140,16 +167,20 @@ def finish_step(
     chosen: Sequence[int],
     insides: Sequence[BoolArray],
 ) -> list[tuple[Model, tuple[float, ...]]]:
-    """Moves models of the same columns by one linear step by all directions of the whitened misfit, each fitted to some
-    segments; returns them with the standard errors of that step.
+    """Moves models of the same columns by one linear step by all directions of the whitened misfit,
+    each fitted to some segments; returns them with the standard errors of that step.
 
-    By its own few directions a fit follows effects far from where they are linear, but cannot separate some of them
-    from numerical errors; by all directions, it can.
+    By its own few directions a fit follows effects far from where they are linear, but cannot
+    separate some of them from numerical errors; by all directions, it can.
     """
     errors_of_models = errors_of(models, forecaster, segments)
     stepped: list[tuple[Model, tuple[float, ...]]] = []
     for model, errors, inside in zip(models, errors_of_models, insides, strict=True):
-        fit = whitened.of(errors).select(inside).fit(chosen, centre=Calibration().steps_from(model.calibration))
+        fit = (
+            whitened.of(errors)
+            .select(inside)
+            .fit(chosen, centre=Calibration().steps_from(model.calibration))
+        )
         step, spread = np.array([fit.of(column) for column in (*range(len(THETA)), *chosen)]).T
         moved = model.moved(cut(step)) if np.isfinite(step).all() else model
         stepped.append((moved, tuple(float(error) for error in spread)))
@@ -192,7 +223,8 @@ def _round(
 
 
 def cut(step: FloatArray) -> tuple[float, ...]:
-    """Cuts a step along the calibrated parameters and strengths to no further than the linear model reaches."""
+    """Cuts a step along the calibrated parameters and strengths to no further than the linear model
+    reaches."""
     longest = np.concatenate([_LONGEST * PRIOR, np.full(len(step) - len(PRIOR), np.inf)])
     return tuple(float(v) for v in np.clip(step, -longest, longest))
 
@@ -216,10 +248,12 @@ def _linearise_models(forecaster: Forecaster, segments: Segments, model: Model) 
 def _step(
     statistics: Statistics, null: NullModel, speeds: FloatArray, model: Model, anchor: Calibration
 ) -> tuple[FloatArray, FloatArray]:
-    """Takes one step of generalised least squares from here, under the prior about a calibration; with standard
-    errors."""
+    """Takes one step of generalised least squares from here, under the prior about a calibration;
+    with standard errors."""
     count = statistics.r.shape[1]
     chosen = range(len(THETA), count)
-    fit = Evidence.of(statistics, speeds, null).fit(chosen, centre=anchor.steps_from(model.calibration))
+    fit = Evidence.of(statistics, speeds, null).fit(
+        chosen, centre=anchor.steps_from(model.calibration)
+    )
     value, error = zip(*(fit.of(column) for column in range(count)), strict=True)
     return np.array(value), np.array(error)

@@ -1,14 +1,16 @@
 """The first candidates refitted beyond the linear model, before one of them is named.
 
-Strong effects are far from linear: a lift of 1.4 shows as 0.3 where sensitivities are taken at none, and predicts
-unseen recordings worse than nothing.
+Strong effects are far from linear: a lift of 1.4 shows as 0.3 where sensitivities are taken at
+none, and predicts unseen recordings worse than nothing.
 
-The misfit across the strengths of an effect: where a likelihood is flat towards an end, a strength is a bound.
+The misfit across the strengths of an effect: where a likelihood is flat towards an end, a strength
+is a bound.
 
-A fit begins where least is left and ends where its steps stay, and its standard error is the slope there. Of an effect
-that saturates both say nothing: beyond some stiffness an attached hoist stands still whatever it is, so that a fit ends
-anywhere (decision 041 has 25, 35 and 2e10 N/m² for 17,000). The profile shows it: from some strength on, all leave the
-same.
+A fit begins where least is left and ends where its steps stay, and its standard error is the slope
+there. Of an effect
+that saturates both say nothing: beyond some stiffness an attached hoist stands still whatever it
+is, so that a fit ends anywhere (decision 041 has 25, 35 and 2e10 N/m² for 17,000). The profile
+shows it: from some strength on, all leave the same.
 """
 
 from __future__ import annotations
@@ -44,8 +46,8 @@ COUNT = 16
 BEYOND = 10.0
 """Factor by which they reach beyond what is expected, and beyond the fit, to either side."""
 _WITHIN_THE_END, _AT_THE_END = 1 - 1e-6, 1 - 1e-5
-"""Shares of the most that an effect may have: where strengths end, so that none is beyond it by rounding, and from
-where on they reach it."""
+"""Shares of the most that an effect may have: where strengths end, so that none is beyond it by
+rounding, and from where on they reach it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,10 +67,11 @@ class Profile:
     misfit: FloatArray
 
     def estimate(self, *, larger: float) -> Estimate | None:
-        """Estimates the strength as a bound; None where the profile has two ends, and the fit says more, or where
-        strengths of the other sign lie beyond an end.
+        """Estimates the strength as a bound; None where the profile has two ends, and the fit says
+        more, or where strengths of the other sign lie beyond an end.
 
-        What the fit's mesh and a mistold cloth do to an effect is a factor, and widens a bound as it does intervals.
+        What the fit's mesh and a mistold cloth do to an effect is a factor, and widens a bound as
+        it does intervals.
 
         Args:
             larger: by how much standard errors are larger than the misfit says.
@@ -83,17 +86,28 @@ class Profile:
         factor = math.exp(CRITERIA.reach * CRITERIA.strength_factor)
         null, unit = described.null, self.column.unit
         best = float(self.sizes[int(np.argmin(self.misfit))])
-        size = {Bound.LEAST: span.low / factor, Bound.MOST: span.high * factor}.get(span.bound, best)
-        ends = (0.0 if span.bound is not Bound.LEAST else size, size if span.bound is Bound.MOST else span.high)
+        size = {Bound.LEAST: span.low / factor, Bound.MOST: span.high * factor}.get(
+            span.bound, best
+        )
+        ends = (
+            0.0 if span.bound is not Bound.LEAST else size,
+            size if span.bound is Bound.MOST else span.high,
+        )
         low, high = sorted(null + self.sign * end for end in ends)
         turned = {Bound.LEAST: Bound.MOST, Bound.MOST: Bound.LEAST}
         bound = span.bound if self.sign > 0 else turned.get(span.bound, span.bound)
         return Estimate(
-            value=null + self.sign * size, low=low, high=high, unit=unit, level=span.level, bound=bound.value
+            value=null + self.sign * size,
+            low=low,
+            high=high,
+            unit=unit,
+            level=span.level,
+            bound=bound.value,
         )
 
     def span(self, *, larger: float) -> Span:
-        """Computes the span of the distance from null, which cannot be less than none; as `estimate`."""
+        """Computes the span of the distance from null, which cannot be less than none; as
+        `estimate`."""
         described = self.column.described
         end = described.admissible[1] if self.sign > 0 else -described.admissible[0]
         farthest = end - self.sign * described.null
@@ -107,23 +121,35 @@ class Profile:
             larger=larger,
             limits=(-math.inf, math.log(farthest)),
         )
-        return replace(logarithmic, low=math.exp(logarithmic.low), high=float(np.exp(logarithmic.high)))
+        return replace(
+            logarithmic, low=math.exp(logarithmic.low), high=float(np.exp(logarithmic.high))
+        )
 
 
 def profile_strength(
-    forecaster: Forecaster, segments: Segments, whitened: WhitenedMisfit, model: Model, index: int = 0
+    forecaster: Forecaster,
+    segments: Segments,
+    whitened: WhitenedMisfit,
+    model: Model,
+    index: int = 0,
 ) -> Profile:
-    """Computes the misfit of a model across the strengths of one of its effects, the others as they are.
+    """Computes the misfit of a model across the strengths of one of its effects, the others as they
+    are.
 
     Args:
         index: of the effect.
     """
     column, coefficient = model.effects[index]
     sizes, sign = across(column, coefficient)
-    effects = [(*model.effects[:index], (column, sign * float(size)), *model.effects[index + 1 :]) for size in sizes]
+    effects = [
+        (*model.effects[:index], (column, sign * float(size)), *model.effects[index + 1 :])
+        for size in sizes
+    ]
     centre = Calibration().steps_from(model.calibration)
     misfits = []
-    for errors in errors_of([replace(model, effects=changed) for changed in effects], forecaster, segments):
+    for errors in errors_of(
+        [replace(model, effects=changed) for changed in effects], forecaster, segments
+    ):
         finite = bool(errors.isfinite().all())
         misfits.append(whitened.of(errors).fit((), centre=centre).remainder if finite else math.inf)
     return Profile(column=column, sizes=sizes, sign=sign, misfit=np.array(misfits))
@@ -136,24 +162,30 @@ def one_sided(described: Parameter) -> bool:
 
 
 def across(column: EffectColumn, coefficient: float) -> tuple[FloatArray, int]:
-    """Spaces distances from null, (n,), ascending, from well below what is expected and what was fitted to well beyond,
-    as far as the effect may have them; returns them with the sign of the strengths."""
+    """Spaces distances from null, (n,), ascending, from well below what is expected and what was
+    fitted to well beyond, as far as the effect may have them; returns them with the sign of the
+    strengths."""
     described = column.described
     ends, single = [end - described.null for end in described.prior], one_sided(described)
     sign = int(np.sign(sum(ends) if single or not coefficient else coefficient))
     expected = sorted(abs(end) for end in ends if end * sign > 0)
-    sizes = [*(expected if single else expected[-1:]), *([abs(coefficient)] if coefficient * sign > 0 else [])]
+    sizes = [
+        *(expected if single else expected[-1:]),
+        *([abs(coefficient)] if coefficient * sign > 0 else []),
+    ]
     farthest = abs(described.nearest(described.null + sign * BEYOND * max(sizes)) - described.null)
     return np.geomspace(min(sizes) / BEYOND, _WITHIN_THE_END * farthest, COUNT), sign
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fits:
-    """Models of one experiment beyond the linear: each is fitted once, and once without the same segments.
+    """Models of one experiment beyond the linear: each is fitted once, and once without the same
+    segments.
 
     Attributes:
         whitened: the measure; the model of its statistics is where the fits begin.
-        settling: (segment, quantity) what recordings settle at less what a model does; None where it is not looked at.
+        settling: (segment, quantity) what recordings settle at less what a model does; None where
+            it is not looked at.
     """
 
     forecaster: Forecaster
@@ -169,18 +201,23 @@ class Fits:
         key = tuple(chosen)
         if key not in self._made:
             try:
-                self._made[key] = refine(self.forecaster, self.segments, self.whitened, key, columns=columns())
+                self._made[key] = refine(
+                    self.forecaster, self.segments, self.whitened, key, columns=columns()
+                )
             except FitDivergedError:
                 self._made[key] = None
         return self._made[key]
 
     def left_out(self, fitted: Refined, outsides: Sequence[BoolArray]) -> list[LeftOut]:
-        """Computes what one of these models leaves, each time fitted to the other segments alone."""
+        """Computes what one of these models leaves, each time fitted to the other segments
+        alone."""
         keys = [(fitted.chosen, outside.tobytes()) for outside in outsides]
         new = [index for index, key in enumerate(keys) if key not in self._left]
         if new:
             new_outsides = [outsides[index] for index in new]
-            fitted_anew = left_out(self.forecaster, self.segments, fitted, self.whitened, new_outsides)
+            fitted_anew = left_out(
+                self.forecaster, self.segments, fitted, self.whitened, new_outsides
+            )
             self._left.update(zip([keys[index] for index in new], fitted_anew, strict=True))
         return [self._left[key] for key in keys]
 
@@ -210,7 +247,9 @@ class Fits:
         """
         fitted = self.of(())
         if fitted is None:
-            raise FitDivergedError("the base model's cloth does not stay one", fix="check cloth, pins and wind")
+            raise FitDivergedError(
+                "the base model's cloth does not stay one", fix="check cloth, pins and wind"
+            )
         return fitted
 
 
@@ -233,9 +272,11 @@ class Refit:
     profile: Profile | None = None
 
 
-def refit(fits: Fits, reference: Reference, candidates: Sequence[int], *, workers: int = 1) -> dict[int, Refit | None]:
-    """Refits the model with each column: column → what its model does; None where its cloth diverges, fitted to all
-    recordings, without one or run freely.
+def refit(
+    fits: Fits, reference: Reference, candidates: Sequence[int], *, workers: int = 1
+) -> dict[int, Refit | None]:
+    """Refits the model with each column: column → what its model does; None where its cloth
+    diverges, fitted to all recordings, without one or run freely.
 
     Args:
         workers: threads; each model is run in one.

@@ -16,7 +16,12 @@ _SHOWN = 50
 
 
 def residuals(
-    experiment: Experiment, segments: Segments, before: Predictions, after: Predictions | None, *, held_out: bool
+    experiment: Experiment,
+    segments: Segments,
+    before: Predictions,
+    after: Predictions | None,
+    *,
+    held_out: bool,
 ) -> tuple[Residual, ...]:
     """Computes the residuals of each recording, from predictions of all segments.
 
@@ -54,10 +59,16 @@ def residuals(
                 mean=(first.sum(axis=0) / np.maximum(counted.sum(axis=0), 1)[:, None]).tolist(),
                 frequencies=_list(frequencies),
                 spectrum=_list(spectrum),
-                spectrum_after=[] if second is None else _list(_spectrum(second, segments.period)[1]),
-                observed=np.where(counted[first_frames, :, None], predicted + first[first_frames], np.nan).tolist(),
+                spectrum_after=[]
+                if second is None
+                else _list(_spectrum(second, segments.period)[1]),
+                observed=np.where(
+                    counted[first_frames, :, None], predicted + first[first_frames], np.nan
+                ).tolist(),
                 before=predicted.tolist(),
-                after=[] if after is None else _join_segments(after.predicted, places)[first_frames].tolist(),
+                after=[]
+                if after is None
+                else _join_segments(after.predicted, places)[first_frames].tolist(),
             )
         )
     return tuple(residuals_of)
@@ -69,15 +80,16 @@ def _join_segments(values: FloatArray, places: IntArray) -> FloatArray:
 
 
 def _over(errors: FloatArray, counted: BoolArray, axis: int) -> FloatArray:
-    """Computes the root mean square distance over frames (0) or markers (1) [m], of what was tracked; NaN where nothing
-    was."""
+    """Computes the root mean square distance over frames (0) or markers (1) [m], of what was
+    tracked; NaN where nothing was."""
     count = counted.sum(axis=axis)
     total = (errors**2).sum(axis=2).sum(axis=axis)
     return np.sqrt(np.divide(total, count, out=np.full(len(count), np.nan), where=count > 0))
 
 
 def _spectrum(errors: FloatArray, period: float) -> tuple[FloatArray, FloatArray]:
-    """Frequencies [Hz] and mean one-sided power density of the errors' coordinates, summed over axes [m²/Hz]."""
+    """Frequencies [Hz] and mean one-sided power density of the errors' coordinates, summed over
+    axes [m²/Hz]."""
     frequencies, density = welch(errors, fs=1 / period, axis=0, nperseg=min(50, len(errors)))
     return frequencies[1:], density.sum(axis=2).mean(axis=1)[1:]
 

@@ -1,14 +1,17 @@
-"""Closing the loop on trajectories: from recordings to the numbers of a verdict about what the base model lacks.
+"""Closing the loop on trajectories: from recordings to the numbers of a verdict about what the base
+model lacks.
 
-The steps are those of the method: align, predict one horizon ahead, fit the base model, compare with nulls of other
-numerics, weigh the library's effects, judge, and run the refitted model on what it was not fitted to.
+The steps are those of the method: align, predict one horizon ahead, fit the base model, compare
+with nulls of other numerics, weigh the library's effects, judge, and run the refitted model on what
+it was not fitted to.
 
-The cloth's calibrated parameters in a reader's units, with intervals that include the scatter between simulators.
+The cloth's calibrated parameters in a reader's units, with intervals that include the scatter
+between simulators.
 
-Nulls of our own code show what noise and discretisation leave open: how well the same simulator would find a parameter
-again. Another code's elements are another model of the same cloth, and its truths are off by more. Both are given, as a
-laboratory gives repeatability and reproducibility (ISO 5725-1): the interval includes both, the standard error of the
-logarithm is the former alone.
+Nulls of our own code show what noise and discretisation leave open: how well the same simulator
+would find a parameter again. Another code's elements are another model of the same cloth, and its
+truths are off by more. Both are given, as a laboratory gives repeatability and reproducibility (ISO
+5725-1): the interval includes both, the standard error of the logarithm is the former alone.
 """
 
 from __future__ import annotations
@@ -48,7 +51,15 @@ from measure.loop.gauss_newton import Refined, cut
 from measure.loop.refit import Fits, Refit, refit
 from measure.loop.residuals import residuals
 from measure.loop.set_up import SetUp
-from measure.loop.validation import LeftOut, Predictions, Trial, compare, folds, numerical_floor, predict
+from measure.loop.validation import (
+    LeftOut,
+    Predictions,
+    Trial,
+    compare,
+    folds,
+    numerical_floor,
+    predict,
+)
 from measure.nulls import bank as banks
 from measure.nulls import null_plan
 from measure.nulls.conformal import kinds_needed
@@ -78,11 +89,13 @@ from measure.verdict.verdict_record import (
 def parameters(
     base: Refined, larger: Refined | None, reach: FloatArray, *, area_weight_uncertainty: float
 ) -> tuple[Parameter, ...]:
-    """Estimates area weight, bending and damping, by their logarithms, of the base and of a larger model.
+    """Estimates area weight, bending and damping, by their logarithms, of the base and of a larger
+    model.
 
     Args:
         reach: (theta,) standard errors to either side within which this code's nulls lie.
-        area_weight_uncertainty: relative standard uncertainty of the area weight before anything was fitted.
+        area_weight_uncertainty: relative standard uncertainty of the area weight before anything
+            was fitted.
     """
     estimated: list[Parameter] = []
     for index, (name, _, _) in enumerate(THETA):
@@ -90,29 +103,45 @@ def parameters(
         before = _estimate(name, base.model.calibration, half, area_weight_uncertainty)
         within = half / CRITERIA.reach
         if larger is None:
-            estimated.append(Parameter(name=name, before=before, after=None, shift=None, within=within))
+            estimated.append(
+                Parameter(name=name, before=before, after=None, shift=None, within=within)
+            )
             continue
         steps = larger.model.calibration.steps_from(base.model.calibration)
         after = _estimate(
-            name, larger.model.calibration, float(reach[index]) * larger.errors[index], area_weight_uncertainty
+            name,
+            larger.model.calibration,
+            float(reach[index]) * larger.errors[index],
+            area_weight_uncertainty,
         )
         shift = steps[index] / base.errors[index]
-        estimated.append(Parameter(name=name, before=before, after=after, shift=shift, within=within))
+        estimated.append(
+            Parameter(name=name, before=before, after=after, shift=shift, within=within)
+        )
     return tuple(estimated)
 
 
-def _estimate(name: str, calibration: Calibration, half: float, area_weight_uncertainty: float) -> Estimate:
-    """Estimates a parameter with its interval, of half the width `half` in its logarithm by this code alone.
+def _estimate(
+    name: str, calibration: Calibration, half: float, area_weight_uncertainty: float
+) -> Estimate:
+    """Estimates a parameter with its interval, of half the width `half` in its logarithm by this
+    code alone.
 
     What codes differ by does not make that of the area weight wider than what was known before.
     """
     if name == "damping":
         return _damping(calibration.damping, half)
     value, between, prior_uncertainty = {
-        "area_weight": (calibration.area_weight, CRITERIA.area_weight_between, area_weight_uncertainty),
+        "area_weight": (
+            calibration.area_weight,
+            CRITERIA.area_weight_between,
+            area_weight_uncertainty,
+        ),
         "bending": (calibration.bending, CRITERIA.bending_between, math.inf),
     }[name]
-    half_width = min(math.hypot(half, CRITERIA.reach * between), max(half, CRITERIA.reach * prior_uncertainty))
+    half_width = min(
+        math.hypot(half, CRITERIA.reach * between), max(half, CRITERIA.reach * prior_uncertainty)
+    )
     return Estimate(
         value=value,
         low=value * math.exp(-half_width),
@@ -123,8 +152,8 @@ def _estimate(name: str, calibration: Calibration, half: float, area_weight_unce
 
 
 def _damping(value: float, half: float) -> Estimate:
-    """Estimates damping [s]: what codes differ by is like so much more or less of it, and where a fit ends is a factor
-    beside; none lies below 0."""
+    """Estimates damping [s]: what codes differ by is like so much more or less of it, and where a
+    fit ends is a factor beside; none lies below 0."""
     between = CRITERIA.reach * CRITERIA.damping_between
     half_width = math.hypot(half, CRITERIA.reach * CRITERIA.damping_factor)
     low = value - math.hypot(value - value * math.exp(-half_width), between)
@@ -142,9 +171,10 @@ class LoopOptions(null_plan.NullOptions):
     """How to close the loop: by which nulls, at which level of the global test.
 
     Attributes:
-        most_nulls: up to so many are simulated where p is near the level; without effect where a bank is given.
-        suspected: the effect with its sign that was suspected before the recordings were looked at, along which alone
-            is tested; None to test along all.
+        most_nulls: up to so many are simulated where p is near the level; without effect where a
+            bank is given.
+        suspected: the effect with its sign that was suspected before the recordings were looked at,
+            along which alone is tested; None to test along all.
 
     Raises:
         UsageError: values that make no sense, or a level that so many nulls cannot test.
@@ -172,9 +202,11 @@ class LoopOutcome:
         verdict: all numbers of the verdict; its sentences are empty.
         experiment: in the frame of the fit, with the logs of the wind moved by what they lag.
         lags: (recording,) by how much they were moved [s].
-        at_bounds: names of the calibrated parameters that are as small or as large as the model holds.
+        at_bounds: names of the calibrated parameters that are as small or as large as the model
+            holds.
         field: modes of the corrective field; empty where the library has the whole answer.
-        whole: whether the field stands for all that the base model lacks, and not for what a larger model leaves.
+        whole: whether the field stands for all that the base model lacks, and not for what a larger
+            model leaves.
         line: of the errors' spectra that remains beside the field.
         course: of the wind that remains beside the field, and is not turbulence.
     """
@@ -189,14 +221,17 @@ class LoopOutcome:
     course: Variation | None = None
 
 
-def solve(experiment: Experiment, options: LoopOptions, *, stage: Stage | None = None) -> LoopOutcome:
+def solve(
+    experiment: Experiment, options: LoopOptions, *, stage: Stage | None = None
+) -> LoopOutcome:
     """Solves an experiment: tests, fits, validates.
 
     Args:
         stage: called with progress.
 
     Raises:
-        InputError: recordings that cannot be used (see `measure.observe.checks` for what is looked at before).
+        InputError: recordings that cannot be used (see `measure.observe.checks` for what is looked
+            at before).
     """
     began = time.perf_counter()
     torch.set_num_threads(1)
@@ -204,7 +239,11 @@ def solve(experiment: Experiment, options: LoopOptions, *, stage: Stage | None =
     setting = Setting.of(experiment, workers=options.workers)
     report("sensitivities", 0, 1)
     measured, projection = _looked_at(setting)
-    late = (0.0,) * len(setting.speeds) if measured.course is None else lags(measured.course, setting.segments)
+    late = (
+        (0.0,) * len(setting.speeds)
+        if measured.course is None
+        else lags(measured.course, setting.segments)
+    )
     if any(late):
         setting = setting.moved(late)
         measured, projection = _looked_at(setting)
@@ -214,10 +253,15 @@ def solve(experiment: Experiment, options: LoopOptions, *, stage: Stage | None =
     def test_against(nulls: int) -> tuple[Setting, Fits, NullBank, Reference]:
         bank = null_plan.bank_for(nominal, options, nulls=nulls, stage=report)
         reference = bank.reference(
-            len(nominal.segments), noise=nominal.design.noise, seed=options.seed, prior=nominal.prior
+            len(nominal.segments),
+            noise=nominal.design.noise,
+            seed=options.seed,
+            prior=nominal.prior,
         )
         report("base model", 0, 1)
-        fitted, fits = _calibrate_statistics(nominal, _fits(nominal, measured, projection, bank), bank)
+        fitted, fits = _calibrate_statistics(
+            nominal, _fits(nominal, measured, projection, bank), bank
+        )
         fits = _settling(fitted, fits, options.seed)
         report("base model", 1, 1)
         reference = reference.at(fitted.calibration)
@@ -230,12 +274,17 @@ def solve(experiment: Experiment, options: LoopOptions, *, stage: Stage | None =
         setting, fits, bank, reference = test_against(nulls := wanted)
         evidence = fits.whitened.evidence(fits.whitened.statistics)
     set_up = SetUp(tolerance=setting.tolerance, attached=hoist_stands_still(setting.experiment))
-    judgement, refits = judge(evidence, reference, level=options.level, set_up=set_up), dict[int, Refit | None]()
+    judgement, refits = (
+        judge(evidence, reference, level=options.level, set_up=set_up),
+        dict[int, Refit | None](),
+    )
     if judgement.conclusion not in NOT_REJECTED:
         report("before and after", 0, 1)
         while new := [column for column in finalists(judgement) if column not in refits]:
             refits |= refit(fits, reference, new, workers=options.workers)
-            judgement = judge(evidence, reference, level=options.level, refits=refits, set_up=set_up)
+            judgement = judge(
+                evidence, reference, level=options.level, refits=refits, set_up=set_up
+            )
     solved = Solved(setting=setting, fits=fits, reference=reference, judgement=judgement)
     trial = _trial(solved, options)
     if trial.rises:
@@ -244,8 +293,11 @@ def solve(experiment: Experiment, options: LoopOptions, *, stage: Stage | None =
     return _outcome(solved, bank, trial, options, began, late)
 
 
-def _nulls_wanted(options: LoopOptions, nulls: int, reference: Reference, evidence: Evidence) -> int | None:
-    """Returns how many nulls to go on with after so many; None where those decide, or are given as a bank."""
+def _nulls_wanted(
+    options: LoopOptions, nulls: int, reference: Reference, evidence: Evidence
+) -> int | None:
+    """Returns how many nulls to go on with after so many; None where those decide, or are given as
+    a bank."""
     if options.bank is not None:
         return None
     statistic = reference.tested(evidence, names())
@@ -293,21 +345,27 @@ class Solved:
 
     @property
     def larger(self) -> Refined | None:
-        """Returns the model with the effects that act; None where none does, its course is unknown (gusts), or its
-        cloth diverges."""
+        """Returns the model with the effects that act; None where none does, its course is unknown
+        (gusts), or its cloth diverges."""
         columns_acting = self.acting
-        return None if not columns_acting or GUST_COLUMN in columns_acting else self.fits.of(columns_acting)
+        return (
+            None
+            if not columns_acting or GUST_COLUMN in columns_acting
+            else self.fits.of(columns_acting)
+        )
 
     @property
     def acting(self) -> tuple[int, ...]:
-        """Lists columns of the larger model: all effects named as acting, or the first of those that may be; none where
-        its cloth diverges."""
+        """Lists columns of the larger model: all effects named as acting, or the first of those
+        that may be; none where its cloth diverges."""
         columns_named = self.judgement.named
-        return columns_named if self.judgement.conclusion is Conclusion.EFFECT else columns_named[:1]
+        return (
+            columns_named if self.judgement.conclusion is Conclusion.EFFECT else columns_named[:1]
+        )
 
     def strength(self, ranked: Weighed, larger: Refined) -> Estimate:
-        """Estimates the strength of an acting effect beyond the linear: its error exceeds what Σ says as where it is
-        linear."""
+        """Estimates the strength of an acting effect beyond the linear: its error exceeds what Σ
+        says as where it is linear."""
         index = self.acting.index(ranked.column)
         column, coefficient = larger.model.effects[index]
         linear = self.evidence.fit([ranked.column]).of(ranked.column)[1]
@@ -345,7 +403,8 @@ def _fits(setting: Setting, statistics: Statistics, projection: Projection, bank
 
 
 def _calibrate_statistics(setting: Setting, fits: Fits, bank: NullBank) -> tuple[Setting, Fits]:
-    """Takes statistics at the base model that all directions lead to, anew until a step is within its errors, or leaves
+    """Takes statistics at the base model that all directions lead to, anew until a step is within
+    its errors, or leaves
     more than there was before it: beyond that, directions follow what numerics do."""
     for _ in range(_LOOKS):
         fit = _base_fit(setting, fits)
@@ -376,11 +435,17 @@ def _settling(setting: Setting, fits: Fits, seed: int) -> Fits:
     )
 
     def settling(model: Model) -> FloatArray:
-        batch = replace(plain, calibrations=(model.calibration,) * len(recordings), effects=model.acting)
+        batch = replace(
+            plain, calibrations=(model.calibration,) * len(recordings), effects=model.acting
+        )
         return settled_off(recordings, batch)[setting.recording]
 
-    with_settled = replace(fits.whitened.statistics, settled=settling(Model(calibration=setting.calibration)))
-    return replace(fits, whitened=replace(fits.whitened, statistics=with_settled), settling=settling)
+    with_settled = replace(
+        fits.whitened.statistics, settled=settling(Model(calibration=setting.calibration))
+    )
+    return replace(
+        fits, whitened=replace(fits.whitened, statistics=with_settled), settling=settling
+    )
 
 
 def _base_fit(setting: Setting, fits: Fits) -> CoefficientFit:
@@ -417,7 +482,9 @@ def _trial(solved: Solved, options: LoopOptions) -> Trial:
     places: list[IntArray] = []
     squared = 0.0
     frames = len(setting.segments.items[0].positions) - setting.segments.first
-    for number, (fold, (before, after, *wrong)) in enumerate(zip(all_folds, zip(*tried, strict=True), strict=True)):
+    for number, (fold, (before, after, *wrong)) in enumerate(
+        zip(all_folds, zip(*tried, strict=True), strict=True)
+    ):
         same_recording = np.isin(of_recording, np.unique(setting.recording[fold.outside]))
         comparisons.append(
             compare(
@@ -431,7 +498,9 @@ def _trial(solved: Solved, options: LoopOptions) -> Trial:
                 control_name="" if control is None else control[0].candidate.effect,
             )
         )
-        if len(all_folds) == 1 or number < len(setting.speeds):  # the late parts are in the recordings as well
+        if len(all_folds) == 1 or number < len(
+            setting.speeds
+        ):  # the late parts are in the recordings as well
             squared += after.squared.sum() - before.squared.sum()
             places.append(np.full(len(after.misfit), number))
             differences += [fitted_wrong.misfit - after.misfit for fitted_wrong in wrong]
@@ -444,7 +513,12 @@ def _trial(solved: Solved, options: LoopOptions) -> Trial:
 
 
 def _outcome(
-    solved: Solved, bank: NullBank, trial: Trial, options: LoopOptions, began: float, late: tuple[float, ...]
+    solved: Solved,
+    bank: NullBank,
+    trial: Trial,
+    options: LoopOptions,
+    began: float,
+    late: tuple[float, ...],
 ) -> LoopOutcome:
     setting, larger, judgement = solved.setting, solved.larger, solved.judgement
     before = _unseen(setting, solved.base)
@@ -455,7 +529,12 @@ def _outcome(
         words="",
         test=_test(solved, bank, options),
         parameters=(
-            *parameters(solved.base, larger, solved.reference.reach, area_weight_uncertainty=float(setting.prior[0])),
+            *parameters(
+                solved.base,
+                larger,
+                solved.reference.reach,
+                area_weight_uncertainty=float(setting.prior[0]),
+            ),
             *_direction(judgement),
         ),
         ranking=_ranking(solved, larger),
@@ -463,7 +542,9 @@ def _outcome(
         open=judgement.open,
         comparisons=trial.comparisons,
         apart=trial.control,
-        residuals=residuals(setting.experiment, setting.segments, before, after, held_out=len(setting.speeds) > 1),
+        residuals=residuals(
+            setting.experiment, setting.segments, before, after, held_out=len(setting.speeds) > 1
+        ),
         provenance={
             "seed": options.seed,
             "code": code_version(),
@@ -495,24 +576,32 @@ def _direction(judgement: LibraryJudgement) -> tuple[Parameter, ...]:
     in_degrees = Estimate(value=value, low=low, high=high, unit="°", level=angle.level)
     return (
         Parameter(
-            name="direction of the wind from its log, counter-clockwise", before=in_degrees, after=None, shift=None
+            name="direction of the wind from its log, counter-clockwise",
+            before=in_degrees,
+            after=None,
+            shift=None,
         ),
     )
 
 
 def _test(solved: Solved, bank: NullBank, options: LoopOptions) -> NullTest:
-    """Reports the global test of the base model, and whether other nulls could decide it otherwise."""
+    """Reports the global test of the base model, and whether other nulls could decide it
+    otherwise."""
     conformal, judgement = solved.reference.test, solved.judgement
     low, high = conformal.interval(judgement.statistic, level=CRITERIA.interval)
     undecided = low <= options.level <= high and conformal.tests(options.level)
     kinds_settling = (
-        conformal.settling(judgement.statistic, at=options.level, level=CRITERIA.interval) if undecided else None
+        conformal.settling(judgement.statistic, at=options.level, level=CRITERIA.interval)
+        if undecided
+        else None
     )
     return NullTest(
         statistic=judgement.statistic,
         null=[float(v) for v in conformal.null],
         kinds=conformal.count,
-        p_value=Estimate(value=judgement.p_value, low=low, high=high, unit="1", level=CRITERIA.interval),
+        p_value=Estimate(
+            value=judgement.p_value, low=low, high=high, unit="1", level=CRITERIA.interval
+        ),
         level=options.level,
         critical=conformal.critical(options.level),
         nulls=bank.words,
@@ -542,19 +631,27 @@ def _field(solved: Solved) -> tuple[Mode, ...]:
     larger = solved.larger
     errors = None if larger is None else solved.fits.errors(larger)
     return corrective_field(
-        solved.setting, solved.fits.whitened, errors=errors, along=() if larger is None else larger.chosen
+        solved.setting,
+        solved.fits.whitened,
+        errors=errors,
+        along=() if larger is None else larger.chosen,
     )
 
 
 def _unseen(setting: Setting, refined: Refined) -> Predictions:
-    """Predicts all segments by the model fitted to the other recordings; of a single recording by its own."""
+    """Predicts all segments by the model fitted to the other recordings; of a single recording by
+    its own."""
     if len(setting.speeds) < 2:
         return predict(setting.forecaster, setting.segments, refined.model)
     parts: list[Predictions] = []
     for index in range(len(setting.speeds)):
         outside = setting.recording == index
         parts.append(
-            predict(setting.forecaster, setting.segments.select(np.flatnonzero(outside)), refined.without(outside))
+            predict(
+                setting.forecaster,
+                setting.segments.select(np.flatnonzero(outside)),
+                refined.without(outside),
+            )
         )
     # Segments are in the order of their recordings.
     return Predictions(

@@ -1,4 +1,5 @@
-"""What recordings show of the set-up against what was declared: it leads a verdict, whatever the test says."""
+"""What recordings show of the set-up against what was declared: it leads a verdict, whatever the
+test says."""
 
 from __future__ import annotations
 
@@ -28,18 +29,24 @@ class SetUp:
 
 
 def wind_turn(evidence: Evidence, reference: Reference) -> Estimate | None:
-    """Estimates by how much the wind is turned from where its logs have it, counter-clockwise [rad], whatever their
-    tolerance; None in still air, which has no direction."""
+    """Estimates by how much the wind is turned from where its logs have it, counter-clockwise
+    [rad], whatever their tolerance; None in still air, which has no direction."""
     column, undirected = names().index(TURNED), evidence.with_directions()
     if not undirected.curvature[:, column, column].any():
         return None
     value, _ = undirected.fit([column]).of(column)
-    error = abs(value) / math.sqrt(max(float(reference.statistics(undirected, names())[column]), 1e-12))
+    error = abs(value) / math.sqrt(
+        max(float(reference.statistics(undirected, names())[column]), 1e-12)
+    )
     half = reference.reach_of(column) * error
-    return Estimate(value=value, low=value - half, high=value + half, unit="rad", level=CRITERIA.interval)
+    return Estimate(
+        value=value, low=value - half, high=value + half, unit="rad", level=CRITERIA.interval
+    )
 
 
 def beyond_tolerance(direction: Estimate | None, tolerance: float) -> bool:
-    """Returns whether all of the interval lies beyond a tolerance; never of a log whose direction is declared exactly,
-    which is tested as every other effect is."""
-    return direction is not None and tolerance > 0 and max(direction.low, -direction.high) > tolerance
+    """Returns whether all of the interval lies beyond a tolerance; never of a log whose direction
+    is declared exactly, which is tested as every other effect is."""
+    return (
+        direction is not None and tolerance > 0 and max(direction.low, -direction.high) > tolerance
+    )

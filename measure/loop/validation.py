@@ -1,6 +1,7 @@
 """Models run on recordings and times that they were not fitted to, beside the numerical floor.
 
-The floor is what numerics leave: the error at which a model predicts recordings of itself that others simulated.
+The floor is what numerics leave: the error at which a model predicts recordings of itself that
+others simulated.
 """
 
 from __future__ import annotations
@@ -46,10 +47,12 @@ class Trial:
 
     Attributes:
         comparisons: one a fold.
-        apart: (segment,) half misfit (see `whitened_misfit`) of the control less that of the effect, each segment of
-            the recordings left out in turn (of a single recording: of its last part); None without a control.
+        apart: (segment,) half misfit (see `whitened_misfit`) of the control less that of the
+            effect, each segment of the recordings left out in turn (of a single recording: of its
+            last part); None without a control.
         recording: (segment,) what was left out together with each.
-        rises: whether squared errors on all that was left out in turn are larger with the effect than without.
+        rises: whether squared errors on all that was left out in turn are larger with the effect
+            than without.
     """
 
     comparisons: tuple[Comparison, ...] = ()
@@ -64,14 +67,17 @@ class Trial:
 
 
 def total_error(values: FloatArray, recording: IntArray) -> float:
-    """Computes the standard error of a sum over segments (segment,) that are drawn within recordings.
+    """Computes the standard error of a sum over segments (segment,) that are drawn within
+    recordings.
 
-    Recordings are strata: that an effect helps more in strong wind than in light wind is no chance. Where one has a
-    single segment, segments are taken to be drawn from all.
+    Recordings are strata: that an effect helps more in strong wind than in light wind is no chance.
+    Where one has a single segment, segments are taken to be drawn from all.
     """
     if len(values) < 2:
         return math.inf
-    return math.sqrt(sum(len(part) * float(np.var(part, ddof=1)) for part in _strata(values, recording)))
+    return math.sqrt(
+        sum(len(part) * float(np.var(part, ddof=1)) for part in _strata(values, recording))
+    )
 
 
 def _strata(values: FloatArray, recording: IntArray) -> list[FloatArray]:
@@ -81,7 +87,8 @@ def _strata(values: FloatArray, recording: IntArray) -> list[FloatArray]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Predictions:
-    """What one model says of segments: errors and predicted markers (frame, marker, 3, segment) [m]."""
+    """What one model says of segments: errors and predicted markers (frame, marker, 3, segment)
+    [m]."""
 
     errors: FloatArray
     predicted: FloatArray
@@ -93,8 +100,9 @@ class Predictions:
 
 
 def folds(segments: Segments, speeds: Sequence[float]) -> tuple[Fold, ...]:
-    """Leaves each recording out in turn, where there are two or more, and the last part of every recording: a third,
-    but two segments of four or more, so that chance within a recording shows."""
+    """Leaves each recording out in turn, where there are two or more, and the last part of every
+    recording: a third, but two segments of four or more, so that chance within a recording
+    shows."""
     recording = segments.recording
     result: list[Fold] = []
     if len(np.unique(recording)) > 1:
@@ -105,7 +113,9 @@ def folds(segments: Segments, speeds: Sequence[float]) -> tuple[Fold, ...]:
     late = np.zeros(len(recording), dtype=bool)
     for index in np.unique(recording):
         in_recording = np.flatnonzero(recording == index)
-        late[in_recording[-max(2 if len(in_recording) > _ENOUGH else 1, len(in_recording) // 3) :]] = True
+        late[
+            in_recording[-max(2 if len(in_recording) > _ENOUGH else 1, len(in_recording) // 3) :]
+        ] = True
     if not late.all():
         result.append(Fold(words="last part of each recording, unseen", outside=late))
     return tuple(result)
@@ -127,7 +137,8 @@ def _array(values: torch.Tensor) -> FloatArray:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LeftOut:
-    """What a model leaves of segments it was not fitted to: (segment,) mean squared distances [m²], half misfits."""
+    """What a model leaves of segments it was not fitted to: (segment,) mean squared distances [m²],
+    half misfits."""
 
     squared: FloatArray
     misfit: FloatArray
@@ -142,7 +153,9 @@ def left_out(
 ) -> list[LeftOut]:
     """Computes what a model leaves, each time fitted to the other segments alone."""
     begun = [fitted.without(outside) for outside in outsides]
-    ended = finish_step(forecaster, segments, whitened, begun, fitted.chosen, [~outside for outside in outsides])
+    ended = finish_step(
+        forecaster, segments, whitened, begun, fitted.chosen, [~outside for outside in outsides]
+    )
     models = [model for model, _ in ended]
     return measure_left_out(forecaster, segments, models, whitened, outsides, fitted.chosen)
 
@@ -155,8 +168,8 @@ def measure_left_out(
     outsides: Sequence[BoolArray],
     chosen: Sequence[int] = (),
 ) -> list[LeftOut]:
-    """Computes what models leave as they are; what each leaves along the nuisances and chosen columns is fitted to the
-    other segments."""
+    """Computes what models leave as they are; what each leaves along the nuisances and chosen
+    columns is fitted to the other segments."""
     errors_of_models = errors_of(models, forecaster, segments)
     return [
         LeftOut(
@@ -187,8 +200,8 @@ def compare(
 
     Args:
         recording: (segment,) of those left out.
-        floor: (segment,) mean squared distances of data simulated from the larger model, which it predicts with other
-            numerics [m²].
+        floor: (segment,) mean squared distances of data simulated from the larger model, which it
+            predicts with other numerics [m²].
     """
     old, new = before.squared, after.squared
     return Comparison(
@@ -206,8 +219,8 @@ def compare(
 
 
 def share_removed(before: FloatArray, after: FloatArray, floor: FloatArray) -> float | None:
-    """Computes the share of the mean square above the floor that is gone after; None where there is hardly anything
-    above it.
+    """Computes the share of the mean square above the floor that is gone after; None where there is
+    hardly anything above it.
 
     Args:
         before, after, floor: (segment,) mean squared distances [m²].
@@ -224,11 +237,14 @@ def a_segment(values: FloatArray, recording: IntArray) -> Estimate:
         free = len(values) - len(_strata(values, recording))
         quantile = float(student.ppf(0.5 + CRITERIA.interval / 2, free))
         reach = quantile * total_error(values, recording) / len(values)
-    return Estimate(value=value, low=value - reach, high=value + reach, unit="1", level=CRITERIA.interval)
+    return Estimate(
+        value=value, low=value - reach, high=value + reach, unit="1", level=CRITERIA.interval
+    )
 
 
 def root(squared: FloatArray) -> Estimate:
-    """Computes the root of the mean over segments, with Student's interval of the mean, through the root [m]."""
+    """Computes the root of the mean over segments, with Student's interval of the mean, through the
+    root [m]."""
     mean = float(squared.mean())
     reach = _reach(squared)
     return Estimate(
@@ -241,11 +257,13 @@ def root(squared: FloatArray) -> Estimate:
 
 
 def paired_difference(before: FloatArray, after: FloatArray) -> Estimate:
-    """Computes the difference of roots of means, paired by segment: linear in the squares, for which Student's interval
-    is valid."""
+    """Computes the difference of roots of means, paired by segment: linear in the squares, for
+    which Student's interval is valid."""
     slope = 1 / (math.sqrt(float(before.mean())) + math.sqrt(float(after.mean())))
     value, reach = slope * float((before - after).mean()), slope * _reach(before - after)
-    return Estimate(value=value, low=value - reach, high=value + reach, unit="m", level=CRITERIA.interval)
+    return Estimate(
+        value=value, low=value - reach, high=value + reach, unit="m", level=CRITERIA.interval
+    )
 
 
 def _reach(values: FloatArray) -> float:
@@ -281,7 +299,9 @@ def numerical_floor(
         calibrations=(model.calibration,) * len(simulated),
         speeds=speeds,
         winds=winds.like(recorded, speeds, duration=_DURATION, seed=floor_seed),
-        tracks=tracks.like(recorded, specimen.seats, len(speeds), duration=_DURATION, seed=floor_seed),
+        tracks=tracks.like(
+            recorded, specimen.seats, len(speeds), duration=_DURATION, seed=floor_seed
+        ),
         seed=floor_seed,
         effects=model.acting,
     )

@@ -1,6 +1,8 @@
-"""Banks of null recordings, built batch by batch into a folder: a build that was stopped goes on where it was.
+"""Banks of null recordings, built batch by batch into a folder: a build that was stopped goes on
+where it was.
 
-A bank about one posterior is a parametric bootstrap by brute force. A bank over priors serves every recording of such
+A bank about one posterior is a parametric bootstrap by brute force. A bank over priors serves every
+recording of such
 a design: an amortised null.
 """
 
@@ -40,11 +42,14 @@ from sim.integrate.split import SplitEuler
 from sim.workers import connect_workers
 
 WINDS = 4
-"""Recordings of a batch: one cloth in so many winds, one experiment of one kind of numerics. What experiments leave
-differs by their numerics more than by the cloth, and only kinds count in the test, so that each has one cloth."""
+"""Recordings of a batch: one cloth in so many winds, one experiment of one kind of numerics. What
+experiments leave differs by their numerics more than by the cloth, and only kinds count in the
+test, so that each has one cloth."""
 _VERSION = 6
-"""Raised whenever the arrays of a batch mean something else; 2: one cloth a batch, the damping by its logarithm;
-3: sensitivities of how cloth bends in double precision; 4: what recordings settle at; 5: whether cloths are carried;
+"""Raised whenever the arrays of a batch mean something else; 2: one cloth a batch, the damping by
+its logarithm;
+3: sensitivities of how cloth bends in double precision; 4: what recordings settle at; 5: whether
+cloths are carried;
 6: the inertia of air at the ends of a cloth."""
 _SEGMENTS = (
     "recording",
@@ -92,13 +97,18 @@ def prior_batch(
     speeds: tuple[float, float],
     seed: int,
 ) -> NullBatch:
-    """Draws a null experiment over the priors: one cloth in four winds, one from each quarter of `speeds`.
+    """Draws a null experiment over the priors: one cloth in four winds, one from each quarter of
+    `speeds`.
 
-    Density and bending are log-uniform about the nominal ones, damping log-uniform, the other stiffness as
-    `stiffness.drawn` has it.
+    Density and bending are log-uniform about the nominal ones, damping log-uniform, the other
+    stiffness as `stiffness.drawn` has it.
     """
     rng = stream(seed, "null", "prior")
-    cloth = Calibration(area_weight=_log(rng, _AREA_WEIGHT), bending=_log(rng, _BENDING), damping=_log(rng, _DAMPING))
+    cloth = Calibration(
+        area_weight=_log(rng, _AREA_WEIGHT),
+        bending=_log(rng, _BENDING),
+        damping=_log(rng, _DAMPING),
+    )
     shares = (np.arange(WINDS) + rng.random(WINDS)) / WINDS
     return NullBatch(
         specimen=specimen,
@@ -118,14 +128,17 @@ def _log(rng: np.random.Generator, span: tuple[float, float]) -> float:
 
 
 def evaluate(batch: NullBatch, numerics: int, along: Sequence[Column]) -> tuple[Nulls, float]:
-    """Simulates a batch and takes its statistics along columns, each recording's at the calibration that it was
-    simulated with, as those of data are taken at the fitted one; with the duration of a segment [s]."""
+    """Simulates a batch and takes its statistics along columns, each recording's at the calibration
+    that it was simulated with, as those of data are taken at the fitted one; with the duration of a
+    segment [s]."""
     recordings = batch.simulate()
     segments = Segments.of(recordings).tied(_anchors(batch, recordings))
     forecaster = Forecaster(specimen=batch.specimen, markers=batch.markers, integrator=SplitEuler())
     calibrations = [batch.calibrations[recording] for recording in segments.recording]
     measured = statistics(forecaster, segments, calibrations, along)
-    measured = replace(measured, settled=settled_off(recordings, mistaken(batch))[measured.recording])
+    measured = replace(
+        measured, settled=settled_off(recordings, mistaken(batch))[measured.recording]
+    )
     cloths = np.array([c.steps_from(Calibration()) for c in batch.calibrations])
     nulls = Nulls(
         statistics=measured,
@@ -140,12 +153,14 @@ def evaluate(batch: NullBatch, numerics: int, along: Sequence[Column]) -> tuple[
 
 
 def _anchors(batch: NullBatch, recordings: Sequence[Trajectory]) -> list[FloatArray]:
-    """Computes anchors (held, 3) for each recording [m]; where they are not given, taken from all recordings of its
-    cloth."""
+    """Computes anchors (held, 3) for each recording [m]; where they are not given, taken from all
+    recordings of its cloth."""
     cloths: dict[Calibration, list[Trajectory]] = {}
     for cloth, recording in zip(batch.calibrations, recordings, strict=True):
         cloths.setdefault(cloth, []).append(recording)
-    anchors = {cloth: as_seen(batch.specimen, of_cloth).anchors for cloth, of_cloth in cloths.items()}
+    anchors = {
+        cloth: as_seen(batch.specimen, of_cloth).anchors for cloth, of_cloth in cloths.items()
+    }
     return [anchors[cloth] for cloth in batch.calibrations]
 
 
@@ -157,8 +172,8 @@ def build(
     scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> None:
-    """Evaluates the batches that the folder lacks, each into a file of its own; long ones first, so that no worker is
-    left alone with one.
+    """Evaluates the batches that the folder lacks, each into a file of its own; long ones first, so
+    that no worker is left alone with one.
 
     Args:
         workers: processes on this machine.
@@ -176,8 +191,12 @@ def build(
         progress(len(batches) - len(missing))
     if not missing:
         return
-    with connect_workers(scheduler, workers=min(workers, len(missing)), say=say_beside_bars) as pool:
-        for index, content in pool.results((_content_of, (batches[index], index)) for index in missing):
+    with connect_workers(
+        scheduler, workers=min(workers, len(missing)), say=say_beside_bars
+    ) as pool:
+        for index, content in pool.results(
+            (_content_of, (batches[index], index)) for index in missing
+        ):
             rewrite(_file(folder, index), content)
             if progress is not None:
                 progress(1)
@@ -187,7 +206,12 @@ def _content_of(batch: NullBatch, index: int) -> tuple[int, bytes]:
     """Evaluates a batch; returns its number and the bytes of its file."""
     nulls, duration = evaluate(batch, index, columns())
     measured = nulls.statistics
-    if measured.lines is None or measured.turning is None or measured.course is None or measured.settled is None:
+    if (
+        measured.lines is None
+        or measured.turning is None
+        or measured.course is None
+        or measured.settled is None
+    ):
         raise UsageError(
             "the batch has no spectra, moments, courses or settled quantities",
             where="null bank",
@@ -231,11 +255,17 @@ def _content(path: Path) -> Mapping[str, np.ndarray]:
     rebuild = "delete it and build the bank again"
     content = read_arrays(path, what="a batch of nulls", fix=rebuild)
     if not set(content) >= {*_SEGMENTS, *_SINGLE, "version", "columns"}:
-        raise CorruptError("it lacks arrays of this version", where=str(path), fix="build the bank again")
+        raise CorruptError(
+            "it lacks arrays of this version", where=str(path), fix="build the bank again"
+        )
     if content["version"].ravel().tolist() != [_VERSION]:
-        raise CorruptError("its arrays are those of another version", where=str(path), fix="build the bank again")
+        raise CorruptError(
+            "its arrays are those of another version", where=str(path), fix="build the bank again"
+        )
     if tuple(content["columns"].ravel().tolist()) != names():
-        raise CorruptError("its columns are not those of this version", where=str(path), fix="build the bank again")
+        raise CorruptError(
+            "its columns are not those of this version", where=str(path), fix="build the bank again"
+        )
     segments = content["recording"].size
     kinds = {name: "U" if name == "cloth" else "biuf" for name in _SEGMENTS}
     wrong = [
@@ -256,7 +286,9 @@ def _content(path: Path) -> Mapping[str, np.ndarray]:
 def _number(path: Path) -> int:
     number = read_bounded(path.stem.partition("-")[2], most=SEED_LIMIT)
     if number is None:
-        raise CorruptError("it is not a file of a bank", where=str(path), fix="move it out of the folder")
+        raise CorruptError(
+            "it is not a file of a bank", where=str(path), fix="move it out of the folder"
+        )
     return number
 
 
@@ -266,7 +298,8 @@ def files(folder: Path) -> list[Path]:
 
 
 def version_of_content() -> dict[str, Any]:
-    """Identifies what the arrays of a batch are, beside its design: nulls of another version are none of these."""
+    """Identifies what the arrays of a batch are, beside its design: nulls of another version are
+    none of these."""
     return {"version": _VERSION, "columns": list(names()), "code": code_version()}
 
 
@@ -283,7 +316,9 @@ def load(folder: Path, *, words: str, kinds: int | None = None) -> NullBank:
     """
     paths = files(folder)[:kinds]
     if not paths:
-        raise NotFoundError("the folder holds no null recordings", where=str(folder), fix="build the bank first")
+        raise NotFoundError(
+            "the folder holds no null recordings", where=str(folder), fix="build the bank first"
+        )
     parts: list[Nulls] = []
     durations: set[float] = set()
     anchors_given: set[bool] = set()
@@ -328,7 +363,8 @@ def load(folder: Path, *, words: str, kinds: int | None = None) -> NullBank:
         lengths = ", ".join(f"{d:g} s" for d in sorted(durations))
         raise CorruptError(
             f"the bank has segments of {lengths}, "
-            f"anchors {' and '.join('given' if g else 'taken from recordings' for g in anchors_given)}, "
+            "anchors "
+            f"{' and '.join('given' if g else 'taken from recordings' for g in anchors_given)}, "
             f"cloths {' and '.join('carried' if c else 'held still' for c in carried)}",
             where=str(folder),
             fix="build a bank of one design into a folder of its own",

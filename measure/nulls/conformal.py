@@ -1,16 +1,16 @@
 """How rare a statistic is among null experiments, counted by their kinds of numerics.
 
-Recordings of one kind of numerics are alike, so that the number of kinds, and not of recordings, says how rare
-anything can be. If the data are one more kind that is exchangeable with the K of the nulls, and their statistic is one
-drawn from among those that groups of their kind have, then
+Recordings of one kind of numerics are alike, so that the number of kinds, and not of recordings,
+says how rare anything can be. If the data are one more kind that is exchangeable with the K of the
+nulls, and their statistic is one drawn from among those that groups of their kind have, then
 
     p(t) = (1 + Σ_k s_k(t)) / (K + 1),   s_k(t) the share of the groups of kind k that are at least as far as t,
 
-is at most α in a share α of experiments or fewer, whatever the distribution of the statistic within kinds and among
-them (conformal prediction with hierarchical data: Lee, Barber and Willett, arXiv:2306.06342; Dunn, Wasserman and
-Ramdas, J. Am. Stat. Assoc. 118:2491, 2023). Many groups of a kind count no more than one, and only make s_k smoother
-than the 0 or 1 of a single draw. Nothing is extrapolated: p is never less than 1/(K + 1), and a level below that cannot
-be tested.
+is at most α in a share α of experiments or fewer, whatever the distribution of the statistic within
+kinds and among them (conformal prediction with hierarchical data: Lee, Barber and Willett,
+arXiv:2306.06342; Dunn, Wasserman and Ramdas, J. Am. Stat. Assoc. 118:2491, 2023). Many groups of a
+kind count no more than one, and only make s_k smoother than the 0 or 1 of a single draw. Nothing is
+extrapolated: p is never less than 1/(K + 1), and a level below that cannot be tested.
 """
 
 from __future__ import annotations
@@ -64,19 +64,21 @@ class GroupedConformal:
         return (1 + self._as_far(value)) / (1 + self.count)
 
     def critical(self, level: float) -> float | None:
-        """Computes the statistic beyond which p is at most `level`; None where the level cannot be tested."""
+        """Computes the statistic beyond which p is at most `level`; None where the level cannot be
+        tested."""
         if not self.tests(level):
             return None
         return max(float(value) for value in np.unique(self.null) if self.p(float(value)) > level)
 
     def interval(self, value: float, *, level: float) -> tuple[float, float]:
-        """Computes the interval of the share of all kinds, simulated or not, that are at least as far, by how many
-        kinds happen to be among the nulls (Clopper and Pearson's interval, with sums of shares in place of counts)."""
+        """Computes the interval of the share of all kinds, simulated or not, that are at least as
+        far, by how many kinds happen to be among the nulls (Clopper and Pearson's interval, with
+        sums of shares in place of counts)."""
         return clopper_pearson(self._as_far(value), self.count, level=level)
 
     def settling(self, value: float, *, at: float, level: float) -> int | None:
-        """Computes the fewest kinds, no fewer than there are, whose `interval` would not hold a share `at`, if the same
-        share of them is as far; None beyond `MOST_KINDS`."""
+        """Computes the fewest kinds, no fewer than there are, whose `interval` would not hold a
+        share `at`, if the same share of them is as far; None beyond `MOST_KINDS`."""
         share = self._as_far(value) / self.count
 
         def holds(count: int) -> bool:
@@ -85,12 +87,15 @@ class GroupedConformal:
 
         if holds(MOST_KINDS):
             return None
-        # The interval narrows about the share, so that it holds `at` up to some count and then no more.
-        return next((count for count in range(self.count, MOST_KINDS) if not holds(count)), MOST_KINDS)
+        # The interval narrows about the share, so that it holds `at` up to some count and then no
+        # more.
+        return next(
+            (count for count in range(self.count, MOST_KINDS) if not holds(count)), MOST_KINDS
+        )
 
     def quantile(self, share: float) -> float:
-        """Computes the value that one more kind does not exceed with a chance of `share` or more; infinite where there
-        are too few kinds for it."""
+        """Computes the value that one more kind does not exceed with a chance of `share` or more;
+        infinite where there are too few kinds for it."""
         order = np.argsort(self.null)
         below = np.cumsum(self._weight[order])
         rank = int(np.searchsorted(below, share * (1 + self.count) - 1e-9))

@@ -1,4 +1,5 @@
-"""The model run freely in the winds of recordings, carried as they are, and by how much these settle elsewhere."""
+"""The model run freely in the winds of recordings, carried as they are, and by how much these
+settle elsewhere."""
 
 from __future__ import annotations
 
@@ -16,12 +17,13 @@ from measure.probes.settled import settling_of
 from measure.verdict.criteria import CRITERIA
 
 _COPIES = 2
-"""Runs of the model for each recording, from other starts: the mean of two differs by chance less than one does."""
+"""Runs of the model for each recording, from other starts: the mean of two differs by chance less
+than one does."""
 
 
 def settled_off(recordings: Sequence[Trajectory], batch: NullBatch) -> FloatArray:
-    """Computes what recordings settle at less what a model does in the same winds, held where they show it to be held,
-    (recording, quantity).
+    """Computes what recordings settle at less what a model does in the same winds, held where they
+    show it to be held, (recording, quantity).
 
     Args:
         batch: the model's cloth, calibrations, winds and effects, one a recording.
@@ -39,8 +41,8 @@ def settled_off(recordings: Sequence[Trajectory], batch: NullBatch) -> FloatArra
     runs = copies.as_fitted()
     off = []
     for number, recording in enumerate(recordings):
-        # As long as the recording, whose wind is not known further, and both at the model's rate: a speed between two
-        # frames is less the further they are apart.
+        # As long as the recording, whose wind is not known further, and both at the model's rate: a
+        # speed between two frames is less the further they are apart.
         stride = max(1, round(recording.rate / batch.rate))
         positions, period = recording.positions[::stride], stride / recording.rate
         modelled = [
@@ -53,11 +55,14 @@ def settled_off(recordings: Sequence[Trajectory], batch: NullBatch) -> FloatArra
 
 
 def mistaken(batch: NullBatch) -> NullBatch:
-    """Moves the batch's calibrations by as much as those of data are off: one draw for its cloth."""
+    """Moves the batch's calibrations by as much as those of data are off: one draw for its
+    cloth."""
     rng = stream(batch.seed, "null", "mistaken")
     spread = (CRITERIA.area_weight_between, CRITERIA.bending_between, CRITERIA.damping_factor)
     steps = tuple(float(step) for step in spread * rng.standard_normal(3))
     moved: dict[Calibration, Calibration] = {
         calibration: calibration.moved(steps) for calibration in batch.calibrations
     }
-    return replace(batch, calibrations=tuple(moved[calibration] for calibration in batch.calibrations))
+    return replace(
+        batch, calibrations=tuple(moved[calibration] for calibration in batch.calibrations)
+    )

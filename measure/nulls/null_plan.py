@@ -21,7 +21,8 @@ from measure.verdict.criteria import CRITERIA
 
 _CARRIED = ", carried along the recordings' own ways from other instants on"
 FEWEST_NULLS = CRITERIA.simulated_kinds * banks.WINDS
-"""So many at least are simulated: each kind of numerics is a batch, and p-values count the kinds."""
+"""So many at least are simulated: each kind of numerics is a batch, and p-values count the
+kinds."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,12 +32,14 @@ class NullOptions:
     Attributes:
         seed: of the nulls.
         level: of the test.
-        nulls: null recordings simulated where no bank is given, in whole batches; at least `FEWEST_NULLS`. A verdict
-            simulates half as many, or fewer, where these show that the base model is not rejected (see `first_round`).
-        bank: a folder of nulls over priors that hold for this design; None simulates nulls of this cloth, its markers
-            and winds, over the same priors.
+        nulls: null recordings simulated where no bank is given, in whole batches; at least
+            `FEWEST_NULLS`. A verdict simulates half as many, or fewer, where these show that the
+            base model is not rejected (see `first_round`).
+        bank: a folder of nulls over priors that hold for this design; None simulates nulls of this
+            cloth, its markers and winds, over the same priors.
         workers: processes for the nulls, then threads for what is fitted.
-        scheduler: address of a Dask scheduler whose workers simulate the nulls; None for processes of this machine.
+        scheduler: address of a Dask scheduler whose workers simulate the nulls; None for processes
+            of this machine.
 
     Raises:
         UsageError: a level or counts that make no sense.
@@ -51,7 +54,9 @@ class NullOptions:
 
     def __post_init__(self) -> None:
         if not 0 < self.level < 1:
-            raise UsageError(f"the level is {self.level!r}", where="nulls", fix="give one between 0 and 1")
+            raise UsageError(
+                f"the level is {self.level!r}", where="nulls", fix="give one between 0 and 1"
+            )
         if self.nulls < FEWEST_NULLS or self.workers < 1:
             raise UsageError(
                 f"{self.nulls} nulls cannot be made by {self.workers} workers",
@@ -60,8 +65,11 @@ class NullOptions:
             )
 
 
-def bank_for(setting: Setting, options: NullOptions, *, nulls: int | None = None, stage: Stage) -> NullBank:
-    """Returns the bank of a folder where one is named; else nulls that are simulated for an experiment.
+def bank_for(
+    setting: Setting, options: NullOptions, *, nulls: int | None = None, stage: Stage
+) -> NullBank:
+    """Returns the bank of a folder where one is named; else nulls that are simulated for an
+    experiment.
 
     Args:
         nulls: how many are simulated; None for as many as the options have.
@@ -87,13 +95,21 @@ def first_round(options: NullOptions) -> int:
 
 
 def more_nulls(
-    nulls: int, wanted: int, most: int, conformal: GroupedConformal, statistic: float, *, level: float
+    nulls: int,
+    wanted: int,
+    most: int,
+    conformal: GroupedConformal,
+    statistic: float,
+    *,
+    level: float,
 ) -> int | None:
-    """Returns twice as many nulls where so many leave open what the test decides; None where they decide it.
+    """Returns twice as many nulls where so many leave open what the test decides; None where they
+    decide it.
 
-    Below `wanted` that is where the interval of p is not wholly above the level: the base model is only ever rejected
-    by that many or more, and p of so many is valid whether fewer would have ended the test or not. Beyond, up to
-    `most`, it is where p is within `Criteria.near` of the level and its interval includes the level.
+    Below `wanted` that is where the interval of p is not wholly above the level: the base model is
+    only ever rejected by that many or more, and p of so many is valid whether fewer would have
+    ended the test or not. Beyond, up to `most`, it is where p is within `Criteria.near` of the
+    level and its interval includes the level.
     """
     p, (low, high) = conformal.p(statistic), conformal.interval(statistic, level=CRITERIA.interval)
     if nulls < wanted:
@@ -118,8 +134,8 @@ def check(bank: NullBank, setting: Setting, *, where: str = "null bank") -> None
     """Refuses nulls that do not fit the recordings.
 
     Raises:
-        InputError: segments of another length or frame interval, anchors known in another way, or cloths held in
-            another way.
+        InputError: segments of another length or frame interval, anchors known in another way, or
+            cloths held in another way.
     """
     if bank.anchors_given != setting.experiment.specimen.anchors_given:
         ways = ("taken from where the recordings show the attachments", "given")
@@ -132,20 +148,27 @@ def check(bank: NullBank, setting: Setting, *, where: str = "null bank") -> None
     if bank.carried != setting.experiment.carried:
         ways = ("held still", "carried")
         raise InputError(
-            f"the bank's cloths were {ways[bank.carried]}, that of the recordings is {ways[not bank.carried]}",
+            f"the bank's cloths were {ways[bank.carried]}, that of the recordings is "
+            f"{ways[not bank.carried]}",
             where=where,
             fix="simulate nulls for these recordings: leave the bank out",
         )
     if abs(bank.duration - setting.segments.duration) > 0.1 * bank.duration:
         raise InputError(
-            f"its segments last {bank.duration:.2g} s, those of the recordings {setting.segments.duration:.2g} s",
+            f"its segments last {bank.duration:.2g} s, those of the recordings "
+            f"{setting.segments.duration:.2g} s",
             where=where,
             fix="simulate nulls for these recordings: leave the bank out; or record for longer",
         )
-    shortest, longest, period = bank.nulls.period.min(), bank.nulls.period.max(), setting.segments.period
+    shortest, longest, period = (
+        bank.nulls.period.min(),
+        bank.nulls.period.max(),
+        setting.segments.period,
+    )
     if not 0.9 * shortest < period < 1.1 * longest:
         raise InputError(
-            f"its frames are {1e3 * shortest:.3g} to {1e3 * longest:.3g} ms apart, those of the recordings "
+            f"its frames are {1e3 * shortest:.3g} to {1e3 * longest:.3g} ms apart, those of the "
+            "recordings "
             f"{1e3 * period:.3g} ms",
             where=where,
             fix="simulate nulls for these recordings: leave the bank out",
@@ -153,9 +176,9 @@ def check(bank: NullBank, setting: Setting, *, where: str = "null bank") -> None
 
 
 def batches(setting: Setting, *, kinds: int, seed: int) -> list[NullBatch]:
-    """Draws nulls over the priors of the cloth, of the winds of an experiment and carried as it is: a batch for each
-    kind of numerics. Those of one cloth hold as many segments as the data, and are as noisy as the noisiest of its
-    recordings.
+    """Draws nulls over the priors of the cloth, of the winds of an experiment and carried as it is:
+    a batch for each kind of numerics. Those of one cloth hold as many segments as the data, and are
+    as noisy as the noisiest of its recordings.
     """
     segments, recordings = setting.segments, setting.experiment.recordings
     drawn = [
@@ -187,10 +210,16 @@ def batches(setting: Setting, *, kinds: int, seed: int) -> list[NullBatch]:
 
 
 def simulate_bank(
-    setting: Setting, *, nulls: int, seed: int, workers: int, stage: Stage, scheduler: str | None = None
+    setting: Setting,
+    *,
+    nulls: int,
+    seed: int,
+    workers: int,
+    stage: Stage,
+    scheduler: str | None = None,
 ) -> NullBank:
-    """Simulates a bank of `batches`, kept in the user's cache folder by the hash of its design: what is there already
-    is not simulated anew, and a build that was stopped goes on."""
+    """Simulates a bank of `batches`, kept in the user's cache folder by the hash of its design:
+    what is there already is not simulated anew, and a build that was stopped goes on."""
     wanted = batches(setting, kinds=math.ceil(nulls / banks.WINDS), seed=seed)
     done = 0
 
@@ -208,14 +237,15 @@ def simulate_bank(
 
 
 def kept_in(setting: Setting, *, seed: int) -> Path:
-    """Returns the folder of the nulls of an experiment's design, by a seed and by this version of the code."""
+    """Returns the folder of the nulls of an experiment's design, by a seed and by this version of
+    the code."""
     identity = {"design": design_hash(setting), "seed": seed, **banks.version_of_content()}
     return user_cache() / "nulls" / recipe_hash(identity)[:32]
 
 
 def design_hash(setting: Setting) -> str:
-    """Hashes all of an experiment that shapes its nulls, SHA-256: cloth, markers, rate, noise, lengths, winds and
-    ways."""
+    """Hashes all of an experiment that shapes its nulls, SHA-256: cloth, markers, rate, noise,
+    lengths, winds and ways."""
     segments, recordings = setting.segments, setting.experiment.recordings
     content, arrays = describe_cloth(setting.experiment.specimen)
     del content["density-uncertainty"]  # nulls are judged under it, not made by it

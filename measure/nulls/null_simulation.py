@@ -1,7 +1,8 @@
-"""Recordings of the base model itself, made with other numerics than the fit's: its errors when it is right.
+"""Recordings of the base model itself, made with other numerics than the fit's: its errors when it
+is right.
 
-Nothing of the fitter's numerics is used: meshes are finer by random factors, half of them irregular, and steps are
-shorter by other methods.
+Nothing of the fitter's numerics is used: meshes are finer by random factors, half of them
+irregular, and steps are shorter by other methods.
 """
 
 from __future__ import annotations
@@ -35,7 +36,8 @@ from sim.integrate.symplectic import SAFETY, Symplectic
 from sim.run.simulation_loop import Batch, DivergedError, Divergence, after
 from sim.wind.sampled import Beyond, Even, SampledWind
 
-SETTLE = 3.0  # s, before the first frame; a flag of 1.5 m has forgotten a start from rest after two swings
+# s, before the first frame; a flag of 1.5 m has forgotten a start from rest after two swings
+SETTLE = 3.0
 _FINER = (1.3, 1.75)
 _STEPS = (1e-3, 2e-3)  # s, of backward Euler
 _LEVEL = 1e-6  # of the cloth's size: attachments that lie less apart along u are on one vertical
@@ -65,11 +67,14 @@ class NullBatch:
         noise: standard deviation of a marker's coordinate [m].
         calibrations: one a recording.
         speeds: of the wind, along +x, one a recording [m/s].
-        winds: that blow in place of steady ones of these speeds, one a recording; none where they are steady.
-        tracks: of attachments that are carried, one a recording; none where they are held still at the anchors.
+        winds: that blow in place of steady ones of these speeds, one a recording; none where they
+            are steady.
+        tracks: of attachments that are carried, one a recording; none where they are held still at
+            the anchors.
         seed: of the numerics, the starts and the noise.
         stiffness: how its tables of stiffness differ from the nominal ones.
-        effects: what acts beside the base model: none for nulls proper, those named for the floor of a larger model.
+        effects: what acts beside the base model: none for nulls proper, those named for the floor
+            of a larger model.
     """
 
     specimen: Specimen
@@ -88,7 +93,9 @@ class NullBatch:
     def simulate(self) -> list[Trajectory]:
         """Simulates one recording a calibration."""
         flat, attached = self._mesh()
-        tracked = np.einsum("mv,fvcb->fmcb", onto(flat.rest, self.markers), self._frames(flat, attached))
+        tracked = np.einsum(
+            "mv,fvcb->fmcb", onto(flat.rest, self.markers), self._frames(flat, attached)
+        )
         jitter = self.noise * stream(self.seed, "null", "markers").standard_normal(tracked.shape)
         trajectories = [
             Trajectory(
@@ -99,7 +106,9 @@ class NullBatch:
                 wind=wind,
                 noise=self.noise,
             )
-            for number, wind in enumerate(self.winds or [WindTrack.constant((u, 0.0, 0.0)) for u in self.speeds])
+            for number, wind in enumerate(
+                self.winds or [WindTrack.constant((u, 0.0, 0.0)) for u in self.speeds]
+            )
         ]
         return (
             [carry_attachments(recording, self.specimen.seats) for recording in trajectories]
@@ -114,25 +123,38 @@ class NullBatch:
         return self._mesh()[0].vertex_count * (2.0 if isinstance(integrator, Symplectic) else 1.0)
 
     def _mesh(self) -> tuple[Mesh, tuple[int, ...]]:
-        """Makes a finer mesh in the fit's frame, and finds its vertices nearest to the attachments: a grid, or in half
-        of the draws one whose inner vertices are moved and joined anew (Delaunay), as other codes' meshes are."""
+        """Makes a finer mesh in the fit's frame, and finds its vertices nearest to the attachments:
+        a grid, or in half of the draws one whose inner vertices are moved and joined anew
+        (Delaunay), as other codes' meshes are."""
         rng = stream(self.seed, "null", "mesh")
         rest = self.specimen.mesh.rest
         low, size = rest.min(axis=0), np.ptp(rest, axis=0)
-        spacing = math.sqrt(size[0] * size[1] / self.specimen.mesh.vertex_count) / rng.uniform(*_FINER)
+        spacing = math.sqrt(size[0] * size[1] / self.specimen.mesh.vertex_count) / rng.uniform(
+            *_FINER
+        )
         columns, rows = (max(2, round(extent / spacing)) for extent in size)
         diagonals = list(Diagonals)[rng.integers(2)]
-        flat = grid(width=float(size[0]), height=float(size[1]), columns=columns, rows=rows, diagonals=diagonals)
+        flat = grid(
+            width=float(size[0]),
+            height=float(size[1]),
+            columns=columns,
+            rows=rows,
+            diagonals=diagonals,
+        )
         if rng.random() < 0.5:
             flat = irregular(flat, spacing, rng)
         flat = replace(flat, rest=flat.rest + low)
-        nearest = (int(np.argmin(np.linalg.norm(flat.rest - rest[vertex], axis=1))) for vertex in self.specimen.held)
+        nearest = (
+            int(np.argmin(np.linalg.norm(flat.rest - rest[vertex], axis=1)))
+            for vertex in self.specimen.held
+        )
         return flat, tuple(nearest)
 
     def _frames(self, flat: Mesh, attached: tuple[int, ...]) -> FloatArray:
         """Computes positions (frame, vertex, 3, recording) [m], after the start has been forgotten.
 
-        Cloth that is stretched beyond what a stable step is estimated for diverges; it is run anew in smaller steps.
+        Cloth that is stretched beyond what a stable step is estimated for diverges; it is run anew
+        in smaller steps.
 
         Raises:
             FlagdataError: it diverges in the smallest steps as well.
@@ -144,11 +166,13 @@ class NullBatch:
             f"a simulation of nulls diverges, even in steps {2**_HALVINGS} times smaller than usual",
             where=f"{self.calibrations[0]}, stretching × {self.stiffness.stretching:.3g}, winds "
             f"{', '.join(f'{speed:.3g}' for speed in self.speeds)} m/s",
-            fix="check the unit of the cloth's stretching (N/m), area weight (kg/m²) and of the winds (m/s)",
+            fix="check the unit of the cloth's stretching (N/m), area weight (kg/m²) and of the "
+            "winds (m/s)",
         )
 
     def as_fitted(self) -> FloatArray:
-        """Computes the same by the mesh and the steps of the fit, without noise, (frame, marker, 3, recording) [m].
+        """Computes the same by the mesh and the steps of the fit, without noise, (frame, marker, 3,
+        recording) [m].
 
         Raises:
             FreeRunDivergedError: it diverges.
@@ -160,11 +184,14 @@ class NullBatch:
             raise FreeRunDivergedError(
                 "a free run of the model diverges",
                 where=f"{self.calibrations[0]}",
-                fix="check the unit of the cloth's stretching (N/m), area weight (kg/m²) and of the winds (m/s)",
+                fix="check the unit of the cloth's stretching (N/m), area weight (kg/m²) and of "
+                "the winds (m/s)",
             ) from None
         return np.einsum("mv,fvcb->fmcb", onto(specimen.mesh.rest, self.markers), frames)
 
-    def _run(self, flat: Mesh, attached: tuple[int, ...], integrator: Integrator, damped: float) -> FloatArray:
+    def _run(
+        self, flat: Mesh, attached: tuple[int, ...], integrator: Integrator, damped: float
+    ) -> FloatArray:
         """Runs the flags by a method that damps by itself so much [s].
 
         Raises:
@@ -172,10 +199,16 @@ class NullBatch:
         """
         specimen = self.specimen
         first = np.array([-self._begins])
-        begun = [track.at(first)[0] for track in self.tracks] or [specimen.anchors] * len(self.speeds)
-        roughness = 2e-3 * stream(self.seed, "null", "start").standard_normal((len(self.speeds), len(flat.rest), 3))
+        begun = [track.at(first)[0] for track in self.tracks] or [specimen.anchors] * len(
+            self.speeds
+        )
+        roughness = 2e-3 * stream(self.seed, "null", "start").standard_normal(
+            (len(self.speeds), len(flat.rest), 3)
+        )
         scenes = []
-        for calibration, rough, speed, anchors in zip(self.calibrations, roughness, self.speeds, begun, strict=True):
+        for calibration, rough, speed, anchors in zip(
+            self.calibrations, roughness, self.speeds, begun, strict=True
+        ):
             position = _hung(flat.rest, specimen.seats, anchors) + rough
             position[list(attached)] = anchors
             material = calibration.material(self.stiffness.of(specimen.material))
@@ -212,7 +245,10 @@ class NullBatch:
 
     def _times(self, period: float) -> FloatArray:
         """Lists times (n,) of a run, so far apart, since the recording's first frame [s]."""
-        return np.arange(math.ceil((SETTLE + self.duration) / period) + 2, dtype=np.float64) * period - self._begins
+        return (
+            np.arange(math.ceil((SETTLE + self.duration) / period) + 2, dtype=np.float64) * period
+            - self._begins
+        )
 
     def _blowing(self, system: System) -> SampledWind:
         """Samples the winds since the start of the run."""
@@ -225,12 +261,14 @@ class NullBatch:
     def _carrying(self, system: System) -> AnchorTracks:
         """Samples the paths of the attachments since the start of the run."""
         places = np.stack([track.at(self._times(CARRIED)) for track in self.tracks], axis=-1)
-        moved = torch.as_tensor(places - places[0], dtype=system.cloth.dtype, device=system.cloth.device)
+        moved = torch.as_tensor(
+            places - places[0], dtype=system.cloth.dtype, device=system.cloth.device
+        )
         return AnchorTracks(start=0.0, period=CARRIED, samples=moved)
 
     def _method(self, halvings: int = 0) -> tuple[Integrator, float]:
-        """Chooses a method for these dampings with steps that were halved so often, and the damping it adds by itself
-        [s]."""
+        """Chooses a method for these dampings with steps that were halved so often, and the damping
+        it adds by itself [s]."""
         if max(c.damping for c in self.calibrations) <= _GENTLE and not self.effects:
             return Symplectic(safety=SAFETY / 2**halvings), 0.0
         step = _STEPS[stream(self.seed, "null", "method").integers(len(_STEPS))] / 2**halvings
@@ -239,14 +277,17 @@ class NullBatch:
 
 
 def _hung(rest: FloatArray, seats: FloatArray, anchors: FloatArray) -> FloatArray:
-    """Hangs a plane upright cloth below or beside its anchors (held, 3) [m], turned about the vertical as they are,
-    (vertex, 3); one that is held along a vertical stands along +x.
+    """Hangs a plane upright cloth below or beside its anchors (held, 3) [m], turned about the
+    vertical as they are, (vertex, 3); one that is held along a vertical stands along +x.
 
     Args:
         rest, seats: (vertex, 2) of the cloth, (held, 2) of its attachments [m].
     """
     lowest = int(np.argmin(anchors[:, 2]))
-    along, (x, y) = seats[:, 0] - seats[:, 0].mean(), (anchors[:, :2] - anchors[:, :2].mean(axis=0)).T
+    along, (x, y) = (
+        seats[:, 0] - seats[:, 0].mean(),
+        (anchors[:, :2] - anchors[:, :2].mean(axis=0)).T,
+    )
     level = np.ptp(along) > _LEVEL * np.ptp(rest)
     angle = math.atan2(float(along @ y), float(along @ x)) if level else 0.0
     offset = rest - seats[lowest]
@@ -255,11 +296,13 @@ def _hung(rest: FloatArray, seats: FloatArray, anchors: FloatArray) -> FloatArra
 
 
 def irregular(flat: Mesh, spacing: float, rng: np.random.Generator) -> Mesh:
-    """Moves a grid's vertices, those inside by up to `_UNEVEN` of the spacing [m] along each axis, and joins them
-    anew."""
+    """Moves a grid's vertices, those inside by up to `_UNEVEN` of the spacing [m] along each axis,
+    and joins them anew."""
     low, high = flat.rest.min(axis=0), flat.rest.max(axis=0)
     inside = ((flat.rest > low + spacing / 2) & (flat.rest < high - spacing / 2)).all(axis=1)
-    rest = flat.rest + np.where(inside[:, None], rng.uniform(-_UNEVEN, _UNEVEN, flat.rest.shape) * spacing, 0.0)
+    rest = flat.rest + np.where(
+        inside[:, None], rng.uniform(-_UNEVEN, _UNEVEN, flat.rest.shape) * spacing, 0.0
+    )
     faces = np.asarray(Delaunay(rest).simplices, dtype=np.int64)
     (a, b), (c, d) = (rest[faces[:, k]].T - rest[faces[:, 0]].T for k in (1, 2))
     doubled = a * d - b * c

@@ -1,4 +1,5 @@
-"""What the tests' statistics are when nothing is missing: groups of null recordings that the null model did not see."""
+"""What the tests' statistics are when nothing is missing: groups of null recordings that the null
+model did not see."""
 
 from __future__ import annotations
 
@@ -20,7 +21,16 @@ from measure.inference.growth import power
 from measure.inference.random_effect import NullModel, Nulls
 from measure.inference.segment_evidence import Evidence, best_gain
 from measure.nulls.conformal import GroupedConformal, kinds_needed
-from measure.nulls.directions import APPEARS, NOTHING, Move, moves, pull_along, pulls_of, shares_of, standardise_pulls
+from measure.nulls.directions import (
+    APPEARS,
+    NOTHING,
+    Move,
+    moves,
+    pull_along,
+    pulls_of,
+    shares_of,
+    standardise_pulls,
+)
 from measure.nulls.tails import as_normal, freedom
 from measure.probes.lines import Lines, SpectralLine, strongest
 from measure.probes.segment_rows import StatisticRows
@@ -28,7 +38,8 @@ from measure.verdict.criteria import CRITERIA
 
 _GROUPS = 400
 GUSTS = "air-density.change"
-"""The column that gusts fluctuate along: the scale of the wind's pressure, twice their relative intensity."""
+"""The column that gusts fluctuate along: the scale of the wind's pressure, twice their relative
+intensity."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,7 +84,9 @@ def left_out_groups(nulls: Nulls, pool: Nulls, segments: int, *, seed: int) -> I
                 )
             groups.append(chosen)
         other_kinds = nulls.select(nulls.numerics != outside.numerics[0])
-        yield LeftOut(model=NullModel.fit(other_kinds, outside.design), outside=outside, groups=tuple(groups))
+        yield LeftOut(
+            model=NullModel.fit(other_kinds, outside.design), outside=outside, groups=tuple(groups)
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -105,7 +118,8 @@ class NullBank:
             raise InputError(
                 f"the nulls are of {kinds} kinds of numerics",
                 where="null bank",
-                fix=f"simulate at least {CRITERIA.fewest_kinds}, and {kinds_needed(CRITERIA.level)} to test at a level "
+                fix=f"simulate at least {CRITERIA.fewest_kinds}, and "
+                f"{kinds_needed(CRITERIA.level)} to test at a level "
                 f"of {CRITERIA.level:g}",
             )
 
@@ -114,19 +128,21 @@ class NullBank:
         return NullModel.fit(self.nulls, design)
 
     def plain(self) -> NullBank:
-        """Removes moments about the pole, the wind's course and settled quantities, for those who look at the errors
-        alone."""
+        """Removes moments about the pole, the wind's course and settled quantities, for those who
+        look at the errors alone."""
         errors_alone = replace(self.nulls.statistics, turning=None, course=None, settled=None)
         return replace(self, nulls=replace(self.nulls, statistics=errors_alone))
 
-    def reference(self, segments: int, *, noise: float, seed: int, prior: FloatArray = PRIOR) -> Reference:
-        """Computes statistics of groups like the data: so many segments of recordings of one null experiment, by a null
-        model that has seen none of its numerics.
+    def reference(
+        self, segments: int, *, noise: float, seed: int, prior: FloatArray = PRIOR
+    ) -> Reference:
+        """Computes statistics of groups like the data: so many segments of recordings of one null
+        experiment, by a null model that has seen none of its numerics.
 
         Args:
             noise: of the data's markers [m].
-            prior: (theta,) standard deviations of the data's calibrated parameters about the nominal ones: nulls are
-                judged under the same.
+            prior: (theta,) standard deviations of the data's calibrated parameters about the
+                nominal ones: nulls are judged under the same.
 
         Raises:
             InputError: no experiment has that many segments, or too few kinds have such noise.
@@ -135,18 +151,30 @@ class NullBank:
         beside_gusts: list[_NullGroups] = []
         groups: list[_Group] = []
         for left_out in left_out_groups(self.nulls, self.nulls, segments, seed=seed):
-            evidence = Evidence.of(left_out.outside.statistics, left_out.outside.speeds, left_out.model.under(prior))
-            for chosen in {tuple(sorted(group.tolist())): group for group in left_out.groups}.values():
+            evidence = Evidence.of(
+                left_out.outside.statistics, left_out.outside.speeds, left_out.model.under(prior)
+            )
+            for chosen in {
+                tuple(sorted(group.tolist())): group for group in left_out.groups
+            }.values():
                 picked, first_segment = evidence.select(chosen), left_out.outside.select(chosen[:1])
                 plain.append(_NullGroups.of(picked, self.columns, first_segment))
                 beside_gusts.append(
-                    _NullGroups.of(picked.freed(self.columns.index(GUSTS)), self.columns, first_segment)
+                    _NullGroups.of(
+                        picked.freed(self.columns.index(GUSTS)), self.columns, first_segment
+                    )
                 )
             first = left_out.groups[0]
-            groups.append(_Group(evidence=evidence.select(first), own=left_out.outside.select(first[:1])))
+            groups.append(
+                _Group(evidence=evidence.select(first), own=left_out.outside.select(first[:1]))
+            )
         with_gusts = Reference.of(_NullGroups.joined(beside_gusts), noise)
         return Reference.of(
-            _NullGroups.joined(plain), noise, beside_gusts=with_gusts, columns=self.columns, groups=groups
+            _NullGroups.joined(plain),
+            noise,
+            beside_gusts=with_gusts,
+            columns=self.columns,
+            groups=groups,
         )
 
 
@@ -170,7 +198,8 @@ class _NullGroups(StatisticRows):
         swings: (group, part) of the wind's course, of no part where it is not looked at.
         settled: (group, quantity) what recordings settle at, of none where it is not looked at.
         lines: (group, shape · axis) `strongest`; None where spectra are not looked at.
-        deviations: (group, theta) of the calibrated parameters from the true ones, in standard errors.
+        deviations: (group, theta) of the calibrated parameters from the true ones, in standard
+            errors.
         noise: (group,) of the markers [m].
         kinds: (group,) of numerics.
         damping: (group,) logarithm of its ratio to the nominal one.
@@ -192,14 +221,17 @@ class _NullGroups(StatisticRows):
     def of(cls, evidence: Evidence, columns: tuple[str, ...], segment: Nulls) -> _NullGroups:
         """Computes the statistics of one group, taken at its true calibration.
 
-        A null's cloth is as far from the nominal one as cloths known to `PRIOR` are. Where the data's is known better,
-        that of a null lies nearer to its nominal one by as much.
+        A null's cloth is as far from the nominal one as cloths known to `PRIOR` are. Where the
+        data's is known better, that of a null lies nearer to its nominal one by as much.
 
         Args:
             segment: one segment of it.
         """
         nominal = -segment.calibration[0] * np.minimum(evidence.prior / PRIOR, 1.0)
-        swing, settles = (np.zeros(0) if values is None else values for values in (evidence.swing, evidence.settles))
+        swing, settles = (
+            np.zeros(0) if values is None else values
+            for values in (evidence.swing, evidence.settles)
+        )
         return cls(
             shares=unscaled_drops(evidence, columns)[None],
             pulls=pulls_of(evidence)[None],
@@ -245,14 +277,16 @@ class _Usual:
         )
 
     def pulled(self, pulls: FloatArray) -> FloatArray:
-        """Computes how far each column pulls more than it does in nulls, in their standard deviations, (group, column,
-        part)."""
+        """Computes how far each column pulls more than it does in nulls, in their standard
+        deviations, (group, column, part)."""
         return standardise_pulls(pulls, self.pull, self.pull_width)
 
     def far(self, groups: _NullGroups) -> FloatArray:
-        """Computes how far groups are from their mean, in deviations by each one's own tail, (group, column + 2 to
-        11)."""
-        distances = as_normal((_roots(groups, self.lines, self.powers) - self.centre) / self.width, self.degrees)
+        """Computes how far groups are from their mean, in deviations by each one's own tail,
+        (group, column + 2 to 11)."""
+        distances = as_normal(
+            (_roots(groups, self.lines, self.powers) - self.centre) / self.width, self.degrees
+        )
         begin = groups.shares.shape[1] + 2
         either = slice(begin, begin + groups.swings.shape[1] + groups.settled.shape[1])
         distances[:, either] = np.abs(distances[:, either])
@@ -262,55 +296,65 @@ class _Usual:
 def _roots(groups: _NullGroups, lines: Lines | None, powers: FloatArray) -> FloatArray:
     swings = groups.swings * np.exp(-np.outer(groups.damping, powers))
     roots = np.c_[np.cbrt(np.c_[groups.shares, groups.left, groups.gained]), swings, groups.settled]
-    return roots if lines is None or groups.lines is None else np.c_[roots, lines.standing_out(groups.lines)]
+    return (
+        roots
+        if lines is None or groups.lines is None
+        else np.c_[roots, lines.standing_out(groups.lines)]
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Reference:
     """Null distributions.
 
-    A column's statistic is the share of its drop in what is left with it, drop/(left − drop), over the mean share of
-    nulls with about the same noise of the markers: 1 in the mean if nothing is missing. Sets whose errors are larger
-    all over are so no larger here, nor are those whose noise alone moves a column. One more statistic stands for gusts:
-    the likelihood ratio of a wind pressure that fluctuates, over one that differs by a constant.
+    A column's statistic is the share of its drop in what is left with it, drop/(left − drop), over
+    the mean share of nulls with about the same noise of the markers: 1 in the mean if nothing is
+    missing. Sets whose errors are larger all over are so no larger here, nor are those whose noise
+    alone moves a column. One more statistic stands for gusts: the likelihood ratio of a wind
+    pressure that fluctuates, over one that differs by a constant.
 
-    Some columns are near their mean in all nulls, others are far from it in some. The tests compare how far from the
-    nulls' mean each cube root is, in their standard deviations: that of a variable like χ², of whatever freedom, is
-    nearly normal (Wilson and Hilferty, Proc. Natl. Acad. Sci. 17:684, 1931); one whose tail is heavier is brought to
-    the normal deviate that is as rare (see `tails`). With the columns they weigh what is left,
-    the same of moments about the pole, and the most prominent line of the errors' spectra, where these are looked at.
-    What the calibrated parameters and the directions of the numerics take in of an effect shows on winds that they were
-    not fitted to: so they weigh the best held-out gain as well.
-    So they do how the wind's course swings: a covariance, of which nulls have what chance and their numerics leave, on
-    either side of nothing, and both sides are far; it grows by a power of the damping, which is taken out (see
-    `growth`). What recordings settle at is far on either side as well. Evidence whose moments, course or settled
-    quantities are not to count goes without them.
+    Some columns are near their mean in all nulls, others are far from it in some. The tests compare
+    how far from the nulls' mean each cube root is, in their standard deviations: that of a variable
+    like χ², of whatever freedom, is nearly normal (Wilson and Hilferty, Proc. Natl. Acad. Sci.
+    17:684, 1931); one whose tail is heavier is brought to the normal deviate that is as rare (see
+    `tails`). With the columns they weigh what is left, the same of moments about the pole, and the
+    most prominent line of the errors' spectra, where these are looked at. What the calibrated
+    parameters and the directions of the numerics take in of an effect shows on winds that they were
+    not fitted to: so they weigh the best held-out gain as well. So they do how the wind's course
+    swings: a covariance, of which nulls have what chance and their numerics leave, on either side
+    of nothing, and both sides are far; it grows by a power of the damping, which is taken out (see
+    `growth`). What recordings settle at is far on either side as well. Evidence whose moments,
+    course or settled quantities are not to count goes without them.
 
-    What is usual of a null group is that of other kinds of numerics, as it is for data: by means and deviations that it
-    had a part in, 3 % of true nulls were rejected at 2 %, and 7 % at 5 % (20 kinds; by other kinds 2 and 4 %).
+    What is usual of a null group is that of other kinds of numerics, as it is for data: by means
+    and deviations that it had a part in, 3 % of true nulls were rejected at 2 %, and 7 % at 5 % (20
+    kinds; by other kinds 2 and 4 %).
 
     Attributes:
         scaled: (group, column) of `unscaled_drops`: columns, gusts, then moments.
         spread: (column,) mean share of nulls as noisy as the data.
-        far: (group, column + 2 to 11) how far the cube root of each is from its mean in other kinds' nulls as noisy, in
-            standard deviations; after the columns that of what the base model leaves, then the best held-out gain,
-            swings, settled quantities and the line as they are.
+        far: (group, column + 2 to 11) how far the cube root of each is from its mean in other
+            kinds' nulls as noisy, in standard deviations; after the columns that of what the base
+            model leaves, then the best held-out gain, swings, settled quantities and the line as
+            they are.
         kinds: (group,) of numerics.
-        deviations: (group, theta) of the calibrated parameters from those that the nulls were simulated with, in
-            standard errors as Σ has them.
-        centre, width: (column + 2 to 11,) mean and standard deviation of the same, of nulls as noisy as the data.
+        deviations: (group, theta) of the calibrated parameters from those that the nulls were
+            simulated with, in standard errors as Σ has them.
+        centre, width: (column + 2 to 11,) mean and standard deviation of the same, of nulls as
+            noisy as the data.
         degrees: (column + 2 to 11,) of freedom of their tails, see `measure.nulls.tails`.
         lines: of the nulls; None where spectra are not looked at.
         powers: (part,) of the damping by which swings grow.
         damping: of the data, the logarithm of its ratio to the nominal one.
         pulled: (group, column, part) of `pulled`, standardised as `far` is.
-        pull, pull_width: (column, part) mean and standard deviation of the same, of nulls as noisy as the data.
+        pull, pull_width: (column, part) mean and standard deviation of the same, of nulls as noisy
+            as the data.
         beside_gusts: the same of `Evidence.freed` along the pressure; None of such a one itself.
         columns: names of the columns; of one from a bank.
         groups: one of each kind; of one from a bank.
         usual: kind → what is usual in the other kinds' nulls.
-        suspected: column and sign of the effect that was suspected beforehand, along which alone is tested; None to
-            test along all.
+        suspected: column and sign of the effect that was suspected beforehand, along which alone is
+            tested; None to test along all.
     """
 
     scaled: FloatArray
@@ -356,21 +400,29 @@ class Reference:
         count, needed = len(np.unique(kinds[similar])), kinds_needed(1 - CRITERIA.interval)
         if count < needed:
             raise InputError(
-                f"the nulls are of {count} kinds of numerics with markers as noisy as {1e3 * noise:.2g} mm",
+                f"the nulls are of {count} kinds of numerics with markers as noisy as "
+                f"{1e3 * noise:.2g} mm",
                 where="null bank",
                 fix=f"build a bank of {needed} or more with such noise, or leave it out",
             )
         usual = _Usual.of(statistics.select(similar))
-        scaled, distances = np.empty_like(statistics.shares), np.empty((len(kinds), len(usual.centre)))
+        scaled, distances = (
+            np.empty_like(statistics.shares),
+            np.empty((len(kinds), len(usual.centre))),
+        )
         pulls, usual_of_kind = np.empty_like(statistics.pulls), dict[int, _Usual]()
         for kind in np.unique(kinds):
             of_kind = kinds == kind
-            similar_noise = np.abs(statistics.noise - statistics.noise[of_kind][0]) <= CRITERIA.alike_noise
+            similar_noise = (
+                np.abs(statistics.noise - statistics.noise[of_kind][0]) <= CRITERIA.alike_noise
+            )
             if (
                 len(np.unique(kinds[similar_noise & ~of_kind])) >= CRITERIA.fewest_kinds
             ):  # else no others have such noise
                 similar_noise &= ~of_kind
-            usual_of_others = replace(_Usual.of(statistics.select(similar_noise)), degrees=usual.degrees)
+            usual_of_others = replace(
+                _Usual.of(statistics.select(similar_noise)), degrees=usual.degrees
+            )
             scaled[of_kind], distances[of_kind] = (
                 statistics.shares[of_kind] / usual_of_others.spread,
                 usual_of_others.far(statistics.select(of_kind)),
@@ -408,7 +460,9 @@ class Reference:
             UsageError: this is it.
         """
         if self.beside_gusts is None:
-            raise UsageError("it is beside gusts itself", where="reference", fix="ask that of the bank")
+            raise UsageError(
+                "it is beside gusts itself", where="reference", fix="ask that of the bank"
+            )
         return self.beside_gusts
 
     @cached_property
@@ -418,18 +472,21 @@ class Reference:
 
     @cached_property
     def reach(self) -> FloatArray:
-        """Computes standard errors, as Σ has them, to either side of an interval of the calibrated parameters: as many
-        as hold the true ones in a share of the kinds of numerics, themselves and one more counted, that is the
-        intervals' level, (theta,)."""
+        """Computes standard errors, as Σ has them, to either side of an interval of the calibrated
+        parameters: as many as hold the true ones in a share of the kinds of numerics, themselves
+        and one more counted, that is the intervals' level, (theta,)."""
         return np.array(
             [
-                GroupedConformal(null=np.abs(deviations), kinds=self.kinds).quantile(CRITERIA.interval)
+                GroupedConformal(null=np.abs(deviations), kinds=self.kinds).quantile(
+                    CRITERIA.interval
+                )
                 for deviations in self.deviations.T
             ]
         )
 
     def along(self, column: int, sign: int) -> Reference:
-        """Returns the null distributions that test along one effect alone, which was suspected beforehand."""
+        """Returns the null distributions that test along one effect alone, which was suspected
+        beforehand."""
         return replace(self, suspected=(column, sign))
 
     @cached_property
@@ -444,31 +501,48 @@ class Reference:
         if self.suspected is None:
             return self.farthest(evidence, columns)
         return float(
-            pull_along(standardise_pulls(pulls_of(evidence), self.pull, self.pull_width)[None], *self.suspected)[0]
+            pull_along(
+                standardise_pulls(pulls_of(evidence), self.pull, self.pull_width)[None],
+                *self.suspected,
+            )[0]
         )
 
     def power(self, level: float) -> tuple[tuple[Move, float], ...]:
-        """Lists effects that are tested for, each with the share of nulls beyond the critical value once it acts on
-        them at its expected strength: on average of both signs, where it may have either, but of the suspected one
-        alone."""
+        """Lists effects that are tested for, each with the share of nulls beyond the critical value
+        once it acts on
+        them at its expected strength: on average of both signs, where it may have either, but of
+        the suspected one alone."""
         critical = self.test.critical(level)
         if critical is None:
             return ()
-        shares = {move: float((statistics_of > critical).mean()) for move, statistics_of in self._acting.items()}
+        shares = {
+            move: float((statistics_of > critical).mean())
+            for move, statistics_of in self._acting.items()
+        }
         by_column: dict[int, list[Move]] = {}
         for move in shares:
             by_column.setdefault(move.column, []).append(move)
-        return tuple((signs[0], float(np.mean([shares[move] for move in signs]))) for signs in by_column.values())
+        return tuple(
+            (signs[0], float(np.mean([shares[move] for move in signs])))
+            for signs in by_column.values()
+        )
 
     @cached_property
     def _acting(self) -> dict[Move, FloatArray]:
-        """Computes the statistic of nulls on which each effect that is tested for acts, as far as appears, (group,)."""
+        """Computes the statistic of nulls on which each effect that is tested for acts, as far as
+        appears, (group,)."""
         statistics_of: dict[Move, FloatArray] = {}
         for move in moves(self.columns):
             if self.suspected is None or (move.column, move.sign) == self.suspected:
-                acted = [group.evidence.moved(move.column, APPEARS * move.strength) for group in self.groups]
+                acted = [
+                    group.evidence.moved(move.column, APPEARS * move.strength)
+                    for group in self.groups
+                ]
                 statistics_of[move] = np.array(
-                    [self._statistic(evidence, group.own) for evidence, group in zip(acted, self.groups, strict=True)]
+                    [
+                        self._statistic(evidence, group.own)
+                        for evidence, group in zip(acted, self.groups, strict=True)
+                    ]
                 )
         return statistics_of
 
@@ -479,8 +553,11 @@ class Reference:
             return float(usual.far(_NullGroups.of(evidence, self.columns, segment)).max())
         return float(pull_along(usual.pulled(pulls_of(evidence)[None]), *self.suspected)[0])
 
-    def statistics(self, evidence: Evidence, columns: tuple[str, ...], along: Sequence[int] = ()) -> FloatArray:
-        """Computes (column,) statistics of data, as `scaled` has them, where some columns are fitted already."""
+    def statistics(
+        self, evidence: Evidence, columns: tuple[str, ...], along: Sequence[int] = ()
+    ) -> FloatArray:
+        """Computes (column,) statistics of data, as `scaled` has them, where some columns are
+        fitted already."""
         shares = unscaled_drops(evidence, columns, along)
         return shares / self.spread[: len(shares)]
 
@@ -493,31 +570,43 @@ class Reference:
         return GroupedConformal(null=self.scaled[:, column], kinds=self.kinds).p(statistic)
 
     def reach_of(self, column: int) -> float:
-        """Computes how many standard errors, those that make nulls' mean squared z 1, reach to either side of an
-        interval."""
+        """Computes how many standard errors, those that make nulls' mean squared z 1, reach to
+        either side of an interval."""
         null = GroupedConformal(null=self.scaled[:, column], kinds=self.kinds)
         return math.sqrt(null.quantile(CRITERIA.interval))
 
-    def p_left_by(self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int]) -> float:
+    def p_left_by(
+        self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int]
+    ) -> float:
         """Computes p of the global test on what some columns leave, fitted to the data."""
         return self.conformal.p(self.farthest(evidence, columns, chosen))
 
-    def farthest(self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int] = ()) -> float:
-        """Computes how far the farthest of data is, where some columns are fitted already: the statistic of the global
-        test."""
-        shares, remainder = unscaled_drops(evidence, columns, chosen), evidence.fit(chosen).remainder
+    def farthest(
+        self, evidence: Evidence, columns: tuple[str, ...], chosen: Sequence[int] = ()
+    ) -> float:
+        """Computes how far the farthest of data is, where some columns are fitted already: the
+        statistic of the global test."""
+        shares, remainder = (
+            unscaled_drops(evidence, columns, chosen),
+            evidence.fit(chosen).remainder,
+        )
         distance = max(
-            float(self._distance(shares, slice(len(shares))).max()), float(self._distance(remainder, len(self.spread)))
+            float(self._distance(shares, slice(len(shares))).max()),
+            float(self._distance(remainder, len(self.spread))),
         )
         best = best_gain(evidence, chosen, without=_uncounted_columns(columns))
         gained = float(self._distance(best, len(self.spread) + 1))
         swing, line, settles = self.swing(evidence), self.line(evidence), self.settles(evidence)
-        further = [swing, None if line is None else line.far, None if settles is None else float(settles.max())]
+        further = [
+            swing,
+            None if line is None else line.far,
+            None if settles is None else float(settles.max()),
+        ]
         return max(distance, gained, *(value for value in further if value is not None))
 
     def swing(self, evidence: Evidence) -> float | None:
-        """Computes how far the wind's course of data swings, by the part that does most; None where it is not looked
-        at.
+        """Computes how far the wind's course of data swings, by the part that does most; None where
+        it is not looked at.
 
         Raises:
             UsageError: it is of the data, and was not of the nulls.
@@ -528,14 +617,16 @@ class Reference:
         columns = slice(len(self.spread) + 2, len(self.spread) + 2 + len(self.powers))
         if len(self.centre[columns]) != len(observed):
             raise UsageError(
-                "only the data have courses of the wind", where="reference", fix="look at them in the nulls as well"
+                "only the data have courses of the wind",
+                where="reference",
+                fix="look at them in the nulls as well",
             )
         damped = observed * np.exp(-self.damping * self.powers)
         return float(np.abs(self._by_tail(damped, columns)).max())
 
     def settles(self, evidence: Evidence) -> FloatArray | None:
-        """Computes how far each quantity of data lies that recordings settle at, (quantity,); None where they are not
-        looked at.
+        """Computes how far each quantity of data lies that recordings settle at, (quantity,); None
+        where they are not looked at.
 
         Raises:
             UsageError: they are of the data, and were not of the nulls.
@@ -547,7 +638,9 @@ class Reference:
         columns = slice(begin, len(self.centre) - (self.lines is not None))
         if len(self.centre[columns]) != len(settled):
             raise UsageError(
-                "only the data have settled quantities", where="reference", fix="look at them in the nulls as well"
+                "only the data have settled quantities",
+                where="reference",
+                fix="look at them in the nulls as well",
             )
         return np.abs(self._by_tail(settled, columns))
 
@@ -565,7 +658,9 @@ class Reference:
                 where="reference",
                 fix="look at lines in both or in none",
             )
-        line = self.lines.line(evidence.lines, centre=float(self.centre[-1]), width=float(self.width[-1]))
+        line = self.lines.line(
+            evidence.lines, centre=float(self.centre[-1]), width=float(self.width[-1])
+        )
         return replace(line, far=float(as_normal(np.array(line.far), self.degrees[-1])))
 
     def _distance(self, values: FloatArray | float, columns: int | slice) -> FloatArray:
@@ -574,18 +669,23 @@ class Reference:
 
     def _by_tail(self, values: FloatArray | float, columns: int | slice) -> FloatArray:
         """Computes how far roots lie, as they are."""
-        return as_normal((values - self.centre[columns]) / self.width[columns], self.degrees[columns])
+        return as_normal(
+            (values - self.centre[columns]) / self.width[columns], self.degrees[columns]
+        )
 
 
 def _uncounted_columns(columns: tuple[str, ...]) -> list[int]:
-    """Columns whose held-out gains do not count in the test: what a log may be off by within its tolerance gains on
-    recordings whose own log was not fitted."""
+    """Columns whose held-out gains do not count in the test: what a log may be off by within its
+    tolerance gains on recordings whose own log was not fitted."""
     return [columns.index(TURNED)] if TURNED in columns else []
 
 
-def unscaled_drops(evidence: Evidence, columns: tuple[str, ...], along: Sequence[int] = ()) -> FloatArray:
-    """Computes each column's drop over what is left with it in some segments, and the likelihood ratio of gusts; where
-    moments about the pole are looked at, then the same drops of these, and what they leave.
+def unscaled_drops(
+    evidence: Evidence, columns: tuple[str, ...], along: Sequence[int] = ()
+) -> FloatArray:
+    """Computes each column's drop over what is left with it in some segments, and the likelihood
+    ratio of gusts; where moments about the pole are looked at, then the same drops of these, and
+    what they leave.
 
     Args:
         along: columns that are fitted already.

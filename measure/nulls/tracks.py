@@ -1,9 +1,11 @@
-"""How the attachments of nulls go: as the data's do where these are carried, from another instant on.
+"""How the attachments of nulls go: as the data's do where these are carried, from another instant
+on.
 
-What a simulation leaves depends on how the cloth is moved, so that nulls held still calibrate no recording of a cloth
-that hands or a robot carry. A null goes the way of a recording drawn at random, from an instant drawn at random on; at
-the recording's ends it slows down, turns and goes back. That way is what the tracked one is without its noise: markers
-and attachments of a null are then tracked with noise of their own.
+What a simulation leaves depends on how the cloth is moved, so that nulls held still calibrate no
+recording of a cloth that hands or a robot carry. A null goes the way of a recording drawn at
+random, from an instant drawn at random on; at the recording's ends it slows down, turns and goes
+back. That way is what the tracked one is without its noise: markers and attachments of a null are
+then tracked with noise of their own.
 """
 
 from __future__ import annotations
@@ -21,9 +23,11 @@ from measure.observe.interpolation import onto
 from measure.observe.trajectory import AttachmentTrack, Trajectory
 
 _TURN = 1.0
-"""In which a way that ends slows down and turns back [s], so that it has no jump of its velocity."""
+"""In which a way that ends slows down and turns back [s], so that it has no jump of its
+velocity."""
 _WEIGHTS = (1e-6, 1e9)
-"""Between which the weight of smoothness is sought: less leaves tracks as they are, more makes them parabolas."""
+"""Between which the weight of smoothness is sought: less leaves tracks as they are, more makes them
+parabolas."""
 _HALVINGS = 40
 
 
@@ -38,7 +42,11 @@ def like(
         duration: of a null recording behind the time in which it settles [s].
         seed: of the draws.
     """
-    ways = [smooth_way(recording, seats) for recording in recordings if recording.attachments is not None]
+    ways = [
+        smooth_way(recording, seats)
+        for recording in recordings
+        if recording.attachments is not None
+    ]
     if not ways:
         return ()
     rng = stream(seed, "null", "tracks")
@@ -56,10 +64,11 @@ def like(
 
 
 def smooth_way(recording: Trajectory, seats: FloatArray) -> CubicSpline:
-    """Smooths the way of a recording's attachments (held, 3) [m] over its time [s], free of the noise of the markers.
+    """Smooths the way of a recording's attachments (held, 3) [m] over its time [s], free of the
+    noise of the markers.
 
-    It is the smoothest, by its third differences, that lies as far from the tracked one as the noise does (Whittaker,
-    Proc. Edinb. Math. Soc. 41:63, 1923; Morozov's discrepancy principle).
+    It is the smoothest, by its third differences, that lies as far from the tracked one as the
+    noise does (Whittaker, Proc. Edinb. Math. Soc. 41:63, 1923; Morozov's discrepancy principle).
 
     Args:
         seats: (held, 2) of them on the flat cloth [m].
@@ -81,10 +90,13 @@ def smooth_way(recording: Trajectory, seats: FloatArray) -> CubicSpline:
 
 
 def _roughness(count: int) -> FloatArray:
-    """Computes the bands (4, count) of the sum of squared third differences of so many values, the diagonal last."""
+    """Computes the bands (4, count) of the sum of squared third differences of so many values, the
+    diagonal last."""
     factors = np.array([-1.0, 3.0, -3.0, 1.0])
     bands = np.zeros((4, count))
-    for lag in range(4):  # off the diagonal: products of factors that far apart, summed over the differences
+    for lag in range(
+        4
+    ):  # off the diagonal: products of factors that far apart, summed over the differences
         for term in range(4 - lag):
             begin = term + lag
             bands[3 - lag, begin : begin + count - 3] += factors[term] * factors[term + lag]
@@ -92,7 +104,8 @@ def _roughness(count: int) -> FloatArray:
 
 
 def _smooth(values: FloatArray, weight: float, bands: FloatArray) -> FloatArray:
-    """Minimises squared distances from values, and a weight times their roughness, (frame, coordinate).
+    """Minimises squared distances from values, and a weight times their roughness, (frame,
+    coordinate).
 
     Args:
         bands: (4, frame) of the roughness, the diagonal last, as `solveh_banded` has them.

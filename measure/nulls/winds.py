@@ -1,6 +1,8 @@
-"""The winds of nulls: steady where the data's are, and else what the data's logs are, begun elsewhere and stronger.
+"""The winds of nulls: steady where the data's are, and else what the data's logs are, begun
+elsewhere and stronger.
 
-What a simulation leaves depends on how the wind fluctuates, so that nulls in steady winds calibrate no recording in a
+What a simulation leaves depends on how the wind fluctuates, so that nulls in steady winds calibrate
+no recording in a
 fluctuating one: its density would be estimated too high, and its interval too narrow.
 """
 
@@ -17,7 +19,8 @@ from measure.observe.trajectory import Trajectory, WindTrack
 _STEADY = 1e-3
 """Fluctuation below which a wind counts as steady, as a share of its mean [1]."""
 _STILL = 0.1
-"""Mean below which a log is of still air [m/s]: it has no course that could be multiplied to another mean."""
+"""Mean below which a log is of still air [m/s]: it has no course that could be multiplied to
+another mean."""
 _EVERY = 0.05
 """Between samples of a null's wind [s]."""
 
@@ -27,8 +30,8 @@ def like(
 ) -> tuple[WindTrack, ...]:
     """Draws a wind for each of `speeds` [m/s]; none where the logs of all recordings are steady.
 
-    Each is the log of a recording that has wind, drawn at random, from an instant drawn at random, forwards and
-    backwards in turns so that it goes on, and multiplied to its speed.
+    Each is the log of a recording that has wind, drawn at random, from an instant drawn at random,
+    forwards and backwards in turns so that it goes on, and multiplied to its speed.
 
     Args:
         recordings: of the data, in the frame of the fit.
@@ -46,7 +49,9 @@ def like(
         length = float(recording.times[-1])
         folded = np.abs((times + rng.uniform(0, 2 * length)) % (2 * length) - length)
         velocity = recording.wind.at(folded)
-        drawn.append(WindTrack(times=times - SETTLE, velocity=velocity * (speed / _mean(recording))))
+        drawn.append(
+            WindTrack(times=times - SETTLE, velocity=velocity * (speed / _mean(recording)))
+        )
     return tuple(drawn)
 
 
@@ -57,4 +62,8 @@ def _fluctuates(recording: Trajectory) -> bool:
 
 def _mean(recording: Trajectory) -> float:
     """Computes the mean speed during a recording [m/s]."""
-    return float(np.linalg.norm(recording.wind.at(np.arange(0.0, recording.times[-1], _EVERY)), axis=1).mean())
+    return float(
+        np.linalg.norm(
+            recording.wind.at(np.arange(0.0, recording.times[-1], _EVERY)), axis=1
+        ).mean()
+    )

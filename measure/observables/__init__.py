@@ -1,8 +1,10 @@
-"""What a window of a film shows that has a unit and that a person could check with a ruler and a stopwatch.
+"""What a window of a film shows that has a unit and that a person could check with a ruler and a
+stopwatch.
 
-Each observable is one file with two definitions: on pixels (`FilmWindow`) and on geometry seen from the same place
-(`ClothWindow`). An entry of `OBSERVABLES` enrols it in the contract suite (`tests/measure/observables/test_contract.py`), in the
-table that `flagdata observe` writes and in the power map.
+Each observable is one file with two definitions: on pixels (`FilmWindow`) and on geometry seen from
+the same place (`ClothWindow`). An entry of `OBSERVABLES` enrols it in the contract suite
+(`tests/measure/observables/test_contract.py`), in the table that `flagdata observe` writes and in
+the power map.
 """
 
 from __future__ import annotations

@@ -14,7 +14,8 @@ def amplitude_across(window: Window) -> float:
 AMPLITUDE_ACROSS = Observable(
     name="amplitude-across",
     unit="1",
-    meaning="standard deviation of the middle of the free edge to and from the hoist in the picture, in flag heights",
+    meaning="standard deviation of the middle of the free edge to and from the hoist in the "
+    "picture, in flag heights",
     blind="motion along the line of sight; slower changes of the wind than a window",
     pixels=amplitude_across,
     geometry=amplitude_across,

@@ -14,7 +14,8 @@ def amplitude_up(window: Window) -> float:
 AMPLITUDE_UP = Observable(
     name="amplitude-up",
     unit="1",
-    meaning="standard deviation of the middle of the free edge up and down in the picture, in flag heights",
+    meaning="standard deviation of the middle of the free edge up and down in the picture, in flag "
+    "heights",
     blind="motion along the line of sight; slower changes of the wind than a window",
     pixels=amplitude_up,
     geometry=amplitude_up,

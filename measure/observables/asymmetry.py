@@ -7,7 +7,8 @@ from measure.observables.observable import Observable
 
 
 def asymmetry(window: Window) -> float:
-    """Computes the mean area above the mean chord less the mean area below it, over their sum [1]."""
+    """Computes the mean area above the mean chord less the mean area below it, over their sum
+    [1]."""
     across, up = chord(window).mean(axis=0)
     shapes = window.silhouettes
     above = shapes.rows[:, None] * across > shapes.columns[None, :] * up
@@ -18,7 +19,8 @@ def asymmetry(window: Window) -> float:
 ASYMMETRY = Observable(
     name="asymmetry",
     unit="1",
-    meaning="area of the silhouette above the mean line from the middle of the hoist to the middle of the free edge, "
+    meaning="area of the silhouette above the mean line from the middle of the hoist to the middle "
+    "of the free edge, "
     "less the area below it, over their sum",
     blind="asymmetries that the view from above or below makes as well",
     pixels=asymmetry,

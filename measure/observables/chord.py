@@ -12,13 +12,13 @@ from measure.observables.tracked_cloth import ClothWindow
 Window = FilmWindow | ClothWindow
 """Both have `times`, `free_edge`, `middle`, `silhouettes`, `length` and `height`."""
 _NARROWEST = 0.12
-"""Share of the flat area that is seen below which the view is along the flag: one that hangs in folds shows more. Lower
-reads chords that are noise; higher refuses flags that droop in folds."""
+"""Share of the flat area that is seen below which the view is along the flag: one that hangs in
+folds shows more. Lower reads chords that are noise; higher refuses flags that droop in folds."""
 
 
 def chord(window: Window) -> FloatArray:
-    """Finds where the middle of the free edge is, (n, 2) from the middle of the hoist: away from the hoist, and up [m].
-    Frames that show no cloth are left out.
+    """Finds where the middle of the free edge is, (n, 2) from the middle of the hoist: away from
+    the hoist, and up [m]. Frames that show no cloth are left out.
 
     Raises:
         UnseenError: the flag is seen edge-on, or is hardly seen.

@@ -1,6 +1,7 @@
 """Silhouettes of triangles, drawn in whole numbers: the same on every machine.
 
-A pixel counts where its middle third, a square, touches a triangle. By the middle alone slender folds would be lost.
+A pixel counts where its middle third, a square, touches a triangle. By the middle alone slender
+folds would be lost.
 """
 
 from __future__ import annotations
@@ -33,10 +34,14 @@ class _Drawing(ctypes.Structure):
 @functools.cache
 def library() -> ctypes.CDLL | None:
     """Compiles the kernel; None, with one warning, where it cannot be built."""
-    from sim.compiler import compile_library  # a film is measured without the simulator, and loads nothing of it
+    from sim.compiler import (
+        compile_library,
+    )  # a film is measured without the simulator, and loads nothing of it
 
     return compile_library(
-        "measure.observables", ("drawing.cpp",), without="silhouettes are drawn by numpy, many times slower"
+        "measure.observables",
+        ("drawing.cpp",),
+        without="silhouettes are drawn by numpy, many times slower",
     )
 
 
@@ -44,8 +49,8 @@ def drawn(places: FloatArray, faces: IntArray, *, width: int, height: int) -> Bo
     """Draws (frame, height, width) silhouettes.
 
     Args:
-        places: (frame, vertex, 2) in pixels, to the right and down; the first pixel's middle is at 0.5. What lies
-            beyond the picture is left out.
+        places: (frame, vertex, 2) in pixels, to the right and down; the first pixel's middle is at
+            0.5. What lies beyond the picture is left out.
         faces: (face, 3) vertex indices.
         width, height: of the picture in pixels.
     """
@@ -77,13 +82,18 @@ def _draw_by_kernel(
     code.draw_silhouettes(ctypes.byref(drawing))
 
 
-def _draw_by_numpy(steps: NDArray[np.int64], corners: NDArray[np.int64], out: NDArray[np.uint8]) -> None:
-    """Draws the same by the same tests: the sides of the square and the edges of the triangle separate them."""
+def _draw_by_numpy(
+    steps: NDArray[np.int64], corners: NDArray[np.int64], out: NDArray[np.uint8]
+) -> None:
+    """Draws the same by the same tests: the sides of the square and the edges of the triangle
+    separate them."""
     _, height, width = out.shape
     for picture, points in zip(out, steps, strict=True):
         for triangle in points[corners]:
             first = np.maximum(-((STEPS // 2 + _REACH - triangle.min(axis=0)) // STEPS), 0)
-            last = np.minimum((triangle.max(axis=0) + _REACH - STEPS // 2) // STEPS, [width - 1, height - 1])
+            last = np.minimum(
+                (triangle.max(axis=0) + _REACH - STEPS // 2) // STEPS, [width - 1, height - 1]
+            )
             if (first > last).any():
                 continue
             x = np.arange(first[0], last[0] + 1) * STEPS + STEPS // 2
@@ -93,5 +103,7 @@ def _draw_by_numpy(steps: NDArray[np.int64], corners: NDArray[np.int64], out: ND
             across = (following - triangle)[:, ::-1] * [-1, 1] * (-1 if ux * vy < uy * vx else 1)
             touched = np.ones((len(y), x.size), bool)
             for (a, b), corner in zip(across.tolist(), triangle.tolist(), strict=True):
-                touched &= a * (x - corner[0]) + b * (y - corner[1]) + _REACH * (abs(a) + abs(b)) >= 0
+                touched &= (
+                    a * (x - corner[0]) + b * (y - corner[1]) + _REACH * (abs(a) + abs(b)) >= 0
+                )
             picture[first[1] : last[1] + 1, first[0] : last[0] + 1] |= touched

@@ -17,7 +17,8 @@ def droop(window: Window) -> float:
 DROOP = Observable(
     name="droop",
     unit="rad",
-    meaning="mean angle below the horizontal of the line from the middle of the hoist to the middle of the free edge",
+    meaning="mean angle below the horizontal of the line from the middle of the hoist to the "
+    "middle of the free edge",
     blind="weight and the air's dynamic pressure in one steady wind: only their ratio is shown",
     pixels=droop,
     geometry=droop,

@@ -16,8 +16,10 @@ def extension(window: Window) -> float:
 EXTENSION = Observable(
     name="extension",
     unit="1",
-    meaning="mean length of the line from the middle of the hoist to that of the free edge over the flag's length",
-    blind="folds along the hoist, and turns of the flag towards the camera, which the view's azimuth has to explain",
+    meaning="mean length of the line from the middle of the hoist to that of the free edge over "
+    "the flag's length",
+    blind="folds along the hoist, and turns of the flag towards the camera, which the view's "
+    "azimuth has to explain",
     pixels=extension,
     geometry=extension,
     bias=-0.016,

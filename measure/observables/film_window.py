@@ -13,7 +13,8 @@ from measure.observables.not_shown import NO_SILHOUETTE, UnseenError
 from measure.observables.silhouettes import Silhouettes
 
 _LARGEST = 1.15
-"""Mean area over that of the flat flag above which the hoist's height, and with it the scale, is wrong."""
+"""Mean area over that of the flat flag above which the hoist's height, and with it the scale, is
+wrong."""
 _SHOWN = 0.8
 """Share of a window's frames whose outline is to be found."""
 
@@ -28,7 +29,8 @@ class FilmWindow:
         masks: (n, size, size) where the cloth is.
         shown: (n,) whether the frame's mask was found.
         scale: of the flag's plane at its hoist, from its given height [px/m].
-        hoist: (2, 2) upper and lower end of the hoist: column and row, the first pixel's middle at 0.5 [px].
+        hoist: (2, 2) upper and lower end of the hoist: column and row, the first pixel's middle at
+            0.5 [px].
         side: 1 where the flag flies to the right, −1 to the left.
         length, height: of the flat flag [m].
 
@@ -48,7 +50,11 @@ class FilmWindow:
 
     def __post_init__(self) -> None:
         n = len(self.times)
-        if self.frames.shape != self.masks.shape or len(self.frames) != n or self.shown.shape != (n,):
+        if (
+            self.frames.shape != self.masks.shape
+            or len(self.frames) != n
+            or self.shown.shape != (n,)
+        ):
             raise InputError(
                 f"{self.frames.shape} frames, {self.masks.shape} masks at {n} instants",
                 where="window of a film",
@@ -80,8 +86,8 @@ class FilmWindow:
 
     @cached_property
     def free_edge(self) -> FloatArray:
-        """(n, 2) middle of the free edge, as far as the outline shows it: away from the middle of the hoist, and above
-        it [m]."""
+        """(n, 2) middle of the free edge, as far as the outline shows it: away from the middle of
+        the hoist, and above it [m]."""
         return self.silhouettes.free_edge()
 
     @cached_property

@@ -11,8 +11,8 @@ from measure.observables.observable import Observable
 from measure.observables.place_courses import spectrum
 
 _STILL = 0.004
-"""Root mean square motion of the free edge, in flag lengths, below which there is no spectrum but of noise. Lower reads
-the frequency of noise."""
+"""Root mean square motion of the free edge, in flag lengths, below which there is no spectrum but
+of noise. Lower reads the frequency of noise."""
 
 
 def moving(window: Window) -> tuple[FloatArray, FloatArray]:
@@ -35,7 +35,8 @@ def frequency(window: Window) -> float:
 FREQUENCY = Observable(
     name="frequency",
     unit="Hz",
-    meaning="centroid of the power spectrum, 0.4 to 8 Hz, of the motion of the middle of the free edge in the picture",
+    meaning="centroid of the power spectrum, 0.4 to 8 Hz, of the motion of the middle of the free "
+    "edge in the picture",
     blind="slower changes of the wind; which of size, tension and damping sets it",
     pixels=frequency,
     geometry=frequency,

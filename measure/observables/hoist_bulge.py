@@ -9,16 +9,16 @@ from measure.observables.not_shown import NO_SILHOUETTE, UnseenError
 from measure.observables.observable import Observable
 
 _BETWEEN = 0.45
-"""Share of the hoist's height above and below its middle in which the cloth's edge is looked at: at the ends it is
-held, and its corners blur."""
+"""Share of the hoist's height above and below its middle in which the cloth's edge is looked at: at
+the ends it is held, and its corners blur."""
 _ROWS = 0.5
 """Share of these rows that is to show cloth."""
 
 
 def hoist_bulge(window: Window) -> float:
-    """Computes how far the cloth next to the pole is from the line that joins the hoist's ends, away from the pole: the
-    mean over frames and rows between the ends [flag lengths]. Cloth on the line's other side counts as on it, since a
-    film's masks end there.
+    """Computes how far the cloth next to the pole is from the line that joins the hoist's ends,
+    away from the pole: the mean over frames and rows between the ends [flag lengths]. Cloth on the
+    line's other side counts as on it, since a film's masks end there.
 
     Raises:
         UnseenError: as `chord`, or hardly any row between the ends shows cloth.
@@ -38,7 +38,8 @@ def hoist_bulge(window: Window) -> float:
 HOIST_BULGE = Observable(
     name="hoist-bulge",
     unit="1",
-    meaning="mean distance, in flag lengths, of the cloth beside the pole from the line that joins the hoist's two "
+    meaning="mean distance, in flag lengths, of the cloth beside the pole from the line that joins "
+    "the hoist's two "
     "ends, away from the pole",
     blind="cloth that bulges to the other side of the pole, and a pole that hides the gap",
     pixels=hoist_bulge,

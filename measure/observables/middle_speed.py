@@ -15,7 +15,8 @@ def middle_speed(window: Window) -> float:
 MIDDLE_SPEED = Observable(
     name="middle-speed",
     unit="1/s",
-    meaning="root mean square speed, in flag lengths, of the centroid of the middle third of the silhouette",
+    meaning="root mean square speed, in flag lengths, of the centroid of the middle third of the "
+    "silhouette",
     blind="motion along the line of sight",
     pixels=middle_speed,
     geometry=middle_speed,

@@ -15,8 +15,8 @@ __all__ = ["Observable", "UnseenError", "WindowReading"]
 
 _Window = TypeVar("_Window")
 WINDOW = 2.5
-"""Length of a window [s]: some flutter periods, and short beside the changes of a wind's mean. Longer averages over
-more flutter and over more change of the wind."""
+"""Length of a window [s]: some flutter periods, and short beside the changes of a wind's mean.
+Longer averages over more flutter and over more change of the wind."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,14 +41,15 @@ class Observable:
         unit: of the value.
         meaning: what it is, one sentence.
         blind: what it does not show.
-        pixels, geometry: its two definitions; each raises `UnseenError` where its window does not show it.
+        pixels, geometry: its two definitions; each raises `UnseenError` where its window does not
+            show it.
         bias: median of pixels less geometry in filmed simulations, in the unit.
-        sigma: robust deviation (1.48 times the median one) of the same for one window: what segmentation, blur and
-            folds leave. Both are measured
-            by `python -m tests.studies observables` (docs/results/validate-observables.md).
+        sigma: robust deviation (1.48 times the median one) of the same for one window: what
+            segmentation, blur and folds leave. Both are measured by `python -m tests.studies
+            observables` (docs/results/validate-observables.md).
         counted_in: what of the flag the value is counted in; None where it is of no length.
-        quadratic: whether it is a root mean square or a standard deviation, so that parts of a window are averaged in
-            squares.
+        quadratic: whether it is a root mean square or a standard deviation, so that parts of a
+            window are averaged in squares.
     """
 
     name: str

@@ -42,7 +42,9 @@ def artifact(table: ObservableTable, subject: Subject, options: Mapping[str, Any
     )
 
 
-def keep(lake: Lake, table: ObservableTable, subject: Subject, options: Mapping[str, Any], *, branch: str) -> Placed:
+def keep(
+    lake: Lake, table: ObservableTable, subject: Subject, options: Mapping[str, Any], *, branch: str
+) -> Placed:
     """Commit a table where it is new, see `flagdata.lake.results`.
 
     Raises:

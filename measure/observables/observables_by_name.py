@@ -1,5 +1,5 @@
-"""The observables by name. An entry here enrols one in the contract suite, in the table that `flagdata observe` writes and
-in the power map.
+"""The observables by name. An entry here enrols one in the contract suite, in the table that
+`flagdata observe` writes and in the power map.
 """
 
 from __future__ import annotations

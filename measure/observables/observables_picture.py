@@ -1,4 +1,5 @@
-"""The observables of a film as one picture: each against time, and against the log's wind where there is one."""
+"""The observables of a film as one picture: each against time, and against the log's wind where
+there is one."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ _BLUE, _RUST = "#2b6f8f", "#c4622d"
 
 
 def picture(table: ObservableTable) -> Figure:
-    """Draws a row an observable: over time on the left, over the wind on the right; bars of one sigma of the pixels."""
+    """Draws a row an observable: over time on the left, over the wind on the right; bars of one
+    sigma of the pixels."""
     from matplotlib.figure import Figure
 
     names = list(table.readings)

@@ -41,7 +41,8 @@ class ObservableTable:
         seconds: length of a window.
         time: (w,) middles of the windows [s from the film's first frame].
         readings: observable → (w,) readings.
-        wind: (w,) of the log, the mean over the window [m/s]; NaN where it was silent. None without a log.
+        wind: (w,) of the log, the mean over the window [m/s]; NaN where it was silent. None without
+            a log.
     """
 
     film: str
@@ -58,7 +59,9 @@ class ObservableTable:
 
     def unseen(self, name: str) -> Counter[str]:
         """Counts windows without a value by their reason."""
-        return Counter(reading.reason for reading in self.readings[name] if reading.reason is not None)
+        return Counter(
+            reading.reason for reading in self.readings[name] if reading.reason is not None
+        )
 
     @property
     def empty(self) -> bool:
@@ -66,28 +69,43 @@ class ObservableTable:
         return not any(np.isfinite(self.values(name)).any() for name in self.readings)
 
     def arrow(self) -> pa.Table:
-        """Returns `time`, `wind` and, for each observable, its value, `NAME-sigma` and `NAME-reason`; units and
-        meanings are in the fields' metadata."""
+        """Returns `time`, `wind` and, for each observable, its value, `NAME-sigma` and
+        `NAME-reason`; units and meanings are in the fields' metadata."""
         import pyarrow as pa
 
         columns: list[pa.Array] = [pa.array(self.time)]
-        fields = [pa.field("time", pa.float64(), metadata={"unit": "s", "meaning": "middle of the window"})]
+        fields = [
+            pa.field(
+                "time", pa.float64(), metadata={"unit": "s", "meaning": "middle of the window"}
+            )
+        ]
         if self.wind is not None:
             columns.append(pa.array(self.wind, from_pandas=True))
-            fields.append(pa.field("wind", pa.float64(), metadata={"unit": "m/s", "meaning": "the log's mean"}))
+            fields.append(
+                pa.field(
+                    "wind", pa.float64(), metadata={"unit": "m/s", "meaning": "the log's mean"}
+                )
+            )
         for name, readings in self.readings.items():
             observable: Observable = OBSERVABLES[name]
             columns.append(pa.array(self.values(name), from_pandas=True))
-            fields.append(pa.field(name, pa.float64(), metadata={k: str(v) for k, v in _about(observable).items()}))
+            fields.append(
+                pa.field(
+                    name, pa.float64(), metadata={k: str(v) for k, v in _about(observable).items()}
+                )
+            )
             columns.append(pa.array(np.full(len(self.time), observable.sigma)))
-            fields.append(pa.field(f"{name}-sigma", pa.float64(), metadata={"unit": observable.unit}))
+            fields.append(
+                pa.field(f"{name}-sigma", pa.float64(), metadata={"unit": observable.unit})
+            )
             columns.append(pa.array([reading.reason for reading in readings], type=pa.string()))
             fields.append(pa.field(f"{name}-reason", pa.string()))
         schema = pa.schema(fields, metadata={"flagdata": json.dumps(self.head())})
         return pa.Table.from_arrays(columns, schema=schema)
 
     def parquet(self) -> bytes:
-        """Returns a Parquet file of the table, which `flagdata calibrate` reads where there is a wind."""
+        """Returns a Parquet file of the table, which `flagdata calibrate` reads where there is a
+        wind."""
         import pyarrow.parquet as pq
 
         sink = io.BytesIO()
@@ -95,12 +113,16 @@ class ObservableTable:
         return sink.getvalue()
 
     def write_zarr(self, folder: Path) -> None:
-        """Writes a new Zarr group: `time`, `wind` and each observable over `time`, units and sigmas as attributes."""
+        """Writes a new Zarr group: `time`, `wind` and each observable over `time`, units and sigmas
+        as attributes."""
         import zarr
 
         group = zarr.open_group(folder, mode="w-", zarr_format=3)
         group.update_attributes(
-            {"flagdata_observables": self.head(), "reasons": {name: dict(self.unseen(name)) for name in self.readings}}
+            {
+                "flagdata_observables": self.head(),
+                "reasons": {name: dict(self.unseen(name)) for name in self.readings},
+            }
         )
         write_plain(group, "time", self.time, ("time",))
         if self.wind is not None:
@@ -123,7 +145,9 @@ class ObservableTable:
         return {
             **self.head(),
             "windows": len(self.time),
-            "wind": None if self.wind is None else [None if math.isnan(v) else v for v in self.wind.tolist()],
+            "wind": None
+            if self.wind is None
+            else [None if math.isnan(v) else v for v in self.wind.tolist()],
             "observables": {name: self._summary(name) for name in self.readings},
         }
 
@@ -146,12 +170,21 @@ class ObservableTable:
         for name in self.readings:
             summary, about = self._summary(name), OBSERVABLES[name]
             unit = "" if about.unit == "1" else f" {about.unit}"
-            missing = "".join(f"; {count} × {REASONS[kind]}" for kind, count in summary["unseen"].items())
+            missing = "".join(
+                f"; {count} × {REASONS[kind]}" for kind, count in summary["unseen"].items()
+            )
             if summary["mean"] is None:
                 lines.append(f"{name:17} not shown{missing}")
                 continue
-            spread = "" if summary["deviation"] is None else f", deviation between windows {summary['deviation']:.3f}"
-            lines.append(f"{name:17} {summary['mean']:8.3f}{unit}{spread}, n = {summary['windows']} windows{missing}")
+            spread = (
+                ""
+                if summary["deviation"] is None
+                else f", deviation between windows {summary['deviation']:.3f}"
+            )
+            lines.append(
+                f"{name:17} {summary['mean']:8.3f}{unit}{spread}, n = {summary['windows']} "
+                f"windows{missing}"
+            )
         return lines
 
 
@@ -167,19 +200,28 @@ def table_of(
     """Computes all observables of all windows.
 
     Args:
-        start: instant of the film's first frame [UTC ns]; None where it is unknown: then the table has no wind.
+        start: instant of the film's first frame [UTC ns]; None where it is unknown: then the table
+            has no wind.
         wind: of the log.
     """
     nothing = WindowReading(value=math.nan, reason=UNSEEN)
     readings = {
-        name: tuple(nothing if window is None else OBSERVABLES[name].of_film(window) for window in watched.windows)
+        name: tuple(
+            nothing if window is None else OBSERVABLES[name].of_film(window)
+            for window in watched.windows
+        )
         for name in OBSERVABLES
     }
     logged = None
     if start is not None and wind is not None and over_ground(wind) is not None:
         truth = TruthSeries.of(wind)
-        ends = [start + round((begin + watched.seconds) * NANOSECONDS) for begin in watched.starts.tolist()]
-        logged = np.array([truth.before(end, window=max(watched.seconds, truth.period)).wind for end in ends])
+        ends = [
+            start + round((begin + watched.seconds) * NANOSECONDS)
+            for begin in watched.starts.tolist()
+        ]
+        logged = np.array(
+            [truth.before(end, window=max(watched.seconds, truth.period)).wind for end in ends]
+        )
     return ObservableTable(
         film=film,
         length=length,

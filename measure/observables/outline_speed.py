@@ -12,7 +12,8 @@ from measure.observables.silhouettes import BESIDE
 
 
 def outline_speed(window: Window) -> float:
-    """Computes the area that the outline sweeps a second, over its free length [flag lengths a second]."""
+    """Computes the area that the outline sweeps a second, over its free length [flag lengths a
+    second]."""
     shapes = window.silhouettes
     step = max(1, round(1 / RATE / float(np.median(np.diff(shapes.times)))))
     free = shapes.columns > BESIDE * shapes.length
@@ -29,7 +30,8 @@ def outline_speed(window: Window) -> float:
 OUTLINE_SPEED = Observable(
     name="outline-speed",
     unit="1/s",
-    meaning="mean speed across itself, in flag lengths, of the outline of the free part: the area that it sweeps a "
+    meaning="mean speed across itself, in flag lengths, of the outline of the free part: the area "
+    "that it sweeps a "
     "second, over the free edges' length (twice 85 % of the flag's length and its height)",
     blind="motion inside the outline and along the line of sight",
     pixels=outline_speed,

@@ -1,4 +1,5 @@
-"""Courses of places in a window: their speed, spectrum and waves, at one rate whatever the film's."""
+"""Courses of places in a window: their speed, spectrum and waves, at one rate whatever the
+film's."""
 
 from __future__ import annotations
 
@@ -12,7 +13,8 @@ from measure.observables.not_shown import FEW_FRAMES, UnseenError
 RATE = 25.0
 """Rate [Hz] at which courses are compared: films of 25 fps and more have it."""
 LOWEST, HIGHEST = 0.4, 8.0
-"""Band [Hz] of the spectra: from a period a window up to where a film of 25 fps still resolves a motion."""
+"""Band [Hz] of the spectra: from a period a window up to where a film of 25 fps still resolves a
+motion."""
 _FEWEST = 25
 """Instants at `RATE` below which a window gives no spectrum."""
 _LARGEST_GAP = 0.25
@@ -34,8 +36,8 @@ def even(times: FloatArray, course: FloatArray) -> tuple[FloatArray, FloatArray]
 
 
 def speed(times: FloatArray, course: FloatArray) -> float:
-    """Computes the root mean square speed of a course (n, 2) by central differences over 2/`RATE` seconds [its unit per
-    s].
+    """Computes the root mean square speed of a course (n, 2) by central differences over 2/`RATE`
+    seconds [its unit per s].
 
     Raises:
         UnseenError: as `even`.
@@ -46,8 +48,8 @@ def speed(times: FloatArray, course: FloatArray) -> float:
 
 
 def spectrum(times: FloatArray, course: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Frequencies [Hz] of the band and power of a course (n, d) there, summed over its axes; a Hann window without the
-    straight line through the course.
+    """Frequencies [Hz] of the band and power of a course (n, d) there, summed over its axes; a Hann
+    window without the straight line through the course.
 
     Raises:
         UnseenError: as `even`.
@@ -60,8 +62,8 @@ def spectrum(times: FloatArray, course: FloatArray) -> tuple[FloatArray, FloatAr
 
 
 def fourier_transform(at: FloatArray, places: FloatArray) -> NDArray[np.complex128]:
-    """Computes the Fourier transform (f, d) of a course (n, d) at even instants less its straight line, under a Hann
-    window."""
+    """Computes the Fourier transform (f, d) of a course (n, d) at even instants less its straight
+    line, under a Hann window."""
     line = np.polynomial.polynomial.polyvander(at - at.mean(), 1)
     residual = places - line @ np.linalg.lstsq(line, places, rcond=None)[0]
     return np.fft.rfft(residual * np.hanning(len(at) + 2)[1:-1, None], axis=0)

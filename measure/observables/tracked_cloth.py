@@ -23,10 +23,12 @@ class View:
     """Where a camera stands.
 
     Attributes:
-        azimuth: horizontal angle from the wind's heading to the camera's axis, counter-clockwise from above [rad]: π/2
-            looks across the wind, and the air goes to the right. As `RenderParameters.camera_angle`.
+        azimuth: horizontal angle from the wind's heading to the camera's axis, counter-clockwise
+            from above [rad]: π/2 looks across the wind, and the air goes to the right. As
+            `RenderParameters.camera_angle`.
         elevation: of the axis above the horizontal [rad]: positive looks up at the flag.
-        distance: from the middle of the flag, which the axis goes through [m]; infinite for a parallel projection.
+        distance: from the middle of the flag, which the axis goes through [m]; infinite for a
+            parallel projection.
     """
 
     azimuth: float = math.pi / 2
@@ -36,14 +38,15 @@ class View:
     def __post_init__(self) -> None:
         if not abs(self.elevation) < math.radians(80) or not self.distance > 0:
             raise InputError(
-                f"the elevation is {math.degrees(self.elevation):.0f}° and the distance {self.distance:g} m",
+                f"the elevation is {math.degrees(self.elevation):.0f}° and the distance "
+                f"{self.distance:g} m",
                 where="view",
                 fix="give an elevation below 80° and a distance above 0",
             )
 
     def axes(self, heading: float) -> FloatArray:
-        """Returns (3, 3) rows: the picture's right, its up, and the direction of view, in a wind that goes to
-        `heading`."""
+        """Returns (3, 3) rows: the picture's right, its up, and the direction of view, in a wind
+        that goes to `heading`."""
         around, up = heading + self.azimuth, self.elevation
         forward = [math.cos(around) * math.cos(up), math.sin(around) * math.cos(up), math.sin(up)]
         right = [math.sin(around), -math.cos(around), 0.0]
@@ -56,8 +59,9 @@ class ClothWindow:
 
     Attributes:
         times: (n,) ascending [s].
-        points: (n, vertex, 2) in metres at the hoist's distance, as someone measures who knows the flag's height: x to
-            the right, z up, from any origin; `seen_from` takes the middle of the hoist.
+        points: (n, vertex, 2) in metres at the hoist's distance, as someone measures who knows the
+            flag's height: x to the right, z up, from any origin; `seen_from` takes the middle of
+            the hoist.
         faces: (face, 3) vertex indices.
         hoist: (k,) vertices along the hoist, from its upper end to its lower one; 2 or more.
         free: (m,) vertices along the free edge, likewise.
@@ -79,13 +83,22 @@ class ClothWindow:
         n, vertices = len(self.times), self.points.shape[1] if self.points.ndim == 3 else 0
         if self.points.shape != (n, vertices, 2) or n < 2 or not np.isfinite(self.points).all():
             raise InputError(
-                f"points of shape {self.points.shape} at {n} instants, all finite: {np.isfinite(self.points).all()}",
+                f"points of shape {self.points.shape} at {n} instants, all finite: "
+                f"{np.isfinite(self.points).all()}",
                 where="cloth",
                 fix="give finite points (n, vertex, 2) at two instants or more",
             )
-        for name, indices in (("hoist", self.hoist), ("free edge", self.free), ("faces", self.faces)):
+        for name, indices in (
+            ("hoist", self.hoist),
+            ("free edge", self.free),
+            ("faces", self.faces),
+        ):
             if indices.size < 2 or indices.min() < 0 or indices.max() >= vertices:
-                raise InputError(f"vertices of the {name} that are not there", where="cloth", fix="give their indices")
+                raise InputError(
+                    f"vertices of the {name} that are not there",
+                    where="cloth",
+                    fix="give their indices",
+                )
 
     @cached_property
     def side(self) -> float:
@@ -105,19 +118,27 @@ class ClothWindow:
 
     @cached_property
     def middle(self) -> FloatArray:
-        """(n, 2) centroid of the middle third of the silhouette's area [m from the hoist, as `free_edge`]."""
+        """(n, 2) centroid of the middle third of the silhouette's area [m from the hoist, as
+        `free_edge`]."""
         return self.silhouettes.middle_of(1 / 3, 2 / 3)
 
     @cached_property
     def silhouettes(self) -> Silhouettes:
         """Its outlines, drawn at `_DRAWN` pixels of the flag's length."""
         scale = _DRAWN / self.length
-        turned = (self.points - self.middle_of_hoist.mean(axis=0)) * np.array([self.side, -1.0]) * scale
+        turned = (
+            (self.points - self.middle_of_hoist.mean(axis=0)) * np.array([self.side, -1.0]) * scale
+        )
         low = np.floor(turned.min(axis=(0, 1))) - 2
         width, high = (np.ceil(turned.max(axis=(0, 1))) - low + 3).astype(int).tolist()
         masks = drawn(turned - low, self.faces, width=width, height=high)
         return Silhouettes(
-            times=self.times, masks=masks, scale=scale, hoist=-low, length=self.length, height=self.height
+            times=self.times,
+            masks=masks,
+            scale=scale,
+            hoist=-low,
+            length=self.length,
+            height=self.height,
         )
 
     def _from_hoist(self, places: FloatArray) -> FloatArray:
@@ -150,16 +171,20 @@ def seen_from(
     """
     upper, lower = int(hoist[0]), int(hoist[-1])
     ends = positions[:, [upper, lower]].mean(axis=(0, 1))
-    # People aim at the flag's middle: from near by the hoist is then seen at another angle than the axis'.
+    # People aim at the flag's middle: from near by the hoist is then seen at another angle than the
+    # axis'.
     aim = ends + length / 2 * np.array([math.cos(heading), math.sin(heading), 0.0])
     camera_frame = (np.asarray(positions, np.float64) - aim) @ view.axes(heading).T
     places = camera_frame[..., :2]
     if math.isfinite(view.distance):
         depth = view.distance + camera_frame[..., 2]
         if depth.min() < 0.05 * view.distance:
-            raise InputError("cloth reaches to the camera or behind it", where="view", fix="enlarge the distance")
+            raise InputError(
+                "cloth reaches to the camera or behind it", where="view", fix="enlarge the distance"
+            )
         places = places * (view.distance / depth)[..., None]
-    # The hoist looks shorter from above or below and by its distance, and its known height is what gives the scale.
+    # The hoist looks shorter from above or below and by its distance, and its known height is what
+    # gives the scale.
     upright = (positions[:, upper, 2] - positions[:, lower, 2]).mean()
     places = places * (upright / (places[:, upper, 1] - places[:, lower, 1]).mean())
     places = places - places[:, [upper, lower]].mean(axis=(0, 1))
@@ -175,8 +200,8 @@ def seen_from(
 
 
 def edges_of(rest: NDArray[np.floating]) -> tuple[IntArray, IntArray]:
-    """Finds hoist and free edge of a flat flag from their upper ends: vertices of least and of largest first
-    coordinate.
+    """Finds hoist and free edge of a flat flag from their upper ends: vertices of least and of
+    largest first coordinate.
 
     Args:
         rest: (vertex, 2) along the length and up along the hoist [m].

@@ -20,11 +20,12 @@ from models.conditioning.stills import halve_picture
 CHUNK = 30.0
 """Length of film [s] that one still picture is of: light and shade change over longer ones."""
 _EXPECTED = 0.9
-"""Least coefficient of Dice with the true silhouette that is expected of a mask. Higher keeps fewer masks, and better
-ones."""
+"""Least coefficient of Dice with the true silhouette that is expected of a mask. Higher keeps fewer
+masks, and better ones."""
 _STEADY = 0.4
-"""Share by which a mask's area may differ from the window's median: a flag does not change as much in a window. Lower
-drops frames in which the flag folds away from the camera; higher keeps masks that lost a part."""
+"""Share by which a mask's area may differ from the window's median: a flag does not change as much
+in a window. Lower drops frames in which the flag folds away from the camera; higher keeps masks
+that lost a part."""
 _LEAST_HOIST = 5.0
 """Length of the hoist in the picture [px] below which nothing is read."""
 _FEWEST = 10
@@ -47,7 +48,11 @@ class Watched:
 
 
 def count_of(
-    film: ConditionedFilm, *, first: float | None = None, last: float | None = None, seconds: float = WINDOW
+    film: ConditionedFilm,
+    *,
+    first: float | None = None,
+    last: float | None = None,
+    seconds: float = WINDOW,
 ) -> int:
     """Counts the complete windows of a part of a film; the parameters as for `watch_film`.
 
@@ -101,7 +106,8 @@ def watch_film(
 
 
 class Watcher:
-    """Makes windows of frames that it is shown one after another, and holds no more than a still picture is of.
+    """Makes windows of frames that it is shown one after another, and holds no more than a still
+    picture is of.
 
     Args:
         film: that the frames are read from.
@@ -129,7 +135,8 @@ class Watcher:
         self._held: list[tuple[float, UInt8Array]] = []
 
     def look(self, time: float, frame: UInt8Array) -> None:
-        """Take the next frame, conditioned, and its time [s]; frames before the first window are left out."""
+        """Take the next frame, conditioned, and its time [s]; frames before the first window are
+        left out."""
         if time < self._begin:
             return
         self._held.append((time, frame))

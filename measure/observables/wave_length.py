@@ -18,7 +18,8 @@ def wave_length(window: Window) -> float:
 WAVE_LENGTH = Observable(
     name="wave-length",
     unit="1",
-    meaning="length, in flag lengths along the picture, of the wave that travels along the silhouette's middle line",
+    meaning="length, in flag lengths along the picture, of the wave that travels along the "
+    "silhouette's middle line",
     blind="waves whose crests are along the line of sight's direction of motion, and standing waves",
     pixels=wave_length,
     geometry=wave_length,

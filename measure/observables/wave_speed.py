@@ -18,7 +18,8 @@ def wave_speed(window: Window) -> float:
 WAVE_SPEED = Observable(
     name="wave-speed",
     unit="1/s",
-    meaning="speed, in flag lengths a second, at which the silhouette's middle line travels away from the hoist",
+    meaning="speed, in flag lengths a second, at which the silhouette's middle line travels away "
+    "from the hoist",
     blind="waves whose crests are along the line of sight's direction of motion, and standing waves",
     pixels=wave_speed,
     geometry=wave_speed,

@@ -1,4 +1,5 @@
-"""The wave that travels along the chord, from the phases of the silhouette's middle line at sections of it."""
+"""The wave that travels along the chord, from the phases of the silhouette's middle line at
+sections of it."""
 
 from __future__ import annotations
 
@@ -14,10 +15,11 @@ from measure.observables.place_courses import HIGHEST, LOWEST, RATE, even, fouri
 _SECTIONS = np.linspace(0.35, 0.85, 6)
 """Of the mean chord, where the middle line is followed."""
 _COHERENT = 0.5
-"""Share of the power at neighbouring sections whose phases belong together from which on there is a wave. Lower reads
-waves into flags that swing as a whole or flutter without order."""
+"""Share of the power at neighbouring sections whose phases belong together from which on there is a
+wave. Lower reads waves into flags that swing as a whole or flutter without order."""
 _LONGEST = 3.0
-"""Length [flag lengths] of a wave above which all of the chord moves together, and no wave is seen."""
+"""Length [flag lengths] of a wave above which all of the chord moves together, and no wave is
+seen."""
 
 
 @dataclass(frozen=True, kw_only=True)

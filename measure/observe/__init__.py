@@ -1,5 +1,5 @@
-"""Observed trajectories: the motion of a cloth, its specimen and its wind; read and checked before anything
-is concluded from them."""
+"""Observed trajectories: the motion of a cloth, its specimen and its wind; read and checked before
+anything is concluded from them."""
 
 from __future__ import annotations
 

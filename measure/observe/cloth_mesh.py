@@ -1,4 +1,5 @@
-"""The model's mesh for a cloth: a grid where the cloth is a rectangle, else a triangulation of its outline."""
+"""The model's mesh for a cloth: a grid where the cloth is a rectangle, else a triangulation of its
+outline."""
 
 from __future__ import annotations
 
@@ -23,17 +24,25 @@ Points = FloatArray
 
 
 def rectangle(width: float, height: float, *, vertices: int = VERTICES) -> Mesh:
-    """Makes a grid of nearly square cells from (0, 0) to (width, height), of about so many vertices.
+    """Makes a grid of nearly square cells from (0, 0) to (width, height), of about so many
+    vertices.
 
     Raises:
         InputError: a size that is not positive.
     """
     if not (width > 0 and height > 0):
-        raise InputError(f"the cloth measures {width} m × {height} m", where="cloth", fix="give positive sizes")
+        raise InputError(
+            f"the cloth measures {width} m × {height} m", where="cloth", fix="give positive sizes"
+        )
     # (w/s + 1) (h/s + 1) = n, solved for the cell s.
     n, total = max(vertices, 4) - 1, width + height
     cell = (total + math.sqrt(total**2 + 4 * n * width * height)) / (2 * n)
-    return grid(width=width, height=height, columns=max(1, round(width / cell)), rows=max(1, round(height / cell)))
+    return grid(
+        width=width,
+        height=height,
+        columns=max(1, round(width / cell)),
+        rows=max(1, round(height / cell)),
+    )
 
 
 def hull(points: Points, *, where: str) -> Points:
@@ -59,10 +68,16 @@ def outline(rest: Points, faces: IntArray, *, where: str) -> Points:
         InputError: it has no edge, several pieces or a hole.
     """
     directed = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    _, inverse, counts = np.unique(np.sort(directed, axis=1), axis=0, return_inverse=True, return_counts=True)
+    _, inverse, counts = np.unique(
+        np.sort(directed, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
     follows = dict(directed[counts[inverse.ravel()] == 1].tolist())
     if not follows:
-        raise InputError("the rest shape has no edge", where=where, fix="is the surface closed, or its rest unwrapped?")
+        raise InputError(
+            "the rest shape has no edge",
+            where=where,
+            fix="is the surface closed, or its rest unwrapped?",
+        )
     first = min(follows)
     loop, vertex = [first], follows.pop(first)
     while vertex != first:
@@ -89,7 +104,8 @@ def is_rectangle(corners: Points) -> bool:
 
 
 def area(corners: Points) -> float:
-    """Computes the signed area of a polygon [m²], positive where it is counter-clockwise (shoelace formula)."""
+    """Computes the signed area of a polygon [m²], positive where it is counter-clockwise (shoelace
+    formula)."""
     following = np.roll(corners, -1, axis=0)
     return float((corners[:, 0] * following[:, 1] - corners[:, 1] * following[:, 0]).sum() / 2)
 
@@ -98,7 +114,8 @@ def model_mesh(corners: Points, *, vertices: int = VERTICES) -> Mesh:
     """Meshes an outline by about so many vertices, in the outline's own coordinates.
 
     Raises:
-        InputError: an outline that has no area, or is too narrow somewhere to be meshed at that spacing.
+        InputError: an outline that has no area, or is too narrow somewhere to be meshed at that
+            spacing.
     """
     low = corners.min(axis=0)
     if is_rectangle(corners):
@@ -106,8 +123,11 @@ def model_mesh(corners: Points, *, vertices: int = VERTICES) -> Mesh:
         return Mesh(rest=flat.rest + low, faces=flat.faces)
     size = abs(area(corners))
     if size <= 1e-9 * float(np.ptp(corners, axis=0).max()) ** 2:
-        raise InputError("the outline of the cloth has no area", where="cloth", fix="check its rest coordinates")
-    # Equilateral triangles of side s have √3/2 s² a vertex, and half the outer edge's are beyond the cloth.
+        raise InputError(
+            "the outline of the cloth has no area", where="cloth", fix="check its rest coordinates"
+        )
+    # Equilateral triangles of side s have √3/2 s² a vertex, and half the outer edge's are beyond
+    # the cloth.
     perimeter = float(np.hypot(*np.diff(np.vstack([corners, corners[:1]]), axis=0).T).sum())
     cell, unit = perimeter / 2, math.sqrt(3) / 2
     spacing = (cell + math.sqrt(cell**2 + 4 * vertices * unit * size)) / (2 * vertices * unit)
@@ -136,7 +156,9 @@ def model_mesh(corners: Points, *, vertices: int = VERTICES) -> Mesh:
 def sharp_corners(corners: Points) -> IntArray:
     """Indices of the corners at which an outline turns by more than 15°."""
     before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
-    turn = np.arctan2(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0], (before * after).sum(axis=1))
+    turn = np.arctan2(
+        before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0], (before * after).sum(axis=1)
+    )
     return np.flatnonzero(np.abs(turn) > _SHARP)
 
 
@@ -149,8 +171,8 @@ def distance_to(corners: Points, point: Points) -> float:
 
 
 def inside(corners: Points, points: Points) -> BoolArray:
-    """Returns whether points are within a polygon, (point,): a ray from each crosses its edges an odd number of
-    times."""
+    """Returns whether points are within a polygon, (point,): a ray from each crosses its edges an
+    odd number of times."""
     x, y = points[:, 0:1], points[:, 1:2]
     x0, y0 = corners.T
     x1, y1 = np.roll(corners, -1, axis=0).T
@@ -183,4 +205,6 @@ def _lattice(corners: Points, spacing: float) -> Points:
     rows = np.arange(v0, v1 + rise, rise)
     columns = np.arange(u0 - spacing, u1 + spacing, spacing)
     v, u = np.meshgrid(rows, columns, indexing="ij")
-    return np.stack([(u + spacing / 2 * (np.arange(len(rows)) % 2)[:, None]).ravel(), v.ravel()], axis=1)
+    return np.stack(
+        [(u + spacing / 2 * (np.arange(len(rows)) % 2)[:, None]).ravel(), v.ravel()], axis=1
+    )

@@ -1,7 +1,9 @@
-"""Recordings of one cloth whose markers or rates differ, followed at the same points and at the same rate.
+"""Recordings of one cloth whose markers or rates differ, followed at the same points and at the
+same rate.
 
-Where they differ because trackers lost some markers, the markers that all recordings have are taken. Where they differ
-as meshes of different runs do, all are followed at the points of the model's mesh.
+Where they differ because trackers lost some markers, the markers that all recordings have are
+taken. Where they differ as meshes of different runs do, all are followed at the points of the
+model's mesh.
 """
 
 from __future__ import annotations
@@ -20,19 +22,26 @@ from measure.observe.interpolation import onto
 from measure.observe.trajectory import Trajectory
 
 _SAME = 1e-6
-"""Share of the cloth's size within which places are the same: rest coordinates are often kept in single precision."""
+"""Share of the cloth's size within which places are the same: rest coordinates are often kept in
+single precision."""
 _DENSER = 2.0
-"""Markers a point: between markers as far apart as the points, wrinkles are lost that the other recordings show."""
+"""Markers a point: between markers as far apart as the points, wrinkles are lost that the other
+recordings show."""
 _SHARED = 0.5
-"""Share of the markers of the recording with most that all must have in common, for these to be taken alone."""
+"""Share of the markers of the recording with most that all must have in common, for these to be
+taken alone."""
 _NEAR = 0.75
 """Share of a point's weight: it counts as tracked where markers of so much were tracked."""
 
 
-def at_same_rate(recordings: Sequence[Trajectory]) -> tuple[tuple[Trajectory, ...], tuple[Finding, ...]]:
-    """Resamples the recordings to the lowest of their rates; returns them as they are if their rates are the same.
+def at_same_rate(
+    recordings: Sequence[Trajectory],
+) -> tuple[tuple[Trajectory, ...], tuple[Finding, ...]]:
+    """Resamples the recordings to the lowest of their rates; returns them as they are if their
+    rates are the same.
 
-    Positions in between are those of cubic splines in time, tracked where both neighbouring frames were.
+    Positions in between are those of cubic splines in time, tracked where both neighbouring frames
+    were.
     """
     rate = min(recording.rate for recording in recordings)
     moved: list[Trajectory] = []
@@ -41,19 +50,27 @@ def at_same_rate(recordings: Sequence[Trajectory]) -> tuple[tuple[Trajectory, ..
         if recording.rate == rate:
             moved.append(recording)
             continue
-        times = np.arange(int((len(recording.positions) - 1) / recording.rate * rate + 1e-9) + 1) / rate
+        times = (
+            np.arange(int((len(recording.positions) - 1) / recording.rate * rate + 1e-9) + 1) / rate
+        )
         frames = times * recording.rate
         before = np.minimum(np.floor(frames + 1e-9).astype(np.int64), len(recording.positions) - 2)
-        tracked = None if recording.seen is None else recording.seen[before] & recording.seen[before + 1]
+        tracked = (
+            None if recording.seen is None else recording.seen[before] & recording.seen[before + 1]
+        )
         moved.append(
             replace(
-                recording, rate=rate, positions=CubicSpline(recording.times, recording.positions)(times), seen=tracked
+                recording,
+                rate=rate,
+                positions=CubicSpline(recording.times, recording.positions)(times),
+                seen=tracked,
             )
         )
         findings.append(
             Finding.of(
                 "recording-resampled",
-                f"its {recording.rate:.4g} frames a second are not those of the other recordings: it is followed at "
+                f"its {recording.rate:.4g} frames a second are not those of the other recordings: "
+                "it is followed at "
                 f"{rate:.4g} Hz",
                 where=f"recording {recording.name!r}",
                 value=rate,
@@ -65,7 +82,8 @@ def at_same_rate(recordings: Sequence[Trajectory]) -> tuple[tuple[Trajectory, ..
 def at_same_points(
     recordings: Sequence[Trajectory], points: FloatArray
 ) -> tuple[tuple[Trajectory, ...], tuple[Finding, ...]]:
-    """Resamples the recordings to these points (point, 2) [m]; returns them as they are if their markers are the same.
+    """Resamples the recordings to these points (point, 2) [m]; returns them as they are if their
+    markers are the same.
 
     Raises:
         InputError: a recording with markers too few to show the cloth at other points.
@@ -84,7 +102,8 @@ def at_same_points(
             continue
         if count < _DENSER * len(points):
             raise InputError(
-                f"its {count} markers are not those of the other recordings, and too few to follow the cloth at "
+                f"its {count} markers are not those of the other recordings, and too few to follow "
+                "the cloth at "
                 f"the same {len(points)} points",
                 where=where,
                 fix="track the same points in all recordings, or close the loop on them one by one",
@@ -98,12 +117,19 @@ def at_same_points(
             else recording.seen @ np.abs(weights).T >= _NEAR * np.abs(weights).sum(axis=1)
         )
         moved.append(
-            replace(recording, markers=points, positions=positions, noise=recording.noise * grown, seen=tracked)
+            replace(
+                recording,
+                markers=points,
+                positions=positions,
+                noise=recording.noise * grown,
+                seen=tracked,
+            )
         )
         findings.append(
             Finding.of(
                 "markers-resampled",
-                f"its {count} markers are not those of the other recordings: all are followed at {len(points)} "
+                f"its {count} markers are not those of the other recordings: all are followed at "
+                f"{len(points)} "
                 "points of the cloth",
                 where=where,
                 count=len(points),
@@ -112,8 +138,11 @@ def at_same_points(
     return tuple(moved), tuple(findings)
 
 
-def _shared_markers(recordings: Sequence[Trajectory]) -> tuple[tuple[Trajectory, ...], tuple[Finding, ...]] | None:
-    """Selects the markers that all recordings have; None where these are too few to speak of one layout."""
+def _shared_markers(
+    recordings: Sequence[Trajectory],
+) -> tuple[tuple[Trajectory, ...], tuple[Finding, ...]] | None:
+    """Selects the markers that all recordings have; None where these are too few to speak of one
+    layout."""
     most = max(recordings, key=lambda recording: len(recording.markers))
     size = _SAME * float(np.ptp(most.markers, axis=0).max())
     places: list[IntArray] = []
@@ -144,4 +173,6 @@ def _shared_markers(recordings: Sequence[Trajectory]) -> tuple[tuple[Trajectory,
 
 
 def _same_markers(first: FloatArray, second: FloatArray) -> bool:
-    return first.shape == second.shape and bool(np.abs(first - second).max() <= _SAME * np.ptp(first, axis=0).max())
+    return first.shape == second.shape and bool(
+        np.abs(first - second).max() <= _SAME * np.ptp(first, axis=0).max()
+    )

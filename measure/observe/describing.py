@@ -1,4 +1,5 @@
-"""What descriptions that travel with a recording say of the cloth: ArcSim's conf.json, and our simulations' rows."""
+"""What descriptions that travel with a recording say of the cloth: ArcSim's conf.json, and our
+simulations' rows."""
 
 from __future__ import annotations
 
@@ -25,11 +26,14 @@ from sim.cloth.handles import ARCSIM_STIFFNESS
 from sim.cloth.material import BENDING_SHAPE, MATERIALS, STRETCHING_SHAPE, Material, named_material
 
 
-def of_arcsim(scene: Mapping[str, Any], rest: FloatArray, *, where: str) -> tuple[Known, tuple[Finding, ...]]:
+def of_arcsim(
+    scene: Mapping[str, Any], rest: FloatArray, *, where: str
+) -> tuple[Known, tuple[Finding, ...]]:
     """Reads what an ArcSim scene says, and what it ran with that no model here has.
 
-    The material is looked up in the catalog under its file's name: output folders name the file, but do not hold it.
-    Its damping stays the catalog's, since ArcSim's own 0 says nothing about what its steps damp.
+    The material is looked up in the catalog under its file's name: output folders name the file,
+    but do not hold it. Its damping stays the catalog's, since ArcSim's own 0 says nothing about
+    what its steps damp.
 
     Args:
         rest: (vertex, 2) of the first frame, whose first vertices are the scene's [m].
@@ -45,7 +49,9 @@ def of_arcsim(scene: Mapping[str, Any], rest: FloatArray, *, where: str) -> tupl
         pins=_arcsim_pins(scene, rest, where),
         stiffness=_number(magic, "handle_stiffness", ARCSIM_STIFFNESS, where),
         gravity=_vector(scene.get("gravity", [0, 0, 0]), where),
-        air=QuadraticNormal(density=_number(wind, "density", 1.0, where), drag=_number(wind, "drag", 0.0, where)),
+        air=QuadraticNormal(
+            density=_number(wind, "density", 1.0, where), drag=_number(wind, "drag", 0.0, where)
+        ),
         wind=None
         if velocity is None
         else WindTrack.constant((velocity["wind_x"], velocity["wind_y"], velocity["wind_z"])),
@@ -91,14 +97,19 @@ def of_simulation(artifact: Artifact, rest: FloatArray) -> Known:
         )
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(
-            f"its parameters cannot be read: {error!r}", where=where, fix="simulate it again with this version"
+            f"its parameters cannot be read: {error!r}",
+            where=where,
+            fix="simulate it again with this version",
         ) from None
 
 
 def _simulated_pins(scene: Mapping[str, Any], rest: FloatArray) -> FloatArray | None:
-    """Locates the pins of the recipe's shape; None for an ArcSim scene, whose handles are not in the row."""
+    """Locates the pins of the recipe's shape; None for an ArcSim scene, whose handles are not in
+    the row."""
     if scene["shape"] == "flag":
-        vertices = handles.full_hoist(rest) if scene["attachment"] == "hoist" else handles.corners(rest)
+        vertices = (
+            handles.full_hoist(rest) if scene["attachment"] == "hoist" else handles.corners(rest)
+        )
     elif scene["shape"] == "hanging-cloth":
         vertices = handles.top_corners(rest)
     else:
@@ -127,7 +138,9 @@ def _arcsim_pins(scene: Mapping[str, Any], rest: FloatArray, where: str) -> Floa
     nodes: list[int] = []
     for handle in scene.get("handles", []):
         listed = _table(handle, where).get("nodes", [])
-        if not isinstance(listed, list) or not all(isinstance(n, int) and 0 <= n < len(rest) for n in listed):
+        if not isinstance(listed, list) or not all(
+            isinstance(n, int) and 0 <= n < len(rest) for n in listed
+        ):
             raise InputError(
                 f"the handles {listed!r} are not vertices of a mesh of {len(rest)}",
                 where=where,
@@ -137,7 +150,9 @@ def _arcsim_pins(scene: Mapping[str, Any], rest: FloatArray, where: str) -> Floa
     return rest[nodes] if nodes else None
 
 
-def _arcsim_findings(scene: Mapping[str, Any], entry: Mapping[str, Any], where: str) -> tuple[Finding, ...]:
+def _arcsim_findings(
+    scene: Mapping[str, Any], entry: Mapping[str, Any], where: str
+) -> tuple[Finding, ...]:
     disabled = scene.get("disable", [])
     acting = [stage for stage in STAGES if stage not in disabled]
     for stage, key in (("strainlimiting", "strain_limits"), ("plasticity", "yield_curv")):
@@ -150,7 +165,8 @@ def _arcsim_findings(scene: Mapping[str, Any], entry: Mapping[str, Any], where: 
         findings.append(
             Finding.of(
                 "simulated-with-numerical-damping",
-                f"ArcSim ran with implicit steps of {1e3 * step:.3g} ms, which damp the cloth by {5e2 * step:.3g} "
+                f"ArcSim ran with implicit steps of {1e3 * step:.3g} ms, which damp the cloth by "
+                f"{5e2 * step:.3g} "
                 "ms beside its own damping",
                 where=where,
                 value=step / 2,

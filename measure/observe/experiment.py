@@ -4,13 +4,15 @@ Where the model mesh is held: the vertices of a named attachment, or one vertex 
 
 Marker noise, estimated from what no smooth motion of a cloth does.
 
-A high difference in time leaves little of a motion that is well sampled, a marker's departure from the polynomial
-through its neighbours little of a shape that is. Of noise that is independent from marker to marker and from frame to
-frame both leave a known multiple, so their product does. Each pair of orders gives an estimate, which is that of the
-noise plus what is left of the motion; the smallest is taken. The same noise is supposed at all markers, so those that
-move least (near the pins) say most: of the markers' variances the lower decile is taken, over that decile of a χ².
+A high difference in time leaves little of a motion that is well sampled, a marker's departure from
+the polynomial through its neighbours little of a shape that is. Of noise that is independent from
+marker to marker and from frame to frame both leave a known multiple, so their product does. Each
+pair of orders gives an estimate, which is that of the noise plus what is left of the motion; the
+smallest is taken. The same noise is supposed at all markers, so those that move least (near the
+pins) say most: of the markers' variances the lower decile is taken, over that decile of a χ².
 
-Noise that neighbours or frames share (a camera that shakes, a smoothing tracker) is not counted as noise.
+Noise that neighbours or frames share (a camera that shakes, a smoothing tracker) is not counted as
+noise.
 """
 
 from __future__ import annotations
@@ -63,8 +65,8 @@ class Stencils:
     weights: FloatArray
 
     def of(self, values: FloatArray, step: int = 1) -> FloatArray:
-        """Computes departures of every `step`-th marker, (frame, …, 3), from values (frame, marker, 3); NaN where one
-        is NaN."""
+        """Computes departures of every `step`-th marker, (frame, …, 3), from values (frame, marker,
+        3); NaN where one is NaN."""
         weights, neighbours = self.weights[::step], self.neighbours[::step]
         departure = np.zeros((len(values), len(neighbours), 3))
         for column in range(neighbours.shape[1]):
@@ -75,8 +77,8 @@ class Stencils:
 def estimate(markers: FloatArray, positions: FloatArray, *, where: str) -> float:
     """Estimates the standard deviation of a coordinate's noise [m].
 
-    Within 10 % for white noise on a motion that is smooth on the scale of the frames or of the markers; too large where
-    it is smooth on neither.
+    Within 10 % for white noise on a motion that is smooth on the scale of the frames or of the
+    markers; too large where it is smooth on neither.
 
     Args:
         markers: (marker, 2) rest coordinates [m].
@@ -99,14 +101,16 @@ def estimate(markers: FloatArray, positions: FloatArray, *, where: str) -> float
             smallest = min(smallest, _quietest(departure, order))
     if not math.isfinite(smallest):
         raise InputError(
-            "too few values to estimate the noise from", where=where, fix="give the standard deviation of a coordinate"
+            "too few values to estimate the noise from",
+            where=where,
+            fix="give the standard deviation of a coordinate",
         )
     return smallest
 
 
 def stencils(markers: FloatArray, degree: int) -> Stencils | None:
-    """Computes departures from polynomials of a degree fitted to the nearest neighbours; None where there are too few
-    of them.
+    """Computes departures from polynomials of a degree fitted to the nearest neighbours; None where
+    there are too few of them.
 
     Args:
         markers: (marker, 2) [m].
@@ -127,12 +131,14 @@ def stencils(markers: FloatArray, degree: int) -> Stencils | None:
     # The fit to the neighbours alone, at the marker: the constant term.
     fit = np.linalg.pinv(basis[:, 1:], rcond=1e-6)[:, 0]
     weights = np.concatenate([np.ones((count, 1)), -fit], axis=1)
-    return Stencils(neighbours=neighbours, weights=weights / np.linalg.norm(weights, axis=1, keepdims=True))
+    return Stencils(
+        neighbours=neighbours, weights=weights / np.linalg.norm(weights, axis=1, keepdims=True)
+    )
 
 
 def _quietest(values: FloatArray, order: int) -> float:
-    """Estimates the standard deviation at the markers that move least, from differences (frame, marker, 3) of an order
-    in time; infinite where too few values are finite."""
+    """Estimates the standard deviation at the markers that move least, from differences (frame,
+    marker, 3) of an order in time; infinite where too few values are finite."""
     square = (values * values).sum(axis=2) / 3
     finite = np.isfinite(square)
     frames = finite.sum(axis=0)
@@ -140,18 +146,24 @@ def _quietest(values: FloatArray, order: int) -> float:
     if not enough.any():
         return math.inf
     means = np.where(finite, square, 0.0).sum(axis=0)[enough] / frames[enough]
-    # Differences of white noise are correlated, ρ_k = C(2d, d+k)/C(2d, d); Σ ρ_k² = C(4d, 2d)/C(2d, d)² of them count
-    # as one.
+    # Differences of white noise are correlated, ρ_k = C(2d, d+k)/C(2d, d); Σ ρ_k² = C(4d, 2d)/C(2d,
+    # d)² of them count as one.
     together = math.comb(4 * order, 2 * order) / math.comb(2 * order, order) ** 2
     scale = math.comb(2 * order, order)  # variance of the difference of unit white noise
     free = max(1.0, 3 * float(np.median(frames[enough])) / together)
-    return math.sqrt(float(np.quantile(means, _SHARE)) / (scale * float(chi2.ppf(_SHARE, free)) / free))
+    return math.sqrt(
+        float(np.quantile(means, _SHARE)) / (scale * float(chi2.ppf(_SHARE, free)) / free)
+    )
 
 
-_NAMED = {Hold.HOIST_CORNERS: handles.corners, Hold.TOP_CORNERS: handles.top_corners, Hold.HOIST: handles.full_hoist}
+_NAMED = {
+    Hold.HOIST_CORNERS: handles.corners,
+    Hold.TOP_CORNERS: handles.top_corners,
+    Hold.HOIST: handles.full_hoist,
+}
 _AROUND, _CLOCKS = 5.0, 5.0
-"""Time [s], and standard deviations of a log's clock, by which its wind is kept before and behind the recording: means
-over more would say nothing of the wind at the cloth."""
+"""Time [s], and standard deviations of a log's clock, by which its wind is kept before and behind
+the recording: means over more would say nothing of the wind at the cloth."""
 _NEAR = 1e-6
 """Share of the cloth's size: what is nearer than this is in one place."""
 
@@ -160,8 +172,9 @@ def hold(mesh: Mesh, pins: Hold | FloatArray) -> tuple[Mesh, tuple[int, ...]]:
     """Moves a vertex of the mesh to each pin; returns the mesh and those vertices.
 
     Args:
-        pins: a named attachment, or (pin, 2) in the mesh's coordinates [m]. Where no vertex is at a pin, the nearest
-            is moved there: one of the edge to a pin on the edge, an inner one to a pin within, never a corner.
+        pins: a named attachment, or (pin, 2) in the mesh's coordinates [m]. Where no vertex is at a
+            pin, the nearest is moved there: one of the edge to a pin on the edge, an inner one to a
+            pin within, never a corner.
 
     Raises:
         InputError: a pin that is not on the cloth, or two in one place.
@@ -183,16 +196,24 @@ def hold(mesh: Mesh, pins: Hold | FloatArray) -> tuple[Mesh, tuple[int, ...]]:
             at_edge = cloth_mesh.distance_to(corners, pin) <= tolerance
             if not at_edge and not cloth_mesh.inside(corners, pin[None])[0]:
                 raise InputError(
-                    "it is not on the cloth", where=where, fix="give pins in the coordinates of the markers, in metres"
+                    "it is not on the cloth",
+                    where=where,
+                    fix="give pins in the coordinates of the markers, in metres",
                 )
             free = (edge == at_edge) & ~fixed
             free[vertices] = False
             if not free.any():
-                raise InputError("no vertex of the model mesh is free for it", where=where, fix="ask for more vertices")
+                raise InputError(
+                    "no vertex of the model mesh is free for it",
+                    where=where,
+                    fix="ask for more vertices",
+                )
             vertex = int(np.where(free, away, np.inf).argmin())
             rest[vertex] = pin
         if vertex in vertices:
-            raise InputError("two pins are at the same point", where=where, fix="give each pin once")
+            raise InputError(
+                "two pins are at the same point", where=where, fix="give each pin once"
+            )
         vertices.append(vertex)
     return Mesh(rest=rest, faces=mesh.faces), tuple(vertices)
 
@@ -239,7 +260,9 @@ def observe(observations: Sequence[Observation], setup: Setup | None = None) -> 
             if setup.gravity is None
             else (0.0, 0.0, -setup.gravity)
         ),
-        air=_agreed_value([k.air for k in descriptions], setup.air, QuadraticNormal(), "wind force"),
+        air=_agreed_value(
+            [k.air for k in descriptions], setup.air, QuadraticNormal(), "wind force"
+        ),
     )
     experiment = Experiment(specimen=specimen, recordings=recordings)
     findings = (
@@ -253,7 +276,8 @@ def observe(observations: Sequence[Observation], setup: Setup | None = None) -> 
 
 
 def _prepare_recording(observation: Observation, corners: FloatArray) -> Observation:
-    """Prepares a recording with even frames and no gaps, its noise settled, its lengths those of the rest shape.
+    """Prepares a recording with even frames and no gaps, its noise settled, its lengths those of
+    the rest shape.
 
     Wrong values become NaN and are reported; then all NaN are filled or left out together.
 
@@ -262,25 +286,35 @@ def _prepare_recording(observation: Observation, corners: FloatArray) -> Observa
     """
     where = f"recording {observation.name!r}"
     if not np.isfinite(observation.positions).all(axis=2).any():
-        raise InputError("no marker was tracked in any frame", where=where, fix="check the columns of the positions")
+        raise InputError(
+            "no marker was tracked in any frame",
+            where=where,
+            fix="check the columns of the positions",
+        )
     observation = frames.even(observation)
     edges = cloth_lengths.Edges.between(observation.markers, where=where)
     observation = frames.without_stuck_markers(observation)
     sigma = _noise(observation)
     scaled = cloth_lengths.check_scale(observation, edges, sigma)
-    observation = frames.without_repeats(cloth_lengths.without_strays(observation, edges, sigma), sigma)
+    observation = frames.without_repeats(
+        cloth_lengths.without_strays(observation, edges, sigma), sigma
+    )
     period = float(observation.times[1] - observation.times[0])
     filled = fill_positions(observation.positions, observation.markers, period=period, where=where)
     begin = float(observation.times[filled.frames.start])
     markers = observation.markers[filled.markers]
     if len(markers) < cloth_lengths.FEWEST:
         raise InputError(
-            f"{len(markers)} of {len(observation.markers)} markers are left", where=where, fix="track more of them"
+            f"{len(markers)} of {len(observation.markers)} markers are left",
+            where=where,
+            fix="track more of them",
         )
     times = observation.times[filled.frames]
     if len(times) < frames.FEWEST or times[-1] - times[0] < frames.SHORTEST * (1 - 1e-9):
         raise InputError(
-            f"{len(times)} frames are left in which enough markers are tracked", where=where, fix="track more of them"
+            f"{len(times)} frames are left in which enough markers are tracked",
+            where=where,
+            fix="track more of them",
         )
     wind = observation.wind or observation.known.wind
     observation = replace(
@@ -300,21 +334,29 @@ def _prepare_recording(observation: Observation, corners: FloatArray) -> Observa
     )
     # What is filled in is smoother than what was tracked, and would make the noise look smaller.
     observation = replace(
-        observation, noise=sigma if filled.seen is not None or not filled.findings else _noise(observation)
+        observation,
+        noise=sigma if filled.seen is not None or not filled.findings else _noise(observation),
     )
-    frames.check_motion(filled.positions, observation.noise or 0.0, float(np.ptp(corners, axis=0).max()), where=where)
+    frames.check_motion(
+        filled.positions,
+        observation.noise or 0.0,
+        float(np.ptp(corners, axis=0).max()),
+        where=where,
+    )
     return observation
 
 
 def _noise(observation: Observation) -> float:
     if observation.noise is not None:
         return observation.noise
-    return estimate(observation.markers, observation.positions, where=f"recording {observation.name!r}")
+    return estimate(
+        observation.markers, observation.positions, where=f"recording {observation.name!r}"
+    )
 
 
 def _check_experiment(experiment: Experiment) -> tuple[Finding, ...]:
-    """Checks the cloth, its pins and its wind. Whether pins stand still, and whether the motion about them is that of
-    the wind's moment, is not asked where they are carried.
+    """Checks the cloth, its pins and its wind. Whether pins stand still, and whether the motion
+    about them is that of the wind's moment, is not asked where they are carried.
 
     Raises:
         InputError: pins, wind, axes or rate that cannot be those of the recording.
@@ -343,16 +385,29 @@ def _stiffness(descriptions: Sequence[Known], setup: Setup) -> float:
     if setup.carried:
         return math.inf
     return _agreed_value(
-        [k.stiffness for k in descriptions], setup.stiffness, ARCSIM_STIFFNESS, "stiffness of the pins"
+        [k.stiffness for k in descriptions],
+        setup.stiffness,
+        ARCSIM_STIFFNESS,
+        "stiffness of the pins",
     )
 
 
-def _outline(observations: Sequence[Observation], setup: Setup) -> tuple[FloatArray, tuple[Finding, ...]]:
-    """Finds the cloth's outline, as the set-up states it, as the meshes have it, or as far as the markers reach."""
+def _outline(
+    observations: Sequence[Observation], setup: Setup
+) -> tuple[FloatArray, tuple[Finding, ...]]:
+    """Finds the cloth's outline, as the set-up states it, as the meshes have it, or as far as the
+    markers reach."""
     if setup.outline is not None:
         corners = np.asarray(setup.outline, dtype=np.float64)
     elif (
-        outline := next((observation.outline for observation in observations if observation.outline is not None), None)
+        outline := next(
+            (
+                observation.outline
+                for observation in observations
+                if observation.outline is not None
+            ),
+            None,
+        )
     ) is not None:
         corners = outline
     else:
@@ -361,7 +416,8 @@ def _outline(observations: Sequence[Observation], setup: Setup) -> tuple[FloatAr
         size = np.ptp(edge, axis=0)
         finding = Finding.of(
             "cloth-assumed-to-end-at-markers",
-            f"the size of the cloth is not given; it is taken to be {size[0]:.4g} m × {size[1]:.4g} m, as far "
+            f"the size of the cloth is not given; it is taken to be {size[0]:.4g} m × "
+            f"{size[1]:.4g} m, as far "
             "as the markers reach",
             where="cloth",
             fix="give its width and height, or its rest mesh",
@@ -373,8 +429,13 @@ def _outline(observations: Sequence[Observation], setup: Setup) -> tuple[FloatAr
 def _trajectory(observation: Observation, low: FloatArray) -> Trajectory:
     where = f"recording {observation.name!r}"
     if observation.wind is None:
-        raise InputError("no wind is known", where=where, fix="give its velocity, or an anemometer's log (--wind)")
-    # Rounded, so that recordings of one rate and of different lengths have the same one to the last bit.
+        raise InputError(
+            "no wind is known",
+            where=where,
+            fix="give its velocity, or an anemometer's log (--wind)",
+        )
+    # Rounded, so that recordings of one rate and of different lengths have the same one to the last
+    # bit.
     duration = float(observation.times[-1] - observation.times[0])
     rate = float(f"{(len(observation.times) - 1) / duration:.9g}")
     reach = _AROUND + _CLOCKS * observation.wind.clock
@@ -392,7 +453,9 @@ def _trajectory(observation: Observation, low: FloatArray) -> Trajectory:
 
 def _material(descriptions: Sequence[Known], setup: Setup) -> Material:
     material = _nominal(descriptions, setup)
-    return material if setup.area_weight is None else replace(material, area_weight=setup.area_weight)
+    return (
+        material if setup.area_weight is None else replace(material, area_weight=setup.area_weight)
+    )
 
 
 def _nominal(descriptions: Sequence[Known], setup: Setup) -> Material:
@@ -434,7 +497,9 @@ def _pins(descriptions: Sequence[Known], setup: Setup, low: FloatArray) -> Hold 
     for points in pins[1:]:
         if points.shape != pins[0].shape or not np.allclose(points, pins[0]):
             raise InputError(
-                "the recordings' cloth is held differently", where="cloth", fix="take those with the same pins"
+                "the recordings' cloth is held differently",
+                where="cloth",
+                fix="take those with the same pins",
             )
     return pins[0] - low
 
@@ -442,8 +507,11 @@ def _pins(descriptions: Sequence[Known], setup: Setup, low: FloatArray) -> Hold 
 T = TypeVar("T")
 
 
-def _agreed_value(descriptions: Sequence[T | None], chosen: T | None, default: T, quantity: str) -> T:
-    """Returns what the user gives, else what the recordings' descriptions agree on, else the default."""
+def _agreed_value(
+    descriptions: Sequence[T | None], chosen: T | None, default: T, quantity: str
+) -> T:
+    """Returns what the user gives, else what the recordings' descriptions agree on, else the
+    default."""
     if chosen is not None:
         return chosen
     values = [value for value in descriptions if value is not None]

@@ -1,4 +1,5 @@
-"""Experiments as TOML. Parsed here and nowhere else; unknown keys are refused, the nearest is named.
+"""Experiments as TOML. Parsed here and nowhere else; unknown keys are refused, the nearest is
+named.
 
     title, up           "z", "-y", …: the axis of the recordings that points up; all other entries use z up
     [test]              level of the global test, nulls: how many null recordings
@@ -18,8 +19,8 @@
                         sensor (a recipe of catalogs/sensors or a file) and zone, where the log does not state them;
                         accept (the hash that confirms a drafted reading, as a refusal shows it)
 
-All values are SI and radians; toward-deg, north-deg and direction-sigma-deg are in degrees. What a recording's own
-description says may be left out. Paths are relative to the file.
+All values are SI and radians; toward-deg, north-deg and direction-sigma-deg are in degrees. What a
+recording's own description says may be left out. Paths are relative to the file.
 """
 
 from __future__ import annotations
@@ -66,11 +67,13 @@ Triple: TypeAlias = tuple[float, float, float]
 
 @dataclass(frozen=True, kw_only=True)
 class WindSource:
-    """A constant velocity [m/s], or a log, how it is read if it is a file, and how it lies beside the recording.
+    """A constant velocity [m/s], or a log, how it is read if it is a file, and how it lies beside
+    the recording.
 
     Attributes:
         confirm: of a file, asks whether a drafted reading is right.
-        gain, direction, clock: standard deviations of what it may be off by, see `WindTrack`; None for the usual ones.
+        gain, direction, clock: standard deviations of what it may be off by, see `WindTrack`; None
+            for the usual ones.
     """
 
     velocity: tuple[float, float, float] | None = None
@@ -85,7 +88,9 @@ class WindSource:
     def certain(self, track: WindTrack) -> WindTrack:
         """Adds the stated uncertainty to the track."""
         uncertainties = {"gain": self.gain, "direction": self.direction, "clock": self.clock}
-        return replace(track, **{name: value for name, value in uncertainties.items() if value is not None})
+        return replace(
+            track, **{name: value for name, value in uncertainties.items() if value is not None}
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,7 +163,9 @@ def parse(path: Path) -> ExperimentRecipe:
         UsageError: values that do not fit together.
     """
     where, folder = str(path), path.parent
-    form = typed_tables.read(_ExperimentTables, parse_recipe(read_recipe(path).text, where=where), where=where)
+    form = typed_tables.read(
+        _ExperimentTables, parse_recipe(read_recipe(path).text, where=where), where=where
+    )
     return ExperimentRecipe(
         title=form.title or path.stem,
         up=form.up,
@@ -274,14 +281,18 @@ def read(recipe: ExperimentRecipe, lake: Lake | None = None) -> Observed:
         NotFoundError: a source that is neither a path nor an artifact.
         FlagdataError: a source that cannot be read or used.
     """
-    return observe([_observation(source, recipe, lake) for source in recipe.recordings], recipe.setup)
+    return observe(
+        [_observation(source, recipe, lake) for source in recipe.recordings], recipe.setup
+    )
 
 
 def _setup(form: _ExperimentTables, folder: Path, *, where: str) -> Setup:
     cloth, pins, inside = form.cloth, form.attachment, f"{where} [material]"
     from_catalog = "name" in form.material or "file" in form.material
     table = with_present_keys(form.material, where=inside)
-    material = typed_tables.entries(_MATERIAL | (_CHANGES if from_catalog else {}), table, where=inside)
+    material = typed_tables.entries(
+        _MATERIAL | (_CHANGES if from_catalog else {}), table, where=inside
+    )
     air = typed_tables.entries(_AIR, form.air, where=f"{where} [air]")
     gravity = air.pop("gravity", None)
     weight = _weight(material, where=inside)
@@ -305,33 +316,43 @@ def _weight(material: Mapping[str, Any], *, where: str) -> Stated | None:
     """Reads what [material] states of the area weight; None where that is its own.
 
     Raises:
-        UsageError: no weight, one that is not above 0, or an uncertainty of one that is unknown or stated twice.
+        UsageError: no weight, one that is not above 0, or an uncertainty of one that is unknown or
+            stated twice.
     """
     weight = Stated.of(material["area-weight"]) if "area-weight" in material else None
     if weight is not None and not weight.low > 0:
         raise UsageError(
-            f"the area weight {weight.text} kg/m² is not above 0", where=where, fix="give kg/m², as in '0.155±0.003'"
+            f"the area weight {weight.text} kg/m² is not above 0",
+            where=where,
+            fix="give kg/m², as in '0.155±0.003'",
         )
     uncertain = weight is not None and not weight.exact
     if _UNCERTAINTY in material:
         say(f"{_UNCERTAINTY} is of the last version: give {BOTH_STATED}", mark="warning")
         if uncertain:
             raise UsageError(
-                "the uncertainty of the weight is given twice", where=where, fix=f"leave {_UNCERTAINTY} out"
+                "the uncertainty of the weight is given twice",
+                where=where,
+                fix=f"leave {_UNCERTAINTY} out",
             )
     if material.get("mass-unknown") and (uncertain or _UNCERTAINTY in material):
         raise UsageError(
             "both mass-unknown and an uncertainty of the area weight are given",
             where=where,
-            fix="keep mass-unknown for a cloth that nobody weighed, the uncertainty for one whose weight is known",
+            fix="keep mass-unknown for a cloth that nobody weighed, the uncertainty for one whose "
+            "weight is known",
         )
     return weight
 
 
 def _outline(cloth: _Cloth, folder: Path, *, where: str) -> Points | None:
-    if (cloth.width is None) != (cloth.height is None) or (cloth.mesh is not None and cloth.width is not None):
+    if (cloth.width is None) != (cloth.height is None) or (
+        cloth.mesh is not None and cloth.width is not None
+    ):
         raise UsageError(
-            "a cloth of half a size, or of two, is given", where=where, fix="give width and height, or a mesh"
+            "a cloth of half a size, or of two, is given",
+            where=where,
+            fix="give width and height, or a mesh",
         )
     if cloth.width is not None and cloth.height is not None:
         return sheet(cloth.width, cloth.height)
@@ -346,9 +367,13 @@ def _stiffness(pins: _Pins, *, where: str) -> float | None:
     if pins.points and pins.at is not None:
         raise UsageError("both at and points are given", where=where, fix="keep one of them")
     if pins.rigid and pins.stiffness is not None:
-        raise UsageError("both rigid and a stiffness are given", where=where, fix="keep one of them")
+        raise UsageError(
+            "both rigid and a stiffness are given", where=where, fix="keep one of them"
+        )
     if pins.carried and pins.stiffness is not None:
-        raise UsageError("pins that are carried hold rigidly", where=where, fix="leave the stiffness out")
+        raise UsageError(
+            "pins that are carried hold rigidly", where=where, fix="leave the stiffness out"
+        )
     return math.inf if pins.rigid else pins.stiffness
 
 
@@ -358,7 +383,11 @@ def _material(form: Mapping[str, Any], folder: Path, *, where: str) -> Material 
         return None
     if name is not None and file is not None:
         raise UsageError("both name and file are given", where=where, fix="keep one of them")
-    base = named_material(name, where=where) if name is not None else material_file(folder / local_path(file or ""))
+    base = (
+        named_material(name, where=where)
+        if name is not None
+        else material_file(folder / local_path(file or ""))
+    )
     thicken = form.get("thicken", 1.0)
     material = base.scaled(
         area_weight=thicken,
@@ -377,11 +406,19 @@ def _wind(content: Any, folder: Path, *, where: str) -> WindSource:
     typed_tables.check_keys(content, content if isinstance(content, Mapping) else (), where=where)
     kinds = [key for key in _WINDS if content.get(key) not in (None, "", [])]
     if len(kinds) != 1:
-        raise UsageError(f"{len(kinds)} winds are given", where=where, fix="give one of velocity, speed and log")
+        raise UsageError(
+            f"{len(kinds)} winds are given", where=where, fix="give one of velocity, speed and log"
+        )
     form = typed_tables.read(_WINDS[kinds[0]], content, where=where)
     if form.direction_sigma is not None and form.direction_sigma < 0:
-        raise InputError(f"direction-sigma is {form.direction_sigma:g}", where=where, fix="give a number of at least 0")
-    source = WindSource(gain=form.gain_sigma, direction=form.direction_sigma, clock=form.clock_sigma)
+        raise InputError(
+            f"direction-sigma is {form.direction_sigma:g}",
+            where=where,
+            fix="give a number of at least 0",
+        )
+    source = WindSource(
+        gain=form.gain_sigma, direction=form.direction_sigma, clock=form.clock_sigma
+    )
     if isinstance(form, _Log):
         start = form.start
         placement = LogPlacement(
@@ -401,14 +438,21 @@ def _wind(content: Any, folder: Path, *, where: str) -> WindSource:
     return replace(source, velocity=cast("_Velocity", form).velocity)
 
 
-def _observation(source: RecordingSource, recipe: ExperimentRecipe, lake: Lake | None) -> Observation:
+def _observation(
+    source: RecordingSource, recipe: ExperimentRecipe, lake: Lake | None
+) -> Observation:
     observation = _take(open_recordings(source, recipe.folder, lake), source)
     return blown(
-        replace(observation.turned(recipe.up), name=source.name or observation.name), source.wind, recipe.folder, lake
+        replace(observation.turned(recipe.up), name=source.name or observation.name),
+        source.wind,
+        recipe.folder,
+        lake,
     )
 
 
-def blown(observation: Observation, source: WindSource | None, folder: Path, lake: Lake | None) -> Observation:
+def blown(
+    observation: Observation, source: WindSource | None, folder: Path, lake: Lake | None
+) -> Observation:
     """Adds the wind to a recording, if there is a source of it, and what was found on reading that.
 
     Raises:
@@ -418,10 +462,14 @@ def blown(observation: Observation, source: WindSource | None, folder: Path, lak
     if source is None:
         return observation
     track, findings = _track(source, folder, lake)
-    return replace(observation, wind=source.certain(track), findings=(*observation.findings, *findings))
+    return replace(
+        observation, wind=source.certain(track), findings=(*observation.findings, *findings)
+    )
 
 
-def open_recordings(source: RecordingSource, folder: Path, lake: Lake | None) -> tuple[Observation, ...]:
+def open_recordings(
+    source: RecordingSource, folder: Path, lake: Lake | None
+) -> tuple[Observation, ...]:
     """Opens all recordings of a source, as they are: neither turned, nor with the wind beside them.
 
     Raises:
@@ -429,7 +477,9 @@ def open_recordings(source: RecordingSource, folder: Path, lake: Lake | None) ->
         UsageError: options that say nothing of such a source.
         FlagdataError: as its reader.
     """
-    return tuple(replace(observation, noise=source.noise) for observation in _read(source, folder, lake))
+    return tuple(
+        replace(observation, noise=source.noise) for observation in _read(source, folder, lake)
+    )
 
 
 def _read(source: RecordingSource, folder: Path, lake: Lake | None) -> tuple[Observation, ...]:
@@ -442,7 +492,9 @@ def _read(source: RecordingSource, folder: Path, lake: Lake | None) -> tuple[Obs
         return markers.from_table(path, options)
     if lake is None:
         raise NotFoundError(
-            "the file or folder does not exist", where=source.source, fix="check the path, or open a lake for ids"
+            "the file or folder does not exist",
+            where=source.source,
+            fix="check the path, or open a lake for ids",
         )
     _refuse(source, ("take", "rate", "rest_unit"), "an artifact")
     if source.unit != "m":
@@ -454,12 +506,18 @@ def _read(source: RecordingSource, folder: Path, lake: Lake | None) -> tuple[Obs
 
 
 def _refuse(source: RecordingSource, keys: tuple[str, ...], kind_of_source: str) -> None:
-    options = {"take": bool(source.take), "rate": source.rate is not None, "rest_unit": source.rest_unit is not None}
+    options = {
+        "take": bool(source.take),
+        "rate": source.rate is not None,
+        "rest_unit": source.rest_unit is not None,
+    }
     for key in keys:
         if options[key]:
             fix = f"leave {key.replace('_', '-')} out"
             raise UsageError(
-                f"{key.replace('_', '-')} means nothing for {kind_of_source}", where=source.source, fix=fix
+                f"{key.replace('_', '-')} means nothing for {kind_of_source}",
+                where=source.source,
+                fix=fix,
             )
 
 
@@ -474,11 +532,16 @@ def _take(observations: tuple[Observation, ...], source: RecordingSource) -> Obs
         if observation.name == source.take or not source.take:
             return observation
     raise UnknownNameError.of(
-        "recording", source.take, [observation.name for observation in observations], where=source.source
+        "recording",
+        source.take,
+        [observation.name for observation in observations],
+        where=source.source,
     )
 
 
-def _track(source: WindSource, folder: Path, lake: Lake | None) -> tuple[WindTrack, tuple[Finding, ...]]:
+def _track(
+    source: WindSource, folder: Path, lake: Lake | None
+) -> tuple[WindTrack, tuple[Finding, ...]]:
     if source.velocity is not None:
         return WindTrack.constant(source.velocity), ()
     placement = source.placement or LogPlacement()
@@ -487,7 +550,9 @@ def _track(source: WindSource, folder: Path, lake: Lake | None) -> tuple[WindTra
         return wind_tracks.from_log(path, placement, source.options, confirm=source.confirm)
     if source.options not in (None, WindOptions()):
         raise UsageError(
-            "an artifact's wind was read before", where=source.log, fix="leave the sensor and the zone out"
+            "an artifact's wind was read before",
+            where=source.log,
+            fix="leave the sensor and the zone out",
         )
     if lake is None:
         raise NotFoundError(

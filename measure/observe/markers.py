@@ -16,12 +16,16 @@ from measure.observe.observation import Observation
 
 
 def from_table(path: Path, options: MarkerOptions | None = None) -> tuple[Observation, ...]:
-    """Reads the recordings of a marker table; one that holds a single, unnamed recording calls it after the file.
+    """Reads the recordings of a marker table; one that holds a single, unnamed recording calls it
+    after the file.
 
     Raises:
         FlagdataError: as `read_table`.
     """
-    return tuple(_observation(sequence, name=name or path.stem) for name, sequence in read_table(path, options).items())
+    return tuple(
+        _observation(sequence, name=name or path.stem)
+        for name, sequence in read_table(path, options).items()
+    )
 
 
 def from_artifact(lake: Lake, artifact: Artifact, *, name: str | None = None) -> Observation:

@@ -1,4 +1,5 @@
-"""Mesh sequences as observations: the vertices of a mesh that keeps its topology, else fixed points of the cloth.
+"""Mesh sequences as observations: the vertices of a mesh that keeps its topology, else fixed points
+of the cloth.
 
 Material points of a moving mesh whose topology may change: where they are in each frame.
 """
@@ -27,7 +28,8 @@ from measure.observe.describing import of_arcsim, of_simulation
 from measure.observe.observation import Known, Observation
 
 _PAIRS = 1_000_000  # of points and faces that are compared at a time
-_SLACK = 1e-3  # barycentric: how far beyond its face, as a share of it, a point still counts as on the cloth
+# barycentric: how far beyond its face, as a share of it, a point still counts as on the cloth
+_SLACK = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,8 +64,18 @@ def locate(rest: FloatArray, faces: IntArray, points: FloatArray, *, where: str)
     doubled = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
     has_area = np.abs(doubled) > 1e-9 * np.abs(doubled).max(initial=0.0)
     if not has_area.any():
-        raise InputError("no face has an area in the rest shape", where=where, fix="export texture coordinates anew")
-    a, b, c, faces, doubled = a[has_area], b[has_area], c[has_area], faces[has_area], doubled[has_area]
+        raise InputError(
+            "no face has an area in the rest shape",
+            where=where,
+            fix="export texture coordinates anew",
+        )
+    a, b, c, faces, doubled = (
+        a[has_area],
+        b[has_area],
+        c[has_area],
+        faces[has_area],
+        doubled[has_area],
+    )
     containing = np.empty(len(points), dtype=np.int64)
     weights = np.empty((len(points), 3))
     step = max(1, _PAIRS // len(faces))
@@ -90,8 +102,8 @@ def locate(rest: FloatArray, faces: IntArray, points: FloatArray, *, where: str)
 
 
 def sample(sequence: MeshSequence | RaggedMeshSequence, points: FloatArray) -> FloatArray:
-    """Interpolates where points of the flat cloth (point, 2) are in each frame, (frame, point, 3) [m], linear in each
-    face.
+    """Interpolates where points of the flat cloth (point, 2) are in each frame, (frame, point, 3)
+    [m], linear in each face.
 
     Raises:
         InputError: a point that is not on the cloth in every frame.
@@ -101,7 +113,11 @@ def sample(sequence: MeshSequence | RaggedMeshSequence, points: FloatArray) -> F
     location: Location | None = None
     for index in range(len(sequence)):
         mesh = sequence.frame(index)
-        same = last is not None and np.array_equal(last[0], mesh.rest) and np.array_equal(last[1], mesh.faces)
+        same = (
+            last is not None
+            and np.array_equal(last[0], mesh.rest)
+            and np.array_equal(last[1], mesh.faces)
+        )
         if location is None or not same:
             rest, faces = mesh.rest.astype(np.float64), mesh.faces.astype(np.int64)
             location = locate(rest, faces, points, where=f"frame {index}")
@@ -115,14 +131,21 @@ def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 MARKERS = 1000
-"""A mesh of more vertices is sampled at fixed points instead: neighbours would say the same twice."""
+"""A mesh of more vertices is sampled at fixed points instead: neighbours would say the same
+twice."""
 _SAME_RATE = 1e-3
 
 
 def from_folder(
-    path: Path, *, name: str | None = None, rate: float | None = None, unit: str = "m", markers: int = VERTICES
+    path: Path,
+    *,
+    name: str | None = None,
+    rate: float | None = None,
+    unit: str = "m",
+    markers: int = VERTICES,
 ) -> Observation:
-    """Reads an ArcSim output folder, or any folder of OBJ meshes with texture coordinates in metres.
+    """Reads an ArcSim output folder, or any folder of OBJ meshes with texture coordinates in
+    metres.
 
     Args:
         name: what reports call it; the folder's if None.
@@ -133,11 +156,17 @@ def from_folder(
     Raises:
         FlagdataError: as `read_folder` and `from_sequence`.
     """
-    sequence = read_folder(path, rate=rate, metre=float(length_unit(unit, where=str(path)).to_si(1.0)))
+    sequence = read_folder(
+        path, rate=rate, metre=float(length_unit(unit, where=str(path)).to_si(1.0))
+    )
     observation = from_sequence(sequence, name=name or path.name, markers=markers)
     scene = sequence.attributes.get("scene")
     frame_time = scene.get("frame_time") if isinstance(scene, Mapping) else None
-    if rate is None or not isinstance(frame_time, int | float) or abs(rate * frame_time - 1) < _SAME_RATE:
+    if (
+        rate is None
+        or not isinstance(frame_time, int | float)
+        or abs(rate * frame_time - 1) < _SAME_RATE
+    ):
         return observation
     finding = Finding.of(
         "rate-not-as-described",
@@ -149,7 +178,9 @@ def from_folder(
     return replace(observation, findings=(*observation.findings, finding))
 
 
-def from_artifact(lake: Lake, artifact: Artifact, *, name: str | None = None, markers: int = VERTICES) -> Observation:
+def from_artifact(
+    lake: Lake, artifact: Artifact, *, name: str | None = None, markers: int = VERTICES
+) -> Observation:
     """Reads a mesh sequence of a lake.
 
     Raises:
@@ -165,16 +196,20 @@ def from_artifact(lake: Lake, artifact: Artifact, *, name: str | None = None, ma
     sequence = read_meshes(lake.whole_object(artifact.object))  # damage must not be measured
     observation = from_sequence(sequence, name=name or artifact.name, markers=markers)
     first = sequence.frame(0).rest.astype(np.float64)
-    description = observation.known if observation.known.pins is not None else of_simulation(artifact, first)
+    description = (
+        observation.known if observation.known.pins is not None else of_simulation(artifact, first)
+    )
     return replace(observation, source=artifact.id, known=description)
 
 
-def from_sequence(sequence: MeshSequence | RaggedMeshSequence, *, name: str, markers: int = VERTICES) -> Observation:
-    """Makes an observation of a moving mesh; one that is remeshed, or has more than `MARKERS` vertices, is followed at
-    fixed points of the cloth.
+def from_sequence(
+    sequence: MeshSequence | RaggedMeshSequence, *, name: str, markers: int = VERTICES
+) -> Observation:
+    """Makes an observation of a moving mesh; one that is remeshed, or has more than `MARKERS`
+    vertices, is followed at fixed points of the cloth.
 
-    The points are those of a model mesh over the first frame's outline, found in each frame through the rest
-    coordinates and linear within its faces.
+    The points are those of a model mesh over the first frame's outline, found in each frame through
+    the rest coordinates and linear within its faces.
 
     Raises:
         InputError: a cloth with holes, whose outline changes, or a scene that cannot be read.
@@ -203,7 +238,9 @@ def from_sequence(sequence: MeshSequence | RaggedMeshSequence, *, name: str, mar
     )
 
 
-def _described_mesh(attributes: Mapping[str, Any], rest: Any, where: str) -> tuple[Known, tuple[Finding, ...]]:
+def _described_mesh(
+    attributes: Mapping[str, Any], rest: Any, where: str
+) -> tuple[Known, tuple[Finding, ...]]:
     scene = attributes.get("scene")
     if attributes.get("source") != "arcsim" or not isinstance(scene, Mapping):
         return Known(), ()

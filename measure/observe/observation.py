@@ -1,4 +1,5 @@
-"""One recording as it came: tracked points, z up, in metres, and what its own description says of the cloth."""
+"""One recording as it came: tracked points, z up, in metres, and what its own description says of
+the cloth."""
 
 from __future__ import annotations
 
@@ -75,7 +76,8 @@ class Observation:
         source: identity of the artifact it was read from; empty where there is none.
         known: from its description.
         findings: of reading it.
-        seen: (frame, marker) whether each position was tracked, once gaps are filled; None where all were.
+        seen: (frame, marker) whether each position was tracked, once gaps are filled; None where
+            all were.
 
     Raises:
         InputError: shapes that disagree, or times that are not finite or do not increase.
@@ -96,17 +98,25 @@ class Observation:
     def __post_init__(self) -> None:
         where = f"recording {self.name!r}"
         markers, frames = np.shape(self.markers), np.shape(self.times)
-        if len(markers) != 2 or markers[1] != 2 or np.shape(self.positions) != (*frames, markers[0], 3):
+        if (
+            len(markers) != 2
+            or markers[1] != 2
+            or np.shape(self.positions) != (*frames, markers[0], 3)
+        ):
             raise InputError(
-                f"{frames} times and markers {markers} do not fit positions of shape {np.shape(self.positions)}",
+                f"{frames} times and markers {markers} do not fit positions of shape "
+                f"{np.shape(self.positions)}",
                 where=where,
                 fix="give (frame,), (marker, 2) and (frame, marker, 3)",
             )
         if not np.isfinite(self.times).all() or (np.diff(self.times) <= 0).any():
-            raise InputError("its times do not increase", where=where, fix="sort the frames by time, each once")
+            raise InputError(
+                "its times do not increase", where=where, fix="sort the frames by time, each once"
+            )
 
     def turned(self, up: Up) -> Observation:
-        """Turns this recording, whose `up` axis pointed up, to z up; its wind and gravity are turned along."""
+        """Turns this recording, whose `up` axis pointed up, to z up; its wind and gravity are
+        turned along."""
         if up is Up.Z:
             return self
         turn = np.array(_TURNS[up], dtype=np.float64)
@@ -116,7 +126,9 @@ class Observation:
             gravity=None if gravity is None else tuple((turn @ np.array(gravity)).tolist()),
             wind=None if wind is None else replace(wind, velocity=wind.velocity @ turn.T),
         )
-        turned_wind = None if self.wind is None else replace(self.wind, velocity=self.wind.velocity @ turn.T)
+        turned_wind = (
+            None if self.wind is None else replace(self.wind, velocity=self.wind.velocity @ turn.T)
+        )
         return replace(self, positions=self.positions @ turn.T, known=description, wind=turned_wind)
 
 
@@ -131,7 +143,8 @@ def from_arrays(
     noise: float | None = None,
     description: Known | None = None,
 ) -> Observation:
-    """Makes a recording from arrays: positions (frame, marker, 3) [m] at `rate` [Hz], rest (marker, 2) [m], z up.
+    """Makes a recording from arrays: positions (frame, marker, 3) [m] at `rate` [Hz], rest (marker,
+    2) [m], z up.
 
     Args:
         faces: (face, 3) of a mesh whose vertices the markers are; its edge is the cloth's.
@@ -140,7 +153,9 @@ def from_arrays(
         InputError: shapes that disagree, or a rate that is not positive.
     """
     if not (np.isfinite(rate) and rate > 0):
-        raise InputError(f"the rate is {rate!r} frames a second", where=f"recording {name!r}", fix="give Hz")
+        raise InputError(
+            f"the rate is {rate!r} frames a second", where=f"recording {name!r}", fix="give Hz"
+        )
     positions, rest = np.asarray(positions, dtype=np.float64), np.asarray(rest, dtype=np.float64)
     corners = None
     if faces is not None:

@@ -39,14 +39,16 @@ class Setup:
 
     Attributes:
         material: nominal.
-        mass_known: whether the cloth was weighed, or its material is known; else its area weight is a guess, and all
-            that is found is a ratio to it.
+        mass_known: whether the cloth was weighed, or its material is known; else its area weight is
+            a guess, and all that is found is a ratio to it.
         area_weight: in place of the material's [kg/m²]; None for that.
-        area_weight_uncertainty: relative standard uncertainty of the cloth's area weight where the mass is known.
+        area_weight_uncertainty: relative standard uncertainty of the cloth's area weight where the
+            mass is known.
         outline: (corner, 2) of the flat cloth, in the coordinates of the markers [m].
         pins: where the cloth is held: a name, or rest coordinates ((u, v), …) [m].
-        carried: whether the attachments move: the cloth is held by hands or by a robot. They then go where the markers
-            at the pins go, or where the nearest markers say that the pins are, and hold rigidly.
+        carried: whether the attachments move: the cloth is held by hands or by a robot. They then
+            go where the markers at the pins go, or where the nearest markers say that the pins are,
+            and hold rigidly.
         stiffness: of each attachment on each axis [N/m]; infinite for rigid.
         gravity: magnitude [m/s²]; it acts along −z.
         air: the base model's force.
@@ -69,16 +71,30 @@ class Setup:
     vertices: int = VERTICES
 
     def __post_init__(self) -> None:
-        if self.outline is not None and (np.ndim(self.outline) != 2 or np.shape(self.outline)[1:] != (2,)):
-            raise self._wrong(f"the outline has the shape {np.shape(self.outline)}", "give (corner, 2) in metres")
-        if self.outline is not None and (len(self.outline) < 3 or not np.isfinite(self.outline).all()):
-            raise self._wrong("the outline has fewer than three finite corners", "list its corners in order")
+        if self.outline is not None and (
+            np.ndim(self.outline) != 2 or np.shape(self.outline)[1:] != (2,)
+        ):
+            raise self._wrong(
+                f"the outline has the shape {np.shape(self.outline)}", "give (corner, 2) in metres"
+            )
+        if self.outline is not None and (
+            len(self.outline) < 3 or not np.isfinite(self.outline).all()
+        ):
+            raise self._wrong(
+                "the outline has fewer than three finite corners", "list its corners in order"
+            )
         if isinstance(self.pins, tuple) and not (self.pins and np.isfinite(self.pins).all()):
-            raise self._wrong(f"the pins are {self.pins!r}", "give a name, or finite (u, v) in metres")
+            raise self._wrong(
+                f"the pins are {self.pins!r}", "give a name, or finite (u, v) in metres"
+            )
         if self.stiffness is not None and not self.stiffness > 0:
-            raise self._wrong(f"the stiffness is {self.stiffness!r}", "give N/m, or infinity for rigid pins")
+            raise self._wrong(
+                f"the stiffness is {self.stiffness!r}", "give N/m, or infinity for rigid pins"
+            )
         if self.carried and self.stiffness not in (None, math.inf):
-            raise self._wrong("a stiffness of pins that are carried", "leave it out: they hold rigidly")
+            raise self._wrong(
+                "a stiffness of pins that are carried", "leave it out: they hold rigidly"
+            )
         if not 0 < self.area_weight_uncertainty <= 1:
             raise self._wrong(
                 f"the relative uncertainty of the area weight is {self.area_weight_uncertainty!r}",
@@ -90,7 +106,8 @@ class Setup:
             raise self._wrong(f"the model mesh has {self.vertices} vertices", "ask for at least 16")
 
     def state_weight(self, area_weight: Stated | None, relative: float | None = None) -> Setup:
-        """Puts what the user states of the cloth's weight in place of the material's; with neither, nothing changes.
+        """Puts what the user states of the cloth's weight in place of the material's; with neither,
+        nothing changes.
 
         Args:
             area_weight: value and standard deviation of a weighing, or a range, uniform [kg/m²].
@@ -117,7 +134,9 @@ class Setup:
                 where="--area-weight",
                 fix="give that of the weighing, as in 0.155±0.003",
             )
-        return replace(self, area_weight=value, mass_known=True, area_weight_uncertainty=sigma / value)
+        return replace(
+            self, area_weight=value, mass_known=True, area_weight_uncertainty=sigma / value
+        )
 
     def _wrong(self, message: str, fix: str) -> InputError:
         return InputError(message, where="setup", fix=fix)
@@ -131,6 +150,8 @@ def sheet(width: float, height: float) -> FloatArray:
     """
     if not (0 < width < math.inf and 0 < height < math.inf):
         raise InputError(
-            f"the cloth measures {width} m × {height} m", where="setup", fix="give positive sizes in metres"
+            f"the cloth measures {width} m × {height} m",
+            where="setup",
+            fix="give positive sizes in metres",
         )
     return np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])

@@ -1,4 +1,5 @@
-"""What was observed: tracked points of one cloth in one or more recordings, and the wind beside each."""
+"""What was observed: tracked points of one cloth in one or more recordings, and the wind beside
+each."""
 
 from __future__ import annotations
 
@@ -17,13 +18,16 @@ from sim.cloth.mesh import Mesh
 from sim.cloth.scene import GRAVITY
 
 GAIN = 0.03
-"""Share: calibrated cups and sonics are good to 1 to 3 % (IEC 61400-12-1, annex I, classes them so)."""
+"""Share: calibrated cups and sonics are good to 1 to 3 % (IEC 61400-12-1, annex I, classes them
+so)."""
 DIRECTION = math.radians(5.0)
-"""rad: how well north, or the axis of a tunnel, is lined up with a camera's axes by eye and compass."""
+"""rad: how well north, or the axis of a tunnel, is lined up with a camera's axes by eye and
+compass."""
 CLOCK = 0.3
 """s: a log of 1 Hz whose stamps are rounded, or a cup's lag at a few metres a second."""
 AREA_WEIGHT_UNCERTAINTY = 0.3
-"""Relative standard uncertainty of a cloth's area weight [kg/m²] where nobody says how well it is known."""
+"""Relative standard uncertainty of a cloth's area weight [kg/m²] where nobody says how well it is
+known."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -38,7 +42,8 @@ class WindTrack:
         clock: the same of the time by which the log lags behind the recording [s].
 
     Raises:
-        InputError: shapes that disagree, values that are not finite, times that do not increase, a negative deviation.
+        InputError: shapes that disagree, values that are not finite, times that do not increase, a
+            negative deviation.
     """
 
     times: FloatArray
@@ -55,7 +60,10 @@ class WindTrack:
                 where="wind",
                 fix="give (n,) seconds and (n, 3) m/s",
             )
-        if not (np.isfinite(times).all() and np.isfinite(velocity).all()) or (np.diff(times) <= 0).any():
+        if (
+            not (np.isfinite(times).all() and np.isfinite(velocity).all())
+            or (np.diff(times) <= 0).any()
+        ):
             raise InputError(
                 "the times do not increase, or a value is not finite",
                 where="wind",
@@ -95,7 +103,8 @@ class WindTrack:
         return replace(self, times=self.times - seconds)
 
     def between(self, begin: float, end: float) -> WindTrack:
-        """Cuts the wind to the part from `begin` to `end` [s], or as much of that as the log has."""
+        """Cuts the wind to the part from `begin` to `end` [s], or as much of that as the log
+        has."""
         begin, end = max(begin, float(self.times[0])), min(end, float(self.times[-1]))
         if not begin < end:
             return self
@@ -104,13 +113,17 @@ class WindTrack:
         return replace(self, times=times, velocity=self.at(times))
 
     def at(self, times: FloatArray) -> FloatArray:
-        """Interpolates velocities (k, 3) [m/s] at times (k,) [s]; outside the log its first and last sample."""
-        return np.stack([np.interp(times, self.times, self.velocity[:, axis]) for axis in range(3)], axis=-1)
+        """Interpolates velocities (k, 3) [m/s] at times (k,) [s]; outside the log its first and
+        last sample."""
+        return np.stack(
+            [np.interp(times, self.times, self.velocity[:, axis]) for axis in range(3)], axis=-1
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AttachmentTrack:
-    """Where the attachments of a carried cloth go, linear between samples and still before and after them.
+    """Where the attachments of a carried cloth go, linear between samples and still before and
+    after them.
 
     Attributes:
         times: (n,) since the recording's first frame [s], increasing.
@@ -125,13 +138,21 @@ class AttachmentTrack:
 
     def __post_init__(self) -> None:
         times, places = _frozen(self.times), _frozen(self.places)
-        if times.ndim != 1 or not len(times) or places.ndim != 3 or places.shape[::2] != (len(times), 3):
+        if (
+            times.ndim != 1
+            or not len(times)
+            or places.ndim != 3
+            or places.shape[::2] != (len(times), 3)
+        ):
             raise InputError(
                 f"the times have the shape {times.shape}, the places {places.shape}",
                 where="attachments",
                 fix="give (n,) seconds and (n, held, 3) metres",
             )
-        if not (np.isfinite(times).all() and np.isfinite(places).all()) or (np.diff(times) <= 0).any():
+        if (
+            not (np.isfinite(times).all() and np.isfinite(places).all())
+            or (np.diff(times) <= 0).any()
+        ):
             raise InputError(
                 "the times do not increase, or a value is not finite",
                 where="attachments",
@@ -143,7 +164,9 @@ class AttachmentTrack:
     def at(self, times: FloatArray) -> FloatArray:
         """Interpolates (k, held, 3) [m] at times (k,) [s]."""
         flat = self.places.reshape(len(self.times), -1)
-        interpolated = np.stack([np.interp(times, self.times, values) for values in flat.T], axis=-1)
+        interpolated = np.stack(
+            [np.interp(times, self.times, values) for values in flat.T], axis=-1
+        )
         return interpolated.reshape(len(times), *self.places.shape[1:])
 
 
@@ -159,9 +182,10 @@ class Trajectory:
         wind: beside it.
         noise: standard deviation of a coordinate [m].
         source: identity of the artifact it was read from; empty where there is none.
-        seen: (frame, marker) whether each position was tracked, where gaps are filled; None where all were. What is
-            filled starts a prediction, and is never compared with one.
-        attachments: (frame, held, 3) where the cloth is held, if that moves [m]; None where it is held still.
+        seen: (frame, marker) whether each position was tracked, where gaps are filled; None where
+            all were. What is filled starts a prediction, and is never compared with one.
+        attachments: (frame, held, 3) where the cloth is held, if that moves [m]; None where it is
+            held still.
 
     Raises:
         InputError: shapes that disagree, a rate or noise that makes no sense, infinite positions.
@@ -187,11 +211,17 @@ class Trajectory:
                 fix="give (marker, 2) and (frame, marker, 3), in metres",
             )
         if not np.isfinite(markers).all() or np.isinf(positions).any():
-            raise InputError("a coordinate is not finite", where=where, fix="mark points that were lost by NaN")
+            raise InputError(
+                "a coordinate is not finite", where=where, fix="mark points that were lost by NaN"
+            )
         if not (np.isfinite(self.rate) and self.rate > 0):
-            raise InputError(f"the rate is {self.rate!r} frames a second", where=where, fix="give Hz")
+            raise InputError(
+                f"the rate is {self.rate!r} frames a second", where=where, fix="give Hz"
+            )
         if not (np.isfinite(self.noise) and self.noise >= 0):
-            raise InputError(f"the noise is {self.noise!r} m", where=where, fix="give at least 0 metres")
+            raise InputError(
+                f"the noise is {self.noise!r} m", where=where, fix="give at least 0 metres"
+            )
         if self.seen is not None and self.seen.shape != positions.shape[:2]:
             raise InputError(
                 f"the mask has the shape {self.seen.shape}, the positions have {positions.shape}",
@@ -206,7 +236,8 @@ class Trajectory:
                 or not np.isfinite(attachments).all()
             ):
                 raise InputError(
-                    f"the attachments have the shape {attachments.shape}, or are not finite; the positions have "
+                    f"the attachments have the shape {attachments.shape}, or are not finite; the "
+                    "positions have "
                     f"{positions.shape}",
                     where=where,
                     fix="give (frame, held, 3), in metres, without gaps",
@@ -223,7 +254,11 @@ class Trajectory:
     @property
     def track(self) -> AttachmentTrack | None:
         """Where its attachments go; None where they are held still."""
-        return None if self.attachments is None else AttachmentTrack(times=self.times, places=self.attachments)
+        return (
+            None
+            if self.attachments is None
+            else AttachmentTrack(times=self.times, places=self.attachments)
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -238,7 +273,8 @@ class Specimen:
         held: vertices of `mesh` that are attached.
         anchors: (held, 3) where they are tied [m].
         stiffness: of each attachment, on each axis [N/m].
-        anchors_given: whether `anchors` are known by themselves, not taken from where recordings show the attachments.
+        anchors_given: whether `anchors` are known by themselves, not taken from where recordings
+            show the attachments.
         gravity: (x, y, z) [m/s²].
         air: the base model's force.
 
@@ -278,7 +314,8 @@ class Experiment:
     """One cloth in one or more recordings.
 
     Raises:
-        InputError: no recording, two of one name, attachments that are not the cloth's, or markers beyond the cloth.
+        InputError: no recording, two of one name, attachments that are not the cloth's, or markers
+            beyond the cloth.
     """
 
     specimen: Specimen
@@ -293,11 +330,15 @@ class Experiment:
         names = [r.name for r in self.recordings]
         if not names or len(set(names)) != len(names):
             raise InputError(
-                f"the recordings' names are {names!r}", where="experiment", fix="give one or more, each its own name"
+                f"the recordings' names are {names!r}",
+                where="experiment",
+                fix="give one or more, each its own name",
             )
         rest = self.specimen.mesh.rest
         slack = 1e-3 * float(np.ptp(rest, axis=0).max())
-        counts = {None if r.attachments is None else r.attachments.shape[1] for r in self.recordings}
+        counts = {
+            None if r.attachments is None else r.attachments.shape[1] for r in self.recordings
+        }
         if counts not in ({None}, {len(self.specimen.held)}):
             raise InputError(
                 "some recordings have attachments that move and some not, or not the cloth's",
@@ -305,7 +346,9 @@ class Experiment:
                 fix="give the tracks of all attachments in all recordings, or none",
             )
         for recording in self.recordings:
-            beyond = (recording.markers < rest.min(axis=0) - slack) | (recording.markers > rest.max(axis=0) + slack)
+            beyond = (recording.markers < rest.min(axis=0) - slack) | (
+                recording.markers > rest.max(axis=0) + slack
+            )
             if beyond.any():
                 marker = int(np.flatnonzero(beyond.any(axis=1))[0])
                 raise InputError(
@@ -316,7 +359,8 @@ class Experiment:
 
 
 def marker_at(rest: FloatArray) -> str:
-    """Returns how a marker is named in messages: by its rest coordinates (2,) [m], since its index is not its name."""
+    """Returns how a marker is named in messages: by its rest coordinates (2,) [m], since its index
+    is not its name."""
     return f"marker at (u, v) = ({rest[0]:.4g}, {rest[1]:.4g}) m"
 
 
@@ -327,7 +371,8 @@ def _frozen(values: FloatArray) -> FloatArray:
 
 
 def describe_cloth(specimen: Specimen) -> tuple[dict[str, Any], list[AnyArray]]:
-    """Lists plain values and arrays that say all of a cloth and its uncertainties, to be hashed; no names and files."""
+    """Lists plain values and arrays that say all of a cloth and its uncertainties, to be hashed; no
+    names and files."""
     material = specimen.material
     content: dict[str, Any] = {
         "held": list(specimen.held),

@@ -1,7 +1,8 @@
 """Wind tracks from anemometers: velocities in the recording's axes, on its clock.
 
-A velocity says where the air goes to. A log's direction says where it comes from, clockwise from north; which way north
-lies in the recording's axes, or the axis along which the air goes, must be given: a camera does not know.
+A velocity says where the air goes to. A log's direction says where it comes from, clockwise from
+north; which way north lies in the recording's axes, or the axis along which the air goes, must be
+given: a camera does not know.
 """
 
 from __future__ import annotations
@@ -34,10 +35,11 @@ class LogPlacement:
     """How a log lies beside a recording, z up.
 
     Attributes:
-        axis: (x, y, z) along which the air goes; speeds are taken along it, directions are not looked at. Of three
-            components, None takes the sensor's axes to be the recording's.
+        axis: (x, y, z) along which the air goes; speeds are taken along it, directions are not
+            looked at. Of three components, None takes the sensor's axes to be the recording's.
         north: where true north lies, from +x towards +y [rad]; used with a direction.
-        offset: added to the recording's clock to reach the log's [s]; each starts at its first sample.
+        offset: added to the recording's clock to reach the log's [s]; each starts at its first
+            sample.
         start: instant of the first frame on the log's clock [UTC ns]; instead of `offset`.
 
     Raises:
@@ -51,18 +53,31 @@ class LogPlacement:
 
     def __post_init__(self) -> None:
         if self.axis is not None and not (np.isfinite(self.axis).all() and any(self.axis)):
-            raise UsageError(f"the axis {self.axis!r} has no direction", where="wind", fix="give (x, y, z)")
+            raise UsageError(
+                f"the axis {self.axis!r} has no direction", where="wind", fix="give (x, y, z)"
+            )
         if self.axis is not None and self.north is not None:
-            raise UsageError("both an axis and north are given", where="wind", fix="keep one of them")
+            raise UsageError(
+                "both an axis and north are given", where="wind", fix="keep one of them"
+            )
         if self.offset is not None and self.start is not None:
-            raise UsageError("both an offset and a start are given", where="wind", fix="keep one of them")
+            raise UsageError(
+                "both an offset and a start are given", where="wind", fix="keep one of them"
+            )
 
     def first_frame(self, series: WindSeries) -> int:
-        """Returns the instant of the first frame on the log's clock [UTC ns]; by default the log's first sample."""
-        return self.start if self.start is not None else int(series.time[0]) + round((self.offset or 0.0) * NANOSECONDS)
+        """Returns the instant of the first frame on the log's clock [UTC ns]; by default the log's
+        first sample."""
+        return (
+            self.start
+            if self.start is not None
+            else int(series.time[0]) + round((self.offset or 0.0) * NANOSECONDS)
+        )
 
 
-def track(series: WindSeries, placement: LogPlacement, *, where: str) -> tuple[WindTrack, tuple[Finding, ...]]:
+def track(
+    series: WindSeries, placement: LogPlacement, *, where: str
+) -> tuple[WindTrack, tuple[Finding, ...]]:
     """Reads the wind that a log holds, without its unusable samples, and its metadata.
 
     Raises:
@@ -72,7 +87,11 @@ def track(series: WindSeries, placement: LogPlacement, *, where: str) -> tuple[W
     velocity = _velocity(series, placement, where=where)
     good = np.isfinite(velocity).all(axis=1) & ((series.flags & UNUSABLE) == 0)
     if not good.any():
-        raise InputError("the wind has no usable sample", where=where, fix="see what flagdata ingest says of the log")
+        raise InputError(
+            "the wind has no usable sample",
+            where=where,
+            fix="see what flagdata ingest says of the log",
+        )
     begin = placement.first_frame(series)
     times = (series.time[good] - begin) / NANOSECONDS
     findings: list[Finding] = []
@@ -109,12 +128,17 @@ def track(series: WindSeries, placement: LogPlacement, *, where: str) -> tuple[W
 
 
 def from_log(
-    path: Path, placement: LogPlacement, options: WindOptions | None = None, *, confirm: Confirm = UNASKED
+    path: Path,
+    placement: LogPlacement,
+    options: WindOptions | None = None,
+    *,
+    confirm: Confirm = UNASKED,
 ) -> tuple[WindTrack, tuple[Finding, ...]]:
     """Reads the wind of an anemometer's file, of any format that can be ingested.
 
     Args:
-        confirm: asks what the file leaves open, and whether a drafted reading is right; without it a draft is refused.
+        confirm: asks what the file leaves open, and whether a drafted reading is right; without it
+            a draft is refused.
 
     Raises:
         OpenFactsError, ZoneMissingError: nobody answered what the file leaves open.
@@ -136,11 +160,16 @@ def _typed_findings(answers: Answers) -> tuple[Finding, ...]:
     """Reports what was answered at a terminal about a file, so that the result states it."""
     if not answers:
         return ()
-    texts = (f"{name} {', '.join(answer) if isinstance(answer, tuple) else answer}" for name, answer in answers.items())
+    texts = (
+        f"{name} {', '.join(answer) if isinstance(answer, tuple) else answer}"
+        for name, answer in answers.items()
+    )
     return (Finding.of("answers-given", f"given at the terminal: {'; '.join(texts)}"),)
 
 
-def from_artifact(lake: Lake, artifact: Artifact, placement: LogPlacement) -> tuple[WindTrack, tuple[Finding, ...]]:
+def from_artifact(
+    lake: Lake, artifact: Artifact, placement: LogPlacement
+) -> tuple[WindTrack, tuple[Finding, ...]]:
     """Reads the wind of a wind or recording artifact, on its common clock.
 
     Raises:
@@ -149,7 +178,11 @@ def from_artifact(lake: Lake, artifact: Artifact, placement: LogPlacement) -> tu
     """
     where = f"artifact {artifact.id}"
     if artifact.kind not in (Kind.WIND, Kind.RECORDING) or artifact.object is None:
-        raise InputError(f"a {artifact.kind.value} holds no wind", where=where, fix="name a wind or recording artifact")
+        raise InputError(
+            f"a {artifact.kind.value} holds no wind",
+            where=where,
+            fix="name a wind or recording artifact",
+        )
     series = open_parent(lake, artifact.object).wind()
     if series is None:
         raise InputError("the record has no wind", where=where, fix="name a wind artifact")
@@ -173,7 +206,12 @@ def _velocity(series: WindSeries, placement: LogPlacement, *, where: str) -> Flo
         heading = placement.north - channels["wind_direction"] + math.pi
         upward = channels.get("wind_z", np.zeros(len(series)))
         return np.stack(
-            [channels["wind_speed"] * np.cos(heading), channels["wind_speed"] * np.sin(heading), upward], axis=1
+            [
+                channels["wind_speed"] * np.cos(heading),
+                channels["wind_speed"] * np.sin(heading),
+                upward,
+            ],
+            axis=1,
         )
     if "wind_x" in channels and "wind_y" in channels:
         if placement.north is not None:
@@ -198,5 +236,7 @@ def _speed(series: WindSeries, where: str) -> FloatArray:
     if "wind_x" in channels and "wind_y" in channels:
         return np.hypot(channels["wind_x"], channels["wind_y"])
     raise InputError(
-        f"the log has no wind speed: {', '.join(sorted(channels))}", where=where, fix="name the log of an anemometer"
+        f"the log has no wind speed: {', '.join(sorted(channels))}",
+        where=where,
+        fix="name the log of an anemometer",
     )

@@ -1,4 +1,5 @@
-"""Narrow lines in the spectra of errors, at frequencies that go with the wind: what sheds vortices upwind leaves them.
+"""Narrow lines in the spectra of errors, at frequencies that go with the wind: what sheds vortices
+upwind leaves them.
 
 Forces that come and go within a segment average to nothing along every steady column. A body of width D sheds at
 f = St U/D, St about 0.2 (Roshko, NACA TN 3169, 1954), so f/U is the same in all winds. Each segment's errors, projected
@@ -19,15 +20,16 @@ from flagdata.core.arrays import FloatArray, IntArray
 from measure.forecasting.regressors import cosine
 
 REDUCED: FloatArray = np.geomspace(1.0, 4.0, 70)
-"""f/U [1/m]: bodies 5 to 20 cm wide. Below are the harmonics of the flutter of a flag of 1.5 m, at about 0.3, by which
-nulls of some numerics stand out. 2 % apart: less than the lines' own width."""
+"""f/U [1/m]: bodies 5 to 20 cm wide. Below are the harmonics of the flutter of a flag of 1.5 m, at
+about 0.3, by which nulls of some numerics stand out. 2 % apart: less than the lines' own width."""
 SHAPES = tuple((i, 0) for i in range(5))
 STROUHAL = 0.2
 """f D/U of a circular cylinder from Re 300 to 2e5 (Roshko 1954)."""
 _POINTS = 128
 """Points of a transform: finer than what segments of 50 frames resolve."""
 _NEAR = 2.0
-"""Hz to either side that a line is compared with; a segment of 2 s resolves 1 Hz (Hann's window)."""
+"""Hz to either side that a line is compared with; a segment of 2 s resolves 1 Hz (Hann's
+window)."""
 _EDGE = 0.5
 """Hz below the highest frequency that lines are sought."""
 
@@ -47,23 +49,33 @@ class Spectrum:
     period: float
 
     @classmethod
-    def of(cls, markers: FloatArray, rest: FloatArray, speeds: FloatArray, period: float) -> Spectrum:
+    def of(
+        cls, markers: FloatArray, rest: FloatArray, speeds: FloatArray, period: float
+    ) -> Spectrum:
         """Makes the shapes of markers (marker, 2) on a cloth (vertex, 2) [m]."""
         shapes = np.stack([cosine(mode, markers, rest) for mode in SHAPES]) / len(markers)
         return cls(shapes=shapes, speeds=speeds, period=period)
 
     def prominence(self, errors: Tensor) -> FloatArray:
-        """Computes the prominence (segment, reduced frequency, shape · axis) of errors (frame, marker, 3, segment) [m];
-        NaN where the frames are too few a second."""
+        """Computes the prominence (segment, reduced frequency, shape · axis) of errors (frame,
+        marker, 3, segment) [m]; NaN where the frames are too few a second."""
         power, frequency = self._power(errors), self._frequency
-        around = np.stack([np.median(power[np.abs(frequency - f) <= _NEAR], axis=0) for f in frequency])
+        around = np.stack(
+            [np.median(power[np.abs(frequency - f) <= _NEAR], axis=0) for f in frequency]
+        )
         return self._with_the_wind(power / np.maximum(around, np.finfo(np.float64).tiny))
 
     def _power(self, errors: Tensor) -> FloatArray:
         """Computes the power (frequency, segment, shape · axis) [m²]."""
         frames, segments = errors.shape[0], errors.shape[3]
         shapes = torch.as_tensor(self.shapes, dtype=errors.dtype, device=errors.device)
-        course = torch.einsum("km,fmcs->fskc", shapes, errors).reshape(frames, segments, -1).double().cpu().numpy()
+        course = (
+            torch.einsum("km,fmcs->fskc", shapes, errors)
+            .reshape(frames, segments, -1)
+            .double()
+            .cpu()
+            .numpy()
+        )
         window = np.hanning(frames + 2)[1:-1, None, None]
         spectrum = np.fft.rfft((course - course.mean(axis=0)) * window, _POINTS, axis=0)
         return spectrum.real**2 + spectrum.imag**2
@@ -74,14 +86,17 @@ class Spectrum:
         return np.asarray(np.fft.rfftfreq(_POINTS, self.period), dtype=np.float64)
 
     def _with_the_wind(self, values: FloatArray) -> FloatArray:
-        """Selects (segment, reduced frequency, shape · axis) of (frequency, segment, shape · axis); NaN where the
-        frames are too few a second, or where there is no wind that anything could be shed in."""
+        """Selects (segment, reduced frequency, shape · axis) of (frequency, segment, shape · axis);
+        NaN where the frames are too few a second, or where there is no wind that anything could be
+        shed in."""
         frequency = self._frequency
         at_reduced = np.full((values.shape[1], len(REDUCED), values.shape[2]), np.nan)
         for segment, speed in enumerate(self.speeds):
             sought = REDUCED * speed
             resolved = (sought > 0) & (sought < frequency[-1] - _EDGE)
-            at_reduced[segment, resolved] = values[np.rint(sought[resolved] / frequency[1]).astype(int), segment]
+            at_reduced[segment, resolved] = values[
+                np.rint(sought[resolved] / frequency[1]).astype(int), segment
+            ]
         return at_reduced
 
 
@@ -122,8 +137,8 @@ class Lines:
         return cls(mean=groups.mean(axis=0), deviation=np.maximum(groups.std(axis=0), 1e-6))
 
     def standing_out(self, groups: FloatArray) -> FloatArray:
-        """Computes how far each group is from nulls' mean, in their standard deviations, at the shape and axis where it
-        is farthest, (group,)."""
+        """Computes how far each group is from nulls' mean, in their standard deviations, at the
+        shape and axis where it is farthest, (group,)."""
         return ((groups - self.mean) / self.deviation).max(axis=1)
 
     def line(self, prominence: FloatArray, *, centre: float, width: float) -> SpectralLine:
@@ -136,13 +151,16 @@ class Lines:
         across = (values - self.mean) / self.deviation
         best = int(np.argmax(across))
         return SpectralLine(
-            far=float((across[best] - centre) / width), reduced=float(REDUCED[places[best]]), direction=best
+            far=float((across[best] - centre) / width),
+            reduced=float(REDUCED[places[best]]),
+            direction=best,
         )
 
 
 def strongest(prominence: FloatArray) -> FloatArray:
-    """Computes the logarithm of the most prominent line's power, (shape · axis,), its mean over segments (segment,
-    reduced frequency, shape · axis); only frequencies that at least half of them can show."""
+    """Computes the logarithm of the most prominent line's power, (shape · axis,), its mean over
+    segments (segment, reduced frequency, shape · axis); only frequencies that at least half of them
+    can show."""
     return _strongest(prominence)[0]
 
 
@@ -150,6 +168,8 @@ def _strongest(prominence: FloatArray) -> tuple[FloatArray, IntArray]:
     resolved = np.flatnonzero(np.isfinite(prominence[:, :, 0]).mean(axis=0) >= 0.5)
     if not len(resolved):  # too few frames a second for any: as prominent as its neighbourhood
         return np.zeros(prominence.shape[2]), np.zeros(prominence.shape[2], dtype=np.int64)
-    mean = np.nanmean(np.log(np.maximum(prominence[:, resolved], np.finfo(np.float64).tiny)), axis=0)
+    mean = np.nanmean(
+        np.log(np.maximum(prominence[:, resolved], np.finfo(np.float64).tiny)), axis=0
+    )
     places = mean.argmax(axis=0)
     return mean.max(axis=0), resolved[places]

@@ -14,14 +14,17 @@ from flagdata.errors import UsageError
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StatisticRows:
-    """Every field is an array with a row for each segment or group, another such record, or None where it is not looked
-    at; but for those named in `_WHOLE`, which are of the record as a whole."""
+    """Every field is an array with a row for each segment or group, another such record, or None
+    where it is not looked at; but for those named in `_WHOLE`, which are of the record as a
+    whole."""
 
     _WHOLE: ClassVar[frozenset[str]] = frozenset()
 
     def select(self, chosen: BoolArray | IntArray) -> Self:
         """Selects some of the rows; indices may repeat."""
-        return replace(self, **{name: _select_rows(getattr(self, name), chosen) for name in self._by_row()})
+        return replace(
+            self, **{name: _select_rows(getattr(self, name), chosen) for name in self._by_row()}
+        )
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
@@ -31,9 +34,15 @@ class StatisticRows:
             UsageError: none, or what is looked at in some of them alone.
         """
         if not parts:
-            raise UsageError("there is nothing to join", where=cls.__name__, fix="give at least one part")
+            raise UsageError(
+                "there is nothing to join", where=cls.__name__, fix="give at least one part"
+            )
         return replace(
-            parts[0], **{name: _together(name, [getattr(part, name) for part in parts]) for name in cls._by_row()}
+            parts[0],
+            **{
+                name: _together(name, [getattr(part, name) for part in parts])
+                for name in cls._by_row()
+            },
         )
 
     @classmethod
@@ -50,7 +59,13 @@ def _select_rows(value: Any, chosen: BoolArray | IntArray) -> Any:
 def _together(name: str, values: Sequence[Any]) -> Any:
     present = [value for value in values if value is not None]
     if present and len(present) < len(values):
-        raise UsageError(f"only some parts have {name}", where="joined", fix="look at it in all parts or in none")
+        raise UsageError(
+            f"only some parts have {name}", where="joined", fix="look at it in all parts or in none"
+        )
     if not present:
         return None
-    return present[0].joined(present) if isinstance(present[0], StatisticRows) else np.concatenate(present)
+    return (
+        present[0].joined(present)
+        if isinstance(present[0], StatisticRows)
+        else np.concatenate(present)
+    )

@@ -1,23 +1,28 @@
-"""Prediction errors and sensitivities, brought down to a few numbers a segment: all that inference needs.
+"""Prediction errors and sensitivities, brought down to a few numbers a segment: all that inference
+needs.
 
-With e the errors, s_i the sensitivity of the predictions to column i and w weights of the markers, a segment gives
+With e the errors, s_i the sensitivity of the predictions to column i and w weights of the markers,
+a segment gives
 
     r_i = Σ w e·s_i / √(Σ w s_i²),   R_ij = Σ w s_i·s_j / √(Σ w s_i²),
 
-sums over frames and markers, w the inverse mean square of a marker's errors in the recording beyond what its noise
-explains: the errors' size along the direction of each column, and how coefficients δ move it, E r = μ + R δ, with μ
-what the model's own numerics leave. The mean square is taken over all frames, so that the errors and sensitivities of a
-marker that was tracked in a share q of them are divided by √q, and r is that of a complete recording.
+sums over frames and markers, w the inverse mean square of a marker's errors in the recording beyond
+what its noise
+explains: the errors' size along the direction of each column, and how coefficients δ move it, E r =
+μ + R δ, with μ what the model's own numerics leave. The mean square is taken over all frames, so
+that the errors and sensitivities of a marker that was tracked in a share q of them are divided by
+√q, and r is that of a complete recording.
 
 The moment of errors about the pole: what inner forces, and so most of what numerics do, cancel in.
 
-Inner forces and those of the attachments, which lie on an axis, have no moment about it: M = Σ m (r × a)_z is that of
-the air and of weight alone, whatever mesh, bending and stretch the cloth is computed with. The errors e of predictions
-one horizon T ahead have, a unit of mass per area,
+Inner forces and those of the attachments, which lie on an axis, have no moment about it: M = Σ m (r
+× a)_z is that of the air and of weight alone, whatever mesh, bending and stretch the cloth is
+computed with. The errors e of predictions one horizon T ahead have, a unit of mass per area,
 
     M = Σ w (r × e)_z / T²,
 
-w a marker's share of the cloth, r where it is observed, from the axis: the moment per density of what the model lacks.
+w a marker's share of the cloth, r where it is observed, from the axis: the moment per density of
+what the model lacks.
 """
 
 from __future__ import annotations
@@ -48,7 +53,8 @@ class PoleMoment:
 
     Attributes:
         arms: (frame, marker, 2, segment) w (−y, x)/T² [m³/s²] of the observed markers.
-        scale: (segment,) root mean square moment of the base model's errors in the recording [m⁴/s²].
+        scale: (segment,) root mean square moment of the base model's errors in the recording
+            [m⁴/s²].
     """
 
     arms: Tensor
@@ -56,47 +62,60 @@ class PoleMoment:
 
     @classmethod
     def of(cls, errors: Tensor, segments: Segments, specimen: Specimen) -> PoleMoment:
-        """Computes moments about the vertical through the middle of the attachments, of errors (frame, marker, 3,
-        segment) [m]."""
-        anchors = [specimen.anchors if item.anchors is None else item.anchors for item in segments.items]
+        """Computes moments about the vertical through the middle of the attachments, of errors
+        (frame, marker, 3, segment) [m]."""
+        anchors = [
+            specimen.anchors if item.anchors is None else item.anchors for item in segments.items
+        ]
         axis = np.stack([points.mean(axis=0) for points in anchors], axis=-1)[None, None, :2]
         positions = segments.positions[segments.first :, :, :2] - axis
         share = shares(specimen, segments.markers)[None, :, None, None] / segments.period**2
-        arms = torch.as_tensor(share * np.stack([-positions[:, :, 1], positions[:, :, 0]], axis=2)).to(errors)
+        arms = torch.as_tensor(
+            share * np.stack([-positions[:, :, 1], positions[:, :, 0]], axis=2)
+        ).to(errors)
         moment = (arms * errors[:, :, :2]).sum((1, 2))
         scale = torch.empty(len(segments)).to(errors)
         for index in np.unique(segments.recording):
-            in_recording = torch.as_tensor(np.flatnonzero(segments.recording == index), device=errors.device)
+            in_recording = torch.as_tensor(
+                np.flatnonzero(segments.recording == index), device=errors.device
+            )
             scale[in_recording] = (moment[:, in_recording] ** 2).mean().sqrt()
         return cls(arms=arms, scale=scale)
 
     def moment(self, changes: Tensor) -> Tensor:
-        """Computes the moment (change, frame, segment) over its scale, of (change, frame, marker, 3, segment) [m]."""
+        """Computes the moment (change, frame, segment) over its scale, of (change, frame, marker,
+        3, segment) [m]."""
         return torch.einsum("fmxs,cfmxs->cfs", self.arms, changes[:, :, :, :2]) / self.scale
 
     @classmethod
     def joined(cls, parts: list[PoleMoment]) -> PoleMoment:
         """Joins the segments of several, one after another."""
-        return cls(arms=torch.cat([p.arms for p in parts], dim=-1), scale=torch.cat([p.scale for p in parts]))
+        return cls(
+            arms=torch.cat([p.arms for p in parts], dim=-1),
+            scale=torch.cat([p.scale for p in parts]),
+        )
 
 
 def shares(specimen: Specimen, markers: FloatArray) -> FloatArray:
-    """Shares the cloth's area [m²] among markers (marker, 2) [m], that of the vertices brought onto them, (marker,)."""
+    """Shares the cloth's area [m²] among markers (marker, 2) [m], that of the vertices brought onto
+    them, (marker,)."""
     return specimen.mesh.vertex_areas @ onto(markers, specimen.mesh.rest)
 
 
 _CHUNK = 64
-"""Segments at a time: bounds memory, 64 segments of 50 frames and 200 markers take 8 MB a column."""
+"""Segments at a time: bounds memory, 64 segments of 50 frames and 200 markers take 8 MB a
+column."""
 _CLIP = 4.0
-"""Errors beyond so many times a marker's root mean square count as that much (Huber): folds snap in ways no effect
-explains."""
+"""Errors beyond so many times a marker's root mean square count as that much (Huber): folds snap in
+ways no effect explains."""
 
 _NEVER = 1e-4
-"""Least mean square of a marker's errors over the largest: one that was hardly ever tracked says nothing."""
+"""Least mean square of a marker's errors over the largest: one that was hardly ever tracked says
+nothing."""
 
 _NOISE = 6.0
-"""Variance of e by markers of variance 1: each frame's weighs 1, the one before 2, the one before that 1, in amplitude,
-as for a point that moves evenly."""
+"""Variance of e by markers of variance 1: each frame's weighs 1, the one before 2, the one before
+that 1, in amplitude, as for a point that moves evenly."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -109,14 +128,15 @@ class Statistics(StatisticRows):
         response: (segment, column, column) R.
         error: (segment,) mean squared prediction error [m²].
         marker_error: (segment, marker) the same of each marker.
-        lines: (segment, reduced frequency, direction) of the errors' spectra: see `lines`; None where not looked at.
-        turning: the same of the errors' moment about the pole, see `pole_moment`, its `error` in m⁸/s⁴; None where not
-            looked at.
+        lines: (segment, reduced frequency, direction) of the errors' spectra: see `lines`; None
+            where not looked at.
+        turning: the same of the errors' moment about the pole, see `pole_moment`, its `error` in
+            m⁸/s⁴; None where not looked at.
         course: of the wind, estimated from the errors; None where not asked for.
-        log: (segment, column, nuisance) how r moves with a prior standard deviation of what the wind's log may be off
-            by, see `wind_log`; None where the wind is known, as in nulls.
-        settled: (segment, quantity) what its recording settles at less what the model does, see `settled`; None where
-            not looked at.
+        log: (segment, column, nuisance) how r moves with a prior standard deviation of what the
+            wind's log may be off by, see `wind_log`; None where the wind is known, as in nulls.
+        settled: (segment, quantity) what its recording settles at less what the model does, see
+            `settled`; None where not looked at.
     """
 
     recording: IntArray
@@ -133,11 +153,13 @@ class Statistics(StatisticRows):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Projection:
-    """The directions that statistics are taken along, kept: other models' errors have r along the same ones.
+    """The directions that statistics are taken along, kept: other models' errors have r along the
+    same ones.
 
     Attributes:
         directions: (segment, column, frame · marker · 3) weighted sensitivities of length 1.
-        scale: (marker, segment) root mean square errors of the base model [m], by which errors are weighed.
+        scale: (marker, segment) root mean square errors of the base model [m], by which errors are
+            weighed.
         spectrum: what their periodograms are taken along; None where lines are not looked at.
         pole_moment: what their moments are taken by; None where they are not looked at.
         turning: (segment, column, frame) the sensitivities' moments, of length 1.
@@ -153,8 +175,8 @@ class Projection:
 
     @classmethod
     def along(cls, changes: Sequence[Tensor], scale: Tensor) -> Projection:
-        """Projects along sensitivities (frame, marker, 3, segment) [m per unit], of errors of some scale (marker,
-        segment)."""
+        """Projects along sensitivities (frame, marker, 3, segment) [m per unit], of errors of some
+        scale (marker, segment)."""
         moved = torch.stack([_plain(change, scale).flatten(1) for change in changes], dim=1)
         moved /= moved.norm(dim=2, keepdim=True).clamp(min=torch.finfo(moved.dtype).tiny)
         return cls(directions=moved, scale=scale)
@@ -165,43 +187,54 @@ class Projection:
         return torch.einsum("sck,sk->sc", self.directions, clipped).double().cpu().numpy()
 
     def turned(self, errors: Tensor) -> FloatArray | None:
-        """Computes r of the moment of errors (frame, marker, 3, segment) [m], (segment, column); None where not looked
-        at."""
+        """Computes r of the moment of errors (frame, marker, 3, segment) [m], (segment, column);
+        None where not looked at."""
         if self.pole_moment is None or self.turning is None:
             return None
         moment = self.pole_moment.moment(errors[None])[0].to(self.turning)
         return torch.einsum("scf,fs->sc", self.turning, moment).double().cpu().numpy()
 
     def course(self, errors: Tensor) -> Course | None:
-        """Computes the wind's course by the errors (frame, marker, 3, segment) [m]; None where not asked for."""
+        """Computes the wind's course by the errors (frame, marker, 3, segment) [m]; None where not
+        asked for."""
         return None if self.gauge is None else self.gauge.course(_clip_errors(errors, self.scale))
 
     def lines(self, errors: Tensor) -> FloatArray | None:
-        """Computes the prominence of the errors' spectra, (segment, reduced frequency, direction): see `lines`; None
-        where not looked at."""
+        """Computes the prominence of the errors' spectra, (segment, reduced frequency, direction):
+        see `lines`; None where not looked at."""
         return None if self.spectrum is None else self.spectrum.prominence(errors)
 
     def response(self, changes: Sequence[Tensor]) -> FloatArray:
-        """Computes how r moves with k sensitivities (frame, marker, 3, segment) [m per unit], (segment, column, k)."""
+        """Computes how r moves with k sensitivities (frame, marker, 3, segment) [m per unit],
+        (segment, column, k)."""
         moved = torch.stack([_plain(change, self.scale).flatten(1) for change in changes], dim=2)
         return (self.directions @ moved).double().cpu().numpy()
 
 
 def statistics(
-    forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], columns: Sequence[Column]
+    forecaster: Forecaster,
+    segments: Segments,
+    calibrations: Sequence[Calibration],
+    columns: Sequence[Column],
 ) -> Statistics:
-    """Runs the base model, its parameters and every column along segments, each with its calibration.
+    """Runs the base model, its parameters and every column along segments, each with its
+    calibration.
 
     The columns of the result are `THETA`'s, then those given.
     """
-    return Statistics.joined([piece.statistics for piece in _pieces(forecaster, segments, calibrations, columns)])
+    return Statistics.joined(
+        [piece.statistics for piece in _pieces(forecaster, segments, calibrations, columns)]
+    )
 
 
 def projected_statistics(
-    forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], columns: Sequence[Column]
+    forecaster: Forecaster,
+    segments: Segments,
+    calibrations: Sequence[Calibration],
+    columns: Sequence[Column],
 ) -> tuple[Statistics, Projection]:
-    """Computes the same statistics, with how they move with what the wind's log may be off by, and with the directions,
-    4 MB a segment of 50 frames, 190 markers and 36 columns."""
+    """Computes the same statistics, with how they move with what the wind's log may be off by, and
+    with the directions, 4 MB a segment of 50 frames, 190 markers and 36 columns."""
     parts: list[Statistics] = []
     along: list[Projection] = []
     pieces = list(_pieces(forecaster, segments, calibrations, columns))
@@ -223,8 +256,9 @@ def projected_statistics(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Piece:
-    """Some segments, with their calibrations, errors and sensitivities (frame, marker, 3, segment), the scale of the
-    errors, the directions of moments (segment, column, frame), and all statistics but those of a log."""
+    """Some segments, with their calibrations, errors and sensitivities (frame, marker, 3, segment),
+    the scale of the errors, the directions of moments (segment, column, frame), and all statistics
+    but those of a log."""
 
     segments: Segments
     calibrations: Sequence[Calibration]
@@ -238,7 +272,10 @@ class _Piece:
 
 
 def _pieces(
-    forecaster: Forecaster, segments: Segments, calibrations: Sequence[Calibration], columns: Sequence[Column]
+    forecaster: Forecaster,
+    segments: Segments,
+    calibrations: Sequence[Calibration],
+    columns: Sequence[Column],
 ) -> Iterator[_Piece]:
     """Yields some segments at a time."""
     # Segments of one recording share weights, and so stay in one chunk.
@@ -291,8 +328,8 @@ def _with_log(piece: _Piece, along: Projection, off: Sequence[Tensor]) -> Statis
 def _turned_statistics(
     pole_moment: PoleMoment, base: Tensor, changes: Sequence[Tensor], recording: IntArray
 ) -> tuple[Statistics, Tensor]:
-    """Statistics of moments of errors and sensitivities (frame, marker, 3, segment), with their directions, (segment,
-    column, frame) of length 1 where there is any."""
+    """Statistics of moments of errors and sensitivities (frame, marker, 3, segment), with their
+    directions, (segment, column, frame) of length 1 where there is any."""
     moment = pole_moment.moment(base[None])[0].double()  # (frame, segment)
     moved = pole_moment.moment(torch.stack(list(changes))).double().permute(2, 0, 1)
     directions = moved / moved.norm(dim=2, keepdim=True).clamp(min=1e-9)
@@ -321,9 +358,11 @@ def _chunks(recording: IntArray) -> list[IntArray]:
     return [np.array(chunk) for chunk in chunks if chunk]
 
 
-def error_scale(base: Tensor, recording: IntArray, noise: FloatArray, counted: BoolArray | None = None) -> Tensor:
-    """Computes root mean square errors of a marker in the recording, beyond what its noise explains, (marker, segment)
-    [m].
+def error_scale(
+    base: Tensor, recording: IntArray, noise: FloatArray, counted: BoolArray | None = None
+) -> Tensor:
+    """Computes root mean square errors of a marker in the recording, beyond what its noise
+    explains, (marker, segment) [m].
 
     Args:
         counted: (frame, marker, segment) whether each position was tracked; None where all were.
@@ -342,7 +381,8 @@ def error_scale(base: Tensor, recording: IntArray, noise: FloatArray, counted: B
 
 
 def _plain(changes: Tensor, scale: Tensor) -> Tensor:
-    """Divides changes (frame, marker, 3, segment) by (marker, segment): (segment, frame, marker · 3)."""
+    """Divides changes (frame, marker, 3, segment) by (marker, segment): (segment, frame, marker ·
+    3)."""
     return (changes / scale[None, :, None]).permute(3, 0, 1, 2).flatten(2)
 
 
@@ -360,8 +400,8 @@ def reduce_errors(
     noise: FloatArray,
     counted: BoolArray | None = None,
 ) -> Statistics:
-    """Computes statistics of segments: errors, sensitivities (frame, marker, 3, segment) and the noise of their markers
-    [m].
+    """Computes statistics of segments: errors, sensitivities (frame, marker, 3, segment) and the
+    noise of their markers [m].
 
     Args:
         counted: (frame, marker, segment) whether each position was tracked; None where all were.
@@ -374,7 +414,11 @@ def reduce_errors(
     errors = _clip_errors(base, scale)
     for segment in range(len(recording)):
         error = errors[segment].flatten().double()
-        moved = (stacked[..., segment] / scale[None, None, :, segment, None]).reshape(len(changes), -1).double()
+        moved = (
+            (stacked[..., segment] / scale[None, None, :, segment, None])
+            .reshape(len(changes), -1)
+            .double()
+        )
         inner = (moved @ moved.T).cpu().numpy()
         length = np.sqrt(np.maximum(np.diag(inner), np.finfo(np.float64).tiny))
         r[segment] = (moved @ error).cpu().numpy() / length

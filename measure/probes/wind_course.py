@@ -1,16 +1,20 @@
-"""The course of the wind within a recording, estimated from errors: what a steady wind's model takes for gusts.
+"""The course of the wind within a recording, estimated from errors: what a steady wind's model
+takes for gusts.
 
-In windows of 0.2 s the errors e are fitted by a wind that is a share c of the mean one stronger, turned to its left, or
-upward: c = g/h with g = Σ w e·s and h = Σ w s², s the sensitivity of the predictions to such a wind. A wind that is the
-logged one leaves a c that is alike in all windows, but for what the numerics do, by whatever parameters and steady
-effects the model is off. How c of neighbouring windows vary together about its mean over the recording,
-Σ √(h h') c c', holds what lasts for some tenths of a second, not the noise.
+In windows of 0.2 s the errors e are fitted by a wind that is a share c of the mean one stronger,
+turned to its left, or
+upward: c = g/h with g = Σ w e·s and h = Σ w s², s the sensitivity of the predictions to such a
+wind. A wind that is the logged one leaves a c that is alike in all windows, but for what the
+numerics do, by whatever parameters and steady effects the model is off. How c of neighbouring
+windows vary together about its mean over the recording, Σ √(h h') c c', holds what lasts for some
+tenths of a second, not the noise.
 
-Turbulence turns the wind as well, by 0.6 to 1 of what it does along it, and changes slowly: eddies of L ≥ 10 m take
-more than a second to go by. Of courses drawn from von Kármán's spectrum (L from 10 to 150 m in 4 and 8 m/s, three
-recordings of 8 s) 1 % turn by less than 0.43 to 0.51 of what they vary along the wind by this measure, where it is 0.78
-in all, and by less than 0.33 to 0.39 where it is 0.6; 1 % vary within 2 s by more than 1.1 to 1.9 of what they do from
-one 2 s to another. Whether the wind rises means little: what pushes a flag along the wind lifts it.
+Turbulence turns the wind as well, by 0.6 to 1 of what it does along it, and changes slowly: eddies
+of L ≥ 10 m take more than a second to go by. Of courses drawn from von Kármán's spectrum (L from 10
+to 150 m in 4 and 8 m/s, three recordings of 8 s) 1 % turn by less than 0.43 to 0.51 of what they
+vary along the wind by this measure, where it is 0.78 in all, and by less than 0.33 to 0.39 where it
+is 0.6; 1 % vary within 2 s by more than 1.1 to 1.9 of what they do from one 2 s to another. Whether
+the wind rises means little: what pushes a flag along the wind lifts it.
 """
 
 from __future__ import annotations
@@ -37,10 +41,11 @@ class Course(StatisticRows):
     """The wind's course in segments.
 
     Attributes:
-        score: (segment, window, part) g, of errors over their scale; parts are along the wind, to its left, upward.
+        score: (segment, window, part) g, of errors over their scale; parts are along the wind, to
+            its left, upward.
         curvature: (segment, window, part, part) H = Σ w s·s', h on its diagonal.
-        log: (segment, window, part, nuisance) how g moves with what the wind's log may be off by; None where the wind
-            is known.
+        log: (segment, window, part, nuisance) how g moves with what the wind's log may be off by;
+            None where the wind is known.
     """
 
     score: FloatArray
@@ -48,7 +53,8 @@ class Course(StatisticRows):
     log: FloatArray | None = None
 
     def swing(self, recording: IntArray) -> FloatArray:
-        """Computes Σ √(h h') c c' over neighbouring windows, c about its recording's mean, a segment, (part,).
+        """Computes Σ √(h h') c c' over neighbouring windows, c about its recording's mean, a
+        segment, (part,).
 
         In units of the errors' scale, so that errors that are larger all over leave no larger ones.
 
@@ -63,7 +69,8 @@ class Course(StatisticRows):
         value, weight = self._about(recording), self._together
         within = value - self._mean(value)
         total, fast = (
-            (weight * c[:, :-1] * c[:, 1:]).sum(axis=(0, 1)) / weight.sum(axis=(0, 1)) for c in (value, within)
+            (weight * c[:, :-1] * c[:, 1:]).sum(axis=(0, 1)) / weight.sum(axis=(0, 1))
+            for c in (value, within)
         )
         # The error of a ratio of sums over segments, of which each may be another.
         residuals = (weight * (value[:, :-1] * value[:, 1:] - total)).sum(axis=1)
@@ -84,18 +91,26 @@ class Course(StatisticRows):
 
     def _mean(self, value: FloatArray) -> FloatArray:
         """Averages over the windows, (segment, 1, part)."""
-        return (self._diagonal * value).sum(axis=1, keepdims=True) / self._diagonal.sum(axis=1, keepdims=True)
+        return (self._diagonal * value).sum(axis=1, keepdims=True) / self._diagonal.sum(
+            axis=1, keepdims=True
+        )
 
     def _about(self, recording: IntArray) -> FloatArray:
-        """Computes c less its recording's mean, and less what its log may be off by, (segment, window, part)."""
+        """Computes c less its recording's mean, and less what its log may be off by, (segment,
+        window, part)."""
         value = self._centre_scores(self.score, recording)
         if self.log is None:
             return value
-        off = np.stack([self._centre_scores(self.log[..., k], recording) for k in range(self.log.shape[-1])], axis=-1)
+        off = np.stack(
+            [self._centre_scores(self.log[..., k], recording) for k in range(self.log.shape[-1])],
+            axis=-1,
+        )
         for index in np.unique(recording):
             in_recording = recording == index
             weighted = self._diagonal[in_recording][..., None] * off[in_recording]
-            curvature = np.einsum("swpj,swpk->jk", weighted, off[in_recording]) + np.eye(off.shape[-1])
+            curvature = np.einsum("swpj,swpk->jk", weighted, off[in_recording]) + np.eye(
+                off.shape[-1]
+            )
             value[in_recording] -= off[in_recording] @ np.linalg.solve(
                 curvature, np.einsum("swpk,swp->k", weighted, value[in_recording])
             )
@@ -106,18 +121,22 @@ class Course(StatisticRows):
         value = score / self._diagonal
         for index in np.unique(recording):
             in_recording = recording == index
-            value[in_recording] -= score[in_recording].sum(axis=(0, 1)) / self._diagonal[in_recording].sum(axis=(0, 1))
+            value[in_recording] -= score[in_recording].sum(axis=(0, 1)) / self._diagonal[
+                in_recording
+            ].sum(axis=(0, 1))
         return value
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Variation:
-    """Variances of the wind's parts over its squared mean, by neighbouring windows: negative where numerics rule.
+    """Variances of the wind's parts over its squared mean, by neighbouring windows: negative where
+    numerics rule.
 
     Attributes:
         total: (part,) about the mean of the recording.
         fast: (part,) about the mean of the segment.
-        error: (part,) standard errors of `total`, by how segments differ; none where they are not known.
+        error: (part,) standard errors of `total`, by how segments differ; none where they are not
+            known.
     """
 
     total: FloatArray
@@ -136,10 +155,12 @@ class Variation:
 
     @property
     def alone(self) -> bool:
-        """Whether the wind varies along itself alone, however fast, and beyond what chance may hide: neither turbulence
-        nor an obstacle does so."""
+        """Whether the wind varies along itself alone, however fast, and beyond what chance may
+        hide: neither turbulence nor an obstacle does so."""
         across = max(float(self.total[LEFT]), 0.0) + CRITERIA.reach * float(self.error[LEFT])
-        return bool(self.total[ALONG] > 0 and across < CRITERIA.least_obstructed**2 * self.total[ALONG])
+        return bool(
+            self.total[ALONG] > 0 and across < CRITERIA.least_obstructed**2 * self.total[ALONG]
+        )
 
     @property
     def words(self) -> str:
@@ -148,9 +169,13 @@ class Variation:
             return "the wind does not vary along its mean as it does in turbulence"
         turned = math.sqrt(max(self.total[LEFT], 0.0) / self.total[ALONG])
         if turned < CRITERIA.least_turned:
-            return f"the wind varies across its mean by {turned:.2g} of what it does along it, in turbulence 0.6 to 1"
+            return (
+                f"the wind varies across its mean by {turned:.2g} of what it does along it, in "
+                "turbulence 0.6 to 1"
+            )
         return (
-            "the wind varies faster than turbulence does: more within two seconds than between stretches of two seconds"
+            "the wind varies faster than turbulence does: more within two seconds than between "
+            "stretches of two seconds"
         )
 
 
@@ -186,8 +211,8 @@ class Gauge:
         return Course(score=self._windows(score), curvature=self._windows(curvature))
 
     def _windows(self, values: Tensor) -> FloatArray:
-        """Sums (segment, frame, …) over windows, (segment, window, …); frames beyond the last whole window are left
-        out."""
+        """Sums (segment, frame, …) over windows, (segment, window, …); frames beyond the last whole
+        window are left out."""
         count = values.shape[1] // self.window
         windows = values[:, : count * self.window].unflatten(1, (count, self.window))
         return windows.sum(2).double().cpu().numpy()

@@ -1,4 +1,5 @@
-"""Effects that the library lacks: proposed from what a model leaves of recordings, tested on others, kept or not."""
+"""Effects that the library lacks: proposed from what a model leaves of recordings, tested on
+others, kept or not."""
 
 from __future__ import annotations
 

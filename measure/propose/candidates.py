@@ -1,4 +1,5 @@
-"""Effects from files as directions of the model: what is tested when a proposal meets new recordings."""
+"""Effects from files as directions of the model: what is tested when a proposal meets new
+recordings."""
 
 from __future__ import annotations
 
@@ -33,7 +34,8 @@ class FileColumn(EffectColumn):
 
 
 def from_file(spec: str) -> tuple[FileColumn, ...]:
-    """Lists the strengths of the effect that `FILE.py:Class` names, with steps of half their expected range.
+    """Lists the strengths of the effect that `FILE.py:Class` names, with steps of half their
+    expected range.
 
     Raises:
         FlagdataError: as `sim.effects.effect_files.load`.

@@ -1,4 +1,5 @@
-"""A proposal as an effect: a module like those of the library, its contract tests, and what is needed to install it."""
+"""A proposal as an effect: a module like those of the library, its contract tests, and what is
+needed to install it."""
 
 from __future__ import annotations
 
@@ -40,11 +41,13 @@ class EffectFile:
 def write(outcome: ProposalOutcome, folder: Path) -> EffectFile:
     """Writes the effect file, its contract tests and its pyproject.toml, into a folder.
 
-    An earlier proposal from the same data that was changed since is kept; the new one gets the next free name.
+    An earlier proposal from the same data that was changed since is kept; the new one gets the next
+    free name.
 
     Raises:
         UsageError: an outcome without terms of the dictionary.
-        ConflictError: pyproject.toml is there and was not written by a proposal, or was changed since.
+        ConflictError: pyproject.toml is there and was not written by a proposal, or was changed
+            since.
     """
     parts = [_part(strength) for strength in outcome.strengths]
     if not parts:
@@ -53,7 +56,11 @@ def write(outcome: ProposalOutcome, folder: Path) -> EffectFile:
     class_name = "".join(word.capitalize() for part in parts for word in part["name"].split("_"))
     module = next(name for name in _names(f"proposed_{short}") if _is_free(folder, name))
     forces, masses = [p for p in parts if not p["mass"]], [p for p in parts if p["mass"]]
-    pieces = (("FieldEffect",) if forces else ()) + (("Flat",) if masses else ()) + (("Seen",) if forces else ())
+    pieces = (
+        (("FieldEffect",) if forces else ())
+        + (("Flat",) if masses else ())
+        + (("Seen",) if forces else ())
+    )
     values: Mapping[str, Any] = {
         "forces": forces,
         "masses": masses,
@@ -79,13 +86,17 @@ def write(outcome: ProposalOutcome, folder: Path) -> EffectFile:
         f"test_{module}.py": "test_effect.py.j2",
         _PROJECT: "pyproject.toml.j2",
     }
-    texts = {name: environment.get_template(template).render(**values) for name, template in templates.items()}
+    texts = {
+        name: environment.get_template(template).render(**values)
+        for name, template in templates.items()
+    }
     write_files(folder, texts, command=_COMMAND)
     return EffectFile(path=folder / f"{module}.py", class_name=class_name)
 
 
 def check(folder: Path) -> None:
-    """Refuses a folder in which `write` cannot write, before any term is sought; raises as `write`."""
+    """Refuses a folder in which `write` cannot write, before any term is sought; raises as
+    `write`."""
     check_files(folder, _PROJECT, command=_COMMAND)
 
 

@@ -49,16 +49,18 @@ class PeriodogramLine:
 
 @dataclass(frozen=True, kw_only=True)
 class StrengthCourse:
-    """How the amplitude of a term behaves: fitted to each stretch of time, with the rest of the model as it is.
+    """How the amplitude of a term behaves: fitted to each stretch of time, with the rest of the
+    model as it is.
 
     Attributes:
         bin: duration of a stretch [s].
         times: of the middles of the stretches, of each recording from its first frame [s].
         amplitudes: of each recording, in the unit of the strength.
-        by_recording: mean amplitude of each, with the interval of its scatter in time; what the fit's numerics leave in
-            a recording is in the value, not in the interval.
+        by_recording: mean amplitude of each, with the interval of its scatter in time; what the
+            fit's numerics leave in a recording is in the value, not in the interval.
         speeds: of the wind, of each recording [m/s].
-        fluctuation: standard deviation of the amplitudes about their recording's mean, their errors included.
+        fluctuation: standard deviation of the amplitudes about their recording's mean, their errors
+            included.
         lines: of each recording, from amplitudes of single frames.
         words: the same in words.
     """
@@ -94,8 +96,9 @@ class TermStrength:
 class Retest:
     """Models before and after on segments that neither choice nor fit has seen.
 
-    Errors are root mean squares [m]. The half misfit of the projected errors decides [nat a segment]; the bias of the
-    fit's mesh, most of a squared distance, is taken out of it with the help of the nulls.
+    Errors are root mean squares [m]. The half misfit of the projected errors decides [nat a
+    segment]; the bias of the fit's mesh, most of a squared distance, is taken out of it with the
+    help of the nulls.
 
     Attributes:
         what: which data.
@@ -103,10 +106,12 @@ class Retest:
         before, after: of each model.
         reduction: paired, before − after.
         helped: the same of half misfits.
-        floor: of the larger model on data simulated from it with other numerics: differences below are not effects.
-        share: of what the model before leaves above the floor, in squares, that the proposal takes away; None where it
-            leaves nothing above.
-        control: after, with the same freedom spent on terms of other directions; None where there are none.
+        floor: of the larger model on data simulated from it with other numerics: differences below
+            are not effects.
+        share: of what the model before leaves above the floor, in squares, that the proposal takes
+            away; None where it leaves nothing above.
+        control: after, with the same freedom spent on terms of other directions; None where there
+            are none.
         apart: paired, control − after, of half misfits.
         control_names: of those terms.
     """
@@ -125,15 +130,22 @@ class Retest:
 
     @property
     def decision(self) -> tuple[Decision, str]:
-        """Whether the proposal is kept, and why: misfits must fall beyond their interval, and below the control's."""
+        """Whether the proposal is kept, and why: misfits must fall beyond their interval, and below
+        the control's."""
         if self.helped.low <= 0:
-            return Decision.REJECTED, "the misfit on unseen data is not significantly lower than before"
+            return (
+                Decision.REJECTED,
+                "the misfit on unseen data is not significantly lower than before",
+            )
         lower = "the misfit on unseen data is significantly lower than before"
         if self.apart is None:
             return Decision.KEPT, f"{lower}; there was no term of another direction to compare with"
         wrong = " and ".join(self.control_names)
         if self.apart.value <= 0:
-            return Decision.REJECTED, f"{lower}, but the same freedom spent on {wrong} lowers it as much"
+            return (
+                Decision.REJECTED,
+                f"{lower}, but the same freedom spent on {wrong} lowers it as much",
+            )
         if self.apart.low <= 0:
             return Decision.KEPT, f"{lower}; its form is open: {wrong} fits as well"
         return Decision.KEPT, f"{lower}, and lower than with the same freedom spent on {wrong}"

@@ -1,17 +1,20 @@
-"""Prediction errors and the effect of terms on them, projected on directions whose null distribution is known.
+"""Prediction errors and the effect of terms on them, projected on directions whose null
+distribution is known.
 
-A test statistic for each term would need its own null recordings. Instead, errors are projected on the directions s_i
-that `measure.nulls.bank` stores (sensitivities to the library's effects and to smooth fields), and a term is described
-by its response along them:
+A test statistic for each term would need its own null recordings. Instead, errors are projected on
+the directions s_i that `measure.nulls.bank` stores (sensitivities to the library's effects and to
+smooth fields), and a term is described by its response along them:
 
     E r_i = μ_i + Σ_j R_ij δ_j,   R_ij = Σ w s_i·c_j / √(Σ w s_i²)
 
-with c_j the sensitivity to term j. The part of a term's response orthogonal to all directions is lost.
+with c_j the sensitivity to term j. The part of a term's response orthogonal to all directions is
+lost.
 
-Sensitivities of predictions to many terms: those of one field run side by side, each on a copy of the segments.
+Sensitivities of predictions to many terms: those of one field run side by side, each on a copy of
+the segments.
 
-A field is evaluated once for all its shapes, and small batches cost as much as larger ones: so a term takes a third of
-the time that it takes alone.
+A field is evaluated once for all its shapes, and small batches cost as much as larger ones: so a
+term takes a third of the time that it takes alone.
 """
 
 from __future__ import annotations
@@ -72,8 +75,8 @@ class MassSideBySide(ClothEffect):
 def of_columns(
     forecaster: Forecaster, segments: Segments, base: Tensor, columns: Sequence[Column]
 ) -> dict[str, Tensor]:
-    """Computes for each column, by name, the change of the predictions with it, (frame, marker, 3, segment) [m per
-    unit].
+    """Computes for each column, by name, the change of the predictions with it, (frame, marker, 3,
+    segment) [m per unit].
 
     Args:
         base: errors of the nominal model.
@@ -89,7 +92,9 @@ def of_columns(
     columns_at_once = max(1, WIDEST // len(segments))
     for of_field in fields.values():
         for first in range(0, len(of_field), columns_at_once):
-            changes |= _bundle(forecaster, segments, base, of_field[first : first + columns_at_once])
+            changes |= _bundle(
+                forecaster, segments, base, of_field[first : first + columns_at_once]
+            )
     return changes
 
 
@@ -101,9 +106,15 @@ def _bundle(
     copies = segments.select(list(range(count)) * len(columns))
     system, state = forecaster.system(copies, [Calibration()] * len(copies))
     flat = Flat(cloth=system.cloth)
-    weights = torch.cat([step * column.term.at.of(flat).expand(-1, 1, count) for column in columns], dim=2)
+    weights = torch.cat(
+        [step * column.term.at.of(flat).expand(-1, 1, count) for column in columns], dim=2
+    )
     field = columns[0].term.field
-    effect: Effect = MassSideBySide(weights=weights) if field == MASS else SideBySide(field=field, weights=weights)
+    effect: Effect = (
+        MassSideBySide(weights=weights)
+        if field == MASS
+        else SideBySide(field=field, weights=weights)
+    )
     errors = forecaster.errors(*effect.apply(system, state), copies)
     return {
         column.name: (base - errors[..., index * count : (index + 1) * count]) / step
@@ -132,8 +143,11 @@ class ProjectedSegments:
     directions: tuple[Tensor, ...]
 
     @classmethod
-    def of(cls, forecaster: Forecaster, segments: Segments, null_columns: Sequence[Column]) -> ProjectedSegments:
-        """Projects on the directions of the calibrated parameters and of the columns that the null bank weighs."""
+    def of(
+        cls, forecaster: Forecaster, segments: Segments, null_columns: Sequence[Column]
+    ) -> ProjectedSegments:
+        """Projects on the directions of the calibrated parameters and of the columns that the null
+        bank weighs."""
         nominal = [Calibration()] * len(segments)
         base = forecaster.errors(*forecaster.system(segments, nominal), segments)
         along = forecaster.sensitivities(null_columns, segments, nominal, base)
@@ -149,11 +163,13 @@ class ProjectedSegments:
         )
 
     def whitened(self, null: NullModel, of_recordings: FloatArray) -> WhitenedMisfit:
-        """Makes the misfit of the projected errors, whitened by the null model; `of_recordings` are wind speeds
-        [m/s]."""
+        """Makes the misfit of the projected errors, whitened by the null model; `of_recordings` are
+        wind speeds [m/s]."""
         recording, noise = self.segments.recording, self.segments.noise
         return WhitenedMisfit(
-            statistics=reduce_errors(self.base, self.directions, recording, noise, self.segments.counted),
+            statistics=reduce_errors(
+                self.base, self.directions, recording, noise, self.segments.counted
+            ),
             projection=Projection.along(
                 self.directions, error_scale(self.base, recording, noise, self.segments.counted)
             ),
@@ -167,7 +183,8 @@ class ProjectedSegments:
         return self.project_errors(self.base, self.directions[: len(THETA)])
 
     def of_columns(self, columns: Sequence[Column]) -> Statistics:
-        """Computes statistics of the calibrated parameters and some columns, at the nominal model."""
+        """Computes statistics of the calibrated parameters and some columns, at the nominal
+        model."""
         parts = [self.calibrated]
         for first in range(0, len(columns), _TOGETHER):
             chunk = columns[first : first + _TOGETHER]
@@ -181,13 +198,20 @@ class ProjectedSegments:
         return self.project_errors(base, changes)
 
     def project_errors(self, base: Tensor, changes: Sequence[Tensor]) -> Statistics:
-        """Projects errors, r (segment, direction), and their response to changes (segment, direction, change)."""
+        """Projects errors, r (segment, direction), and their response to changes (segment,
+        direction, change)."""
         both_responses = reduce_errors(
-            base, [*self.directions, *changes], self.segments.recording, self.segments.noise, self.segments.counted
+            base,
+            [*self.directions, *changes],
+            self.segments.recording,
+            self.segments.noise,
+            self.segments.counted,
         )
         count = len(self.directions)
         return replace(
-            both_responses, r=both_responses.r[:, :count], response=both_responses.response[:, :count, count:]
+            both_responses,
+            r=both_responses.r[:, :count],
+            response=both_responses.response[:, :count, count:],
         )
 
     def speeds(self, of_recordings: FloatArray) -> FloatArray:

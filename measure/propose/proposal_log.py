@@ -1,4 +1,5 @@
-"""The proposal log: the terms tried on each data set, errors before and after, and whether the term was kept."""
+"""The proposal log: the terms tried on each data set, errors before and after, and whether the term
+was kept."""
 
 from __future__ import annotations
 
@@ -24,8 +25,12 @@ def entries(path: Path) -> list[dict[str, Any]]:
     if not path.exists():
         return []
     content = read_json(path, noun="proposal log", fix="move it away")
-    if content.get("schema") not in (SCHEMA, _FORMER_SCHEMA) or not isinstance(content.get("entries"), list):
-        raise CorruptError(f"it is not a proposal log of schema {SCHEMA}", where=str(path), fix="move it away")
+    if content.get("schema") not in (SCHEMA, _FORMER_SCHEMA) or not isinstance(
+        content.get("entries"), list
+    ):
+        raise CorruptError(
+            f"it is not a proposal log of schema {SCHEMA}", where=str(path), fix="move it away"
+        )
     return content["entries"]
 
 
@@ -50,5 +55,7 @@ def add(path: Path, outcome: ProposalOutcome, *, effect: str) -> None:
         CorruptError: the file is not a proposal log.
     """
     all_entries = [*entries(path), {"effect": effect, **outcome.as_dict()}]
-    text = json.dumps({"schema": SCHEMA, "entries": all_entries}, indent=1, allow_nan=False, ensure_ascii=False)
+    text = json.dumps(
+        {"schema": SCHEMA, "entries": all_entries}, indent=1, allow_nan=False, ensure_ascii=False
+    )
     rewrite(path, text + "\n")

@@ -11,14 +11,21 @@ _NEAREST = 4
 
 def words(outcome: ProposalOutcome) -> str:
     """Describes what was tried, what was found, what became of it."""
-    lines = [f"{outcome.decision.value}: {outcome.reason} ({outcome.tried} terms were tried; nulls: {outcome.nulls})"]
+    lines = [
+        f"{outcome.decision.value}: {outcome.reason} ({outcome.tried} terms were tried; nulls: "
+        f"{outcome.nulls})"
+    ]
     for step in outcome.steps:
         verb = "taken" if step.taken else f"not taken: {step.reason}"
         lines.append(
             f"  {step.name}: p = {step.p_family:.2g} over all terms, "
             f"held-out gain {step.gain:.1f} ± {step.gain_error:.1f}, {verb}"
         )
-    nearest = [ranked for ranked in outcome.ranking if ranked.name not in {step.name for step in outcome.steps}]
+    nearest = [
+        ranked
+        for ranked in outcome.ranking
+        if ranked.name not in {step.name for step in outcome.steps}
+    ]
     if nearest:
         further = ", ".join(f"{ranked.name} {ranked.gain:.1f}" for ranked in nearest[:_NEAREST])
         lines.append(f"  not tested further, listed by held-out gain: {further}")
@@ -32,17 +39,23 @@ def words(outcome: ProposalOutcome) -> str:
 
 def _test_sentences(tested: Retest) -> list[str]:
     errors = (
-        f"on {tested.what}, unseen, n = {tested.segments} segments: error {interval(tested.before)} before, "
+        f"on {tested.what}, unseen, n = {tested.segments} segments: error "
+        f"{interval(tested.before)} before, "
         f"{interval(tested.after)} after, reduction {interval(tested.reduction)}"
     )
     floor = f"  numerical floor: {interval(tested.floor)}"
     if tested.share is not None:
         floor += f"; of the squared error above it, {100 * tested.share:.0f} % is removed"
-    lines = [errors, floor, f"  misfit: lower by {interval(tested.helped)} nat per segment than before"]
+    lines = [
+        errors,
+        floor,
+        f"  misfit: lower by {interval(tested.helped)} nat per segment than before",
+    ]
     if tested.control is not None and tested.apart is not None:
         lines.append(
             f"  instead with {' and '.join(tested.control_names)}: {interval(tested.control)}, "
-            f"whose misfit is higher by {interval(tested.apart)} nat per segment than the proposal's"
+            f"whose misfit is higher by {interval(tested.apart)} nat per segment than the "
+            "proposal's"
         )
     return lines
 

@@ -1,7 +1,8 @@
 """The amplitude of a term in time: steady, growing with the wind, or oscillating?
 
-With e the prediction errors of the model that has the term and s its sensitivity, the amplitude in a stretch of time is
-the fitted one plus Σ e·s / Σ s², sums over the stretch's frames and all markers.
+With e the prediction errors of the model that has the term and s its sensitivity, the amplitude in
+a stretch of time is the fitted one plus Σ e·s / Σ s², sums over the stretch's frames and all
+markers.
 """
 
 from __future__ import annotations
@@ -44,7 +45,10 @@ def course(setting: Setting, model: Model, effect: int) -> StrengthCourse:
             top, bottom = amplitudes[0][:, segment], amplitudes[1][:, segment]
             frames.append(top / bottom)
             count = len(top) // stretch
-            sums = [values[: count * stretch].reshape(count, stretch).sum(axis=1) for values in (top, bottom)]
+            sums = [
+                values[: count * stretch].reshape(count, stretch).sum(axis=1)
+                for values in (top, bottom)
+            ]
             parts.append(fitted + sums[0] / sums[1])
             middle = (np.arange(count) + 0.5) * stretch * period
             places.append(segments.items[segment].start + segments.first * period + middle)
@@ -70,7 +74,8 @@ def course(setting: Setting, model: Model, effect: int) -> StrengthCourse:
 def _amplitudes(
     setting: Setting, model: Model, column: EffectColumn, fitted: float
 ) -> tuple[tuple[FloatArray, FloatArray], float]:
-    """Computes Σ e·s and Σ s² over the markers, (frame, segment), and the time between frames [s]."""
+    """Computes Σ e·s and Σ s² over the markers, (frame, segment), and the time between frames
+    [s]."""
     forecaster, segments = setting.forecaster, setting.segments
     base = forecaster.errors(*model.system(forecaster, segments), segments)
     other_effects = tuple(effect for effect in model.effects if effect[0] is not column)
@@ -82,15 +87,21 @@ def _amplitudes(
 
 
 def _mean(values: FloatArray, unit: str) -> Estimate:
-    """Averages, with an interval from blocks of five stretches, which hardly know of one another."""
-    blocks = values[: len(values) // 5 * 5].reshape(-1, 5).mean(axis=1) if len(values) >= 10 else values
-    reach = float(student.ppf(0.5 + _LEVEL / 2, len(blocks) - 1) * blocks.std(ddof=1) / math.sqrt(len(blocks)))
+    """Averages, with an interval from blocks of five stretches, which hardly know of one
+    another."""
+    blocks = (
+        values[: len(values) // 5 * 5].reshape(-1, 5).mean(axis=1) if len(values) >= 10 else values
+    )
+    reach = float(
+        student.ppf(0.5 + _LEVEL / 2, len(blocks) - 1) * blocks.std(ddof=1) / math.sqrt(len(blocks))
+    )
     value = float(values.mean())
     return Estimate(value=value, low=value - reach, high=value + reach, unit=unit, level=_LEVEL)
 
 
 def line(values: FloatArray, period: float) -> PeriodogramLine:
-    """Finds the largest line of the periodogram, of three periods or more (Fisher, Proc. R. Soc. A 125, 1929).
+    """Finds the largest line of the periodogram, of three periods or more (Fisher, Proc. R. Soc. A
+    125, 1929).
 
     Args:
         values: equally spaced.
@@ -111,7 +122,11 @@ def line(values: FloatArray, period: float) -> PeriodogramLine:
 
 
 def _words(
-    by_recording: list[Estimate], speeds: list[float], spread: float, lines: list[PeriodogramLine], height: float
+    by_recording: list[Estimate],
+    speeds: list[float],
+    spread: float,
+    lines: list[PeriodogramLine],
+    height: float,
 ) -> str:
     unit = "" if by_recording[0].unit == "1" else f" {by_recording[0].unit}"
     means = "; ".join(
@@ -120,8 +135,13 @@ def _words(
     )
     text = f"{means}; in time it varies by {spread:.2g}{unit}, errors included"
     significant = [
-        f"{line.frequency:.2f} Hz ({100 * line.share:.0f} %; f L/U = {line.frequency * height / u:.2g}) at {u:.1f} m/s"
+        f"{line.frequency:.2f} Hz ({100 * line.share:.0f} %; f L/U = "
+        f"{line.frequency * height / u:.2g}) at {u:.1f} m/s"
         for line, u in zip(lines, speeds, strict=True)
         if line.p_value < _RARE
     ]
-    return f"{text}, with lines at {', '.join(significant)}; L is the cloth's height" if significant else text
+    return (
+        f"{text}, with lines at {', '.join(significant)}; L is the cloth's height"
+        if significant
+        else text
+    )

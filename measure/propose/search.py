@@ -1,8 +1,10 @@
-"""Which terms: forward selection, each by a calibrated statistic and by what it predicts of recordings left out.
+"""Which terms: forward selection, each by a calibrated statistic and by what it predicts of
+recordings left out.
 
-A term is looked at only if its statistic is beyond those of nulls at the level, the largest of *all* terms compared
-with the largest of all (so that trying many costs power, not false positives). Of those that are, the one that predicts
-best is taken, if it does so beyond chance; the next is sought in what is left.
+A term is looked at only if its statistic is beyond those of nulls at the level, the largest of
+*all* terms compared with the largest of all (so that trying many costs power, not false positives).
+Of those that are, the one that predicts best is taken, if it does so beyond chance; the next is
+sought in what is left.
 """
 
 from __future__ import annotations
@@ -19,11 +21,13 @@ from measure.propose.family import Family
 
 MOST = 3
 _FAR = 2.0
-"""Standard errors of held-out gain by which a further term must improve on those before; the first must improve."""
+"""Standard errors of held-out gain by which a further term must improve on those before; the first
+must improve."""
 _TIED = 1.0
 """Standard errors within which held-out gains say nothing, and the larger statistic leads."""
 _APART = 0.7
-"""Cosine of two columns' directions, beside what is always fitted, below which they are not the same thing."""
+"""Cosine of two columns' directions, beside what is always fitted, below which they are not the
+same thing."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,7 +64,8 @@ def search(
     acting: Sequence[int] = (),
     level: float,
 ) -> tuple[Step, ...]:
-    """Searches the terms: returns those looked at, in order: those taken, and the one at which it ended.
+    """Searches the terms: returns those looked at, in order: those taken, and the one at which it
+    ended.
 
     Args:
         names: of the evidence's columns.
@@ -74,7 +79,9 @@ def search(
         pool = [column for column in candidates if column not in chosen]
         if not pool:
             break
-        step = _best(evidence, family, names, pool, chosen, candidates, level=level, first=not steps)
+        step = _best(
+            evidence, family, names, pool, chosen, candidates, level=level, first=not steps
+        )
         steps.append(step)
         if not step.taken:
             break
@@ -125,9 +132,11 @@ def _best(
     )
 
 
-def wrong(evidence: Evidence, pool: Sequence[int], taken: Sequence[int], acting: Sequence[int]) -> list[int]:
-    """Selects as many other columns as were taken, of other directions than theirs, that predict left-out recordings
-    best.
+def wrong(
+    evidence: Evidence, pool: Sequence[int], taken: Sequence[int], acting: Sequence[int]
+) -> list[int]:
+    """Selects as many other columns as were taken, of other directions than theirs, that predict
+    left-out recordings best.
 
     Fewer where there are not as many; none where there is none.
 
@@ -137,20 +146,27 @@ def wrong(evidence: Evidence, pool: Sequence[int], taken: Sequence[int], acting:
     """
     close = _cosines(evidence, acting)
     others_by_direction = [
-        c for c in pool if c not in taken and all(abs(close[c, column_taken]) < _APART for column_taken in taken)
+        c
+        for c in pool
+        if c not in taken and all(abs(close[c, column_taken]) < _APART for column_taken in taken)
     ]
     chosen: list[int] = []
     while others_by_direction and len(chosen) < len(taken):
-        held_out = gains(evidence, [[*acting, *chosen, column] for column in others_by_direction]).sum(axis=1)
+        held_out = gains(
+            evidence, [[*acting, *chosen, column] for column in others_by_direction]
+        ).sum(axis=1)
         chosen.append(others_by_direction.pop(int(np.argmax(held_out))))
     return chosen
 
 
 def _cosines(evidence: Evidence, acting: Sequence[int]) -> np.ndarray:
-    """Computes cosines (column, column) of directions, beside the nuisances and some columns more; 0 with those."""
+    """Computes cosines (column, column) of directions, beside the nuisances and some columns more;
+    0 with those."""
     total = evidence.curvature.sum(axis=0)
     fixed = [*evidence.nuisance, *acting]
-    priors = np.concatenate([evidence.prior**-2, np.ones(len(evidence.nuisance) - len(THETA)), np.zeros(len(acting))])
+    priors = np.concatenate(
+        [evidence.prior**-2, np.ones(len(evidence.nuisance) - len(THETA)), np.zeros(len(acting))]
+    )
     inner = total[np.ix_(fixed, fixed)] + np.diag(priors)
     remaining = total - total[:, fixed] @ np.linalg.solve(inner, total[fixed])
     size = np.sqrt(np.maximum(np.diag(remaining), 1e-9 * np.diag(total)))

@@ -1,12 +1,14 @@
-"""Effects from data: terms are selected and fitted on one part of the recordings and tested on the rest.
+"""Effects from data: terms are selected and fitted on one part of the recordings and tested on the
+rest.
 
-Errors are projected on directions whose null distribution is known, because errors of the numerics could look like a
-term. The selected model is refitted and tested on data not used before, against control terms of another direction and
-against the numerical floor.
+Errors are projected on directions whose null distribution is known, because errors of the numerics
+could look like a term. The selected model is refitted and tested on data not used before, against
+control terms of another direction and against the numerical floor.
 
 What a proposal may see and what it is tested on: divided before anything is fitted.
 
-Gauss–Newton fits of models to projected errors: linearised again at each estimate until it converges.
+Gauss–Newton fits of models to projected errors: linearised again at each estimate until it
+converges.
 
 Before and after on data that neither the choice of the terms nor the fit of either model used.
 """
@@ -69,12 +71,15 @@ def retest(
     words: str,
     seed: int,
 ) -> Retest:
-    """Compares prediction errors of untouched segments by the models, paired by segment, beside what numerics leave.
+    """Compares prediction errors of untouched segments by the models, paired by segment, beside
+    what numerics leave.
 
     Args:
         whitened: of all segments.
-        used: (segment,) those that the models were fitted to, and that what is left of the numerics is fitted to.
-        control: the same freedom spent on other terms; None where there are none of another direction.
+        used: (segment,) those that the models were fitted to, and that what is left of the numerics
+            is fitted to.
+        control: the same freedom spent on other terms; None where there are none of another
+            direction.
         control_names: which.
         words: which data.
         seed: of the recordings that the floor is of.
@@ -85,7 +90,9 @@ def retest(
 
     first, second, recording = misfits_left(before), misfits_left(after), setting.recording[~used]
     wrong = None if control is None else misfits_left(control)
-    _, floor = numerical_floor(setting, np.unique(recording), after, copies=_FLOOR_COPIES, seed=seed)
+    _, floor = numerical_floor(
+        setting, np.unique(recording), after, copies=_FLOOR_COPIES, seed=seed
+    )
     return Retest(
         what=words,
         segments=int((~used).sum()),
@@ -103,7 +110,8 @@ def retest(
 
 @dataclass(frozen=True, kw_only=True)
 class FittedModel:
-    """A model with standard errors of its calibrated parameters and strengths, as the null model has them."""
+    """A model with standard errors of its calibrated parameters and strengths, as the null model
+    has them."""
 
     model: Model
     errors: tuple[float, ...]
@@ -135,11 +143,12 @@ def fit(
 def _step(
     projected: ProjectedSegments, null: NullModel, speeds: FloatArray, model: Model
 ) -> tuple[FloatArray, FloatArray]:
-    """Takes one step of generalised least squares from a model, under the prior about the nominal calibration, and
-    returns its standard errors."""
+    """Takes one step of generalised least squares from a model, under the prior about the nominal
+    calibration, and returns its standard errors."""
     projected_evidence = evidence(projected.at(model), speeds, null)
     fitted = projected_evidence.fit(
-        range(len(THETA), projected_evidence.columns), centre=Calibration().steps_from(model.calibration)
+        range(len(THETA), projected_evidence.columns),
+        centre=Calibration().steps_from(model.calibration),
     )
     value, error = np.array([fitted.of(column) for column in range(projected_evidence.columns)]).T
     return np.array(cut(value)), error
@@ -163,8 +172,8 @@ class Split:
 
 
 def split(segments: Segments, speeds: FloatArray) -> Split:
-    """Splits off the last third of every recording for the test; of three or more, also the whole one of the middle
-    wind.
+    """Splits off the last third of every recording for the test; of three or more, also the whole
+    one of the middle wind.
 
     Args:
         speeds: (recording,) of the wind [m/s].
@@ -184,7 +193,8 @@ def split(segments: Segments, speeds: FloatArray) -> Split:
         words = f"all of the recording at {speeds[middle]:.1f} m/s and the last third of the others"
     if min(int(used.sum()), int((~used).sum())) < _LEAST:
         raise InputError(
-            f"there are {int(used.sum())} segments to propose from and {int((~used).sum())} to test on",
+            f"there are {int(used.sum())} segments to propose from and {int((~used).sum())} to "
+            "test on",
             where="propose",
             fix=f"record for longer, or more recordings: {_LEAST} of each are needed, of up to 2 s",
         )
@@ -195,7 +205,9 @@ def data_hash(segments: Segments) -> str:
     """Hashes the markers, positions and wind of segments, SHA-256, hex."""
     digest = hashlib.sha256(np.ascontiguousarray(segments.markers, dtype="<f8").tobytes())
     for item in segments.items:
-        times = np.asarray(item.start + np.arange(len(item.positions)) * segments.period, dtype=np.float64)
+        times = np.asarray(
+            item.start + np.arange(len(item.positions)) * segments.period, dtype=np.float64
+        )
         for values in (item.positions, item.wind.at(times)):
             digest.update(np.ascontiguousarray(values, dtype="<f8").tobytes())
     return digest.hexdigest()
@@ -220,7 +232,8 @@ def propose(
     options: null_plan.NullOptions,
     stage: Stage | None = None,
 ) -> ProposalOutcome:
-    """Seeks terms that a model lacks, and keeps them if they help on recordings that were not looked at.
+    """Seeks terms that a model lacks, and keeps them if they help on recordings that were not
+    looked at.
 
     Args:
         candidates: terms, or strengths of an effect from a file.
@@ -312,16 +325,27 @@ def weigh(
     def fit_columns(columns: Sequence[int]) -> FittedModel:
         linear = projected_evidence.fit(columns)
         start = [linear.of(column)[0] for column in (*range(len(THETA)), *columns)]
-        return fit(projected, null, speeds, [tried.columns[column - len(THETA)] for column in columns], start)
+        return fit(
+            projected,
+            null,
+            speeds,
+            [tried.columns[column - len(THETA)] for column in columns],
+            start,
+        )
 
     strengths: tuple[TermStrength, ...] = ()
     tested = None
     decision, reason = Decision.REJECTED, steps[0].reason if steps else "no term was given"
     if taken:
         stage("test on untouched data", 0, 1)
-        before, after = fit_columns(acting), fit_columns([*acting, *(step.column for step in taken)])
+        before, after = (
+            fit_columns(acting),
+            fit_columns([*acting, *(step.column for step in taken)]),
+        )
         kinds = {_kind(tried.columns[step.column - len(THETA)]) for step in taken}
-        unlike = [column for column in physical if _kind(tried.columns[column - len(THETA)]) not in kinds]
+        unlike = [
+            column for column in physical if _kind(tried.columns[column - len(THETA)]) not in kinds
+        ]
         instead = wrong(projected_evidence, unlike, [step.column for step in taken], acting)
         tested = retest(
             setting,
@@ -354,9 +378,13 @@ def weigh(
     )
 
 
-def _admissible(column: EffectColumn, projected_evidence: Evidence, index: int, acting: Sequence[int]) -> bool:
+def _admissible(
+    column: EffectColumn, projected_evidence: Evidence, index: int, acting: Sequence[int]
+) -> bool:
     """Returns whether the strength that fits makes sense."""
-    return column.described.admits(column.described.null + projected_evidence.fit([*acting, index]).of(index)[0])
+    return column.described.admits(
+        column.described.null + projected_evidence.fit([*acting, index]).of(index)[0]
+    )
 
 
 def _kind(column: EffectColumn) -> str:
@@ -385,27 +413,40 @@ def _try_terms(
     for size in _MOVES:
         first = len(THETA) + len(fixed)
         gained = gains(
-            evidence(tried.statistics, speeds, null), [[c] for c in range(first, len(THETA) + len(tried.columns))]
+            evidence(tried.statistics, speeds, null),
+            [[c] for c in range(first, len(THETA) + len(tried.columns))],
         )
-        moved = _move_best_term(dict(zip(tried.columns[len(fixed) :], gained.sum(axis=1).tolist(), strict=True)), size)
+        moved = _move_best_term(
+            dict(zip(tried.columns[len(fixed) :], gained.sum(axis=1).tolist(), strict=True)), size
+        )
         if not moved:
             break
         added = projected.of_columns(moved).response[:, :, len(THETA) :]
         response = np.concatenate([tried.statistics.response, added], axis=2)
-        tried = _Tried(columns=(*tried.columns, *moved), statistics=replace(tried.statistics, response=response))
+        tried = _Tried(
+            columns=(*tried.columns, *moved),
+            statistics=replace(tried.statistics, response=response),
+        )
     return tried
 
 
 def _move_best_term(gained: dict[EffectColumn, float], size: float) -> list[TermColumn]:
     """Moves the best local term to places nearby, if it is among the best at all."""
     best = max(gained.values(), default=0.0)
-    leading = {c: g for c, g in gained.items() if isinstance(c, TermColumn) and c.term.at.place and g >= _CLOSE * best}
+    leading = {
+        c: g
+        for c, g in gained.items()
+        if isinstance(c, TermColumn) and c.term.at.place and g >= _CLOSE * best
+    }
     if not leading or best <= 0:
         return []
     term = max(leading, key=lambda column: leading[column]).term
     count = len(term.at.place)
     steps = np.array(np.meshgrid(*[(-size, 0.0, size)] * count)).reshape(count, -1).T
-    by_name = {column.name: column for column in (TermColumn.of(term.moved(*step)) for step in steps.tolist())}
+    by_name = {
+        column.name: column
+        for column in (TermColumn.of(term.moved(*step)) for step in steps.tolist())
+    }
     tried = {column.name for column in gained}
     return [column for name, column in by_name.items() if name not in tried]
 
@@ -433,7 +474,8 @@ def _strengths(
     acting: Sequence[int],
     after: FittedModel,
 ) -> tuple[TermStrength, ...]:
-    """Estimates strengths beyond the linear; errors are scaled by what makes the nulls' mean squared z 1."""
+    """Estimates strengths beyond the linear; errors are scaled by what makes the nulls' mean
+    squared z 1."""
     chosen = [*acting, *(step.column for step in taken)]
     linear = projected_evidence.fit(chosen)
     strengths: list[TermStrength] = []
@@ -448,7 +490,10 @@ def _strengths(
         words = _words(setting, column, value, after.model.calibration.area_weight)
         strengths.append(
             TermStrength(
-                name=column.parameter, words=words, estimate=strength, course=course(setting, after.model, index)
+                name=column.parameter,
+                words=words,
+                estimate=strength,
+                course=course(setting, after.model, index),
             )
         )
     return tuple(strengths)
@@ -463,5 +508,10 @@ def _words(setting: Setting, column: EffectColumn, value: float, weight_factor: 
     specimen = setting.experiment.specimen
     cloth = setting.forecaster.system(setting.segments.select([0]), [setting.calibration])[0].cloth
     share = column.term.at.of(Flat(cloth=cloth))[:, 0, 0].double().numpy()
-    added = value * weight_factor * specimen.material.area_weight * float(specimen.mesh.vertex_areas @ share)
+    added = (
+        value
+        * weight_factor
+        * specimen.material.area_weight
+        * float(specimen.mesh.vertex_areas @ share)
+    )
     return f"{column.term.words}: {1e3 * added:+.3g} g in all"

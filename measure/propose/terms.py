@@ -1,6 +1,8 @@
-"""The terms that are tried: a shape on the flat cloth times a field, as a force per mass or as a share of mass.
+"""The terms that are tried: a shape on the flat cloth times a field, as a force per mass or as a
+share of mass.
 
-Shapes and fields are those of `sim.effects.field`. A local shape is named by its place in hundredths: `near_70_30`.
+Shapes and fields are those of `sim.effects.field`. A local shape is named by its place in
+hundredths: `near_70_30`.
 """
 
 from __future__ import annotations
@@ -46,7 +48,11 @@ class TermShape:
     @property
     def code(self) -> str:
         """As an attribute of a `Flat`, in Python."""
-        return f"{self.method}({', '.join(f'{p:g}' for p in self.place)})" if self.place else self.method
+        return (
+            f"{self.method}({', '.join(f'{p:g}' for p in self.place)})"
+            if self.place
+            else self.method
+        )
 
     def of(self, flat: Flat) -> Tensor:
         """Computes the shape on a flat cloth, (vertex, 1, 1)."""
@@ -73,7 +79,8 @@ _LOCAL_WORDS = {
 
 
 def shape_named(name: str) -> TermShape:
-    """Parses a shape of `SHAPES`, or near_U_V, stripe_U, band_V with shares of the width and the height in hundredths.
+    """Parses a shape of `SHAPES`, or near_U_V, stripe_U, band_V with shares of the width and the
+    height in hundredths.
 
     Raises:
         UsageError: no such shape.
@@ -81,15 +88,22 @@ def shape_named(name: str) -> TermShape:
     if name in SHAPES:
         return TermShape(method=name, words=SHAPES[name])
     match = _LOCAL.fullmatch(name)
-    numbers = [] if match is None else [read_bounded(part, most=100) for part in match.groups()[1:] if part is not None]
+    numbers = (
+        []
+        if match is None
+        else [read_bounded(part, most=100) for part in match.groups()[1:] if part is not None]
+    )
     arguments = tuple(number / 100 for number in numbers if number is not None)
     if match is None or len(arguments) != (2 if match[1] == "near" else 1):
         raise UsageError(
             f"there is no shape {name!r}",
             where="terms",
-            fix=f"take one of {', '.join(SHAPES)}, or near_U_V, stripe_U, band_V in hundredths from 0 to 100",
+            fix=f"take one of {', '.join(SHAPES)}, or near_U_V, stripe_U, band_V in hundredths "
+            "from 0 to 100",
         )
-    return TermShape(method=match[1], place=arguments, words=_LOCAL_WORDS[match[1]].format(*arguments))
+    return TermShape(
+        method=match[1], place=arguments, words=_LOCAL_WORDS[match[1]].format(*arguments)
+    )
 
 
 def local(method: str, *shares: float) -> str:
@@ -125,26 +139,49 @@ _BANDS = tuple(local("band", v) for v in (0.0, 0.25, 0.5, 0.75, 1.0))
 
 FIELDS: dict[str, TermField] = {
     "downwind": TermField(unit="m/s²", step=0.5, words="a steady push downwind", shapes=_ALL),
-    "leftward": TermField(unit="m/s²", step=0.5, words="a steady push across the wind, to its left", shapes=_ALL),
+    "leftward": TermField(
+        unit="m/s²", step=0.5, words="a steady push across the wind, to its left", shapes=_ALL
+    ),
     "upward": TermField(unit="m/s²", step=0.5, words="a steady push upward", shapes=_ALL),
     "downwind_squared": TermField(
         unit="1/m", step=0.02, words="a push downwind as the square of the wind", shapes=_QUARTERS
     ),
     "leftward_squared": TermField(
-        unit="1/m", step=0.02, words="a push to the left as the square of the wind", shapes=_QUARTERS
+        unit="1/m",
+        step=0.02,
+        words="a push to the left as the square of the wind",
+        shapes=_QUARTERS,
     ),
     "upward_squared": TermField(
         unit="1/m", step=0.02, words="a push upward as the square of the wind", shapes=_QUARTERS
     ),
-    "to_pole": TermField(unit="m/s²", step=0.5, words="a steady pull to the pole, horizontally", shapes=_HALVES),
-    "toward_pole": TermField(unit="1/s²", step=1.0, words="a spring to the pole, horizontally", shapes=_FLY),
-    "toward_height": TermField(unit="1/s²", step=1.0, words="a spring to the height of the attachments", shapes=_FLY),
-    "against_motion": TermField(unit="1/s", step=0.5, words="a resistance to motion", shapes=_QUARTERS),
-    "against_normal_motion": TermField(unit="1/s", step=0.5, words="a resistance to normal motion", shapes=_QUARTERS),
-    "left_of_motion": TermField(
-        unit="1/s", step=0.5, words="a push to the left of the motion, as in a turning frame", shapes=("everywhere",)
+    "to_pole": TermField(
+        unit="m/s²", step=0.5, words="a steady pull to the pole, horizontally", shapes=_HALVES
     ),
-    "across": TermField(unit="1/s", step=0.2, words="a pressure in proportion to the wind across it", shapes=_QUARTERS),
+    "toward_pole": TermField(
+        unit="1/s²", step=1.0, words="a spring to the pole, horizontally", shapes=_FLY
+    ),
+    "toward_height": TermField(
+        unit="1/s²", step=1.0, words="a spring to the height of the attachments", shapes=_FLY
+    ),
+    "against_motion": TermField(
+        unit="1/s", step=0.5, words="a resistance to motion", shapes=_QUARTERS
+    ),
+    "against_normal_motion": TermField(
+        unit="1/s", step=0.5, words="a resistance to normal motion", shapes=_QUARTERS
+    ),
+    "left_of_motion": TermField(
+        unit="1/s",
+        step=0.5,
+        words="a push to the left of the motion, as in a turning frame",
+        shapes=("everywhere",),
+    ),
+    "across": TermField(
+        unit="1/s",
+        step=0.2,
+        words="a pressure in proportion to the wind across it",
+        shapes=_QUARTERS,
+    ),
     "across_squared": TermField(
         unit="1/m",
         step=0.1,
@@ -157,16 +194,32 @@ FIELDS: dict[str, TermField] = {
         words="a pressure as the square of the wind across it, always toward one side of the cloth",
         shapes=_QUARTERS,
     ),
-    "rising": TermField(unit="1/s", step=0.2, words="the pressure of a wind that also blows upward", shapes=_HALVES),
-    "crossing": TermField(
-        unit="1/s", step=0.2, words="the pressure of a wind that also blows to the left", shapes=_HALVES
+    "rising": TermField(
+        unit="1/s", step=0.2, words="the pressure of a wind that also blows upward", shapes=_HALVES
     ),
-    "along": TermField(unit="1/s", step=0.05, words="a friction in proportion to the wind along it", shapes=_QUARTERS),
+    "crossing": TermField(
+        unit="1/s",
+        step=0.2,
+        words="the pressure of a wind that also blows to the left",
+        shapes=_HALVES,
+    ),
+    "along": TermField(
+        unit="1/s",
+        step=0.05,
+        words="a friction in proportion to the wind along it",
+        shapes=_QUARTERS,
+    ),
     "along_squared": TermField(
-        unit="1/m", step=0.01, words="a friction as the square of the wind along it", shapes=_QUARTERS
+        unit="1/m",
+        step=0.01,
+        words="a friction as the square of the wind along it",
+        shapes=_QUARTERS,
     ),
     "along_width": TermField(
-        unit="1/s", step=0.1, words="a friction in proportion to the wind along its width", shapes=("everywhere", "fly")
+        unit="1/s",
+        step=0.1,
+        words="a friction in proportion to the wind along its width",
+        shapes=("everywhere", "fly"),
     ),
     "along_height": TermField(
         unit="1/s",
@@ -175,10 +228,14 @@ FIELDS: dict[str, TermField] = {
         shapes=("everywhere", "fly"),
     ),
     MASS: TermField(
-        unit="1", step=0.5, words="more mass, as a share of the cloth's", shapes=(*_PLACES, *_STRIPES, *_BANDS)
+        unit="1",
+        step=0.5,
+        words="more mass, as a share of the cloth's",
+        shapes=(*_PLACES, *_STRIPES, *_BANDS),
     ),
 }
-"""Names of fields. The wind's whole pressure and the whole mass are left out: those are the calibrated model's own."""
+"""Names of fields. The wind's whole pressure and the whole mass are left out: those are the
+calibrated model's own."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -198,7 +255,11 @@ class Term:
 
     def __post_init__(self) -> None:
         if self.field not in FIELDS:
-            raise UsageError(f"there is no field {self.field!r}", where="terms", fix=f"take one of {', '.join(FIELDS)}")
+            raise UsageError(
+                f"there is no field {self.field!r}",
+                where="terms",
+                fix=f"take one of {', '.join(FIELDS)}",
+            )
         shape_named(self.shape)
 
     @classmethod
@@ -231,7 +292,9 @@ class Term:
 
     def moved(self, *steps: float) -> Term:
         """Moves the term to a place of the cloth nearby, by shares of the width and the height."""
-        shifted = (min(1.0, max(0.0, p + step)) for p, step in zip(self.at.place, steps, strict=True))
+        shifted = (
+            min(1.0, max(0.0, p + step)) for p, step in zip(self.at.place, steps, strict=True)
+        )
         return replace(self, shape=local(self.at.method, *shifted))
 
 
@@ -244,7 +307,9 @@ class TermEffect(FieldEffect):
         term: which.
     """
 
-    coefficient: Annotated[Value, strength(unit="of the field", prior=(-1.0, 1.0), source=_SOURCE)] = 0.0
+    coefficient: Annotated[
+        Value, strength(unit="of the field", prior=(-1.0, 1.0), source=_SOURCE)
+    ] = 0.0
     term: Term
 
     def acceleration(self, seen: Seen) -> Tensor:
@@ -261,7 +326,8 @@ class TermMass(ClothEffect):
     """
 
     coefficient: Annotated[
-        Value, strength(unit="1", prior=(-0.5, 2.0), admissible=(_LIGHTEST, float("inf")), source=_SOURCE)
+        Value,
+        strength(unit="1", prior=(-0.5, 2.0), admissible=(_LIGHTEST, float("inf")), source=_SOURCE),
     ] = 0.0
     term: Term
 
@@ -285,7 +351,9 @@ class TermColumn(EffectColumn):
 
     @cached_property
     def described(self) -> Parameter:
-        admissible = NOT_NEGATIVE if self.term.field == MASS else EVERYTHING  # nothing takes mass away
+        admissible = (
+            NOT_NEGATIVE if self.term.field == MASS else EVERYTHING
+        )  # nothing takes mass away
         return Parameter(
             role=Role.STRENGTH,
             unit=FIELDS[self.term.field].unit,
@@ -302,7 +370,9 @@ class TermColumn(EffectColumn):
 
 def dictionary() -> tuple[TermColumn, ...]:
     """Lists all terms that are tried."""
-    return columns_of([Term(shape=shape, field=name) for name, entry in FIELDS.items() for shape in entry.shapes])
+    return columns_of(
+        [Term(shape=shape, field=name) for name, entry in FIELDS.items() for shape in entry.shapes]
+    )
 
 
 def columns_of(terms: Sequence[Term]) -> tuple[TermColumn, ...]:

@@ -1,7 +1,9 @@
-"""Points of the search space → embeddings, kept on disk: what has been simulated once is never simulated again.
+"""Points of the search space → embeddings, kept on disk: what has been simulated once is never
+simulated again.
 
-All optimisers share one evaluator. An embedding depends on the point, the number of the replicate and the evaluator's
-identity alone, not on who asked, when, or beside what: an interrupted run is resumed by running it again.
+All optimisers share one evaluator. An embedding depends on the point, the number of the replicate
+and the evaluator's identity alone, not on who asked, when, or beside what: an interrupted run is
+resumed by running it again.
 """
 
 from __future__ import annotations
@@ -25,7 +27,9 @@ from measure.refine.simulator import FilmRequest, Simulator
 from models.trained.estimator import Estimator
 
 STAGES = ("simulate", "render", "embed")
-_DECIMALS = 12  # of a point: enough for any optimiser, and none of the last bits of another machine's
+_DECIMALS = (
+    12  # of a point: enough for any optimiser, and none of the last bits of another machine's
+)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -34,7 +38,8 @@ class Evaluated:
 
     Attributes:
         embedding: (replicate, dimension) float64; NaN where a simulation failed.
-        frame: (height, width) uint8, the middle frame of the first replicate; None where that failed.
+        frame: (height, width) uint8, the middle frame of the first replicate; None where that
+            failed.
         seconds: by stage, all replicates together, at the time they were made.
     """
 
@@ -49,10 +54,11 @@ class Evaluator:
 
     Attributes:
         simulator: makes the films.
-        estimator: makes the embeddings: those of all its learners side by side, so that the squared distance is the
-            sum of theirs.
+        estimator: makes the embeddings: those of all its learners side by side, so that the squared
+            distance is the sum of theirs.
         seed: of the replicates.
-        folder: where embeddings are kept, in a folder of this evaluator's identity; None keeps them in memory alone.
+        folder: where embeddings are kept, in a folder of this evaluator's identity; None keeps them
+            in memory alone.
     """
 
     simulator: Simulator
@@ -66,7 +72,11 @@ class Evaluator:
     @property
     def identity(self) -> str:
         """A hash of all that shapes an embedding beside the point and the replicate."""
-        return digest(canonical({"simulator": self.simulator.identity, "model": self.model, "seed": self.seed}))
+        return digest(
+            canonical(
+                {"simulator": self.simulator.identity, "model": self.model, "seed": self.seed}
+            )
+        )
 
     def evaluate(
         self, points: FloatArray, replicates: int, *, advance: Callable[[int], object] | None = None
@@ -79,8 +89,16 @@ class Evaluator:
         Raises:
             CorruptError: a file of the cache that cannot be read.
         """
-        asked = [[self._request(point, number) for number in range(replicates)] for point in points.tolist()]
-        missing = [request for requests in asked for request in requests if self._read_cached(request) is None]
+        asked = [
+            [self._request(point, number) for number in range(replicates)]
+            for point in points.tolist()
+        ]
+        missing = [
+            request
+            for requests in asked
+            for request in requests
+            if self._read_cached(request) is None
+        ]
         size = self.simulator.batch
         for first in range(0, len(missing), size):
             part = missing[first : first + size]
@@ -90,7 +108,9 @@ class Evaluator:
                 advance(len(part))
         if advance is not None:
             advance(sum(len(requests) for requests in asked) - len(missing))
-        return [_together([self._read_cached(request) for request in requests]) for requests in asked]
+        return [
+            _together([self._read_cached(request) for request in requests]) for requests in asked
+        ]
 
     def clip(self, point: FloatArray, replicate: int = 0) -> UInt8Array | None:
         """Simulates all frames (frame, height, width) of one clip again; None where that fails."""
@@ -113,7 +133,9 @@ class Evaluator:
         rows = iter(embedded)
         return [
             Evaluated(
-                embedding=np.full((1, embedded.shape[1]), np.nan) if film.clip is None else next(rows)[None],
+                embedding=np.full((1, embedded.shape[1]), np.nan)
+                if film.clip is None
+                else next(rows)[None],
                 frame=None if film.clip is None else film.clip[len(film.clip) // 2],
                 seconds={**film.seconds, "embed": 0.0 if film.clip is None else share},
             )
@@ -122,8 +144,8 @@ class Evaluator:
 
     @torch.no_grad()
     def embed(self, clips: UInt8Array) -> FloatArray:
-        """Embeds clips (n, frame, height, width) uint8 to (n, dimension), one by one, so that none depends on the
-        others."""
+        """Embeds clips (n, frame, height, width) uint8 to (n, dimension), one by one, so that none
+        depends on the others."""
         rows = []
         for clip in clips:
             embedded = self.estimator.embeddings(self.estimator.inputs(clip[None]))
@@ -150,7 +172,11 @@ class Evaluator:
 
 def fingerprint(estimator: Estimator) -> str:
     """Hashes an estimator's weights and front end."""
-    parts = [canonical({"front_end": asdict(estimator.front_end), "cropping": estimator.cropping.as_dict()})]
+    parts = [
+        canonical(
+            {"front_end": asdict(estimator.front_end), "cropping": estimator.cropping.as_dict()}
+        )
+    ]
     for learner in estimator.learners:
         for name, value in sorted(learner.state_dict().items()):
             parts.append(f"{name}:{digest(value.cpu().double().numpy().tobytes().hex())}")
@@ -160,7 +186,10 @@ def fingerprint(estimator: Estimator) -> str:
 def _together(evaluated: list[Evaluated | None]) -> Evaluated:
     present = [entry for entry in evaluated if entry is not None]
     width = max(entry.embedding.shape[1] for entry in present)
-    rows = [entry.embedding if entry.embedding.shape[1] == width else np.full((1, width), np.nan) for entry in present]
+    rows = [
+        entry.embedding if entry.embedding.shape[1] == width else np.full((1, width), np.nan)
+        for entry in present
+    ]
     seconds = {stage: sum(entry.seconds[stage] for entry in present) for stage in STAGES}
     return Evaluated(embedding=np.concatenate(rows), frame=present[0].frame, seconds=seconds)
 
@@ -181,11 +210,21 @@ def _read(path: Path) -> Evaluated:
     again = "delete it: it is evaluated anew"
     try:
         if not is_sealed(path):
-            raise CorruptError("a cached simulation is damaged, or of an older version", where=str(path), fix=again)
+            raise CorruptError(
+                "a cached simulation is damaged, or of an older version", where=str(path), fix=again
+            )
         content = read_arrays(path, what="a cached simulation", fix=again)
-        embedding, frame, seconds = content["embedding"], content["frame"], content["seconds"].tolist()
+        embedding, frame, seconds = (
+            content["embedding"],
+            content["frame"],
+            content["seconds"].tolist(),
+        )
     except (OSError, ValueError, KeyError) as error:
-        raise CorruptError(f"a cached simulation cannot be read: {error}", where=str(path), fix=again) from None
+        raise CorruptError(
+            f"a cached simulation cannot be read: {error}", where=str(path), fix=again
+        ) from None
     return Evaluated(
-        embedding=embedding, frame=frame if frame.size else None, seconds=dict(zip(STAGES, seconds, strict=True))
+        embedding=embedding,
+        frame=frame if frame.size else None,
+        seconds=dict(zip(STAGES, seconds, strict=True)),
     )

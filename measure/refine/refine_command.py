@@ -1,4 +1,5 @@
-"""What `flagdata measure --refine N` calls: clips in, a refinement and its section of the report out."""
+"""What `flagdata measure --refine N` calls: clips in, a refinement and its section of the report
+out."""
 
 from __future__ import annotations
 
@@ -29,7 +30,8 @@ class Learned:
 
     Attributes:
         scenes: recipes that are simulated to refine its estimates, and whose ranges are searched.
-        films: how many films of which scene: the prior of its answer, and so of the refined one (decision 020).
+        films: how many films of which scene: the prior of its answer, and so of the refined one
+            (decision 020).
     """
 
     scenes: tuple[str, ...]
@@ -43,10 +45,12 @@ LEARNED: Mapping[tuple[str, str], Learned] = {
         films={"flag-wide": 3600, "flag-fabrics": 800, "flag-fabrics-damped": 800},
     ),
     ("outdoor_wind", "fabric_area_weight"): Learned(
-        scenes=("flag-outdoor", "flag-outdoor-damped"), films={"flag-outdoor": 960, "flag-outdoor-damped": 1856}
+        scenes=("flag-outdoor", "flag-outdoor-damped"),
+        films={"flag-outdoor": 960, "flag-outdoor-damped": 1856},
     ),
     ("outdoor_wind", "world_area_weight"): Learned(
-        scenes=("flag-world", "flag-world-damped"), films={"flag-world": 3360, "flag-world-damped": 6720}
+        scenes=("flag-world", "flag-world-damped"),
+        films={"flag-world": 3360, "flag-world-damped": 6720},
     ),
 }
 """By the wind and the area weight that a model estimates."""
@@ -60,8 +64,9 @@ class Clip:
 
     Attributes:
         name: for people.
-        frames: (frame, height, width) uint8 gray, as many and as fast as the model takes, conditioned
-            (`models.conditioning`), at instants that make the flag look like one of 1.5 m (see `measure.estimate`).
+        frames: (frame, height, width) uint8 gray, as many and as fast as the model takes,
+            conditioned (`models.conditioning`), at instants that make the flag look like one of 1.5
+            m (see `measure.estimate`).
         recording: its row in the lake, where it has one: a simulated recording states its own ζ.
     """
 
@@ -74,7 +79,8 @@ def scenes_of(estimator: Estimator, *, aspect: float | None = None) -> tuple[Rec
     """Loads recipes that are simulated to refine a model's estimates.
 
     Args:
-        aspect: length over height of the flag, for a model that knows several; None for the recipes' own.
+        aspect: length over height of the flag, for a model that knows several; None for the
+            recipes' own.
 
     Raises:
         InputError: a model of another kind of cloth.
@@ -82,7 +88,10 @@ def scenes_of(estimator: Estimator, *, aspect: float | None = None) -> tuple[Rec
     recipes = tuple(load(name) for name in _learned_of(estimator).scenes)
     if aspect is None:
         return recipes
-    return tuple(replace(recipe, scene=replace(recipe.scene, height=recipe.scene.width / aspect)) for recipe in recipes)
+    return tuple(
+        replace(recipe, scene=replace(recipe.scene, height=recipe.scene.width / aspect))
+        for recipe in recipes
+    )
 
 
 def space_of(estimator: Estimator) -> Space:
@@ -103,7 +112,8 @@ def _learned_of(estimator: Estimator) -> Learned:
     matching = [data for targets, data in LEARNED.items() if set(targets) <= set(names)]
     if not matching:
         raise InputError(
-            f"the model estimates {', '.join(names) or 'nothing'}, but no wind and area weight of a flag",
+            f"the model estimates {', '.join(names) or 'nothing'}, but no wind and area weight of "
+            "a flag",
             where=f"model {estimator.name!r}",
             fix="take the model of flags that comes with the package",
         )
@@ -127,10 +137,10 @@ def run(
     Args:
         budget: simulated clips for each.
         cache: folder for evaluations, so that an interrupted run goes on.
-        view: how all were filmed, where that is known; None takes what their recordings state, and otherwise draws ζ
-            anew for each simulated clip.
-        area_weight: range in which it is known to lie, of a flag of 1.5 m [kg/m²], any value of it alike; None for the
-            prior that the model learned.
+        view: how all were filmed, where that is known; None takes what their recordings state, and
+            otherwise draws ζ anew for each simulated clip.
+        area_weight: range in which it is known to lie, of a flag of 1.5 m [kg/m²], any value of it
+            alike; None for the prior that the model learned.
         aspect: see `scenes_of`.
 
     Raises:
@@ -140,7 +150,8 @@ def run(
     if area_weight is not None:
         stated_range = Range(low=area_weight[0], high=area_weight[1])
         recipes = tuple(
-            replace(recipe, material=replace(recipe.material, area_weight=stated_range)) for recipe in recipes
+            replace(recipe, material=replace(recipe.material, area_weight=stated_range))
+            for recipe in recipes
         )
         space = Space.of(recipes[0])
     otherwise = view or DrawnView(prior=named_prior(RENDERS), assets=Assets())
@@ -152,4 +163,12 @@ def run(
     ]
     settings = Settings(budget=budget, seed=seed, level=level)
     with progress(budget * len(targets), label="refining", unit="clip") as advance:
-        return refine(targets, estimator, recipes, space=space, settings=settings, cache=cache, advance=advance)
+        return refine(
+            targets,
+            estimator,
+            recipes,
+            space=space,
+            settings=settings,
+            cache=cache,
+            advance=advance,
+        )

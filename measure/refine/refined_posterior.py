@@ -1,11 +1,14 @@
-"""The posterior of one cloth and of the wind in each of its clips, from a synthetic likelihood and the prior.
+"""The posterior of one cloth and of the wind in each of its clips, from a synthetic likelihood and
+the prior.
 
     p(cloth, w₁ … w_J | y₁ … y_J) ∝ p(cloth) ∏ p(w_j) p(y_j | cloth, w_j)
 
-with `Metamodel`'s predictive density as p(y_j | cloth, w_j); summaries of clips are taken as independent given cloth
-and wind. The 16 parameters of the cloth are drawn from their prior and weighted, and each wind is integrated over a
-grid, since clips constrain it most. Where evaluations were made does not weigh on the result, other than by how
-well the density is known there: they may follow the amortised posterior without counting the data twice.
+with `Metamodel`'s predictive density as p(y_j | cloth, w_j); summaries of clips are taken as
+independent given cloth and wind. The 16 parameters of the cloth are drawn from their prior and
+weighted, and each wind is integrated over a grid, since clips constrain it most. Where evaluations
+were made does not weigh on the result, other than by how
+well the density is known there: they may follow the amortised posterior without counting the data
+twice.
 """
 
 from __future__ import annotations
@@ -31,10 +34,11 @@ REGRESSORS = 4
 def regressors(reported: FloatArray, space: Space) -> FloatArray:
     """Computes what the metamodel is linear in, of reported quantities (n, 5): (n, `REGRESSORS`).
 
-    The wind's share u of its range and √u, since a flag that hangs in a faint wind rises within a few tenths of its
-    range; the logarithm of the area weight and the scale of bending, the two that all of the cloth's accelerations are
-    divided by or multiplied with. All are bounded: with logits, few evaluations near an end of the range would fix the
-    slope for all others (decision 025). Anisotropy and nonlinearity of bending are left to the residual.
+    The wind's share u of its range and √u, since a flag that hangs in a faint wind rises within a
+    few tenths of its range; the logarithm of the area weight and the scale of bending, the two that
+    all of the cloth's accelerations are divided by or multiplied with. All are bounded: with
+    logits, few evaluations near an end of the range would fix the slope for all others (decision
+    025). Anisotropy and nonlinearity of bending are left to the residual.
     """
     wind, area_weight, scale = reported[:, 0], reported[:, 1], reported[:, 2]
     share = np.clip((wind - space.wind.low) / (space.wind.high - space.wind.low), 0.0, 1.0)
@@ -82,7 +86,10 @@ def posterior(
     grid = low + step * (np.arange(winds, dtype=np.float64) + 0.5)
     reported = space.reported_quantities(prior)
     likelihoods = np.stack(
-        [_likelihood(model, reported, grid, y, space) for model, y in zip(models, observed, strict=True)]
+        [
+            _likelihood(model, reported, grid, y, space)
+            for model, y in zip(models, observed, strict=True)
+        ]
     )
     marginal = np.asarray(logsumexp(likelihoods, axis=2)).sum(axis=0)
     weight = np.exp(marginal - logsumexp(marginal))
@@ -90,7 +97,9 @@ def posterior(
     chosen = rng.choice(cloths, size=draws, p=weight)
     out = np.empty((draws, len(models)))
     for clip, table in enumerate(likelihoods):
-        share = np.exp(table[chosen] - logsumexp(table[chosen], axis=1, keepdims=True)).cumsum(axis=1)
+        share = np.exp(table[chosen] - logsumexp(table[chosen], axis=1, keepdims=True)).cumsum(
+            axis=1
+        )
         cell = (rng.random((draws, 1)) > share / share[:, -1:]).sum(axis=1)
         out[:, clip] = grid[cell] + step * (rng.random(draws) - 0.5)
     points = prior[chosen]
@@ -112,6 +121,7 @@ def _likelihood(
 
 
 def bending_table(space: Space, drawn: Posterior, level: float) -> FloatArray:
-    """Tabulates median and interval of each bending coefficient [N·m], (15, 3): mostly the prior's."""
+    """Tabulates median and interval of each bending coefficient [N·m], (15, 3): mostly the
+    prior's."""
     values = space.values(drawn.points)[:, :BENDING]
     return np.quantile(values, [0.5, (1 - level) / 2, (1 + level) / 2], axis=0).T

@@ -20,9 +20,12 @@ from measure.refine.target import Target
 from measure.refine.trace import Trace
 
 METHOD = (
-    "Clips are simulated at draws of the network's posterior, then at draws of the refined one, in replicates, and "
-    "filmed as the target was. The network's estimates of wind and area weight are regressed on the parameters; the "
-    "regression's predictive Student-t density is the likelihood of its estimates of the target (synthetic likelihood, "
+    "Clips are simulated at draws of the network's posterior, then at draws of the refined one, in "
+    "replicates, and "
+    "filmed as the target was. The network's estimates of wind and area weight are regressed on "
+    "the parameters; the "
+    "regression's predictive Student-t density is the likelihood of its estimates of the target "
+    "(synthetic likelihood, "
     "Wood 2010), and weighs draws of the prior."
 )
 
@@ -34,10 +37,11 @@ class Interval:
     Attributes:
         name: of `QUANTITIES`; of clips after the first, the wind's has the clip's number behind it.
         unit: SI.
-        median: of the posterior; None where its draws pile up at an end of the range beyond which there may be more.
+        median: of the posterior; None where its draws pile up at an end of the range beyond which
+            there may be more.
         span: the central interval, or a bound on one side (`measure.posterior_ends`).
-        prior_share: width of the central interval over that of the prior's of the same level: near 1 where the clip
-            does not constrain it.
+        prior_share: width of the central interval over that of the prior's of the same level: near
+            1 where the clip does not constrain it.
     """
 
     name: str
@@ -80,8 +84,8 @@ class Round:
 
     Attributes:
         evaluations: clips so far, of each target.
-        distance: smallest mean squared distance of a θ's replicates to the target, in the replicates' covariance, the
-            mean over targets.
+        distance: smallest mean squared distance of a θ's replicates to the target, in the
+            replicates' covariance, the mean over targets.
         floor: median squared distance of replicates of one θ to each other, likewise.
         intervals: of wind and area weight; empty while there are too few evaluations.
         seconds: from the start [s].
@@ -102,19 +106,22 @@ class Refinement:
         targets: what was measured.
         level: of all intervals.
         intervals: of `QUANTITIES`, then of the other clips' winds.
-        amortised: the network's own estimate of the same, before any evaluation, of the first target.
+        amortised: the network's own estimate of the same, before any evaluation, of the first
+            target.
         bending: (15, 3) median and interval of each bending coefficient under its prior [N·m].
         rounds: in their order.
         traces: of each target, distances in the replicates' covariance.
         floor: at the end; the mean over targets.
-        reached: whether the nearest θ is as near to the target as its own replicates are to each other.
+        reached: whether the nearest θ is as near to the target as its own replicates are to each
+            other.
         stopped: why it ended, in words.
         posterior: its draws.
         evaluators: of each target, for pictures.
         seconds: by stage: "simulate", "render", "embed", "infer".
         findings: what is to be kept in mind.
         seed: of all random streams.
-        scale: size of the targets' flag over that of the simulated ones, whose winds are √scale times less.
+        scale: size of the targets' flag over that of the simulated ones, whose winds are √scale
+            times less.
     """
 
     targets: tuple[Target, ...]
@@ -145,7 +152,10 @@ class Refinement:
         digits = {quantity.name: quantity.digits for quantity in QUANTITIES}
         parts = []
         for entry, title in zip(self.intervals, ("wind", "area weight"), strict=False):
-            parts.append(f"{title} {entry.phrase(digits[entry.name], f' {entry.unit}')} {entry.span.level * 100:.3g} %")
+            parts.append(
+                f"{title} {entry.phrase(digits[entry.name], f' {entry.unit}')} "
+                f"{entry.span.level * 100:.3g} %"
+            )
         return f"{', '.join(parts)}, n = {self.evaluations} simulated clips"
 
     def as_dict(self) -> dict[str, Any]:
@@ -157,7 +167,10 @@ class Refinement:
             "intervals": [entry.as_dict() for entry in self.intervals],
             "amortised": [entry.as_dict() for entry in self.amortised],
             "bending": self.bending.tolist(),
-            "rounds": [{**vars(r), "intervals": [entry.as_dict() for entry in r.intervals]} for r in self.rounds],
+            "rounds": [
+                {**vars(r), "intervals": [entry.as_dict() for entry in r.intervals]}
+                for r in self.rounds
+            ],
             "distances": [_finite(trace.distances) for trace in self.traces],
             "floor": self.floor,
             "reached": self.reached,
@@ -191,11 +204,15 @@ def intervals_of(
     least, _, most = np.quantile(prior, ends, axis=0)
     intervals = []
     for i, quantity in enumerate(QUANTITIES[: draws.shape[1]]):
-        span_of_draws = Span(low=float(low[i]), high=float(high[i]), level=level, bound=None, estimated=True)
+        span_of_draws = Span(
+            low=float(low[i]), high=float(high[i]), level=level, bound=None, estimated=True
+        )
         if i < len(ranges):
             first, last = ranges[i].low, ranges[i].high
             places = (draws[:, i] - first) / (last - first)
-            span_of_draws = span(draws[:, i], places, level=level, limits=limits[i], assumed=(first, last))
+            span_of_draws = span(
+                draws[:, i], places, level=level, limits=limits[i], assumed=(first, last)
+            )
         intervals.append(
             Interval(
                 name=quantity.name,

@@ -1,6 +1,7 @@
 """The refinement's section of a report: a fragment of HTML for any page of `flagdata.pages`.
 
-Pictures of a refinement, as in the paper's figures: the trace, and the target beside simulated clips.
+Pictures of a refinement, as in the paper's figures: the trace, and the target beside simulated
+clips.
 """
 
 from __future__ import annotations
@@ -48,8 +49,8 @@ class Shown:
 
 
 def frames(trace: Trace, evaluator: Evaluator, *, steps: Sequence[int] = STEPS) -> list[Shown]:
-    """Selects the nearest simulated clip after each of some steps, by its middle frame; steps beyond the trace are left
-    out."""
+    """Selects the nearest simulated clip after each of some steps, by its middle frame; steps
+    beyond the trace are left out."""
     nearest = []
     for step in steps:
         if step >= len(trace):
@@ -58,19 +59,30 @@ def frames(trace: Trace, evaluator: Evaluator, *, steps: Sequence[int] = STEPS) 
         point = trace.points[index]
         evaluated = evaluator.evaluate(point[None], 1)[0]
         wind = float(evaluator.simulator.space.values(point[None])[0, WIND_COLUMN])
-        nearest.append(Shown(step=step, frame=evaluated.frame, wind=wind, distance=float(trace.distances[index])))
+        nearest.append(
+            Shown(
+                step=step, frame=evaluated.frame, wind=wind, distance=float(trace.distances[index])
+            )
+        )
     return nearest
 
 
 def trace_picture(refinement: Refinement, clip: int = 0) -> str:
-    """Draws distance and wind over evaluations, as a PNG in a data URL: the paper's figure 8, intervals, the floor."""
+    """Draws distance and wind over evaluations, as a PNG in a data URL: the paper's figure 8,
+    intervals, the floor."""
     trace, target = refinement.traces[clip], refinement.targets[clip]
     figure = Figure(figsize=(9.5, 3.1), layout="constrained")
     distance_axes, wind_axes = figure.subplots(1, 2)
     number = np.arange(1, len(trace) + 1)
-    distance_axes.semilogy(number, trace.distances, ".", color=_OTHER, markersize=4, label="simulated clip")
-    distance_axes.semilogy(number, trace.distances[trace.best], color=_OWN, linewidth=1.4, label="nearest so far")
-    distance_axes.axhline(refinement.floor, color=_TARGET, linewidth=1.0, linestyle="--", label="noise floor")
+    distance_axes.semilogy(
+        number, trace.distances, ".", color=_OTHER, markersize=4, label="simulated clip"
+    )
+    distance_axes.semilogy(
+        number, trace.distances[trace.best], color=_OWN, linewidth=1.4, label="nearest so far"
+    )
+    distance_axes.axhline(
+        refinement.floor, color=_TARGET, linewidth=1.0, linestyle="--", label="noise floor"
+    )
     distance_axes.set(xlabel="evaluations", ylabel="squared distance to the target")
     distance_axes.legend(fontsize=8)
     space, root = refinement.evaluators[clip].simulator.space, math.sqrt(refinement.scale)
@@ -98,7 +110,13 @@ def trace_picture(refinement: Refinement, clip: int = 0) -> str:
             label="median",
         )
     if "wind_speed" in target.truth:
-        wind_axes.axhline(target.truth["wind_speed"], color=_TARGET, linewidth=1.0, linestyle="--", label="true wind")
+        wind_axes.axhline(
+            target.truth["wind_speed"],
+            color=_TARGET,
+            linewidth=1.0,
+            linestyle="--",
+            label="true wind",
+        )
     wind_axes.set(xlabel="evaluations", ylabel="wind speed [m/s]", ylim=(least, most))
     wind_axes.legend(fontsize=8)
     return figure_url(figure, dpi=130)
@@ -108,7 +126,8 @@ def section(refinement: Refinement, *, in_motion: bool = True) -> Markup:
     """Renders what a refinement found, with its trace and pictures; the page gives it a heading.
 
     Args:
-        in_motion: whether the nearest simulated clip plays beside the target; it is simulated once more for that.
+        in_motion: whether the nearest simulated clip plays beside the target; it is simulated once
+            more for that.
     """
     clips = []
     for number, (target, trace, evaluator) in enumerate(
@@ -171,7 +190,9 @@ def _rows(refinement: Refinement) -> list[dict[str, str]]:
                 "unit": quantity.unit,
                 "refined": entry.phrase(quantity.digits),
                 "note": note,
-                "amortised": before[entry.name].phrase(quantity.digits) if entry.name in before else "",
+                "amortised": before[entry.name].phrase(quantity.digits)
+                if entry.name in before
+                else "",
             }
         )
     return rows

@@ -1,12 +1,15 @@
-"""From points of the search space to films: simulated in joint batches, then filmed and conditioned one by one.
+"""From points of the search space to films: simulated in joint batches, then filmed and conditioned
+one by one.
 
-A film that is measured is conditioned before anything is judged (`models.conditioning`). So what is compared with it is
-filmed by the target's view and then conditioned by the same code, which frames its flag as it frames the target's.
+A film that is measured is conditioned before anything is judged (`models.conditioning`). So what is
+compared with it is filmed by the target's view and then conditioned by the same code, which frames
+its flag as it frames the target's.
 
-Replicates of one θ differ in a start that is a millimetre off, of which nothing is left after the seconds that settle
-but another phase of the same motion, in the camera's noise, in ζ where it is not known, and in the internal damping:
-nobody knows that of a cloth which is filmed, and steps of an integrator damp by themselves. So they take turns at
-scenes which differ in their integrator, and each draws its damping where its scene has a range of it.
+Replicates of one θ differ in a start that is a millimetre off, of which nothing is left after the
+seconds that settle but another phase of the same motion, in the camera's noise, in ζ where it is
+not known, and in the internal damping: nobody knows that of a cloth which is filmed, and steps of
+an integrator damp by themselves. So they take turns at scenes which differ in their integrator, and
+each draws its damping where its scene has a range of it.
 """
 
 from __future__ import annotations
@@ -62,7 +65,8 @@ class SimulatedFilm:
 
     Attributes:
         clip: (frame, height, width) uint8 gray, conditioned; None where the simulation failed.
-        seconds: by stage, this film's share of them: "simulate", "render", which includes filming and conditioning.
+        seconds: by stage, this film's share of them: "simulate", "render", which includes filming
+            and conditioning.
     """
 
     clip: UInt8Array | None
@@ -77,8 +81,8 @@ class Simulator:
         scenes: that replicates take turns at, with `time` as the network's clips need it; see `of`.
         view: how they are filmed.
         renderer: a name of `sim.render.RENDERERS`.
-        batch: flags that are simulated together. Results depend on it in their last bits, so that batches are filled
-            up to it. Several scenes share it.
+        batch: flags that are simulated together. Results depend on it in their last bits, so that
+            batches are filled up to it. Several scenes share it.
         assets: textures and backgrounds.
     """
 
@@ -105,7 +109,8 @@ class Simulator:
             recipes: a scene's, or those of several scenes of one space.
 
         Raises:
-            InputError: see `Space.of`; scenes of different spaces, or none; fewer than one flag in a batch.
+            InputError: see `Space.of`; scenes of different spaces, or none; fewer than one flag in
+                a batch.
         """
         if batch < 1:
             raise InputError(f"the batches are of {batch}", fix="take at least one flag")
@@ -117,7 +122,8 @@ class Simulator:
                 fix="give scenes of the same ranges",
             )
         scenes = tuple(
-            SimulatedScene(replace(recipe, time=replace(recipe.time, frames=frames, rate=rate))) for recipe in several
+            SimulatedScene(replace(recipe, time=replace(recipe.time, frames=frames, rate=rate)))
+            for recipe in several
         )
         return cls(scenes=scenes, view=view, renderer=renderer, batch=batch)
 
@@ -156,16 +162,26 @@ class Simulator:
         films_made: dict[int, SimulatedFilm] = {}
         for number, scene in enumerate(self.scenes):
             of_scene = [
-                index for index, request in enumerate(requests) if request.replicate % len(self.scenes) == number
+                index
+                for index, request in enumerate(requests)
+                if request.replicate % len(self.scenes) == number
             ]
             for first in range(0, len(of_scene), size):
                 part = of_scene[first : first + size]
-                films_made |= zip(part, self._batch(scene, [requests[index] for index in part], size=size), strict=True)
+                films_made |= zip(
+                    part,
+                    self._batch(scene, [requests[index] for index in part], size=size),
+                    strict=True,
+                )
         return [films_made[index] for index in range(len(requests))]
 
-    def _batch(self, scene: SimulatedScene, requests: Sequence[FilmRequest], *, size: int) -> list[SimulatedFilm]:
+    def _batch(
+        self, scene: SimulatedScene, requests: Sequence[FilmRequest], *, size: int
+    ) -> list[SimulatedFilm]:
         begun = time.perf_counter()
-        outcomes = run(scene.crew, scene.stepper, [scene.member(request) for request in requests], size=size)
+        outcomes = run(
+            scene.crew, scene.stepper, [scene.member(request) for request in requests], size=size
+        )
         share = (time.perf_counter() - begun) / len(requests)
         films: list[SimulatedFilm] = []
         for request, outcome in zip(requests, outcomes, strict=True):
@@ -173,10 +189,16 @@ class Simulator:
             if outcome.sequence is not None:
                 zeta, camera = self.view.at(request.seed)
                 with torch.no_grad():
-                    rendered = self._renderer.render(Meshes.flag(outcome.sequence, heading=0.0), zeta)
+                    rendered = self._renderer.render(
+                        Meshes.flag(outcome.sequence, heading=0.0), zeta
+                    )
                 filmed = camera.filmed(rendered.numpy(), seed=child_seed(request.seed, "camera"))
                 clip = FitFilm.of(filmed, np.arange(len(filmed)) / scene.recipe.time.rate).frames
-            films.append(SimulatedFilm(clip=clip, seconds={"simulate": share, "render": time.perf_counter() - begun}))
+            films.append(
+                SimulatedFilm(
+                    clip=clip, seconds={"simulate": share, "render": time.perf_counter() - begun}
+                )
+            )
         return films
 
     @cached_property
@@ -206,7 +228,9 @@ class SimulatedScene:
         """Makes the flag of a request."""
         values = self.space.values(np.array([request.point]))[0]
         scene = self._template.scene
-        start = roughen_start(scene.position, scene.handles, stream(request.seed, "start"), START_NOISE)
+        start = roughen_start(
+            scene.position, scene.handles, stream(request.seed, "start"), START_NOISE
+        )
         damping = self.recipe.material.damping
         material = replace(
             scene.material,
@@ -218,9 +242,13 @@ class SimulatedScene:
                 else scene.material.damping
             ),
         )
-        flag = replace(scene, position=start, material=material, wind=(float(values[WIND_COLUMN]), 0.0, 0.0))
+        flag = replace(
+            scene, position=start, material=material, wind=(float(values[WIND_COLUMN]), 0.0, 0.0)
+        )
         return replace(self._template, scene=flag, seed=request.seed, parameters={})
 
     @cached_property
     def _template(self) -> Member:
-        return Crew(replace(self.recipe, scene=replace(self.recipe.scene, start_noise=0.0))).member(0)
+        return Crew(replace(self.recipe, scene=replace(self.recipe.scene, start_noise=0.0))).member(
+            0
+        )

@@ -1,9 +1,11 @@
-"""The 17 parameters of the paper's search space, normalised to [−1, 1], and what is reported of them.
+"""The 17 parameters of the paper's search space, normalised to [−1, 1], and what is reported of
+them.
 
-Runia et al. 2020, table 1: 15 bending coefficients, each a tenth to ten times its material's, area weight and wind
-speed. Bending is searched in logarithms, so that the centre is the material itself; its prior is what the scene's
-recipe draws, which may be uniform in the factor, or a mixture of what several draw. Single bending coefficients can
-hardly be separated, so that three combinations of their logarithms are reported: scale, anisotropy and nonlinearity.
+Runia et al. 2020, table 1: 15 bending coefficients, each a tenth to ten times its material's, area
+weight and wind speed. Bending is searched in logarithms, so that the centre is the material itself;
+its prior is what the scene's recipe draws, which may be uniform in the factor, or a mixture of what
+several draw. Single bending coefficients can hardly be separated, so that three combinations of
+their logarithms are reported: scale, anisotropy and nonlinearity.
 """
 
 from __future__ import annotations
@@ -24,7 +26,8 @@ BENDING = BENDING_SHAPE[0] * BENDING_SHAPE[1]
 AREA_WEIGHT_COLUMN, WIND_COLUMN = BENDING, BENDING + 1
 """Columns of θ."""
 DIMENSION = BENDING + 2
-"""Length of θ: bending coefficients 0 to 14 (three directions of five curvatures), area weight, wind speed."""
+"""Length of θ: bending coefficients 0 to 14 (three directions of five curvatures), area weight,
+wind speed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +51,10 @@ QUANTITIES = (
     ReportedQuantity(name="wind_speed", unit="m/s", about="wind speed", digits=2),
     ReportedQuantity(name="area_weight", unit="kg/m²", about="area weight", digits=3),
     ReportedQuantity(
-        name="bending_scale", unit="log10(N·m)", about="mean logarithm of the bending coefficients", digits=2
+        name="bending_scale",
+        unit="log10(N·m)",
+        about="mean logarithm of the bending coefficients",
+        digits=2,
     ),
     ReportedQuantity(
         name="anisotropy",
@@ -60,7 +66,8 @@ QUANTITIES = (
         name="nonlinearity",
         unit="1",
         digits=2,
-        about="mean logarithm of the coefficients at the two largest curvatures less that at the two smallest",
+        about="mean logarithm of the coefficients at the two largest curvatures less that at the "
+        "two smallest",
     ),
 )
 """What a refinement reports; the first two have the paper's ranges."""
@@ -75,13 +82,13 @@ class Space:
 
     Attributes:
         material: whose bending coefficients are multiplied.
-        factor: range of each bending coefficient's factor. Its scale is that of the prior; the search is always
-            logarithmic.
+        factor: range of each bending coefficient's factor. Its scale is that of the prior; the
+            search is always logarithmic.
         common: of all bending coefficients together, likewise; None where there is none.
         area_weight: [kg/m²].
         wind: [m/s].
-        parts: the prior as a mixture of the priors of smaller boxes, each with its weight; without any it is what the
-            ranges say. What is searched is the whole box either way.
+        parts: the prior as a mixture of the priors of smaller boxes, each with its weight; without
+            any it is what the ranges say. What is searched is the whole box either way.
     """
 
     material: Material
@@ -96,14 +103,17 @@ class Space:
         """Makes the space of a scene's recipe.
 
         Raises:
-            InputError: a recipe that has no such ranges, or ranges of anything else but the damping; several materials,
-                effects, or another scene than a flag.
+            InputError: a recipe that has no such ranges, or ranges of anything else but the
+                damping; several materials, effects, or another scene than a flag.
         """
         spec, speed = recipe.material, recipe.wind.speed
         factor, area_weight, wind = spec.bending_each, spec.area_weight, speed
         common = spec.bending if isinstance(spec.bending, Range) else None
         alone = len(spec.bases) == 1 and not recipe.effects and recipe.scene.shape is Shape.FLAG
-        alone &= not any(isinstance(q, Range) for q in (spec.area_weight_factor, spec.stretching, recipe.wind.toward))
+        alone &= not any(
+            isinstance(q, Range)
+            for q in (spec.area_weight_factor, spec.stretching, recipe.wind.toward)
+        )
         if not (
             isinstance(factor, Range)
             and isinstance(area_weight, Range)
@@ -113,14 +123,18 @@ class Space:
             and factor.low > 0
         ):
             raise InputError(
-                "the scene is no flag of one material with ranges of bending factors (above 0), area weight and wind",
+                "the scene is no flag of one material with ranges of bending factors (above 0), "
+                "area weight and wind",
                 where=f"recipe {recipe.name!r}",
                 fix='take "flag-wide", or a recipe of the same form',
             )
-        return cls(material=spec.bases[0], factor=factor, area_weight=area_weight, wind=wind, common=common)
+        return cls(
+            material=spec.bases[0], factor=factor, area_weight=area_weight, wind=wind, common=common
+        )
 
     def learned(self, parts: Sequence[tuple[Space, float]]) -> Space:
-        """Returns the same box under the prior that a model learned from data sets of several scenes.
+        """Returns the same box under the prior that a model learned from data sets of several
+        scenes.
 
         Args:
             parts: of each scene its box, and how much of the data shows it.
@@ -130,13 +144,16 @@ class Space:
         """
         for part, weight in parts:
             inner = all(
-                box_range.low <= part_range.low * (1 + 1e-9) and part_range.high * (1 - 1e-9) <= box_range.high
+                box_range.low <= part_range.low * (1 + 1e-9)
+                and part_range.high * (1 - 1e-9) <= box_range.high
                 for part_range, box_range in zip(part.ranges, self.ranges, strict=True)
             )
             if weight <= 0 or not inner:
                 raise InputError(
-                    f"a part of the prior with the weight {weight:g}" + ("" if inner else " reaches out of the box"),
-                    fix="give positive weights, and as the box a scene whose ranges include those of all others",
+                    f"a part of the prior with the weight {weight:g}"
+                    + ("" if inner else " reaches out of the box"),
+                    fix="give positive weights, and as the box a scene whose ranges include those "
+                    "of all others",
                 )
         return replace(self, parts=tuple(parts))
 
@@ -152,18 +169,23 @@ class Space:
     def _factors(self) -> tuple[float, float]:
         """Smallest and largest factor of a bending coefficient."""
         low, high = self.factor.low, self.factor.high
-        return (low, high) if self.common is None else (low * self.common.low, high * self.common.high)
+        return (
+            (low, high) if self.common is None else (low * self.common.low, high * self.common.high)
+        )
 
     @property
     def start_ranges(self) -> tuple[Range, Range, Range, Range]:
-        """Returns ranges of wind, area weight, bending scale and anisotropy: of the latter two the prior's mean and
-        `_REACH` of its standard deviations either way, within the box."""
+        """Returns ranges of wind, area weight, bending scale and anisotropy: of the latter two the
+        prior's mean and `_REACH` of its standard deviations either way, within the box."""
         table = np.log10(self.material.bending)
         logs = np.log10(_drawn(self.factor, _SHARES))
         common = np.zeros(1) if self.common is None else np.log10(_drawn(self.common, _SHARES))
         scale = _REACH * float(np.sqrt(logs.var() / BENDING + common.var()))
         slope = _REACH * float(np.sqrt(2 * logs.var() / _COLUMNS))
-        middle, tilt = float(table.mean() + logs.mean() + common.mean()), float(table[0].mean() - table[-1].mean())
+        middle, tilt = (
+            float(table.mean() + logs.mean() + common.mean()),
+            float(table[0].mean() - table[-1].mean()),
+        )
         low, high = (float(end) for end in np.log10(self._factors))
         least, most = float(table.mean()) + low, float(table.mean()) + high
         slope = min(slope, high - low)
@@ -186,11 +208,14 @@ class Space:
                 fix=f"give (n, {DIMENSION}) within [-1, 1]",
             )
         share = np.clip((unit + 1) / 2, 0.0, 1.0)
-        columns = [[entry.at(float(value)) for value in share[:, i]] for i, entry in enumerate(self.ranges)]
+        columns = [
+            [entry.at(float(value)) for value in share[:, i]] for i, entry in enumerate(self.ranges)
+        ]
         return np.array(columns, dtype=np.float64).T.reshape(len(unit), DIMENSION)
 
     def unit(self, values: FloatArray) -> FloatArray:
-        """Converts SI values to points (n, 17) of [−1, 1]¹⁷; those outside of the box are moved to its edge."""
+        """Converts SI values to points (n, 17) of [−1, 1]¹⁷; those outside of the box are moved to
+        its edge."""
         out = np.empty_like(values, dtype=np.float64)
         for i, entry in enumerate(self.ranges):
             low, high, column = entry.low, entry.high, values[:, i]

@@ -1,4 +1,5 @@
-"""What is measured: a clip as the network takes it, and how it was filmed, as far as that is known."""
+"""What is measured: a clip as the network takes it, and how it was filmed, as far as that is
+known."""
 
 from __future__ import annotations
 
@@ -23,8 +24,8 @@ class Target:
 
     Attributes:
         name: for tables and pictures.
-        clip: (frame, height, width) uint8 gray, conditioned (`models.conditioning`), as the simulated clips are that it
-            is compared with.
+        clip: (frame, height, width) uint8 gray, conditioned (`models.conditioning`), as the
+            simulated clips are that it is compared with.
         view: how simulated flags are filmed to be compared with it.
         truth: name → its known values, SI; for the trace's dashed line and for scores.
     """
@@ -44,7 +45,8 @@ class Target:
 
 
 def of_recording(recording: Artifact, clip: UInt8Array, *, otherwise: View, space: Space) -> Target:
-    """Makes a target of a recording in the lake: ζ and truth are what its row states, if it is simulated.
+    """Makes a target of a recording in the lake: ζ and truth are what its row states, if it is
+    simulated.
 
     Args:
         clip: (frame, height, width) of it, conditioned.
@@ -54,8 +56,11 @@ def of_recording(recording: Artifact, clip: UInt8Array, *, otherwise: View, spac
     return as_stated(recording.name, clip, content, otherwise=otherwise, space=space)
 
 
-def as_stated(name: str, clip: UInt8Array, parameters: Mapping[str, Any], *, otherwise: View, space: Space) -> Target:
-    """Makes a target of which `parameters` state what recordings of simulated flags state, or nothing.
+def as_stated(
+    name: str, clip: UInt8Array, parameters: Mapping[str, Any], *, otherwise: View, space: Space
+) -> Target:
+    """Makes a target of which `parameters` state what recordings of simulated flags state, or
+    nothing.
 
     Args:
         clip: (frame, height, width), conditioned.
@@ -63,7 +68,9 @@ def as_stated(name: str, clip: UInt8Array, parameters: Mapping[str, Any], *, oth
         otherwise: the view of one that states no ζ.
     """
     stated_view = of_parameters(parameters, where=f"target {name!r}") if parameters else None
-    return Target(name=name, clip=clip, view=stated_view or otherwise, truth=_truth(parameters, space))
+    return Target(
+        name=name, clip=clip, view=stated_view or otherwise, truth=_truth(parameters, space)
+    )
 
 
 def knows_view(target: Target) -> bool:
@@ -74,7 +81,15 @@ def knows_view(target: Target) -> bool:
 def _truth(content: Mapping[str, Any], space: Space) -> dict[str, float]:
     names = [*(f"bending.{index}" for index in range(BENDING)), "area_weight", "wind_speed"]
     if any(name not in content for name in names):
-        return {name: float(content[name]) for name in ("area_weight", "wind_speed") if name in content}
+        return {
+            name: float(content[name]) for name in ("area_weight", "wind_speed") if name in content
+        }
     point = space.unit(np.array([[float(content[name]) for name in names]]))
-    truth = dict(zip((q.name for q in QUANTITIES), space.reported_quantities(point)[0].tolist(), strict=True))
-    return {**truth, "area_weight": float(content["area_weight"]), "wind_speed": float(content["wind_speed"])}
+    truth = dict(
+        zip((q.name for q in QUANTITIES), space.reported_quantities(point)[0].tolist(), strict=True)
+    )
+    return {
+        **truth,
+        "area_weight": float(content["area_weight"]),
+        "wind_speed": float(content["wind_speed"]),
+    }

@@ -1,8 +1,9 @@
-"""How simulated cloth is filmed: by the ζ and the camera of the target, where they are known, or by draws of a prior.
+"""How simulated cloth is filmed: by the ζ and the camera of the target, where they are known, or by
+draws of a prior.
 
-The paper renders with one fixed ζ and trusts the network to see past it. Where the target's own ζ is known the
-comparison is free of it; where it is not, ζ is drawn anew for each clip, so that what the network does not see past
-becomes a part of the replicates' covariance in place of a bias.
+The paper renders with one fixed ζ and trusts the network to see past it. Where the target's own ζ
+is known the comparison is free of it; where it is not, ζ is drawn anew for each clip, so that what
+the network does not see past becomes a part of the replicates' covariance in place of a bias.
 """
 
 from __future__ import annotations
@@ -44,8 +45,8 @@ class FilmCamera:
     shot_noise: float = 1.75
 
     def filmed(self, frames: UInt8Array, *, seed: int) -> UInt8Array:
-        """Converts colours (n, height, width, 3) to gray frames (n, height, width) as they come back from the camera's
-        file."""
+        """Converts colours (n, height, width, 3) to gray frames (n, height, width) as they come
+        back from the camera's file."""
         spec = CameraSpec(
             coding=Coding.H264,
             jpeg_quality=90.0,
@@ -54,7 +55,9 @@ class FilmCamera:
             shot_noise=self.shot_noise,
             frame_slot=1,
         )
-        coded = camera_picture.encode_pictures(frames, camera_picture.settings(spec, seed=seed), spec, seed=seed)
+        coded = camera_picture.encode_pictures(
+            frames, camera_picture.settings(spec, seed=seed), spec, seed=seed
+        )
         return np.stack(decode(coded, where="a simulated film"))
 
 
@@ -63,7 +66,8 @@ RANGES = {
     "read_noise": Range(low=0.3, high=1.5),
     "shot_noise": Range(low=0.5, high=3.0),
 }
-"""What an unknown camera is drawn from: as the data set `flagsim-wide`, on which models are trained."""
+"""What an unknown camera is drawn from: as the data set `flagsim-wide`, on which models are
+trained."""
 
 
 class View(Protocol):
@@ -104,18 +108,26 @@ class DrawnView:
     assets: Assets
 
     def at(self, seed: int) -> tuple[RenderParameters, FilmCamera]:
-        drawn = {name: entry.at(stream(seed, "camera", name).random()) for name, entry in RANGES.items()}
+        drawn = {
+            name: entry.at(stream(seed, "camera", name).random()) for name, entry in RANGES.items()
+        }
         return self.prior.draw(child_seed(seed, "zeta"), self.assets), FilmCamera(**drawn)
 
     @property
     def identity(self) -> str:
         return digest(
-            canonical({"prior": self.prior.identity(), "camera": {k: r.as_dict() for k, r in RANGES.items()}})
+            canonical(
+                {
+                    "prior": self.prior.identity(),
+                    "camera": {k: r.as_dict() for k, r in RANGES.items()},
+                }
+            )
         )
 
 
 def of_parameters(parameters: str | Mapping[str, Any], *, where: str) -> FixedView | None:
-    """Reads the view that a simulated recording states in its parameters; None where it states none.
+    """Reads the view that a simulated recording states in its parameters; None where it states
+    none.
 
     Args:
         parameters: of the catalog's row, JSON or decoded.
@@ -124,15 +136,23 @@ def of_parameters(parameters: str | Mapping[str, Any], *, where: str) -> FixedVi
         InputError: a ζ that this version cannot read.
     """
     content = json.loads(parameters) if isinstance(parameters, str) else parameters
-    entries = {key.removeprefix(_NAMED): value for key, value in content.items() if key.startswith(_NAMED)}
+    entries = {
+        key.removeprefix(_NAMED): value for key, value in content.items() if key.startswith(_NAMED)
+    }
     if "texture" not in entries or "background" not in entries:
         return None
     names = {entry.name for entry in fields(RenderParameters)}
     if unknown := sorted(set(entries) - names):
-        raise InputError(f"render parameters {', '.join(unknown)} are not known", where=where, fix="update flagdata")
+        raise InputError(
+            f"render parameters {', '.join(unknown)} are not known",
+            where=where,
+            fix="update flagdata",
+        )
     values = {
         name: round(value) if isinstance(getattr(RenderParameters, name, None), int) else value
         for name, value in entries.items()
     }
-    camera = {name: float(content[f"camera.{name}"]) for name in RANGES if f"camera.{name}" in content}
+    camera = {
+        name: float(content[f"camera.{name}"]) for name in RANGES if f"camera.{name}" in content
+    }
     return FixedView(zeta=RenderParameters(**values), camera=FilmCamera(**camera))

@@ -17,7 +17,8 @@ class Trace:
         method: name of the optimiser.
         points: (n, d) of [−1, 1]ᵈ.
         distances: (n,) squared distances to the target; infinite where a simulation failed.
-        seconds: (n,) from the start to the end of each evaluation, with the optimiser's own time [s].
+        seconds: (n,) from the start to the end of each evaluation, with the optimiser's own time
+            [s].
     """
 
     method: str
@@ -33,12 +34,14 @@ class Trace:
         """(n,) number of the nearest evaluation so far."""
         order = np.arange(len(self))
         new = self.distances <= np.minimum.accumulate(self.distances)
-        new &= np.concatenate([[True], self.distances[1:] < np.minimum.accumulate(self.distances)[:-1]])
+        new &= np.concatenate(
+            [[True], self.distances[1:] < np.minimum.accumulate(self.distances)[:-1]]
+        )
         return np.maximum.accumulate(np.where(new, order, 0))
 
     def incumbent(self, *, evaluations: int | None = None, seconds: float | None = None) -> int:
-        """Returns the number of the nearest evaluation within so many evaluations, and so many seconds; the first at
-        least."""
+        """Returns the number of the nearest evaluation within so many evaluations, and so many
+        seconds; the first at least."""
         count = len(self) if evaluations is None else min(evaluations, len(self))
         if seconds is not None:
             count = min(count, int(np.searchsorted(self.seconds, seconds, side="right")))

@@ -1,6 +1,7 @@
 """Charts as SVG that takes its colours from the page: axes, lines, points, intervals.
 
-A chart is 640 units wide by default. Everything it writes is escaped; classes are styled in `page.css`.
+A chart is 640 units wide by default. Everything it writes is escaped; classes are styled in
+`page.css`.
 """
 
 from __future__ import annotations
@@ -51,14 +52,22 @@ class Linear(Scale):
     """Equal steps."""
 
     @classmethod
-    def over(cls, values: Iterable[float], start: float, stop: float, *, at_least: Sequence[float] = ()) -> Linear:
-        """Spans the finite `values` with a margin, and exactly `at_least` where that reaches further."""
+    def over(
+        cls, values: Iterable[float], start: float, stop: float, *, at_least: Sequence[float] = ()
+    ) -> Linear:
+        """Spans the finite `values` with a margin, and exactly `at_least` where that reaches
+        further."""
         finite = [v for v in values if math.isfinite(v)]
         low, high = min([*finite, *at_least], default=0.0), max([*finite, *at_least], default=1.0)
         if low == high:
             low, high = low - max(0.5 * abs(low), 1e-9), high + max(0.5 * abs(high), 1e-9)
         margin = 0.04 * (high - low)
-        return cls(low if low in at_least else low - margin, high if high in at_least else high + margin, start, stop)
+        return cls(
+            low if low in at_least else low - margin,
+            high if high in at_least else high + margin,
+            start,
+            stop,
+        )
 
     def measure(self, value: float) -> float:
         return value
@@ -99,14 +108,21 @@ class Logarithmic(Scale):
     def ticks(self, room: Callable[[str], float]) -> list[tuple[float, str]]:
         first, last = math.ceil(math.log10(self.low)), math.floor(math.log10(self.high))
         if last - first < 2:
-            return self._spaced_ticks([(v, number(v, digits=1)) for v in _within_decade(self.low, self.high)], room)
+            return self._spaced_ticks(
+                [(v, number(v, digits=1)) for v in _within_decade(self.low, self.high)], room
+            )
         return self._spaced_ticks([(10.0**n, _decade(n)) for n in range(first, last + 1)], room)
 
-    def _spaced_ticks(self, ticks: list[tuple[float, str]], room: Callable[[str], float]) -> list[tuple[float, str]]:
+    def _spaced_ticks(
+        self, ticks: list[tuple[float, str]], room: Callable[[str], float]
+    ) -> list[tuple[float, str]]:
         """Selects as many of the ticks, from the first on, as do not touch."""
         spaced: list[tuple[float, str]] = []
         for value, label in ticks:
-            if not spaced or abs(self(value) - self(spaced[-1][0])) >= (room(label) + room(spaced[-1][1])) / 2:
+            if (
+                not spaced
+                or abs(self(value) - self(spaced[-1][0])) >= (room(label) + room(spaced[-1][1])) / 2
+            ):
                 spaced.append((value, label))
         return spaced
 
@@ -143,24 +159,32 @@ class Chart:
     def point(self, x: float, y: float, kind: str) -> None:
         """Draws a dot."""
         if self.x.shows(x) and self.y.shows(y):
-            self.marks.append(f'<circle class="{kind}" cx="{self.x(x):.1f}" cy="{self.y(y):.1f}" r="4"/>')
+            self.marks.append(
+                f'<circle class="{kind}" cx="{self.x(x):.1f}" cy="{self.y(y):.1f}" r="4"/>'
+            )
 
     def bar(self, left: float, right: float, height: float, kind: str) -> None:
         """Draws a bar of a histogram, from the axis up."""
         top, bottom = self.y(height), self.y(self.y.low)
         self.marks.append(
             f'<rect class="{kind}" x="{self.x(left):.1f}" y="{top:.1f}" '
-            f'width="{max(self.x(right) - self.x(left) - 1, 0.5):.1f}" height="{bottom - top:.1f}"/>'
+            f'width="{max(self.x(right) - self.x(left) - 1, 0.5):.1f}" '
+            f'height="{bottom - top:.1f}"/>'
         )
 
     def upright(self, x: float, kind: str) -> None:
         """Draws a line across the chart at `x`."""
         if self.x.shows(x):
-            self.marks.append(f'<path class="line {kind}" d="M{self.x(x):.1f} {self.y.start:.1f}V{self.y.stop:.1f}"/>')
+            self.marks.append(
+                f'<path class="line {kind}" d="M{self.x(x):.1f} '
+                f'{self.y.start:.1f}V{self.y.stop:.1f}"/>'
+            )
 
     def note(self, x: float, y: float, text: str, anchor: str) -> None:
         """Writes text at a place of the chart, in the chart's units."""
-        self.marks.append(f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{escape(text)}</text>')
+        self.marks.append(
+            f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{escape(text)}</text>'
+        )
 
     def svg(self) -> Markup:
         """Renders the finished chart."""
@@ -173,18 +197,27 @@ class Chart:
         for value, label in self.y.ticks(room_below):
             at = self.y(value)
             parts.append(f'<path class="grid" d="M{left:.1f} {at:.1f}H{right:.1f}"/>')
-            parts.append(f'<text x="{left - 6:.1f}" y="{at + 4:.1f}" text-anchor="end">{escape(label)}</text>')
+            parts.append(
+                f'<text x="{left - 6:.1f}" y="{at + 4:.1f}" '
+                f'text-anchor="end">{escape(label)}</text>'
+            )
         for value, label in self.x.ticks(room_beside):
             at = self.x(value)
             parts.append(f'<path class="tick" d="M{at:.1f} {bottom:.1f}v4"/>')
-            parts.append(f'<text x="{at:.1f}" y="{bottom + 17:.1f}" text-anchor="middle">{escape(label)}</text>')
+            parts.append(
+                f'<text x="{at:.1f}" y="{bottom + 17:.1f}" '
+                f'text-anchor="middle">{escape(label)}</text>'
+            )
         parts.append(f'<path class="axis" d="M{left:.1f} {bottom:.1f}H{right:.1f}"/>')
         middle = (left + right) / 2
         parts.append(
-            f'<text class="label" x="{middle:.1f}" y="{bottom + 36:.1f}" text-anchor="middle">{escape(self.x_label)}'
+            f'<text class="label" x="{middle:.1f}" y="{bottom + 36:.1f}" '
+            f'text-anchor="middle">{escape(self.x_label)}'
             "</text>"
         )
-        parts.append(f'<text class="label" x="{left:.1f}" y="{top - 10:.1f}">{escape(self.y_label)}</text>')
+        parts.append(
+            f'<text class="label" x="{left:.1f}" y="{top - 10:.1f}">{escape(self.y_label)}</text>'
+        )
         return parts
 
 
@@ -197,9 +230,13 @@ def drawing(width: float, height: float, title: str, description: str, inside: s
 
 
 def thin_line(axes: Sequence[tuple[Scale, Sequence[float]]]) -> tuple[list[float], list[float]]:
-    """Thins a line's points: of each stretch too dense to show, its lowest and highest; NaN where none is shown."""
+    """Thins a line's points: of each stretch too dense to show, its lowest and highest; NaN where
+    none is shown."""
     (x, xs), (y, ys) = axes
-    places = [(x(a), y(b)) if x.shows(a) and y.shows(b) else (math.nan, math.nan) for a, b in zip(xs, ys, strict=True)]
+    places = [
+        (x(a), y(b)) if x.shows(a) and y.shows(b) else (math.nan, math.nan)
+        for a, b in zip(xs, ys, strict=True)
+    ]
     stretch = max(1, math.ceil(2 * len(places) / _MOST_POINTS))
     if stretch <= 2:
         points = places
@@ -207,8 +244,15 @@ def thin_line(axes: Sequence[tuple[Scale, Sequence[float]]]) -> tuple[list[float
         points = []
         for begin in range(0, len(places), stretch):
             part = places[begin : begin + stretch]
-            ends = {min(range(len(part)), key=lambda i: part[i][1]), max(range(len(part)), key=lambda i: part[i][1])}
-            points += [(math.nan, math.nan)] if any(math.isnan(p[1]) for p in part) else [part[i] for i in sorted(ends)]
+            ends = {
+                min(range(len(part)), key=lambda i: part[i][1]),
+                max(range(len(part)), key=lambda i: part[i][1]),
+            }
+            points += (
+                [(math.nan, math.nan)]
+                if any(math.isnan(p[1]) for p in part)
+                else [part[i] for i in sorted(ends)]
+            )
     return [p[0] for p in points], [p[1] for p in points]
 
 

@@ -1,10 +1,12 @@
-"""The report as a JSON document, and back: the same content as the page, checked against the verdict's own types.
+"""The report as a JSON document, and back: the same content as the page, checked against the
+verdict's own types.
 
-JSON has no NaN and no infinities. A number that is missing is null; an interval's open end is "Infinity" or
-"-Infinity", as in the JSON mapping of Protocol Buffers.
+JSON has no NaN and no infinities. A number that is missing is null; an interval's open end is
+"Infinity" or "-Infinity", as in the JSON mapping of Protocol Buffers.
 
-The cloth in motion, most of a verdict by far, is packed: {"shape": [frame, marker, 3], "float32": base64 of the values
-[m], little-endian}, where a missing one is NaN. Documents that hold it as nested lists are read too.
+The cloth in motion, most of a verdict by far, is packed: {"shape": [frame, marker, 3], "float32":
+base64 of the values [m], little-endian}, where a missing one is NaN. Documents that hold it as
+nested lists are read too.
 """
 
 from __future__ import annotations
@@ -34,7 +36,10 @@ def as_document(verdict: Verdict) -> dict[str, Any]:
     """Returns the verdict as JSON values, with its schema tag."""
     content = plain({**verdict.as_dict(), "residuals": ()})
     content["residuals"] = [
-        {**plain({**residual, **dict.fromkeys(_MOVING)}), **{name: _pack_frames(residual[name]) for name in _MOVING}}
+        {
+            **plain({**residual, **dict.fromkeys(_MOVING)}),
+            **{name: _pack_frames(residual[name]) for name in _MOVING},
+        }
         for residual in map(dataclasses.asdict, verdict.residuals)
     ]
     return content
@@ -44,7 +49,8 @@ def from_document(document: Mapping[str, Any]) -> Verdict:
     """Reads the verdict that a document holds.
 
     Raises:
-        InputError: another schema, a field that is missing, unknown or of another type; it says which.
+        InputError: another schema, a field that is missing, unknown or of another type; it says
+            which.
     """
     content = dict(document)
     if "ranking" in content:
@@ -60,11 +66,13 @@ def from_document(document: Mapping[str, Any]) -> Verdict:
 
 
 def _current(candidate: Any) -> Any:
-    """Renames a candidate's entries to the names of today: documents of version 0.1 called the p of heterogeneity
-    `steady`."""
+    """Renames a candidate's entries to the names of today: documents of version 0.1 called the p of
+    heterogeneity `steady`."""
     if not isinstance(candidate, Mapping) or "steady" not in candidate:
         return candidate
-    return {"heterogeneity" if name == "steady" else name: value for name, value in candidate.items()}
+    return {
+        "heterogeneity" if name == "steady" else name: value for name, value in candidate.items()
+    }
 
 
 def plain(value: Any) -> Any:
@@ -81,8 +89,13 @@ def plain(value: Any) -> Any:
 
 
 def _pack_frames(frames: _Moving) -> dict[str, Any]:
-    values = np.asarray(frames, dtype="<f4").reshape(len(frames), len(frames[0]) if frames else 0, 3)
-    return {"shape": list(values.shape), "float32": base64.b64encode(values.tobytes()).decode("ascii")}
+    values = np.asarray(frames, dtype="<f4").reshape(
+        len(frames), len(frames[0]) if frames else 0, 3
+    )
+    return {
+        "shape": list(values.shape),
+        "float32": base64.b64encode(values.tobytes()).decode("ascii"),
+    }
 
 
 def _unpack_frames(value: Mapping[str, Any], where: str) -> _Moving:
@@ -91,12 +104,15 @@ def _unpack_frames(value: Mapping[str, Any], where: str) -> _Moving:
         return data.astype(np.float64).reshape(value["shape"]).tolist()
     except (KeyError, TypeError, ValueError, binascii.Error) as error:
         raise InputError(
-            f"the packed values cannot be read: {error}", where=where, fix="give shape, and float32 in base64"
+            f"the packed values cannot be read: {error}",
+            where=where,
+            fix="give shape, and float32 in base64",
         ) from error
 
 
 def _read(value: Any, kind: Any, where: str) -> Any:
-    """Reads `value` as `kind`: one of the verdict's types, built from dataclasses, tuples, lists, numbers and texts."""
+    """Reads `value` as `kind`: one of the verdict's types, built from dataclasses, tuples, lists,
+    numbers and texts."""
     if get_origin(kind) in (Union, types.UnionType):
         (present,) = (k for k in get_args(kind) if k is not types.NoneType)
         return None if value is None else _read(value, present, where)
@@ -117,7 +133,9 @@ def _read(value: Any, kind: Any, where: str) -> Any:
         return kind(text)
     except ValueError as error:
         choices = ", ".join(repr(str(k)) for k in kind)
-        raise InputError(f"the value {text!r} is unknown", where=where, fix=f"give one of {choices}") from error
+        raise InputError(
+            f"the value {text!r} is unknown", where=where, fix=f"give one of {choices}"
+        ) from error
 
 
 def _record(value: Any, kind: Any, where: str) -> Any:
@@ -130,10 +148,14 @@ def _record(value: Any, kind: Any, where: str) -> Any:
     }
     fix = f"the fields are {', '.join(hints)}"
     if unknown := content.keys() - hints.keys():
-        raise InputError(f"it has the unknown field {', '.join(sorted(unknown))}", where=where, fix=fix)
+        raise InputError(
+            f"it has the unknown field {', '.join(sorted(unknown))}", where=where, fix=fix
+        )
     if lacking := needed - content.keys():
         raise InputError(f"it lacks the field {', '.join(sorted(lacking))}", where=where, fix=fix)
-    return kind(**{name: _read(item, hints[name], f"{where}.{name}") for name, item in content.items()})
+    return kind(
+        **{name: _read(item, hints[name], f"{where}.{name}") for name, item in content.items()}
+    )
 
 
 def _sequence(value: Any, kind: Any, where: str) -> Any:
@@ -147,7 +169,10 @@ def _sequence(value: Any, kind: Any, where: str) -> Any:
         return tuple(_read(item, inner[0], f"{where}[{n}]") for n, item in enumerate(items))
     if len(items) != len(inner):
         raise InputError(f"there are {len(items)} entries", where=where, fix=f"give {len(inner)}")
-    return tuple(_read(item, k, f"{where}[{n}]") for n, (item, k) in enumerate(zip(items, inner, strict=True)))
+    return tuple(
+        _read(item, k, f"{where}[{n}]")
+        for n, (item, k) in enumerate(zip(items, inner, strict=True))
+    )
 
 
 def _number(value: Any, where: str) -> float:
@@ -161,6 +186,8 @@ def _number(value: Any, where: str) -> float:
 def _expected_value(value: Any, kind: Any, wanted: str, where: str) -> Any:
     if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
         raise InputError(
-            f"the value is of type {type(value).__name__}, not {wanted}", where=where, fix=f"give {wanted}"
+            f"the value is of type {type(value).__name__}, not {wanted}",
+            where=where,
+            fix=f"give {wanted}",
         )
     return value

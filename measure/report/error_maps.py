@@ -1,4 +1,5 @@
-"""The error over the cloth: maps over the material coordinates (u, v), or profiles where the markers lie on a line."""
+"""The error over the cloth: maps over the material coordinates (u, v), or profiles where the
+markers lie on a line."""
 
 from __future__ import annotations
 
@@ -25,12 +26,15 @@ _LEFT, _TOP, _BOTTOM = 46.0, 26.0, 40.0
 _PIXELS = 150  # across a map; the browser smooths
 _LEVELS = 255  # colours of a picture; one index more stands for none
 _LEAN = 1e-3  # shear that makes all diagonals of a regular grid run the same way
-_SLIVER = 2e-2  # triangles smaller than this part of the median come of rounding, or of that shear, at straight edges
+# triangles smaller than this part of the median come of rounding, or of that shear, at straight
+# edges
+_SLIVER = 2e-2
 
 
 @dataclass(frozen=True, kw_only=True)
 class Shade:
-    """What the colours of several maps mean: `low` to `high` [m] over a colour map of matplotlib."""
+    """What the colours of several maps mean: `low` to `high` [m] over a colour map of
+    matplotlib."""
 
     low: float
     high: float
@@ -40,12 +44,18 @@ class Shade:
         return display((self.low, self.high), "m")
 
     def picture(self, values: FloatArray) -> str:
-        """Encodes a PNG of values (row, column) [m], the first row on top, as a URL; transparent where there is no
-        value."""
+        """Encodes a PNG of values (row, column) [m], the first row on top, as a URL; transparent
+        where there is no value."""
         part = (values - self.low) / (self.high - self.low)
-        indices = np.where(np.isfinite(part), part * (_LEVELS - 1), _LEVELS).round().astype(np.uint8)
+        indices = (
+            np.where(np.isfinite(part), part * (_LEVELS - 1), _LEVELS).round().astype(np.uint8)
+        )
         image = Image.frombytes("P", (indices.shape[1], indices.shape[0]), indices.tobytes())
-        palette = (255 * colormaps[self.colours](np.linspace(0, 1, _LEVELS))[:, :3]).round().astype(np.uint8)
+        palette = (
+            (255 * colormaps[self.colours](np.linspace(0, 1, _LEVELS))[:, :3])
+            .round()
+            .astype(np.uint8)
+        )
         image.putpalette(palette.tobytes() + bytes(3))
         buffer = io.BytesIO()
         image.save(buffer, "PNG", transparency=_LEVELS)
@@ -55,7 +65,9 @@ class Shade:
 def size_shade(residuals: Sequence[Residual]) -> Shade:
     """Scales the errors of all recordings, before and after, from zero."""
     return Shade(
-        low=0.0, high=_largest([v for r in residuals for v in (*r.in_space, *r.in_space_after)]), colours="viridis"
+        low=0.0,
+        high=_largest([v for r in residuals for v in (*r.in_space, *r.in_space_after)]),
+        colours="viridis",
     )
 
 
@@ -66,7 +78,8 @@ def mean_shade(residuals: Sequence[Residual]) -> Shade:
 
 
 def size_maps(residual: Residual, shade: Shade, after_label: str) -> list[tuple[str, Markup]]:
-    """Draws (heading, chart) of the root mean square error over the cloth: of the base model, then of `after_label`."""
+    """Draws (heading, chart) of the root mean square error over the cloth: of the base model, then
+    of `after_label`."""
     parts = [("base model", residual.in_space)]
     if residual.in_space_after:
         parts.append((after_label, residual.in_space_after))
@@ -75,7 +88,9 @@ def size_maps(residual: Residual, shade: Shade, after_label: str) -> list[tuple[
 
 def mean_maps(residual: Residual, shade: Shade) -> list[tuple[str, Markup]]:
     """Draws (heading, chart) of x, y and z of the base model's mean error over the cloth."""
-    parts = [(f"mean error in {axis}", [m[i] for m in residual.mean]) for i, axis in enumerate("xyz")]
+    parts = [
+        (f"mean error in {axis}", [m[i] for m in residual.mean]) for i, axis in enumerate("xyz")
+    ]
     return _maps(residual, parts, shade, "mean error of the base model") if residual.mean else []
 
 
@@ -84,19 +99,25 @@ def colour_bar(shade: Shade, meaning: str) -> Markup:
     in_unit = shade.in_unit()
     scale = Linear(shade.low * in_unit.factor, shade.high * in_unit.factor, 12, 288)
     image = shade.picture(np.linspace(shade.low, shade.high, 128)[None, :])
-    parts = [f'<image href="{image}" x="12" y="0" width="276" height="10" preserveAspectRatio="none"/>']
+    parts = [
+        f'<image href="{image}" x="12" y="0" width="276" height="10" preserveAspectRatio="none"/>'
+    ]
     for value, label in scale.ticks(room_beside):
         parts.append(f'<path class="tick" d="M{scale(value):.1f} 10v4"/>')
-        parts.append(f'<text x="{scale(value):.1f}" y="26" text-anchor="middle">{escape(label)}</text>')
+        parts.append(
+            f'<text x="{scale(value):.1f}" y="26" text-anchor="middle">{escape(label)}</text>'
+        )
     parts.append(
-        f'<text class="label" x="150" y="43" text-anchor="middle">{escape(meaning)} [{escape(in_unit.unit)}]</text>'
+        f'<text class="label" x="150" y="43" text-anchor="middle">{escape(meaning)} '
+        f"[{escape(in_unit.unit)}]</text>"
     )
     ends = f"{scale.low:.3g} to {scale.high:.3g} {in_unit.unit}"
     return drawing(300, 48, f"Colours of the {meaning}", ends, "".join(parts))
 
 
 def triangles(markers: FloatArray) -> IntArray:
-    """Triangulates markers (marker, 2) [m], (triangle, 3), without slivers; empty where they lie on a line."""
+    """Triangulates markers (marker, 2) [m], (triangle, 3), without slivers; empty where they lie on
+    a line."""
     if on_a_line(markers):
         return np.zeros((0, 3), dtype=np.int64)
     leaning = markers @ np.array([[1.0, 0.0], [_LEAN, 1.0]])
@@ -120,7 +141,10 @@ def _maps(
     markers = np.asarray(residual.markers, dtype=np.float64).reshape(-1, 2)
     draw = _profile if on_a_line(markers) else _map
     return [
-        (heading, draw(markers, np.asarray(values, dtype=np.float64), shade, f"{meaning}, {heading}"))
+        (
+            heading,
+            draw(markers, np.asarray(values, dtype=np.float64), shade, f"{meaning}, {heading}"),
+        )
         for heading, values in parts
     ]
 
@@ -145,12 +169,16 @@ def _map(markers: FloatArray, values: FloatArray, shade: Shade, title: str) -> M
         grid = np.meshgrid(np.linspace(left, right, _PIXELS), np.linspace(top, bottom, rows))
         image = shade.picture(LinearNDInterpolator(markers[finite], values[finite])(*grid))
         chart.marks.append(
-            f'<image href="{image}" x="{_LEFT:g}" y="{_TOP:g}" width="{across:.1f}" height="{tall:.1f}" '
+            f'<image href="{image}" x="{_LEFT:g}" y="{_TOP:g}" width="{across:.1f}" '
+            f'height="{tall:.1f}" '
             'preserveAspectRatio="none"/>'
         )
     kinds = ("marker lost", "marker")
     for (u, v), is_finite in zip(markers.tolist(), finite.tolist(), strict=True):
-        chart.marks.append(f'<circle class="{kinds[is_finite]}" cx="{chart.x(u):.1f}" cy="{chart.y(v):.1f}" r="1"/>')
+        chart.marks.append(
+            f'<circle class="{kinds[is_finite]}" cx="{chart.x(u):.1f}" cy="{chart.y(v):.1f}" '
+            'r="1"/>'
+        )
     return chart.svg()
 
 

@@ -1,4 +1,5 @@
-"""Charts of the evidence: the error in time, in frequency and against wind, and the test against simulated nulls."""
+"""Charts of the evidence: the error in time, in frequency and against wind, and the test against
+simulated nulls."""
 
 from __future__ import annotations
 
@@ -61,7 +62,8 @@ def in_frequency(residual: Residual) -> Markup:
 
 
 def against_wind(residuals: Sequence[Residual]) -> Markup:
-    """Draws the error of each recording against its mean logged wind; hollow where the models were not fitted to it."""
+    """Draws the error of each recording against its mean logged wind; hollow where the models were
+    not fitted to it."""
     placed = [r for r in residuals if math.isfinite(r.speed)]
     before = [root_mean_square(r.in_time) for r in placed]
     after = [root_mean_square(r.in_time_after) for r in placed]
@@ -83,18 +85,24 @@ def against_wind(residuals: Sequence[Residual]) -> Markup:
 
 
 def null_distribution(test: NullTest) -> Markup:
-    """Draws a histogram of the statistic over simulated nulls, the observed one, and the least that would be
-    significant."""
+    """Draws a histogram of the statistic over simulated nulls, the observed one, and the least that
+    would be significant."""
     null = [v for v in test.null if math.isfinite(v)]
     values = [v for v in (*null, test.statistic) if math.isfinite(v)]
     critical = test.critical
     marked = [*values, *([critical] if critical is not None else [])]
-    ratio = bool(values) and min(values) > 0 and math.isfinite(test.statistic) and test.statistic > _FAR * max(null)
+    ratio = (
+        bool(values)
+        and min(values) > 0
+        and math.isfinite(test.statistic)
+        and test.statistic > _FAR * max(null)
+    )
     x = Logarithmic.over(marked, _LEFT, _RIGHT) if ratio else Linear.over(marked, _LEFT, _RIGHT)
     edges, counts = _histogram(null, ratio=ratio)
     chart = Chart(
         title="The statistic under simulated nulls",
-        description=f"histogram of {len(null)} nulls, with the observed statistic {number(test.statistic)}",
+        description=f"histogram of {len(null)} nulls, with the observed statistic "
+        f"{number(test.statistic)}",
         x=x,
         y=Linear.over([1.05 * max(counts, default=1)], 194, 58, at_least=[0.0]),
         x_label="test statistic (logarithmic)" if ratio else "test statistic",

@@ -1,4 +1,5 @@
-"""The verdict's first sentence, of markers and of films: what was found, how large it is, how strong the evidence."""
+"""The verdict's first sentence, of markers and of films: what was found, how large it is, how
+strong the evidence."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ from measure.verdict.quantity import known, number, probability, with_level
 from measure.verdict.verdict_record import Candidate, Conclusion, NullTest, Verdict
 
 _EVIDENCE = ((0.001, "very strong"), (0.01, "strong"), (0.05, "moderate"), (0.1, "weak"))
-"""Largest p → the word for the evidence (Muff, Nilsen, O'Hara and Nater, Trends in Ecology & Evolution 37, 2022)."""
+"""Largest p → the word for the evidence (Muff, Nilsen, O'Hara and Nater, Trends in Ecology &
+Evolution 37, 2022)."""
 _NONE = "little or no"
 
 
@@ -31,7 +33,8 @@ def lead(verdict: Verdict) -> str:
     if verdict.conclusion is Conclusion.UNTESTED:
         test = verdict.test
         return (
-            f"The base model cannot be tested at level {test.level:g}: with {test.kinds} numerical set-ups no p is "
+            f"The base model cannot be tested at level {test.level:g}: with {test.kinds} numerical "
+            "set-ups no p is "
             f"below {probability(test.least)}; at least {test.kinds_needed} are needed."
         )
     if verdict.conclusion is Conclusion.SUFFICIENT and contradicting_findings(verdict):
@@ -39,19 +42,23 @@ def lead(verdict: Verdict) -> str:
     p = f"p = {probability(verdict.test.p_value.value)}"
     if verdict.conclusion is Conclusion.UNDECIDED:
         return _add_remainder(
-            f"Nothing is decided: the base model is not rejected, {p}, but {'; '.join(verdict.open)}", verdict
+            f"Nothing is decided: the base model is not rejected, {p}, but "
+            f"{'; '.join(verdict.open)}",
+            verdict,
         )
     if verdict.conclusion is Conclusion.SUFFICIENT:
         does = "is not rejected" if erring(verdict) else "explains these recordings"
         return _add_remainder(
-            f"The base model {does}, no effect is needed; {evidence(verdict.test)} that anything is missing, {p}",
+            f"The base model {does}, no effect is needed; {evidence(verdict.test)} that anything "
+            f"is missing, {p}",
             verdict,
         )
     return _add_remainder(f"{_what_was_found(verdict)}; {_strength(verdict)}", verdict)
 
 
 def _add_remainder(sentence: str, verdict: Verdict) -> str:
-    """Adds where the model that is offered errs, if it does by more than may be called explained."""
+    """Adds where the model that is offered errs, if it does by more than may be called
+    explained."""
     return ". ".join([sentence, *([text] if (text := erring_text(verdict)) else [])]) + "."
 
 
@@ -62,28 +69,40 @@ def evidence(test: NullTest) -> str:
 
 
 def p_text(test: NullTest) -> str:
-    """Writes "p = 0.024, could be up to 0.07": with the upper end of the interval that the number of nulls leaves."""
+    """Writes "p = 0.024, could be up to 0.07": with the upper end of the interval that the number
+    of nulls leaves."""
     p = test.p_value
     text = f"p = {probability(p.value)}"
     return f"{text}, could be up to {probability(p.high)}" if p.high > p.value else text
 
 
 def explained_words(verdict: Verdict) -> str:
-    """Words the explained part, as "33 % of the error that a better model could remove", on data that neither model was
-    fitted to.
+    """Words the explained part, as "33 % of the error that a better model could remove", on data
+    that neither model was fitted to.
 
-    Of squared errors, each comparison in units of the base model's, those of all that lie above the floor together.
-    Where none does, of the whole error. Empty where no error after is known.
+    Of squared errors, each comparison in units of the base model's, those of all that lie above the
+    floor together. Where none does, of the whole error. Empty where no error after is known.
     """
-    compared = [c for c in verdict.comparisons if known(c.after) and known(c.before) and c.before.value > 0]
-    above = [c for c in compared if c.share is not None and not math.isnan(c.share) and known(c.floor)]
+    compared = [
+        c for c in verdict.comparisons if known(c.after) and known(c.before) and c.before.value > 0
+    ]
+    above = [
+        c for c in compared if c.share is not None and not math.isnan(c.share) and known(c.floor)
+    ]
     removed = sum(1 - (c.after.value / c.before.value) ** 2 for c in above or compared)
     if compared and removed <= 0:
         return "none of the error on unseen data"
     if above:
         most = sum(1 - (c.floor.value / c.before.value) ** 2 for c in above)
-        return f"{number(100 * removed / most, digits=2)} % of the error that a better model could remove"
-    return f"{number(100 * removed / len(compared), digits=2)} % of the squared error" if compared else ""
+        return (
+            f"{number(100 * removed / most, digits=2)} % of the error that a better model could "
+            "remove"
+        )
+    return (
+        f"{number(100 * removed / len(compared), digits=2)} % of the squared error"
+        if compared
+        else ""
+    )
 
 
 def _what_was_found(verdict: Verdict) -> str:
@@ -95,8 +114,15 @@ def _what_was_found(verdict: Verdict) -> str:
     explains = "removes" if erring(verdict) else "explains"
     if verdict.conclusion is Conclusion.ONE_OF:
         either = " or ".join(shorten_list([_strength_words(verdict, effect) for effect in effects]))
-        does = f"{explains} {share_explained}" if share_explained else f"{explains} what the base model lacks"
-        return f"Adding {'one of ' if len(effects) > 1 else ''}{either} {does}; these recordings do not decide which"
+        does = (
+            f"{explains} {share_explained}"
+            if share_explained
+            else f"{explains} what the base model lacks"
+        )
+        return (
+            f"Adding {'one of ' if len(effects) > 1 else ''}{either} {does}; these recordings do "
+            "not decide which"
+        )
     added = list_names([_strength_words(verdict, effect) for effect in effects])
     if verdict.conclusion is Conclusion.PARTLY:
         does = (
@@ -119,7 +145,10 @@ def _by_effect(candidates: Sequence[Candidate]) -> list[list[Candidate]]:
 def _strength_words(verdict: Verdict, candidates: Sequence[Candidate]) -> str:
     """Names an effect with its strength, or its strengths."""
     if len(candidates) > 1:
-        strengths = [f"{readable(candidate.parameter)} {with_level(candidate.strength)}" for candidate in candidates]
+        strengths = [
+            f"{readable(candidate.parameter)} {with_level(candidate.strength)}"
+            for candidate in candidates
+        ]
         return f"{candidates[0].effect} ({join_strengths(strengths, verdict)})"
     (candidate,) = candidates
     several = sum(c.effect == candidate.effect for c in verdict.ranking) > 1
@@ -130,7 +159,9 @@ def _strength_words(verdict: Verdict, candidates: Sequence[Candidate]) -> str:
 def _strength(verdict: Verdict) -> str:
     test = verdict.test
     if test.p_value.value > test.level:
-        return f"the set-up is not as declared, and what is left of it is not rejected, {p_text(test)}"
+        return (
+            f"the set-up is not as declared, and what is left of it is not rejected, {p_text(test)}"
+        )
     return f"{evidence(test)} that something was missing, {p_text(test)}"
 
 
@@ -141,7 +172,8 @@ def _incomplete(verdict: Verdict) -> str:
             strengths = ", ".join(number(s.value, digits=2) for s in candidate.by_recording)
             unit = "" if candidate.strength.unit == "1" else f" {candidate.strength.unit}"
             return (
-                f"fitted to each recording alone it is {strengths}{unit}, which differs by more than chance, so that "
+                f"fitted to each recording alone it is {strengths}{unit}, which differs by more "
+                "than chance, so that "
                 "another dependence on the wind would fit better"
             )
     return "the errors that remain are larger than those of simulations"

@@ -1,8 +1,8 @@
 """The observed cloth in motion against the two predictions, thinned to what a page can carry.
 
-Positions travel as 16-bit integers, little-endian, base64: the observed ones, and the errors of either model on a scale
-of their own, so that an error of a tenth of a millimetre is not lost beside a cloth of metres. A marker missing in a
-frame is `MISSING`.
+Positions travel as 16-bit integers, little-endian, base64: the observed ones, and the errors of
+either model on a scale of their own, so that an error of a tenth of a millimetre is not lost beside
+a cloth of metres. A marker missing in a frame is `MISSING`.
 """
 
 from __future__ import annotations
@@ -55,8 +55,8 @@ class MotionClip:
         frames, markers: how many are shown.
         of_frames, of_markers: how many the verdict holds.
         edges: (edge, 2) pairs of markers that are joined.
-        observed, before, after: (frame, marker, xyz) [m], about the mean; predictions as they are, not as errors.
-            `after` is None where no effect was named.
+        observed, before, after: (frame, marker, xyz) [m], about the mean; predictions as they are,
+            not as errors. `after` is None where no effect was named.
         azimuth: of the view at the start [rad].
         factor: by which errors are enlarged at the start.
     """
@@ -77,13 +77,17 @@ class MotionClip:
 
     @property
     def radius(self) -> float:
-        """Half a panel's width [m]: the circle about the upright through the mean that holds the observed cloth."""
+        """Half a panel's width [m]: the circle about the upright through the mean that holds the
+        observed cloth."""
         return _finite_reach(np.linalg.norm(self.observed[..., :2], axis=-1))
 
     @property
     def rise(self) -> float:
-        """How far the observed cloth reaches up or down in any view of the player's elevation [m]."""
-        return _finite_reach(self.observed[..., 2]) * math.cos(ELEVATION) + self.radius * math.sin(ELEVATION)
+        """How far the observed cloth reaches up or down in any view of the player's elevation
+        [m]."""
+        return _finite_reach(self.observed[..., 2]) * math.cos(ELEVATION) + self.radius * math.sin(
+            ELEVATION
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """Returns JSON values for the player."""
@@ -108,8 +112,11 @@ class MotionClip:
 
 
 def motion(residual: Residual) -> MotionClip | None:
-    """Makes the stretch a residual holds, its markers thinned evenly; None where it holds none, or no times."""
-    observed, before, after = (_array(p) for p in (residual.observed, residual.before, residual.after))
+    """Makes the stretch a residual holds, its markers thinned evenly; None where it holds none, or
+    no times."""
+    observed, before, after = (
+        _array(p) for p in (residual.observed, residual.before, residual.after)
+    )
     rate = _rate(residual.times)
     if observed.size == 0 or before.shape != observed.shape or math.isnan(rate):
         return None
@@ -138,7 +145,8 @@ def motion(residual: Residual) -> MotionClip | None:
 
 
 def still(stretch: MotionClip, after_label: str) -> Markup:
-    """Draws the first frame as the player draws it: one panel a model, the observed cloth under the prediction.
+    """Draws the first frame as the player draws it: one panel a model, the observed cloth under the
+    prediction.
 
     The view is from the side, turned and raised a little; `motion.js` uses the same projection.
     """
@@ -153,17 +161,25 @@ def still(stretch: MotionClip, after_label: str) -> Markup:
         centre = (_HALF * (2 * number + 1) + _GAP * number, tall + _HEAD)
         parts.append(
             f'<text class="label" x="{centre[0] - _HALF + 8:g}" y="14">{escape(heading)}</text>'
-            f'<path class="mesh observed" d="{_wires(stretch.observed[0], stretch, scale, centre)}"/>'
+            '<path class="mesh observed" '
+            f'd="{_wires(stretch.observed[0], stretch, scale, centre)}"/>'
             f'<path class="mesh {kind}" d="{_wires(enlarged, stretch, scale, centre)}"/>'
         )
     width = 2 * _HALF * len(panels) + _GAP * (len(panels) - 1)
     return drawing(
-        width, 2 * tall + _HEAD + 4, "Observed cloth and predictions", f"a frame of {stretch.recording}", "".join(parts)
+        width,
+        2 * tall + _HEAD + 4,
+        "Observed cloth and predictions",
+        f"a frame of {stretch.recording}",
+        "".join(parts),
     )
 
 
-def _wires(points: FloatArray, stretch: MotionClip, scale: float, centre: tuple[float, float]) -> str:
-    """Writes path data of the edges between markers (marker, xyz), as seen from `stretch.azimuth` and `ELEVATION`."""
+def _wires(
+    points: FloatArray, stretch: MotionClip, scale: float, centre: tuple[float, float]
+) -> str:
+    """Writes path data of the edges between markers (marker, xyz), as seen from `stretch.azimuth`
+    and `ELEVATION`."""
     x, y, z = points.T
     right = x * math.cos(stretch.azimuth) + y * math.sin(stretch.azimuth)
     away = -x * math.sin(stretch.azimuth) + y * math.cos(stretch.azimuth)
@@ -178,15 +194,21 @@ def _wires(points: FloatArray, stretch: MotionClip, scale: float, centre: tuple[
 
 
 def _azimuth(observed: FloatArray) -> float:
-    """Computes the direction [rad] of the cloth's longest horizontal extent, turned by a sixth of a right angle."""
+    """Computes the direction [rad] of the cloth's longest horizontal extent, turned by a sixth of a
+    right angle."""
     flat = observed[..., :2].reshape(-1, 2)
     flat = flat[np.isfinite(flat).all(axis=1)]
-    x, y = np.linalg.svd(flat - flat.mean(axis=0), full_matrices=False)[2][0] if len(flat) > 1 else (1.0, 0.0)
+    x, y = (
+        np.linalg.svd(flat - flat.mean(axis=0), full_matrices=False)[2][0]
+        if len(flat) > 1
+        else (1.0, 0.0)
+    )
     return (math.atan2(y, x) + math.pi / 12 + math.pi / 2) % math.pi - math.pi / 2
 
 
 def _edges(uv: FloatArray) -> IntArray:
-    """Lists edges (edge, 2): the sides of the triangles over the markers, or neighbours along a line."""
+    """Lists edges (edge, 2): the sides of the triangles over the markers, or neighbours along a
+    line."""
     if on_a_line(uv):
         order = np.argsort(np.linalg.norm(uv - uv[:1], axis=1))
         return np.stack([order[:-1], order[1:]], axis=1).astype(np.int64)
@@ -206,7 +228,9 @@ def _enlargement(observed: FloatArray, predicted: FloatArray) -> int:
 
 
 def _array(frames: Sequence[Sequence[Sequence[float]]]) -> FloatArray:
-    return np.asarray(frames, dtype=np.float64).reshape(len(frames), len(frames[0]) if frames else 0, 3)
+    return np.asarray(frames, dtype=np.float64).reshape(
+        len(frames), len(frames[0]) if frames else 0, 3
+    )
 
 
 def _spread(count: int, most: int) -> IntArray:

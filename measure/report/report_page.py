@@ -1,6 +1,8 @@
-"""The report of closing the loop as one page: HTML that refers to no other file and needs no network.
+"""The report of closing the loop as one page: HTML that refers to no other file and needs no
+network.
 
-One chart for a verdict: the error of the base model, with what was added, and the floor, on unseen data.
+One chart for a verdict: the error of the base model, with what was added, and the floor, on unseen
+data.
 """
 
 from __future__ import annotations
@@ -31,17 +33,26 @@ _MOST = 8
 
 
 def overview(comparisons: Sequence[Comparison], *, after: str) -> Markup:
-    """Draws bars of each comparison of two models in per cent of the base model's error, the floor shaded; empty where
-    the base model is alone, since all its bars would be 100 % long.
+    """Draws bars of each comparison of two models in per cent of the base model's error, the floor
+    shaded; empty where the base model is alone, since all its bars would be 100 % long.
 
     Args:
         after: what the model after is called, "with lift".
     """
-    drawn = [c for c in comparisons if known(c.before) and c.before.value > 0 and known(c.after)][:_MOST]
+    drawn = [c for c in comparisons if known(c.before) and c.before.value > 0 and known(c.after)][
+        :_MOST
+    ]
     if not drawn:
         return Markup("")
-    ends = [100 * v / c.before.value for c in drawn for e in (c.before, c.after, c.floor) for v in (e.value, e.high)]
-    scale = Linear(0.0, max(110.0, *(min(v, 250.0) for v in ends if math.isfinite(v))), _LEFT, _WIDTH - _RIGHT)
+    ends = [
+        100 * v / c.before.value
+        for c in drawn
+        for e in (c.before, c.after, c.floor)
+        for v in (e.value, e.high)
+    ]
+    scale = Linear(
+        0.0, max(110.0, *(min(v, 250.0) for v in ends if math.isfinite(v))), _LEFT, _WIDTH - _RIGHT
+    )
     height = _ROW * len(drawn) + 24
     parts = [_axis(scale, height - 18)]
     captions = []
@@ -56,11 +67,16 @@ def overview(comparisons: Sequence[Comparison], *, after: str) -> Markup:
 def _row(comparison: Comparison, scale: Linear, top: float) -> list[str]:
     """Draws what is compared, its bars, and the floor behind them."""
     parts = [
-        f'<text class="label" x="{_LEFT - 8:g}" y="{top + 17:g}" text-anchor="end">{_short(comparison.what)}</text>'
+        f'<text class="label" x="{_LEFT - 8:g}" y="{top + 17:g}" '
+        f'text-anchor="end">{_short(comparison.what)}</text>'
     ]
     if known(comparison.floor):
-        width = scale(min(100 * comparison.floor.value / comparison.before.value, scale.high)) - _LEFT
-        parts.append(f'<rect class="floor" x="{_LEFT:g}" y="{top - 3:g}" width="{width:.1f}" height="36"/>')
+        width = (
+            scale(min(100 * comparison.floor.value / comparison.before.value, scale.high)) - _LEFT
+        )
+        parts.append(
+            f'<rect class="floor" x="{_LEFT:g}" y="{top - 3:g}" width="{width:.1f}" height="36"/>'
+        )
     parts.append(_bar(comparison.before, comparison.before.value, scale, top, "before"))
     parts.append(_bar(comparison.after, comparison.before.value, scale, top + 15, "after"))
     return parts
@@ -77,15 +93,20 @@ def _bar(estimate: Estimate, unit: float, scale: Linear, top: float, kind: str) 
     whisker = f'<path class="line" d="M{low:.1f} {middle:.1f}H{high:.1f}"/>' if bounded else ""
     text = f"{number(100 * estimate.value / unit, digits=2)} %"
     return (
-        f'<rect class="bar {kind}" x="{scale.start:g}" y="{top:g}" width="{width:.1f}" height="{_BAR:g}"/>{whisker}'
-        f'<text x="{(max(value, high) if bounded else value) + 5:.1f}" y="{middle + 4:.1f}">{text}</text>'
+        f'<rect class="bar {kind}" x="{scale.start:g}" y="{top:g}" width="{width:.1f}" '
+        f'height="{_BAR:g}"/>{whisker}'
+        f'<text x="{(max(value, high) if bounded else value) + 5:.1f}" '
+        f'y="{middle + 4:.1f}">{text}</text>'
     )
 
 
 def _axis(scale: Linear, bottom: float) -> str:
     ticks = [value for value in (0, 50, 100, 150, 200) if value <= scale.high]
     lines = (f'<path class="grid" d="M{scale(v):.1f} 0V{bottom:g}"/>' for v in ticks)
-    labels = (f'<text x="{scale(v):.1f}" y="{bottom + 14:g}" text-anchor="middle">{v} %</text>' for v in ticks)
+    labels = (
+        f'<text x="{scale(v):.1f}" y="{bottom + 14:g}" text-anchor="middle">{v} %</text>'
+        for v in ticks
+    )
     return "".join([*lines, *labels])
 
 
@@ -134,11 +155,15 @@ def page(verdict: Verdict) -> str:
         "has_control": any(quantity.known(c.control) for c in verdict.comparisons),
         "has_shift": any(quantity.known(p.after) for p in verdict.parameters),
         "residual_after": any(r.in_time_after for r in verdict.residuals),
-        "level": verdict_sentences.common_level(e for c in verdict.comparisons for e in (c.before, c.after, c.floor)),
+        "level": verdict_sentences.common_level(
+            e for c in verdict.comparisons for e in (c.before, c.after, c.floor)
+        ),
         "ranking_level": verdict_sentences.common_level(c.strength for c in verdict.ranking),
         "lengths": _lengths(verdict),
         "errors_row": lambda comparison: row_charts.errors_row(comparison, errors),
-        "gain_row": lambda c: row_charts.gain_row(c, gains, "after" if c in named_candidates else "single"),
+        "gain_row": lambda c: row_charts.gain_row(
+            c, gains, "after" if c in named_candidates else "single"
+        ),
         "title": lambda c: verdict_sentences.candidate_title(verdict, c),
         "strength_row": row_charts.strength_row,
         "null": figures.null_distribution(verdict.test),
@@ -153,7 +178,8 @@ def page(verdict: Verdict) -> str:
 
 
 def opening(verdict: Verdict) -> dict[str, Any]:
-    """Returns what the top of a page of markers or films shows: sentence, chart and what speaks against them."""
+    """Returns what the top of a page of markers or films shows: sentence, chart and what speaks
+    against them."""
     first = lead(verdict)
     after = verdict_sentences.after_label(verdict)
     return {
@@ -175,7 +201,12 @@ def opening(verdict: Verdict) -> dict[str, Any]:
 
 def _lengths(verdict: Verdict) -> quantity.Display:
     """Chooses millimetres or metres for all errors of the table."""
-    errors = [e for c in verdict.comparisons for e in (c.before, c.after, c.floor, c.control) if e is not None]
+    errors = [
+        e
+        for c in verdict.comparisons
+        for e in (c.before, c.after, c.floor, c.control)
+        if e is not None
+    ]
     return quantity.display([e.value for e in errors], "m")
 
 
@@ -203,7 +234,9 @@ def _motions(motions: list[moving_cloth.MotionClip], after_label: str) -> dict[s
     stills = [moving_cloth.still(m, after_label) for m in ordered]
     data = {
         "view": moving_cloth.VIEW,
-        "list": [{**m.as_dict(), "still": str(still)} for m, still in zip(ordered, stills, strict=True)],
+        "list": [
+            {**m.as_dict(), "still": str(still)} for m, still in zip(ordered, stills, strict=True)
+        ],
     }
     return {
         "motions": ordered,
@@ -219,7 +252,10 @@ def _flatten_values(values: Mapping[str, Any], prefix: str = "") -> Iterable[tup
         if isinstance(value, Mapping):
             yield from _flatten_values(value, f"{prefix}{name}.")
         else:
-            yield f"{prefix}{name}", value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+            yield (
+                f"{prefix}{name}",
+                value if isinstance(value, str) else json.dumps(value, ensure_ascii=False),
+            )
 
 
 def _data(value: float | None, text: str) -> Markup:
@@ -234,7 +270,9 @@ def _data(value: float | None, text: str) -> Markup:
 def _estimate(estimate: Estimate | None, display_as: quantity.Display | None = None) -> Markup:
     """Writes the value over its interval."""
     value, ends = quantity.estimate_parts(estimate, display_as=display_as)
-    return _data(estimate.value if estimate else None, value) + Markup('<span class="ends">{}</span>').format(ends)
+    return _data(estimate.value if estimate else None, value) + Markup(
+        '<span class="ends">{}</span>'
+    ).format(ends)
 
 
 def _full(estimate: Estimate) -> Markup:

@@ -1,4 +1,5 @@
-"""What every form of the report says in the same words: the conclusion, the test, what the columns mean."""
+"""What every form of the report says in the same words: the conclusion, the test, what the columns
+mean."""
 
 from __future__ import annotations
 
@@ -6,33 +7,62 @@ import math
 from collections.abc import Iterable, Sequence
 
 from measure.verdict.decided import NOT_REJECTED, erring, times_floor
-from measure.verdict.quantity import display, estimate_text, known, level_text, number, probability, share, with_level
-from measure.verdict.verdict_record import Candidate, Comparison, Conclusion, Estimate, NullTest, Verdict
+from measure.verdict.quantity import (
+    display,
+    estimate_text,
+    known,
+    level_text,
+    number,
+    probability,
+    share,
+    with_level,
+)
+from measure.verdict.verdict_record import (
+    Candidate,
+    Comparison,
+    Conclusion,
+    Estimate,
+    NullTest,
+    Verdict,
+)
 
 CONTRADICTING = ("still-away-from-pins",)
-"""Kinds of findings by which the recordings contradict what was declared: they lead a verdict that names nothing."""
+"""Kinds of findings by which the recordings contradict what was declared: they lead a verdict that
+names nothing."""
 
 _LISTED = 3
 """Effects of which one is meant, or parts of the data, that a sentence names."""
 _DETERMINED = 5.0
-"""A factor to either side beyond which a quantity counts as not determined: cloths of all kinds lie within some ten."""
+"""A factor to either side beyond which a quantity counts as not determined: cloths of all kinds lie
+within some ten."""
 _FACTORS = ("of nominal", "s")
 """Units of what is estimated by its logarithm."""
 
 
 def heading(verdict: Verdict) -> str:
-    """Writes the conclusion in one line; what contradicts it in the set-up, if anything does, before it."""
+    """Writes the conclusion in one line; what contradicts it in the set-up, if anything does,
+    before it."""
     contradicting = contradicting_findings(verdict)
     if verdict.conclusion is Conclusion.SUFFICIENT and contradicting:
-        return f"The set-up is not as declared, so that this verdict does not count: {contradicting[0]}"
+        return (
+            "The set-up is not as declared, so that this verdict does not count: "
+            f"{contradicting[0]}"
+        )
     effects, either = list_names(titles(verdict)), list_names(shorten_list(titles(verdict)))
-    partly = f"the base model lacked {effects}, and something more" if verdict.named else "something is still missing"
+    partly = (
+        f"the base model lacked {effects}, and something more"
+        if verdict.named
+        else "something is still missing"
+    )
     return {
-        Conclusion.UNTESTED: "The base model cannot be tested: there are too few kinds of nulls for the level",
+        Conclusion.UNTESTED: "The base model cannot be tested: there are too few kinds of nulls "
+        "for the level",
         Conclusion.SUFFICIENT: f"No effect needed: {_suffices(verdict)}",
-        Conclusion.UNDECIDED: "Not decided: the base model is not rejected, and not shown to suffice either",
+        Conclusion.UNDECIDED: "Not decided: the base model is not rejected, and not shown to "
+        "suffice either",
         Conclusion.EFFECT: f"The base model lacked {effects}",
-        Conclusion.ONE_OF: f"The base model lacked {_one_of(verdict)}{either}: these recordings do not decide which",
+        Conclusion.ONE_OF: f"The base model lacked {_one_of(verdict)}{either}: these recordings do "
+        "not decide which",
         Conclusion.PARTLY: f"Partly explained: {partly}",
         Conclusion.OUTSIDE: "The base model lacks something that no effect of the library explains",
     }[verdict.conclusion]
@@ -45,17 +75,24 @@ def _one_of(verdict: Verdict) -> str:
 
 def _suffices(verdict: Verdict) -> str:
     """Writes what a base model that is not rejected does: it explains nothing that it errs on."""
-    return "the base model is not rejected" if erring(verdict) else "the base model explains these recordings"
+    return (
+        "the base model is not rejected"
+        if erring(verdict)
+        else "the base model explains these recordings"
+    )
 
 
 def erring_text(verdict: Verdict) -> str:
-    """Writes where the model that is offered as the answer errs by more than three floors, in a sentence; empty where
-    it does nowhere."""
+    """Writes where the model that is offered as the answer errs by more than three floors, in a
+    sentence; empty where it does nowhere."""
     comparisons = erring(verdict)
     if not comparisons:
         return ""
     names = shorten_list(
-        [f"{comparison.what} by {number(times_floor(comparison, verdict), digits=2)}" for comparison in comparisons]
+        [
+            f"{comparison.what} by {number(times_floor(comparison, verdict), digits=2)}"
+            for comparison in comparisons
+        ]
     )
     model = f"the model {after_label(verdict)}" if verdict.named else "the base model"
     return f"In floors, {model} errs on {list_names(names)}: it does not explain that"
@@ -73,12 +110,19 @@ def contradicting_findings(verdict: Verdict) -> list[str]:
 
 def list_names(names: Sequence[str]) -> str:
     """Lists names as `a`, `a and b`, `a, b and c`."""
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names) or "an unnamed effect"
+    return (
+        " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+        or "an unnamed effect"
+    )
 
 
 def shorten_list(names: Sequence[str]) -> list[str]:
     """Shortens a list to the names, or if there are many the first of them and "12 more"."""
-    return list(names) if len(names) <= _LISTED + 1 else [*names[:_LISTED], f"{len(names) - _LISTED} more"]
+    return (
+        list(names)
+        if len(names) <= _LISTED + 1
+        else [*names[:_LISTED], f"{len(names) - _LISTED} more"]
+    )
 
 
 def after_label(verdict: Verdict) -> str:
@@ -93,16 +137,16 @@ def after_label(verdict: Verdict) -> str:
 
 
 def leads_with_p(verdict: Verdict) -> bool:
-    """Returns whether the verdict's first sentence states the p-value of the global test: not where the base model
-    could not be tested, nor where the recordings contradict the declared set-up."""
+    """Returns whether the verdict's first sentence states the p-value of the global test: not where
+    the base model could not be tested, nor where the recordings contradict the declared set-up."""
     if verdict.conclusion is Conclusion.UNTESTED:
         return False
     return verdict.conclusion is not Conclusion.SUFFICIENT or not contradicting_findings(verdict)
 
 
 def test_sentence(verdict: Verdict) -> str:
-    """Describes the global test: what it says, how its p-value is counted and the interval that the number of nulls
-    leaves it.
+    """Describes the global test: what it says, how its p-value is counted and the interval that the
+    number of nulls leaves it.
 
     The value itself stands here only where the verdict's first sentence has none.
     """
@@ -113,11 +157,17 @@ def test_sentence(verdict: Verdict) -> str:
     if test.critical is None:
         says = "cannot be tested"
     value = "p" if leads_with_p(verdict) else f"p = {probability(p.value)}"
-    along = f" along {test.suspected} alone, suspected before the recordings were looked at," if test.suspected else ""
+    along = (
+        f" along {test.suspected} alone, suspected before the recordings were looked at,"
+        if test.suspected
+        else ""
+    )
     return (
         f"The base model {says}{along} at level {test.level:g}: {as_large(test)} of {len(null)} "
-        f"{'groups of simulations' if test.effective is None else 'null flags'} deviate as much as the recordings "
-        f"(statistic {number(test.statistic)}). {value} is {_counting_sentence(test)}; its sampling interval is "
+        f"{'groups of simulations' if test.effective is None else 'null flags'} deviate as much as "
+        "the recordings "
+        f"(statistic {number(test.statistic)}). {value} is {_counting_sentence(test)}; its "
+        "sampling interval is "
         f"[{probability(p.low)}, {probability(p.high)}] {level_text(p.level)}.{_tail(test)}"
     )
 
@@ -126,13 +176,16 @@ def _counting_sentence(test: NullTest) -> str:
     """Explains how p is counted."""
     if test.effective is None:
         return (
-            f"(1 + number of the {test.kinds} numerical set-ups whose simulations deviate as much) / {1 + test.kinds}, "
+            f"(1 + number of the {test.kinds} numerical set-ups whose simulations deviate as much) "
+            f"/ {1 + test.kinds}, "
             "a set-up counting by the share of its groups"
         )
     flags = number(test.effective)
     return (
-        f"(1 + {flags} × the share of null flags that deviate as much) / (1 + {flags}): so many independent ones are "
-        f"what those of {test.kinds} numerical set-ups count as, since flags of one set-up are correlated by "
+        f"(1 + {flags} × the share of null flags that deviate as much) / (1 + {flags}): so many "
+        "independent ones are "
+        f"what those of {test.kinds} numerical set-ups count as, since flags of one set-up are "
+        "correlated by "
         f"{number(test.correlation, digits=2)}"
     )
 
@@ -141,14 +194,18 @@ def _tail(test: NullTest) -> str:
     """Writes what the tail of a distribution says beside p; empty where it was not taken."""
     if test.tail is None:
         return ""
-    return f" By the tail of Student's t, which extrapolates and decides nothing, it would be {probability(test.tail)}."
+    return (
+        " By the tail of Student's t, which extrapolates and decides nothing, it would be "
+        f"{probability(test.tail)}."
+    )
 
 
 def test_remark(test: NullTest) -> str:
     """Writes what limits the test; empty where nothing does."""
     if test.critical is None:
         return (
-            f"With {test.kinds} kinds of numerics no p-value below {probability(test.least)} is possible, so "
+            f"With {test.kinds} kinds of numerics no p-value below {probability(test.least)} is "
+            "possible, so "
             f"that the test could not have rejected the base model at level {test.level:g}."
         )
     if test.p_value.value > test.level:
@@ -157,7 +214,8 @@ def test_remark(test: NullTest) -> str:
 
 
 def power_text(verdict: Verdict) -> str:
-    """Writes how surely effects of their expected strengths are seen, in a sentence; empty where that is not known."""
+    """Writes how surely effects of their expected strengths are seen, in a sentence; empty where
+    that is not known."""
     if not verdict.power:
         return ""
     chances = [
@@ -173,7 +231,10 @@ def power_mean(verdict: Verdict) -> str:
     if not verdict.power:
         return ""
     mean = sum(power.share for power in verdict.power) / len(verdict.power)
-    return f"An effect of the strength that is expected of it would be seen with a chance of {share(mean)} on average"
+    return (
+        "An effect of the strength that is expected of it would be seen with a chance of "
+        f"{share(mean)} on average"
+    )
 
 
 def as_large(test: NullTest) -> int:
@@ -182,21 +243,28 @@ def as_large(test: NullTest) -> int:
 
 
 def control_warnings(verdict: Verdict) -> list[str]:
-    """Warns where the wrong effect helps as much as the named one, or hardly less: a sentence for all parts of each
-    kind."""
+    """Warns where the wrong effect helps as much as the named one, or hardly less: a sentence for
+    all parts of each kind."""
     compared = [c for c in verdict.comparisons if c.apart is not None and known(c.apart)]
     failing = [c for c in compared if c.apart is not None and c.apart.value <= 0]
     equal = [c for c in compared if c.apart is not None and c.apart.low <= 0 < c.apart.value]
     warnings = []
     if failing:
-        text = f"the control {failing[0].control_name} does as well as the named effect, so that the attribution fails"
+        text = (
+            f"the control {failing[0].control_name} does as well as the named effect, so that the "
+            "attribution fails"
+        )
         warnings.append(f"{_parts(failing, verdict)}: {text} there.")
     if equal:
         text = f"the control {equal[0].control_name} and the named effect fit equally well"
         better = verdict.apart is not None and known(verdict.apart) and verdict.apart.low > 0
         together = "; over all parts together the named effect does better" if better else ""
         everywhere = 1 < len(equal) == len(verdict.comparisons)
-        where = f"In each of the {len(equal)} parts by itself" if everywhere else f"{_parts(equal, verdict)}:"
+        where = (
+            f"In each of the {len(equal)} parts by itself"
+            if everywhere
+            else f"{_parts(equal, verdict)}:"
+        )
         warnings.append(f"{where} {text}{together}.")
     return warnings
 
@@ -206,26 +274,37 @@ def _parts(comparisons: Sequence[Comparison], verdict: Verdict) -> str:
     names = [c.what for c in comparisons]
     which = _begun(list_names(shorten_list(names)))
     return (
-        which if len(verdict.comparisons) == 1 else f"{which}, {len(comparisons)} of {len(verdict.comparisons)} parts"
+        which
+        if len(verdict.comparisons) == 1
+        else f"{which}, {len(comparisons)} of {len(verdict.comparisons)} parts"
     )
 
 
 def control_summary(verdict: Verdict) -> str:
-    """Sums up the wrong-effect control over all that was left out, in a sentence; empty where none was run."""
+    """Sums up the wrong-effect control over all that was left out, in a sentence; empty where none
+    was run."""
     difference = verdict.apart
     if difference is None or not known(difference):
         return ""
-    control = next((c.control_name for c in verdict.comparisons if c.control_name), "the best wrong effect")
+    control = next(
+        (c.control_name for c in verdict.comparisons if c.control_name), "the best wrong effect"
+    )
     line = "the named effect does better" if difference.low > 0 else "the two fit equally well"
     return (
-        f"On recordings left out, {control} instead predicts worse by {estimate_text(difference)} nat per segment "
+        f"On recordings left out, {control} instead predicts worse by {estimate_text(difference)} "
+        "nat per segment "
         f"({level_text(difference.level)}): {line}."
     )
 
 
 def reduction_warnings(verdict: Verdict) -> list[str]:
-    """Warns where the effect's reduction of the error is not significant: one sentence for all parts."""
-    weak = [c for c in verdict.comparisons if known(c.after) and known(c.reduction) and c.reduction.low <= 0]
+    """Warns where the effect's reduction of the error is not significant: one sentence for all
+    parts."""
+    weak = [
+        c
+        for c in verdict.comparisons
+        if known(c.after) and known(c.reduction) and c.reduction.low <= 0
+    ]
     return [f"{_parts(weak, verdict)}: the reduction is not significant there."] if weak else []
 
 
@@ -239,8 +318,8 @@ def floor_text(comparison: Comparison) -> str:
 
 
 def parameter_text(estimate: Estimate) -> str:
-    """Writes a calibrated parameter; that these recordings do not determine it, where its interval is wider than a
-    factor of five to either side."""
+    """Writes a calibrated parameter; that these recordings do not determine it, where its interval
+    is wider than a factor of five to either side."""
     if not known(estimate) or estimate.unit not in _FACTORS:
         return with_level(estimate)
     in_unit = display((estimate.value, estimate.low, estimate.high), estimate.unit)
@@ -248,14 +327,19 @@ def parameter_text(estimate: Estimate) -> str:
         return f"not determined by these recordings: {with_level(estimate)}"
     if estimate.low == 0 and estimate.high > _DETERMINED * estimate.value:
         most = f"{number(in_unit.factor * estimate.high, digits=2)}{in_unit.suffix}"
-        return f"at most {most} {level_text(estimate.level)}, best {number(in_unit.factor * estimate.value, digits=2)}"
+        return (
+            f"at most {most} {level_text(estimate.level)}, best "
+            f"{number(in_unit.factor * estimate.value, digits=2)}"
+        )
     return with_level(estimate)
 
 
 def named_candidates(verdict: Verdict) -> list[Candidate]:
-    """Lists the candidates that the verdict names, in its order: of an effect with several parameters, those that
-    act."""
-    return [c for name in verdict.named for c in verdict.ranking if c.effect == name and not c.why_not]
+    """Lists the candidates that the verdict names, in its order: of an effect with several
+    parameters, those that act."""
+    return [
+        c for name in verdict.named for c in verdict.ranking if c.effect == name and not c.why_not
+    ]
 
 
 def rejected_candidates(verdict: Verdict) -> list[Candidate]:
@@ -276,12 +360,15 @@ def _begun(text: str) -> str:
 
 def common_level(estimates: Iterable[Estimate]) -> str:
     """Writes the level of all intervals, or all that there are."""
-    return ", ".join(level_text(level) for level in sorted({e.level for e in estimates if known(e)}))
+    return ", ".join(
+        level_text(level) for level in sorted({e.level for e in estimates if known(e)})
+    )
 
 
 def titles(verdict: Verdict) -> tuple[str, ...]:
-    """Lists what the verdict names, in its order: each effect once, with those of its parameters that act where several
-    were weighed, and the air's density and holes in the cloth by what they have in common."""
+    """Lists what the verdict names, in its order: each effect once, with those of its parameters
+    that act where several were weighed, and the air's density and holes in the cloth by what they
+    have in common."""
     names: list[str] = []
     pressure = [name for name in verdict.named if name in ("air-density", "porosity")]
     for name in verdict.named:
@@ -297,7 +384,8 @@ def titles(verdict: Verdict) -> tuple[str, ...]:
 
 
 def join_strengths(parts: Sequence[str], verdict: Verdict) -> str:
-    """Strengths of one effect: `lean and sway` that act together, `lean or sway` of which one may."""
+    """Strengths of one effect: `lean and sway` that act together, `lean or sway` of which one
+    may."""
     return " or ".join(parts) if verdict.conclusion is Conclusion.ONE_OF else list_names(parts)
 
 

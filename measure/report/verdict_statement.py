@@ -25,24 +25,34 @@ from measure.verdict.quantity import number, with_error
 from measure.verdict.verdict_record import Conclusion, NullTest, Verdict
 
 _SEPARATES: dict[frozenset[str], str] = {
-    frozenset({"tangential-linear-drag", "tangential-quadratic-drag"}): "a second wind speed, twice as fast: one drag "
-    "doubles, the other quadruples",
+    frozenset(
+        {"tangential-linear-drag", "tangential-quadratic-drag"}
+    ): "a second wind speed, twice as fast: one drag doubles, the other quadruples",
     frozenset(
         {"added-mass", "reactive-loading"}
     ): "the cloth released in still air, where only its own motion loads it",
     frozenset(
         {"reactive-loading", "finite-span-loading"}
     ): "a flag of another height: the mass of air of finite-span-loading changes with it",
-    frozenset({"air-density", "porosity"}): "the air's temperature and pressure: they give its density",
-    frozenset({"air-density", "power-law-drag"}): "a second wind speed, twice as fast: a power law changes its scale",
-    frozenset({"lift", "power-law-drag"}): "a stiff plate of the same cloth at a few angles to the wind",
+    frozenset(
+        {"air-density", "porosity"}
+    ): "the air's temperature and pressure: they give its density",
+    frozenset(
+        {"air-density", "power-law-drag"}
+    ): "a second wind speed, twice as fast: a power law changes its scale",
+    frozenset(
+        {"lift", "power-law-drag"}
+    ): "a stiff plate of the same cloth at a few angles to the wind",
     frozenset({"hem-mass", "hem-stiffness"}): "the hem weighed, or the cloth hanging in calm air",
-    frozenset({"shear", "vertical-wind"}): "the wind logged at the top and at the bottom of the flag",
+    frozenset(
+        {"shear", "vertical-wind"}
+    ): "the wind logged at the top and at the bottom of the flag",
 }
 
 
 _ROUGH = 0.1
-"""Relative uncertainty of the area weight above which weighing the cloth is better than the material's name."""
+"""Relative uncertainty of the area weight above which weighing the cloth is better than the
+material's name."""
 _AXES = ("along the wind", "across the wind", "up")
 
 
@@ -55,7 +65,11 @@ def with_sentences(outcome: LoopOutcome) -> Verdict:
         words=" ".join(parts),
         separating=separating(verdict),
         proposal=_lacking(outcome),
-        assumptions=(*assumptions(experiment), *unweighed_effects(verdict), *clocks(experiment, outcome.lags)),
+        assumptions=(
+            *assumptions(experiment),
+            *unweighed_effects(verdict),
+            *clocks(experiment, outcome.lags),
+        ),
     )
 
 
@@ -70,14 +84,21 @@ def _lacking(outcome: LoopOutcome) -> str:
 
 
 def by_draw(test: NullTest) -> tuple[str, ...]:
-    """Says that other nulls could decide otherwise, and how many would settle it; nothing where they hardly could."""
+    """Says that other nulls could decide otherwise, and how many would settle it; nothing where
+    they hardly could."""
     if not test.open:
         return ()
     if test.settling is None:
-        return (f"The evidence is borderline; more than {MOST_KINDS} numerical set-ups would be needed to decide.",)
+        return (
+            f"The evidence is borderline; more than {MOST_KINDS} numerical set-ups would be needed "
+            "to decide.",
+        )
     nulls = banks.WINDS * test.settling
     more = command_line("--nulls", nulls)
-    return (f"The evidence is borderline; rerun with {more} ({test.settling} numerical set-ups) to decide.",)
+    return (
+        f"The evidence is borderline; rerun with {more} ({test.settling} numerical set-ups) to "
+        "decide.",
+    )
 
 
 def bounds(ended: Sequence[str]) -> tuple[str, ...]:
@@ -88,30 +109,41 @@ def bounds(ended: Sequence[str]) -> tuple[str, ...]:
 
 
 def ratios(experiment: Experiment) -> tuple[str, ...]:
-    """Says what the numbers are of where the mass of the cloth is not known; nothing where it is."""
+    """Says what the numbers are of where the mass of the cloth is not known; nothing where it
+    is."""
     if experiment.specimen.mass_known:
         return ()
     sentence = (
-        "The mass of the cloth is not known: motion shows forces per mass alone, so that area weight, bending and the "
-        f"strengths of forces are ratios to an area weight of {number(experiment.specimen.material.area_weight)} kg/m²."
+        "The mass of the cloth is not known: motion shows forces per mass alone, so that area "
+        "weight, bending and the "
+        "strengths of forces are ratios to an area weight of "
+        f"{number(experiment.specimen.material.area_weight)} kg/m²."
     )
     return (sentence,)
 
 
 def clocks(experiment: Experiment, late: Sequence[float]) -> tuple[str, ...]:
-    """Says by how much the logs of the wind were moved, estimated from the errors [s]; nothing where none was."""
+    """Says by how much the logs of the wind were moved, estimated from the errors [s]; nothing
+    where none was."""
     moved = [
         f"{recording.name} by {number(lag, digits=2)} s"
         for recording, lag in zip(experiment.recordings, late, strict=True)
         if lag
     ]
-    return (f"by the motion of the cloth the log of the wind lags; it was moved: {', '.join(moved)}",) if moved else ()
+    return (
+        (f"by the motion of the cloth the log of the wind lags; it was moved: {', '.join(moved)}",)
+        if moved
+        else ()
+    )
 
 
 def unweighed_effects(verdict: Verdict) -> tuple[str, ...]:
-    """Lists which effects of the library a cloth cannot have as it is held; nothing where it can have all."""
+    """Lists which effects of the library a cloth cannot have as it is held; nothing where it can
+    have all."""
     ranked = {(candidate.effect, candidate.parameter) for candidate in verdict.ranking}
-    absent = [column.effect for column in library() if (column.effect, column.parameter) not in ranked]
+    absent = [
+        column.effect for column in library() if (column.effect, column.parameter) not in ranked
+    ]
     missing = list(dict.fromkeys(absent))
     why = "not weighed, since the cloth cannot have it as it is held and in its wind"
     return (f"{why}: {list_names(missing)}",) if missing else ()
@@ -124,7 +156,10 @@ def separating(verdict: Verdict) -> str:
     pairs = [text for effects, text in _SEPARATES.items() if effects <= set(verdict.named)]
     if pairs:
         return "; ".join(pairs)
-    return "a longer recording, at one more wind speed: the effects named differ in how they grow with the wind"
+    return (
+        "a longer recording, at one more wind speed: the effects named differ in how they grow "
+        "with the wind"
+    )
 
 
 def proposal(modes: Sequence[Mode], *, is_all: bool = True) -> str:
@@ -134,7 +169,9 @@ def proposal(modes: Sequence[Mode], *, is_all: bool = True) -> str:
         is_all: whether it is all that the base model lacks, or what a named effect leaves.
     """
     largest = sorted(modes, key=lambda mode: -abs(mode.value / mode.error))[:3]
-    terms = [f"{_where(mode.column)} ({with_error(mode.value, mode.error)}) m/s²" for mode in largest]
+    terms = [
+        f"{_where(mode.column)} ({with_error(mode.value, mode.error)}) m/s²" for mode in largest
+    ]
     fitted = "fits the errors best" if is_all else "fits the remaining errors best"
     return f"The smooth force field that {fitted}, per mass: {'; '.join(terms)}."
 
@@ -142,7 +179,8 @@ def proposal(modes: Sequence[Mode], *, is_all: bool = True) -> str:
 def shedding(line: SpectralLine) -> str:
     """Describes a line of the errors' spectra."""
     return (
-        f"The errors oscillate {_AXES[line.axis]} at {line.reduced:.2g} Hz for each m/s of wind, as vortices behind a "
+        f"The errors oscillate {_AXES[line.axis]} at {line.reduced:.2g} Hz for each m/s of wind, "
+        "as vortices behind a "
         f"cylinder of {number(STROUHAL / line.reduced, digits=2)} m do."
     )
 
@@ -152,7 +190,8 @@ def blowing(variation: Variation) -> str:
     along, turned = (math.sqrt(max(variation.total[part], 0.0)) for part in (ALONG, LEFT))
     fast = math.sqrt(max(variation.fast[ALONG], 0.0))
     return (
-        f"The errors look like those of a wind that varies by {number(100 * along, digits=2)} % of its mean along its "
+        f"The errors look like those of a wind that varies by {number(100 * along, digits=2)} % of "
+        "its mean along its "
         f"own direction, by {number(100 * fast, digits=2)} % within two seconds, and by "
         f"{number(100 * turned, digits=2)} % across it."
     )
@@ -170,14 +209,17 @@ def _where(mode: FieldColumn) -> str:
 
 
 def _how_well_weighed(specimen: Specimen) -> tuple[str, ...]:
-    """Says how well the cloth's mass is known, and what that leaves open; nothing where it is not known."""
+    """Says how well the cloth's mass is known, and what that leaves open; nothing where it is not
+    known."""
     uncertainty, weight = specimen.area_weight_uncertainty, specimen.material.area_weight
     if not specimen.mass_known:
         return ()
     known_to = f"its area weight is known to {100 * uncertainty:.2g} % (one standard deviation)"
     weighing = (
-        ": a pressure of the air that is off by as much differs from another weight only in how the cloth stretches, "
-        f"which a cloth that was weighed to 2 % would settle (area weight {weight:.3g}±{0.02 * weight:.1g})"
+        ": a pressure of the air that is off by as much differs from another weight only in how "
+        "the cloth stretches, "
+        "which a cloth that was weighed to 2 % would settle (area weight "
+        f"{weight:.3g}±{0.02 * weight:.1g})"
     )
     return (known_to + weighing if uncertainty >= _ROUGH else known_to,)
 
@@ -187,16 +229,24 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
     specimen = experiment.specimen
     size = np.ptp(specimen.mesh.rest, axis=0)
     air = specimen.air.plain
-    cut = Cut.of(experiment.recordings[0].rate, min(len(r.positions) for r in experiment.recordings))
+    cut = Cut.of(
+        experiment.recordings[0].rate, min(len(r.positions) for r in experiment.recordings)
+    )
     which_frames = "every frame" if cut.stride == 1 else f"every {cut.stride}th frame"
     winds = [recording.wind.uncertainty for recording in experiment.recordings]
     gain, direction, clock = (max(parts) for parts in zip(*winds, strict=True))
     logged = (
-        "the wind at the flag is the same all over it, and the logged one within standard deviations of "
-        f"{number(100 * gain, digits=2)} % in speed, {number(math.degrees(direction), digits=2)}° in direction and "
+        "the wind at the flag is the same all over it, and the logged one within standard "
+        "deviations of "
+        f"{number(100 * gain, digits=2)} % in speed, {number(math.degrees(direction), digits=2)}° "
+        "in direction and "
         f"{number(clock, digits=2)} s in time"
     )
-    attachment = "rigidly" if math.isinf(specimen.stiffness) else f"by springs of {number(specimen.stiffness)} N/m"
+    attachment = (
+        "rigidly"
+        if math.isinf(specimen.stiffness)
+        else f"by springs of {number(specimen.stiffness)} N/m"
+    )
     if experiment.carried:
         places = ", carried where the markers at them go"
     else:
@@ -205,8 +255,10 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
         "intervals of these include the scatter between simulators of other authors, "
         f"{100 * CRITERIA.area_weight_between:.0f} % in area weight, a factor of "
         f"{math.exp(CRITERIA.bending_between):.1f} in "
-        f"bending and {number(1e3 * CRITERIA.damping_between, digits=2)} ms in damping, and for the damping a factor "
-        f"of {math.exp(CRITERIA.damping_factor):.0f} by which its fit may end elsewhere, each one standard deviation"
+        f"bending and {number(1e3 * CRITERIA.damping_between, digits=2)} ms in damping, and for "
+        "the damping a factor "
+        f"of {math.exp(CRITERIA.damping_factor):.0f} by which its fit may end elsewhere, each one "
+        "standard deviation"
     )
     factor = number(math.exp(CRITERIA.strength_factor), digits=2)
     cloth = f"{specimen.material.name} (nominally {number(specimen.material.area_weight)} kg/m²)"
@@ -214,11 +266,16 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
         f"the cloth is {size[0]:.3g} m × {size[1]:.3g} m of {cloth}, whose stretching is known",
         *_how_well_weighed(specimen),
         f"it is held at {len(specimen.held)} points {attachment}{places}",
-        f"the base model's air pushes along the cloth's normal with ρ w² per area, ρ = {number(air.density)} kg/m³",
+        "the base model's air pushes along the cloth's normal with ρ w² per area, ρ = "
+        f"{number(air.density)} kg/m³",
         logged,
-        f"predictions are made {number(1e3 * cut.period, digits=2)} ms ahead, at {which_frames} of the recordings",
-        "area weight, bending and internal damping are calibrated, so that what only changes them is not an effect",
+        f"predictions are made {number(1e3 * cut.period, digits=2)} ms ahead, at {which_frames} of "
+        "the recordings",
+        "area weight, bending and internal damping are calibrated, so that what only changes them "
+        "is not an effect",
         between,
-        f"a strength may be off by a factor of {factor} by the fit's mesh and a mistold cloth: its interval says so",
-        "the effect was chosen on all recordings; the errors before and after come from fits without them",
+        f"a strength may be off by a factor of {factor} by the fit's mesh and a mistold cloth: its "
+        "interval says so",
+        "the effect was chosen on all recordings; the errors before and after come from fits "
+        "without them",
     )

@@ -26,7 +26,8 @@ _NO_BREAK = "\N{NO-BREAK SPACE}"
 
 
 def words(verdict: Verdict) -> str:
-    """Writes the verdict, its test, the errors before and after, what else was weighed and what was assumed.
+    """Writes the verdict, its test, the errors before and after, what else was weighed and what was
+    assumed.
 
     Lines of at most 100 characters, except where a name is longer; no final line break.
     """
@@ -43,17 +44,26 @@ def _parts(verdict: Verdict) -> Iterator[list[str]]:
     if power := verdict_sentences.power_text(verdict):
         yield item("power", power)
     for candidate in verdict_sentences.named_candidates(verdict):
-        yield item(verdict_sentences.candidate_title(verdict, candidate), _candidate_text(candidate))
+        yield item(
+            verdict_sentences.candidate_title(verdict, candidate), _candidate_text(candidate)
+        )
     for comparison in verdict.comparisons:
-        yield item(comparison.what, _comparison_line(comparison, verdict_sentences.after_label(verdict)))
+        yield item(
+            comparison.what, _comparison_line(comparison, verdict_sentences.after_label(verdict))
+        )
     if control := verdict_sentences.control_summary(verdict):
         yield item("control", control)
-    for warning in verdict_sentences.control_warnings(verdict) + verdict_sentences.reduction_warnings(verdict):
+    for warning in verdict_sentences.control_warnings(
+        verdict
+    ) + verdict_sentences.reduction_warnings(verdict):
         yield item("beware", warning)
     for parameter in verdict.parameters:
         moved = ""
         if known(parameter.after):
-            moved = f" → {estimate_text(parameter.after)}, a shift of {in_errors(parameter.shift)} standard errors"
+            moved = (
+                f" → {estimate_text(parameter.after)}, a shift of {in_errors(parameter.shift)} "
+                "standard errors"
+            )
         yield item(parameter.name, f"{verdict_sentences.parameter_text(parameter.before)}{moved}")
     rejected = verdict_sentences.rejected_candidates(verdict)
     for candidate in rejected[:_RUNNERS_UP]:
@@ -62,7 +72,9 @@ def _parts(verdict: Verdict) -> Iterator[list[str]]:
             candidate.why_not or "no reason was recorded",
         )
     if len(rejected) > _RUNNERS_UP:
-        yield item("", f"and {len(rejected) - _RUNNERS_UP} more were weighed; the page has them all")
+        yield item(
+            "", f"and {len(rejected) - _RUNNERS_UP} more were weighed; the page has them all"
+        )
     for label, text in (("would separate", verdict.separating), ("proposal", verdict.proposal)):
         if text:
             yield item(label, text)
@@ -81,7 +93,9 @@ def _candidate_text(candidate: Candidate) -> str:
         f"p = {probability(candidate.leftover)} for the errors that remain with it",
     ]
     if candidate.heterogeneity is not None:
-        parts.append(f"p = {probability(candidate.heterogeneity)} for the same strength in all recordings")
+        parts.append(
+            f"p = {probability(candidate.heterogeneity)} for the same strength in all recordings"
+        )
     return _join_parts(parts)
 
 
@@ -94,7 +108,10 @@ def _comparison_line(comparison: Comparison, after_label: str) -> str:
         parts.append(f"E_red {share(comparison.share)}")
     parts.append(verdict_sentences.floor_text(comparison))
     if known(comparison.control):
-        parts.append(f"control {comparison.control_name} {estimate_text(comparison.control, display_as=in_unit)}")
+        parts.append(
+            f"control {comparison.control_name} "
+            f"{estimate_text(comparison.control, display_as=in_unit)}"
+        )
         if known(comparison.apart):
             parts[-1] += f", worse by {estimate_text(comparison.apart)} nat per segment"
     parts.append(f"intervals {level_text(comparison.before.level)}, n = {comparison.frames} frames")
@@ -113,5 +130,7 @@ def item(label: str, text: str) -> list[str]:
 
 def wrap_lines(text: str, *, indent: str = "") -> list[str]:
     """Breaks a text into lines of at most 100 characters, but for longer names."""
-    lines = textwrap.wrap(text, _WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+    lines = textwrap.wrap(
+        text, _WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
+    )
     return [line.replace(_NO_BREAK, " ") for line in lines]

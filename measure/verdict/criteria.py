@@ -1,7 +1,9 @@
-"""All thresholds that a verdict depends on, in one frozen object that every verdict records with its hash.
+"""All thresholds that a verdict depends on, in one frozen object that every verdict records with
+its hash.
 
-What is simulated and how errors are brought down to numbers is the method, in its modules. What is decided by comparing
-two numbers is here, each with what it was taken from. Changing one changes the hash.
+What is simulated and how errors are brought down to numbers is the method, in its modules. What is
+decided by comparing two numbers is here, each with what it was taken from. Changing one changes the
+hash.
 """
 
 from __future__ import annotations
@@ -21,45 +23,55 @@ class Criteria:
     """Thresholds of closing the loop.
 
     Attributes:
-        level: of the global test, and of the same test of what a model with effects leaves: rejected at p ≤ level.
+        level: of the global test, and of the same test of what a model with effects leaves:
+            rejected at p ≤ level.
         interval: level of all intervals.
         fewest_kinds: kinds of numerics below which their spread cannot be estimated.
-        simulated_kinds: kinds of numerics that are simulated at least where no bank is given, before the base model is
-            rejected. A level of 0.05 can be tested by 19; of 40, one kind whose groups are all as far does not save the
-            base model.
-        first_kinds: kinds after which no more are simulated where the interval of p lies above the level: what twenty
-            leave open is decided by twice as many. Rejecting needs all of `simulated_kinds`, so that the level holds.
-        alike_noise: difference of the markers' noise up to which nulls stand for the data [m]: it moves statistics
-            little beside the 20 mm that meshes do.
-        refitted: candidates that are refitted at least, of each of two orders (held-out gain, statistic); all that are
-            in the confidence set are.
-        lead: standard errors of the paired difference of held-out scores by which a model must be behind to leave the
-            confidence set, and by which one must lead a model that it contains.
-        strength_factor: standard deviation of the logarithm of a strength by what the fit's mesh and a mistold cloth do
-            to an effect, which nulls do not show: the root mean square of ln(reported/true) of eight strengths that
-            were named rightly (decision 030).
-        least_turned: a wind that varies across its mean by less than this share of what it does along it is not
-            turbulence (see `course`).
-        least_obstructed: one that certainly varies across its mean by less than this share varies along itself alone,
-            as a fan makes it: passing obstacles turn it by 0.15 to 0.23 (decision 012).
-        most_within: nor is one whose variance within two seconds is more than so many times that between stretches.
-        area_weight_between: standard deviation of the logarithm of the area weight by which simulators of other authors
-            differ; this and the next two are of twenty nulls of MuJoCo (decision 023).
+        simulated_kinds: kinds of numerics that are simulated at least where no bank is given,
+            before the base model is rejected. A level of 0.05 can be tested by 19; of 40, one kind
+            whose groups are all as far does not save the base model.
+        first_kinds: kinds after which no more are simulated where the interval of p lies above the
+            level: what twenty leave open is decided by twice as many. Rejecting needs all of
+            `simulated_kinds`, so that the level holds.
+        alike_noise: difference of the markers' noise up to which nulls stand for the data [m]: it
+            moves statistics little beside the 20 mm that meshes do.
+        refitted: candidates that are refitted at least, of each of two orders (held-out gain,
+            statistic); all that are in the confidence set are.
+        lead: standard errors of the paired difference of held-out scores by which a model must be
+            behind to leave the confidence set, and by which one must lead a model that it contains.
+        strength_factor: standard deviation of the logarithm of a strength by what the fit's mesh
+            and a mistold cloth do to an effect, which nulls do not show: the root mean square of
+            ln(reported/true) of eight strengths that were named rightly (decision 030).
+        least_turned: a wind that varies across its mean by less than this share of what it does
+            along it is not turbulence (see `course`).
+        least_obstructed: one that certainly varies across its mean by less than this share varies
+            along itself alone, as a fan makes it: passing obstacles turn it by 0.15 to 0.23
+            (decision 012).
+        most_within: nor is one whose variance within two seconds is more than so many times that
+            between stretches.
+        area_weight_between: standard deviation of the logarithm of the area weight by which
+            simulators of other authors differ; this and the next two are of twenty nulls of MuJoCo
+            (decision 023).
         bending_between: the same of the bending stiffness.
         damping_between: standard deviation of the internal damping by which they differ [s].
-        damping_factor: standard deviation of the logarithm of the internal damping by which a fit that begins at
-            2.5 ms ends elsewhere than at that of a cloth that is damped more (decision 029).
-        near: factor of the level within which p lets more nulls be simulated: of 40 kinds, p is decided by one at 2/41.
-        room: share of the squared error before that must lie above the floor, for a reduction to be a share of it.
-        film_kinds: kinds of numerics of eight flags each that are simulated for films, which are counted by flags: 160
-            of them put p of 5 % at the eighth farthest.
-        borderline: factor of the level within which p of a base model that is not rejected leaves it undecided; this
-            and the next two were fixed on 2026-11-28, before any verdict was made by them.
-        departure: root mean square departure of observables from the base model fitted to them, in their scatters,
-            above which it is not said to suffice.
-        least_power: mean chance of seeing an effect of its expected strength below which a base model that is not
-            rejected is not said to suffice.
-        errs: floors by which an observable has to err at most on unseen data, for a model to be said to explain it.
+        damping_factor: standard deviation of the logarithm of the internal damping by which a fit
+            that begins at 2.5 ms ends elsewhere than at that of a cloth that is damped more
+            (decision 029).
+        near: factor of the level within which p lets more nulls be simulated: of 40 kinds, p is
+            decided by one at 2/41.
+        room: share of the squared error before that must lie above the floor, for a reduction to be
+            a share of it.
+        film_kinds: kinds of numerics of eight flags each that are simulated for films, which are
+            counted by flags: 160 of them put p of 5 % at the eighth farthest.
+        borderline: factor of the level within which p of a base model that is not rejected leaves
+            it undecided; this and the next two were fixed on 2026-11-28, before any verdict was
+            made by them.
+        departure: root mean square departure of observables from the base model fitted to them, in
+            their scatters, above which it is not said to suffice.
+        least_power: mean chance of seeing an effect of its expected strength below which a base
+            model that is not rejected is not said to suffice.
+        errs: floors by which an observable has to err at most on unseen data, for a model to be
+            said to explain it.
 
     Raises:
         UsageError: a level or share that is not between 0 and 1.
@@ -93,7 +105,9 @@ class Criteria:
         for name in ("level", "interval", "strength_factor", "room", "least_power"):
             value = getattr(self, name)
             if not 0 < value < 1:
-                raise UsageError(f"{name} is {value!r}", where="criteria", fix="give one between 0 and 1")
+                raise UsageError(
+                    f"{name} is {value!r}", where="criteria", fix="give one between 0 and 1"
+                )
 
     @property
     def reach(self) -> float:

@@ -1,9 +1,10 @@
 """How quantities are written: digits by the interval's width, units everywhere, real minus signs.
 
-Digits follow the Particle Data Group's rule ("Review of Particle Physics", Introduction, section 5.3): an uncertainty
-keeps two digits if its three leading digits lie below 355, and one above (from 950 on it is rounded up to 1000); the
-value and both ends of the interval are rounded to the same place; never to more than four significant digits, since an
-interval from a few values can be narrow by chance.
+Digits follow the Particle Data Group's rule ("Review of Particle Physics", Introduction, section
+5.3): an uncertainty keeps two digits if its three leading digits lie below 355, and one above (from
+950 on it is rounded up to 1000); the value and both ends of the interval are rounded to the same
+place; never to more than four significant digits, since an interval from a few values can be narrow
+by chance.
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ class Display:
 
 
 def display(values: Iterable[float], unit: str) -> Display:
-    """Millimetres and milliseconds where every value is below 0.1 m or s; the unit as it is elsewhere."""
+    """Millimetres and milliseconds where every value is below 0.1 m or s; the unit as it is
+    elsewhere."""
     largest = max((abs(v) for v in values if math.isfinite(v)), default=0.0)
     if unit in _THOUSANDTHS and 0 < largest < 0.1:
         return Display(factor=1e3, unit=_THOUSANDTHS[unit])
@@ -78,12 +80,14 @@ def probability(value: float | None) -> str:
 
 
 def estimate_text(estimate: Estimate | None, *, display_as: Display | None = None) -> str:
-    """Formats `6.2 m/s [5.7, 6.8]` or `at least 5.7 m/s`, without the level, which a table's caption or `with_level`
-    states."""
+    """Formats `6.2 m/s [5.7, 6.8]` or `at least 5.7 m/s`, without the level, which a table's
+    caption or `with_level` states."""
     return " ".join(estimate_parts(estimate, display_as=display_as)).rstrip()
 
 
-def estimate_parts(estimate: Estimate | None, *, display_as: Display | None = None) -> tuple[str, str]:
+def estimate_parts(
+    estimate: Estimate | None, *, display_as: Display | None = None
+) -> tuple[str, str]:
     """Formats `6.2 m/s` and `[5.7, 6.8]`; the second is empty where there is no interval."""
     if estimate is None or not known(estimate):
         return NONE, ""

@@ -1,4 +1,5 @@
-"""What closing the loop concludes, and everything a reader needs to judge it. Plain values only: it becomes JSON."""
+"""What closing the loop concludes, and everything a reader needs to judge it. Plain values only: it
+becomes JSON."""
 
 from __future__ import annotations
 
@@ -25,8 +26,9 @@ class Estimate:
     """A value with its interval: `value [low, high]` at `level`, in `unit`.
 
     Attributes:
-        bound: "at-least" or "at-most" where it is known on one side only: `value` is then that bound, and the other end
-            is infinite or one that the quantity cannot pass; "nothing" where all of the range looks alike.
+        bound: "at-least" or "at-most" where it is known on one side only: `value` is then that
+            bound, and the other end is infinite or one that the quantity cannot pass; "nothing"
+            where all of the range looks alike.
     """
 
     value: float
@@ -42,24 +44,27 @@ class Candidate:
     """An effect that was weighed.
 
     Attributes:
-        effect: its name in the library, or "corrective-field" for the smooth field of forces outside it.
+        effect: its name in the library, or "corrective-field" for the smooth field of forces
+            outside it.
         parameter: of the effect.
         strength: as fitted, with the effect's own unit.
         null: the strength at which the effect is not there.
         z: of the strength against the null distribution.
         p_value: of |z| for this candidate alone.
         p_family: of the largest |z| of all candidates.
-        gain: held-out improvement of the fit over the base model, in units of log likelihood; higher is better. On
-            films the logarithm of the Bayes factor.
+        gain: held-out improvement of the fit over the base model, in units of log likelihood;
+            higher is better. On films the logarithm of the Bayes factor.
         gain_error: its standard error.
-        behind: how many standard errors of the paired difference it lies behind the best candidate; 0 for the best.
+        behind: how many standard errors of the paired difference it lies behind the best candidate;
+            0 for the best.
         leftover: p-value of what the model with it still leaves unexplained.
-        by_recording: strength fitted on each recording alone, in the order of the recordings; of a refitted candidate
-            about what it then has.
-        heterogeneity: p-value of the same strength in all of these (Cochran's Q); None of a single recording, and
-            of gusts.
+        by_recording: strength fitted on each recording alone, in the order of the recordings; of a
+            refitted candidate about what it then has.
+        heterogeneity: p-value of the same strength in all of these (Cochran's Q); None of a single
+            recording, and of gusts.
         why_not: why it was not named; empty where it was.
-        probability: on films, given that one effect of the library is missing; None on trajectories.
+        probability: on films, given that one effect of the library is missing; None on
+            trajectories.
     """
 
     effect: str
@@ -88,12 +93,13 @@ class Comparison:
         frames: how many.
         before, after: of the base model and of the model with the effect.
         reduction: paired, before − after [m].
-        floor: of the model itself on data simulated from it with other numerics: differences below are not effects.
+        floor: of the model itself on data simulated from it with other numerics: differences below
+            are not effects.
         share: E_red = (before − after) / (before − floor); None where before is not above it.
         control: after, with the same freedom spent on the best wrong effect.
         control_name: which.
-        apart: mean half misfit of a segment by the control less that by the effect, paired, what the model's numerics
-            leave taken out: natural units of log likelihood.
+        apart: mean half misfit of a segment by the control less that by the effect, paired, what
+            the model's numerics leave taken out: natural units of log likelihood.
     """
 
     what: str
@@ -154,25 +160,27 @@ class NullTest:
     """The global test.
 
     Attributes:
-        statistic: observed: how far the farthest column is from nulls' mean, in their standard deviations (see
-            `measure.nulls.reference`).
+        statistic: observed: how far the farthest column is from nulls' mean, in their standard
+            deviations (see `measure.nulls.reference`).
         null: the same of every group of simulated nulls.
-        p_value: (1 + kinds of numerics at least as far)/(kinds + 1), see `measure.nulls.conformal`, or the same of
-            flags, see `effective`, with an interval of the share of all that are, by how many were simulated.
+        p_value: (1 + kinds of numerics at least as far)/(kinds + 1), see `measure.nulls.conformal`,
+            or the same of flags, see `effective`, with an interval of the share of all that are, by
+            how many were simulated.
         kinds: of numerics among the nulls.
         level: at which it was judged.
-        critical: the statistic beyond which the base model is rejected; None where there are too few kinds for any.
+        critical: the statistic beyond which the base model is rejected; None where there are too
+            few kinds for any.
         nulls: how they were made, in words: how many, from which parameters, with which numerics.
-        open: whether the interval of p includes the level, so that another draw of nulls could decide otherwise;
-            None in documents without it.
-        settling: kinds of numerics whose interval would exclude it, if as large a share deviates as much; None where
-            the test is not open, or 1,000 would not do.
-        effective: how many independent flags the nulls count as, see `measure.nulls.clustered`; None where kinds are
-            counted.
+        open: whether the interval of p includes the level, so that another draw of nulls could
+            decide otherwise; None in documents without it.
+        settling: kinds of numerics whose interval would exclude it, if as large a share deviates as
+            much; None where the test is not open, or 1,000 would not do.
+        effective: how many independent flags the nulls count as, see `measure.nulls.clustered`;
+            None where kinds are counted.
         correlation: of flags of one kind, by which it is found.
         tail: p by the tail of Student's t, beside the one that is counted.
-        suspected: the effect with its sign that was suspected before the recordings were looked at, along which alone
-            was looked; empty where none was.
+        suspected: the effect with its sign that was suspected before the recordings were looked at,
+            along which alone was looked; empty where none was.
     """
 
     statistic: float
@@ -196,7 +204,8 @@ class NullTest:
 
     @property
     def kinds_needed(self) -> int:
-        """Computes the fewest kinds by which the level can be tested, each as many independent nulls as these."""
+        """Computes the fewest kinds by which the level can be tested, each as many independent
+        nulls as these."""
         nulls_of_kind = 1.0 if self.effective is None else self.effective / self.kinds
         return math.ceil((1 / self.level - 1) / nulls_of_kind - 1e-9)
 
@@ -224,10 +233,11 @@ class Parameter:
 
     Attributes:
         name: "area_weight", "bending" or "damping".
-        before, after: of the base model, and with the effect; their intervals include the scatter between simulators.
+        before, after: of the base model, and with the effect; their intervals include the scatter
+            between simulators.
         shift: from one to the other, in standard errors.
-        within: standard error of its logarithm by noise and by the discretisations of one simulator alone; None where
-            it was not recorded.
+        within: standard error of its logarithm by noise and by the discretisations of one simulator
+            alone; None where it was not recorded.
     """
 
     name: str
@@ -251,13 +261,16 @@ class Verdict:
         comparisons: on unseen data.
         residuals: of every recording.
         assumptions: what was taken as given.
-        separating: the cheapest experiment that would separate the named effects; empty where one is named.
-        proposal: what the corrective field looks like and the terms it proposes, where the library has no answer.
-        apart: half misfit of the wrong-effect control less that of what was named, a segment, over all recordings left
-            out in turn [nat]; None where no control was run.
+        separating: the cheapest experiment that would separate the named effects; empty where one
+            is named.
+        proposal: what the corrective field looks like and the terms it proposes, where the library
+            has no answer.
+        apart: half misfit of the wrong-effect control less that of what was named, a segment, over
+            all recordings left out in turn [nat]; None where no control was run.
         findings: remarks on the data (kind, text).
         power: on films, of each effect that was weighed; empty on trajectories.
-        open: why nothing was decided, where the base model is not rejected and not said to suffice; empty elsewhere.
+        open: why nothing was decided, where the base model is not rejected and not said to suffice;
+            empty elsewhere.
         provenance: seed, versions, parents, recipe.
         seconds: wall time.
     """

@@ -1,15 +1,18 @@
 """The camera's motion, from features of the background, as one similarity transform a frame.
 
-Corners (Shi and Tomasi, Good Features to Track, CVPR 1994) of one reference picture are followed to each frame by
-pyramidal Lucas–Kanade (Bouguet 2001). Those that most frames move by one similarity transform are the background's:
-cloth bends, so that its corners follow no such transform over a whole film. Where the corners stay in their places, the
-camera is still, and no frame is resampled. Of a background without corners its edges are followed.
+Corners (Shi and Tomasi, Good Features to Track, CVPR 1994) of one reference picture are followed to
+each frame by pyramidal Lucas–Kanade (Bouguet 2001). Those that most frames move by one similarity
+transform are the background's: cloth bends, so that its corners follow no such transform over a
+whole film. Where the corners stay in their places, the camera is still, and no frame is resampled.
+Of a background without corners its edges are followed.
 
-The camera's motion where the background has no corners: by its edges, as of a pole before a plain sky.
+The camera's motion where the background has no corners: by its edges, as of a pole before a plain
+sky.
 
-The shift of a frame is that at which the edges of the reference picture fit it best: least squares between slopes and
-differences (Lucas and Kanade, IJCAI 1981) over the edges' pixels, with Huber's weights, from coarse to fine. Along an
-edge a shift does not show; there it stays near that of the frame before.
+The shift of a frame is that at which the edges of the reference picture fit it best: least squares
+between slopes and differences (Lucas and Kanade, IJCAI 1981) over the edges' pixels, with Huber's
+weights, from coarse to fine. Along an edge a shift does not show; there it stays near that of the
+frame before.
 """
 
 from __future__ import annotations
@@ -48,7 +51,8 @@ class Edges:
         places: (n, 2) x and y [px].
         values: (blur, n) gray levels.
         slopes: (blur, n, 2) along x and y [gray levels/px].
-        axes: (a, 2) unit vectors along which the picture may shift: both, or the one across a single straight edge.
+        axes: (a, 2) unit vectors along which the picture may shift: both, or the one across a
+            single straight edge.
     """
 
     places: Float32Array
@@ -58,10 +62,13 @@ class Edges:
 
     @classmethod
     def of(cls, reference: UInt8Array, outside: BoolArray) -> Edges | None:
-        """Finds the edges of a picture (height, width) within the background's mask; None where there are too few."""
+        """Finds the edges of a picture (height, width) within the background's mask; None where
+        there are too few."""
         smoothed = [_smooth_picture(reference, blur) for blur in _BLURS]
         slopes = [
-            np.stack([cv2.Sobel(picture, cv2.CV_32F, x, 1 - x, ksize=3) / 8 for x in (1, 0)], axis=-1)
+            np.stack(
+                [cv2.Sobel(picture, cv2.CV_32F, x, 1 - x, ksize=3) / 8 for x in (1, 0)], axis=-1
+            )
             for picture in smoothed
         ]
         steep = np.linalg.norm(slopes[-1], axis=-1)
@@ -85,13 +92,14 @@ class Edges:
         return replace(self, axes=np.linalg.eigh(slopes.T @ slopes)[1][:, 1:].T)
 
     def misfit(self, picture: UInt8Array, shift: tuple[float, float]) -> float:
-        """Computes the mean difference of a picture from the reference at a shift [gray levels], each clipped at `2 *
-        _HUBER`."""
+        """Computes the mean difference of a picture from the reference at a shift [gray levels],
+        each clipped at `2 * _HUBER`."""
         away = self._difference(_smooth_picture(picture, _BLURS[-1]), -1, np.array(shift))
         return float(np.minimum(np.abs(away), 2 * _HUBER).mean())
 
     def shift(self, picture: UInt8Array, guess: tuple[float, float]) -> tuple[float, float] | None:
-        """Estimates the shift along x and y [px] from the reference picture to this one; None where none fits.
+        """Estimates the shift along x and y [px] from the reference picture to this one; None where
+        none fits.
 
         Args:
             guess: of a frame nearby.
@@ -104,7 +112,8 @@ class Edges:
         return None if shift is None else (float(shift[0]), float(shift[1]))
 
     def _refine_guess(self, smoothed: list[Float32Array], guess: FloatArray) -> FloatArray | None:
-        """Refines a guess of the shift by Gauss–Newton steps, coarse to fine; None where it does not fit."""
+        """Refines a guess of the shift by Gauss–Newton steps, coarse to fine; None where it does
+        not fit."""
         shift, difference = guess.copy(), np.zeros(len(self.places))
         for level, picture in enumerate(smoothed):
             slopes = self.slopes[level].astype(np.float64)
@@ -124,21 +133,28 @@ class Edges:
         return shift if fits else None
 
     def _search_grid(self, smoothed: Float32Array, guess: FloatArray) -> FloatArray:
-        """Searches a grid of shifts about a guess for the best one, as is needed after a jerk of the camera."""
+        """Searches a grid of shifts about a guess for the best one, as is needed after a jerk of
+        the camera."""
         steps = np.arange(-_JERK, _JERK + 1, _GRID, dtype=np.float64)
         shifts = (
-            guess + np.stack(np.meshgrid(*[steps] * len(self.axes)), axis=-1).reshape(-1, len(self.axes)) @ self.axes
+            guess
+            + np.stack(np.meshgrid(*[steps] * len(self.axes)), axis=-1).reshape(-1, len(self.axes))
+            @ self.axes
         )
         subset = slice(None, None, max(1, len(self.places) // _LOOKED))
         at = (self.places[subset][None] + shifts[:, None]).astype(np.float32)
-        values = cv2.remap(smoothed, at[..., 0], at[..., 1], cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
+        values = cv2.remap(
+            smoothed, at[..., 0], at[..., 1], cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE
+        )
         misfit = np.minimum(np.abs(values - self.values[0][subset]), 2 * _HUBER).mean(axis=1)
         away = np.linalg.norm(shifts - guess, axis=1) / _JERK
         return shifts[int(np.argmin(misfit + 0.1 * _HUBER * away))]
 
     def _difference(self, smoothed: Float32Array, level: int, shift: FloatArray) -> FloatArray:
         at = (self.places + shift).astype(np.float32)
-        values = cv2.remap(smoothed, at[:, :1], at[:, 1:], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        values = cv2.remap(
+            smoothed, at[:, :1], at[:, 1:], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+        )
         return np.asarray(values, dtype=np.float64)[:, 0] - self.values[level]
 
 
@@ -155,7 +171,8 @@ STILL = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 _CORNERS = 240
 _QUALITY = 0.005
 _APART = 0.02
-"""Least distance of two corners, as a share of the picture's diagonal: those of a flag are few of all."""
+"""Least distance of two corners, as a share of the picture's diagonal: those of a flag are few of
+all."""
 _WINDOW = (17, 17)
 _LEVELS = 3
 _INLIER = 0.8
@@ -171,7 +188,8 @@ _SPREAD = 0.08
 _LOST = 0.3
 """Share of the frames to which edges that are the background's fit."""
 _BETTER = 0.9
-"""Share of the misfit of shifts across edges to which shifts along them have to bring it, to be believed."""
+"""Share of the misfit of shifts across edges to which shifts along them have to bring it, to be
+believed."""
 _MOST_TURN, _MOST_ZOOM = 0.35, 1.5
 
 
@@ -182,8 +200,10 @@ class Camera:
     Attributes:
         reference: (height, width) gray, its longer side `WORK` px at most.
         corners: (n, 2) float32 places of the background's features in it; none where it has none.
-        edges: of the background, which are followed where it has no corners; None where it has none either.
-        moves: whether frames are moved back; of a camera that is still, and of one whose motion no feature shows, none.
+        edges: of the background, which are followed where it has no corners; None where it has none
+            either.
+        moves: whether frames are moved back; of a camera that is still, and of one whose motion no
+            feature shows, none.
     """
 
     reference: UInt8Array
@@ -204,10 +224,14 @@ class Camera:
     @property
     def evidence(self) -> str:
         """The same in words."""
-        return f"{self.support} {'corners' if self.edges is None else 'pixels at edges'} of the background"
+        return (
+            f"{self.support} {'corners' if self.edges is None else 'pixels at edges'} of the "
+            "background"
+        )
 
     def follow(self, picture: UInt8Array, guess: Transform) -> Transform | None:
-        """Registers a frame: the transform from the reference picture to it; None where too few features are matched.
+        """Registers a frame: the transform from the reference picture to it; None where too few
+        features are matched.
 
         Args:
             picture: (height, width) gray, as large as the reference.
@@ -225,10 +249,12 @@ class Camera:
 def camera_of(
     pictures: Sequence[UInt8Array], *, outside: BoolArray | None = None, least: float = 0.0
 ) -> tuple[Camera, list[Transform]]:
-    """Returns the camera of a film, from a sample of its frames in order, and the transform of each of them.
+    """Returns the camera of a film, from a sample of its frames in order, and the transform of each
+    of them.
 
     Args:
-        pictures: (height, width) gray, of one size, `WORK` px at most; the middle one becomes the reference.
+        pictures: (height, width) gray, of one size, `WORK` px at most; the middle one becomes the
+            reference.
         outside: (height, width) where features may lie; everywhere by default.
         least: root mean square motion [px] from which on frames are moved back.
     """
@@ -242,7 +268,11 @@ def camera_of(
         max(4.0, _APART * float(np.hypot(height, width))),
         mask=None if outside is None else outside.astype(np.uint8),
     )
-    corners = np.zeros((0, 2), np.float32) if features is None else np.asarray(features, np.float32).reshape(-1, 2)
+    corners = (
+        np.zeros((0, 2), np.float32)
+        if features is None
+        else np.asarray(features, np.float32).reshape(-1, 2)
+    )
     still = Camera(reference=reference, corners=corners[:0], moves=False)
     unmoved = [STILL] * len(pictures)
     if len(corners) < _FEWEST:
@@ -264,7 +294,8 @@ def camera_of(
 def by_edges(
     pictures: Sequence[UInt8Array], *, outside: BoolArray, least: float = 0.0
 ) -> tuple[Camera, list[Transform]]:
-    """Estimates the camera and its transforms as `camera_of` does, from the background's edges in place of its corners.
+    """Estimates the camera and its transforms as `camera_of` does, from the background's edges in
+    place of its corners.
 
     Args:
         outside: (height, width) where they may lie.
@@ -276,7 +307,8 @@ def by_edges(
     if edges is None:
         return still, unmoved
     both_axes, one_axis = (
-        _align_pictures(pictures, replace(still, edges=candidate, moves=True)) for candidate in (edges, edges.across)
+        _align_pictures(pictures, replace(still, edges=candidate, moves=True))
+        for candidate in (edges, edges.across)
     )
     aligned = both_axes if both_axes.misfit < _BETTER * one_axis.misfit else one_axis
     if aligned.lost > _LOST * len(pictures):
@@ -289,7 +321,8 @@ def by_edges(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Aligned:
-    """Transforms of a sample by edges, in how many frames they do not fit, and their mean misfit."""
+    """Transforms of a sample by edges, in how many frames they do not fit, and their mean
+    misfit."""
 
     camera: Camera
     transforms: list[Transform]
@@ -309,7 +342,9 @@ def _align_pictures(pictures: Sequence[UInt8Array], camera: Camera) -> _Aligned:
     misfit = 0.0
     if camera.edges is not None:
         pairs = zip(pictures, transforms, strict=True)
-        misfit = float(np.mean([camera.edges.misfit(picture, (at[0, 2], at[1, 2])) for picture, at in pairs]))
+        misfit = float(
+            np.mean([camera.edges.misfit(picture, (at[0, 2], at[1, 2])) for picture, at in pairs])
+        )
     return _Aligned(camera=camera, transforms=transforms, lost=lost, misfit=misfit)
 
 
@@ -327,8 +362,8 @@ def path(transforms: Sequence[Transform], point: tuple[float, float]) -> FloatAr
 def _track_corners(
     pictures: Sequence[UInt8Array], corners: Float32Array
 ) -> tuple[Float32Array, BoolArray, list[Transform]]:
-    """Tracks corners through a sample: (frame, corner, 2) positions, (frame, corner) whether each follows its frame's
-    transform, and the transforms."""
+    """Tracks corners through a sample: (frame, corner, 2) positions, (frame, corner) whether each
+    follows its frame's transform, and the transforms."""
     count, middle = len(pictures), len(pictures) // 2
     places = np.repeat(corners[None], count, axis=0)
     follows = np.zeros((count, len(corners)), bool)
@@ -347,7 +382,9 @@ def _track_corners(
     return places, follows, transforms
 
 
-def _again(camera: Camera, pictures: Sequence[UInt8Array], guesses: Sequence[Transform]) -> list[Transform]:
+def _again(
+    camera: Camera, pictures: Sequence[UInt8Array], guesses: Sequence[Transform]
+) -> list[Transform]:
     transforms = []
     for picture, guess in zip(pictures, guesses, strict=True):
         transform = camera.follow(picture, guess)
@@ -377,11 +414,18 @@ def _move_places(places: Float32Array, transform: Transform) -> Float32Array:
 
 
 def _similarity(before: Float32Array, after: Float32Array) -> Transform | None:
-    """Fits the similarity that most pairs of points agree on; None where too few do or no camera turns and zooms so."""
+    """Fits the similarity that most pairs of points agree on; None where too few do or no camera
+    turns and zooms so."""
     if len(before) < _FEWEST:
         return None
     transform, inside = cv2.estimateAffinePartial2D(
-        before, after, method=cv2.RANSAC, ransacReprojThreshold=_INLIER, maxIters=500, confidence=0.999, refineIters=10
+        before,
+        after,
+        method=cv2.RANSAC,
+        ransacReprojThreshold=_INLIER,
+        maxIters=500,
+        confidence=0.999,
+        refineIters=10,
     )  # its random numbers have a fixed seed
     if transform is None or int(inside.sum()) < _FEWEST:
         return None

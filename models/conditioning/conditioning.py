@@ -12,7 +12,15 @@ import numpy as np
 from flagdata.core.arrays import BoolArray, Float32Array, FloatArray, UInt8Array
 from flagdata.errors import InputError, UsageError
 from models.conditioning import camera_noise, framing
-from models.conditioning.camera_motion import STILL, WORK, Camera, Transform, by_edges, camera_of, path
+from models.conditioning.camera_motion import (
+    STILL,
+    WORK,
+    Camera,
+    Transform,
+    by_edges,
+    camera_of,
+    path,
+)
 from models.conditioning.framing import Square
 from models.conditioning.outline import FEWEST, Hoist, hoist_of
 from models.conditioning.regions import Region, regions_of
@@ -21,16 +29,18 @@ from models.conditioning.stills import halve_picture
 from models.conditioning.whole import CUT, SIDES, at_edges
 
 VERSION = 2
-"""Raised whenever the same film gives other pictures: what networks are trained on is then made anew."""
+"""Raised whenever the same film gives other pictures: what networks are trained on is then made
+anew."""
 SAMPLE = 96
 """Frames of a film that are looked at to find camera and flag."""
 LEAST = 3
 """Frames without which neither can be found."""
 _LEAST_MOTION = 0.15
-"""Root mean square motion of the camera [px of the square that is judged] below which no frame is moved: resampling
-would blur more than it steadies."""
+"""Root mean square motion of the camera [px of the square that is judged] below which no frame is
+moved: resampling would blur more than it steadies."""
 _AROUND = 0.08
-"""Width of the band about the places that the cloth visits, within which nothing is frozen, in sizes of the region."""
+"""Width of the band about the places that the cloth visits, within which nothing is frozen, in
+sizes of the region."""
 _FEATHER = 0.04
 """Width over which freezing sets in, in sizes of the region."""
 _BACKGROUND = 48
@@ -38,21 +48,27 @@ _BACKGROUND = 48
 _NOISES = 3.0
 """Deviations of the camera's noise that a frozen place may be off its median."""
 _USUAL = 1.5
-"""Deviation of a place that is noise and no more, in deviations of the noise: coding leaves more at edges."""
+"""Deviation of a place that is noise and no more, in deviations of the noise: coding leaves more at
+edges."""
 _ROUNDING = 0.7
 """Least deviation [gray levels] that counts as noise, of rounding and coding."""
 _DRIFT = 10
 """Frames over which the camera's place is smoothed for its drift."""
 _NEARBY = 6
-"""Frames of the sample about the middle one over which a camera without known motion counts as still."""
+"""Frames of the sample about the middle one over which a camera without known motion counts as
+still."""
 _BORDER = 2
-"""Pixels at the picture's edge in which no edge is looked for: what is padded beyond begins there."""
+"""Pixels at the picture's edge in which no edge is looked for: what is padded beyond begins
+there."""
 _LEAST_SIZE = 150
-"""Size of the pictures from which on a hoist is sought, half of the 300 px of the network that places it [px]."""
+"""Size of the pictures from which on a hoist is sought, half of the 300 px of the network that
+places it [px]."""
 _PART, _PARTS = 5.0, 4
-"""Length of the parts of a film in which a hoist is sought at least [s], and their number at most."""
+"""Length of the parts of a film in which a hoist is sought at least [s], and their number at
+most."""
 _AHEAD = 0.1
-"""Width of the band about cloth in which no feature of the background is sought, in sizes of the region."""
+"""Width of the band about cloth in which no feature of the background is sought, in sizes of the
+region."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -67,13 +83,16 @@ class Conditioning:
         chosen: place of the flag among them.
         square: that is judged, in the reference picture [px of the film].
         weight: (size, size) float32, 1 where the film is shown, 0 where it is frozen.
-        framed: (n, size, size) the frames of the sample whose median the background is, nothing frozen in them.
+        framed: (n, size, size) the frames of the sample whose median the background is, nothing
+            frozen in them.
         background: (size, size) what is shown there, the median in time.
         noise: deviation of the camera's [gray levels], which is left where the film is frozen.
         kept: (size, size) float32 share of each pixel's changes that is noise, 0 to 1.
         path: (n, 2) of the square's centre over the sample [px of the film].
-        cut: (n, 4) length at which the cloth moves along each of `whole.SIDES` of the picture, in sizes of the cloth.
-        seconds: between the first and the last frame of the sample; 0 where their times are not known.
+        cut: (n, 4) length at which the cloth moves along each of `whole.SIDES` of the picture, in
+            sizes of the cloth.
+        seconds: between the first and the last frame of the sample; 0 where their times are not
+            known.
         standing: edges that stand still in the square.
         places: (size, size) all places in the square that the cloth visits.
     """
@@ -101,21 +120,24 @@ class Conditioning:
         return self.regions[self.chosen] if self.regions else None
 
     def framed_box(self, region: Region) -> Box:
-        """Returns left, top, right and bottom of a region's places in the pictures that come out [px]."""
+        """Returns left, top, right and bottom of a region's places in the pictures that come out
+        [px]."""
         begins, step = (self.square.x, self.square.y) * 2, self.square.side / self.size
         left, top, right, bottom = (
-            (edge / self.scale - begin) / step for edge, begin in zip(region.box, begins, strict=True)
+            (edge / self.scale - begin) / step
+            for edge, begin in zip(region.box, begins, strict=True)
         )
         return left, top, right, bottom
 
     @property
     def cut_share(self) -> dict[str, float]:
-        """Share of the sample in which the edge on each of `whole.SIDES` cuts the cloth off, 0 to 1."""
+        """Share of the sample in which the edge on each of `whole.SIDES` cuts the cloth off, 0 to
+        1."""
         return dict(zip(SIDES, (self.cut > CUT).mean(axis=0).tolist(), strict=True))
 
     def follow(self, frame: UInt8Array, guess: Transform) -> Transform | None:
-        """Registers a frame: the transform from the reference picture to it; None where the background's features are
-        not found.
+        """Registers a frame: the transform from the reference picture to it; None where the
+        background's features are not found.
 
         Args:
             frame: (height, width) of the film.
@@ -124,15 +146,19 @@ class Conditioning:
         return self.camera.follow(shrunk(frame, self.scale), guess) if self.camera.moves else STILL
 
     def show(self, frame: UInt8Array, transform: Transform) -> UInt8Array:
-        """Returns the (size, size) picture of the flag: registered, cropped, scaled, all else frozen."""
+        """Returns the (size, size) picture of the flag: registered, cropped, scaled, all else
+        frozen."""
         return self._frozen(
-            _frame_square(frame, self.square, self.size, transform, scale=self.scale, moves=self.camera.moves)
+            _frame_square(
+                frame, self.square, self.size, transform, scale=self.scale, moves=self.camera.moves
+            )
         )
 
     def hoists(self) -> Iterator[Hoist]:
-        """Places the edge that the cloth is attached to: in the whole film, and then in each of its parts of `_PART` or
-        more, four at most. None in a film of fewer than ten frames, and in pictures too small for the network that
-        places it. Light, camera and the wind's direction may change in a long film."""
+        """Places the edge that the cloth is attached to: in the whole film, and then in each of its
+        parts of `_PART` or more, four at most. None in a film of fewer than ten frames, and in
+        pictures too small for the network that places it. Light, camera and the wind's direction
+        may change in a long film."""
         if self.size < _LEAST_SIZE:
             return
         pictures = np.stack([halve_picture(self._frozen(picture)) for picture in self.framed])
@@ -160,7 +186,8 @@ class Conditioned:
         frames: (n, size, size) gray.
         found: what was found in it.
         path: (n, 2) of the square's centre in each frame [px of the film].
-        lost: frames in which the background's features were not found; the transform of the frame before is used.
+        lost: frames in which the background's features were not found; the transform of the frame
+            before is used.
     """
 
     frames: UInt8Array
@@ -169,7 +196,9 @@ class Conditioned:
     lost: int
 
 
-def condition_film(frames: UInt8Array, times: FloatArray, *, size: int = 300, flag: int | None = None) -> Conditioned:
+def condition_film(
+    frames: UInt8Array, times: FloatArray, *, size: int = 300, flag: int | None = None
+) -> Conditioned:
     """Conditions a short film in memory.
 
     Args:
@@ -184,7 +213,8 @@ def condition_film(frames: UInt8Array, times: FloatArray, *, size: int = 300, fl
     """
     if len(frames) < LEAST or len(times) != len(frames):
         raise InputError(
-            f"{len(frames)} frames have {len(times)} instants", fix="give three frames or more, each a time"
+            f"{len(frames)} frames have {len(times)} instants",
+            fix="give three frames or more, each a time",
         )
     stride = -(-len(frames) // SAMPLE)
     conditioning = conditioning_of(frames[::stride], times=times[::stride], size=size, flag=flag)
@@ -211,13 +241,16 @@ class Follower:
         return np.array(self._path).reshape(-1, 2)
 
     def motion(self) -> dict[str, float]:
-        """Returns drift, the largest distance between positions of the square's centre, smoothed over `_DRIFT` frames,
-        and shake, the root mean square of its steps from frame to frame [px of the film]."""
+        """Returns drift, the largest distance between positions of the square's centre, smoothed
+        over `_DRIFT` frames, and shake, the root mean square of its steps from frame to frame [px
+        of the film]."""
         at = self.path
         if len(at) < 2:
             return {"drift": 0.0, "shake": 0.0}
         ones = np.ones(min(_DRIFT, len(at)))
-        smooth = np.stack([np.convolve(axis, ones / len(ones), mode="valid") for axis in at.T], axis=1)
+        smooth = np.stack(
+            [np.convolve(axis, ones / len(ones), mode="valid") for axis in at.T], axis=1
+        )
         steps = np.diff(at, axis=0)
         return {
             "drift": float(np.hypot(*np.ptp(smooth, axis=0))),
@@ -249,9 +282,11 @@ def conditioning_of(
     Args:
         sample: (height, width) gray, spread over the film, in order; three or more.
         size: of the pictures that are to come out [px].
-        times: (n,) of the sample [s], where it is uneven: cloth is sought between those `regions.MOMENT` apart at most.
+        times: (n,) of the sample [s], where it is uneven: cloth is sought between those
+            `regions.MOMENT` apart at most.
         flag: number of the flag, from 1; None for the first.
-        within: x, y, width and height of the part of the middle frame in which the flag is [px]; None for all.
+        within: x, y, width and height of the part of the middle frame in which the flag is [px];
+            None for all.
 
     Raises:
         UsageError: a flag of a number that the film does not have.
@@ -269,14 +304,18 @@ def conditioning_of(
         raise UsageError(
             f"there is no flag {flag}: {len(regions)} regions of the film move like cloth",
             where="--flag",
-            fix="give a number from the page's picture" if regions else "give --crop around the flag",
+            fix="give a number from the page's picture"
+            if regions
+            else "give --crop around the flag",
         )
     chosen = 0 if flag is None else flag - 1
     box = (0.0, 0.0, float(width), float(height))
     if regions:
         left, top, right, bottom = regions[chosen].box
         box = (left / scale, top / scale, right / scale, bottom / scale)
-    square = framing.square_about(box, width=width, height=height, allow_centred=not camera.moves or not regions)
+    square = framing.square_about(
+        box, width=width, height=height, allow_centred=not camera.moves or not regions
+    )
     step = -(-len(sample) // _BACKGROUND)
     framed = [
         _frame_square(frame, square, size, transform, scale=scale, moves=camera.moves)
@@ -306,7 +345,9 @@ def conditioning_of(
         path=np.stack([_centre(square, transform, scale) for transform in transforms]),
         cut=cut,
         seconds=0.0 if times is None else float(times[-1] - times[0]),
-        standing=Standing.of(stack, _shown(square, size, width=width, height=height), enlarged=size / square.side),
+        standing=Standing.of(
+            stack, _shown(square, size, width=width, height=height), enlarged=size / square.side
+        ),
         places=places,
     )
 
@@ -322,7 +363,8 @@ def shrunk(frame: UInt8Array, scale: float) -> UInt8Array:
 def _camera_and_regions(
     small: list[UInt8Array], times: FloatArray, inside: BoolArray | None, unit: float
 ) -> tuple[Camera, list[Transform], UInt8Array, tuple[Region, ...]]:
-    """Estimates the camera and the cloth in turns, each with the other's last estimate, and registers the pictures.
+    """Estimates the camera and the cloth in turns, each with the other's last estimate, and
+    registers the pictures.
 
     Args:
         unit: pixels of `small` in one of the pictures that come out, of a film that is shown whole.
@@ -332,14 +374,18 @@ def _camera_and_regions(
     if camera.known:
         regions = regions_of(_register_pictures(small, transforms), times, within=inside)
         again, moved = (
-            camera_of(small, outside=_outside(regions, small[0].shape), least=least) if regions else (camera, [])
+            camera_of(small, outside=_outside(regions, small[0].shape), least=least)
+            if regions
+            else (camera, [])
         )
     else:  # while the camera moves little, what moves is cloth
         middle = len(small) // 2
         nearby = slice(max(0, middle - _NEARBY), middle + _NEARBY + 1)
         regions = regions_of(np.stack(small[nearby]), times[nearby], within=inside)
         again, moved = (
-            by_edges(small, outside=_outside(regions, small[0].shape), least=least) if regions else (camera, [])
+            by_edges(small, outside=_outside(regions, small[0].shape), least=least)
+            if regions
+            else (camera, [])
         )
     if regions and again.known:
         camera, transforms = again, moved
@@ -395,7 +441,9 @@ def _widen_mask(mask: BoolArray, share: float) -> UInt8Array:
 
 def _weight(mask: BoolArray, square: Square, size: int, scale: float) -> Float32Array:
     """Weighs pixels (size, size): 1 on and about the cloth, falling to 0 across the feather."""
-    extent = max(np.ptp(np.flatnonzero(mask.any(axis=1))), np.ptp(np.flatnonzero(mask.any(axis=0)))) + 1
+    extent = (
+        max(np.ptp(np.flatnonzero(mask.any(axis=1))), np.ptp(np.flatnonzero(mask.any(axis=0)))) + 1
+    )
     near = _in_square(_widen_mask(mask, _AROUND + _FEATHER), square, size, scale)
     feather = max(_FEATHER * extent / scale / (square.side / size), 1.0)
     away = cv2.distanceTransform(near, cv2.DIST_L2, 5)
@@ -405,14 +453,21 @@ def _weight(mask: BoolArray, square: Square, size: int, scale: float) -> Float32
 def _in_square(mask: UInt8Array, square: Square, size: int, scale: float) -> UInt8Array:
     """Brings a mask of the pictures in which regions are sought into the square (size, size)."""
     step = square.side / size
-    to_reference = np.array([[step, 0.0, square.x + step / 2 - 0.5], [0.0, step, square.y + step / 2 - 0.5]])
-    to_reference = np.column_stack([to_reference[:, :2] * scale, (to_reference[:, 2] + 0.5) * scale - 0.5])
-    out = cv2.warpAffine(mask, to_reference, (size, size), flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP)
+    to_reference = np.array(
+        [[step, 0.0, square.x + step / 2 - 0.5], [0.0, step, square.y + step / 2 - 0.5]]
+    )
+    to_reference = np.column_stack(
+        [to_reference[:, :2] * scale, (to_reference[:, 2] + 0.5) * scale - 0.5]
+    )
+    out = cv2.warpAffine(
+        mask, to_reference, (size, size), flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
+    )
     return np.asarray(out, dtype=np.uint8)
 
 
 def _noise(stack: UInt8Array, weight: Float32Array) -> float:
-    """Estimates the deviation of the camera's noise where the film (n, size, size) is frozen [gray levels].
+    """Estimates the deviation of the camera's noise where the film (n, size, size) is frozen [gray
+    levels].
 
     By the differences of frames, which have √2 times the noise of one.
     """
@@ -425,11 +480,14 @@ def _noise(stack: UInt8Array, weight: Float32Array) -> float:
 
 
 def _shown(square: Square, size: int, *, width: int, height: int) -> BoolArray:
-    """Masks the pixels (size, size) of the square that lie in a picture of this size, without its outermost ones."""
+    """Masks the pixels (size, size) of the square that lie in a picture of this size, without its
+    outermost ones."""
     step = square.side / size
     columns, rows = (begin + step * (np.arange(size) + 0.5) for begin in (square.x, square.y))
     edge = _BORDER * step
-    across, down = ((at > edge) & (at < length - edge) for at, length in ((columns, width), (rows, height)))
+    across, down = (
+        (at > edge) & (at < length - edge) for at, length in ((columns, width), (rows, height))
+    )
     return np.asarray(down[:, None] & across[None], dtype=np.bool_)
 
 

@@ -1,8 +1,8 @@
 """The cloth's mask in every picture of a film that was made fit, and where its hoist is.
 
 Both are found by a small network that sees each picture beside what the film shows all the time
-(`models.conditioning.mask_network`). It was trained on films of simulated flags, whose silhouettes are known
-(`python -m tests.studies masks`).
+(`models.conditioning.mask_network`). It was trained on films of simulated flags, whose silhouettes
+are known (`python -m tests.studies masks`).
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from models.conditioning.mask_network import MaskNetwork, inputs_of, load_shippe
 from models.conditioning.stills import SAMPLE, Stills
 
 _CLOTH = 0.45
-"""Probability from which on a place is cloth: on films that were not learned from, the masks' area is then right."""
+"""Probability from which on a place is cloth: on films that were not learned from, the masks' area
+is then right."""
 FEWEST = 10
 """Pictures below which a film shows nothing all the time."""
 _LOOKED_AT = 40
@@ -56,8 +57,10 @@ class Hoist:
     Attributes:
         stills: what the pictures show all the time.
         logits: (n, 3, rows, columns) of cloth, of the hoist's upper end and of its lower end.
-        ends: (2, 2) upper and lower end: column and row in the halved picture, the first pixel's middle at 0.5 [px].
-        certainty: probability that an end is within `_NEAR` of where it is placed; of the less certain one.
+        ends: (2, 2) upper and lower end: column and row in the halved picture, the first pixel's
+            middle at 0.5 [px].
+        certainty: probability that an end is within `_NEAR` of where it is placed; of the less
+            certain one.
     """
 
     stills: Stills
@@ -67,7 +70,8 @@ class Hoist:
 
     @property
     def lean(self) -> float:
-        """The angle between the hoist, from its upper to its lower end, and the downright [rad], 0 to π."""
+        """The angle between the hoist, from its upper to its lower end, and the downright [rad], 0
+        to π."""
         across, down = self.ends[1] - self.ends[0]
         return float(np.arctan2(abs(across), down))
 
@@ -88,25 +92,35 @@ class Hoist:
 
     @property
     def held(self) -> float:
-        """The share of it, over the pictures, that has cloth beside it; 0 where it is less than a pixel long."""
+        """The share of it, over the pictures, that has cloth beside it; 0 where it is less than a
+        pixel long."""
         (x, y), (across, down) = self.ends[0], self.ends[1] - self.ends[0]
         rows = np.arange(math.ceil(y), math.floor(y + down))
         if not len(rows):
             return 0.0
         columns = np.floor(x + (rows + 0.5 - y) * across / down + self.side * _OFF).astype(int)
-        inside = (rows >= 0) & (rows < self.cloth.shape[1]) & (columns >= 0) & (columns < self.cloth.shape[2])
+        inside = (
+            (rows >= 0)
+            & (rows < self.cloth.shape[1])
+            & (columns >= 0)
+            & (columns < self.cloth.shape[2])
+        )
         return float(self.cloth[:, rows[inside], columns[inside]].mean(axis=0).sum() / len(rows))
 
 
 def hoist_of(pictures: UInt8Array) -> Hoist | None:
-    """Places the hoist in pictures (n, size / 2, size / 2) as `Conditioning.show` gives them, `halved`, spread over the
-    film; None where they are fewer than ten."""
+    """Places the hoist in pictures (n, size / 2, size / 2) as `Conditioning.show` gives them,
+    `halved`, spread over the film; None where they are fewer than ten."""
     if len(pictures) < FEWEST:
         return None
     small = pictures[:: -(-len(pictures) // SAMPLE)]
     stills = Stills.of(small)
-    logits = torch.cat(list(_maps(load_shipped_mask(), small[:: -(-len(small) // _LOOKED_AT)], stills)))
-    ends, certainties = zip(*(_end(of_end) for of_end in logits[:, 1:].mean(dim=0).double()), strict=True)
+    logits = torch.cat(
+        list(_maps(load_shipped_mask(), small[:: -(-len(small) // _LOOKED_AT)], stills))
+    )
+    ends, certainties = zip(
+        *(_end(of_end) for of_end in logits[:, 1:].mean(dim=0).double()), strict=True
+    )
     return Hoist(stills=stills, logits=logits, ends=np.stack(ends), certainty=min(certainties))
 
 
@@ -116,8 +130,8 @@ class Outliner:
 
     Attributes:
         stills: what is shown all the time.
-        hoist: (2, 2) upper and lower end of the hoist: column and row in the halved picture, the first pixel's middle
-            at 0.5 [px].
+        hoist: (2, 2) upper and lower end of the hoist: column and row in the halved picture, the
+            first pixel's middle at 0.5 [px].
         side: 1 where the cloth is to the right of its hoist, −1 where it is to the left.
         network: that finds it.
     """
@@ -129,8 +143,9 @@ class Outliner:
 
     @classmethod
     def of(cls, pictures: UInt8Array) -> Outliner | None:
-        """Finds the hoist in pictures (n, size / 2, size / 2) as `Conditioning.show` gives them, `halved`, spread over
-        the film. Returns None where they are fewer than ten or show no upright hoist with cloth beside it.
+        """Finds the hoist in pictures (n, size / 2, size / 2) as `Conditioning.show` gives them,
+        `halved`, spread over the film. Returns None where they are fewer than ten or show no
+        upright hoist with cloth beside it.
         """
         hoist = hoist_of(pictures)
         if hoist is None or hoist.certainty < CERTAIN or hoist.lean > UPRIGHT:
@@ -140,20 +155,26 @@ class Outliner:
         if cloth.sum(axis=(1, 2)).mean() < _LEAST * (places[1, 1] - places[0, 1]) ** 2:
             return None
         usual = cloth.mean(axis=0)
-        if np.quantile(stills.greatest[usual > 0].astype(int) - stills.least[usual > 0], 0.95) < _MOVES:
+        if (
+            np.quantile(stills.greatest[usual > 0].astype(int) - stills.least[usual > 0], 0.95)
+            < _MOVES
+        ):
             return None
         side = _side(usual, places)
         return cls(
-            stills=stills, hoist=_lower_hoist_end(usual > 0.5, places, side), side=side, network=load_shipped_mask()
+            stills=stills,
+            hoist=_lower_hoist_end(usual > 0.5, places, side),
+            side=side,
+            network=load_shipped_mask(),
         )
 
     def masks(self, pictures: UInt8Array) -> tuple[Masks, FloatArray]:
-        """Segments the cloth in pictures (n, size / 2, size / 2), `halved`, that follow one another in the film: the
-        largest part that is cloth, on its side of the hoist's line, with its holes filled. Also returns Dice's
-        coefficient (n,) with the truth, as the network expects it.
+        """Segments the cloth in pictures (n, size / 2, size / 2), `halved`, that follow one another
+        in the film: the largest part that is cloth, on its side of the hoist's line, with its holes
+        filled. Also returns Dice's coefficient (n,) with the truth, as the network expects it.
 
-        A picture's probabilities count a half and its neighbours' a quarter each, so that an outline does not tremble
-        from picture to picture.
+        A picture's probabilities count a half and its neighbours' a quarter each, so that an
+        outline does not tremble from picture to picture.
         """
         probability = np.concatenate(
             [maps[:, 0].sigmoid().numpy() for maps in _maps(self.network, pictures, self.stills)]
@@ -163,22 +184,25 @@ class Outliner:
         probability *= _side_of_hoist(self.hoist, self.side, self.stills.usual.shape)
         cloth = np.stack([_largest_filled(picture > _CLOTH) for picture in probability])
         intersection = 2 * (probability * cloth).sum(axis=(1, 2))
-        return cloth, (intersection / np.maximum(probability.sum(axis=(1, 2)) + cloth.sum(axis=(1, 2)), 1.0)).astype(
-            np.float64
-        )
+        return cloth, (
+            intersection / np.maximum(probability.sum(axis=(1, 2)) + cloth.sum(axis=(1, 2)), 1.0)
+        ).astype(np.float64)
 
 
 def _maps(network: MaskNetwork, small: UInt8Array, stills: Stills) -> Iterator[Tensor]:
     """Yields (n, 3, rows, columns) logits, a few pictures at a time."""
     for k in range(0, len(small), _TOGETHER):
-        inputs = inputs_of(small[k : k + _TOGETHER], stills).contiguous(memory_format=torch.channels_last)
+        inputs = inputs_of(small[k : k + _TOGETHER], stills).contiguous(
+            memory_format=torch.channels_last
+        )
         with torch.inference_mode():
             maps = network(inputs)
         yield maps
 
 
 def _end(logits: Tensor) -> tuple[FloatArray, float]:
-    """Locates an end of the hoist: (2,) column and row, and the probability that it is near there."""
+    """Locates an end of the hoist: (2,) column and row, and the probability that it is near
+    there."""
     shares = logits.flatten().softmax(dim=0).reshape(logits.shape).numpy()
     row, column = np.unravel_index(int(shares.argmax()), shares.shape)
     rows, columns = (
@@ -187,19 +211,27 @@ def _end(logits: Tensor) -> tuple[FloatArray, float]:
     )
     neighbourhood = shares[np.ix_(rows, columns)]
     total = float(neighbourhood.sum())
-    place = np.array([neighbourhood.sum(axis=0) @ columns, neighbourhood.sum(axis=1) @ rows]) / total + 0.5
+    place = (
+        np.array([neighbourhood.sum(axis=0) @ columns, neighbourhood.sum(axis=1) @ rows]) / total
+        + 0.5
+    )
     return place, total
 
 
 def _side(usual: FloatArray, ends: FloatArray) -> float:
-    """Returns 1 where cloth (rows, columns), a share of the time, is to the right of a hoist, −1 where to the left."""
-    return 1.0 if usual.sum(axis=0) @ (np.arange(usual.shape[1]) + 0.5 - ends[:, 0].mean()) >= 0 else -1.0
+    """Returns 1 where cloth (rows, columns), a share of the time, is to the right of a hoist, −1
+    where to the left."""
+    return (
+        1.0
+        if usual.sum(axis=0) @ (np.arange(usual.shape[1]) + 0.5 - ends[:, 0].mean()) >= 0
+        else -1.0
+    )
 
 
 def _lower_hoist_end(usual: Masks, places: FloatArray, side: float) -> FloatArray:
-    """Moves the hoist's upper end (2, 2) to where the cloth's upper edge beside it meets the hoist's line: a pole's top
-    is not the cloth's corner. The network's point is unchanged where the cloth does not show the edge, or shows one
-    that does not lead there.
+    """Moves the hoist's upper end (2, 2) to where the cloth's upper edge beside it meets the
+    hoist's line: a pole's top is not the cloth's corner. The network's point is unchanged where the
+    cloth does not show the edge, or shows one that does not lead there.
 
     Args:
         usual: (rows, columns) where cloth is most of the time.
@@ -207,7 +239,9 @@ def _lower_hoist_end(usual: Masks, places: FloatArray, side: float) -> FloatArra
         side: at which the cloth is.
     """
     length = float(places[1, 1] - places[0, 1])
-    columns = np.unique(np.floor(places[:, 0].mean() + side * np.linspace(*_BESIDE, 16) * length).astype(int))
+    columns = np.unique(
+        np.floor(places[:, 0].mean() + side * np.linspace(*_BESIDE, 16) * length).astype(int)
+    )
     columns = columns[(columns >= 0) & (columns < usual.shape[1])]
     strip = usual[:, columns]
     if len(columns) < 3 or not strip.any(axis=0).all():
@@ -219,7 +253,8 @@ def _lower_hoist_end(usual: Masks, places: FloatArray, side: float) -> FloatArra
 
 
 def _side_of_hoist(hoist: FloatArray, side: float, shape: tuple[int, ...]) -> Masks:
-    """Masks the cloth's side of the line through the hoist: a pole before the cloth is not cloth."""
+    """Masks the cloth's side of the line through the hoist: a pole before the cloth is not
+    cloth."""
     (x, y), (across, down) = hoist[0], hoist[1] - hoist[0]
     rows, columns = np.indices(shape) + 0.5
     return side * (columns - x - (rows - y) * across / down) > 0

@@ -1,8 +1,9 @@
 """Frames that repeat the one before: a camera or a converter that ran slower than the file's rate.
 
-A repeated frame differs from the one before by what the video's coding leaves, between changes that do not. So a frame
-is a repetition where its mean change is below `SHARE` of the largest change of the frames before it, and of that of the
-frames after it. A cloth that comes to rest does so over many frames, and a film that stands still has no repetitions.
+A repeated frame differs from the one before by what the video's coding leaves, between changes that
+do not. So a frame is a repetition where its mean change is below `SHARE` of the largest change of
+the frames before it, and of that of the frames after it. A cloth that comes to rest does so over
+many frames, and a film that stands still has no repetitions.
 """
 
 from __future__ import annotations
@@ -16,10 +17,11 @@ from flagdata.core.arrays import UInt8Array
 from models.conditioning.frame_interpolation import TimedFrame
 
 SHARE = 0.15
-"""Chosen on six real films: of those whose frames all differ none is below 0.2, and of one with 15 pictures in 60
-frames two thirds are."""
+"""Chosen on six real films: of those whose frames all differ none is below 0.2, and of one with 15
+pictures in 60 frames two thirds are."""
 _ABOUT = 4
-"""Frames before and after whose changes are compared: up to three of four frames may be repetitions."""
+"""Frames before and after whose changes are compared: up to three of four frames may be
+repetitions."""
 
 
 class Distinct:
@@ -42,10 +44,14 @@ class Distinct:
 
     def __iter__(self) -> Iterator[TimedFrame]:
         waiting: deque[TimedFrame] = deque()
-        changes: deque[float] = deque(maxlen=2 * _ABOUT + 1)  # of the frames about the first that waits
+        changes: deque[float] = deque(
+            maxlen=2 * _ABOUT + 1
+        )  # of the frames about the first that waits
         last: UInt8Array | None = None
         for time, picture in self._source:
-            change = np.inf if last is None else float(np.abs(picture.astype(np.int16) - last).mean())
+            change = (
+                np.inf if last is None else float(np.abs(picture.astype(np.int16) - last).mean())
+            )
             last = picture
             waiting.append((time, picture))
             changes.append(change)
@@ -56,8 +62,13 @@ class Distinct:
 
     def _next(self, waiting: deque[TimedFrame], changes: deque[float]) -> Iterator[TimedFrame]:
         index = len(changes) - len(waiting)  # place of the first that waits
-        finite = [0.0 if np.isinf(change) else change for change in changes]  # the film's first frame has none
-        before, after = finite[max(0, index - _ABOUT) : index], finite[index + 1 : index + _ABOUT + 1]
+        finite = [
+            0.0 if np.isinf(change) else change for change in changes
+        ]  # the film's first frame has none
+        before, after = (
+            finite[max(0, index - _ABOUT) : index],
+            finite[index + 1 : index + _ABOUT + 1],
+        )
         self.frames += 1
         if changes[index] < SHARE * min(max(before, default=0.0), max(after, default=0.0)):
             self.repeated += 1

@@ -1,8 +1,10 @@
-"""Edges that stand still about the cloth: of the pole beside a flag, of a second one in it, or of a bar along its side.
+"""Edges that stand still about the cloth: of the pole beside a flag, of a second one in it, or of a
+bar along its side.
 
-An edge stands still where the slope of the picture keeps its direction and strength for most of the film. A straight
-line of such edges is looked for in each direction near the upright, and near the level: pixels count whose slope is
-across the line, so that foliage and other textures, whose slopes point everywhere, make none.
+An edge stands still where the slope of the picture keeps its direction and strength for most of the
+film. A straight line of such edges is looked for in each direction near the upright, and near the
+level: pixels count whose slope is across the line, so that foliage and other textures, whose slopes
+point everywhere, make none.
 """
 
 from __future__ import annotations
@@ -19,10 +21,12 @@ _PICTURES = 24
 _BLUR = 1.2
 """Width of the Gaussian by which they are smoothed [px]."""
 _ABSENT, _LEFT = 0.5, 0.5
-"""Share of the time in which the slope of an edge at rest may be below this share of its mean: cloth flies before it,
-and frames of a camera that moves are registered to a pixel. Higher takes what comes again for what stands."""
+"""Share of the time in which the slope of an edge at rest may be below this share of its mean:
+cloth flies before it, and frames of a camera that moves are registered to a pixel. Higher takes
+what comes again for what stands."""
 _FAINT, _CLEAR = 1.0, 2.5
-"""Slopes [gray levels/px] of the mean picture at which an edge ends, and from which on there is one (Canny)."""
+"""Slopes [gray levels/px] of the mean picture at which an edge ends, and from which on there is one
+(Canny)."""
 _ACROSS = 25.0
 """Degrees by which the slope at an edge may differ from that across a line."""
 _TILT = 20
@@ -30,15 +34,17 @@ _TILT = 20
 _GAP = 0.03
 """Gaps in a line, in lengths of what it is compared with: where cloth or a rope is before it."""
 _OUTSIDE, _INSIDE = 0.25, 0.1
-"""How far outside and inside a box's side a line is looked for, in sizes of the box: plain cloth at its hoist moves
-too little to be found, and a slack rope keeps it from the pole. More takes what stands in the background for a pole."""
+"""How far outside and inside a box's side a line is looked for, in sizes of the box: plain cloth at
+its hoist moves too little to be found, and a slack rope keeps it from the pole. More takes what
+stands in the background for a pole."""
 _BESIDE = 0.22
-"""Distance from the sides of a box from which on a line stands inside it, in widths: nearer, it may be the hoist."""
+"""Distance from the sides of a box from which on a line stands inside it, in widths: nearer, it may
+be the hoist."""
 _STEEP = 8
 """Degrees by which a second pole may differ from the upright."""
 _BELOW, _GOES_ON = 0.25, 0.8
-"""A line goes on below the cloth where it is seen on this share of so long a stretch, in heights of the box: a pole
-does, a stripe of the cloth ends with it."""
+"""A line goes on below the cloth where it is seen on this share of so long a stretch, in heights of
+the box: a pole does, a stripe of the cloth ends with it."""
 _UNITS = 64
 """Steps of a slope of one gray level a pixel, as whole numbers."""
 
@@ -51,9 +57,10 @@ class Line:
     """A line of edges.
 
     Attributes:
-        length: from its first row to its last, in heights of the box that it is compared with; 0 where there is none.
-        above, below: how far it reaches beyond the upper and the lower side of that box, in heights of it; negative
-            where it ends inside.
+        length: from its first row to its last, in heights of the box that it is compared with; 0
+            where there is none.
+        above, below: how far it reaches beyond the upper and the lower side of that box, in heights
+            of it; negative where it ends inside.
     """
 
     length: float
@@ -66,7 +73,8 @@ class Inside:
     """Upright lines inside what moves.
 
     Attributes:
-        height: of what moves along which the longest one stands, in heights of the box; 0 where there is none.
+        height: of what moves along which the longest one stands, in heights of the box; 0 where
+            there is none.
         going_on: the same of the longest one that goes on below what moves, as a pole does.
     """
 
@@ -92,16 +100,21 @@ class Standing:
 
         Args:
             pictures: (n, height, width) gray, registered, of the whole film.
-            inside: (height, width) what the film shows: beyond its edge the picture is padded by stripes.
+            inside: (height, width) what the film shows: beyond its edge the picture is padded by
+                stripes.
             enlarged: by how much the film was, which makes its edges less steep.
         """
-        slopes = np.stack([_slopes(picture) for picture in pictures[:: -(-len(pictures) // _PICTURES)]])
+        slopes = np.stack(
+            [_slopes(picture) for picture in pictures[:: -(-len(pictures) // _PICTURES)]]
+        )
         slopes *= max(enlarged, 1.0)
         mean = slopes.mean(axis=0)  # (2, height, width): along x and y
         steep = np.hypot(*mean)
         along = (slopes * (mean / np.maximum(steep, 1e-6))).sum(axis=1)
         rests = np.sort(along, axis=0)[int(_ABSENT * len(along))] > _LEFT * steep
-        across, down = np.rint((mean * (rests & inside) * _UNITS).clip(-32_000, 32_000)).astype(np.int16)
+        across, down = np.rint((mean * (rests & inside) * _UNITS).clip(-32_000, 32_000)).astype(
+            np.int16
+        )
         edges = cv2.Canny(across, down, _FAINT * _UNITS, _CLEAR * _UNITS, L2gradient=True) > 0
         angle = np.degrees(np.arctan2(np.abs(mean[1]), np.abs(mean[0])))
         return cls(upright=edges & (angle < _ACROSS), level=edges & (angle > 90 - _ACROSS))
@@ -118,11 +131,13 @@ class Standing:
         return _longest(self.upright, (top, bottom), tuple(places[side] for side in sides))
 
     def above(self, box: Box) -> Line:
-        """Finds the longest level line at the top of a box, compared with its width; see `beside`."""
+        """Finds the longest level line at the top of a box, compared with its width; see
+        `beside`."""
         return self._level(box, box[1])
 
     def below(self, box: Box) -> Line:
-        """Finds the longest level line at the bottom of a box, compared with its width; see `beside`."""
+        """Finds the longest level line at the bottom of a box, compared with its width; see
+        `beside`."""
         return self._level(box, box[3])
 
     def inside(self, box: Box, places: BoolArray) -> Inside:
@@ -133,7 +148,9 @@ class Standing:
             places: (height, width) all places that it visits.
         """
         left, top, right, bottom = box
-        columns = np.arange(round(left + _BESIDE * (right - left)), round(right - _BESIDE * (right - left)) + 1)
+        columns = np.arange(
+            round(left + _BESIDE * (right - left)), round(right - _BESIDE * (right - left)) + 1
+        )
         columns = columns[(columns >= 0) & (columns < places.shape[1])]
         high, middle = bottom - top, (top + bottom) / 2
         within = np.asarray(cv2.erode(places.astype(np.uint8), np.ones((3, 3), np.uint8)), np.uint8)
@@ -155,9 +172,12 @@ class Standing:
 
 
 def _slopes(picture: UInt8Array) -> Float32Array:
-    """Computes the slopes (2, height, width) of a smoothed picture along x and y [gray levels/px]."""
+    """Computes the slopes (2, height, width) of a smoothed picture along x and y [gray
+    levels/px]."""
     smooth = cv2.GaussianBlur(picture.astype(np.float32), (0, 0), _BLUR)
-    return np.stack([cv2.Sobel(smooth, cv2.CV_32F, x, 1 - x, ksize=3) / 8 for x in (1, 0)]).astype(np.float32)
+    return np.stack([cv2.Sobel(smooth, cv2.CV_32F, x, 1 - x, ksize=3) / 8 for x in (1, 0)]).astype(
+        np.float32
+    )
 
 
 def _widen_edges(edges: BoolArray) -> UInt8Array:
@@ -166,7 +186,8 @@ def _widen_edges(edges: BoolArray) -> UInt8Array:
 
 
 def _lines(picture: UInt8Array, middle: float, columns: IntArray, tilt: int) -> UInt8Array:
-    """Returns what a picture (height, width) shows along lines: (tilt, row, column), 0 beyond its sides.
+    """Returns what a picture (height, width) shows along lines: (tilt, row, column), 0 beyond its
+    sides.
 
     Args:
         middle: row at which a line has its column.
@@ -181,8 +202,11 @@ def _lines(picture: UInt8Array, middle: float, columns: IntArray, tilt: int) -> 
     return np.where((moved >= 0) & (moved < width), shown, 0).astype(np.uint8)
 
 
-def _longest(edges: BoolArray, ends: tuple[float, float], places: tuple[tuple[float, float], ...]) -> Line:
-    """Finds the longest line down the rows of edges (height, width), and compares it with the distance of `ends`.
+def _longest(
+    edges: BoolArray, ends: tuple[float, float], places: tuple[tuple[float, float], ...]
+) -> Line:
+    """Finds the longest line down the rows of edges (height, width), and compares it with the
+    distance of `ends`.
 
     Args:
         ends: rows between which a part of the line is.
@@ -210,4 +234,8 @@ def _longest(edges: BoolArray, ends: tuple[float, float], places: tuple[tuple[fl
     if not longest:
         return Line(length=0.0, above=0.0, below=0.0)
     first = last - longest + 1
-    return Line(length=longest / extent, above=(ends[0] - first) / extent, below=(last + 1 - ends[1]) / extent)
+    return Line(
+        length=longest / extent,
+        above=(ends[0] - first) / extent,
+        below=(last + 1 - ends[1]) / extent,
+    )

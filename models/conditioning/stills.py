@@ -1,4 +1,5 @@
-"""What a film shows all the time: of each place the usual value, and the least and the greatest that it takes."""
+"""What a film shows all the time: of each place the usual value, and the least and the greatest
+that it takes."""
 
 from __future__ import annotations
 
@@ -25,8 +26,8 @@ class Stills:
     """Of pictures of one film in one light.
 
     Attributes:
-        usual: (rows, columns) middle of the narrowest fifth of a pixel's values: what is behind, where it is bare for
-            that long, and cloth where it never is.
+        usual: (rows, columns) middle of the narrowest fifth of a pixel's values: what is behind,
+            where it is bare for that long, and cloth where it never is.
         least, greatest: (rows, columns) 3 % and 97 % quantiles of them.
     """
 
@@ -36,10 +37,13 @@ class Stills:
 
     @classmethod
     def of(cls, small: Sequence[NDArray[np.generic]] | NDArray[np.generic]) -> Stills:
-        """Computes the usual, least and greatest picture from pictures (n, rows, columns), of which `SAMPLE` spread
-        over all are taken."""
+        """Computes the usual, least and greatest picture from pictures (n, rows, columns), of which
+        `SAMPLE` spread over all are taken."""
         ordered = np.sort(
-            np.stack([np.asarray(picture, np.float32) for picture in small[:: -(-len(small) // SAMPLE)]]), axis=0
+            np.stack(
+                [np.asarray(picture, np.float32) for picture in small[:: -(-len(small) // SAMPLE)]]
+            ),
+            axis=0,
         )
         window = min(max(1, int(_USUAL * len(ordered))), len(ordered) - 1)
         first = (ordered[window:] - ordered[: len(ordered) - window]).argmin(axis=0)[None]

@@ -1,4 +1,5 @@
-"""Whether the whole cloth is in the picture: how much of it moves at the picture's own edge, frame by frame."""
+"""Whether the whole cloth is in the picture: how much of it moves at the picture's own edge, frame
+by frame."""
 
 from __future__ import annotations
 
@@ -13,8 +14,8 @@ from models.conditioning.regions import nearby
 
 SIDES = ("left", "upper", "right", "lower")
 CUT = 0.12
-"""Length along the edge that moves, in sizes of the cloth, above which the edge cuts it off: of six films of whole
-flags none has more than 0.08, of two that are cut off none less than 0.17."""
+"""Length along the edge that moves, in sizes of the cloth, above which the edge cuts it off: of six
+films of whole flags none has more than 0.08, of two that are cut off none less than 0.17."""
 _CHANGE = 6.0
 """Gray levels of change from one picture of the sample to the next from which on a pixel moves."""
 _STRIP = 2
@@ -23,9 +24,11 @@ _NEAR = 5
 """Pixels about the places of the cloth that belong to it."""
 
 
-def at_edges(registered: UInt8Array, times: FloatArray, transforms: Sequence[Transform], mask: BoolArray) -> FloatArray:
-    """Measures how much of the cloth moves at the picture's edges: (n, 4) length along each of `SIDES`, in sizes of the
-    cloth.
+def at_edges(
+    registered: UInt8Array, times: FloatArray, transforms: Sequence[Transform], mask: BoolArray
+) -> FloatArray:
+    """Measures how much of the cloth moves at the picture's edges: (n, 4) length along each of
+    `SIDES`, in sizes of the cloth.
 
     Args:
         registered: (n, height, width) gray, in order.
@@ -54,10 +57,13 @@ def at_edges(registered: UInt8Array, times: FloatArray, transforms: Sequence[Tra
 
 
 def _inside(transform: Transform, shape: tuple[int, int]) -> BoolArray:
-    """Masks the pixels of the reference picture that lie in a picture, without its outermost pixels."""
+    """Masks the pixels of the reference picture that lie in a picture, without its outermost
+    pixels."""
     ones = np.ones(shape, np.uint8)
     if transform is not STILL:
-        moved = cv2.warpAffine(ones, transform, shape[::-1], flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP)
+        moved = cv2.warpAffine(
+            ones, transform, shape[::-1], flags=cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
+        )
         ones = np.asarray(moved, dtype=np.uint8)
     return _erode_mask(ones > 0, 1)
 

@@ -1,8 +1,10 @@
-"""Intervals over sequences: clips of one simulation are not independent, so whole groups are drawn with replacement.
+"""Intervals over sequences: clips of one simulation are not independent, so whole groups are drawn
+with replacement.
 
-Percentile bootstrap of clusters (Davison and Hinkley, Bootstrap Methods and their Application, 1997, sections 3.8 and
-5.3). Scores are functions of sums over clips, so a draw is a vector of how often each group occurs, and its sums are
-one matrix product. Two models that are scored with the same `Resamples` are compared pair by pair.
+Percentile bootstrap of clusters (Davison and Hinkley, Bootstrap Methods and their Application,
+1997, sections 3.8 and 5.3). Scores are functions of sums over clips, so a draw is a vector of how
+often each group occurs, and its sums are one matrix product. Two models that are scored with the
+same `Resamples` are compared pair by pair.
 """
 
 from __future__ import annotations
@@ -26,8 +28,8 @@ class ScoreEstimate:
 
     Attributes:
         value: of the data; NaN where it is undefined (a correlation with a constant).
-        low, high: percentile interval of `LEVEL`; NaN with fewer than two groups, which say nothing about
-            others.
+        low, high: percentile interval of `LEVEL`; NaN with fewer than two groups, which say nothing
+            about others.
         clips, groups: how many the value rests on.
     """
 
@@ -59,14 +61,17 @@ class Resamples:
 
     Attributes:
         index: (n,) the group of each clip, 0 to G - 1.
-        counts: (1 + draws, G) how often each group occurs; the first row is all ones, the data themselves.
+        counts: (1 + draws, G) how often each group occurs; the first row is all ones, the data
+            themselves.
     """
 
     index: IntArray
     counts: FloatArray
 
     @classmethod
-    def of(cls, group: IntArray, *, generator: np.random.Generator, draws: int = DRAWS) -> Resamples:
+    def of(
+        cls, group: IntArray, *, generator: np.random.Generator, draws: int = DRAWS
+    ) -> Resamples:
         """Draws from the groups of clips.
 
         Args:
@@ -76,12 +81,17 @@ class Resamples:
         """
         if draws < 1:
             raise InputError(
-                f"{draws} bootstrap draws are too few", where="draws", fix=f"give at least 1; {DRAWS} is usual"
+                f"{draws} bootstrap draws are too few",
+                where="draws",
+                fix=f"give at least 1; {DRAWS} is usual",
             )
         labels, index = np.unique(group, return_inverse=True)
         size = len(labels)
         drawn = generator.multinomial(size, np.full(size, 1 / size), size=draws)
-        return cls(index=index.astype(np.int64), counts=np.vstack([np.ones((1, size)), drawn.astype(np.float64)]))
+        return cls(
+            index=index.astype(np.int64),
+            counts=np.vstack([np.ones((1, size)), drawn.astype(np.float64)]),
+        )
 
     @property
     def groups(self) -> int:
@@ -94,8 +104,8 @@ class Resamples:
         return self.counts @ per_group
 
     def pair_ratio(self, hits: FloatArray, of: FloatArray) -> FloatArray:
-        """Computes Σ hits / Σ of (1 + draws,), where both (G, G) are sums over pairs of groups; a pair counts as often
-        as the product of its groups' occurrences."""
+        """Computes Σ hits / Σ of (1 + draws,), where both (G, G) are sums over pairs of groups; a
+        pair counts as often as the product of its groups' occurrences."""
         upper = np.einsum("bi,bi->b", self.counts @ hits, self.counts)
         return ratio(upper, np.einsum("bi,bi->b", self.counts @ of, self.counts))
 
@@ -112,6 +122,10 @@ def estimate(values: FloatArray, *, clips: int, groups: int) -> ScoreEstimate:
     """
     drawn = values[1:][np.isfinite(values[1:])]
     if groups < 2 or drawn.size == 0:
-        return ScoreEstimate(value=float(values[0]), low=math.nan, high=math.nan, clips=clips, groups=groups)
+        return ScoreEstimate(
+            value=float(values[0]), low=math.nan, high=math.nan, clips=clips, groups=groups
+        )
     low, high = np.quantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-    return ScoreEstimate(value=float(values[0]), low=float(low), high=float(high), clips=clips, groups=groups)
+    return ScoreEstimate(
+        value=float(values[0]), low=float(low), high=float(high), clips=clips, groups=groups
+    )

@@ -1,4 +1,5 @@
-"""Scores against what a model was given: how many sequences it was trained on, how many frames it saw."""
+"""Scores against what a model was given: how many sequences it was trained on, how many frames it
+saw."""
 
 from __future__ import annotations
 
@@ -17,7 +18,13 @@ class LearningPoint:
     interval: tuple[float, float]
 
     def __post_init__(self) -> None:
-        _check(f"learning curve of {self.label!r}", self.sequences, "sequences", self.rmse, self.interval)
+        _check(
+            f"learning curve of {self.label!r}",
+            self.sequences,
+            "sequences",
+            self.rmse,
+            self.interval,
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,7 +41,9 @@ class FramesPoint:
         _check(where, self.frames, "frames", self.accuracy, self.interval)
         if self.accuracy > 1:
             raise InputError(
-                f"the triplet accuracy is {self.accuracy:g}, above 1", where=where, fix="give a share, not per cent"
+                f"the triplet accuracy is {self.accuracy:g}, above 1",
+                where=where,
+                fix="give a share, not per cent",
             )
 
 
@@ -44,5 +53,6 @@ def _check(where: str, size: int, noun: str, value: float, interval: tuple[float
         raise InputError(
             f"{value:g} [{low:g}, {high:g}] at {size} {noun} is no score with its interval",
             where=where,
-            fix=f"give a positive number of {noun}, a finite score and the lower end of the interval first",
+            fix=f"give a positive number of {noun}, a finite score and the lower end of the "
+            "interval first",
         )

@@ -1,4 +1,5 @@
-"""What embeddings are worth beside the table: triplets of clips of other lengths, and what a linear model reads."""
+"""What embeddings are worth beside the table: triplets of clips of other lengths, and what a linear
+model reads."""
 
 from __future__ import annotations
 
@@ -29,17 +30,20 @@ Films = Callable[[FrontEnd, Cropping], Prepared]
 def triplet_accuracies(
     runs: Sequence[Estimator], frames: Sequence[int], films: Films, *, seed: int
 ) -> list[FramesPoint]:
-    """Computes the triplet accuracy of one network's embedding, given so many frames of each film from a random one on.
+    """Computes the triplet accuracy of one network's embedding, given so many frames of each film
+    from a random one on.
 
-    A network on maps takes clips of any length, as the maps' size does not depend on it. It is not trained anew: the
-    result shows what its distance is worth on clips shorter or longer than the training clips.
+    A network on maps takes clips of any length, as the maps' size does not depend on it. It is not
+    trained anew: the result shows what its distance is worth on clips shorter or longer than the
+    training clips.
 
     Args:
         runs: networks of one recipe from several seeds; the mean over them is reported.
         frames: lengths of the clips.
 
     Raises:
-        InputError: a film that is shorter, a length that the front end does not take, or clips without a triplet.
+        InputError: a film that is shorter, a length that the front end does not take, or clips
+            without a triplet.
     """
     points, first = [], runs[0]
     for count in frames:
@@ -47,17 +51,25 @@ def triplet_accuracies(
         clips = films(replace(first.front_end, frames=count), cropping)
         resamples = Resamples.of(clips.sequence, generator=stream(seed, "evaluation", "bootstrap"))
         chosen = triplets.draw(clips.sequence, seed=seed)
-        values = [triplets.accuracy_values(embed_entries(run.learners[0], clips), chosen, resamples) for run in runs]
+        values = [
+            triplets.accuracy_values(embed_entries(run.learners[0], clips), chosen, resamples)
+            for run in runs
+        ]
         accuracy = estimate(np.mean(values, axis=0), clips=len(clips), groups=resamples.groups)
         points.append(
-            FramesPoint(label=first.name, frames=count, accuracy=accuracy.value, interval=(accuracy.low, accuracy.high))
+            FramesPoint(
+                label=first.name,
+                frames=count,
+                accuracy=accuracy.value,
+                interval=(accuracy.low, accuracy.high),
+            )
         )
     return points
 
 
 def takes_any_length(estimator: Estimator) -> bool:
-    """Returns whether a network can be given clips of other lengths than those it learned from, and has an
-    embedding."""
+    """Returns whether a network can be given clips of other lengths than those it learned from, and
+    has an embedding."""
     return estimator.front_end.maps in ("spectral-maps", "wave-maps", "flow-maps", "flow-maps-3")
 
 
@@ -72,19 +84,24 @@ def quantities(parameters: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
 
 
 def readouts(
-    predictions: Sequence[Predictions], parameters: Mapping[str, FloatArray], *, data: str, seed: int
+    predictions: Sequence[Predictions],
+    parameters: Mapping[str, FloatArray],
+    *,
+    data: str,
+    seed: int,
 ) -> list[Read]:
-    """Follows the protocol of Bouman et al. 2013 on the embedding of each model's first run, one simulation left out at
-    a time.
+    """Follows the protocol of Bouman et al. 2013 on the embedding of each model's first run, one
+    simulation left out at a time.
 
-    Read out are the logarithms of the area weight [kg/m²] and of the stiffness, the geometric mean of the 15 bending
-    coefficients [N·m].
+    Read out are the logarithms of the area weight [kg/m²] and of the stiffness, the geometric mean
+    of the 15 bending coefficients [N·m].
 
     Args:
         parameters: name → (n,) values of the clips, as their records state them.
 
     Raises:
-        InputError: too few clips, or a quantity that they do not state or that is the same in all of them.
+        InputError: too few clips, or a quantity that they do not state or that is the same in all
+            of them.
     """
     wanted = quantities(parameters)
     reads: dict[str, Read] = {}

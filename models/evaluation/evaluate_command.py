@@ -35,19 +35,24 @@ if TYPE_CHECKING:
     from models.training.inputs import Prepared
     from models.training.training_recipe import DataSpec
 
-_BEFORE: dict[str, tuple[str, ...]] = {"train": (), "validation": ("train",), "test": ("train", "validation")}
-"""Side → the sides that a network has learned from, or was selected by, before it is judged on it."""
+_BEFORE: dict[str, tuple[str, ...]] = {
+    "train": (),
+    "validation": ("train",),
+    "test": ("train", "validation"),
+}
+"""Side → the sides that a network has learned from, or was selected by, before it is judged on
+it."""
 
 
 @verb(Evaluating, example='flagdata.evaluate(["flow", "sdn"], lake="lake", at="v1")')
 def evaluate(chosen: Evaluating) -> Iterator[Result]:
     """Judge trained networks on one side of a data set and write the table.
 
-    MODEL is a network of the lake by its name (all seeds of it) or the beginning of its id, or "shipped" for the one
-    of flags that comes with the package, "shipped/NAME" for another. The clips are those of --at; networks are taken
-    from the heads of main and of the branch of --at, so that a tag older than a network can be judged. Clips are cut
-    and resampled to what each network takes. Networks that were trained on a part of the sequences make the learning
-    curve.
+    MODEL is a network of the lake by its name (all seeds of it) or the beginning of its id, or
+    "shipped" for the one of flags that comes with the package, "shipped/NAME" for another. The
+    clips are those of --at; networks are taken from the heads of main and of the branch of --at, so
+    that a tag older than a network can be judged. Clips are cut and resampled to what each network
+    takes. Networks that were trained on a part of the sequences make the learning curve.
 
     \b
       flagdata evaluate flow sdn --at v1 --lake lake --out evaluation
@@ -78,9 +83,11 @@ def evaluate(chosen: Evaluating) -> Iterator[Result]:
         say(str(written))
 
 
-def refuse_learned(catalog: pa.Table, learned: Iterable[DataSpec], *, dataset: str, side: str) -> None:
-    """Refuses clips of a sequence or session that a network learned from, or was selected by, in whatever data set. The
-    training side is judged as what it is.
+def refuse_learned(
+    catalog: pa.Table, learned: Iterable[DataSpec], *, dataset: str, side: str
+) -> None:
+    """Refuses clips of a sequence or session that a network learned from, or was selected by, in
+    whatever data set. The training side is judged as what it is.
 
     Args:
         catalog: rows of the lake.
@@ -97,14 +104,19 @@ def refuse_learned(catalog: pa.Table, learned: Iterable[DataSpec], *, dataset: s
     evaluated = {f"{side} of {dataset}": DataSpec(datasets=(dataset,)).where(side)}
     for datasets in {data.datasets for data in learned}:
         data = DataSpec(datasets=datasets)
-        before = {f"{side_before} of {', '.join(datasets)}": data.where(side_before) for side_before in _BEFORE[side]}
+        before = {
+            f"{side_before} of {', '.join(datasets)}": data.where(side_before)
+            for side_before in _BEFORE[side]
+        }
         explicit_sides(catalog, ExplicitSplit(where={**evaluated, **before}))
 
 
 def label_networks(found: Sequence[tuple[Artifact, Estimator]]) -> list[tuple[Artifact, Estimator]]:
-    """Names networks of one name so that those of one training, which differ by their seeds alone, have one label.
+    """Names networks of one name so that those of one training, which differ by their seeds alone,
+    have one label.
 
-    Where the recipe or the data changed meanwhile, the beginning of an artifact's identity is added.
+    Where the recipe or the data changed meanwhile, the beginning of an artifact's identity is
+    added.
     """
     trainings: dict[str, str] = {}
     keys = []
@@ -117,7 +129,10 @@ def label_networks(found: Sequence[tuple[Artifact, Estimator]]) -> list[tuple[Ar
         trainings.setdefault(keys[-1], f"{estimator.name} {row.id[:8]}")
     if len(trainings) < 2:
         return list(found)
-    return [(row, replace(model, name=trainings[key])) for (row, model), key in zip(found, keys, strict=True)]
+    return [
+        (row, replace(model, name=trainings[key]))
+        for (row, model), key in zip(found, keys, strict=True)
+    ]
 
 
 class _Desk:
@@ -158,10 +173,12 @@ class _Desk:
         learned: list[tuple[Artifact, DataSpec, Predictions]] = []
         curves: set[str] = set()
         chosen = self._models(names)
-        trained_on = [DataSpec.of_identity(_card(estimator)["recipe"]["data"]) for _, estimator in chosen]
+        trained_on = [
+            DataSpec.of_identity(_card(estimator)["recipe"]["data"]) for _, estimator in chosen
+        ]
         refuse_learned(self._catalog(), trained_on, dataset=self._dataset, side=side)
-        # First: what cannot be judged, lengths that no film has and networks that are none on maps are refused before
-        # the rest is computed.
+        # First: what cannot be judged, lengths that no film has and networks that are none on maps
+        # are refused before the rest is computed.
         self._check([estimator for _, estimator in chosen], side, handmade=handmade, linear=linear)
         triplets = self._triplets([estimator for _, estimator in chosen], frames, side)
         for row, estimator in chosen:
@@ -199,7 +216,8 @@ class _Desk:
 
     @cached_property
     def _heads(self) -> tuple[str, ...]:
-        """Branches at whose heads networks are sought: main, to which `train` commits, and the one that is judged."""
+        """Branches at whose heads networks are sought: main, to which `train` commits, and the one
+        that is judged."""
         from flagdata.lake.refs import MAIN
 
         lake = self._source.lake
@@ -207,19 +225,27 @@ class _Desk:
         return (MAIN, shown) if shown in lake.refs.branches() else (MAIN,)
 
     def _catalog(self) -> pa.Table:
-        """Reads the rows of the version that is judged and of the heads that networks come from, each once."""
+        """Reads the rows of the version that is judged and of the heads that networks come from,
+        each once."""
         import pyarrow as pa
 
         lake = self._source.lake
         views = dict.fromkeys(lake.view(at) for at in (self._at, *self._heads))
         rows = pa.concat_tables([lake.table(view) for view in views])
-        return rows.take(np.sort(np.unique(rows["artifact"].to_numpy(zero_copy_only=False), return_index=True)[1]))
+        return rows.take(
+            np.sort(
+                np.unique(rows["artifact"].to_numpy(zero_copy_only=False), return_index=True)[1]
+            )
+        )
 
-    def _check(self, chosen: Sequence[Estimator], side: str, *, handmade: bool, linear: bool) -> None:
+    def _check(
+        self, chosen: Sequence[Estimator], side: str, *, handmade: bool, linear: bool
+    ) -> None:
         """Checks that the clips of a side can be judged, before any is prepared.
 
         Raises:
-            InputError: their films are too short or too slow for a model, or state none of its targets.
+            InputError: their films are too short or too slow for a model, or state none of its
+                targets.
         """
         from models.evaluation.embeddings import quantities
         from models.evaluation.feature_baselines import check_stated
@@ -251,19 +277,29 @@ class _Desk:
         rows: dict[str, Mapping[str, Any]] = {}
         for head in self._heads:
             of_head = lake.rows({"kind": Kind.NETWORK}, at=head, columns=COLUMNS).to_pylist()
-            rows |= {row["artifact"]: {**row, "head": head} for row in of_head if row["artifact"] not in rows}
+            rows |= {
+                row["artifact"]: {**row, "head": head}
+                for row in of_head
+                if row["artifact"] not in rows
+            }
         chosen: list[tuple[Artifact | None, Estimator]] = []
         for name in names:
             if name == "shipped" or name.startswith("shipped/"):
                 ours = estimator.load_shipped(name.partition("/")[2] or estimator.DEFAULT)
-                chosen.append((None, replace(ours, name=f"{ours.name}, as shipped")))  # beside its seeds, if they are
+                chosen.append(
+                    (None, replace(ours, name=f"{ours.name}, as shipped"))
+                )  # beside its seeds, if they are
                 continue
             same = {row["artifact"]: row["head"] for row in meant(rows.values(), name)}
             if not same:
-                raise UnknownNameError.of("network", name, sorted({row["name"] for row in rows.values()} | {"shipped"}))
+                raise UnknownNameError.of(
+                    "network", name, sorted({row["name"] for row in rows.values()} | {"shipped"})
+                )
             self._head_of |= same
             found = [lake.artifact(artifact, at=same[artifact]) for artifact in sorted(same)]
-            chosen += label_networks([(row, estimator.load(lake.object_path(str(row.object)))) for row in found])
+            chosen += label_networks(
+                [(row, estimator.load(lake.object_path(str(row.object)))) for row in found]
+            )
         return chosen
 
     def _side(self, side: str) -> Pairs:
@@ -283,7 +319,9 @@ class _Desk:
         key = (side, estimator.front_end.hash)
         if key not in self._prepared:
             pairs = self._side(side)
-            with progress(len(pairs), f"prepare {estimator.front_end.maps} of {side}", "clip") as advance:
+            with progress(
+                len(pairs), f"prepare {estimator.front_end.maps} of {side}", "clip"
+            ) as advance:
                 self._prepared[key] = prepare_clips(
                     pairs,
                     estimator.front_end,
@@ -310,8 +348,11 @@ class _Desk:
             fitted_on=self._clips("train", estimator) if contrast else None,
         )
 
-    def _triplets(self, chosen: Sequence[Estimator], frames: Sequence[int], side: str) -> list[FramesPoint]:
-        """Computes triplet accuracies of the networks on maps, by label, for clips of so many frames."""
+    def _triplets(
+        self, chosen: Sequence[Estimator], frames: Sequence[int], side: str
+    ) -> list[FramesPoint]:
+        """Computes triplet accuracies of the networks on maps, by label, for clips of so many
+        frames."""
         from models.evaluation.embeddings import takes_any_length, triplet_accuracies
         from models.training.inputs import film_rows, prepare_films
 
@@ -338,12 +379,18 @@ class _Desk:
                 where="--frames",
                 fix="name one, such as wave or sdn, or leave --frames out",
             )
-        return [point for runs in labels.values() for point in triplet_accuracies(runs, frames, films, seed=self._seed)]
+        return [
+            point
+            for runs in labels.values()
+            for point in triplet_accuracies(runs, frames, films, seed=self._seed)
+        ]
 
     def _reads(self, evaluated: Sequence[Predictions], side: str, data: str) -> list[Read]:
         from models.evaluation.embeddings import readouts
 
-        return readouts(evaluated, self._side(side).table.parameter_columns(), data=data, seed=self._seed)
+        return readouts(
+            evaluated, self._side(side).table.parameter_columns(), data=data, seed=self._seed
+        )
 
     @property
     def _statement_text(self) -> str:
@@ -354,7 +401,8 @@ class _Desk:
         )
 
     def _sequences(self, network: Artifact, data: DataSpec) -> int:
-        """Counts the sequences of these data sets that a network learned from, at the head that it comes from."""
+        """Counts the sequences of these data sets that a network learned from, at the head that it
+        comes from."""
         pairs = self._source.pairs(data.rows, at=self._head_of[network.id], split="train")
         return len(set(pairs.table.seed.tolist()))
 
@@ -385,11 +433,16 @@ def _note(estimator: Estimator, table: PairTable) -> str:
 
 
 def _cut_out_of(table: PairTable, shape: FrontEnd) -> str:
-    """Says which clips the network's are cut out of; nothing where they are the catalog's as they are."""
+    """Says which clips the network's are cut out of; nothing where they are the catalog's as they
+    are."""
     from models.training.timed_film import frame_rate, has_rate
 
     seconds = (table.end - table.start) / NANOSECONDS
-    of = "" if (table.frame_count == shape.frames).all() else f" of clips of {_from_to(table.frame_count)} frames"
+    of = (
+        ""
+        if (table.frame_count == shape.frames).all()
+        else f" of clips of {_from_to(table.frame_count)} frames"
+    )
     if has_rate(table.frame_count, seconds, shape.rate).all():
         return of
     rates = _from_to(frame_rate(table.frame_count, seconds))
@@ -402,8 +455,8 @@ def _from_to(values: FloatArray | IntArray) -> str:
 
 
 def _points(learned: Sequence[tuple[int, Predictions]]) -> list[LearningPoint]:
-    """Computes the RMSE of wind against the number of sequences, of each run; none where one sequence is judged, since
-    that gives no interval."""
+    """Computes the RMSE of wind against the number of sequences, of each run; none where one
+    sequence is judged, since that gives no interval."""
     from flagdata.core.rng import stream
     from models.evaluation.bootstrap import Resamples, estimate
     from models.evaluation.curves import LearningPoint
@@ -415,8 +468,17 @@ def _points(learned: Sequence[tuple[int, Predictions]]) -> list[LearningPoint]:
         resamples = Resamples.of(run.group, generator=stream(0, "learning"))
         if resamples.groups < 2:
             continue
-        rmse = estimate(SCORES["rmse"].values(run, WIND, resamples), clips=len(run.group), groups=resamples.groups)
+        rmse = estimate(
+            SCORES["rmse"].values(run, WIND, resamples),
+            clips=len(run.group),
+            groups=resamples.groups,
+        )
         points.append(
-            LearningPoint(label=run.label, sequences=sequences, rmse=rmse.value, interval=(rmse.low, rmse.high))
+            LearningPoint(
+                label=run.label,
+                sequences=sequences,
+                rmse=rmse.value,
+                interval=(rmse.low, rmse.high),
+            )
         )
     return points

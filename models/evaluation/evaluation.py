@@ -1,4 +1,5 @@
-"""Every score of every model, computed once: what the page, the words and the JSON document are made of."""
+"""Every score of every model, computed once: what the page, the words and the JSON document are
+made of."""
 
 from __future__ import annotations
 
@@ -78,14 +79,15 @@ class Evaluation:
         clips, groups: tested on; groups are sequences.
         rows: of the table.
         targets: scores of every target.
-        reference: label that the differences are against; the lowest wind RMSE unless another was asked for, None if no
-            model gives the wind.
+        reference: label that the differences are against; the lowest wind RMSE unless another was
+            asked for, None if no model gives the wind.
         differences: paired, over the same draws of sequences.
         wind_errors, calibrations, expected: of the models that have them.
         learning, frames, reads, layout: given, or made of what was given.
         findings: what a reader has to know.
         unseen: whether no model learned from these sequences.
-        split, split_by: the side that was judged, and how sides were decided, see `flagdata.dataset.Pairs`.
+        split, split_by: the side that was judged, and how sides were decided, see
+            `flagdata.dataset.Pairs`.
     """
 
     data: str
@@ -147,23 +149,39 @@ def evaluate(
         if label is not None and label not in models:
             raise UnknownNameError.of("model", label, models)
     group = predictions[0].group
-    resamples = Resamples.of(group, generator=rng.stream(seed, "evaluation", "bootstrap"), draws=draws)
+    resamples = Resamples.of(
+        group, generator=rng.stream(seed, "evaluation", "bootstrap"), draws=draws
+    )
     findings: list[Finding] = []
     chosen = triplets.draw(group, seed=seed) if triplets.possible(group) else None
     if chosen is None:
         findings.append(
-            _warning("no-triplets", "no sequence has two clips beside another's: there is no triplet accuracy")
+            _warning(
+                "no-triplets",
+                "no sequence has two clips beside another's: there is no triplet accuracy",
+            )
         )
     if resamples.groups < 20:
-        text = f"intervals rest on {resamples.groups} sequences; below 20 a percentile interval is too narrow"
+        text = (
+            f"intervals rest on {resamples.groups} sequences; below 20 a percentile interval is "
+            "too narrow"
+        )
         findings.append(_warning("few-sequences", text))
-    runs = {label: [score_table.metric_values(run, resamples, chosen) for run in of] for label, of in models.items()}
+    runs = {
+        label: [score_table.metric_values(run, resamples, chosen) for run in of]
+        for label, of in models.items()
+    }
     values = {label: score_table.mean_values(of) for label, of in runs.items()}
     with_wind = {label: of for label, of in models.items() if WIND in of[0].targets}
     with_samples = {label: of for label, of in models.items() if of[0].samples is not None}
-    varied = {label: of for label, of in with_samples.items() if (np.ptp(of[0].truth, axis=0) > 0).all()}
+    varied = {
+        label: of for label, of in with_samples.items() if (np.ptp(of[0].truth, axis=0) > 0).all()
+    }
     findings += [
-        _warning("no-tarp", f"a target of {label} is the same in all clips: there is no expected coverage (TARP)")
+        _warning(
+            "no-tarp",
+            f"a target of {label} is the same in all clips: there is no expected coverage (TARP)",
+        )
         for label in with_samples
         if label not in varied
     ]
@@ -174,14 +192,23 @@ def evaluate(
         seed=seed,
         clips=len(group),
         groups=resamples.groups,
-        rows=tuple(row for label, of in models.items() for row in score_table.rows(of, runs[label], resamples)),
-        targets=tuple(row for of in models.values() for row in score_table.target_rows(of, resamples)),
+        rows=tuple(
+            row
+            for label, of in models.items()
+            for row in score_table.rows(of, runs[label], resamples)
+        ),
+        targets=tuple(
+            row for of in models.values() for row in score_table.target_rows(of, resamples)
+        ),
         reference=reference,
         differences=()
         if reference is None
-        else score_table.differences(values, reference, clips=len(group), groups=resamples.groups, metrics=_COMPARED),
+        else score_table.differences(
+            values, reference, clips=len(group), groups=resamples.groups, metrics=_COMPARED
+        ),
         wind_errors=tuple(
-            WindError(label=label, bins=error_against(of, WIND, resamples)) for label, of in with_wind.items()
+            WindError(label=label, bins=error_against(of, WIND, resamples))
+            for label, of in with_wind.items()
         ),
         calibrations=tuple(
             CalibrationCurve(
@@ -194,7 +221,10 @@ def evaluate(
             for target in of[0].targets
         ),
         expected=tuple(
-            Expected(label=label, curve=tarp(of, resamples, generator=rng.stream(seed, "evaluation", "tarp")))
+            Expected(
+                label=label,
+                curve=tarp(of, resamples, generator=rng.stream(seed, "evaluation", "tarp")),
+            )
             for label, of in varied.items()
         ),
         unseen=unseen,
@@ -206,7 +236,11 @@ def evaluate(
         layout=None if tsne_of is None else layout(models[tsne_of][0], seed=seed),
         findings=(
             *findings,
-            *(replace(f, where=f"{read.label} on {read.data}") for read in reads for f in read.readout.findings),
+            *(
+                replace(f, where=f"{read.label} on {read.data}")
+                for read in reads
+                for f in read.readout.findings
+            ),
         ),
     )
 
@@ -233,13 +267,24 @@ def as_document(evaluation: Evaluation) -> dict[str, Any]:
             {
                 "label": of.label,
                 "bins": [
-                    {"low": b.low, "high": b.high, "rmse": b.rmse.as_dict(), "bias": b.bias.as_dict()} for b in of.bins
+                    {
+                        "low": b.low,
+                        "high": b.high,
+                        "rmse": b.rmse.as_dict(),
+                        "bias": b.bias.as_dict(),
+                    }
+                    for b in of.bins
                 ],
             }
             for of in evaluation.wind_errors
         ],
         "calibration": [
-            {"label": of.label, "target": of.target, "coverage": _curve(of.curve), "ranks": asdict(of.ranks)}
+            {
+                "label": of.label,
+                "target": of.target,
+                "coverage": _curve(of.curve),
+                "ranks": asdict(of.ranks),
+            }
             for of in evaluation.calibrations
         ],
         "tarp": [{"label": of.label, "coverage": _curve(of.curve)} for of in evaluation.expected],
@@ -251,7 +296,8 @@ def as_document(evaluation: Evaluation) -> dict[str, Any]:
                 "data": of.data,
                 "components": of.readout.components,
                 "pearson": {
-                    target: r.as_dict() for target, r in zip(of.readout.targets, of.readout.pearson, strict=True)
+                    target: r.as_dict()
+                    for target, r in zip(of.readout.targets, of.readout.pearson, strict=True)
                 },
             }
             for of in evaluation.reads
@@ -265,8 +311,13 @@ def as_document(evaluation: Evaluation) -> dict[str, Any]:
         },
         "paper": {
             "warning": paper.WARNING,
-            "flagsim": [{**asdict(row), "bound": row.bound, "breaks_bound": row.breaks_bound} for row in paper.FLAGSIM],
-            "triplets": [{"frames": frames, "accuracy": accuracy} for frames, accuracy in paper.TRIPLETS],
+            "flagsim": [
+                {**asdict(row), "bound": row.bound, "breaks_bound": row.breaks_bound}
+                for row in paper.FLAGSIM
+            ],
+            "triplets": [
+                {"frames": frames, "accuracy": accuracy} for frames, accuracy in paper.TRIPLETS
+            ],
         },
         "findings": [finding.as_dict() for finding in evaluation.findings],
     }

@@ -1,6 +1,7 @@
 """The evaluation as a page (HTML that refers to no other file), as Markdown and as a JSON document.
 
-The report's charts as SVG that takes its colours from the page, so that they follow its light or dark style.
+The report's charts as SVG that takes its colours from the page, so that they follow its light or
+dark style.
 """
 
 from __future__ import annotations
@@ -29,12 +30,29 @@ from flagdata.pages.render import render
 from models.evaluation import paper, score_table
 from models.evaluation.bootstrap import LEVEL
 from models.evaluation.curves import FramesPoint, LearningPoint
-from models.evaluation.evaluation import CalibrationCurve, Evaluation, Expected, WindError, as_document
+from models.evaluation.evaluation import (
+    CalibrationCurve,
+    Evaluation,
+    Expected,
+    WindError,
+    as_document,
+)
 from models.evaluation.predictive_calibration import BAND, CURVE, LEVELS, Coverage
 from models.evaluation.tsne import TsneLayout
 
 _INK, _QUIET, _RULE = "#1c2326", "#56646b", "#d5dbde"
-_SERIES = ("#1f6f9c", "#b4531a", "#7a4a9a", "#2f8068", "#97700d", "#a8402d", "#5b6fb8", "#a84a7e", "#58702a", "#6b5848")
+_SERIES = (
+    "#1f6f9c",
+    "#b4531a",
+    "#7a4a9a",
+    "#2f8068",
+    "#97700d",
+    "#a8402d",
+    "#5b6fb8",
+    "#a84a7e",
+    "#58702a",
+    "#6b5848",
+)
 _MARKERS = "osD^vPX<>h"
 _THEME = {_INK: "--ink", _QUIET: "--quiet", _RULE: "--rule"} | {
     colour: f"--series-{number}" for number, colour in enumerate(_SERIES)
@@ -63,7 +81,8 @@ _WIDTH = 9.2  # inches, 72 units each
 
 
 def _svg(figure: Figure, name: str) -> Markup:
-    """Renders the figure as an inline element whose ids start with `name`, so that several fit into one page."""
+    """Renders the figure as an inline element whose ids start with `name`, so that several fit into
+    one page."""
     target = io.StringIO()
     figure.savefig(target, format="svg", transparent=True, metadata={"Date": None})
     text = target.getvalue()
@@ -82,7 +101,9 @@ def _panels(count: int, height: float) -> tuple[Figure, list[Axes]]:
 
 def _legend(figure: Figure, axes: Axes) -> None:
     handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=min(4, len(labels)), fontsize=8)
+    figure.legend(
+        handles, labels, loc="outside lower center", ncols=min(4, len(labels)), fontsize=8
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,7 +117,10 @@ class Look:
 def _look(labels: Iterable[str]) -> dict[str, Look]:
     """Assigns a colour and a marker to each label."""
     return {
-        label: Look(colour=_SERIES[i % len(_SERIES)], marker=_MARKERS[(i + i // len(_SERIES)) % len(_MARKERS)])
+        label: Look(
+            colour=_SERIES[i % len(_SERIES)],
+            marker=_MARKERS[(i + i // len(_SERIES)) % len(_MARKERS)],
+        )
         for i, label in enumerate(dict.fromkeys(labels))
     }
 
@@ -111,7 +135,9 @@ def _interval_line(
 ) -> None:
     low, high = np.array(ends, dtype=float).T
     axes.fill_between(x, low, high, color=look.colour, alpha=0.13, linewidth=0)
-    axes.plot(x, value, label=label, markersize=3.5, linewidth=1.3, color=look.colour, marker=look.marker)
+    axes.plot(
+        x, value, label=label, markersize=3.5, linewidth=1.3, color=look.colour, marker=look.marker
+    )
 
 
 def error_against_wind(errors: Sequence[WindError]) -> Markup:
@@ -126,7 +152,9 @@ def error_against_wind(errors: Sequence[WindError]) -> Markup:
                 (bias_panel, [b.bias for b in model.bins]),
             ):
                 ends = [(s.low, s.high) for s in scores]
-                _interval_line(axes, middle, [s.value for s in scores], ends, model.label, look[model.label])
+                _interval_line(
+                    axes, middle, [s.value for s in scores], ends, model.label, look[model.label]
+                )
         rmse_panel.set(xlabel="true wind speed [m/s]", ylabel="RMSE [m/s]", ylim=(0, None))
         bias_panel.axhline(0, color=_QUIET, linewidth=0.8)
         bias_panel.set(xlabel="true wind speed [m/s]", ylabel="bias [m/s]")
@@ -147,11 +175,15 @@ def calibration(curves: Sequence[CalibrationCurve], expected: Sequence[Expected]
             for curve in curves:
                 if curve.target == target:
                     _coverage(axes, curve.label, curve.curve, look[curve.label])
-            axes.set(title=target, xlabel="nominal level of the central interval", ylabel="share covered")
+            axes.set(
+                title=target, xlabel="nominal level of the central interval", ylabel="share covered"
+            )
         joint = panels[len(targets)]
         for curve in expected:
             _coverage(joint, curve.label, curve.curve, look[curve.label])
-        joint.set(title="all targets together (TARP)", xlabel="nominal level", ylabel="expected coverage")
+        joint.set(
+            title="all targets together (TARP)", xlabel="nominal level", ylabel="expected coverage"
+        )
         for axes in panels[: len(targets) + 1]:
             axes.plot([0, 1], [0, 1], color=_QUIET, linewidth=0.9, linestyle="--")
             axes.set(xlim=(0, 1), ylim=(0, 1), aspect="equal")
@@ -179,7 +211,8 @@ def _coverage(axes: Axes, label: str, curve: tuple[Coverage, ...], look: Look) -
 
 
 def ranks(curves: Sequence[CalibrationCurve]) -> Markup:
-    """Draws rank histograms, a row a model, a panel a target, with the band of a calibrated model."""
+    """Draws rank histograms, a row a model, a panel a target, with the band of a calibrated
+    model."""
     labels = list(dict.fromkeys(curve.label for curve in curves))
     columns = max(sum(curve.label == label for curve in curves) for label in labels)
     look = _look(labels)
@@ -191,7 +224,9 @@ def ranks(curves: Sequence[CalibrationCurve]) -> Markup:
             of_model = [curve for curve in curves if curve.label == label]
             for axes, curve in zip(line, of_model, strict=False):
                 edges = np.linspace(0, 1, len(curve.ranks.share) + 1)
-                axes.axhspan(curve.ranks.low, curve.ranks.high, color=_QUIET, alpha=0.18, linewidth=0)
+                axes.axhspan(
+                    curve.ranks.low, curve.ranks.high, color=_QUIET, alpha=0.18, linewidth=0
+                )
                 axes.stairs(curve.ranks.share, edges, color=look[label].colour, linewidth=1.4)
                 axes.set(title=f"{label}: {curve.target}", xlim=(0, 1), ylim=(0, top))
             line[0].set_ylabel("share of clips")
@@ -208,10 +243,22 @@ def learning(points: Sequence[LearningPoint]) -> Markup:
         figure, (axes,) = _panels(1, 3.6)
         look = _look(point.label for point in points)
         for label in look:
-            of_label = sorted((point for point in points if point.label == label), key=lambda point: point.sequences)
+            of_label = sorted(
+                (point for point in points if point.label == label),
+                key=lambda point: point.sequences,
+            )
             ends = [point.interval for point in of_label]
-            _interval_line(axes, [p.sequences for p in of_label], [p.rmse for p in of_label], ends, label, look[label])
-        axes.set(xscale="log", yscale="log", xlabel="sequences trained on", ylabel="wind RMSE [m/s]")
+            _interval_line(
+                axes,
+                [p.sequences for p in of_label],
+                [p.rmse for p in of_label],
+                ends,
+                label,
+                look[label],
+            )
+        axes.set(
+            xscale="log", yscale="log", xlabel="sequences trained on", ylabel="wind RMSE [m/s]"
+        )
         for axis, ticks in (
             (axes.xaxis, sorted({point.sequences for point in points})),
             (axes.yaxis, _round_ticks(points)),
@@ -236,11 +283,27 @@ def frames(points: Sequence[FramesPoint]) -> Markup:
         figure, (axes,) = _panels(1, 3.2)
         look = _look(point.label for point in points)
         for label in look:
-            of_label = sorted((point for point in points if point.label == label), key=lambda point: point.frames)
+            of_label = sorted(
+                (point for point in points if point.label == label), key=lambda point: point.frames
+            )
             ends = [point.interval for point in of_label]
-            _interval_line(axes, [p.frames for p in of_label], [p.accuracy for p in of_label], ends, label, look[label])
+            _interval_line(
+                axes,
+                [p.frames for p in of_label],
+                [p.accuracy for p in of_label],
+                ends,
+                label,
+                look[label],
+            )
         size, accuracy = zip(*paper.TRIPLETS, strict=True)
-        axes.plot(size, accuracy, color=_QUIET, linestyle="--", linewidth=1.1, label="SDN, quoted from the paper")
+        axes.plot(
+            size,
+            accuracy,
+            color=_QUIET,
+            linestyle="--",
+            linewidth=1.1,
+            label="SDN, quoted from the paper",
+        )
         axes.set(xlabel="frames", ylabel="triplet accuracy", ylim=(None, 1))
         _legend(figure, axes)
         return _svg(figure, "frames")
@@ -251,7 +314,9 @@ def t_sne(layout: TsneLayout) -> Markup:
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(6.2, 5.0), layout="constrained", dpi=150)
         axes = figure.subplots()
-        drawn = axes.scatter(*layout.places.T, c=layout.wind, s=9, cmap="viridis", linewidths=0, rasterized=True)
+        drawn = axes.scatter(
+            *layout.places.T, c=layout.wind, s=9, cmap="viridis", linewidths=0, rasterized=True
+        )
         figure.colorbar(drawn, ax=axes, label="true wind speed [m/s]").outline.set_visible(False)
         axes.set(xticks=[], yticks=[], aspect="equal")
         axes.spines[:].set_visible(False)
@@ -263,7 +328,8 @@ _COMMAND = "evaluate"
 
 @dataclass(frozen=True, kw_only=True)
 class TableLine:
-    """A row of a table for people: cells as lines, the value first; `run` marks one run of the model above."""
+    """A row of a table for people: cells as lines, the value first; `run` marks one run of the
+    model above."""
 
     cells: tuple[tuple[str, ...], ...]
     run: bool = False
@@ -287,29 +353,41 @@ class Picture:
     square: bool = False
 
 
-def write(evaluation: Evaluation, folder: Path, *, name: str = "evaluation") -> tuple[Path, Path, Path]:
+def write(
+    evaluation: Evaluation, folder: Path, *, name: str = "evaluation"
+) -> tuple[Path, Path, Path]:
     """Writes NAME.html, NAME.json and NAME.md into `folder`, which is made; returns their paths.
 
     Raises:
-        ConflictError: one of them is there and was not written by an evaluation, or was changed since.
+        ConflictError: one of them is there and was not written by an evaluation, or was changed
+            since.
     """
-    document = json.dumps(as_document(evaluation), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    document = (
+        json.dumps(as_document(evaluation), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    )
     names = _names(name)
     write_files(
-        folder, dict(zip(names, (page(evaluation), document, markdown(evaluation)), strict=True)), command=_COMMAND
+        folder,
+        dict(zip(names, (page(evaluation), document, markdown(evaluation)), strict=True)),
+        command=_COMMAND,
     )
     page_path, document_path, text_path = (folder / file for file in names)
     return page_path, document_path, text_path
 
 
 def check(folder: Path, *, name: str) -> None:
-    """Refuses a folder in which `write` cannot write, before anything is evaluated; raises as `write`.
+    """Refuses a folder in which `write` cannot write, before anything is evaluated; raises as
+    `write`.
 
     Raises:
         UsageError: a name that is more than the name of a file.
     """
     if name != Path(name).name:
-        raise UsageError(f"{name!r} is not a file's name", where="--name", fix="give a name, and the folder by --out")
+        raise UsageError(
+            f"{name!r} is not a file's name",
+            where="--name",
+            fix="give a name, and the folder by --out",
+        )
     check_files(folder, *_names(name), command=_COMMAND)
 
 
@@ -332,11 +410,12 @@ def page(evaluation: Evaluation) -> str:
 
 
 def markdown(evaluation: Evaluation) -> str:
-    """Renders the tables and their warnings as Markdown, names of models and data sets as text; the charts are the
-    page's."""
+    """Renders the tables and their warnings as Markdown, names of models and data sets as text; the
+    charts are the page's."""
     parts = [f"# Models compared on {plain(evaluation.data)}", _counts(evaluation)]
     parts += [
-        f"**Warning:** {plain(f'{finding.where}: {finding.what}' if finding.where else finding.what)}."
+        "**Warning:** "
+        f"{plain(f'{finding.where}: {finding.what}' if finding.where else finding.what)}."
         for finding in evaluation.findings
     ]
     parts += [
@@ -364,9 +443,12 @@ def _grid(grid: Grid) -> str:
 
 
 def _counts(evaluation: Evaluation) -> str:
-    learned = "that no model was trained on" if evaluation.unseen else "that models may have learned from"
+    learned = (
+        "that no model was trained on" if evaluation.unseen else "that models may have learned from"
+    )
     return (
-        f"{evaluation.clips:,} clips of {evaluation.groups:,} sequences {learned}; intervals are of "
+        f"{evaluation.clips:,} clips of {evaluation.groups:,} sequences {learned}; intervals are "
+        "of "
         f"{100 * LEVEL:.0f} % over sequences."
     )
 
@@ -375,7 +457,10 @@ def _models(evaluation: Evaluation) -> Grid:
     return Grid(
         head=tuple(column.heading for column in score_table.COLUMNS),
         body=tuple(
-            TableLine(cells=tuple(column.cell(row) for column in score_table.COLUMNS), run=row.run is not None)
+            TableLine(
+                cells=tuple(column.cell(row) for column in score_table.COLUMNS),
+                run=row.run is not None,
+            )
             for row in evaluation.rows
         ),
     )
@@ -420,7 +505,11 @@ def _differences(evaluation: Evaluation) -> Grid | None:
     if not evaluation.differences:
         return None
     by_model = {
-        label: {difference.metric: difference for difference in evaluation.differences if difference.label == label}
+        label: {
+            difference.metric: difference
+            for difference in evaluation.differences
+            if difference.label == label
+        }
         for label in dict.fromkeys(difference.label for difference in evaluation.differences)
     }
     metrics = [name for name in _METRICS if any(name in of for of in by_model.values())]
@@ -434,18 +523,22 @@ def _differences(evaluation: Evaluation) -> Grid | None:
     return Grid(
         head=("model", *(_METRICS[name] for name in metrics)),
         body=tuple(
-            TableLine(cells=((label,), *(cell(of, name) for name in metrics))) for label, of in by_model.items()
+            TableLine(cells=((label,), *(cell(of, name) for name in metrics)))
+            for label, of in by_model.items()
         ),
     )
 
 
 def _targets(evaluation: Evaluation) -> Grid:
-    ordered = sorted(evaluation.targets, key=lambda row: [r.target for r in evaluation.targets].index(row.target))
+    ordered = sorted(
+        evaluation.targets, key=lambda row: [r.target for r in evaluation.targets].index(row.target)
+    )
 
     def cells(row: score_table.TargetRow) -> tuple[tuple[str, ...], ...]:
         decimals = score_table.digits(row.scores["rmse"].value)
         return tuple(
-            score_table.cell(row.scores[name], decimals if name in ("rmse", "bias") else 3) for name in _SCORES
+            score_table.cell(row.scores[name], decimals if name in ("rmse", "bias") else 3)
+            for name in _SCORES
         )
 
     return Grid(
@@ -460,7 +553,15 @@ def _linear(evaluation: Evaluation) -> Grid | None:
     return Grid(
         head=("model", "data", "components", "quantity", "Pearson r"),
         body=tuple(
-            TableLine(cells=((of.label,), (of.data,), (str(of.readout.components),), (target,), score_table.cell(r, 3)))
+            TableLine(
+                cells=(
+                    (of.label,),
+                    (of.data,),
+                    (str(of.readout.components),),
+                    (target,),
+                    score_table.cell(r, 3),
+                )
+            )
             for of in evaluation.reads
             for target, r in zip(of.readout.targets, of.readout.pearson, strict=True)
         ),
@@ -473,7 +574,8 @@ def _learning(evaluation: Evaluation) -> Grid | None:
     return Grid(
         head=("model", "sequences", "wind RMSE [m/s]"),
         body=tuple(
-            TableLine(cells=((p.label,), (f"{p.sequences:,}",), _ends(p.rmse, p.interval))) for p in evaluation.learning
+            TableLine(cells=((p.label,), (f"{p.sequences:,}",), _ends(p.rmse, p.interval)))
+            for p in evaluation.learning
         ),
     )
 
@@ -486,7 +588,8 @@ def _frames(evaluation: Evaluation) -> Grid | None:
         for size, accuracy in paper.TRIPLETS
     )
     ours = tuple(
-        TableLine(cells=((p.label,), (str(p.frames),), _ends(p.accuracy, p.interval))) for p in evaluation.frames
+        TableLine(cells=((p.label,), (str(p.frames),), _ends(p.accuracy, p.interval)))
+        for p in evaluation.frames
     )
     return Grid(head=("model", "frames", "triplet accuracy"), body=(*ours, *quoted))
 
@@ -511,7 +614,8 @@ def _pictures(evaluation: Evaluation) -> list[Picture]:
             Picture(
                 title="Error against wind",
                 svg=error_against_wind(evaluation.wind_errors),
-                caption="Clips by true wind in bins of 1 m/s; means over runs. Shaded: intervals over sequences, none "
+                caption="Clips by true wind in bins of 1 m/s; means over runs. Shaded: intervals "
+                "over sequences, none "
                 "where a bin has one sequence only.",
             )
         )
@@ -520,15 +624,19 @@ def _pictures(evaluation: Evaluation) -> list[Picture]:
             Picture(
                 title="Calibration",
                 svg=calibration(evaluation.calibrations, evaluation.expected),
-                caption="Share of truths inside central intervals, over their nominal level. Below the dashed line "
-                "distributions are too narrow or biased, above it too wide. TARP (Lemos et al. 2023) tests all targets "
+                caption="Share of truths inside central intervals, over their nominal level. Below "
+                "the dashed line "
+                "distributions are too narrow or biased, above it too wide. TARP (Lemos et al. "
+                "2023) tests all targets "
                 "together.",
             ),
             Picture(
                 title="Ranks of the truth among the draws",
                 svg=ranks(evaluation.calibrations),
-                caption="Flat if calibrated (Talts et al. 2018); a hump is too wide, a trough too narrow, a slope "
-                f"biased. Shaded: where at least {100 * BAND:.0f} % of the shares of a calibrated model lie, bin by "
+                caption="Flat if calibrated (Talts et al. 2018); a hump is too wide, a trough too "
+                "narrow, a slope "
+                f"biased. Shaded: where at least {100 * BAND:.0f} % of the shares of a calibrated "
+                "model lie, bin by "
                 "bin, sequences being independent and clips of one sequence not.",
             ),
         ]
@@ -537,7 +645,8 @@ def _pictures(evaluation: Evaluation) -> list[Picture]:
             Picture(
                 title="Learning curve",
                 svg=learning(evaluation.learning),
-                caption="Error on the same test sequences after training on more of them; both axes are logarithmic.",
+                caption="Error on the same test sequences after training on more of them; both "
+                "axes are logarithmic.",
             )
         )
     if evaluation.frames:
@@ -545,7 +654,8 @@ def _pictures(evaluation: Evaluation) -> list[Picture]:
             Picture(
                 title="Triplet accuracy against frames",
                 svg=frames(evaluation.frames),
-                caption="How often a clip lies nearer to one of its own simulation than to one of another.",
+                caption="How often a clip lies nearer to one of its own simulation than to one of "
+                "another.",
             )
         )
     if evaluation.layout is not None:
@@ -553,7 +663,8 @@ def _pictures(evaluation: Evaluation) -> list[Picture]:
             Picture(
                 title=f"t-SNE of the embedding of {evaluation.layout.label}",
                 svg=t_sne(evaluation.layout),
-                caption=f"{len(evaluation.layout.wind):,} of {evaluation.layout.clips:,} clips. Distances between "
+                caption=f"{len(evaluation.layout.wind):,} of {evaluation.layout.clips:,} clips. "
+                "Distances between "
                 "clusters and their sizes mean nothing.",
                 square=True,
             )

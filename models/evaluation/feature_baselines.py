@@ -1,5 +1,5 @@
-"""What needs no network: ridge regression and gradient boosting on a page of hand-made features, beside the
-networks."""
+"""What needs no network: ridge regression and gradient boosting on a page of hand-made features,
+beside the networks."""
 
 from __future__ import annotations
 
@@ -69,16 +69,27 @@ def check_stated(train: Pairs, *judged: Pairs) -> tuple[str, ...]:
     return targets
 
 
-def fit_baselines(train: Pairs, *judged: Pairs, cache: Path, workers: int, seed: int, bars: Bars) -> Fitted:
-    """Fits ridge and gradient boosting on crops of the training side's films, to what the judged clips state, too.
+def fit_baselines(
+    train: Pairs, *judged: Pairs, cache: Path, workers: int, seed: int, bars: Bars
+) -> Fitted:
+    """Fits ridge and gradient boosting on crops of the training side's films, to what the judged
+    clips state, too.
 
     Raises:
         InputError: see `check_stated`.
     """
     targets = check_stated(train, *judged)
-    with bars(len(set(train.table.recording.tolist())), "hand-made features to fit on", "film") as advance:
+    with bars(
+        len(set(train.table.recording.tolist())), "hand-made features to fit on", "film"
+    ) as advance:
         inputs = prepare_films(
-            train, _FRONT_END, _CROPPING, variants=_VARIANTS, folder=cache, workers=workers, advance=advance
+            train,
+            _FRONT_END,
+            _CROPPING,
+            variants=_VARIANTS,
+            folder=cache,
+            workers=workers,
+            advance=advance,
         )
     x, y = _table(inputs, _VARIANTS), np.tile(inputs.truth(targets), (_VARIANTS, 1))
     group = np.tile(inputs.sequence, _VARIANTS)
@@ -88,18 +99,25 @@ def fit_baselines(train: Pairs, *judged: Pairs, cache: Path, workers: int, seed:
     return Fitted(targets=targets, ridge=ridge, boosting=boosting)
 
 
-def predictions(train: Pairs, pairs: Pairs, *, cache: Path, workers: int, seed: int, bars: Bars) -> list[Predictions]:
+def predictions(
+    train: Pairs, pairs: Pairs, *, cache: Path, workers: int, seed: int, bars: Bars
+) -> list[Predictions]:
     """Predicts the targets of another side's clips by both models."""
     models = fit_baselines(train, pairs, cache=cache, workers=workers, seed=seed, bars=bars)
     targets, ridge, boosting = models.targets, models.ridge, models.boosting
     with bars(len(pairs), "hand-made features to judge", "clip") as advance:
-        inputs = prepare_clips(pairs, _FRONT_END, _CROPPING, folder=cache, workers=workers, advance=advance)
+        inputs = prepare_clips(
+            pairs, _FRONT_END, _CROPPING, folder=cache, workers=workers, advance=advance
+        )
     wanted, truth = _table(inputs, 1), inputs.truth(targets)
     spent = milliseconds(lambda clip: _features(clip[0]), timed_clips(pairs, _FRONT_END))
     common = {"targets": targets, "truth": truth, "group": inputs.sequence, "embedding": None}
     note = f"{len(FEATURES)} hand-made features, {_VARIANTS} crops of each film"
     if len(targets) < len(TARGETS):
-        note += f"; not judged by {', '.join(sorted({*TARGETS} - {*targets}))}, which not all clips state"
+        note += (
+            f"; not judged by {', '.join(sorted({*TARGETS} - {*targets}))}, which not all clips "
+            "state"
+        )
     return [
         Predictions(
             label="ridge",
@@ -130,5 +148,8 @@ def _features(film: UInt8Array) -> Tensor:
 
 def _table(prepared: Prepared, variants: int) -> FloatArray:
     entries = np.arange(len(prepared))
-    parts = [prepared.batch(entries, np.full(len(entries), variant)).double().numpy() for variant in range(variants)]
+    parts = [
+        prepared.batch(entries, np.full(len(entries), variant)).double().numpy()
+        for variant in range(variants)
+    ]
     return np.concatenate(parts)

@@ -1,7 +1,9 @@
-"""What a linear model reads out of an embedding: PCA, linear regression, one left out at a time, Pearson's r.
+"""What a linear model reads out of an embedding: PCA, linear regression, one left out at a time,
+Pearson's r.
 
-Bouman, Xiao, Battaglia and Freeman, Estimating the material properties of fabric from video, ICCV 2013, as in Runia et
-al., Cloth in the Wind, CVPR 2020, section 6: r of log stiffness and log area weight.
+Bouman, Xiao, Battaglia and Freeman, Estimating the material properties of fabric from video, ICCV
+2013, as in Runia et al., Cloth in the Wind, CVPR 2020, section 6: r of log stiffness and log area
+weight.
 """
 
 from __future__ import annotations
@@ -50,20 +52,21 @@ def bouman(
     generator: np.random.Generator,
     components: int = COMPONENTS,
 ) -> Readout:
-    """Reads quantities out of an embedding by the protocol on logarithms of positive quantities, usually stiffness and
-    area weight.
+    """Reads quantities out of an embedding by the protocol on logarithms of positive quantities,
+    usually stiffness and area weight.
 
     Args:
         embedding: (n, d).
         quantities: (n,) each, positive; SI.
-        group: (n,) of what is left out together: `np.arange(n)` leaves out one clip at a time, as the paper does; clips
-            of one cloth should share a group, else its twin stays in the training set.
+        group: (n,) of what is left out together: `np.arange(n)` leaves out one clip at a time, as
+            the paper does; clips of one cloth should share a group, else its twin stays in the
+            training set.
         generator: of the bootstrap.
         components: to keep; fewer where the clips do not suffice, which a finding says.
 
     Raises:
-        InputError: fewer than four clips or three groups, a quantity that is not positive or the same in all clips,
-            lengths that do not fit.
+        InputError: fewer than four clips or three groups, a quantity that is not positive or the
+            same in all clips, lengths that do not fit.
     """
     for name, values in quantities.items():
         if values.shape != (len(embedding),) or not (np.isfinite(values) & (values > 0)).all():
@@ -74,7 +77,9 @@ def bouman(
             )
         if np.ptp(values) == 0:
             raise InputError(
-                f"{name} is the same in all clips", where="the quantities", fix="a correlation needs cloths that differ"
+                f"{name} is the same in all clips",
+                where="the quantities",
+                fix="a correlation needs cloths that differ",
             )
     truth = np.log(np.column_stack(list(quantities.values())))
     used, findings = _admissible(embedding, group, components)
@@ -82,7 +87,9 @@ def bouman(
     resamples = Resamples.of(group, generator=generator)
     pearson = tuple(
         estimate(
-            SCORES["pearson"].value(resamples.sums(SCORES["pearson"].terms(truth[:, i], predicted[:, i]))),
+            SCORES["pearson"].value(
+                resamples.sums(SCORES["pearson"].terms(truth[:, i], predicted[:, i]))
+            ),
             clips=len(truth),
             groups=resamples.groups,
         )
@@ -98,9 +105,11 @@ def bouman(
     )
 
 
-def _admissible(embedding: NDArray[np.floating], group: IntArray, components: int) -> tuple[int, tuple[Finding, ...]]:
-    """Limits components to three fifths of a fold's degrees of freedom, which admits the paper's 50 components of 90
-    clips."""
+def _admissible(
+    embedding: NDArray[np.floating], group: IntArray, components: int
+) -> tuple[int, tuple[Finding, ...]]:
+    """Limits components to three fifths of a fold's degrees of freedom, which admits the paper's 50
+    components of 90 clips."""
     clips, dimension = embedding.shape
     size = np.unique(group, return_counts=True)[1]
     if clips < 4 or len(size) < 3:
@@ -110,12 +119,18 @@ def _admissible(embedding: NDArray[np.floating], group: IntArray, components: in
             fix="give at least four clips and three groups",
         )
     if components < 1:
-        raise InputError(f"{components} components are too few", where="components", fix="give at least 1")
+        raise InputError(
+            f"{components} components are too few", where="components", fix="give at least 1"
+        )
     training = clips - int(size.max())
     most = max(1, min(dimension, 3 * (training - 1) // 5))
     if components <= most:
         return components, ()
-    reason = f"the embedding has {dimension} dimensions" if most == dimension else f"{training} clips train a fold"
+    reason = (
+        f"the embedding has {dimension} dimensions"
+        if most == dimension
+        else f"{training} clips train a fold"
+    )
     text = f"{most} principal components are kept, not {components}: {reason}"
     return most, (Finding.of("fewer-components", text, value=float(most)),)
 
@@ -125,9 +140,10 @@ def leave_one_group_out(
 ) -> FloatArray:
     """Predicts (n, t) for each group by principal component regression on all others.
 
-    PCA and regression are both fitted without the group. The other groups' scatter and cross moments are the whole's
-    less the group's own (a closed form, exact), so a fold costs one eigenvalue problem of min(n - 1, d) rows.
-    Coordinates are first turned into the embedding's own row space, which loses nothing and changes no PCA.
+    PCA and regression are both fitted without the group. The other groups' scatter and cross
+    moments are the whole's less the group's own (a closed form, exact), so a fold costs one
+    eigenvalue problem of min(n - 1, d) rows. Coordinates are first turned into the embedding's own
+    row space, which loses nothing and changes no PCA.
 
     Args:
         embedding: (n, d).

@@ -1,7 +1,8 @@
-"""What the paper printed of its models on FlagSim, quoted to stand beside ours: it is not an aim to tune to.
+"""What the paper printed of its models on FlagSim, quoted to stand beside ours: it is not an aim to
+tune to.
 
-Runia et al., Cloth in the Wind, CVPR 2020: the supplement's table of wind speeds on FlagSim (0 to 10 m/s, 3,500 clips),
-and section 6's triplet accuracies.
+Runia et al., Cloth in the Wind, CVPR 2020: the supplement's table of wind speeds on FlagSim (0 to
+10 m/s, 3,500 clips), and section 6's triplet accuracies.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from models.evaluation.scores import rmse_bound
 
 @dataclass(frozen=True, kw_only=True)
 class Quoted:
-    """A row of the paper's table: its input (frames × height × width), RMSE and Acc@0.5 as printed."""
+    """A row of the paper's table: its input (frames × height × width), RMSE and Acc@0.5 as
+    printed."""
 
     model: str
     input_size: str
@@ -42,6 +44,8 @@ FLAGSIM = (
 TRIPLETS = ((10, 0.893), (20, 0.921), (30, 0.963), (40, 0.901), (50, 0.924))
 """(frames, triplet accuracy) of the paper's SDN."""
 WARNING = (
-    "If a share 1 − A of the errors exceeds 0.5 m/s, then RMSE ≥ 0.5 √(1 − A) m/s. Four rows of the paper's table "
-    "break this bound, so its two columns cannot be in the same units. They are quoted, not compared with."
+    "If a share 1 − A of the errors exceeds 0.5 m/s, then RMSE ≥ 0.5 √(1 − A) m/s. Four rows of "
+    "the paper's table "
+    "break this bound, so its two columns cannot be in the same units. They are quoted, not "
+    "compared with."
 )

@@ -1,4 +1,5 @@
-"""What a trained model of the lake says of the clips of a side: the `Predictions` that all scores are made of."""
+"""What a trained model of the lake says of the clips of a side: the `Predictions` that all scores
+are made of."""
 
 from __future__ import annotations
 
@@ -28,14 +29,16 @@ _TOGETHER = 64
 _TIMED = 12  # clips
 _RIDGE = 1e-3  # of the mean eigenvalue of the embeddings' covariance
 READ_FROM = ("wind_speed", "area_weight", "bending_scale", "anisotropy")
-"""Targets that a model without a head is read for, by ridge regression of its embeddings of training clips."""
+"""Targets that a model without a head is read for, by ridge regression of its embeddings of
+training clips."""
 
 
 def judged_targets(estimator: Estimator, *clips: Mapping[str, FloatArray]) -> tuple[str, ...]:
     """Selects the targets that a model is judged by: those that every clip states, by their keys.
 
     Args:
-        clips: name → (n,) parameters of the clips that are judged, and of those that embeddings are read by.
+        clips: name → (n,) parameters of the clips that are judged, and of those that embeddings are
+            read by.
 
     Raises:
         InputError: there is none.
@@ -67,11 +70,11 @@ def predict(
     """Predicts the targets of prepared clips by a model.
 
     Args:
-        note: what tables say beside the model; targets that are not judged, since not all clips state them, and clips
-            whose truth lies beyond the model's ranges are added to it.
+        note: what tables say beside the model; targets that are not judged, since not all clips
+            state them, and clips whose truth lies beyond the model's ranges are added to it.
         known: statements about quantities of all clips, by name; only distributions use it.
-        fitted_on: clips of the training side, needed by a model without a head, whose embeddings are then read by ridge
-            regression.
+        fitted_on: clips of the training side, needed by a model without a head, whose embeddings
+            are then read by ridge regression.
 
     Raises:
         InputError: see `judged_targets`.
@@ -102,7 +105,9 @@ def predict(
         samples=samples,
         embedding=embedding,
         group=prepared.sequence,
-        parameters=sum(w.numel() for member in estimator.learners for w in member.network.parameters()),
+        parameters=sum(
+            w.numel() for member in estimator.learners for w in member.network.parameters()
+        ),
         milliseconds=milliseconds,
         note=note,
     )
@@ -117,9 +122,12 @@ def _predict_entries(
         inputs = _batch(prepared, first).to(estimator.device)
         if learner.objective is Loss.POSTERIOR:
             statements = [
-                Known.everywhere(name, statement, count=len(inputs)) for name, statement in (known or {}).items()
+                Known.everywhere(name, statement, count=len(inputs))
+                for name, statement in (known or {}).items()
             ]
-            estimates = estimator.estimate(inputs, seed=child_seed(seed, "clips", first), draws=DRAWS, known=statements)
+            estimates = estimator.estimate(
+                inputs, seed=child_seed(seed, "clips", first), draws=DRAWS, known=statements
+            )
             draws.append(estimates.draws)
             means.append(estimates.mean)
             embeddings.append(estimates.summary)
@@ -128,7 +136,11 @@ def _predict_entries(
             embedding = learner.network(inputs)
             means.append(learner.point_estimates(embedding).double().cpu().numpy())
             embeddings.append(embedding.float().cpu().numpy())
-    return np.concatenate(draws) if draws else None, np.concatenate(means), np.concatenate(embeddings)
+    return (
+        np.concatenate(draws) if draws else None,
+        np.concatenate(means),
+        np.concatenate(embeddings),
+    )
 
 
 @torch.no_grad()
@@ -143,7 +155,11 @@ def embed_entries(learner: Learner, prepared: Prepared) -> np.ndarray:
 
 
 def _read(
-    embedding: np.ndarray, prepared: Prepared, fitted_on: Prepared, learner: Learner, targets: tuple[str, ...]
+    embedding: np.ndarray,
+    prepared: Prepared,
+    fitted_on: Prepared,
+    learner: Learner,
+    targets: tuple[str, ...],
 ) -> np.ndarray:
     """Predicts (n, target) by ridge regression on the embeddings of `fitted_on`."""
     fitted = embed_entries(learner, fitted_on).astype(np.float64)
@@ -167,7 +183,8 @@ def timed_clips(pairs: Pairs, front_end: FrontEnd) -> list[UInt8Array]:
 
 @torch.no_grad()
 def time_a_clip(estimator: Estimator, pairs: Pairs) -> float:
-    """Milliseconds a clip takes on one core from its pixels: the median of some clips, one at a time."""
+    """Milliseconds a clip takes on one core from its pixels: the median of some clips, one at a
+    time."""
 
     def work(clip: UInt8Array) -> None:
         inputs = estimator.inputs(clip)

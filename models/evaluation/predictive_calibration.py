@@ -1,8 +1,9 @@
 """Whether predictive distributions say how wrong they are: coverage, PIT, rank histogram and TARP.
 
-All rest on ranks. Of s draws, u are below the truth and v are below or equal; were truth and draws exchangeable, a
-uniform point of the cell [u / (s + 1), (v + 1) / (s + 1)] would be uniform over [0, 1], whatever s is. Shares are
-expectations over that point, in closed form, so that they are neither random nor biased by a small s.
+All rest on ranks. Of s draws, u are below the truth and v are below or equal; were truth and draws
+exchangeable, a uniform point of the cell [u / (s + 1), (v + 1) / (s + 1)] would be uniform over [0,
+1], whatever s is. Shares are expectations over that point, in closed form, so that they are neither
+random nor biased by a small s.
 """
 
 from __future__ import annotations
@@ -65,10 +66,12 @@ class RankHistogram:
     """Simulation-based calibration (Talts et al., arXiv:1804.06788, 2018) in equal bins.
 
     Attributes:
-        share: of the clips, each group weighing the same, in each bin; 1 / bins if calibrated. A hump says that the
-            distributions are too wide, a trough that they are too narrow, a slope that they are biased.
-        low, high: where `BAND` of the shares of a calibrated model lie at least, bin by bin: binomial with one clip a
-            group. Means over a group's clips vary less, however they depend on each other.
+        share: of the clips, each group weighing the same, in each bin; 1 / bins if calibrated. A
+            hump says that the distributions are too wide, a trough that they are too narrow, a
+            slope that they are biased.
+        low, high: where `BAND` of the shares of a calibrated model lie at least, bin by bin:
+            binomial with one clip a group. Means over a group's clips vary less, however they
+            depend on each other.
         groups: how many sequences.
     """
 
@@ -104,9 +107,11 @@ def _draws(predictions: Predictions) -> Float32Array:
     return predictions.samples
 
 
-def coverage_values(predictions: Predictions, target: str, level: float, resamples: Resamples) -> FloatArray:
-    """Computes (1 + draws,): share of clips whose central interval of a level has the truth, in the data and in each
-    draw."""
+def coverage_values(
+    predictions: Predictions, target: str, level: float, resamples: Resamples
+) -> FloatArray:
+    """Computes (1 + draws,): share of clips whose central interval of a level has the truth, in the
+    data and in each draw."""
     return _mean(cells(predictions, target).central(level), resamples)
 
 
@@ -116,24 +121,35 @@ def _mean(share: FloatArray, resamples: Resamples) -> FloatArray:
 
 
 def coverage(
-    runs: tuple[Predictions, ...], target: str, resamples: Resamples, *, levels: tuple[float, ...] = LEVELS
+    runs: tuple[Predictions, ...],
+    target: str,
+    resamples: Resamples,
+    *,
+    levels: tuple[float, ...] = LEVELS,
 ) -> tuple[Coverage, ...]:
-    """Measures the covered share of central intervals at nominal levels, mean over runs of one model, with intervals
-    over groups."""
+    """Measures the covered share of central intervals at nominal levels, mean over runs of one
+    model, with intervals over groups."""
     ranks = [cells(run, target) for run in runs]
-    return tuple(_coverage_of(level, [of.central(level) for of in ranks], resamples) for level in levels)
+    return tuple(
+        _coverage_of(level, [of.central(level) for of in ranks], resamples) for level in levels
+    )
 
 
 def _coverage_of(level: float, shares: list[FloatArray], resamples: Resamples) -> Coverage:
     values = np.mean([_mean(share, resamples) for share in shares], axis=0)
-    return Coverage(level=level, share=estimate(values, clips=len(shares[0]), groups=resamples.groups))
+    return Coverage(
+        level=level, share=estimate(values, clips=len(shares[0]), groups=resamples.groups)
+    )
 
 
-def rank_histogram(runs: tuple[Predictions, ...], target: str, *, bins: int = BINS) -> RankHistogram:
-    """Counts the ranks of the truths among the draws in `bins` bins (simulation-based calibration), mean over runs of
-    one model, with a calibrated model's band.
+def rank_histogram(
+    runs: tuple[Predictions, ...], target: str, *, bins: int = BINS
+) -> RankHistogram:
+    """Counts the ranks of the truths among the draws in `bins` bins (simulation-based calibration),
+    mean over runs of one model, with a calibrated model's band.
 
-    A cell that reaches over an edge counts in both bins by its shares, so s + 1 need not be a multiple of the bins.
+    A cell that reaches over an edge counts in both bins by its shares, so s + 1 need not be a
+    multiple of the bins.
     """
     if bins < 2:
         raise InputError(f"{bins} bins are too few", where="bins", fix="give at least 2")
@@ -144,7 +160,9 @@ def rank_histogram(runs: tuple[Predictions, ...], target: str, *, bins: int = BI
     groups = len(size)
     low, high = binom.interval(BAND, groups, 1 / bins)
     return RankHistogram(
-        share=tuple(float(share) for share in (np.diff(below, axis=0) / size[index]).sum(axis=1) / groups),
+        share=tuple(
+            float(share) for share in (np.diff(below, axis=0) / size[index]).sum(axis=1) / groups
+        ),
         low=float(low) / groups,
         high=float(high) / groups,
         groups=groups,
@@ -158,12 +176,15 @@ def tarp(
     generator: np.random.Generator,
     levels: tuple[float, ...] = CURVE,
 ) -> tuple[Coverage, ...]:
-    """Tests expected coverage of all targets together with random points (TARP), mean over runs of one model.
+    """Tests expected coverage of all targets together with random points (TARP), mean over runs of
+    one model.
 
-    Each clip gets a reference point, uniform over the box of all truths and independent of the clip. The ball around it
-    that reaches to the truth holds a share of the draws; if the distributions are calibrated, that share is uniform.
-    Lemos, Coogan, Hezaveh and Perreault-Levasseur, ICML 2023, algorithm 2. Distances are Euclidean, each target over
-    its range. A model whose distributions are all the prior is calibrated too: this says nothing of sharpness.
+    Each clip gets a reference point, uniform over the box of all truths and independent of the
+    clip. The ball around it that reaches to the truth holds a share of the draws; if the
+    distributions are calibrated, that share is uniform. Lemos, Coogan, Hezaveh and
+    Perreault-Levasseur, ICML 2023, algorithm 2. Distances are Euclidean, each target over its
+    range. A model whose distributions are all the prior is calibrated too: this says nothing of
+    sharpness.
 
     Args:
         runs: with samples.
@@ -176,7 +197,9 @@ def tarp(
     """
     reference = generator.uniform(size=runs[0].truth.shape)
     ranks = [_ball(run, reference) for run in runs]
-    return tuple(_coverage_of(level, [of.below(level) for of in ranks], resamples) for level in levels)
+    return tuple(
+        _coverage_of(level, [of.below(level) for of in ranks], resamples) for level in levels
+    )
 
 
 def _ball(predictions: Predictions, reference: FloatArray) -> Cells:

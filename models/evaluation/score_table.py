@@ -1,4 +1,5 @@
-"""One table of all models on the same clips: the contents of each row, and how its cells are written."""
+"""One table of all models on the same clips: the contents of each row, and how its cells are
+written."""
 
 from __future__ import annotations
 
@@ -36,7 +37,8 @@ class Row:
         runs: how many runs the row rests on.
         scores: by metric; a metric that the model has no output for is missing.
         spread: lowest and highest of the runs by metric; empty for one run.
-        bound: the least RMSE [m/s] that goes with the accuracy: of several runs the mean of theirs, None without wind.
+        bound: the least RMSE [m/s] that goes with the accuracy: of several runs the mean of theirs,
+            None without wind.
         parameters: of the network.
         milliseconds: a clip, mean over runs [ms].
         note: input size, epochs, what differs from the paper.
@@ -59,7 +61,9 @@ class Row:
             "run": self.run,
             "runs": self.runs,
             "scores": {name: score.as_dict() for name, score in self.scores.items()},
-            "range_of_runs": {name: list(ends) for name, ends in self.spread.items() if np.isfinite(ends).all()},
+            "range_of_runs": {
+                name: list(ends) for name, ends in self.spread.items() if np.isfinite(ends).all()
+            },
             "bound": self.bound,
             "parameters": self.parameters,
             "milliseconds": self.milliseconds,
@@ -83,7 +87,8 @@ class TargetRow:
 
 @dataclass(frozen=True, kw_only=True)
 class Difference:
-    """A model's score less the reference's on the same draws of sequences; means over runs of both."""
+    """A model's score less the reference's on the same draws of sequences; means over runs of
+    both."""
 
     label: str
     reference: str
@@ -110,10 +115,13 @@ def models(predictions: Sequence[Predictions]) -> dict[str, tuple[Predictions, .
     """Groups the runs by label, in the order given, all on the same clips.
 
     Raises:
-        InputError: no predictions; clips, sequences or truths that differ; runs of one label that are not one model.
+        InputError: no predictions; clips, sequences or truths that differ; runs of one label that
+            are not one model.
     """
     if not predictions:
-        raise InputError("there are no predictions", where="the table", fix="give those of at least one model")
+        raise InputError(
+            "there are no predictions", where="the table", fix="give those of at least one model"
+        )
     for former, second in combinations(predictions, 2):
         check_same_clips(former, second)
     models_of: dict[str, tuple[Predictions, ...]] = {}
@@ -134,24 +142,36 @@ def check_same_clips(first: Predictions, second: Predictions) -> None:
     """Refuses two predictions that are not of the same clips in the same order.
 
     Raises:
-        InputError: another number of clips, other sequences, or another truth of a target that both have.
+        InputError: another number of clips, other sequences, or another truth of a target that both
+            have.
     """
     where = f"{first.label!r} and {second.label!r}"
     fix = "evaluate all models on the same clips of the same split, in the same order"
     if not np.array_equal(first.group, second.group):
         raise InputError("the models were not tested on the same sequences", where=where, fix=fix)
     for target in set(first.targets) & set(second.targets):
-        if not np.array_equal(first.truth[:, first.column(target)], second.truth[:, second.column(target)]):
-            raise InputError(f"the models were not tested on the same truth of {target}", where=where, fix=fix)
+        if not np.array_equal(
+            first.truth[:, first.column(target)], second.truth[:, second.column(target)]
+        ):
+            raise InputError(
+                f"the models were not tested on the same truth of {target}", where=where, fix=fix
+            )
 
 
-def metric_values(predictions: Predictions, resamples: Resamples, triplets: IntArray | None) -> Values:
+def metric_values(
+    predictions: Predictions, resamples: Resamples, triplets: IntArray | None
+) -> Values:
     """Computes every metric of the table that these predictions have an output for."""
     values = {}
     if WIND in predictions.targets:
-        values = {name: SCORES[name].values(predictions, WIND, resamples) for name in ("rmse", "accuracy", "bias")}
+        values = {
+            name: SCORES[name].values(predictions, WIND, resamples)
+            for name in ("rmse", "accuracy", "bias")
+        }
     if AREA_WEIGHT in predictions.targets:
-        values["area_weight_error"] = SCORES["relative_error"].values(predictions, AREA_WEIGHT, resamples)
+        values["area_weight_error"] = SCORES["relative_error"].values(
+            predictions, AREA_WEIGHT, resamples
+        )
     if predictions.samples is not None and WIND in predictions.targets:
         for level in LEVELS:
             values[_coverage_heading(level)] = coverage_values(predictions, WIND, level, resamples)
@@ -169,7 +189,9 @@ def mean_values(runs: Sequence[Values]) -> Values:
     return {name: np.mean([run[name] for run in runs], axis=0) for name in runs[0]}
 
 
-def rows(runs: tuple[Predictions, ...], values: Sequence[Values], resamples: Resamples) -> tuple[Row, ...]:
+def rows(
+    runs: tuple[Predictions, ...], values: Sequence[Values], resamples: Resamples
+) -> tuple[Row, ...]:
     """Returns the model's row and, below it, its runs' if there are several."""
     first = runs[0]
     single = tuple(
@@ -220,7 +242,8 @@ def _row(
         run=run,
         runs=runs,
         scores={
-            name: estimate(draws, clips=predictions.clips, groups=resamples.groups) for name, draws in values.items()
+            name: estimate(draws, clips=predictions.clips, groups=resamples.groups)
+            for name, draws in values.items()
         },
         spread=spread,
         bound=bound,
@@ -243,7 +266,8 @@ def target_rows(runs: tuple[Predictions, ...], resamples: Resamples) -> tuple[Ta
     scored = []
     for target in runs[0].targets:
         values = {
-            name: [SCORES[name].values(predictions, target, resamples) for predictions in runs] for name in OF_TARGETS
+            name: [SCORES[name].values(predictions, target, resamples) for predictions in runs]
+            for name in OF_TARGETS
         }
         scores = {
             name: estimate(np.mean(of, axis=0), clips=runs[0].clips, groups=resamples.groups)
@@ -256,7 +280,8 @@ def target_rows(runs: tuple[Predictions, ...], resamples: Resamples) -> tuple[Ta
 def differences(
     values: Mapping[str, Values], reference: str, *, clips: int, groups: int, metrics: Sequence[str]
 ) -> tuple[Difference, ...]:
-    """Computes paired differences of every other model against `reference`, for the metrics that both have.
+    """Computes paired differences of every other model against `reference`, for the metrics that
+    both have.
 
     Args:
         values: of each label, means over its runs, all of the same resamples.
@@ -266,7 +291,9 @@ def differences(
             label=label,
             reference=reference,
             metric=metric,
-            difference=estimate(scores[metric] - values[reference][metric], clips=clips, groups=groups),
+            difference=estimate(
+                scores[metric] - values[reference][metric], clips=clips, groups=groups
+            ),
         )
         for label, scores in values.items()
         if label != reference
@@ -277,7 +304,8 @@ def differences(
 
 @dataclass(frozen=True, kw_only=True)
 class TableColumn:
-    """A column of the table: its heading, and its cell of a row as lines: the value first, what belongs to it below."""
+    """A column of the table: its heading, and its cell of a row as lines: the value first, what
+    belongs to it below."""
 
     heading: str
     cell: Callable[[Row], tuple[str, ...]]
@@ -299,7 +327,10 @@ def cell(score: ScoreEstimate | None, digits: int) -> tuple[str, ...]:
         return (_NONE,)
     if not score.has_interval:
         return (number(score.value, digits), "no interval: one sequence")
-    return (number(score.value, digits), f"[{number(score.low, digits)}, {number(score.high, digits)}]")
+    return (
+        number(score.value, digits),
+        f"[{number(score.low, digits)}, {number(score.high, digits)}]",
+    )
 
 
 def _scored_cells(metric: str, digits: int) -> Callable[[Row], tuple[str, ...]]:
@@ -324,14 +355,21 @@ def _coverage(row: Row) -> tuple[str, ...]:
     if any(score is None for score in scores):
         return (_NONE,)
     values = " / ".join(number(100 * score.value, 0) for score in scores if score is not None)
-    ends = [f"{number(100 * s.low, 0)}–{number(100 * s.high, 0)}" for s in scores if s is not None and s.has_interval]
+    ends = [
+        f"{number(100 * s.low, 0)}–{number(100 * s.high, 0)}"
+        for s in scores
+        if s is not None and s.has_interval
+    ]
     return (values, f"[{', '.join(ends)}]") if ends else (values,)
 
 
 COLUMNS = (
     TableColumn(heading="model", cell=_model),
     TableColumn(heading="wind RMSE [m/s]", cell=_scored_cells("rmse", 3)),
-    TableColumn(heading="bound", cell=lambda row: (_NONE if row.bound is None else f"≥ {number(row.bound, 3)}",)),
+    TableColumn(
+        heading="bound",
+        cell=lambda row: (_NONE if row.bound is None else f"≥ {number(row.bound, 3)}",),
+    ),
     TableColumn(heading="Acc@0.5", cell=_scored_cells("accuracy", 3)),
     TableColumn(heading="wind bias [m/s]", cell=_scored_cells("bias", 3)),
     TableColumn(heading="area weight error / spread", cell=_scored_cells("area_weight_error", 3)),
@@ -342,9 +380,13 @@ COLUMNS = (
     TableColumn(heading="note", cell=lambda row: (row.note or _NONE,)),
 )
 LEGEND = (
-    f"Brackets: {100 * LEVEL:.0f} % intervals, sequences drawn with replacement; of several runs they are the mean's "
-    "and do not include the scatter between training runs, which the range of the runs shows. Bound: "
-    "0.5 √(1 − Acc@0.5) m/s, the least RMSE that goes with the accuracy. Area weight error / spread: RMSE over the "
-    "standard deviation of the true area weight over the clips tested, which are draws of its prior; 1 for a constant "
+    f"Brackets: {100 * LEVEL:.0f} % intervals, sequences drawn with replacement; of several runs "
+    "they are the mean's "
+    "and do not include the scatter between training runs, which the range of the runs shows. "
+    "Bound: "
+    "0.5 √(1 − Acc@0.5) m/s, the least RMSE that goes with the accuracy. Area weight error / "
+    "spread: RMSE over the "
+    "standard deviation of the true area weight over the clips tested, which are draws of its "
+    "prior; 1 for a constant "
     "prediction of the mean."
 )

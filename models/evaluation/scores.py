@@ -1,4 +1,5 @@
-"""Scores of point estimates: RMSE, Acc@0.5, bias, R², Pearson's r, error against wind, and a bound between two of them.
+"""Scores of point estimates: RMSE, Acc@0.5, bias, R², Pearson's r, error against wind, and a bound
+between two of them.
 
 All in the units of the target; wind speed in m/s.
 """
@@ -41,23 +42,28 @@ class Score:
     def values(self, predictions: Predictions, target: str, resamples: Resamples) -> FloatArray:
         """Computes (1 + draws,): the score of the data, then of each draw."""
         column = predictions.column(target)
-        return self.value(resamples.sums(self.terms(predictions.truth[:, column], predictions.mean[:, column])))
+        return self.value(
+            resamples.sums(self.terms(predictions.truth[:, column], predictions.mean[:, column]))
+        )
 
 
 def _errors(truth: FloatArray, mean: FloatArray) -> FloatArray:
     error = mean - truth
-    return np.column_stack([np.ones_like(error), error, error**2, (np.abs(error) <= TOLERANCE).astype(np.float64)])
+    return np.column_stack(
+        [np.ones_like(error), error, error**2, (np.abs(error) <= TOLERANCE).astype(np.float64)]
+    )
 
 
 def _moments(truth: FloatArray, mean: FloatArray) -> FloatArray:
-    """Tabulates the moments 1, y, y², e², m, m², ym with y and m less their means, on which no score of them
-    depends."""
+    """Tabulates the moments 1, y, y², e², m, m², ym with y and m less their means, on which no
+    score of them depends."""
     y, m, error = truth - truth.mean(), mean - mean.mean(), mean - truth
     return np.column_stack([np.ones_like(y), y, y**2, error**2, m, m**2, y * m])
 
 
 def _variance(sums: FloatArray, first: int, second: int) -> FloatArray:
-    """Computes n times the variance, 0 where rounding makes it less than 1e-12 of the sum of squares."""
+    """Computes n times the variance, 0 where rounding makes it less than 1e-12 of the sum of
+    squares."""
     scatter = sums[:, second] - sums[:, first] ** 2 / sums[:, 0]
     return np.where(scatter > 1e-12 * sums[:, second], scatter, 0.0)
 
@@ -79,29 +85,36 @@ SCORES: dict[str, Score] = {
     "r_squared": Score(terms=_moments, value=lambda sums: 1 - _relative(sums) ** 2),
     "pearson": Score(terms=_moments, value=_pearson),
 }
-"""By name. "accuracy" is the share of clips whose error is at most 0.5 (Acc@0.5 for wind in m/s); "bias" is the mean of
-estimate less truth; "relative_error" is the RMSE over the standard deviation of the truth over the clips tested, which
-is 1 for a constant prediction of their mean, and equals √(1 - R²)."""
+"""By name. "accuracy" is the share of clips whose error is at most 0.5 (Acc@0.5 for wind in m/s);
+"bias" is the mean of estimate less truth; "relative_error" is the RMSE over the standard deviation
+of the truth over the clips tested, which is 1 for a constant prediction of their mean, and equals
+√(1 - R²)."""
 
 
 def rmse_bound(accuracy: float) -> float:
     """Bounds from below the RMSE [m/s] that goes with an Acc@0.5: RMSE ≥ 0.5 √(1 - A).
 
-    Proof. Let e be the errors of n clips and A the share of those with |e| ≤ 0.5. The other (1 - A) n clips have
-    e² > 0.25, and no square is negative, so n RMSE² = Σ e² ≥ 0.25 (1 - A) n. Equality is approached by errors of 0 and
-    of just more than 0.5. ∎ (Chebyshev's inequality for the empirical distribution.)
+    Proof. Let e be the errors of n clips and A the share of those with |e| ≤ 0.5. The other (1 - A)
+    n clips have e² > 0.25, and no square is negative, so n RMSE² = Σ e² ≥ 0.25 (1 - A) n. Equality
+    is approached by errors of 0 and of just more than 0.5. ∎ (Chebyshev's inequality for the
+    empirical distribution.)
 
     Raises:
         InputError: the accuracy is no share.
     """
     if not 0 <= accuracy <= 1:
-        raise InputError(f"the accuracy {accuracy:g} is no share", where="accuracy", fix="give a share between 0 and 1")
+        raise InputError(
+            f"the accuracy {accuracy:g} is no share",
+            where="accuracy",
+            fix="give a share between 0 and 1",
+        )
     return TOLERANCE * math.sqrt(1 - accuracy)
 
 
 @dataclass(frozen=True, kw_only=True)
 class BinError:
-    """Errors of clips whose true wind lies in a bin [m/s]: `low` belongs to it, `high` to the last bin only."""
+    """Errors of clips whose true wind lies in a bin [m/s]: `low` belongs to it, `high` to the last
+    bin only."""
 
     low: float
     high: float
@@ -112,8 +125,8 @@ class BinError:
 def error_against(
     predictions: tuple[Predictions, ...], target: str, resamples: Resamples, *, width: float = BIN
 ) -> tuple[BinError, ...]:
-    """Computes RMSE and bias by the truth's bin, means over runs of one model on the same clips; empty bins are left
-    out."""
+    """Computes RMSE and bias by the truth's bin, means over runs of one model on the same clips;
+    empty bins are left out."""
     truth = predictions[0].truth[:, predictions[0].column(target)]
     first = math.floor(truth.min() / width)
     count = max(1, math.ceil(truth.max() / width) - first)
@@ -123,7 +136,8 @@ def error_against(
         inside = bins == number
         clips, groups = int(inside.sum()), len(np.unique(resamples.index[inside]))
         sums = [
-            resamples.sums(_errors(truth, run.mean[:, run.column(target)]) * inside[:, None]) for run in predictions
+            resamples.sums(_errors(truth, run.mean[:, run.column(target)]) * inside[:, None])
+            for run in predictions
         ]
         rmse = np.mean([np.sqrt(ratio(s[:, 2], s[:, 0])) for s in sums], axis=0)
         bias = np.mean([ratio(s[:, 1], s[:, 0]) for s in sums], axis=0)

@@ -1,7 +1,8 @@
-"""Triplet accuracy of an embedding: how often a clip is nearer to one of its own simulation than to one of another.
+"""Triplet accuracy of an embedding: how often a clip is nearer to one of its own simulation than to
+one of another.
 
-Veit, Belongie and Karaletsos, Conditional similarity networks, CVPR 2017; Runia et al., Cloth in the Wind, CVPR 2020,
-section 6. Distances are Euclidean; ties count half.
+Veit, Belongie and Karaletsos, Conditional similarity networks, CVPR 2017; Runia et al., Cloth in
+the Wind, CVPR 2020, section 6. Distances are Euclidean; ties count half.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ COUNT = 3500
 
 
 def possible(group: IntArray) -> bool:
-    """Returns whether clips (n,) of these groups have any triplet: two groups, one of them with two clips."""
+    """Returns whether clips (n,) of these groups have any triplet: two groups, one of them with two
+    clips."""
     size = np.unique(group, return_counts=True)[1]
     return len(size) > 1 and bool((size > 1).any())
 
@@ -27,8 +29,8 @@ def possible(group: IntArray) -> bool:
 def draw(group: IntArray, *, seed: int, count: int = COUNT) -> IntArray:
     """Draws triplets (count, 3) of clips: anchor, positive, negative; the same for one seed.
 
-    The anchor is uniform among clips that share their group with another, the positive among those others, the negative
-    among clips of other groups.
+    The anchor is uniform among clips that share their group with another, the positive among those
+    others, the negative among clips of other groups.
 
     Raises:
         InputError: there is no triplet, or a count below 1.
@@ -48,10 +50,13 @@ def draw(group: IntArray, *, seed: int, count: int = COUNT) -> IntArray:
     return order[np.column_stack([anchor, positive, negative])]
 
 
-def accuracy_values(embedding: NDArray[np.floating], triplets: IntArray, resamples: Resamples) -> FloatArray:
+def accuracy_values(
+    embedding: NDArray[np.floating], triplets: IntArray, resamples: Resamples
+) -> FloatArray:
     """Computes (1 + draws,) triplet accuracies in the data and in each draw of groups.
 
-    A triplet rests on two sequences; in a draw it counts as often as the product of their occurrences.
+    A triplet rests on two sequences; in a draw it counts as often as the product of their
+    occurrences.
 
     Args:
         embedding: (n, d).

@@ -1,7 +1,7 @@
 """Embeddings laid out in the plane by t-SNE, for a picture with the wind as colour.
 
-Barnes-Hut t-SNE (van der Maaten, JMLR 15:3221, 2014) of scikit-learn, which is loaded only here. Distances between
-clusters and their sizes in such a picture mean nothing.
+Barnes-Hut t-SNE (van der Maaten, JMLR 15:3221, 2014) of scikit-learn, which is loaded only here.
+Distances between clusters and their sizes in such a picture mean nothing.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ CLIPS = 2000
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TsneLayout:
-    """Places (n, 2) of clips in the plane and their true wind (n,) [m/s], of `clips` that were tested."""
+    """Places (n, 2) of clips in the plane and their true wind (n,) [m/s], of `clips` that were
+    tested."""
 
     label: str
     places: FloatArray
@@ -31,7 +32,9 @@ class TsneLayout:
     clips: int
 
 
-def layout(predictions: Predictions, *, seed: int, perplexity: float = PERPLEXITY, most: int = CLIPS) -> TsneLayout:
+def layout(
+    predictions: Predictions, *, seed: int, perplexity: float = PERPLEXITY, most: int = CLIPS
+) -> TsneLayout:
     """Lays out the embedding of a model; the same for one seed.
 
     Args:
@@ -45,7 +48,11 @@ def layout(predictions: Predictions, *, seed: int, perplexity: float = PERPLEXIT
         InputError: no embedding, or no more clips than the perplexity.
     """
     if importlib.util.find_spec("sklearn") is None:
-        raise UsageError("t-SNE needs scikit-learn", where="tsne", fix="pip install scikit-learn, or leave t-SNE out")
+        raise UsageError(
+            "t-SNE needs scikit-learn",
+            where="tsne",
+            fix="pip install scikit-learn, or leave t-SNE out",
+        )
     from sklearn.manifold import TSNE  # pyright: ignore[reportMissingImports]
 
     where = f"predictions of {predictions.label!r}"
@@ -55,7 +62,9 @@ def layout(predictions: Predictions, *, seed: int, perplexity: float = PERPLEXIT
     chosen = np.arange(predictions.clips)
     if predictions.clips > most:
         chosen = np.sort(
-            rng.stream(seed, "evaluation", "t-sne", "clips").choice(predictions.clips, most, replace=False)
+            rng.stream(seed, "evaluation", "t-sne", "clips").choice(
+                predictions.clips, most, replace=False
+            )
         )
     if len(chosen) <= perplexity:
         raise InputError(
@@ -72,4 +81,6 @@ def layout(predictions: Predictions, *, seed: int, perplexity: float = PERPLEXIT
         random_state=rng.child_seed(seed, "evaluation", "t-sne", "optimiser") % 2**32,
     )
     places = optimiser.fit_transform(predictions.embedding[chosen]).astype(np.float64)
-    return TsneLayout(label=predictions.label, places=places, wind=wind[chosen], clips=predictions.clips)
+    return TsneLayout(
+        label=predictions.label, places=places, wind=wind[chosen], clips=predictions.clips
+    )

@@ -1,8 +1,9 @@
-"""Which part of a film a network sees: the paper's augmentation (supplement, "Data Augmentation") and the plain view.
+"""Which part of a film a network sees: the paper's augmentation (supplement, "Data Augmentation")
+and the plain view.
 
-A random run of successive frames, a square of one of several sizes at a random place, resized to the network's, and a
-mirror image half of the time. A mirrored clip has the same wind speed and cloth, and networks estimate nothing that has
-a side.
+A random run of successive frames, a square of one of several sizes at a random place, resized to
+the network's, and a mirror image half of the time. A mirrored clip has the same wind speed and
+cloth, and networks estimate nothing that has a side.
 """
 
 from __future__ import annotations
@@ -48,8 +49,8 @@ class Cropping:
         size: it is resized to [px].
         scales: sides of the squares, as shares of the film's shorter side; one is drawn each time.
         mirror: whether half of the crops are mirror images.
-        conditioned: whether films are conditioned before (`models.conditioning`), and shown at the network's instants
-            whatever their rate.
+        conditioned: whether films are conditioned before (`models.conditioning`), and shown at the
+            network's instants whatever their rate.
 
     Raises:
         InputError: no scale, or one outside of [`LEAST_SCALE`, 1].
@@ -62,15 +63,20 @@ class Cropping:
     conditioned: bool = False
 
     def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values; the entry `conditioned` is left out where it is false, so that older recipes keep their
-        hash."""
+        """Returns JSON values; the entry `conditioned` is left out where it is false, so that older
+        recipes keep their hash."""
         entries = asdict(self)
-        return entries if self.conditioned else {key: value for key, value in entries.items() if key != "conditioned"}
+        return (
+            entries
+            if self.conditioned
+            else {key: value for key, value in entries.items() if key != "conditioned"}
+        )
 
     def __post_init__(self) -> None:
         if not self.scales or not all(LEAST_SCALE <= scale <= 1 for scale in self.scales):
             raise InputError(
-                f"the scales of crops are {self.scales}", fix=f"give shares of the picture, from {LEAST_SCALE:g} to 1"
+                f"the scales of crops are {self.scales}",
+                fix=f"give shares of the picture, from {LEAST_SCALE:g} to 1",
             )
 
     def draw(self, rng: np.random.Generator, shape: tuple[int, int, int]) -> Crop:
@@ -90,20 +96,29 @@ class Cropping:
         )
 
     def whole(self, shape: tuple[int, int, int], *, first: int = 0) -> Crop:
-        """Returns the largest square about the middle of a film of (frames, height, width), from frame `first` on.
+        """Returns the largest square about the middle of a film of (frames, height, width), from
+        frame `first` on.
 
         Raises:
             InputError: the film ends before the clip does.
         """
         count, height, width = self._check_shape(shape)
         if first + self.frames > count:
-            raise InputError(f"{count} frames end before frame {first + self.frames}", fix="begin earlier")
+            raise InputError(
+                f"{count} frames end before frame {first + self.frames}", fix="begin earlier"
+            )
         side = min(height, width)
-        return Crop(first=first, top=(height - side) // 2, left=(width - side) // 2, side=side, mirrored=False)
+        return Crop(
+            first=first,
+            top=(height - side) // 2,
+            left=(width - side) // 2,
+            side=side,
+            mirrored=False,
+        )
 
     def cut(self, film: UInt8Array, crop: Crop) -> Tensor:
-        """Cuts the part out of a film (frames, height, width): (1, frames, size, size), uint8 where nothing was
-        resized, else float32 (bilinear; averaging where it shrinks)."""
+        """Cuts the part out of a film (frames, height, width): (1, frames, size, size), uint8 where
+        nothing was resized, else float32 (bilinear; averaging where it shrinks)."""
         part = film[
             crop.first : crop.first + self.frames,
             crop.top : crop.top + crop.side,
@@ -113,7 +128,9 @@ class Cropping:
         if crop.side == self.size:
             return clip[None]
         size = (self.size, self.size)
-        return functional.interpolate(clip[None].float(), size, mode="bilinear", antialias=True, align_corners=False)
+        return functional.interpolate(
+            clip[None].float(), size, mode="bilinear", antialias=True, align_corners=False
+        )
 
     def _check_shape(self, shape: tuple[int, int, int]) -> tuple[int, int, int]:
         if shape[0] < self.frames:

@@ -1,27 +1,30 @@
-"""From a clip's pixels to maps of what moves: Gaussian in time, derivatives in space, half the size, a spectrum a
-pixel.
+"""From a clip's pixels to maps of what moves: Gaussian in time, derivatives in space, half the
+size, a spectrum a pixel.
 
-Runia et al. 2020, section 4.3: a Gaussian of σ = 1 frame, first Gaussian derivatives of σ = 2 px along x and y, maximum
-pooling by two, the spectral decomposition layer. All but the pooling is linear, so that the filters are products with
-banded matrices (below) and the spectrum is one product with a matrix of (mean removal, Hann window, discrete Fourier
-transform). `models.maps.spectral_layer.periodogram` is the definition that tests hold this to.
+Runia et al. 2020, section 4.3: a Gaussian of σ = 1 frame, first Gaussian derivatives of σ = 2 px
+along x and y, maximum pooling by two, the spectral decomposition layer. All but the pooling is
+linear, so that the filters are products with banded matrices (below) and the spectrum is one
+product with a matrix of (mean removal, Hann window, discrete Fourier transform).
+`models.maps.spectral_layer.periodogram` is the definition that tests hold this to.
 
 From the same spectra come two kinds of maps, and a third of the clip's optical flow:
 
-- *spectral maps* (4, H/2, W/2), what the paper's network takes: the largest power of each derivative, then its
-  frequency;
-- *wave maps* (`WAVE_CHANNELS`, H/4, W/4), what `models.networks.wave` takes: two peaks, power by band, the spectrum's
-  centre and width, the gradient of the phase at the strongest frequency with its coherence (a travelling wave's wave
-  number), and what the clip looks like at rest;
+- *spectral maps* (4, H/2, W/2), what the paper's network takes: the largest power of each
+  derivative, then its frequency;
+- *wave maps* (`WAVE_CHANNELS`, H/4, W/4), what `models.networks.wave` takes: two peaks, power by
+  band, the spectrum's centre and width, the gradient of the phase at the strongest frequency with
+  its coherence (a travelling wave's wave number), and what the clip looks like at rest;
 - *flow maps* (`models.maps.flow.channels`; on two scales H/4, W/4, on three H/8, W/8), what
   `models.networks.flow_network` takes.
 
-Gaussian filters and their first derivatives along the axes of a video, as products with banded matrices.
+Gaussian filters and their first derivatives along the axes of a video, as products with banded
+matrices.
 
-A filter of 17 taps along an axis of 224 samples is a banded 224 × 224 matrix. Cut into blocks of 32 outputs, each of
-which sees 48 inputs, it becomes a batch of small dense products: 0.3 billion multiply-adds a clip of 30 × 224 × 224 for
-both derivatives, at the speed of the matrix product, with no copies of the clip shifted by a sample. A few frames are
-taken at a time, so that what lies between the products stays in the processor's cache.
+A filter of 17 taps along an axis of 224 samples is a banded 224 × 224 matrix. Cut into blocks of 32
+outputs, each of which sees 48 inputs, it becomes a batch of small dense products: 0.3 billion
+multiply-adds a clip of 30 × 224 × 224 for both derivatives, at the speed of the matrix product,
+with no copies of the clip shifted by a sample. A few frames are taken at a time, so that what lies
+between the products stays in the processor's cache.
 """
 
 from __future__ import annotations
@@ -39,7 +42,14 @@ from torch.nn import functional
 from flagdata.core.provenance import canonical, digest
 from flagdata.errors import InputError, LimitError
 from models.maps import flow
-from models.maps.pixel_course import at_rest, band_powers, centre_and_width, fourier_rows, log_power, shares_of_nyquist
+from models.maps.pixel_course import (
+    at_rest,
+    band_powers,
+    centre_and_width,
+    fourier_rows,
+    log_power,
+    shares_of_nyquist,
+)
 from models.regression.handmade import FEATURES, features
 
 _BLOCK = 32
@@ -48,11 +58,11 @@ _TRUNCATE = 4.0  # standard deviations, as scipy.ndimage.gaussian_filter1d does
 
 
 def gaussian(sigma: float, *, order: int = 0) -> Tensor:
-    """Computes taps (2r + 1,) of a Gaussian, r = round(4σ), or of its first derivative, for correlation: Σ h[i] x[n + i
-    − r].
+    """Computes taps (2r + 1,) of a Gaussian, r = round(4σ), or of its first derivative, for
+    correlation: Σ h[i] x[n + i − r].
 
-    The Gaussian's taps sum to 1. The derivative's are those of the same, normalised Gaussian: i/σ² times its taps, so
-    that a ramp of slope 1 gives Σ i² g(i)/σ², 1 but for what is cut off.
+    The Gaussian's taps sum to 1. The derivative's are those of the same, normalised Gaussian: i/σ²
+    times its taps, so that a ramp of slope 1 gives Σ i² g(i)/σ², 1 but for what is cut off.
 
     Args:
         sigma: standard deviation [samples].
@@ -62,7 +72,10 @@ def gaussian(sigma: float, *, order: int = 0) -> Tensor:
         InputError: σ that is not above 0, or another order.
     """
     if not sigma > 0 or order not in (0, 1):
-        raise InputError(f"the Gaussian has σ = {sigma:g} and order {order}", fix="give σ above 0 and order 0 or 1")
+        raise InputError(
+            f"the Gaussian has σ = {sigma:g} and order {order}",
+            fix="give σ above 0 and order 0 or 1",
+        )
     radius = int(_TRUNCATE * sigma + 0.5)
     offset = torch.arange(-radius, radius + 1, dtype=torch.float64)
     taps = torch.exp(-(offset**2) / (2 * sigma**2))
@@ -71,8 +84,9 @@ def gaussian(sigma: float, *, order: int = 0) -> Tensor:
 
 
 def smoothing_matrix(count: int, sigma: float) -> Tensor:
-    """Builds the matrix (count, count) float64 of the Gaussian along an axis of `count` samples, its ends repeated
-    outwards. the Gaussian along an axis of `count` samples, its ends repeated outwards."""
+    """Builds the matrix (count, count) float64 of the Gaussian along an axis of `count` samples,
+    its ends repeated outwards. the Gaussian along an axis of `count` samples, its ends repeated
+    outwards."""
     taps = gaussian(sigma)
     radius = len(taps) // 2
     matrix = torch.zeros((count, count), dtype=torch.float64)
@@ -83,11 +97,11 @@ def smoothing_matrix(count: int, sigma: float) -> Tensor:
 
 
 def pooled_derivatives(frames: Tensor, *, sigma: float) -> Tensor:
-    """Filters by first derivatives of a Gaussian along x (the last axis) and along y, each pooled: (2, time, height/2,
-    width/2).
+    """Filters by first derivatives of a Gaussian along x (the last axis) and along y, each pooled:
+    (2, time, height/2, width/2).
 
-    Each derivative is smoothed by the Gaussian along the other axis. Beyond the edges the outermost samples are
-    repeated. Of each two by two samples of the derivative the largest is taken.
+    Each derivative is smoothed by the Gaussian along the other axis. Beyond the edges the outermost
+    samples are repeated. Of each two by two samples of the derivative the largest is taken.
 
     Args:
         frames: (time, height, width), floating; an even height and width.
@@ -96,12 +110,19 @@ def pooled_derivatives(frames: Tensor, *, sigma: float) -> Tensor:
     Raises:
         InputError: another shape or type.
     """
-    if frames.ndim != 3 or not frames.is_floating_point() or frames.shape[1] % 2 or frames.shape[2] % 2:
+    if (
+        frames.ndim != 3
+        or not frames.is_floating_point()
+        or frames.shape[1] % 2
+        or frames.shape[2] % 2
+    ):
         raise InputError(
             f"the frames have the shape {tuple(frames.shape)} and the type {frames.dtype}",
             fix="give floating (time, height, width) with an even height and width",
         )
-    smooth, slope = (_band(sigma, order).to(device=frames.device, dtype=frames.dtype) for order in (0, 1))
+    smooth, slope = (
+        _band(sigma, order).to(device=frames.device, dtype=frames.dtype) for order in (0, 1)
+    )
     count, height, width = frames.shape
     pooled = frames.new_empty((2, count, height // 2, width // 2))
     for first in range(0, count, _FRAMES):
@@ -114,8 +135,8 @@ def pooled_derivatives(frames: Tensor, *, sigma: float) -> Tensor:
 
 @functools.cache
 def _band(sigma: float, order: int) -> Tensor:
-    """Builds the part of the filter's matrix that one block of outputs sees, (block + taps − 1, block). the part of the
-    filter's matrix that one block of outputs sees."""
+    """Builds the part of the filter's matrix that one block of outputs sees, (block + taps − 1,
+    block). the part of the filter's matrix that one block of outputs sees."""
     taps = gaussian(sigma, order=order)
     band = torch.zeros((_BLOCK + len(taps) - 1, _BLOCK), dtype=torch.float64)
     for column in range(_BLOCK):
@@ -124,40 +145,52 @@ def _band(sigma: float, order: int) -> Tensor:
 
 
 def _along_height(frames: Tensor, *bands: Tensor) -> Tensor:
-    """Filters along the second axis of (time, height, width): (bands, time, blocks · 32, padded width).
+    """Filters along the second axis of (time, height, width): (bands, time, blocks · 32, padded
+    width).
 
-    The outermost samples are repeated on all sides, as often as the filters see beyond the edge and as the last block
-    has rows and columns too many.
+    The outermost samples are repeated on all sides, as often as the filters see beyond the edge and
+    as the last block has rows and columns too many.
     """
     reach = len(bands[0])
     radius = (reach - _BLOCK) // 2
     below, right = (-size % _BLOCK for size in frames.shape[1:])
-    padded = functional.pad(frames, (radius, radius + right, radius, radius + below), mode="replicate")
+    padded = functional.pad(
+        frames, (radius, radius + right, radius, radius + below), mode="replicate"
+    )
     rows = torch.cat(bands, dim=1).T  # (bands · 32, reach): one product for all filters
     filtered = padded.new_empty((len(bands), len(frames), frames.shape[1] + below, padded.shape[2]))
     for first in range(0, filtered.shape[2], _BLOCK):
-        product = torch.matmul(rows, padded[:, first : first + reach]).unflatten(1, (len(bands), _BLOCK))
+        product = torch.matmul(rows, padded[:, first : first + reach]).unflatten(
+            1, (len(bands), _BLOCK)
+        )
         filtered[:, :, first : first + _BLOCK] = product.transpose(0, 1)
     return filtered
 
 
 def _pooled_along_width(padded: Tensor, band: Tensor) -> Tensor:
-    """Filters along the last axis of contiguous (time, height, blocks · 32 + taps − 1) and takes the largest of each
+    """Filters along the last axis of contiguous (time, height, blocks · 32 + taps − 1) and takes
+    the largest of each
     two by two: (time, height/2, blocks · 16)."""
     time, height, width = padded.shape
     blocks = (width - len(band)) // _BLOCK + 1
     view = padded.as_strided((blocks, time * height, len(band)), (_BLOCK, width, 1))
-    filtered = torch.bmm(view, band.expand(blocks, -1, -1)).view(blocks, time, height // 2, 2, _BLOCK)
+    filtered = torch.bmm(view, band.expand(blocks, -1, -1)).view(
+        blocks, time, height // 2, 2, _BLOCK
+    )
     rows = torch.maximum(filtered[:, :, :, 0], filtered[:, :, :, 1])
     return torch.maximum(rows[..., 0::2], rows[..., 1::2]).permute(1, 2, 0, 3).flatten(2)
 
 
-Maps: TypeAlias = Literal["frames", "spectral-maps", "wave-maps", "flow-maps", "flow-maps-3", "handmade"]
-"""What a front end gives: standardised frames, one of the kinds of maps, or the page of hand-made features."""
+Maps: TypeAlias = Literal[
+    "frames", "spectral-maps", "wave-maps", "flow-maps", "flow-maps-3", "handmade"
+]
+"""What a front end gives: standardised frames, one of the kinds of maps, or the page of hand-made
+features."""
 _FLOW_SCALES = {"flow-maps": 2, "flow-maps-3": 3}
 
 BANDS = ((0.0, 0.08), (0.08, 0.16), (0.16, 0.32), (0.32, 0.52), (0.52, 1.0))
-"""Parts of the spectrum up to the Nyquist frequency whose power is a wave map; each takes the bins in (low, high]."""
+"""Parts of the spectrum up to the Nyquist frequency whose power is a wave map; each takes the bins
+in (low, high]."""
 _OF_EACH = (
     "peak 1 log power",
     "peak 2 log power",
@@ -178,8 +211,9 @@ WAVE_CHANNELS = (
     "log of its slope",
     "log standard deviation in time",
 )
-"""Names of the wave maps, in order. Frequencies are shares of the Nyquist frequency, phase gradients shares of π a
-pixel of the pooled picture; powers are log(1 + I/10⁻³), I as in `periodogram`
+"""Names of the wave maps, in order. Frequencies are shares of the Nyquist frequency, phase
+gradients shares of π a pixel of the pooled picture; powers are log(1 + I/10⁻³), I as in
+`periodogram`
 of standardised frames: logarithmic where something moves, near 0 where there is but noise."""
 FRAMES_LIMIT = 4096
 """Most frames of a clip."""
@@ -188,7 +222,8 @@ PIXELS_LIMIT = 1 << 26
 RATE_LIMIT = 1e6
 """Highest frame rate [Hz]."""
 _TINY = 1e-12
-_FLOOR = 1e-3  # power below which the scale is linear; edges that move have 10⁻² to 10, camera noise 10⁻⁴
+# power below which the scale is linear; edges that move have 10⁻² to 10, camera noise 10⁻⁴
+_FLOOR = 1e-3
 _VERSION = 1
 """Raised whenever the same clip gives other maps."""
 
@@ -199,15 +234,16 @@ class FrontEnd:
 
     Attributes:
         maps: what it gives.
-        size: height and width of the clips it takes [px]; a whole multiple of 4, of 8 for flow on three scales.
+        size: height and width of the clips it takes [px]; a whole multiple of 4, of 8 for flow on
+            three scales.
         frames: their length.
         rate: their frames a second [Hz].
         temporal_sigma: of the Gaussian in time [frames].
         spatial_sigma: of the derivatives [px].
 
     Raises:
-        InputError: fewer than four frames, a size that is no multiple of 4, a rate or width that is not above 0, or a
-            Gaussian wider than what it smooths.
+        InputError: fewer than four frames, a size that is no multiple of 4, a rate or width that is
+            not above 0, or a Gaussian wider than what it smooths.
         LimitError: clips larger than `FRAMES_LIMIT` and `PIXELS_LIMIT`.
     """
 
@@ -228,13 +264,20 @@ class FrontEnd:
         if self.frames > FRAMES_LIMIT or self.frames * self.size**2 > PIXELS_LIMIT:
             raise LimitError(
                 f"the front end takes clips of {self.frames:.3g} frames of {self.size:.3g} px",
-                fix=f"give at most {FRAMES_LIMIT} frames, and {PIXELS_LIMIT} px in all of them together",
+                fix=f"give at most {FRAMES_LIMIT} frames, and {PIXELS_LIMIT} px in all of them "
+                "together",
             )
-        within = (self.rate <= RATE_LIMIT, self.temporal_sigma <= self.frames, self.spatial_sigma <= self.size)
+        within = (
+            self.rate <= RATE_LIMIT,
+            self.temporal_sigma <= self.frames,
+            self.spatial_sigma <= self.size,
+        )
         if not (min(self.rate, self.temporal_sigma, self.spatial_sigma) > 0 and all(within)):
             raise InputError(
-                f"the rate is {self.rate:g} Hz, σ is {self.temporal_sigma:g} frames and {self.spatial_sigma:g} px",
-                fix=f"give values above 0: at most {RATE_LIMIT:g} Hz, {self.frames} frames and {self.size} px",
+                f"the rate is {self.rate:g} Hz, σ is {self.temporal_sigma:g} frames and "
+                f"{self.spatial_sigma:g} px",
+                fix=f"give values above 0: at most {RATE_LIMIT:g} Hz, {self.frames} frames and "
+                f"{self.size} px",
             )
 
     @property
@@ -249,7 +292,11 @@ class FrontEnd:
         scales = _FLOW_SCALES.get(self.maps)
         if scales is None:
             return (len(WAVE_CHANNELS), self.size // 4, self.size // 4)
-        return (len(flow.channels(scales)), self.size // flow.pool(scales), self.size // flow.pool(scales))
+        return (
+            len(flow.channels(scales)),
+            self.size // flow.pool(scales),
+            self.size // flow.pool(scales),
+        )
 
     @property
     def hash(self) -> str:
@@ -284,7 +331,9 @@ class FrontEnd:
         if self.maps in _FLOW_SCALES:
             return flow.flow_maps(frames, scales=_FLOW_SCALES[self.maps])
         smooth = self._temporal.to(frames)
-        pooled = pooled_derivatives((smooth @ frames.flatten(1)).view_as(frames), sigma=self.spatial_sigma)
+        pooled = pooled_derivatives(
+            (smooth @ frames.flatten(1)).view_as(frames), sigma=self.spatial_sigma
+        )
         real, imaginary = fourier_rows(self.frames).to(frames)
         flat, picture = pooled.flatten(2), pooled.shape[2:]
         spectra = (real @ flat).unflatten(2, picture), (imaginary @ flat).unflatten(2, picture)
@@ -310,18 +359,24 @@ class FrontEnd:
         centre, width = centre_and_width(power, share, floor=_TINY)
         peaks, places = power.topk(min(2, power.shape[1]), dim=1)
         banded = [_logarithm(band) for band in band_powers(power, share, BANDS)]
-        maps = [_logarithm(peaks), share[places], torch.stack([_logarithm(power.sum(dim=1)), centre, width], dim=1)]
+        maps = [
+            _logarithm(peaks),
+            share[places],
+            torch.stack([_logarithm(power.sum(dim=1)), centre, width], dim=1),
+        ]
         maps += [torch.stack(banded, dim=1), _phases(real, imaginary, places[:, :1])]
         return torch.cat(maps, dim=1).flatten(0, 1)
 
 
 def standardise_clip(clip: Tensor) -> Tensor:
-    """Standardises a clip: less its mean, over its standard deviation, float32; one without contrast is 0
-    everywhere."""
+    """Standardises a clip: less its mean, over its standard deviation, float32; one without
+    contrast is 0 everywhere."""
     frames = clip.float()
     frames = frames - frames.mean()
     flat = frames.flatten()
-    return frames / (flat.dot(flat) / len(flat)).sqrt().clamp(min=1e-6)  # a fifth of the time of torch.std_mean
+    return frames / (flat.dot(flat) / len(flat)).sqrt().clamp(
+        min=1e-6
+    )  # a fifth of the time of torch.std_mean
 
 
 def _logarithm(power: Tensor) -> Tensor:
@@ -334,11 +389,11 @@ def _sum_of_four(values: Tensor) -> Tensor:
 
 
 def _phases(real: Tensor, imaginary: Tensor, frequency: Tensor) -> Tensor:
-    """Computes the phase gradient along x and y [π a pixel] at bin `frequency` (2, 1, h/2, w/2), and their coherence:
-    (2, 4, h/2, w/2).
+    """Computes the phase gradient along x and y [π a pixel] at bin `frequency` (2, 1, h/2, w/2),
+    and their coherence: (2, 4, h/2, w/2).
 
-    Along x it is the angle of C = Σ F(x + 1, y) F*(x, y) over the two pairs of neighbours in each two by two pixels,
-    and the coherence is |C|/√(Σ|F(x + 1)|² Σ|F(x)|²), 1 for a plane wave.
+    Along x it is the angle of C = Σ F(x + 1, y) F*(x, y) over the two pairs of neighbours in each
+    two by two pixels, and the coherence is |C|/√(Σ|F(x + 1)|² Σ|F(x)|²), 1 for a plane wave.
     """
     corners = [
         (part[..., row::2, column::2].gather(1, frequency).squeeze(1))
@@ -349,13 +404,21 @@ def _phases(real: Tensor, imaginary: Tensor, frequency: Tensor) -> Tensor:
     (a, b, c, d), (e, f, g, h) = corners[:4], corners[4:]
     power = [re.square() + im.square() for re, im in ((a, e), (b, f), (c, g), (d, h))]
 
-    def cross_spectrum(ahead: tuple[Tensor, Tensor], behind: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
-        return ahead[0] * behind[0] + ahead[1] * behind[1], ahead[1] * behind[0] - ahead[0] * behind[1]
+    def cross_spectrum(
+        ahead: tuple[Tensor, Tensor], behind: tuple[Tensor, Tensor]
+    ) -> tuple[Tensor, Tensor]:
+        return ahead[0] * behind[0] + ahead[1] * behind[1], ahead[1] * behind[0] - ahead[
+            0
+        ] * behind[1]
 
-    def along(pairs: list[tuple[tuple[Tensor, Tensor], tuple[Tensor, Tensor]]], norm: Tensor) -> tuple[Tensor, Tensor]:
+    def along(
+        pairs: list[tuple[tuple[Tensor, Tensor], tuple[Tensor, Tensor]]], norm: Tensor
+    ) -> tuple[Tensor, Tensor]:
         crosses = [cross_spectrum(later, earlier) for later, earlier in pairs]
         re, im = crosses[0][0] + crosses[1][0], crosses[0][1] + crosses[1][1]
-        return torch.atan2(im, re) / math.pi, (re.square() + im.square()).sqrt() / (norm.sqrt() + _TINY)
+        return torch.atan2(im, re) / math.pi, (re.square() + im.square()).sqrt() / (
+            norm.sqrt() + _TINY
+        )
 
     x = along([((b, f), (a, e)), ((d, h), (c, g))], (power[1] + power[3]) * (power[0] + power[2]))
     y = along([((c, g), (a, e)), ((d, h), (b, f))], (power[2] + power[3]) * (power[0] + power[1]))

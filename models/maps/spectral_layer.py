@@ -14,15 +14,17 @@ from flagdata.errors import InputError
 def periodogram(signal: Tensor, *, rate: float) -> tuple[Tensor, Tensor]:
     """Computes power and frequency of real signals along dimension 2 (time) of a video volume.
 
-    I(ω) = |F(jω)|² / N_t of the signal less its mean, under a Hann window w scaled so that Σw² = N_t: white noise then
-    keeps its power, and a sinusoid of amplitude a at a bin's centre has its peak at a² N_t / 6.
+    I(ω) = |F(jω)|² / N_t of the signal less its mean, under a Hann window w scaled so that Σw² =
+    N_t: white noise then keeps its power, and a sinusoid of amplitude a at a bin's centre has its
+    peak at a² N_t / 6.
 
     Args:
         signal: (batch, channel, time, height, width), floating.
         rate: frames per second [Hz].
 
     Returns:
-        power (batch, channel, N_t // 2, height, width) without the bin at zero, and frequency (N_t // 2,) [Hz].
+        power (batch, channel, N_t // 2, height, width) without the bin at zero, and frequency (N_t
+            // 2,) [Hz].
 
     Raises:
         InputError: fewer than four frames, or not floating.
@@ -44,10 +46,12 @@ def periodogram(signal: Tensor, *, rate: float) -> tuple[Tensor, Tensor]:
 
 
 class SpectralDecomposition(nn.Module):
-    """Maps (batch, C, time, H, W) to (batch, 2kC, H, W): the k strongest powers and their frequencies at each pixel.
+    """Maps (batch, C, time, H, W) to (batch, 2kC, H, W): the k strongest powers and their
+    frequencies at each pixel.
 
-    The channels are ordered power 1 … k of channel 1, …, then the frequencies likewise. Frequencies are in Hz; the
-    gradient flows through the powers alone, since an index has none. The mean is taken out first and the bin at zero
+    The channels are ordered power 1 … k of channel 1, …, then the frequencies likewise. Frequencies
+    are in Hz; the gradient flows through the powers alone, since an index has none. The mean is
+    taken out first and the bin at zero
     is not a candidate: a clip's brightness is not motion.
 
     Args:
@@ -59,7 +63,8 @@ class SpectralDecomposition(nn.Module):
         super().__init__()
         if rate <= 0 or peaks < 1:
             raise InputError(
-                f"the rate is {rate} Hz, with {peaks} peaks", fix="give a rate above 0 and at least one peak"
+                f"the rate is {rate} Hz, with {peaks} peaks",
+                fix="give a rate above 0 and at least one peak",
             )
         self.rate = rate
         self.peaks = peaks

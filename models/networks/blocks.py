@@ -1,7 +1,7 @@
 """Residual blocks and the trunk of ResNet-18, with random initial weights.
 
-He et al., Deep Residual Learning for Image Recognition, CVPR 2016, figures 2 and 5 and table 1; initial weights by
-He et al., Delving Deep into Rectifiers, ICCV 2015, equation 10.
+He et al., Deep Residual Learning for Image Recognition, CVPR 2016, figures 2 and 5 and table 1;
+initial weights by He et al., Delving Deep into Rectifiers, ICCV 2015, equation 10.
 """
 
 from __future__ import annotations
@@ -12,11 +12,13 @@ from flagdata.errors import InputError
 
 
 def initialise(module: nn.Module) -> None:
-    """Draws the weights of all convolutions from N(0, 2/fan_out) with torch's own generator; normalisations start at 1.
+    """Draws the weights of all convolutions from N(0, 2/fan_out) with torch's own generator;
+    normalisations start at 1.
 
-    Fan-out keeps the variance of the gradients from layer to layer (He et al. 2015, section 2.2, backward case).
-    Weights without memory (`torch.device("meta")`) are left as they are: there is nothing to draw, and drawing it would
-    load torch's compiler, which takes as long as torch itself.
+    Fan-out keeps the variance of the gradients from layer to layer (He et al. 2015, section 2.2,
+    backward case). Weights without memory (`torch.device("meta")`) are left as they are: there is
+    nothing to draw, and drawing it would load torch's compiler, which takes as long as torch
+    itself.
     """
     for layer in module.modules():
         if isinstance(layer, nn.Conv2d) and not layer.weight.is_meta:
@@ -27,9 +29,11 @@ def initialise(module: nn.Module) -> None:
 
 
 class BasicBlock(nn.Module):
-    """Two 3×3 convolutions with batch normalisation, added to their input: (n, inputs, h, w) → (n, width, h/s, w/s).
+    """Two 3×3 convolutions with batch normalisation, added to their input: (n, inputs, h, w) → (n,
+    width, h/s, w/s).
 
-    Where width or size change, the short cut is a 1×1 convolution with the same stride (option B of the paper).
+    Where width or size change, the short cut is a 1×1 convolution with the same stride (option B of
+    the paper).
 
     Args:
         inputs: channels that come in.
@@ -49,7 +53,9 @@ class BasicBlock(nn.Module):
         self.shortcut = (
             nn.Identity()
             if stride == 1 and inputs == width
-            else nn.Sequential(nn.Conv2d(inputs, width, 1, stride=stride, bias=False), nn.BatchNorm2d(width))
+            else nn.Sequential(
+                nn.Conv2d(inputs, width, 1, stride=stride, bias=False), nn.BatchNorm2d(width)
+            )
         )
 
     def forward(self, x: Tensor) -> Tensor:
@@ -58,9 +64,11 @@ class BasicBlock(nn.Module):
 
 
 class ResNet18(nn.Module):
-    """The trunk of ResNet-18 without its pooling and classes: (n, channels, h, w) → (n, 8·width, ⌈h/32⌉, ⌈w/32⌉).
+    """The trunk of ResNet-18 without its pooling and classes: (n, channels, h, w) → (n, 8·width,
+    ⌈h/32⌉, ⌈w/32⌉).
 
-    With three channels and a width of 64 it has 11,176,512 parameters, as published (11.69 M with 1000 classes).
+    With three channels and a width of 64 it has 11,176,512 parameters, as published (11.69 M with
+    1000 classes).
 
     Args:
         channels: of the images; 1 for gray.
@@ -74,7 +82,8 @@ class ResNet18(nn.Module):
         super().__init__()
         if channels < 1 or width < 1:
             raise InputError(
-                f"the ResNet-18 has {channels} channels and the width {width}", fix="give at least 1 of each"
+                f"the ResNet-18 has {channels} channels and the width {width}",
+                fix="give at least 1 of each",
             )
         layers: list[nn.Module] = [
             nn.Conv2d(channels, width, 7, stride=2, padding=3, bias=False),

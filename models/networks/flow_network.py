@@ -1,7 +1,8 @@
-"""Our own network: maps of optical flow to a summary of 32 numbers that a distribution over the parameters rests on.
+"""Our own network: maps of optical flow to a summary of 32 numbers that a distribution over the
+parameters rests on.
 
-It sees how fast, in which rhythm and which way the picture moves at each place, on two scales or three, and what the
-clip looks like at rest (`models.maps.flow`).
+It sees how fast, in which rhythm and which way the picture moves at each place, on two scales or
+three, and what the clip looks like at rest (`models.maps.flow`).
 """
 
 from __future__ import annotations

@@ -23,23 +23,26 @@ from models.networks.targets import Scaling
 def contrastive_loss(
     embedding: Tensor, seed: Tensor, *, margin: float = 1.0, positive_share: float | None = None
 ) -> Tensor:
-    """Pulls clips of one simulation together and pushes others apart to the margin, over all pairs of the batch.
+    """Pulls clips of one simulation together and pushes others apart to the margin, over all pairs
+    of the batch.
 
-    The mean over all n(n − 1)/2 pairs (BatchAll) of y D² + (1 − y) max(0, m − D)², with D the Euclidean distance of the
-    two embeddings and y = 1 where both clips are renders of one simulation (Hadsell, Chopra and LeCun, CVPR 2006,
-    equation 4 without its factor 1/2; Runia et al., section 3.1). Coincident embeddings of a negative pair have no
-    direction to part in, and get gradient 0.
+    The mean over all n(n − 1)/2 pairs (BatchAll) of y D² + (1 − y) max(0, m − D)², with D the
+    Euclidean distance of the two embeddings and y = 1 where both clips are renders of one
+    simulation (Hadsell, Chopra and LeCun, CVPR 2006, equation 4 without its factor 1/2; Runia et
+    al., section 3.1). Coincident embeddings of a negative pair have no direction to part in, and
+    get gradient 0.
 
     Args:
         embedding: (n, dimension).
         seed: (n,) integers, the simulation's seed of each clip.
         margin: m.
-        positive_share: None to count every pair alike, as the paper does. A batch of 16 simulations with two clips each
-            has 16 positive pairs and 480 negative ones; a share of 0.5 weighs the mean over the positive pairs as much
-            as that over the negative ones.
+        positive_share: None to count every pair alike, as the paper does. A batch of 16 simulations
+            with two clips each has 16 positive pairs and 480 negative ones; a share of 0.5 weighs
+            the mean over the positive pairs as much as that over the negative ones.
 
     Raises:
-        InputError: a batch without positive or without negative pairs, sizes that differ, or a number out of range.
+        InputError: a batch without positive or without negative pairs, sizes that differ, or a
+            number out of range.
     """
     if embedding.ndim != 2 or seed.shape != embedding.shape[:1]:
         raise InputError(
@@ -61,7 +64,8 @@ def contrastive_loss(
         )
     if positives == len(positive):
         raise InputError(
-            f"all {len(seed)} clips of this batch are of one simulation", fix="draw at least two simulations a batch"
+            f"all {len(seed)} clips of this batch are of one simulation",
+            fix="draw at least two simulations a batch",
         )
     distance = pdist(embedding)
     pulled = distance[positive].square()
@@ -105,7 +109,13 @@ class Learner(nn.Module):
     spread: Tensor
 
     def __init__(
-        self, network: nn.Module, *, loss: Loss, targets: tuple[str, ...], components: int = 6, margin: float = 1.0
+        self,
+        network: nn.Module,
+        *,
+        loss: Loss,
+        targets: tuple[str, ...],
+        components: int = 6,
+        margin: float = 1.0,
     ) -> None:
         super().__init__()
         if (loss is Loss.CONTRASTIVE) == bool(targets):
@@ -122,7 +132,9 @@ class Learner(nn.Module):
         if loss is Loss.REGRESSION:
             self.head = nn.Linear(dimension, len(targets))
         elif loss is Loss.POSTERIOR:
-            self.head = MixtureHead(dimension=dimension, targets=len(targets), components=components)
+            self.head = MixtureHead(
+                dimension=dimension, targets=len(targets), components=components
+            )
         self.register_buffer("centre", torch.zeros(len(targets)))
         self.register_buffer("spread", torch.ones(len(targets)))
 
@@ -163,7 +175,8 @@ class Learner(nn.Module):
         return -self.head(embedding).log_prob(wanted).mean()
 
     def point_estimates(self, embedding: Tensor) -> Tensor:
-        """Returns (n, target) values of a regression's embeddings, or the means of a posterior's components."""
+        """Returns (n, target) values of a regression's embeddings, or the means of a posterior's
+        components."""
         predicted = self.head(embedding)
         if isinstance(predicted, Mixture):
             predicted = predicted.mean()
@@ -176,7 +189,10 @@ class Learner(nn.Module):
             InputError: a learner of another loss.
         """
         if self.objective is not Loss.POSTERIOR:
-            raise InputError(f"a {self.objective.value} gives no distribution", fix="take a model of a posterior loss")
+            raise InputError(
+                f"a {self.objective.value} gives no distribution",
+                fix="take a model of a posterior loss",
+            )
         return self.head(embedding)
 
     def _learned_logits(self, values: Tensor) -> Tensor:
@@ -187,11 +203,18 @@ class Learner(nn.Module):
 
 
 def build(
-    network: str, options: Mapping[str, Any], *, loss: Loss, targets: tuple[str, ...], components: int, margin: float
+    network: str,
+    options: Mapping[str, Any],
+    *,
+    loss: Loss,
+    targets: tuple[str, ...],
+    components: int,
+    margin: float,
 ) -> Learner:
     """Builds a named network with its head, its weights drawn by torch's generator as it stands.
 
-    It is built without memory for its weights first, so that no recipe or card takes more than `WEIGHTS_LIMIT`.
+    It is built without memory for its weights first, so that no recipe or card takes more than
+    `WEIGHTS_LIMIT`.
 
     Args:
         network: name in `models.networks.networks_by_name.NETWORKS`.
@@ -203,7 +226,9 @@ def build(
         InputError: options that the network does not take, or targets that do not go with the loss.
         LimitError: numbers or lists beyond any network's, or more weights than `WEIGHTS_LIMIT`.
     """
-    arguments = {key: tuple(value) if isinstance(value, list) else value for key, value in options.items()}
+    arguments = {
+        key: tuple(value) if isinstance(value, list) else value for key, value in options.items()
+    }
     for key, value in {**arguments, "components": components, "margin": margin}.items():
         _check_option(key, value)
 
@@ -243,11 +268,15 @@ def _check_option(key: str, value: object) -> None:
     """
     many = value if isinstance(value, tuple) else (value,)
     if len(many) > LIST_LIMIT:
-        raise LimitError(f"{key} has {len(many)} entries", where="[network]", fix=f"give at most {LIST_LIMIT}")
+        raise LimitError(
+            f"{key} has {len(many)} entries", where="[network]", fix=f"give at most {LIST_LIMIT}"
+        )
     for entry in many:
         if isinstance(entry, str):
             continue
         if isinstance(entry, bool) or not isinstance(entry, int | float) or not entry > 0:
             raise InputError(f"{key} is {entry!r}", where="[network]", fix="give a positive number")
         if entry > NUMBER_LIMIT:
-            raise LimitError(f"{key} is {str(entry)[:20]}", where="[network]", fix=f"give at most {NUMBER_LIMIT}")
+            raise LimitError(
+                f"{key} is {str(entry)[:20]}", where="[network]", fix=f"give at most {NUMBER_LIMIT}"
+            )

@@ -1,4 +1,5 @@
-"""A small residual network on maps: what `models.networks.wave` and `models.networks.flow_network` have in common."""
+"""A small residual network on maps: what `models.networks.wave` and `models.networks.flow_network`
+have in common."""
 
 from __future__ import annotations
 
@@ -14,7 +15,8 @@ from models.networks.blocks import BasicBlock, initialise
 class MapsNetwork(nn.Module):
     """Maps (batch, channel, h, w) to a summary (batch, dimension).
 
-    The maps are standardised by batch statistics, pass residual blocks, and are pooled by their mean and their maximum
+    The maps are standardised by batch statistics, pass residual blocks, and are pooled by their
+    mean and their maximum
     over the picture: how much there is, and how strong it is at its strongest.
 
     Attributes:
@@ -28,7 +30,8 @@ class MapsNetwork(nn.Module):
         channels: names of the maps that are used, to measure what each adds; all by default.
 
     Raises:
-        InputError: no map, or one that is not known; as many strides as there are widths are needed.
+        InputError: no map, or one that is not known; as many strides as there are widths are
+            needed.
     """
 
     recurrent: ClassVar[bool] = False
@@ -48,10 +51,13 @@ class MapsNetwork(nn.Module):
         strides = self.reduces if strides is None else strides
         unknown = set(chosen) - set(names)
         if unknown or not chosen:
-            raise InputError(f"maps {sorted(unknown)} are not known", fix=f"name some of {', '.join(names)}")
+            raise InputError(
+                f"maps {sorted(unknown)} are not known", fix=f"name some of {', '.join(names)}"
+            )
         if len(widths) != len(strides) or not widths:
             raise InputError(
-                f"there are {len(widths)} widths and {len(strides)} strides", fix="give one of each for every block"
+                f"there are {len(widths)} widths and {len(strides)} strides",
+                fix="give one of each for every block",
             )
         self.dimension = dimension
         self.channels = len(names)
@@ -65,10 +71,14 @@ class MapsNetwork(nn.Module):
             )
         )
         initialise(self.blocks)
-        self.summary = nn.Sequential(nn.Linear(2 * widths[-1], 128), nn.ReLU(), nn.Linear(128, dimension))
+        self.summary = nn.Sequential(
+            nn.Linear(2 * widths[-1], 128), nn.ReLU(), nn.Linear(128, dimension)
+        )
 
     def forward(self, maps: Tensor) -> Tensor:
         """Computes the summary (batch, dimension)."""
         used = maps if len(self._chosen) == maps.shape[1] else maps[:, self._chosen]
         features = self.blocks(self.standardise(used))
-        return self.summary(torch.cat([features.mean(dim=(2, 3)), features.amax(dim=(2, 3))], dim=1))
+        return self.summary(
+            torch.cat([features.mean(dim=(2, 3)), features.amax(dim=(2, 3))], dim=1)
+        )

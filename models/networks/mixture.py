@@ -1,6 +1,8 @@
-"""A distribution for each clip: a mixture of Gaussians with full covariances, and the head that predicts it.
+"""A distribution for each clip: a mixture of Gaussians with full covariances, and the head that
+predicts it.
 
-Bishop, Mixture Density Networks, 1994; full covariances by Cholesky factors after Williams, Neural Computation 8, 1996.
+Bishop, Mixture Density Networks, 1994; full covariances by Cholesky factors after Williams, Neural
+Computation 8, 1996.
 """
 
 from __future__ import annotations
@@ -17,8 +19,8 @@ from torch.nn.functional import softplus
 from flagdata.errors import InputError
 
 LEAST_DEVIATION = 1e-3
-"""Least diagonal entry of a Cholesky factor, in standard deviations of the prior: a likelihood without bound, where
-a component sits on one training clip, is kept out by it."""
+"""Least diagonal entry of a Cholesky factor, in standard deviations of the prior: a likelihood
+without bound, where a component sits on one training clip, is kept out by it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -43,7 +45,8 @@ class Mixture:
             or self.factor.shape != (*shape, shape[2])
         ):
             raise InputError(
-                f"weights {tuple(self.log_weight.shape)}, means {shape}, factors {tuple(self.factor.shape)}",
+                f"weights {tuple(self.log_weight.shape)}, means {shape}, factors "
+                f"{tuple(self.factor.shape)}",
                 fix="give (n, K), (n, K, t) and (n, K, t, t)",
             )
 
@@ -75,12 +78,14 @@ class Mixture:
             factor=torch.linalg.cholesky(factor @ factor.mT),
         )
 
-    def sample_given(self, columns: Sequence[int], values: Tensor, generator: torch.Generator) -> Tensor:
+    def sample_given(
+        self, columns: Sequence[int], values: Tensor, generator: torch.Generator
+    ) -> Tensor:
         """Draws from the distribution of all targets given some of them: (n, p, t).
 
-        With the given targets first, a component's covariance has the Cholesky factor [[A, 0], [B, C]]; given y of
-        them, the others have the mean m + B A⁻¹ (y − m_y) and the covariance C Cᵀ, and the component's weight is
-        proportional to its density at y.
+        With the given targets first, a component's covariance has the Cholesky factor [[A, 0], [B,
+        C]]; given y of them, the others have the mean m + B A⁻¹ (y − m_y) and the covariance C Cᵀ,
+        and the component's weight is proportional to its density at y.
 
         Args:
             columns: of the targets that are given.
@@ -97,15 +102,25 @@ class Mixture:
             factor=ordered.factor[..., :conditioned, :conditioned],
         )
         share = first._log_joint(values).softmax(dim=1).mT
-        component = torch.multinomial(share.flatten(0, 1), 1, generator=generator).reshape(values.shape[:2])
+        component = torch.multinomial(share.flatten(0, 1), 1, generator=generator).reshape(
+            values.shape[:2]
+        )
         row = torch.arange(len(values), device=values.device)[:, None]
         location, factor = ordered.location[row, component], ordered.factor[row, component]
         offset = (values - location[..., :conditioned]).unsqueeze(-1)
-        whitened = torch.linalg.solve_triangular(factor[..., :conditioned, :conditioned], offset, upper=False)
-        noise = torch.randn(
-            (*values.shape[:2], len(rest), 1), generator=generator, dtype=values.dtype, device=values.device
+        whitened = torch.linalg.solve_triangular(
+            factor[..., :conditioned, :conditioned], offset, upper=False
         )
-        deviation = factor[..., conditioned:, :conditioned] @ whitened + factor[..., conditioned:, conditioned:] @ noise
+        noise = torch.randn(
+            (*values.shape[:2], len(rest), 1),
+            generator=generator,
+            dtype=values.dtype,
+            device=values.device,
+        )
+        deviation = (
+            factor[..., conditioned:, :conditioned] @ whitened
+            + factor[..., conditioned:, conditioned:] @ noise
+        )
         drawn = torch.cat([values, location[..., conditioned:] + deviation.squeeze(-1)], dim=-1)
         return drawn[..., torch.tensor(order).argsort()]
 
@@ -120,8 +135,8 @@ class Mixture:
         return (weight * (self.factor @ self.factor.mT + offset @ offset.mT)).sum(dim=1)
 
     def cdf(self, y: Tensor) -> Tensor:
-        """Computes the marginal cumulative probability of each target at y (n, t): (n, t). Uniform on [0, 1] if
-        calibrated."""
+        """Computes the marginal cumulative probability of each target at y (n, t): (n, t). Uniform
+        on [0, 1] if calibrated."""
         self._require(y)
         deviation = self.factor.square().sum(dim=-1).sqrt()
         score = (y[:, None] - self.location) / deviation
@@ -136,14 +151,19 @@ class Mixture:
         """
         if count < 1:
             raise InputError(f"{count} draws are too few", fix="ask for at least 1")
-        component = torch.multinomial(self.log_weight.exp(), count, replacement=True, generator=generator)
+        component = torch.multinomial(
+            self.log_weight.exp(), count, replacement=True, generator=generator
+        )
         row = torch.arange(len(component), device=component.device)[:, None]
         location, factor = self.location[row, component], self.factor[row, component]
-        noise = torch.randn(location.shape, generator=generator, dtype=location.dtype, device=location.device)
+        noise = torch.randn(
+            location.shape, generator=generator, dtype=location.dtype, device=location.device
+        )
         return location + (factor @ noise.unsqueeze(-1)).squeeze(-1)
 
     def rescale_by(self, *, scale: Tensor, shift: Tensor) -> Mixture:
-        """Returns the mixture of scale · y + shift, scale (t,) above 0 and shift (t,), or (n, 1, t) for each clip."""
+        """Returns the mixture of scale · y + shift, scale (t,) above 0 and shift (t,), or (n, 1, t)
+        for each clip."""
         return Mixture(
             log_weight=self.log_weight,
             location=self.location * scale + shift,
@@ -153,26 +173,36 @@ class Mixture:
     def rows(self, places: Sequence[int]) -> Mixture:
         """Selects the mixtures of some of the clips."""
         chosen = list(places)
-        return Mixture(log_weight=self.log_weight[chosen], location=self.location[chosen], factor=self.factor[chosen])
+        return Mixture(
+            log_weight=self.log_weight[chosen],
+            location=self.location[chosen],
+            factor=self.factor[chosen],
+        )
 
     def double(self) -> Mixture:
         """Converts the mixture to float64."""
         return Mixture(
-            log_weight=self.log_weight.double(), location=self.location.double(), factor=self.factor.double()
+            log_weight=self.log_weight.double(),
+            location=self.location.double(),
+            factor=self.factor.double(),
         )
 
     def _require(self, y: Tensor) -> None:
         expected = (self.location.shape[0], self.location.shape[2])
         if tuple(y.shape) != expected:
-            raise InputError(f"the targets have the shape {tuple(y.shape)}", fix=f"give {expected} for these mixtures")
+            raise InputError(
+                f"the targets have the shape {tuple(y.shape)}",
+                fix=f"give {expected} for these mixtures",
+            )
 
 
 class MixtureHead(nn.Module):
     """Embeddings (n, dimension) → `Mixture` of n clips over standardised targets.
 
-    One linear layer gives the weights' logarithms, the means and the Cholesky factors, whose diagonals are
-    softplus(·) + `LEAST_DEVIATION`. At the start all covariances are the unit matrix's and the means stand at quantiles
-    of the standard normal distribution, apart from each other: equal components would get equal gradients.
+    One linear layer gives the weights' logarithms, the means and the Cholesky factors, whose
+    diagonals are softplus(·) + `LEAST_DEVIATION`. At the start all covariances are the unit
+    matrix's and the means stand at quantiles of the standard normal distribution, apart from each
+    other: equal components would get equal gradients.
 
     Args:
         dimension: of the embedding.
@@ -210,7 +240,9 @@ class MixtureHead(nn.Module):
         logit, location, diagonal, below = raw.split([1, t, t, raw.shape[2] - 1 - 2 * t], dim=2)
         lower = torch.zeros((*raw.shape[:2], t * t), dtype=raw.dtype, device=raw.device)
         index = torch.as_tensor(self.below).expand(*raw.shape[:2], -1)
-        factor = torch.diag_embed(softplus(diagonal) + LEAST_DEVIATION) + lower.scatter(2, index, below).unflatten(
-            2, (t, t)
+        factor = torch.diag_embed(softplus(diagonal) + LEAST_DEVIATION) + lower.scatter(
+            2, index, below
+        ).unflatten(2, (t, t))
+        return Mixture(
+            log_weight=logit.squeeze(2).log_softmax(dim=1), location=location, factor=factor
         )
-        return Mixture(log_weight=logit.squeeze(2).log_softmax(dim=1), location=location, factor=factor)

@@ -1,4 +1,5 @@
-"""The networks by name. A name in a recipe or a checkpoint is looked up here; the module is imported only then.
+"""The networks by name. A name in a recipe or a checkpoint is looked up here; the module is
+imported only then.
 
 Installed packages add networks by entry points of the group `flagdata.networks`.
 """

@@ -1,7 +1,8 @@
-"""The Spectral Decomposition Network: what moves where and how fast, to an embedding of 512 numbers.
+"""The Spectral Decomposition Network: what moves where and how fast, to an embedding of 512
+numbers.
 
-Runia et al., Cloth in the Wind, CVPR 2020, section 5: spectral power and frequency maps, three standard ResNet blocks
-and a linear layer; one frequency peak, 512 numbers, 2.6 M parameters.
+Runia et al., Cloth in the Wind, CVPR 2020, section 5: spectral power and frequency maps, three
+standard ResNet blocks and a linear layer; one frequency peak, 512 numbers, 2.6 M parameters.
 """
 
 from __future__ import annotations
@@ -19,23 +20,27 @@ from models.networks.blocks import BasicBlock, initialise
 class SpectralNetwork(nn.Module):
     """Spectral maps (batch, channels, height, width) → embedding (batch, dimension).
 
-    With the default widths it has 2,626,384 parameters: the paper states 2.6 M and neither the blocks' widths, nor
-    their strides, nor what comes between the last block and the linear layer. Here each block halves the map, and the
-    average over a grid of 3×3 fields goes to the linear layer, so that where in the image the motion is stays known,
-    and maps of 112×112 and 56×56 serve alike.
+    With the default widths it has 2,626,384 parameters: the paper states 2.6 M and neither the
+    blocks' widths, nor their strides, nor what comes between the last block and the linear layer.
+    Here each block halves the map, and the average over a grid of 3×3 fields goes to the linear
+    layer, so that where in the image the motion is stays known, and maps of 112×112 and 56×56 serve
+    alike.
 
-    Scaling. A power is the square of an amplitude and its density over the pixels has a heavy tail: an edge that
-    sweeps past a pixel leaves 10³ to 10⁴ times the power of camera noise, and batch normalisation of such maps would be
-    that of a few pixels. So powers enter as log(1 + P/floor): logarithmic where something moves, and linear, thus
-    small, below the floor, where a bare logarithm would spread out noise. Frequencies enter over the Nyquist frequency,
-    from 0 to 1. Both are fixed, not learned, so that one clip alone is treated as in a batch.
+    Scaling. A power is the square of an amplitude and its density over the pixels has a heavy tail:
+    an edge that sweeps past a pixel leaves 10³ to 10⁴ times the power of camera noise, and batch
+    normalisation of such maps would be that of a few pixels. So powers enter as log(1 + P/floor):
+    logarithmic where something moves, and linear, thus small, below the floor, where a bare
+    logarithm would spread out noise. Frequencies enter over the Nyquist frequency, from 0 to 1.
+    Both are fixed, not learned, so that one clip alone is treated as in a batch.
 
     Args:
-        channels: of the maps, 2kC: powers first, then as many frequencies [Hz] (`models.maps.spectral_layer`).
+        channels: of the maps, 2kC: powers first, then as many frequencies [Hz]
+            (`models.maps.spectral_layer`).
         widths: channels of the three blocks.
         grid: fields along each side over which the last map is averaged.
         dimension: of the embedding.
-        floor: power below which the scale is linear, in squares of the standardised gray level's gradient [1/px²].
+        floor: power below which the scale is linear, in squares of the standardised gray level's
+            gradient [1/px²].
         nyquist: half of the frame rate [Hz].
 
     Raises:
@@ -57,12 +62,19 @@ class SpectralNetwork(nn.Module):
     ) -> None:
         super().__init__()
         if channels < 2 or channels % 2:
-            raise InputError(f"{channels} channels are not powers and as many frequencies", fix="give an even number")
+            raise InputError(
+                f"{channels} channels are not powers and as many frequencies",
+                fix="give an even number",
+            )
         if len(widths) != 3:
-            raise InputError(f"{len(widths)} widths do not fit three blocks", fix="give three, such as [64, 128, 280]")
+            raise InputError(
+                f"{len(widths)} widths do not fit three blocks",
+                fix="give three, such as [64, 128, 280]",
+            )
         if min(*widths, grid, dimension, floor, nyquist) <= 0:
             raise InputError(
-                f"the widths are {tuple(widths)}, grid {grid}, dimension {dimension}, floor {floor}, nyquist {nyquist}",
+                f"the widths are {tuple(widths)}, grid {grid}, dimension {dimension}, floor "
+                f"{floor}, nyquist {nyquist}",
                 fix="give positive numbers",
             )
         self.channels = channels
@@ -78,7 +90,8 @@ class SpectralNetwork(nn.Module):
         initialise(self)
 
     def scaled(self, maps: Tensor) -> Tensor:
-        """Returns the maps as the first block sees them: log(1 + P/floor) and f/f_Nyquist, of the same shape."""
+        """Returns the maps as the first block sees them: log(1 + P/floor) and f/f_Nyquist, of the
+        same shape."""
         power, frequency = maps.chunk(2, dim=1)
         return torch.cat([(power / self.floor).log1p(), frequency / self.nyquist], dim=1)
 

@@ -1,13 +1,15 @@
-"""What networks estimate from a clip: physical parameters, their ranges, and their encoding for training.
+"""What networks estimate from a clip: physical parameters, their ranges, and their encoding for
+training.
 
-Each target lies in a range, for flags that of the search space of Runia et al. 2020 (table 1), or a wider one of flags
-of any fabric. What networks learn is the logit of its place in that range, widened by 1 % so that the ends stay finite:
-a distribution over it has no mass outside of what was simulated, and a uniform prior becomes a logistic one.
+Each target lies in a range, for flags that of the search space of Runia et al. 2020 (table 1), or a
+wider one of flags of any fabric. What networks learn is the logit of its place in that range,
+widened by 1 % so that the ends stay finite: a distribution over it has no mass outside of what was
+simulated, and a uniform prior becomes a logistic one.
 
-A quantity has one name in all tables ("area_weight"), whatever cloth it is of; the range is that of one kind of cloth.
-A recipe therefore names targets by the keys of `TARGETS`: "area_weight" is a flag's in the paper's range,
-"fabric_area_weight" a flag's of any fabric, "world_area_weight" one's in a wider range still, "cloth_area_weight" a
-hanging cloth's.
+A quantity has one name in all tables ("area_weight"), whatever cloth it is of; the range is that of
+one kind of cloth. A recipe therefore names targets by the keys of `TARGETS`: "area_weight" is a
+flag's in the paper's range, "fabric_area_weight" a flag's of any fabric, "world_area_weight" one's
+in a wider range still, "cloth_area_weight" a hanging cloth's.
 """
 
 from __future__ import annotations
@@ -63,7 +65,9 @@ _OF_FLAGS = {
     target.name: target
     for target in (
         Target(name="wind_speed", unit="m/s", low=0.0, high=10.0, about="wind speed"),
-        Target(name="area_weight", unit="kg/m²", low=0.10, high=0.17, about="area weight", digits=3),
+        Target(
+            name="area_weight", unit="kg/m²", low=0.10, high=0.17, about="area weight", digits=3
+        ),
         Target(
             name="bending_scale",
             unit="log10(N·m)",
@@ -76,16 +80,19 @@ _OF_FLAGS = {
             unit="1",
             low=-1.8,
             high=1.8,
-            about="mean logarithm (base 10) of the 5 coefficients along the warp less that of the 5 along the weft",
+            about="mean logarithm (base 10) of the 5 coefficients along the warp less that of the "
+            "5 along the weft",
         ),
     )
 }
-"""The ranges of wind and area weight are the paper's. With each of 15 factors drawn uniformly from 0.1 to 10 about
-Camel Ponte Roma's entries, the bending scale has mean -3.93 and standard deviation 0.10, the anisotropy 0.15 and 0.25;
-the ranges reach at least 6 of them either way."""
+"""The ranges of wind and area weight are the paper's. With each of 15 factors drawn uniformly from
+0.1 to 10 about Camel Ponte Roma's entries, the bending scale has mean -3.93 and standard deviation
+0.10, the anisotropy 0.15 and 0.25; the ranges reach at least 6 of them either way."""
 
 _OF_FLAGS_OF_ANY_FABRIC = {
-    "fabric_area_weight": Target(name="area_weight", unit="kg/m²", low=0.05, high=0.40, about="area weight", digits=3),
+    "fabric_area_weight": Target(
+        name="area_weight", unit="kg/m²", low=0.05, high=0.40, about="area weight", digits=3
+    ),
     "fabric_bending": Target(
         name="bending_scale",
         unit="log10(N·m)",
@@ -94,9 +101,9 @@ _OF_FLAGS_OF_ANY_FABRIC = {
         about="mean of the logarithms of the 15 bending coefficients",
     ),
 }
-"""Flags of the scene `flag-fabrics`: area weights from spinnaker cloth to denim, and a factor of 0.125 to 4 of all
-bending coefficients together, which moves the bending scale's mean from -4.8 to -3.3; the ranges reach 4 of its
-standard deviations beyond either."""
+"""Flags of the scene `flag-fabrics`: area weights from spinnaker cloth to denim, and a factor of
+0.125 to 4 of all bending coefficients together, which moves the bending scale's mean from -4.8 to
+-3.3; the ranges reach 4 of its standard deviations beyond either."""
 
 ASPECT = "log_aspect"
 """The natural logarithm of a flag's length over its height."""
@@ -104,28 +111,47 @@ ASPECT = "log_aspect"
 _OF_FLAGS_OUTDOORS = {
     "outdoor_wind": Target(name="wind_speed", unit="m/s", low=0.0, high=16.0, about="wind speed"),
     ASPECT: Target(
-        name=ASPECT, unit="1", low=-0.05, high=0.75, about="natural logarithm of the length over the height"
+        name=ASPECT,
+        unit="1",
+        low=-0.05,
+        high=0.75,
+        about="natural logarithm of the length over the height",
     ),
 }
-"""Flags of the scenes `flag-outdoor` and `flag-outdoor-damped`: winds of up to 16 m/s, and lengths of 1 to 2 heights,
-with a margin on either side so that a flag of 1:1 or 2:1 lies well within. Who knows a flag's size conditions on it."""
+"""Flags of the scenes `flag-outdoor` and `flag-outdoor-damped`: winds of up to 16 m/s, and lengths
+of 1 to 2 heights, with a margin on either side so that a flag of 1:1 or 2:1 lies well within. Who
+knows a flag's size conditions on it."""
 
 _OF_FLAGS_OF_THE_WORLD = {
-    "world_area_weight": Target(name="area_weight", unit="kg/m²", low=0.03, high=0.65, about="area weight", digits=3),
+    "world_area_weight": Target(
+        name="area_weight", unit="kg/m²", low=0.03, high=0.65, about="area weight", digits=3
+    ),
 }
-"""Flags of the scenes `flag-world` and `flag-world-damped`, whose weights reach well beyond the fabrics that are flown:
-a cloth of 0.38 kg/m² lay at the end of the range of `fabric_area_weight`, and its wind was read too fast. Their winds,
-bending and shapes are those outdoors."""
+"""Flags of the scenes `flag-world` and `flag-world-damped`, whose weights reach well beyond the
+fabrics that are flown: a cloth of 0.38 kg/m² lay at the end of the range of `fabric_area_weight`,
+and its wind was read too fast. Their winds, bending and shapes are those outdoors."""
 
 _BENDING = 15
 _ROW = 5
-_STATED = {"wind_speed": ("wind_speed",), "area_weight": ("area_weight",), ASPECT: ("width", "height")}
+_STATED = {
+    "wind_speed": ("wind_speed",),
+    "area_weight": ("area_weight",),
+    ASPECT: ("width", "height"),
+}
 """What quantities are made of that are not made of the bending coefficients."""
 
 _OF_HANGING_CLOTH = {
-    "cloth_wind": Target(name="wind_speed", unit="m/s", low=0.0, high=6.0, about="wind speed", cloth=Cloth.HANGING),
+    "cloth_wind": Target(
+        name="wind_speed", unit="m/s", low=0.0, high=6.0, about="wind speed", cloth=Cloth.HANGING
+    ),
     "cloth_area_weight": Target(
-        name="area_weight", unit="kg/m²", low=0.079, high=0.454, about="area weight", digits=3, cloth=Cloth.HANGING
+        name="area_weight",
+        unit="kg/m²",
+        low=0.079,
+        high=0.454,
+        about="area weight",
+        digits=3,
+        cloth=Cloth.HANGING,
     ),
     "cloth_bending": Target(
         name="bending_scale",
@@ -136,20 +162,28 @@ _OF_HANGING_CLOTH = {
         about="mean of the logarithms of the 15 bending coefficients",
     ),
 }
-"""Those of the ten materials of Wang et al. 2011 with the factors of the scene `hanging-cloth-wide`: area weights of
-0.113 to 0.324 kg/m² times 0.7 to 1.4, bending scales of -4.76 to -3.78 and 0.30 either way. Its anisotropy is the
-material's own, one of ten values, and no target."""
+"""Those of the ten materials of Wang et al. 2011 with the factors of the scene
+`hanging-cloth-wide`: area weights of 0.113 to 0.324 kg/m² times 0.7 to 1.4, bending scales of -4.76
+to -3.78 and 0.30 either way. Its anisotropy is the material's own, one of ten values, and no
+target."""
 
-TARGETS = {**_OF_FLAGS, **_OF_FLAGS_OF_ANY_FABRIC, **_OF_FLAGS_OUTDOORS, **_OF_FLAGS_OF_THE_WORLD, **_OF_HANGING_CLOTH}
+TARGETS = {
+    **_OF_FLAGS,
+    **_OF_FLAGS_OF_ANY_FABRIC,
+    **_OF_FLAGS_OUTDOORS,
+    **_OF_FLAGS_OF_THE_WORLD,
+    **_OF_HANGING_CLOTH,
+}
 """By the names that recipes know them by."""
 
 
 def truth(parameters: Mapping[str, FloatArray], names: Sequence[str]) -> FloatArray:
-    """Computes the targets of clips from their parameters: (n, target), NaN where a clip does not know them.
+    """Computes the targets of clips from their parameters: (n, target), NaN where a clip does not
+    know them.
 
     Args:
-        parameters: name → (n,) values, as simulated records state them ("wind_speed", "area_weight", "bending.0" …;
-            "width" and "height" of the cloth [m]).
+        parameters: name → (n,) values, as simulated records state them ("wind_speed",
+            "area_weight", "bending.0" …; "width" and "height" of the cloth [m]).
         names: keys of `TARGETS`.
 
     Raises:
@@ -182,7 +216,9 @@ def _made_of(name: str) -> tuple[str, ...]:
 def _target_values(parameters: Mapping[str, FloatArray], name: str) -> FloatArray:
     needed = _made_of(name)
     quantity = TARGETS[name].name
-    missing = [key for key in needed if key not in parameters or not np.isfinite(parameters[key]).any()]
+    missing = [
+        key for key in needed if key not in parameters or not np.isfinite(parameters[key]).any()
+    ]
     if missing:
         raise InputError(
             f"no clip states its {missing[0]}, which the target {name} is made of",
@@ -204,7 +240,8 @@ class Scaling:
     """Between targets and what is learned.
 
     Attributes:
-        names: keys of `TARGETS`, in the order of the columns; all of one kind of cloth, no quantity twice.
+        names: keys of `TARGETS`, in the order of the columns; all of one kind of cloth, no quantity
+            twice.
 
     Raises:
         UnknownNameError: a name that is none.
@@ -217,13 +254,16 @@ class Scaling:
         for name in self.names:
             if name not in TARGETS:
                 raise UnknownNameError.of("target", name, TARGETS)
-        if len({target.cloth for target in self.targets}) > 1 or len(set(self.quantities)) < len(self.names):
+        if len({target.cloth for target in self.targets}) > 1 or len(set(self.quantities)) < len(
+            self.names
+        ):
             raise InputError(
                 f"the targets are {', '.join(self.names)}",
                 where="[loss] targets",
                 fix="name targets of one kind of cloth, each quantity once: "
                 + "; or ".join(
-                    ", ".join(key for key, target in TARGETS.items() if target.cloth is cloth) for cloth in Cloth
+                    ", ".join(key for key, target in TARGETS.items() if target.cloth is cloth)
+                    for cloth in Cloth
                 ),
             )
 
@@ -246,8 +286,8 @@ class Scaling:
         return low - margin, high + margin
 
     def beyond(self, values: FloatArray) -> tuple[str, ...]:
-        """Describes, for each target of which some of the values (n, target) lie beyond its widened range, how many and
-        how far.
+        """Describes, for each target of which some of the values (n, target) lie beyond its widened
+        range, how many and how far.
 
         A network of these targets can state no such value; NaN lies nowhere.
         """
@@ -258,7 +298,8 @@ class Scaling:
             count = int(((entries < low[column]) | (entries > high[column])).sum())
             if count:
                 texts.append(
-                    f"{count} of {len(entries)} clips lie beyond the range of the target {name}, {target.low:g} to "
+                    f"{count} of {len(entries)} clips lie beyond the range of the target {name}, "
+                    f"{target.low:g} to "
                     f"{target.high:g} {target.unit}: they reach from {np.nanmin(entries):.4g} to "
                     f"{np.nanmax(entries):.4g}"
                 )
@@ -268,20 +309,27 @@ class Scaling:
         """Checks that all values (n, target) that are to be learned lie within their ranges.
 
         Raises:
-            InputError: some do not; it names the range, how many they are, and targets whose range is wide enough.
+            InputError: some do not; it names the range, how many they are, and targets whose range
+                is wide enough.
         """
         beyond = self.beyond(values)
         if not beyond:
             return
         wide = [name for name in TARGETS if self._covers(name, values)]
-        fix = f"name the target {' or '.join(wide)} in [loss] targets" if wide else "leave that target out"
+        fix = (
+            f"name the target {' or '.join(wide)} in [loss] targets"
+            if wide
+            else "leave that target out"
+        )
         raise InputError(
-            "; ".join(beyond), where=where, fix=f"{fix}, or train on a data set whose values lie within the range"
+            "; ".join(beyond),
+            where=where,
+            fix=f"{fix}, or train on a data set whose values lie within the range",
         )
 
     def _covers(self, name: str, values: FloatArray) -> bool:
-        """Returns whether the target of that name is another one of the same quantity and cloth, whose range holds all
-        of the values."""
+        """Returns whether the target of that name is another one of the same quantity and cloth,
+        whose range holds all of the values."""
         wanted = TARGETS[name]
         columns = [
             column
@@ -292,7 +340,8 @@ class Scaling:
         return any(not ranges.beyond(values[:, [column]]) for column in columns)
 
     def learned(self, values: Tensor) -> Tensor:
-        """Transforms values to (n, target) logits; one outside of its range is taken at its end, less a millionth.
+        """Transforms values to (n, target) logits; one outside of its range is taken at its end,
+        less a millionth.
 
         What is trained on is refused before it comes to that, see `check`.
         """
@@ -307,5 +356,8 @@ class Scaling:
 
     @property
     def spread(self) -> tuple[float, ...]:
-        """(target,) standard deviation of a uniform distribution over each range, to state errors against."""
-        return tuple((TARGETS[name].high - TARGETS[name].low) / math.sqrt(12) for name in self.names)
+        """(target,) standard deviation of a uniform distribution over each range, to state errors
+        against."""
+        return tuple(
+            (TARGETS[name].high - TARGETS[name].low) / math.sqrt(12) for name in self.names
+        )

@@ -1,8 +1,9 @@
 """Wave maps to a summary of 32 numbers that a distribution over the parameters rests on.
 
-Beside the paper's strongest power and frequency the network sees a second peak, the power by band, the spectrum's
-centre and width, the wave number at the strongest frequency with its coherence, and what the clip looks like at rest
-(`models.maps.frontend`). At a quarter of the clip's size a forward and backward pass takes a sixth of the SDN's time.
+Beside the paper's strongest power and frequency the network sees a second peak, the power by band,
+the spectrum's centre and width, the wave number at the strongest frequency with its coherence, and
+what the clip looks like at rest (`models.maps.frontend`). At a quarter of the clip's size a forward
+and backward pass takes a sixth of the SDN's time.
 """
 
 from __future__ import annotations

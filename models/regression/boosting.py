@@ -1,7 +1,7 @@
 """Gradient boosting of trees on features: a mean and quantiles of each target.
 
-Friedman, Annals of Statistics 29, 2001; quantiles by the pinball loss (Koenker and Bassett, Econometrica 46, 1978).
-Needs scikit-learn.
+Friedman, Annals of Statistics 29, 2001; quantiles by the pinball loss (Koenker and Bassett,
+Econometrica 46, 1978). Needs scikit-learn.
 """
 
 from __future__ import annotations
@@ -47,8 +47,9 @@ class Boosting:
     def predict_quantiles(self, features: NDArray[np.floating]) -> FloatArray:
         """Estimates quantiles of the targets: (n, level, t), ascending.
 
-        Ensembles of neighbouring levels know nothing of each other and may cross; sorting them never makes a quantile
-        worse (Chernozhukov, Fernández-Val and Galichon, Econometrica 78, 2010).
+        Ensembles of neighbouring levels know nothing of each other and may cross; sorting them
+        never makes a quantile worse (Chernozhukov, Fernández-Val and Galichon, Econometrica 78,
+        2010).
         """
         self._require(features)
         quantiles = [[model.predict(features) for model in models] for models in self.quantiles]
@@ -57,9 +58,10 @@ class Boosting:
     def samples(self, features: NDArray[np.floating], *, count: int) -> Float32Array:
         """Returns `count` equally probable values of each target by itself: (n, count, t) float32.
 
-        They stand at the levels (i + ½)/count of the quantile function, linear between the fitted levels and constant
-        beyond the outermost: no interval is wider than the one between these, and the samples do not show how targets
-        vary together.
+        They stand at the levels (i + ½)/count of the quantile function, linear between the fitted
+        levels and constant
+        beyond the outermost: no interval is wider than the one between these, and the samples do
+        not show how targets vary together.
         """
         if count < 1:
             raise InputError(f"{count} samples cannot be drawn", fix="ask for at least 1")
@@ -68,7 +70,9 @@ class Boosting:
         low, high = np.array(self.levels)[upper - 1], np.array(self.levels)[upper]
         share = np.clip((level - low) / (high - low), 0, 1)[None, :, None]
         quantiles = self.predict_quantiles(features)
-        return ((1 - share) * quantiles[:, upper - 1] + share * quantiles[:, upper]).astype(np.float32)
+        return ((1 - share) * quantiles[:, upper - 1] + share * quantiles[:, upper]).astype(
+            np.float32
+        )
 
     def _require(self, features: NDArray[np.floating]) -> None:
         if features.ndim != 2 or features.shape[1] != self.features:
@@ -91,8 +95,8 @@ def fit_boosting(
 ) -> Boosting:
     """Fits trees to clips.
 
-    The number of rounds is fixed: stopping early on clips drawn at random would judge by other clips of the same
-    sequences.
+    The number of rounds is fixed: stopping early on clips drawn at random would judge by other
+    clips of the same sequences.
 
     Args:
         features: (n, f).
@@ -102,7 +106,8 @@ def fit_boosting(
         rate: by which each tree counts.
         leaves: of each tree, at most.
         levels: of the quantiles, ascending, at least two.
-        advance: called with 1 after each ensemble, `ENSEMBLES` times for each target where the levels are `LEVELS`.
+        advance: called with 1 after each ensemble, `ENSEMBLES` times for each target where the
+            levels are `LEVELS`.
 
     Raises:
         InputError: sizes that differ, numbers that are not finite, or a number out of its range.
@@ -115,10 +120,18 @@ def fit_boosting(
             fix="give at least 1 round, a rate in (0, 1] and at least 2 leaves",
         )
     ascending = tuple(float(level) for level in levels)
-    if len(ascending) < 2 or ascending != tuple(sorted(set(ascending))) or not 0 < ascending[0] < ascending[-1] < 1:
-        raise InputError(f"the levels are {ascending}", fix="give at least two between 0 and 1, ascending")
+    if (
+        len(ascending) < 2
+        or ascending != tuple(sorted(set(ascending)))
+        or not 0 < ascending[0] < ascending[-1] < 1
+    ):
+        raise InputError(
+            f"the levels are {ascending}", fix="give at least two between 0 and 1, ascending"
+        )
 
-    def fit_one(target: FloatArray, loss: str, level: float | None) -> HistGradientBoostingRegressor:
+    def fit_one(
+        target: FloatArray, loss: str, level: float | None
+    ) -> HistGradientBoostingRegressor:
         trees = HistGradientBoostingRegressor(
             loss=loss,
             quantile=level,
@@ -133,7 +146,9 @@ def fit_boosting(
 
     return Boosting(
         means=tuple(fit_one(target, "squared_error", None) for target in y.T),
-        quantiles=tuple(tuple(fit_one(target, "quantile", level) for level in ascending) for target in y.T),
+        quantiles=tuple(
+            tuple(fit_one(target, "quantile", level) for level in ascending) for target in y.T
+        ),
         levels=ascending,
         features=x.shape[1],
     )

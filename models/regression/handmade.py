@@ -1,6 +1,7 @@
 """A page of hand-made features of a clip: what a person would measure before training a network.
 
-They are the yardstick of every network: one that does not beat a regression on them has learned nothing beyond them.
+They are the yardstick of every network: one that does not beat a regression on them has learned
+nothing beyond them.
 """
 
 from __future__ import annotations
@@ -16,17 +17,20 @@ from torch import Tensor
 from flagdata.errors import InputError
 
 BAND_EDGES = (0.4, 1.25, 2.1, 3.3, 5.0, 7.5, 12.5)
-"""Edges [Hz] of the frequency bands: from below one cycle in a clip of 30 frames to the Nyquist frequency of 25 Hz."""
+"""Edges [Hz] of the frequency bands: from below one cycle in a clip of 30 frames to the Nyquist
+frequency of 25 Hz."""
 
 SIDE = 112
-"""Height and width [px] to which larger clips are averaged down; in px of this grid all lengths are given."""
+"""Height and width [px] to which larger clips are averaged down; in px of this grid all lengths are
+given."""
 
 FLOOR = 1e-6
-"""Power, in variances of the clip, added before logarithms: about what rounding to 8 bits leaves in one frequency of
-a clip with a standard deviation of 50 gray levels, (1/12) / 50² / 15."""
+"""Power, in variances of the clip, added before logarithms: about what rounding to 8 bits leaves in
+one frequency of a clip with a standard deviation of 50 gray levels, (1/12) / 50² / 15."""
 
 LEAST_SLOPE = 0.02
-"""Slope [standard deviations/px] added to the divisor of the normal flow: flat pixels have no flow."""
+"""Slope [standard deviations/px] added to the divisor of the normal flow: flat pixels have no
+flow."""
 
 _SIGNALS = ("change", "slope_x", "slope_y")
 _BANDS = tuple(f"{low:g}_{high:g}hz" for low, high in pairwise(BAND_EDGES))
@@ -70,11 +74,13 @@ FEATURES: tuple[str, ...] = (
     "log_share_moving",
     "change_unsteadiness",
 )
-"""Names of the features in their order. A slope is a derivative of the gray level; motion, its deviation in time."""
+"""Names of the features in their order. A slope is a derivative of the gray level; motion, its
+deviation in time."""
 
 
 def features(frames: Tensor, *, rate: float) -> Tensor:
-    """Measures the features of clips: (batch, len(FEATURES)) float32, none of them changed by contrast or brightness.
+    """Measures the features of clips: (batch, len(FEATURES)) float32, none of them changed by
+    contrast or brightness.
 
     Powers are logarithms to base 10 of variances over the clip's own; frequencies in Hz; flows in
     log10(px/s) and positions and lengths in px, over `SIDE`. Flow is the normal flow of Horn and Schunck (1981),
@@ -90,14 +96,21 @@ def features(frames: Tensor, *, rate: float) -> Tensor:
     Raises:
         InputError: clips too short, small or slow, or without contrast.
     """
-    if frames.ndim != 5 or frames.shape[1] != 1 or frames.shape[2] < 8 or min(frames.shape[3:]) < 16:
+    if (
+        frames.ndim != 5
+        or frames.shape[1] != 1
+        or frames.shape[2] < 8
+        or min(frames.shape[3:]) < 16
+    ):
         raise InputError(
             f"the clips have the shape {tuple(frames.shape)}",
-            fix="give gray clips (batch, 1, time, height, width) of at least 8 frames and 16×16 pixels",
+            fix="give gray clips (batch, 1, time, height, width) of at least 8 frames and 16×16 "
+            "pixels",
         )
     if rate < 2 * BAND_EDGES[-1]:
         raise InputError(
-            f"{rate:g} frames a second do not resolve {BAND_EDGES[-1]:g} Hz", fix=f"give {2 * BAND_EDGES[-1]:g} or more"
+            f"{rate:g} frames a second do not resolve {BAND_EDGES[-1]:g} Hz",
+            fix=f"give {2 * BAND_EDGES[-1]:g} or more",
         )
     return torch.stack([_of_clip(clip[0], rate) for clip in frames])
 
@@ -127,11 +140,14 @@ def _of_clip(clip: Tensor, rate: float) -> Tensor:
         *_waves(wave),
         *_appearance(change, slope_x, slope_y, motion),
     ]
-    return torch.stack([torch.as_tensor(number, dtype=torch.float32, device=clip.device) for number in numbers])
+    return torch.stack(
+        [torch.as_tensor(number, dtype=torch.float32, device=clip.device) for number in numbers]
+    )
 
 
 def _reduce_clip(clip: Tensor) -> Tensor:
-    """Returns the clip averaged over whole blocks of pixels, so that its shorter side is near `SIDE`."""
+    """Returns the clip averaged over whole blocks of pixels, so that its shorter side is near
+    `SIDE`."""
     block = max(1, round(min(clip.shape[1:]) / SIDE))
     height, width = (side // block * block for side in clip.shape[1:])
     parts = [clip[:, i:height:block, j:width:block] for i in range(block) for j in range(block)]
@@ -143,10 +159,12 @@ def _log(power: Tensor) -> Tensor:
 
 
 def _transform(signal: Tensor, rate: float) -> tuple[Tensor, Tensor, Tensor]:
-    """Returns real and imaginary part (bin, height, width) of the windowed transform without its mean, and Hz (bin,).
+    """Returns real and imaginary part (bin, height, width) of the windowed transform without its
+    mean, and Hz (bin,).
 
-    One matrix product: the Hann window (Σw² = n) and the subtraction of the mean are part of the matrix, and |F|²/n² is
-    the part of the variance in a bin, but for the factor 2 of negative frequencies.
+    One matrix product: the Hann window (Σw² = n) and the subtraction of the mean are part of the
+    matrix, and |F|²/n² is the part of the variance in a bin, but for the factor 2 of negative
+    frequencies.
     """
     n = len(signal)
     t = np.arange(n)
@@ -159,19 +177,27 @@ def _transform(signal: Tensor, rate: float) -> tuple[Tensor, Tensor, Tensor]:
     matrix = torch.as_tensor(rows, dtype=signal.dtype, device=signal.device)
     flat = (matrix @ signal.flatten(1)).unflatten(1, signal.shape[1:])
     real, imaginary = flat.chunk(2)
-    return real, imaginary, torch.as_tensor(frequency * rate / n, dtype=signal.dtype, device=signal.device)
+    return (
+        real,
+        imaginary,
+        torch.as_tensor(frequency * rate / n, dtype=signal.dtype, device=signal.device),
+    )
 
 
 def _band_shares(frequency: Tensor, width: float) -> Tensor:
-    """Returns the share of each bin, f ± width/2, in each band: (band, bin). Bands finer than the bins share them."""
+    """Returns the share of each bin, f ± width/2, in each band: (band, bin). Bands finer than the
+    bins share them."""
     edges = torch.tensor(BAND_EDGES, dtype=frequency.dtype, device=frequency.device)
     low = torch.maximum(edges[:-1, None], frequency - width / 2)
     high = torch.minimum(edges[1:, None], frequency + width / 2)
     return (high - low).clamp_min(0) / width
 
 
-def _spectral(wave: tuple[Tensor, Tensor, Tensor], slope_x: Tensor, slope_y: Tensor, rate: float) -> list[Tensor]:
-    """Computes band powers and shape of the spectra of the change from frame to frame and of both slopes."""
+def _spectral(
+    wave: tuple[Tensor, Tensor, Tensor], slope_x: Tensor, slope_y: Tensor, rate: float
+) -> list[Tensor]:
+    """Computes band powers and shape of the spectra of the change from frame to frame and of both
+    slopes."""
     powers: list[Tensor] = []
     shapes: list[Tensor] = []
     local: list[Tensor] = []
@@ -188,7 +214,11 @@ def _spectral(wave: tuple[Tensor, Tensor, Tensor], slope_x: Tensor, slope_y: Ten
         powers += list(_log(_band_shares(frequency, float(frequency[0])) @ spectrum))
         weight = spectrum + FLOOR / len(spectrum)
         middle = _weighted_mean(frequency, weight)
-        shapes += [frequency[spectrum.argmax()], middle, _weighted_mean((frequency - middle).square(), weight).sqrt()]
+        shapes += [
+            frequency[spectrum.argmax()],
+            middle,
+            _weighted_mean((frequency - middle).square(), weight).sqrt(),
+        ]
     return powers + shapes + local
 
 
@@ -207,8 +237,8 @@ def _coverage(motion: Tensor) -> list[Tensor]:
 
 
 def _flow(change: Tensor, slope_x: Tensor, slope_y: Tensor, rate: float) -> list[Tensor]:
-    """Computes normal flow where there is slope, and the translation of each frame, both in widths of the reduced
-    image."""
+    """Computes normal flow where there is slope, and the translation of each frame, both in widths
+    of the reduced image."""
     scale = rate / SIDE
     x, y = 0.5 * (slope_x[1:] + slope_x[:-1]), 0.5 * (slope_y[1:] + slope_y[:-1])
     xx, yy, xy = (x * x).mean(dim=(1, 2)), (y * y).mean(dim=(1, 2)), (x * y).mean(dim=(1, 2))
@@ -220,7 +250,9 @@ def _flow(change: Tensor, slope_x: Tensor, slope_y: Tensor, rate: float) -> list
     slope = (x[sparse].square() + y[sparse].square()).sqrt()
     normal = change[sparse].abs() / (slope + LEAST_SLOPE)
     median, high = _quantiles(normal, (0.5, 0.9))
-    rms = (change.square().mean() / (slope_x.square().mean() + slope_y.square().mean() + FLOOR)).sqrt()
+    rms = (
+        change.square().mean() / (slope_x.square().mean() + slope_y.square().mean() + FLOOR)
+    ).sqrt()
     return [
         _log(rms * scale),
         _log(median * scale),
@@ -232,7 +264,8 @@ def _flow(change: Tensor, slope_x: Tensor, slope_y: Tensor, rate: float) -> list
 
 
 def _shape(motion: Tensor) -> list[Tensor]:
-    """Computes moments of the motion's power over the image: moments of its power over the image."""
+    """Computes moments of the motion's power over the image: moments of its power over the
+    image."""
     height, width = motion.shape
     weight = motion + FLOOR
     x = (torch.arange(width, device=motion.device, dtype=motion.dtype) - (width - 1) / 2) / SIDE
@@ -256,10 +289,13 @@ def _shape(motion: Tensor) -> list[Tensor]:
 
 
 def _waves(transform: tuple[Tensor, Tensor, Tensor]) -> list[Tensor]:
-    """Computes coherence and wavenumber [rad/px] along x and y at the frequency that dominates the rate of change."""
+    """Computes coherence and wavenumber [rad/px] along x and y at the frequency that dominates the
+    rate of change."""
     real, imaginary, frequency = transform
     power = (real.square() + imaginary.square()).mean(dim=(1, 2))
-    wave = torch.complex(*(part[(power * frequency.square()).argmax()] for part in (real, imaginary)))
+    wave = torch.complex(
+        *(part[(power * frequency.square()).argmax()] for part in (real, imaginary))
+    )
     pairs = ((wave[:, 1:], wave[:, :-1]), (wave[1:], wave[:-1]))
     coherence, wavenumber = [], []
     for ahead, behind in pairs:

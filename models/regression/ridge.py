@@ -23,7 +23,8 @@ class Ridge:
 
     Attributes:
         centre: (f,), means of the features over the training clips.
-        scale: (f,), their standard deviations; 1 for features that are constant there, whose weights are 0.
+        scale: (f,), their standard deviations; 1 for features that are constant there, whose
+            weights are 0.
         weights: (f, t).
         intercept: (t,).
         penalty: (t,), chosen for each target, a multiple of the number of clips.
@@ -39,7 +40,8 @@ class Ridge:
         """Estimates the targets of clips with features (n, f): (n, t)."""
         if features.ndim != 2 or features.shape[1] != len(self.centre):
             raise InputError(
-                f"the features have the shape {features.shape}, and the ridge takes {len(self.centre)}",
+                f"the features have the shape {features.shape}, and the ridge takes "
+                f"{len(self.centre)}",
                 fix=f"give (n, {len(self.centre)})",
             )
         return (features - self.centre) / self.scale @ self.weights + self.intercept
@@ -54,11 +56,14 @@ class Ridge:
         return cls(**{field.name: np.asarray(arrays[field.name]) for field in fields(cls)})
 
 
-def fit_ridge(features: NDArray[np.floating], targets: NDArray[np.floating], *, group: NDArray[np.integer]) -> Ridge:
-    """Fits a ridge to clips, for each target with the penalty of least squared error on sequences left out.
+def fit_ridge(
+    features: NDArray[np.floating], targets: NDArray[np.floating], *, group: NDArray[np.integer]
+) -> Ridge:
+    """Fits a ridge to clips, for each target with the penalty of least squared error on sequences
+    left out.
 
-    Sequences are dealt out to `FOLDS` folds in the order of their numbers: clips of one sequence are in one fold, since
-    they share all that is to be estimated.
+    Sequences are dealt out to `FOLDS` folds in the order of their numbers: clips of one sequence
+    are in one fold, since they share all that is to be estimated.
 
     Args:
         features: (n, f).
@@ -96,23 +101,33 @@ def check_folds(group: NDArray[np.integer]) -> None:
         InputError: fewer sequences than folds.
     """
     if (sequences := len(np.unique(group))) < FOLDS:
-        raise InputError(f"{sequences} sequences cannot be dealt out to {FOLDS} folds", fix="give more sequences")
+        raise InputError(
+            f"{sequences} sequences cannot be dealt out to {FOLDS} folds", fix="give more sequences"
+        )
 
 
 def require_table(features: FloatArray, targets: FloatArray, group: NDArray[np.integer]) -> None:
-    """Checks that features (n, f), targets (n, t) and groups (n,) are of the same clips, and finite.
+    """Checks that features (n, f), targets (n, t) and groups (n,) are of the same clips, and
+    finite.
 
     Raises:
         InputError: they are not.
     """
     if features.ndim != 2 or targets.ndim != 2 or not len(features) == len(targets) == len(group):
         raise InputError(
-            f"the features have the shape {features.shape}, the targets {targets.shape}, the groups {group.shape}",
+            f"the features have the shape {features.shape}, the targets {targets.shape}, the "
+            f"groups {group.shape}",
             fix="give (n, f), (n, t) and (n,) of the same clips",
         )
     if not (np.isfinite(features).all() and np.isfinite(targets).all()):
-        clip = int(np.flatnonzero(~(np.isfinite(features).all(axis=1) & np.isfinite(targets).all(axis=1)))[0])
-        raise InputError("features or targets are not finite", where=f"clip {clip}", fix="leave that clip out")
+        clip = int(
+            np.flatnonzero(~(np.isfinite(features).all(axis=1) & np.isfinite(targets).all(axis=1)))[
+                0
+            ]
+        )
+        raise InputError(
+            "features or targets are not finite", where=f"clip {clip}", fix="leave that clip out"
+        )
 
 
 def _path(x: FloatArray, y: FloatArray) -> list[Ridge]:

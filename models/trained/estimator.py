@@ -1,8 +1,10 @@
-"""A trained model at work: clips in, a distribution of wind and cloth out, and whether the clip is one it can judge.
+"""A trained model at work: clips in, a distribution of wind and cloth out, and whether the clip is
+one it can judge.
 
-An estimator has one learner or several of other seeds, whose distributions are mixed with equal weights: they differ
-most where the data constrain them least. Estimates for clips unlike all training clips mean nothing, so each
-estimate carries a p-value of the distance of its summary to the training clips' (`models.trained.outliers`).
+An estimator has one learner or several of other seeds, whose distributions are mixed with equal
+weights: they differ most where the data constrain them least. Estimates for clips unlike all
+training clips mean nothing, so each estimate carries a p-value of the distance of its summary to
+the training clips' (`models.trained.outliers`).
 """
 
 from __future__ import annotations
@@ -44,7 +46,8 @@ class Estimates:
         targets: what the columns are.
         draws: (n, draw, target) of the predictive distribution, in the targets' units.
         summary: (n, dimension) of the first learner.
-        unlike: (n,) p-value of a clip as far from the training clips as this one; None for a model without a cloud.
+        unlike: (n,) p-value of a clip as far from the training clips as this one; None for a model
+            without a cloud.
     """
 
     targets: tuple[Target, ...]
@@ -58,13 +61,16 @@ class Estimates:
         return self.draws.mean(axis=1, dtype=np.float64)
 
     def interval(self, share: float) -> tuple[FloatArray, FloatArray]:
-        """Computes the ends of the central interval with this share of each distribution: two of (n, target).
+        """Computes the ends of the central interval with this share of each distribution: two of
+        (n, target).
 
         Raises:
             InputError: a share that is not between 0 and 1.
         """
         if not 0 < share < 1:
-            raise InputError(f"an interval cannot have the share {share:g}", fix="give a share between 0 and 1")
+            raise InputError(
+                f"an interval cannot have the share {share:g}", fix="give a share between 0 and 1"
+            )
         low, high = np.quantile(self.draws, [(1 - share) / 2, (1 + share) / 2], axis=1)
         return low, high
 
@@ -75,8 +81,8 @@ class Estimator:
     name: of the model.
     learners: of one recipe, other seeds.
     front_end, cropping: what their inputs are made by.
-    widening: (target,) factors by which each distribution is spread about its mean, on the logits; found on validation
-        clips, 1 where none was needed.
+    widening: (target,) factors by which each distribution is spread about its mean, on the logits;
+        found on validation clips, 1 where none was needed.
     cloud: the training clips' summaries; None where the model has none.
     card: its description.
     """
@@ -101,7 +107,10 @@ class Estimator:
             InputError: a model without targets, which has no ranges.
         """
         if not self.targets:
-            raise InputError(f"the model {self.name!r} has no targets", fix="take one that was trained for targets")
+            raise InputError(
+                f"the model {self.name!r} has no targets",
+                fix="take one that was trained for targets",
+            )
         return self.targets[0].cloth
 
     @property
@@ -115,8 +124,8 @@ class Estimator:
         return self
 
     def inputs(self, clips: UInt8Array) -> Tensor:
-        """Computes what the networks take, of clips (n, frames, height, width) gray: the largest square about the
-        middle.
+        """Computes what the networks take, of clips (n, frames, height, width) gray: the largest
+        square about the middle.
 
         Raises:
             InputError: clips of another length, or that are not uint8.
@@ -128,7 +137,8 @@ class Estimator:
             )
         if clips.shape[1] != self.front_end.frames:
             raise InputError(
-                f"clips of {clips.shape[1]} frames, the model was trained on {self.front_end.frames} at "
+                f"clips of {clips.shape[1]} frames, the model was trained on "
+                f"{self.front_end.frames} at "
                 f"{self.front_end.rate:g} Hz",
                 where=f"model {self.name!r}",
                 fix="cut or resample the clips to that",
@@ -138,7 +148,9 @@ class Estimator:
         return torch.cat([self.front_end(clip[None].to(self.device)) for clip in cut])
 
     @torch.no_grad()
-    def estimate(self, inputs: Tensor, *, seed: int = 0, draws: int = DRAWS, known: Sequence[Known] = ()) -> Estimates:
+    def estimate(
+        self, inputs: Tensor, *, seed: int = 0, draws: int = DRAWS, known: Sequence[Known] = ()
+    ) -> Estimates:
         """Estimates the targets for inputs (n, *shape), see `inputs`.
 
         Args:
@@ -172,8 +184,8 @@ class Estimator:
 
     @torch.no_grad()
     def logits(self, embeddings: Sequence[Tensor], *, seed: int, draws: int) -> Tensor:
-        """Draws logits (n, draw, target) from the learners' distributions (`models.networks.targets`), spread by
-        `widening`.
+        """Draws logits (n, draw, target) from the learners' distributions
+        (`models.networks.targets`), spread by `widening`.
 
         Raises:
             InputError: a model without distributions.
@@ -183,21 +195,25 @@ class Estimator:
         for member, (learner, embedding) in enumerate(zip(self.learners, embeddings, strict=True)):
             generator = torch_generator(seed, "draws", member, device=embedding.device)
             mixture = learner.mixture(embedding)
-            draws_of_learners.append(mixture.sample(share, generator) * learner.spread + learner.centre)
+            draws_of_learners.append(
+                mixture.sample(share, generator) * learner.spread + learner.centre
+            )
         logits = torch.cat(draws_of_learners, dim=1)
         centre = logits.mean(dim=1, keepdim=True)
         return centre + (logits - centre) * self.widening.to(logits)
 
     @torch.no_grad()
     def posterior(self, embeddings: Sequence[Tensor]) -> Mixture:
-        """Returns the distributions that `logits` draws from, in closed form: float64, the learners' components side by
-        side.
+        """Returns the distributions that `logits` draws from, in closed form: float64, the
+        learners' components side by side.
 
         Raises:
             InputError: a model without distributions.
         """
         parts = [
-            learner.mixture(embedding).double().rescale_by(scale=learner.spread.double(), shift=learner.centre.double())
+            learner.mixture(embedding)
+            .double()
+            .rescale_by(scale=learner.spread.double(), shift=learner.centre.double())
             for learner, embedding in zip(self.learners, embeddings, strict=True)
         ]
         together = Mixture(
@@ -206,21 +222,27 @@ class Estimator:
             factor=torch.cat([part.factor for part in parts], dim=1),
         )
         widening = self.widening.to(together.location)
-        return together.rescale_by(scale=widening, shift=(together.mean() * (1 - widening))[:, None])
+        return together.rescale_by(
+            scale=widening, shift=(together.mean() * (1 - widening))[:, None]
+        )
 
     @torch.no_grad()
-    def given(self, posterior: Mixture, known: Sequence[Known], *, seed: int, draws: int) -> Restricted:
+    def given(
+        self, posterior: Mixture, known: Sequence[Known], *, seed: int, draws: int
+    ) -> Restricted:
         """Draws from distributions of `posterior` restricted to what is known.
 
         Raises:
             InputError: see `models.trained.restriction.restrict_mixtures`.
         """
         generator = torch_generator(seed, "known", device=posterior.location.device)
-        return restrict_mixtures(posterior, self.learners[0].scaling, known, draws=draws, generator=generator)
+        return restrict_mixtures(
+            posterior, self.learners[0].scaling, known, draws=draws, generator=generator
+        )
 
     def prior(self, count: int) -> Mixture:
-        """Describes what the training set's targets are like: `count` times the Gaussian of their logits' means and
-        standard deviations, as one component, float64."""
+        """Describes what the training set's targets are like: `count` times the Gaussian of their
+        logits' means and standard deviations, as one component, float64."""
         learner = self.learners[0]
         size = len(self.targets)
         centre, spread = learner.centre.double(), learner.spread.double()
@@ -247,12 +269,18 @@ def load(folder: Path) -> Estimator:
         crops = card["cropping"]
         cropping = Cropping(**{**crops, "scales": tuple(crops["scales"])})
         if (cropping.frames, cropping.size) != (front_end.frames, front_end.size):
-            raise InputError("its crops have another size or number of frames than its front end takes", fix=_FIX)
+            raise InputError(
+                "its crops have another size or number of frames than its front end takes", fix=_FIX
+            )
         loss, network = recipe["loss"], recipe["network"]
         learners = []
         for member in range(int(card.get("members", 1))):
             prefix = f"{member}." if "members" in card else ""
-            weights = {name.removeprefix(prefix): value for name, value in tensors.items() if name.startswith(prefix)}
+            weights = {
+                name.removeprefix(prefix): value
+                for name, value in tensors.items()
+                if name.startswith(prefix)
+            }
             learner = build(
                 network["name"],
                 network["options"],
@@ -262,16 +290,25 @@ def load(folder: Path) -> Estimator:
                 margin=loss["margin"],
             )
             learner.load_state_dict(
-                {name: value.float() if value.is_floating_point() else value for name, value in weights.items()}
+                {
+                    name: value.float() if value.is_floating_point() else value
+                    for name, value in weights.items()
+                }
             )
             learners.append(learner.eval())
-        widening = torch.tensor(card.get("widening") or [1.0] * len(loss["targets"]), dtype=torch.float32)
-        if widening.shape != (len(loss["targets"]),) or not bool(((widening > 0) & widening.isfinite()).all()):
+        widening = torch.tensor(
+            card.get("widening") or [1.0] * len(loss["targets"]), dtype=torch.float32
+        )
+        if widening.shape != (len(loss["targets"]),) or not bool(
+            ((widening > 0) & widening.isfinite()).all()
+        ):
             raise InputError(f"its distributions are spread by {widening.tolist()}", fix=_FIX)
         path = folder / CLOUD
         cloud = None
         if path.exists():
-            cloud = Familiarity.of_arrays({name: value.double().numpy() for name, value in read_tensors(path).items()})
+            cloud = Familiarity.of_arrays(
+                {name: value.double().numpy() for name, value in read_tensors(path).items()}
+            )
         return Estimator(
             name=str(card["name"]),
             learners=tuple(learners),
@@ -281,8 +318,18 @@ def load(folder: Path) -> Estimator:
             cloud=cloud,
             card=card,
         )
-    except (KeyError, TypeError, ValueError, RuntimeError, ArithmeticError, AttributeError, FlagdataError) as error:
-        what = error.what if isinstance(error, FlagdataError) else f"{type(error).__name__}: {error}"
+    except (
+        KeyError,
+        TypeError,
+        ValueError,
+        RuntimeError,
+        ArithmeticError,
+        AttributeError,
+        FlagdataError,
+    ) as error:
+        what = (
+            error.what if isinstance(error, FlagdataError) else f"{type(error).__name__}: {error}"
+        )
         raise CorruptError(
             f"this version of flagdata cannot load the model ({what})", where=str(folder), fix=_FIX
         ) from None

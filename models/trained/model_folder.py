@@ -1,4 +1,5 @@
-"""Models as folders: weights in safetensors, a card in JSON. Nothing in them is executed when they are read.
+"""Models as folders: weights in safetensors, a card in JSON. Nothing in them is executed when they
+are read.
 
 card.json            what it is: recipe, data, seeds, scores, limits; "format" is `FORMAT`
 weights.safetensors  the learner's parameters and buffers
@@ -39,27 +40,32 @@ def check_model(folder: Path) -> None:
 
     Raises:
         NotFoundError: there is no model.
-        CorruptError: a file has changed, is missing or was added, or nothing states what the files should hold.
+        CorruptError: a file has changed, is missing or was added, or nothing states what the files
+            should hold.
     """
     resolved = folder.resolve()
     if not (resolved / CARD).is_file():
         raise NotFoundError("there is no model here", where=str(folder), fix="name a trained model")
     if stored := _OBJECT.fullmatch(resolved.name):
         if content_hash(resolved) != stored[1]:
-            raise CorruptError("the model's files have changed since it was stored", where=str(folder), fix=_AGAIN)
+            raise CorruptError(
+                "the model's files have changed since it was stored", where=str(folder), fix=_AGAIN
+            )
     elif not (resolved / SUMS).is_file():
         raise CorruptError(
             f"the model has no {SUMS}, so that damage to it cannot be found",
             where=str(folder),
-            fix=f"name it by its lake, or state that its files are whole: (cd FOLDER && sha256sum * > {SUMS})",
+            fix="name it by its lake, or state that its files are whole: (cd FOLDER && sha256sum "
+            f"* > {SUMS})",
         )
     else:
         check_sums(resolved, fix=_AGAIN)
 
 
 def renew(folder: Path, name: str, content: bytes) -> None:
-    """Replaces a file of a stored model, or adds one, and states its checksum. Each of the two files is the old one or
-    the new one at any time; a process that is killed between them leaves a model that is refused by the file's name.
+    """Replaces a file of a stored model, or adds one, and states its checksum. Each of the two
+    files is the old one or the new one at any time; a process that is killed between them leaves a
+    model that is refused by the file's name.
 
     Raises:
         CorruptError: the model's checksums cannot be read.
@@ -99,7 +105,9 @@ def read_card(folder: Path) -> dict[str, Any]:
 
 def tensor_bytes(tensors: Mapping[str, Tensor]) -> bytes:
     """Tensors by name as they are stored; each is copied, so that views are stored whole."""
-    return save({name: tensor.detach().cpu().contiguous().clone() for name, tensor in tensors.items()})
+    return save(
+        {name: tensor.detach().cpu().contiguous().clone() for name, tensor in tensors.items()}
+    )
 
 
 def write_tensors(path: Path, tensors: Mapping[str, Tensor]) -> None:
@@ -120,16 +128,26 @@ def read_tensors(path: Path) -> dict[str, Tensor]:
         LimitError: larger than `TENSORS_LIMIT`.
     """
     if not path.is_file():
-        raise NotFoundError("there are no weights here", where=str(path), fix="name a trained model")
+        raise NotFoundError(
+            "there are no weights here", where=str(path), fix="name a trained model"
+        )
     try:
         if (size := path.stat().st_size) > TENSORS_LIMIT:
-            raise LimitError(f"the file has {size} bytes", where=str(path), fix=f"at most {TENSORS_LIMIT} are read")
+            raise LimitError(
+                f"the file has {size} bytes",
+                where=str(path),
+                fix=f"at most {TENSORS_LIMIT} are read",
+            )
         tensors = load(path.read_bytes())
     except (SafetensorError, OSError, ValueError) as error:
-        raise CorruptError(f"the weights cannot be read: {error}", where=str(path), fix=_AGAIN) from None
+        raise CorruptError(
+            f"the weights cannot be read: {error}", where=str(path), fix=_AGAIN
+        ) from None
     for name, tensor in tensors.items():
         if not bool(tensor.isfinite().all()):
-            raise CorruptError(f"{name} holds numbers that are not finite", where=str(path), fix=_AGAIN)
+            raise CorruptError(
+                f"{name} holds numbers that are not finite", where=str(path), fix=_AGAIN
+            )
     return tensors
 
 

@@ -1,20 +1,24 @@
-"""What a model says of clips of which something is known besides their pictures: a weighed cloth, a measured shape.
+"""What a model says of clips of which something is known besides their pictures: a weighed cloth, a
+measured shape.
 
-A network gives p(θ | x) = p(x | θ) π(θ) / p(x) under the prior π that it learned. A statement about some of the
-quantities κ of θ is of one of three kinds, and acts by its likelihood L(κ):
+A network gives p(θ | x) = p(x | θ) π(θ) / p(x) under the prior π that it learned. A statement about
+some of the quantities κ of θ is of one of three kinds, and acts by its likelihood L(κ):
 
-- *exact*: L is a delta function; p(θ | x, κ) is the conditional distribution, on which π(κ) has no influence at all;
-- *with a standard deviation*: L(κ) = N(value; κ, σ²), that of a measurement which is independent of the film given θ;
+- *exact*: L is a delta function; p(θ | x, κ) is the conditional distribution, on which π(κ) has no
+  influence at all;
+- *with a standard deviation*: L(κ) = N(value; κ, σ²), that of a measurement which is independent of
+  the film given θ;
 - *a range*: L(κ) is 1 within it and 0 outside.
 
-By Bayes' rule p(θ | x, L) = p(θ | x) L(κ) / Z with Z = ∫ p(κ | x) L(κ) dκ. So within a range, and within σ, the prior
-that the network learned stays; outside, the statement replaces it. Nothing is approximated: p(θ | x) is a mixture of
-Gaussians in the targets' logits, of which p(κ | x) is a marginal, in closed form. κ is drawn from p(κ | x) L(κ) by
-cells of a fine grid, and the rest from the mixture's conditional given κ, in closed form too. A value far from what the
-network believes is answered as exactly as one that it expects, as far as the mixture's tails can be relied on.
+By Bayes' rule p(θ | x, L) = p(θ | x) L(κ) / Z with Z = ∫ p(κ | x) L(κ) dκ. So within a range, and
+within σ, the prior that the network learned stays; outside, the statement replaces it. Nothing is
+approximated: p(θ | x) is a mixture of Gaussians in the targets' logits, of which p(κ | x) is a
+marginal, in closed form. κ is drawn from p(κ | x) L(κ) by cells of a fine grid, and the rest from
+the mixture's conditional given κ, in closed form too. A value far from what the network believes is
+answered as exactly as one that it expects, as far as the mixture's tails can be relied on.
 
-Z over the same integral under the prior, Z_π = ∫ π(κ) L(κ) dκ, is the Bayes factor p(x | L)/p(x): how much more, or
-less, probable the statement makes the film.
+Z over the same integral under the prior, Z_π = ∫ π(κ) L(κ) dκ, is the Bayes factor p(x | L)/p(x):
+how much more, or less, probable the statement makes the film.
 """
 
 from __future__ import annotations
@@ -34,9 +38,11 @@ from models.networks.mixture import Mixture
 from models.networks.targets import ASPECT, Scaling, Target
 
 CELLS = {1: 1024, 2: 96}
-"""Cells of the grid along each axis, by how many quantities are stated inexactly; more than two are refused."""
+"""Cells of the grid along each axis, by how many quantities are stated inexactly; more than two are
+refused."""
 ASPECT_SLACK = 0.04
-"""Half the width of the range that a stated length over height stands for, relative: a hem, a rounded size."""
+"""Half the width of the range that a stated length over height stands for, relative: a hem, a
+rounded size."""
 REACH = 8.0
 """Standard deviations either way that the grid of a value with an uncertainty covers."""
 
@@ -47,8 +53,8 @@ class Known:
 
     Attributes:
         name: of the quantity, as "area_weight".
-        low, high: (n, m) ends of its range in the quantity's unit, equal where a value is stated; m is 1, or the number
-            of draws that are asked for, each of which then has its own.
+        low, high: (n, m) ends of its range in the quantity's unit, equal where a value is stated; m
+            is 1, or the number of draws that are asked for, each of which then has its own.
         sigma: (n, m) standard deviations of values; 0 of exact ones and of ranges.
 
     Raises:
@@ -63,7 +69,9 @@ class Known:
     @classmethod
     def stated(cls, name: str, statement: Stated, *, scale: FloatArray) -> Known:
         """States a quantity that is `scale` (n, m) times the one of the network."""
-        low, high, sigma = (np.asarray(end / scale) for end in (statement.low, statement.high, statement.sigma))
+        low, high, sigma = (
+            np.asarray(end / scale) for end in (statement.low, statement.high, statement.sigma)
+        )
         return cls(name=name, low=low, high=high, sigma=sigma)
 
     @classmethod
@@ -73,8 +81,8 @@ class Known:
 
     @classmethod
     def of_aspect(cls, length: float, height: float, *, count: int) -> Known:
-        """States the ratio of a flag's length to its height, of a model that estimates it, the same for all of `count`
-        clips.
+        """States the ratio of a flag's length to its height, of a model that estimates it, the same
+        for all of `count` clips.
 
         Args:
             length, height: of the flag, in one unit.
@@ -85,15 +93,19 @@ class Known:
         shape = self.low.shape
         if self.low.ndim != 2 or self.high.shape != shape or self.sigma.shape != shape:
             raise InputError(
-                f"the ends of the {self.name} have the shapes {shape}, {self.high.shape}, {self.sigma.shape}",
+                f"the ends of the {self.name} have the shapes {shape}, {self.high.shape}, "
+                f"{self.sigma.shape}",
                 fix="give (n, m)",
             )
         if (self.low > self.high).any() or (self.sigma < 0).any():
-            raise InputError(f"the ends of the {self.name} are not in order", fix="give the lower end first")
+            raise InputError(
+                f"the ends of the {self.name} are not in order", fix="give the lower end first"
+            )
         wide, blurred = self.high > self.low, self.sigma > 0
         if wide.any() != wide.all() or blurred.any() != blurred.all() or (wide & blurred).any():
             raise InputError(
-                f"the {self.name} is stated in several ways", fix="give values, values with deviations, or ranges"
+                f"the {self.name} is stated in several ways",
+                fix="give values, values with deviations, or ranges",
             )
 
     @property
@@ -113,11 +125,15 @@ def stated_aspect(length: float, height: float) -> Stated:
 
 
 def usable_aspect(targets: Sequence[Target], length: float, height: float) -> Stated | None:
-    """States the aspect as `stated_aspect` does, for a model of these targets; None where it estimates no aspect, or
-    none so large or small."""
+    """States the aspect as `stated_aspect` does, for a model of these targets; None where it
+    estimates no aspect, or none so large or small."""
     aspect = stated_aspect(length, height)
     estimated = next((target for target in targets if target.name == ASPECT), None)
-    return aspect if estimated is not None and estimated.low <= aspect.low and aspect.high <= estimated.high else None
+    return (
+        aspect
+        if estimated is not None and estimated.low <= aspect.low and aspect.high <= estimated.high
+        else None
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -126,8 +142,9 @@ class Restricted:
 
     Attributes:
         logits: (n, draw, target) draws, on the targets' logits.
-        log_mass: (n, draw) log Z of the statement that each draw was made under, −∞ of one that is impossible within
-            the network's ranges; its draw means nothing then. It has the unit of L: compare it with that of a prior.
+        log_mass: (n, draw) log Z of the statement that each draw was made under, −∞ of one that is
+            impossible within the network's ranges; its draw means nothing then. It has the unit of
+            L: compare it with that of a prior.
     """
 
     logits: Tensor
@@ -135,7 +152,12 @@ class Restricted:
 
 
 def restrict_mixtures(
-    mixture: Mixture, scaling: Scaling, known: Sequence[Known], *, draws: int, generator: torch.Generator
+    mixture: Mixture,
+    scaling: Scaling,
+    known: Sequence[Known],
+    *,
+    draws: int,
+    generator: torch.Generator,
 ) -> Restricted:
     """Draws from mixtures restricted by statements about some of their quantities.
 
@@ -147,15 +169,16 @@ def restrict_mixtures(
         generator: on the device of the mixture.
 
     Raises:
-        InputError: a quantity that the model does not estimate or that is named twice, a statement that leaves the
-            model's range for all draws, or more than two that are inexact.
+        InputError: a quantity that the model does not estimate or that is named twice, a statement
+            that leaves the model's range for all draws, or more than two that are inexact.
     """
     order = sorted(known, key=lambda statement: statement.exact)
     columns = [_column(scaling, statement.name) for statement in order]
     soft = sum(not statement.exact for statement in order)
     if not order or len(set(columns)) < len(columns) or soft > max(CELLS):
         raise InputError(
-            f"{len(order)} statements about {', '.join(statement.name for statement in order) or 'nothing'}",
+            f"{len(order)} statements about "
+            f"{', '.join(statement.name for statement in order) or 'nothing'}",
             fix=f"state each quantity once, at most {max(CELLS)} of them inexactly",
         )
     for statement, column in zip(order, columns, strict=True):
@@ -164,7 +187,9 @@ def restrict_mixtures(
     marginal = mixture.marginal(columns)
     exact = [ends.tensor(statement.low) for statement in order[soft:]]
     if soft:
-        values, log_mass = _drawn(marginal, ends, order[:soft], exact, draws=draws, generator=generator)
+        values, log_mass = _drawn(
+            marginal, ends, order[:soft], exact, draws=draws, generator=generator
+        )
     else:
         values = torch.stack(torch.broadcast_tensors(*exact), dim=-1)
         log_mass = marginal.log_density(ends.logits(values)) + ends.log_slope(values)
@@ -183,18 +208,28 @@ def _drawn(
     draws: int,
     generator: torch.Generator,
 ) -> tuple[Tensor, Tensor]:
-    """Draws (n, draw, s) values of what is stated, the inexact first, from p(κ | x) L(κ), and computes (n, m) log Z."""
+    """Draws (n, draw, s) values of what is stated, the inexact first, from p(κ | x) L(κ), and
+    computes (n, m) log Z."""
     cells = CELLS[len(soft)]
-    at = torch.cartesian_prod(*[torch.arange(cells)] * len(soft)).reshape(-1, len(soft)).to(marginal.location.device)
+    at = (
+        torch.cartesian_prod(*[torch.arange(cells)] * len(soft))
+        .reshape(-1, len(soft))
+        .to(marginal.location.device)
+    )
     log_likelihood = torch.zeros(1).to(marginal.location)
     below, above, points = [], [], []
     for column, statement in enumerate(soft):
-        reach = [ends.tensor(end).clamp(ends.least[column], ends.most[column]) for end in statement.reach()]
+        reach = [
+            ends.tensor(end).clamp(ends.least[column], ends.most[column])
+            for end in statement.reach()
+        ]
         first, last = reach[0].amin(dim=1, keepdim=True), reach[1].amax(dim=1, keepdim=True)
         edges = first + (last - first) * torch.linspace(0, 1, cells + 1).to(first)
         lower, upper = edges[:, None, :-1], edges[:, None, 1:]
         middle = (lower + upper) / 2
-        low, high, sigma = (ends.tensor(end)[..., None] for end in (statement.low, statement.high, statement.sigma))
+        low, high, sigma = (
+            ends.tensor(end)[..., None] for end in (statement.low, statement.high, statement.sigma)
+        )
         if statement.sigma.any():
             likelihood = (upper - lower).log() - 0.5 * ((middle - low) / sigma).square()
         else:
@@ -206,9 +241,9 @@ def _drawn(
         above.append(upper[..., at[:, column]])
     points += [value[..., None].expand(-1, -1, len(at)) for value in exact]
     centre = torch.stack(torch.broadcast_tensors(*points), dim=-1)
-    density = marginal.log_density(ends.logits(centre).flatten(1, 2)).reshape(centre.shape[:-1]) + ends.log_slope(
-        centre
-    )
+    density = marginal.log_density(ends.logits(centre).flatten(1, 2)).reshape(
+        centre.shape[:-1]
+    ) + ends.log_slope(centre)
     weight = torch.where(ends.inside(centre), density, -torch.inf) + log_likelihood
     log_mass = torch.logsumexp(weight, dim=-1)
     share = torch.where(log_mass[..., None] > -torch.inf, weight, 0.0).softmax(dim=-1)
@@ -219,7 +254,9 @@ def _drawn(
     for lower, upper in zip(below, above, strict=True):
         low, high = (end.expand(-1, draws, -1).gather(2, cell).squeeze(2) for end in (lower, upper))
         values.append(
-            low + (high - low) * torch.rand(low.shape, generator=generator, dtype=low.dtype, device=low.device)
+            low
+            + (high - low)
+            * torch.rand(low.shape, generator=generator, dtype=low.dtype, device=low.device)
         )
     return torch.stack(torch.broadcast_tensors(*values, *exact), dim=-1), log_mass
 
@@ -237,7 +274,9 @@ class _Ends:
     def of(cls, scaling: Scaling, columns: Sequence[int], *, like: Tensor) -> _Ends:
         low, high = (bound.to(like)[list(columns)] for bound in scaling.bounds)
         targets = [scaling.targets[column] for column in columns]
-        least, most = torch.tensor([[t.low, t.high] for t in targets], dtype=torch.float64).to(like).T
+        least, most = (
+            torch.tensor([[t.low, t.high] for t in targets], dtype=torch.float64).to(like).T
+        )
         return cls(least=least, most=most, low=low, high=high)
 
     def tensor(self, values: FloatArray) -> Tensor:
@@ -249,7 +288,8 @@ class _Ends:
         return ((values >= self.least - slack) & (values <= self.most + slack)).all(dim=-1)
 
     def logits(self, values: Tensor) -> Tensor:
-        """Transforms values (…, s) to logits (…, s); one beyond the network's range is taken at its end."""
+        """Transforms values (…, s) to logits (…, s); one beyond the network's range is taken at its
+        end."""
         return torch.logit(self._share(values))
 
     def log_slope(self, values: Tensor) -> Tensor:
@@ -258,7 +298,9 @@ class _Ends:
         return -(share.log() + (-share).log1p() + (self.high - self.low).log()).sum(dim=-1)
 
     def _share(self, values: Tensor) -> Tensor:
-        return (torch.minimum(torch.maximum(values, self.least), self.most) - self.low) / (self.high - self.low)
+        return (torch.minimum(torch.maximum(values, self.least), self.most) - self.low) / (
+            self.high - self.low
+        )
 
 
 _SLACK = 1e-9
@@ -275,7 +317,8 @@ def _check(statement: Known, scaling: Scaling, column: int) -> None:
         low, high = statement.low.min(), statement.high.max()
         extent = f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
         raise InputError(
-            f"the {target.about} is {extent} {target.unit}; the model was trained on {target.low:g} to {target.high:g}",
+            f"the {target.about} is {extent} {target.unit}; the model was trained on "
+            f"{target.low:g} to {target.high:g}",
             fix="give one within that",
         )
 
@@ -283,6 +326,7 @@ def _check(statement: Known, scaling: Scaling, column: int) -> None:
 def _column(scaling: Scaling, name: str) -> int:
     if name not in scaling.quantities:
         raise InputError(
-            f"the model does not estimate the {name}", fix=f"it estimates {', '.join(scaling.quantities) or 'nothing'}"
+            f"the model does not estimate the {name}",
+            fix=f"it estimates {', '.join(scaling.quantities) or 'nothing'}",
         )
     return scaling.quantities.index(name)

@@ -1,4 +1,5 @@
-"""Training from catalogs: recipes, inputs that were prepared once, steps that can be taken up again, checkpoints."""
+"""Training from catalogs: recipes, inputs that were prepared once, steps that can be taken up
+again, checkpoints."""
 
 from __future__ import annotations
 

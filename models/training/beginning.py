@@ -1,4 +1,5 @@
-"""What a recipe asks of the clips that it names, compared when a training begins: before anything is prepared."""
+"""What a recipe asks of the clips that it names, compared when a training begins: before anything
+is prepared."""
 
 from __future__ import annotations
 
@@ -21,7 +22,13 @@ _MULTIPLE = 8  # of the sizes that every front end takes [px]
 
 
 def check_clips(
-    recipe: TrainingRecipe, lake: Lake, train: Pairs, validation: Pairs, *, films: IntArray, at: str | None
+    recipe: TrainingRecipe,
+    lake: Lake,
+    train: Pairs,
+    validation: Pairs,
+    *,
+    films: IntArray,
+    at: str | None,
 ) -> None:
     """Checks that a recipe can be trained on the clips of two sides.
 
@@ -30,8 +37,8 @@ def check_clips(
         at: the version that the sides are of.
 
     Raises:
-        InputError, UsageError: their length, rate, size, number, targets or simulations do not fit; the fix is a line
-            of the recipe, where one helps.
+        InputError, UsageError: their length, rate, size, number, targets or simulations do not fit;
+            the fix is a line of the recipe, where one helps.
     """
     check_batch(len(films), recipe.optimiser.batch)
     StatedFilms.of(lake, train, validation, at=at).check_learned(recipe.front_end, recipe.cropping)
@@ -49,9 +56,14 @@ def check_clips(
 
 
 def _check_size(recipe: TrainingRecipe, *sides: Pairs) -> None:
-    """Refuses pictures of which every crop would be enlarged; those of one clip of each side are looked at."""
+    """Refuses pictures of which every crop would be enlarged; those of one clip of each side are
+    looked at."""
     size = recipe.front_end.size
-    side = SIZE if recipe.cropping.conditioned else min(min(pairs[0].clip.shape[-2:]) for pairs in sides)
+    side = (
+        SIZE
+        if recipe.cropping.conditioned
+        else min(min(pairs[0].clip.shape[-2:]) for pairs in sides)
+    )
     if size > side:
         most = side // _MULTIPLE * _MULTIPLE
         raise InputError(
@@ -68,7 +80,9 @@ def _check_alike(sequence: IntArray, *, side: str) -> None:
     simulations, count = np.unique(sequence, return_counts=True)
     if len(simulations) < 2 or count.max() < 2:
         raise InputError(
-            f"the {side} side has no two clips of one simulation beside another's, which a contrastive loss compares",
+            f"the {side} side has no two clips of one simulation beside another's, which a "
+            "contrastive loss compares",
             where="[loss] name",
-            fix='write name = "posterior" and targets in [loss], or learn from a data set of several films a sequence',
+            fix='write name = "posterior" and targets in [loss], or learn from a data set of '
+            "several films a sequence",
         )

@@ -1,8 +1,10 @@
-"""Where a training stands: all that the steps still to come depend on, in one folder that is replaced as a whole.
+"""Where a training stands: all that the steps still to come depend on, in one folder that is
+replaced as a whole.
 
-A checkpoint holds the learner, Adam's moments, the best learner so far, the course of the losses, and the cursor of the
-batches, with the checksums of all files. It is written beside the last one and renamed, so that a kill or a full disk
-leaves the last good one; the one before it is kept, for where the last was damaged later.
+A checkpoint holds the learner, Adam's moments, the best learner so far, the course of the losses,
+and the cursor of the batches, with the checksums of all files. It is written beside the last one
+and renamed, so that a kill or a full disk leaves the last good one; the one before it is kept, for
+where the last was damaged later.
 """
 
 from __future__ import annotations
@@ -24,11 +26,21 @@ from flagdata.core.files.file_locks import LOCK
 from flagdata.core.numbered import read_bounded
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, RefusedError
 from models.networks.learner import Learner
-from models.trained.model_folder import CARD, WEIGHTS, read_card, read_tensors, write_card, write_tensors
+from models.trained.model_folder import (
+    CARD,
+    WEIGHTS,
+    read_card,
+    read_tensors,
+    write_card,
+    write_tensors,
+)
 from models.training.progress import LossCourse
 
 _LOG = logging.getLogger("flagdata")
-_ANEW = "restore the folder from a copy, or delete all checkpoints beside it to train from the beginning"
+_ANEW = (
+    "restore the folder from a copy, or delete all checkpoints beside it to train from the "
+    "beginning"
+)
 _LAST = "last"
 _NEXT = "next"
 _BEFORE = "before"
@@ -68,7 +80,9 @@ def check_folder(folder: Path) -> None:
         ConflictError: it holds something that no training wrote.
     """
     files = {Path(LOCK)} | {
-        Path(part) / name for part in (_LAST, _NEXT, _BEFORE) for name in (WEIGHTS, _BEST, _MOMENTS, CARD, SUMS)
+        Path(part) / name
+        for part in (_LAST, _NEXT, _BEFORE)
+        for name in (WEIGHTS, _BEST, _MOMENTS, CARD, SUMS)
     }
     expected = files | {file.parent for file in files}
     for path in sorted(folder.rglob("*")):
@@ -117,9 +131,11 @@ def save(folder: Path, standing: Standing, *, identity: dict[str, Any]) -> None:
 
 
 def restore(folder: Path, standing: Standing, *, identity: dict[str, Any]) -> bool:
-    """Brings `standing` to where the last sound checkpoint in `folder` was taken; False where there is none at all.
+    """Brings `standing` to where the last sound checkpoint in `folder` was taken; False where there
+    is none at all.
 
-    A damaged last one is passed over with a warning for the one before it, from which the same steps are taken again.
+    A damaged last one is passed over with a warning for the one before it, from which the same
+    steps are taken again.
 
     Raises:
         RefusedError: it is of another recipe or of other data.
@@ -135,7 +151,8 @@ def restore(folder: Path, standing: Standing, *, identity: dict[str, Any]) -> bo
             continue
         if damage is not None:
             _LOG.warning(
-                "flagdata: warning: the last checkpoint is damaged: %s; the training goes on from the one before it"
+                "flagdata: warning: the last checkpoint is damaged: %s; the training goes on from "
+                "the one before it"
                 "\n  where: %s",
                 damage.what,
                 damage.where,
@@ -153,7 +170,9 @@ def _take(folder: Path, standing: Standing, identity: dict[str, Any]) -> None:
     stored = json.loads(json.dumps(identity))
     trained_on = card.get("identity")
     if not isinstance(trained_on, dict):
-        raise CorruptError("the checkpoint does not state its training", where=str(folder), fix=_ANEW)
+        raise CorruptError(
+            "the checkpoint does not state its training", where=str(folder), fix=_ANEW
+        )
     different = [name for name in stored if trained_on.get(name) != stored[name]]
     if different:
         raise RefusedError(
@@ -166,25 +185,44 @@ def _take(folder: Path, standing: Standing, identity: dict[str, Any]) -> None:
         _take_moments(standing, read_tensors(folder / _MOMENTS))
         standing.best = read_tensors(folder / _BEST) if (folder / _BEST).exists() else None
         if standing.best is not None:
-            copy.deepcopy(standing.learner).load_state_dict(standing.best)  # it is needed at the training's end
+            copy.deepcopy(standing.learner).load_state_dict(
+                standing.best
+            )  # it is needed at the training's end
         standing.course = LossCourse.of(card["course"])
         standing.batches = dict(card["batches"])
         standing.running = (float(card["running"][0]), int(card["running"][1]))
-    except (KeyError, TypeError, ValueError, RuntimeError, IndexError, OverflowError, AttributeError) as error:
+    except (
+        KeyError,
+        TypeError,
+        ValueError,
+        RuntimeError,
+        IndexError,
+        OverflowError,
+        AttributeError,
+    ) as error:
         raise CorruptError(
-            f"the checkpoint does not fit its recipe: {error}", where=str(folder), fix="delete it and train again"
+            f"the checkpoint does not fit its recipe: {error}",
+            where=str(folder),
+            fix="delete it and train again",
         ) from None
 
 
 def _moments(standing: Standing) -> dict[str, Tensor]:
     """Flattens Adam's state by parameter, "0.exp_avg" …."""
     state = standing.optimiser.state_dict()["state"]
-    return {f"{index}.{kind}": values[kind] for index, values in state.items() for kind in _KINDS if kind in values}
+    return {
+        f"{index}.{kind}": values[kind]
+        for index, values in state.items()
+        for kind in _KINDS
+        if kind in values
+    }
 
 
 def _take_moments(standing: Standing, tensors: dict[str, Tensor]) -> None:
     state = standing.optimiser.state_dict()
-    shapes = {index: tuple(weights.shape) for index, weights in enumerate(standing.learner.parameters())}
+    shapes = {
+        index: tuple(weights.shape) for index, weights in enumerate(standing.learner.parameters())
+    }
     moments: dict[int, dict[str, Tensor]] = {}
     for name, tensor in tensors.items():
         digits, _, kind = name.partition(".")

@@ -1,7 +1,7 @@
 """Films as `flagdata measure` judges them: conditioned, and shown at the network's instants.
 
-A training film has its flag in the middle, since that is where its camera aims. Where something else moves more like
-cloth, the region nearest to the middle is taken.
+A training film has its flag in the middle, since that is where its camera aims. Where something
+else moves more like cloth, the region nearest to the middle is taken.
 """
 
 from __future__ import annotations
@@ -40,7 +40,9 @@ class FitFilm(TimedFilm):
             conditioning = conditioning_of(sample, times=instants, size=size, flag=flag + 1)
         follower = Follower(conditioning)
         return cls(
-            found=conditioning, frames=np.stack([follower.show(frame) for frame in film]), times=times - times[0]
+            found=conditioning,
+            frames=np.stack([follower.show(frame) for frame in film]),
+            times=times - times[0],
         )
 
     @property
@@ -50,7 +52,8 @@ class FitFilm(TimedFilm):
 
 
 def _nearest_to_the_middle(conditioning: Conditioning) -> int:
-    """Chooses the region nearest to the picture's middle; the chosen one's index where nothing moves."""
+    """Chooses the region nearest to the picture's middle; the chosen one's index where nothing
+    moves."""
     if len(conditioning.regions) < 2:
         return conditioning.chosen
     boxes = np.array([region.box for region in conditioning.regions], dtype=np.float64)

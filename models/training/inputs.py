@@ -1,15 +1,17 @@
-"""What networks are trained on, prepared once: the front end's output of several crops of each film, on disk.
+"""What networks are trained on, prepared once: the front end's output of several crops of each
+film, on disk.
 
-A network's step takes a few milliseconds, decoding and filtering a clip thirty. So each film is decoded once, cut in
-`variants` ways, and what the front end makes of each cut is kept: maps as float16, frames as uint8. An epoch takes one
-variant of each film, the next epoch the next. This is exact for all that the augmentation does, since it is done before
-the filters; a mirror image, for one, could not be made of the maps, as a maximum of slopes is not minus that of their
-negatives.
+A network's step takes a few milliseconds, decoding and filtering a clip thirty. So each film is
+decoded once, cut in `variants` ways, and what the front end makes of each cut is kept: maps as
+float16, frames as uint8. An epoch takes one variant of each film, the next epoch the next. This is
+exact for all that the augmentation does, since it is done before the filters; a mirror image, for
+one, could not be made of the maps, as a maximum of slopes is not minus that of their negatives.
 
-The folder is disposable and outside the lake. A film's file is named by the hash of all that shapes it (the object and
-its frames, the front end, the crops and their seed), so that trainings of other seeds, and on parts of the films, share
-them, and a preparation that was stopped goes on. Each file ends with its SHA-256, which every run compares before it
-uses the file; a damaged one is made anew, with a warning. One process at a time prepares, others wait for it.
+The folder is disposable and outside the lake. A film's file is named by the hash of all that shapes
+it (the object and its frames, the front end, the crops and their seed), so that trainings of other
+seeds, and on parts of the films, share them, and a preparation that was stopped goes on. Each file
+ends with its SHA-256, which every run compares before it uses the file; a damaged one is made anew,
+with a warning. One process at a time prepares, others wait for it.
 """
 
 from __future__ import annotations
@@ -51,7 +53,8 @@ Advance = Callable[[int], None]
 
 @dataclass(frozen=True, kw_only=True)
 class Files:
-    """One array (variants, *shape) a file; indexed by entries and variants as one array (n, variants, *shape) would be.
+    """One array (variants, *shape) a file; indexed by entries and variants as one array (n,
+    variants, *shape) would be.
 
     Attributes:
         paths: of n files.
@@ -89,9 +92,11 @@ class Prepared:
     """Inputs of n entries, `variants` of each, and their known parameters.
 
     Attributes:
-        maps: (n, variants, *shape) float16 or uint8: an array, or files that are read as they are needed.
+        maps: (n, variants, *shape) float16 or uint8: an array, or files that are read as they are
+            needed.
         parameters: name → (n,) values.
-        sequence: (n,) seed of the simulation, or a number of its own for each recording that has none.
+        sequence: (n,) seed of the simulation, or a number of its own for each recording that has
+            none.
         fingerprint: of the pairs they were made of.
         front_end: they were made by.
     """
@@ -106,8 +111,8 @@ class Prepared:
         return len(self.maps)
 
     def in_memory(self) -> Prepared:
-        """Reads the inputs into memory, if that leaves half of what is free; small random reads of files are slower
-        than steps.
+        """Reads the inputs into memory, if that leaves half of what is free; small random reads of
+        files are slower than steps.
 
         Raises:
             CorruptError: a file that is cut off or gone.
@@ -139,7 +144,8 @@ class Prepared:
 
 
 def complete_truth(parameters: Mapping[str, FloatArray], names: Sequence[str]) -> FloatArray:
-    """Returns (n, target), as `models.networks.targets.truth`, where every entry states all of them.
+    """Returns (n, target), as `models.networks.targets.truth`, where every entry states all of
+    them.
 
     Raises:
         InputError: one that does not.
@@ -156,7 +162,8 @@ def complete_truth(parameters: Mapping[str, FloatArray], names: Sequence[str]) -
 
 
 def as_input(stored: Tensor) -> Tensor:
-    """Converts what was stored to what a network takes: maps as float32, frames standardised clip by clip."""
+    """Converts what was stored to what a network takes: maps as float32, frames standardised clip
+    by clip."""
     if stored.dtype != torch.uint8:
         return stored.float()
     return torch.stack([standardise_clip(clip) for clip in stored])
@@ -181,7 +188,8 @@ def prepare_films(
 
     Args:
         augment: what happens to conditioned films beside; None for nothing.
-        sequences: how many of the simulations are used, those of a random order's beginning; None for all.
+        sequences: how many of the simulations are used, those of a random order's beginning; None
+            for all.
         seed: of that order.
         advance: called with the number of entries done.
 
@@ -189,11 +197,18 @@ def prepare_films(
         InputError: films that are too short, or too few sequences.
         FlagdataError: the disk is full.
     """
-    rows, own_rate = film_rows(pairs, sequences=sequences, seed=seed), _of_own_rate(pairs, front_end)
+    rows, own_rate = (
+        film_rows(pairs, sequences=sequences, seed=seed),
+        _of_own_rate(pairs, front_end),
+    )
     disturbed = augment if augment is not None else Augment()
 
     def key(row: int) -> dict[str, Any]:
-        key_parts = {"film": pairs.table.recording[row], "variants": variants, "crops": cropping.as_dict()}
+        key_parts = {
+            "film": pairs.table.recording[row],
+            "variants": variants,
+            "crops": cropping.as_dict(),
+        }
         if not cropping.conditioned:
             return key_parts if own_rate[row] else {**key_parts, **_VERSION}
         key_parts |= {"augment": disturbed.identity(), **_VERSION}
@@ -203,18 +218,24 @@ def prepare_films(
 
     def crops(row: int) -> list[Tensor]:
         if cropping.conditioned:
-            return _conditioned_crops(pairs, row, front_end, cropping, variants=variants, augment=disturbed)
+            return _conditioned_crops(
+                pairs, row, front_end, cropping, variants=variants, augment=disturbed
+            )
         film, recording = pairs.film(row), str(pairs.table.recording[row])
         if not own_rate[row]:
             film = TimedFilm(frames=film, times=pairs.film_times(row)).whole(front_end.rate)
-        drawn = [cropping.draw(stream(0, "crop", recording, variant), _shape(film)) for variant in range(variants)]
+        drawn = [
+            cropping.draw(stream(0, "crop", recording, variant), _shape(film))
+            for variant in range(variants)
+        ]
         return [cropping.cut(film, crop) for crop in drawn]
 
     return _prepare_pairs(pairs, rows, front_end, key, crops, variants, folder, workers, advance)
 
 
 def film_rows(pairs: Pairs, *, sequences: int | None, seed: int) -> IntArray:
-    """Selects a row of the table for each film, of all simulations or of the first of a random order of this seed.
+    """Selects a row of the table for each film, of all simulations or of the first of a random
+    order of this seed.
 
     Raises:
         InputError: fewer simulations than are asked for.
@@ -224,12 +245,19 @@ def film_rows(pairs: Pairs, *, sequences: int | None, seed: int) -> IntArray:
 
 
 def prepare_clips(
-    pairs: Pairs, front_end: FrontEnd, cropping: Cropping, *, folder: Path, workers: int, advance: Advance
+    pairs: Pairs,
+    front_end: FrontEnd,
+    cropping: Cropping,
+    *,
+    folder: Path,
+    workers: int,
+    advance: Advance,
 ) -> Prepared:
-    """Prepares the catalog's clips, the largest square of each, for validation and tests: entries are clips.
+    """Prepares the catalog's clips, the largest square of each, for validation and tests: entries
+    are clips.
 
-    A clip of another rate or length than the front end takes is cut to it, see `clip_as_taken`; so is a conditioned
-    one, of its conditioned film.
+    A clip of another rate or length than the front end takes is cut to it, see `clip_as_taken`; so
+    is a conditioned one, of its conditioned film.
 
     Raises:
         InputError: films that are too short or too slow.
@@ -238,23 +266,35 @@ def prepare_clips(
     as_stored = _of_own_rate(pairs, front_end) & (pairs.table.frame_count >= front_end.frames)
 
     def key(row: int) -> dict[str, Any]:
-        key_parts = {"clip": pairs.table.artifact[row], "size": cropping.size, "frames": cropping.frames}
-        return {**key_parts, **_VERSION} if cropping.conditioned or not as_stored[row] else key_parts
+        key_parts = {
+            "clip": pairs.table.artifact[row],
+            "size": cropping.size,
+            "frames": cropping.frames,
+        }
+        return (
+            {**key_parts, **_VERSION} if cropping.conditioned or not as_stored[row] else key_parts
+        )
 
     def crops(row: int) -> list[Tensor]:
         clip = (
-            _conditioned_clip(pairs, row, front_end) if cropping.conditioned else clip_as_taken(pairs, row, front_end)
+            _conditioned_clip(pairs, row, front_end)
+            if cropping.conditioned
+            else clip_as_taken(pairs, row, front_end)
         )
         return [cropping.cut(clip, cropping.whole(_shape(clip)))]
 
-    return _prepare_pairs(pairs, np.arange(len(pairs)), front_end, key, crops, 1, folder, workers, advance)
+    return _prepare_pairs(
+        pairs, np.arange(len(pairs)), front_end, key, crops, 1, folder, workers, advance
+    )
 
 
 def clip_as_taken(pairs: Pairs, row: int, front_end: FrontEnd) -> UInt8Array:
-    """Returns the clip of a row as long as the front end takes, at its rate: (frames, height, width) gray.
+    """Returns the clip of a row as long as the front end takes, at its rate: (frames, height,
+    width) gray.
 
-    A clip of that rate is cut after so many frames. A shorter one goes on in its film, or begins as early as its film
-    has to be entered; one of another rate is shown at the front end's instants, as conditioned films are.
+    A clip of that rate is cut after so many frames. A shorter one goes on in its film, or begins as
+    early as its film has to be entered; one of another rate is shown at the front end's instants,
+    as conditioned films are.
 
     Raises:
         InputError: its film is too short or too slow.
@@ -267,16 +307,28 @@ def clip_as_taken(pairs: Pairs, row: int, front_end: FrontEnd) -> UInt8Array:
     if own_rate and len(film) >= frames:
         first = min(first, len(film) - frames)
         return film[first : first + frames]
-    return TimedFilm(frames=film, times=pairs.film_times(row)).clip_near(first, frames, front_end.rate)
+    return TimedFilm(frames=film, times=pairs.film_times(row)).clip_near(
+        first, frames, front_end.rate
+    )
 
 
 def _conditioned_crops(
-    pairs: Pairs, row: int, front_end: FrontEnd, cropping: Cropping, *, variants: int, augment: Augment
+    pairs: Pairs,
+    row: int,
+    front_end: FrontEnd,
+    cropping: Cropping,
+    *,
+    variants: int,
+    augment: Augment,
 ) -> list[Tensor]:
-    """Crops a film at random that was disturbed and conditioned once; each crop starts on a frame of its own."""
+    """Crops a film at random that was disturbed and conditioned once; each crop starts on a frame
+    of its own."""
     recording, times = str(pairs.table.recording[row]), pairs.film_times(row)
     disturbed = augment.before(
-        pairs.film(row), times, source=recording, other_film=lambda: pairs.film(_row_of_second_film(pairs, row))
+        pairs.film(row),
+        times,
+        source=recording,
+        other_film=lambda: pairs.film(_row_of_second_film(pairs, row)),
     )
     film = FitFilm.of(disturbed, times)
     starts, crops = film.starts(front_end.frames, front_end.rate), []
@@ -289,7 +341,8 @@ def _conditioned_crops(
 
 
 def _row_of_second_film(pairs: Pairs, row: int) -> int:
-    """Selects a row of the film that a second flag is of: of all films in the order of their artifacts the next."""
+    """Selects a row of the film that a second flag is of: of all films in the order of their
+    artifacts the next."""
     recordings, first = np.unique(pairs.table.recording, return_index=True)
     row_of_film = int(np.searchsorted(recordings, pairs.table.recording[row]))
     return int(first[(row_of_film + 1) % len(recordings)])
@@ -313,14 +366,20 @@ def _prepare_pairs(
     advance: Advance,
 ) -> Prepared:
     subfolder = folder / f"{front_end.maps}-{front_end.hash}"
-    names = [_name(key(row), front_end, str(pairs.table.objects[pairs.table.object[row]])) for row in rows.tolist()]
+    names = [
+        _name(key(row), front_end, str(pairs.table.objects[pairs.table.object[row]]))
+        for row in rows.tolist()
+    ]
     paths = tuple(subfolder / name[:2] / f"{name}.npy" for name in names)
     try:
         missing = _unsound(list(zip(rows.tolist(), paths, strict=True)), workers)
         advance(len(rows) - len(missing))
         if missing:
             with alone_in(
-                subfolder, occupied=lambda: _LOG.warning("flagdata: another process prepares inputs, waiting for it")
+                subfolder,
+                occupied=lambda: _LOG.warning(
+                    "flagdata: another process prepares inputs, waiting for it"
+                ),
             ):
                 still = _unsound(missing, workers)
                 advance(len(missing) - len(still))
@@ -345,8 +404,8 @@ def _prepare_pairs(
 
 
 def simulations(pairs: Pairs, rows: IntArray) -> IntArray:
-    """Returns the seed of the simulation of each of some clips, or a number of its own for each recording that has
-    none."""
+    """Returns the seed of the simulation of each of some clips, or a number of its own for each
+    recording that has none."""
     alone = -1 - np.unique(pairs.table.recording[rows], return_inverse=True)[1]
     return np.where(pairs.table.seeded[rows], pairs.table.seed[rows], alone)
 
@@ -371,7 +430,8 @@ def _unsound(files: Sequence[tuple[int, Path]], workers: int) -> list[tuple[int,
 def _warn_of_damage(paths: Sequence[Path]) -> None:
     if paths:
         _LOG.warning(
-            "flagdata: warning: %d prepared inputs are damaged, or of an older version; they are made anew"
+            "flagdata: warning: %d prepared inputs are damaged, or of an older version; they are "
+            "made anew"
             "\n  where: %s",
             len(paths),
             paths[0],
@@ -389,7 +449,8 @@ def _fill(
     with one_thread():
         try:
             todo = [
-                pool.submit(lambda row, path: _write(path, compute(row), front_end), row, path) for row, path in missing
+                pool.submit(lambda row, path: _write(path, compute(row), front_end), row, path)
+                for row, path in missing
             ]
             for finished in as_completed(todo):
                 finished.result()
@@ -399,7 +460,8 @@ def _fill(
 
 
 def _write(path: Path, clips: Sequence[Tensor], front_end: FrontEnd) -> None:
-    """Writes the front end's output of some clips, with its checksum; a file is whole or not there."""
+    """Writes the front end's output of some clips, with its checksum; a file is whole or not
+    there."""
     if front_end.maps == "frames":
         stored = np.stack([clip.round().to(torch.uint8).numpy() for clip in clips])
     else:
@@ -410,7 +472,8 @@ def _write(path: Path, clips: Sequence[Tensor], front_end: FrontEnd) -> None:
 
 
 def _first_sequences(pairs: Pairs, rows: IntArray, *, count: int | None, seed: int) -> BoolArray:
-    """Masks the films that belong to the first `count` simulations of an order that depends on the seed alone."""
+    """Masks the films that belong to the first `count` simulations of an order that depends on the
+    seed alone."""
     if count is None:
         return np.ones(len(rows), dtype=np.bool_)
     seeds = np.unique(pairs.table.seed[rows])

@@ -64,7 +64,12 @@ class LossCourse:
         Raises:
             AttributeError, KeyError, OverflowError, TypeError, ValueError: it is not from there.
         """
-        return cls(epochs=[Epoch(**{name: _KINDS[name](value) for name, value in entry.items()}) for entry in content])
+        return cls(
+            epochs=[
+                Epoch(**{name: _KINDS[name](value) for name, value in entry.items()})
+                for entry in content
+            ]
+        )
 
     def picture(self) -> bytes:
         """Draws the losses and the learning rate against the epoch: a PNG."""
@@ -76,12 +81,20 @@ class LossCourse:
         axes.plot(numbers, [epoch.train for epoch in self.epochs], label="training")
         axes.plot(numbers, [epoch.validation for epoch in self.epochs], label="validation")
         if (best := self.best) is not None:
-            axes.plot([best.number + 1], [best.validation], "o", color="C1", label=f"best, epoch {best.number + 1}")
+            axes.plot(
+                [best.number + 1],
+                [best.validation],
+                "o",
+                color="C1",
+                label=f"best, epoch {best.number + 1}",
+            )
         axes.set_xlabel("epoch")
         axes.set_ylabel("loss")
         axes.grid(alpha=0.3)
         rates = axes.twinx()
-        rates.plot(numbers, [epoch.rate for epoch in self.epochs], color="0.6", linewidth=1, linestyle=":")
+        rates.plot(
+            numbers, [epoch.rate for epoch in self.epochs], color="0.6", linewidth=1, linestyle=":"
+        )
         rates.set_ylabel("learning rate (dotted)")
         axes.legend()
         out = io.BytesIO()

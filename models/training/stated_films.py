@@ -1,4 +1,5 @@
-"""What the catalog states of films, compared with what a network takes before any of them is decoded."""
+"""What the catalog states of films, compared with what a network takes before any of them is
+decoded."""
 
 from __future__ import annotations
 
@@ -67,8 +68,8 @@ class StatedFilms:
         )
 
     def check_learned(self, front_end: FrontEnd, cropping: Cropping) -> None:
-        """Checks that a recipe's clips can be cut out of every film: of its length, and of its rate, which only
-        conditioned films may miss.
+        """Checks that a recipe's clips can be cut out of every film: of its length, and of its
+        rate, which only conditioned films may miss.
 
         Raises:
             InputError: not of some; the fix is a line of the recipe.
@@ -90,7 +91,8 @@ class StatedFilms:
                 f"have another rate than the recipe's {rate:g} Hz",
                 fix=f"write rate = {slowest:.4g} in [input]"
                 if has_rate(self.count, self.seconds, slowest).all()
-                else f"write conditioned = true in [input], which shows films of any rate, here {slowest:.4g} to "
+                else "write conditioned = true in [input], which shows films of any rate, here "
+                f"{slowest:.4g} to "
                 f"{fastest:.4g} Hz, at the network's",
             )
             most = int(self.count.min())
@@ -113,7 +115,8 @@ class StatedFilms:
         if wrong.any():
             first = int(np.flatnonzero(wrong)[0])
             raise InputError(
-                f"{int(wrong.sum())} of {len(wrong)} films {what}; the first has {self.count[first]} frames at "
+                f"{int(wrong.sum())} of {len(wrong)} films {what}; the first has "
+                f"{self.count[first]} frames at "
                 f"{self.rate[first]:.4g} Hz",
                 where=f"recording {self.recordings[first]}",
                 fix=fix,

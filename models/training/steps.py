@@ -1,11 +1,14 @@
-"""The steps of a training: forward, backward, Adam, one batch after another, until the validation loss has settled.
+"""The steps of a training: forward, backward, Adam, one batch after another, until the validation
+loss has settled.
 
-What a step does depends on the recipe, the data and the step's number alone, so that a training that was killed and
-taken up from its checkpoint reaches the same weights as one that ran through (on one kind of machine, with as many
-threads). With several processes (`torchrun`) each takes its part of every batch, and gradients are averaged by
-`DistributedDataParallel`; the mean over all parts is that of the whole batch.
+What a step does depends on the recipe, the data and the step's number alone, so that a training
+that was killed and taken up from its checkpoint reaches the same weights as one that ran through
+(on one kind of machine, with as many threads). With several processes (`torchrun`) each takes its
+part of every batch, and gradients are averaged by `DistributedDataParallel`; the mean over all
+parts is that of the whole batch.
 
-The order of training: batches of entries that depend on (data, seed, epoch) alone, with a cursor that is kept.
+The order of training: batches of entries that depend on (data, seed, epoch) alone, with a cursor
+that is kept.
 """
 
 from __future__ import annotations
@@ -34,7 +37,13 @@ from models.training import checkpoint
 from models.training.checkpoint import Standing
 from models.training.inputs import Prepared
 from models.training.progress import Epoch, LossCourse
-from models.training.training_recipe import LEAST_BATCH, OptimiserSpec, Precision, Schedule, TrainingRecipe
+from models.training.training_recipe import (
+    LEAST_BATCH,
+    OptimiserSpec,
+    Precision,
+    Schedule,
+    TrainingRecipe,
+)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -52,13 +61,15 @@ class TrainingBatch:
 
 @dataclass(kw_only=True)
 class Batches:
-    """Batches of one epoch after another, all of one size; what does not fill the last is in no batch of that epoch.
+    """Batches of one epoch after another, all of one size; what does not fill the last is in no
+    batch of that epoch.
 
     Attributes:
         prepared: the entries.
         size: entries a batch, all ranks together.
         seed: of the orders.
-        together: whether films of one simulation follow one another, so that a contrastive loss finds pairs.
+        together: whether films of one simulation follow one another, so that a contrastive loss
+            finds pairs.
         share: (rank, ranks); each takes its part of every batch.
         epoch, cursor: of the next batch.
     """
@@ -101,10 +112,12 @@ class Batches:
                 return
 
     def order_hash(self, epoch: int) -> str:
-        """Hashes the entries, their variants and their order in an epoch, SHA-256 in hexadecimal: equal for any
-        share."""
+        """Hashes the entries, their variants and their order in an epoch, SHA-256 in hexadecimal:
+        equal for any share."""
         order, variant = self._order(epoch)
-        content = {name: value for name, value in self.state().items() if name not in ("epoch", "cursor")}
+        content = {
+            name: value for name, value in self.state().items() if name not in ("epoch", "cursor")
+        }
         return array_hash(content, [order.astype("<i8"), variant[order].astype("<i8")])
 
     def _order(self, epoch: int) -> tuple[IntArray, IntArray]:
@@ -140,16 +153,27 @@ class Batches:
             CorruptError: it names a batch that no epoch has.
         """
         current = self.state()
-        different = [name for name in current if name not in ("epoch", "cursor") and state.get(name) != current[name]]
+        different = [
+            name
+            for name in current
+            if name not in ("epoch", "cursor") and state.get(name) != current[name]
+        ]
         if different:
-            changes = "; ".join(f"{name} was {state.get(name)!r}, is {current[name]!r}" for name in different)
+            changes = "; ".join(
+                f"{name} was {state.get(name)!r}, is {current[name]!r}" for name in different
+            )
             raise RefusedError(
                 f"the checkpoint is of other batches: {changes}",
                 where="the training data",
                 fix="train at the same tag with the same recipe, or begin anew in another folder",
             )
         epoch, cursor = state.get("epoch"), state.get("cursor")
-        if not (isinstance(epoch, int) and epoch >= 0 and isinstance(cursor, int) and 0 <= cursor < len(self)):
+        if not (
+            isinstance(epoch, int)
+            and epoch >= 0
+            and isinstance(cursor, int)
+            and 0 <= cursor < len(self)
+        ):
             raise CorruptError(
                 f"the checkpoint goes on at batch {cursor!r} of {len(self)} in epoch {epoch!r}",
                 where="the training data",
@@ -242,7 +266,11 @@ class Training:
         spec, batches, learner = self.recipe.optimiser, self.batches, self._fresh()
         optimiser = torch.optim.Adam(learner.parameters(), lr=spec.rate, weight_decay=spec.decay)
         standing = Standing(
-            learner=learner, best=None, optimiser=optimiser, course=LossCourse(), batches=batches.state()
+            learner=learner,
+            best=None,
+            optimiser=optimiser,
+            course=LossCourse(),
+            batches=batches.state(),
         )
         if checkpoint.restore(self.run, standing, identity=self.identity):
             batches.take_up(standing.batches)
@@ -257,26 +285,42 @@ class Training:
             FlagdataError: the disk is full.
         """
         standing = standing if standing is not None else self.begin()
-        spec, batches, learner, course = self.recipe.optimiser, self.batches, standing.learner, standing.course
+        spec, batches, learner, course = (
+            self.recipe.optimiser,
+            self.batches,
+            standing.learner,
+            standing.course,
+        )
         values = self._values(self.train, learner)
-        self._values(self.validation, learner)  # what cannot be learned is refused before the first step
+        self._values(
+            self.validation, learner
+        )  # what cannot be learned is refused before the first step
         module = _Loss(learner)
         stepped: nn.Module = module if _share()[1] == 1 else DistributedDataParallel(module)
         while len(course.epochs) < spec.epochs and not course.is_stalled(spec.patience):
             self._epoch(standing, batches, stepped, values)
         if standing.best is not None:
             learner.load_state_dict(standing.best)
-        return Trained(learner=learner.eval(), course=course, seconds=sum(epoch.seconds for epoch in course.epochs))
+        return Trained(
+            learner=learner.eval(),
+            course=course,
+            seconds=sum(epoch.seconds for epoch in course.epochs),
+        )
 
     def length(self, epochs: int) -> float:
-        """Predicts how long so many epochs take on this machine, validation left out, by a step that changes nothing
-        [s]."""
+        """Predicts how long so many epochs take on this machine, validation left out, by a step
+        that changes nothing [s]."""
         spec = self.recipe.optimiser
         with torch.random.fork_rng(devices=[]):
             learner = self._fresh().train()
             entries = np.arange(min(spec.batch, len(self.train)))
-            inputs = self.train.batch(entries, np.zeros(len(entries), dtype=np.int64)).to(self.device)
-            values, sequence = self._values(self.train, learner)[: len(entries)], torch.from_numpy(self.train.sequence)
+            inputs = self.train.batch(entries, np.zeros(len(entries), dtype=np.int64)).to(
+                self.device
+            )
+            values, sequence = (
+                self._values(self.train, learner)[: len(entries)],
+                torch.from_numpy(self.train.sequence),
+            )
             begun = 0.0
             for _ in range(_TRIED):
                 begun = time.monotonic()
@@ -316,13 +360,17 @@ class Training:
         scaling.check(truth, where="the training data")
         return torch.from_numpy(truth).to(self.device)
 
-    def _epoch(self, standing: Standing, batches: Batches, stepped: nn.Module, values: Tensor) -> None:
+    def _epoch(
+        self, standing: Standing, batches: Batches, stepped: nn.Module, values: Tensor
+    ) -> None:
         spec, number = self.recipe.optimiser, batches.epoch
         begun = written = time.monotonic()
         total, steps = standing.running
         clips = len(batches) * spec.batch
         standing.learner.train()
-        with self.bars(clips, f"{self.recipe.name}: epoch {number + 1} of {spec.epochs}", "clip") as advance:
+        with self.bars(
+            clips, f"{self.recipe.name}: epoch {number + 1} of {spec.epochs}", "clip"
+        ) as advance:
             advance(steps * spec.batch)
             for batch in batches:
                 rate = learning_rate(spec, number * len(batches) + steps, len(batches))
@@ -344,12 +392,22 @@ class Training:
         )
         best = standing.course.best
         if best is None or validation < best.validation:
-            standing.best = {name: value.detach().clone() for name, value in standing.learner.state_dict().items()}
+            standing.best = {
+                name: value.detach().clone()
+                for name, value in standing.learner.state_dict().items()
+            }
         standing.course.epochs.append(epoch)
         standing.running, standing.batches = (0.0, 0), batches.state()
         self._save(standing)
 
-    def _step(self, standing: Standing, stepped: nn.Module, batch: TrainingBatch, values: Tensor, rate: float) -> float:
+    def _step(
+        self,
+        standing: Standing,
+        stepped: nn.Module,
+        batch: TrainingBatch,
+        values: Tensor,
+        rate: float,
+    ) -> float:
         """Takes a step on one batch; returns its loss."""
         optimiser, spec = standing.optimiser, self.recipe.optimiser
         for group in optimiser.param_groups:
@@ -374,13 +432,19 @@ class Training:
 
     @torch.no_grad()
     def _validate(self, learner: Learner) -> float:
-        """Computes the mean loss over the validation side; a contrastive one over batches of whole sequences."""
+        """Computes the mean loss over the validation side; a contrastive one over batches of whole
+        sequences."""
         learner.eval()
-        values, sequence = self._values(self.validation, learner), torch.from_numpy(self.validation.sequence)
+        values, sequence = (
+            self._values(self.validation, learner),
+            torch.from_numpy(self.validation.sequence),
+        )
         whole = learner.objective is Loss.CONTRASTIVE
         total, count = 0.0, 0
         for entries in validation_batches(self.validation.sequence, whole=whole):
-            inputs = self.validation.batch(entries, np.zeros(len(entries), dtype=np.int64)).to(self.device)
+            inputs = self.validation.batch(entries, np.zeros(len(entries), dtype=np.int64)).to(
+                self.device
+            )
             loss = learner.loss(inputs, values[entries.tolist()], sequence[entries].to(self.device))
             total, count = total + float(loss) * len(entries), count + len(entries)
         return total / count
@@ -395,8 +459,8 @@ def validation_batches(sequence: IntArray, *, whole: bool) -> list[IntArray]:
 
     Args:
         sequence: (n,) of each clip.
-        whole: whether sequences stay whole and each batch has several, with two clips of one at least, as a contrastive
-            loss needs; where that cannot be had all clips are one batch.
+        whole: whether sequences stay whole and each batch has several, with two clips of one at
+            least, as a contrastive loss needs; where that cannot be had all clips are one batch.
     """
     order = np.argsort(sequence, kind="stable")
     if not whole:

@@ -12,15 +12,18 @@ from flagdata.errors import InputError
 from models.conditioning.frame_interpolation import Interpolator, TimedFrame, at_instants
 
 LEAST_RATE = 0.8
-"""Least frame rate of a film, in those of the network: most of its pictures must have been taken."""
+"""Least frame rate of a film, in those of the network: most of its pictures must have been
+taken."""
 SAME_RATE = 0.01
-"""Share by which a film's rate may differ from the network's, so that its frames are taken as they are."""
+"""Share by which a film's rate may differ from the network's, so that its frames are taken as they
+are."""
 _BEYOND = 0.05
 """Share of the time between two frames by which a clip may end beyond its film."""
 
 
 def frame_rate(count: AnyArray | int, seconds: AnyArray | float) -> FloatArray:
-    """Computes the frame rates [Hz] of films from their numbers of frames, and the time from the first to the last."""
+    """Computes the frame rates [Hz] of films from their numbers of frames, and the time from the
+    first to the last."""
     return (np.asarray(count, dtype=np.float64) - 1) / np.maximum(seconds, 1e-9)
 
 
@@ -29,10 +32,15 @@ def has_rate(count: AnyArray | int, seconds: AnyArray | float, rate: float) -> B
     return np.abs(frame_rate(count, seconds) / rate - 1) <= SAME_RATE
 
 
-def gives_clip(count: AnyArray | int, seconds: AnyArray | float, *, frames: int, rate: float) -> BoolArray:
-    """Returns whether films of so many frames in that time give a clip of `frames` at `rate` [Hz]."""
+def gives_clip(
+    count: AnyArray | int, seconds: AnyArray | float, *, frames: int, rate: float
+) -> BoolArray:
+    """Returns whether films of so many frames in that time give a clip of `frames` at `rate`
+    [Hz]."""
     own = frame_rate(count, seconds)
-    return (own >= LEAST_RATE * rate) & ((frames - 1) / rate <= seconds + _BEYOND / np.maximum(own, 1e-9))
+    return (own >= LEAST_RATE * rate) & (
+        (frames - 1) / rate <= seconds + _BEYOND / np.maximum(own, 1e-9)
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,7 +73,8 @@ class TimedFilm:
             raise InputError(
                 f"the film of {len(self.times)} frames at {film_rate:.4g} Hz cannot give "
                 f"clips of {count} at {rate:g} Hz",
-                fix=f"give {(count - 1) / rate:.3g} s or more, of {LEAST_RATE * rate:.3g} Hz or more",
+                fix=f"give {(count - 1) / rate:.3g} s or more, of {LEAST_RATE * rate:.3g} Hz or "
+                "more",
             )
         return fits
 
@@ -79,13 +88,17 @@ class TimedFilm:
         return self.clip(0, int(self.times[-1] * rate + 1e-6) + 1, rate)[0]
 
     def clip(self, first: int, count: int, rate: float) -> tuple[UInt8Array, FloatArray]:
-        """Resamples (count, height, width) pictures at `rate` [Hz] from a frame on, and returns their times [s]."""
+        """Resamples (count, height, width) pictures at `rate` [Hz] from a frame on, and returns
+        their times [s]."""
         instants = self.times[first] + np.arange(count) / rate
         period = float(np.median(np.diff(self.times)))
-        return at_instants(self._timed_frames, instants, period=period, interpolator=self._interpolator)[0], instants
+        return at_instants(
+            self._timed_frames, instants, period=period, interpolator=self._interpolator
+        )[0], instants
 
     def clip_near(self, first: int, count: int, rate: float) -> UInt8Array:
-        """Resamples a clip, as `clip`, from a frame on or from as early as the film has to be entered for its length.
+        """Resamples a clip, as `clip`, from a frame on or from as early as the film has to be
+        entered for its length.
 
         Raises:
             InputError: as `starts`.

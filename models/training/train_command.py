@@ -31,12 +31,13 @@ from models.training.training_recipe import TrainingRecipe
 
 CURVES = "curves.png"
 PARENTS = 100
-"""Recordings that a model's row names as what it was made from, at most; their number is in its recipe."""
+"""Recordings that a model's row names as what it was made from, at most; their number is in its
+recipe."""
 
 
 def data_identity(lake: Lake, train: Pairs, validation: Pairs, *, at: str | None) -> dict[str, Any]:
-    """Identifies what a training learns from: the version of the lake, the pairs' fingerprints, and how the sides were
-    decided."""
+    """Identifies what a training learns from: the version of the lake, the pairs' fingerprints, and
+    how the sides were decided."""
     return {
         "at": at,
         "view": [f"{part.branch}@{part.version}" for part in lake.view(at)],
@@ -52,21 +53,31 @@ def recordings_of(train: Pairs, validation: Pairs) -> list[str]:
 
 
 def network_artifact(
-    lake: Lake, recipe: TrainingRecipe, data: dict[str, Any], recordings: Sequence[str], *, branch: str
+    lake: Lake,
+    recipe: TrainingRecipe,
+    data: dict[str, Any],
+    recordings: Sequence[str],
+    *,
+    branch: str,
 ) -> Artifact:
-    """Makes the row of a model without its result; its identity, hence, is what goes in: recipe, data and seed.
+    """Makes the row of a model without its result; its identity, hence, is what goes in: recipe,
+    data and seed.
 
-    Its parents are the first `PARENTS` of the recordings that the branch shows: of thousands, ids in order are a random
-    sample. The fingerprints in its recipe state all data exactly.
+    Its parents are the first `PARENTS` of the recordings that the branch shows: of thousands, ids
+    in order are a random sample. The fingerprints in its recipe state all data exactly.
     """
     ingredients = {
         "recipe": recipe.identity(),
         "data": {key: data[key] for key in ("train", "validation")},
         "recordings": len(recordings),
     }
-    visible = lake.rows({"artifact": recordings}, at=branch, columns=["artifact"])["artifact"].to_pylist()
+    visible = lake.rows({"artifact": recordings}, at=branch, columns=["artifact"])[
+        "artifact"
+    ].to_pylist()
     parents = sorted(visible)[:PARENTS]
-    return Artifact(kind=Kind.NETWORK, name=recipe.name, recipe=ingredients, seed=recipe.seed, parents=parents)
+    return Artifact(
+        kind=Kind.NETWORK, name=recipe.name, recipe=ingredients, seed=recipe.seed, parents=parents
+    )
 
 
 def card_of(
@@ -104,7 +115,8 @@ def publish(
     batches: dict[str, Any],
     branch: str,
 ) -> tuple[Artifact, dict[str, Any], Remade | None]:
-    """Commits a model and returns its row and card; one that is there already is kept, unless its object is damaged or
+    """Commits a model and returns its row and card; one that is there already is kept, unless its
+    object is damaged or
     missing: what was done about that is returned, too. A recording that was withdrawn
     from the branch since the training began is not among its parents.
 
@@ -123,12 +135,17 @@ def publish(
         best = {"epochs": card["epochs"], "best": card["best"], "parameters": card["parameters"]}
         artifact = replace(artifact, object=transaction.put(staged), parameters=canonical(best))
         transaction.add(artifact)
-    return transaction.result.artifacts[artifact.id], card, transaction.result.healed.get(artifact.id)
+    return (
+        transaction.result.artifacts[artifact.id],
+        card,
+        transaction.result.healed.get(artifact.id),
+    )
 
 
 _LONGEST_WAIT = timedelta(days=7)
 _PREPARED = 0.05
-"""s of one core for a crop: its maps take 0.03 to 0.04 (docs/results/bench-models.json), decoding its film the rest."""
+"""s of one core for a crop: its maps take 0.03 to 0.04 (docs/results/bench-models.json), decoding
+its film the rest."""
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -143,9 +160,10 @@ if TYPE_CHECKING:
 def train(chosen: Training) -> Iterator[Result]:
     """Train a network on the clips of a lake and commit it as an artifact.
 
-    RECIPE is a TOML file, or a recipe of the catalog: flow, wave, sdn and the networks they are compared with. Each
-    film is decoded and filtered once, into the cache; steps then read from there. A training that was stopped or killed
-    goes on from its last checkpoint when the command is given again.
+    RECIPE is a TOML file, or a recipe of the catalog: flow, wave, sdn and the networks they are
+    compared with. Each film is decoded and filtered once, into the cache; steps then read from
+    there. A training that was stopped or killed goes on from its last checkpoint when the command
+    is given again.
 
     \b
       flagdata train flow --at v1 --lake lake
@@ -164,7 +182,8 @@ def train(chosen: Training) -> Iterator[Result]:
     yield Result("train", report)
     best = report["best"]
     say(
-        f"{report['epochs']} epochs of {report['seconds'] / max(1, report['epochs']):.0f} s; the best was "
+        f"{report['epochs']} epochs of {report['seconds'] / max(1, report['epochs']):.0f} s; the "
+        "best was "
         f"{best['number'] + 1}, validation loss {best['validation']:.4f}"
     )
     echo(f"{report['artifact']}  network {report['name']}, seed {report['seed']}")
@@ -176,10 +195,12 @@ def train_and_publish(
     *,
     bars: Callable[[int, str, str], AbstractContextManager[Callable[[int], None]]],
 ) -> dict[str, Any] | None:
-    """Prepares, trains and publishes; returns what the command reports, or None in all ranks but the first.
+    """Prepares, trains and publishes; returns what the command reports, or None in all ranks but
+    the first.
 
     Raises:
-        FlagdataError: see `models.training.steps.Training.complete`, `flagdata.dataset.Source.pairs`.
+        FlagdataError: see `models.training.steps.Training.complete`,
+            `flagdata.dataset.Source.pairs`.
     """
     import torch
     from torch import distributed as ranks
@@ -201,7 +222,9 @@ def train_and_publish(
     source = open_source(chosen.lake)
     source.lake.check_writable()
     cache = chosen.inputs(source.lake)
-    train_pairs, validation_pairs = (sides_of(source, recipe, side, at=at) for side in ("train", "validation"))
+    train_pairs, validation_pairs = (
+        sides_of(source, recipe, side, at=at) for side in ("train", "validation")
+    )
     data = data_identity(source.lake, train_pairs, validation_pairs, at=at)
     recordings = recordings_of(train_pairs, validation_pairs)
     wanted = network_artifact(source.lake, recipe, data, recordings, branch=branch).id
@@ -209,17 +232,25 @@ def train_and_publish(
         existing = present(source.lake, source.lake.artifact(wanted, at=branch))
         if existing.whole is not None:
             say("this model was trained before")
-            return _report(existing.whole, read_card(source.lake.object_path(str(existing.whole.object))))
-        say("this model was trained before, but its object is damaged or missing: it is trained again")
+            return _report(
+                existing.whole, read_card(source.lake.object_path(str(existing.whole.object)))
+            )
+        say(
+            "this model was trained before, but its object is damaged or missing: it is trained "
+            "again"
+        )
     films = film_rows(train_pairs, sequences=recipe.data.sequences, seed=recipe.seed)
     check_clips(recipe, source.lake, train_pairs, validation_pairs, films=films, at=at)
     torch.set_num_threads(max(1, workers))
     several = "RANK" in os.environ and int(os.environ.get("WORLD_SIZE", "1")) > 1
     if several:
         device = device_of_rank(device)
-        # The others wait while the first prepares the inputs, which takes hours where there are many films.
+        # The others wait while the first prepares the inputs, which takes hours where there are
+        # many films.
         ranks.init_process_group("gloo" if device == "cpu" else "nccl", timeout=_LONGEST_WAIT)
-    folder = chosen.run if chosen.run is not None else cache / f"run-{recipe.name}-{digest(wanted)[:12]}"
+    folder = (
+        chosen.run if chosen.run is not None else cache / f"run-{recipe.name}-{digest(wanted)[:12]}"
+    )
     locks = ExitStack()
     try:
         first = not several or ranks.get_rank() == 0
@@ -249,13 +280,24 @@ def train_and_publish(
                 sequences=recipe.data.sequences,
                 seed=recipe.seed,
             )
-        with bars(len(validation_pairs), f"{recipe.name}: prepare what validates", "clip") as advance:
+        with bars(
+            len(validation_pairs), f"{recipe.name}: prepare what validates", "clip"
+        ) as advance:
             validation_inputs = prepare_clips(
-                validation_pairs, recipe.front_end, recipe.cropping, folder=cache, workers=workers, advance=advance
+                validation_pairs,
+                recipe.front_end,
+                recipe.cropping,
+                folder=cache,
+                workers=workers,
+                advance=advance,
             )
         if several and first:
             ranks.barrier()
-        identity = {"recipe": recipe.identity(), "train": data["train"], "validation": data["validation"]}
+        identity = {
+            "recipe": recipe.identity(),
+            "train": data["train"],
+            "validation": data["validation"],
+        }
         training = Steps(
             recipe=recipe,
             train=train_inputs.in_memory(),
@@ -270,7 +312,10 @@ def train_and_publish(
         standing = training.begin()
         if first:
             if standing.has_begun:
-                say(f"the training goes on from its checkpoint: {_place(standing, recipe.optimiser.epochs)}")
+                say(
+                    "the training goes on from its checkpoint: "
+                    f"{_place(standing, recipe.optimiser.epochs)}"
+                )
             if left := recipe.optimiser.epochs - len(standing.course.epochs):
                 say(
                     announce_work(
@@ -286,7 +331,13 @@ def train_and_publish(
         if not first:
             return None
         row, card, healed = publish(
-            source.lake, recipe, data, recordings, done, batches=training.batches.state(), branch=branch
+            source.lake,
+            recipe,
+            data,
+            recordings,
+            done,
+            batches=training.batches.state(),
+            branch=branch,
         )
         if healed is not None:
             say(said(row.id, healed))
@@ -302,7 +353,9 @@ def _place(standing: Standing, epochs: int) -> str:
     done, steps = len(standing.course.epochs), standing.running[1]
     if steps:
         return f"from step {steps + 1} of epoch {done + 1} of {epochs}"
-    return f"from epoch {done + 1} of {epochs}" if done < epochs else f"all {epochs} epochs are done"
+    return (
+        f"from epoch {done + 1} of {epochs}" if done < epochs else f"all {epochs} epochs are done"
+    )
 
 
 def device_of_rank(device: str) -> str:

@@ -1,16 +1,16 @@
-"""What is trained on what, as TOML. Parsed here and nowhere else; unknown keys are refused, the nearest is named.
+"""What is trained on what, as TOML. Parsed here and nowhere else; unknown keys are refused, the
+nearest is named.
 
-title, seed
-[data]       dataset: a data set's name, or a list of them; sequences: of the training side, all by default
-[input]      maps: "frames", "spectral-maps", "wave-maps", "flow-maps" or "flow-maps-3"; size [px], frames; scales,
-             mirror: of crops; variants: crops of each film that are prepared; conditioned = true: films are made fit as
-             `flagdata measure` does it, at the network's instants
-[input.augment.NAME]  of conditioned films, NAME of `models.training.augment.DISTURBANCES`: share (of the films), low,
-             high
-[network]    name: of `models.networks.networks_by_name.NETWORKS`; its other keys are the network's own
-[loss]       name: "regression", "posterior" or "contrastive"; targets: of `models.networks.targets`; components, margin
-[optimiser]  rate, decay, batch, epochs; schedule: "steps" or "cosine"; drop-after: epochs; clip-norm; precision:
-             "float32" or "bfloat16"; patience: epochs without a better validation loss, after which it ends
+title, seed [data]       dataset: a data set's name, or a list of them; sequences: of the training
+side, all by default [input]      maps: "frames", "spectral-maps", "wave-maps", "flow-maps" or
+"flow-maps-3"; size [px], frames; scales, mirror: of crops; variants: crops of each film that are
+prepared; conditioned = true: films are made fit as `flagdata measure` does it, at the network's
+instants [input.augment.NAME]  of conditioned films, NAME of `models.training.augment.DISTURBANCES`:
+share (of the films), low, high [network]    name: of `models.networks.networks_by_name.NETWORKS`;
+its other keys are the network's own [loss]       name: "regression", "posterior" or "contrastive";
+targets: of `models.networks.targets`; components, margin [optimiser]  rate, decay, batch, epochs;
+schedule: "steps" or "cosine"; drop-after: epochs; clip-norm; precision: "float32" or "bfloat16";
+patience: epochs without a better validation loss, after which it ends
 """
 
 from __future__ import annotations
@@ -62,7 +62,8 @@ class Schedule(StrEnum):
     STEPS = "steps"
     """To a tenth after so many epochs, as the paper's."""
     COSINE = "cosine"
-    """From a twentieth up to the full rate within the first twentieth of the steps, then down as a cosine."""
+    """From a twentieth up to the full rate within the first twentieth of the steps, then down as a
+    cosine."""
 
 
 class Precision(StrEnum):
@@ -86,7 +87,10 @@ class DataSpec:
     def of_identity(cls, entry: Mapping[str, Any]) -> DataSpec:
         """Rebuilds what `identity` was made of, as a model's card keeps it."""
         datasets = entry["dataset"]
-        return cls(datasets=(datasets,) if isinstance(datasets, str) else tuple(datasets), sequences=entry["sequences"])
+        return cls(
+            datasets=(datasets,) if isinstance(datasets, str) else tuple(datasets),
+            sequences=entry["sequences"],
+        )
 
     @property
     def rows(self) -> Values:
@@ -104,10 +108,16 @@ class DataSpec:
             NotFoundError: it has no data set at all.
             UnknownNameError: one that it has not; the nearest is named.
         """
-        available = set(lake.rows({"kind": Kind.CLIP}, at=at, columns=["dataset"])["dataset"].drop_null().to_pylist())
+        available = set(
+            lake.rows({"kind": Kind.CLIP}, at=at, columns=["dataset"])["dataset"]
+            .drop_null()
+            .to_pylist()
+        )
         for dataset in self.datasets:
             if not available:
-                message = f"the lake has no clips of a data set, and the recipe learns from {dataset!r}"
+                message = (
+                    f"the lake has no clips of a data set, and the recipe learns from {dataset!r}"
+                )
                 fix = f"build it first: {command_line('flagdata', 'build', dataset)}"
                 raise NotFoundError(message, where=str(lake.path), fix=fix)
             if dataset not in available:
@@ -180,7 +190,8 @@ class TrainingRecipe:
         title: one line for people.
         seed: of initial weights, crops and orders.
         data, input, network, loss, optimiser: the tables above.
-        variants: crops of each film that are prepared; an epoch takes one of them, the next the next.
+        variants: crops of each film that are prepared; an epoch takes one of them, the next the
+            next.
         augment: what happens to films beside crops and mirror images.
     """
 
@@ -205,7 +216,11 @@ class TrainingRecipe:
             "front_end": asdict(self.front_end),
             "cropping": self.cropping.as_dict(),
             "variants": self.variants,
-            **({"augment": self.augment.identity(), "conditioning": VERSION} if self.cropping.conditioned else {}),
+            **(
+                {"augment": self.augment.identity(), "conditioning": VERSION}
+                if self.cropping.conditioned
+                else {}
+            ),
             "network": {"name": self.network.name, "options": dict(self.network.options)},
             "loss": {**asdict(self.loss), "targets": tuple(map(hashed_name, self.loss.targets))},
             "optimiser": asdict(self.optimiser),
@@ -228,7 +243,8 @@ class TrainingRecipe:
         )
 
     def check(self) -> None:
-        """Checks that the network takes what the front end gives, by shapes alone, before anything is prepared.
+        """Checks that the network takes what the front end gives, by shapes alone, before anything
+        is prepared.
 
         Raises:
             InputError: options or clips that the network does not take.
@@ -239,7 +255,8 @@ class TrainingRecipe:
         except RuntimeError as error:
             shape = "×".join(map(str, self.front_end.shape))
             raise InputError(
-                f"the network {self.network.name} does not take {shape} {self.front_end.maps}: {error}",
+                f"the network {self.network.name} does not take {shape} {self.front_end.maps}: "
+                f"{error}",
                 where="[network]",
                 fix="give it smaller strides, or larger clips",
             ) from None
@@ -259,7 +276,9 @@ def load(source: str) -> TrainingRecipe:
         InputError, UsageError: a value that does not fit.
     """
     source_text = TRAININGS.find(source)
-    return parse(source_text.text, name=source_text.name, where=source_text.where, folder=source_text.folder)
+    return parse(
+        source_text.text, name=source_text.name, where=source_text.where, folder=source_text.folder
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -325,10 +344,13 @@ def _data(data: _Data, *, where: str) -> DataSpec:
 
 
 def _input(form: _Input, *, where: str) -> tuple[FrontEnd, Cropping]:
-    front_end = FrontEnd(maps=cast("Maps", form.maps), size=form.size, frames=form.frames, rate=form.rate)
+    front_end = FrontEnd(
+        maps=cast("Maps", form.maps), size=form.size, frames=form.frames, rate=form.rate
+    )
     if (values := form.variants * math.prod(front_end.shape)) > FILM_LIMIT:
         raise LimitError(
-            f"{form.variants} variants of {math.prod(front_end.shape)} values are {values:.3g} values of each film",
+            f"{form.variants} variants of {math.prod(front_end.shape)} values are {values:.3g} "
+            "values of each film",
             where=where,
             fix=f"at most {FILM_LIMIT} are kept: give fewer variants or a smaller size",
         )
@@ -340,14 +362,23 @@ def _input(form: _Input, *, where: str) -> tuple[FrontEnd, Cropping]:
         )
     scales = form.scales or Cropping.scales
     return front_end, Cropping(
-        frames=form.frames, size=form.size, scales=scales, mirror=form.mirror, conditioned=form.conditioned
+        frames=form.frames,
+        size=form.size,
+        scales=scales,
+        mirror=form.mirror,
+        conditioned=form.conditioned,
     )
 
 
 def _network(content: Mapping[str, Any], front_end: FrontEnd, *, where: str) -> NetworkSpec:
-    name, options = content.get("name"), {key: entry for key, entry in content.items() if key != "name"}
+    name, options = (
+        content.get("name"),
+        {key: entry for key, entry in content.items() if key != "name"},
+    )
     if not isinstance(name, str):
-        raise InputError("no name is given", where=where, fix=f"add name, one of {', '.join(NETWORKS)}")
+        raise InputError(
+            "no name is given", where=where, fix=f"add name, one of {', '.join(NETWORKS)}"
+        )
     takes = NETWORKS[name].takes
     if takes != front_end.maps:
         raise UsageError(
@@ -355,7 +386,9 @@ def _network(content: Mapping[str, Any], front_end: FrontEnd, *, where: str) -> 
             where=where,
             fix=f'write maps = "{takes}" in [input]',
         )
-    return NetworkSpec(name=name, options={key.replace("-", "_"): option for key, option in options.items()})
+    return NetworkSpec(
+        name=name, options={key.replace("-", "_"): option for key, option in options.items()}
+    )
 
 
 def _loss(content: Mapping[str, Any], *, where: str) -> LossSpec:
@@ -368,12 +401,18 @@ def _loss(content: Mapping[str, Any], *, where: str) -> LossSpec:
         )
     for key, needed in (("components", Loss.POSTERIOR), ("margin", Loss.CONTRASTIVE)):
         if loss.name is not needed and key in content:
-            raise UsageError(f"{key} has no effect on {loss.name.value}", where=where, fix="leave it out")
+            raise UsageError(
+                f"{key} has no effect on {loss.name.value}", where=where, fix="leave it out"
+            )
     return loss
 
 
 def _optimiser(content: Mapping[str, Any], *, where: str) -> OptimiserSpec:
     optimiser = read(OptimiserSpec, content, where=where)
     if optimiser.schedule is not Schedule.STEPS and "drop-after" in content:
-        raise UsageError(f"drop-after has no effect on {optimiser.schedule.value}", where=where, fix="leave it out")
+        raise UsageError(
+            f"drop-after has no effect on {optimiser.schedule.value}",
+            where=where,
+            fix="leave it out",
+        )
     return optimiser

@@ -1,14 +1,16 @@
 """Reading ArcSim 0.2.1's scenes and materials. What the simulator does not do is refused by name.
 
-A scene file names one cloth with one material, its handles, gravity and wind. ArcSim's step has stages, which all act
-unless the scene disables them, strain limiting and plasticity only where a material has settings for them, separation
-and the pop filter only after remeshing. Of these, *proximity* becomes `Scene.contact` (`magic.repulsion_thickness`,
-1 mm; `magic.collision_stiffness`, 1e9 N/m³; `friction`, 0.6), *strainlimiting* `Scene.limits`, and *remeshing*, where
-the cloth has settings for it, `Scene.remeshing`. The others are not simulated: they are an error unless the scene
+A scene file names one cloth with one material, its handles, gravity and wind. ArcSim's step has
+stages, which all act unless the scene disables them, strain limiting and plasticity only where a
+material has settings for them, separation and the pop filter only after remeshing. Of these,
+*proximity* becomes `Scene.contact` (`magic.repulsion_thickness`, 1 mm; `magic.collision_stiffness`,
+1e9 N/m³; `friction`, 0.6), *strainlimiting* `Scene.limits`, and *remeshing*, where the cloth has
+settings for it, `Scene.remeshing`. The others are not simulated: they are an error unless the scene
 disables them or the caller accepts to leave them out.
 
-Two deviations: ArcSim reads `duration` only beside `timestep` and runs without end beside `frame_time`, here it ends
-the run in both; ArcSim meets strain limits by an optimisation, here the faces are corrected in sweeps.
+Two deviations: ArcSim reads `duration` only beside `timestep` and runs without end beside
+`frame_time`, here it ends the run in both; ArcSim meets strain limits by an optimisation, here the
+faces are corrected in sweeps.
 """
 
 from __future__ import annotations
@@ -35,7 +37,15 @@ from sim.cloth.mesh import Mesh
 from sim.cloth.scene import Scene
 from sim.cloth.sizing import Remeshing
 
-STAGES = ("strainlimiting", "remeshing", "proximity", "collision", "separation", "popfilter", "plasticity")
+STAGES = (
+    "strainlimiting",
+    "remeshing",
+    "proximity",
+    "collision",
+    "separation",
+    "popfilter",
+    "plasticity",
+)
 """Stages of ArcSim's step that a scene may disable."""
 SIMULATED = ("strainlimiting", "remeshing", "proximity")
 """Those of them that are simulated here."""
@@ -44,12 +54,23 @@ SWEEPS = 50
 REMESHED_SWEEPS = 500
 """The same with remeshing (`sim.cloth.limits.RADIUS_AMONG_SLIVERS`)."""
 THICKNESS, STIFFNESS, FRICTION = 1e-3, 1e9, 0.6
-"""ArcSim's defaults of proximity: repulsion thickness [m], collision stiffness [N/m³], friction of cloth on cloth."""
+"""ArcSim's defaults of proximity: repulsion thickness [m], collision stiffness [N/m³], friction of
+cloth on cloth."""
 
-# What of a scene file is read: key → None for a value, a mapping for a table, a list of one for a list of tables.
+# What of a scene file is read: key → None for a value, a mapping for a table, a list of one for a
+# list of tables.
 _KEYS: Mapping[str, Any] = {
     **dict.fromkeys(
-        ("frame_time", "frame_steps", "end_time", "end_frame", "duration", "gravity", "disable", "friction")
+        (
+            "frame_time",
+            "frame_steps",
+            "end_time",
+            "end_frame",
+            "duration",
+            "gravity",
+            "disable",
+            "friction",
+        )
     ),
     "cloths": [
         {
@@ -70,7 +91,9 @@ _KEYS: Mapping[str, Any] = {
                     )
                 )
             ],
-            "remeshing": dict.fromkeys(("refine_angle", "refine_compression", "refine_velocity", "size", "aspect_min")),
+            "remeshing": dict.fromkeys(
+                ("refine_angle", "refine_compression", "refine_velocity", "size", "aspect_min")
+            ),
         }
     ],
     "handles": [dict.fromkeys(("nodes", "type"))],
@@ -88,8 +111,8 @@ _KEYS: Mapping[str, Any] = {
     ),
     **dict.fromkeys(("motions", "obstacles", "morphs", "obs_friction")),
 }
-# `projection_thickness` to `combine_tensors`, `weakening` and `obs_friction` belong to stages that are not
-# simulated and to obstacles: they say nothing once those are left out.
+# `projection_thickness` to `combine_tensors`, `weakening` and `obs_friction` belong to stages that
+# are not simulated and to obstacles: they say nothing once those are left out.
 _EMPTY = ("motions", "obstacles", "morphs")  # known, and only supported empty
 
 
@@ -115,9 +138,15 @@ class ArcsimScene:
     left_out: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.frame_time) and self.frame_time > 0 and self.frame_steps >= 1 and self.frames >= 1):
+        if not (
+            math.isfinite(self.frame_time)
+            and self.frame_time > 0
+            and self.frame_steps >= 1
+            and self.frames >= 1
+        ):
             raise InputError(
-                f"the run has {self.frames} frames of {self.frame_time!r} s, each in {self.frame_steps} steps",
+                f"the run has {self.frames} frames of {self.frame_time!r} s, each in "
+                f"{self.frame_steps} steps",
                 where="ArcSim scene",
                 fix="let it last at least one frame of at least one step",
             )
@@ -129,7 +158,8 @@ class ArcsimScene:
 
 
 def read_material(path: Path) -> Material:
-    """Reads a material file: density, stretching (6 × 4) and bending (3 × 5). Its damping is 0, as ArcSim's.
+    """Reads a material file: density, stretching (6 × 4) and bending (3 × 5). Its damping is 0, as
+    ArcSim's.
 
     Raises:
         NotFoundError: no such file.
@@ -139,24 +169,35 @@ def read_material(path: Path) -> Material:
     _check_keys(content, {"density", "stretching", "bending"}, f"material {path}")
     missing = sorted({"density", "stretching", "bending"} - set(content))
     if missing:
-        raise InputError(f"these keys are missing: {', '.join(missing)}", where=f"material {path}", fix="add them")
-    tables = {"area-weight": content["density"], "stretching": content["stretching"], "bending": content["bending"]}
+        raise InputError(
+            f"these keys are missing: {', '.join(missing)}",
+            where=f"material {path}",
+            fix="add them",
+        )
+    tables = {
+        "area-weight": content["density"],
+        "stretching": content["stretching"],
+        "bending": content["bending"],
+    }
     return Material.from_mapping(
         {**tables, "source": f"ArcSim material file {path.name}", "damping": 0.0}, name=path.stem
     )
 
 
-def read_scene(path: Path, *, root: Path | None = None, accept: Collection[str] = ()) -> ArcsimScene:
+def read_scene(
+    path: Path, *, root: Path | None = None, accept: Collection[str] = ()
+) -> ArcsimScene:
     """Reads a scene file with its mesh and material.
 
     Args:
         root: folder that the mesh and material paths are relative to; the scene file's own if None.
-        accept: stages (of `STAGES`) that are left out although the scene has them act, those of `SIMULATED` too.
+        accept: stages (of `STAGES`) that are left out although the scene has them act, those of
+            `SIMULATED` too.
 
     Raises:
         NotFoundError: a file that is not there.
-        InputError: keys or stages that are not supported, all of them listed; several cloths or materials; impossible
-            values.
+        InputError: keys or stages that are not supported, all of them listed; several cloths or
+            materials; impossible values.
         UnknownNameError: an accepted or disabled stage that does not exist.
     """
     content = read_json(path)
@@ -180,7 +221,9 @@ def read_scene(path: Path, *, root: Path | None = None, accept: Collection[str] 
     for handle in _list(content, "handles", where):
         if handle.get("type", "node") != "node":
             raise InputError(
-                f"the handle's type is {handle['type']!r}", where=where, fix="only node handles are supported"
+                f"the handle's type is {handle['type']!r}",
+                where=where,
+                fix="only node handles are supported",
             )
         nodes += [int(node) for node in handle.get("nodes", [])]
     scene = Scene(
@@ -188,21 +231,27 @@ def read_scene(path: Path, *, root: Path | None = None, accept: Collection[str] 
         position=_place_positions(shape.positions, transform, where),
         material=_scale_material(read_material(folder / _text(entry, "data", where)), entry, where),
         handles=Handles(
-            vertices=tuple(nodes), stiffness=_number(magic, "handle_stiffness", ARCSIM_STIFFNESS, f"{where}, magic")
+            vertices=tuple(nodes),
+            stiffness=_number(magic, "handle_stiffness", ARCSIM_STIFFNESS, f"{where}, magic"),
         ),
         wind=_vector(wind, "velocity", (0.0, 0.0, 0.0), f"{where}, wind"),
         gravity=_vector(content, "gravity", (0.0, 0.0, 0.0), where),
         air=QuadraticNormal(
-            density=_number(wind, "density", 1.0, f"{where}, wind"), drag=_number(wind, "drag", 0.0, f"{where}, wind")
+            density=_number(wind, "density", 1.0, f"{where}, wind"),
+            drag=_number(wind, "drag", 0.0, f"{where}, wind"),
         ),
         contact=_contact(content, magic, where) if "proximity" in simulated else None,
         limits=_limits(entry, sweeps, where) if "strainlimiting" in simulated else None,
-        remeshing=_remeshing(cloth["remeshing"], f"{where}, remeshing") if "remeshing" in simulated else None,
+        remeshing=_remeshing(cloth["remeshing"], f"{where}, remeshing")
+        if "remeshing" in simulated
+        else None,
     )
     frame_time = _number(content, "frame_time", math.nan, where)
     frame_steps = _number(content, "frame_steps", math.nan, where)
     if not (frame_time > 0 and frame_steps >= 1 and frame_steps == int(frame_steps)):
-        raise InputError("frame_time or frame_steps are missing or impossible", where=where, fix="give both")
+        raise InputError(
+            "frame_time or frame_steps are missing or impossible", where=where, fix="give both"
+        )
     return ArcsimScene(
         scene=scene,
         frame_time=frame_time,
@@ -215,15 +264,23 @@ def read_scene(path: Path, *, root: Path | None = None, accept: Collection[str] 
 def _frames(content: Mapping[str, Any], frame_time: float, where: str) -> int:
     ends = [key for key in ("end_time", "duration", "end_frame") if key in content]
     if len(ends) != 1:
-        raise InputError(f"its end is given {len(ends)} times", where=where, fix="give end_time, duration or end_frame")
+        raise InputError(
+            f"its end is given {len(ends)} times",
+            where=where,
+            fix="give end_time, duration or end_frame",
+        )
     value = _number(content, ends[0], math.nan, where)
     frames = value if ends[0] == "end_frame" else value / frame_time
     if not (math.isfinite(frames) and frames >= 1):
-        raise InputError(f"{ends[0]} is {value!r}", where=where, fix="let it last at least one frame")
+        raise InputError(
+            f"{ends[0]} is {value!r}", where=where, fix="let it last at least one frame"
+        )
     return math.floor(frames + 1e-9)
 
 
-def _supported_stages(content: Mapping[str, Any], where: str, accept: frozenset[str]) -> tuple[str, ...]:
+def _supported_stages(
+    content: Mapping[str, Any], where: str, accept: frozenset[str]
+) -> tuple[str, ...]:
     """Lists the stages that act and are left out.
 
     Raises:
@@ -238,13 +295,23 @@ def _supported_stages(content: Mapping[str, Any], where: str, accept: frozenset[
     refused = [stage for stage in acting if stage not in (*accept, *simulated)]
     reasons = [
         f"{kind} {', '.join(names)}"
-        for kind, names in (("the keys", keys), ("the contents of", filled), ("the stages", refused))
+        for kind, names in (
+            ("the keys", keys),
+            ("the contents of", filled),
+            ("the stages", refused),
+        )
         if names
     ]
     if reasons:
         fixes = ["remove what is not supported"] if keys or filled else []
-        fixes += ['add the stages to the scene\'s "disable", or accept to leave them out'] if refused else []
-        raise InputError(f"these are not supported: {'; '.join(reasons)}", where=where, fix="; ".join(fixes))
+        fixes += (
+            ['add the stages to the scene\'s "disable", or accept to leave them out']
+            if refused
+            else []
+        )
+        raise InputError(
+            f"these are not supported: {'; '.join(reasons)}", where=where, fix="; ".join(fixes)
+        )
     return left_out
 
 
@@ -252,7 +319,10 @@ def _acting(content: Mapping[str, Any], where: str) -> set[str]:
     """Stages that act in a scene."""
     acting: set[str] = {*STAGES} - set(_list(content, "disable", where))
     entries = [
-        entry for c in _cloths(content, where) for entry in _list(c, "materials", where) if isinstance(entry, Mapping)
+        entry
+        for c in _cloths(content, where)
+        for entry in _list(c, "materials", where)
+        if isinstance(entry, Mapping)
     ]
     for stage, key in (("strainlimiting", "strain_limits"), ("plasticity", "yield_curv")):
         if not any(key in entry for entry in entries):
@@ -303,7 +373,9 @@ def _strange(content: Any, schema: Mapping[str, Any], path: str, where: str) -> 
         InputError: a value where a table or list belongs.
     """
     if not isinstance(content, Mapping):
-        raise InputError(f"{path or 'the file'} is {content!r}", where=where, fix="give an object, {…}")
+        raise InputError(
+            f"{path or 'the file'} is {content!r}", where=where, fix="give an object, {…}"
+        )
     unknown: list[str] = []
     for key, value in content.items():
         name = f"{path}.{key}" if path else str(key)
@@ -335,7 +407,9 @@ def _place_positions(positions: FloatArray, transform: Mapping[str, Any], where:
         if not isinstance(turn, list) or len(turn) != 4 or not any(turn[1:]):
             raise InputError(f"rotate is {turn!r}", where=where, fix="give [degrees, x, y, z]")
         axis = np.array(turn[1:], dtype=np.float64)
-        placed = Rotation.from_rotvec(math.radians(turn[0]) * axis / np.linalg.norm(axis)).apply(placed)
+        placed = Rotation.from_rotvec(math.radians(turn[0]) * axis / np.linalg.norm(axis)).apply(
+            placed
+        )
     return placed + np.array(_vector(transform, "translate", (0.0, 0.0, 0.0), where))
 
 
@@ -345,7 +419,9 @@ def _check_keys(content: Any, keys: Collection[str], where: str) -> None:
     unknown = sorted(set(content) - set(keys))
     if unknown:
         raise InputError(
-            f"these keys are not supported: {', '.join(unknown)}", where=where, fix=f"known: {', '.join(sorted(keys))}"
+            f"these keys are not supported: {', '.join(unknown)}",
+            where=where,
+            fix=f"known: {', '.join(sorted(keys))}",
         )
 
 

@@ -1,8 +1,9 @@
-"""Writing scenes as ArcSim 0.2.1 reads them. What ArcSim's format cannot express is refused by name.
+"""Writing scenes as ArcSim 0.2.1 reads them. What ArcSim's format cannot express is refused by
+name.
 
-All stages that are not simulated here are disabled in what is written, and those that are where the scene does without
-them, so that ArcSim runs what the scene says. The sweeps of strain limits are not written: ArcSim meets its limits by
-an optimisation.
+All stages that are not simulated here are disabled in what is written, and those that are where the
+scene does without them, so that ArcSim runs what the scene says. The sweeps of strain limits are
+not written: ArcSim meets its limits by an optimisation.
 """
 
 from __future__ import annotations
@@ -24,17 +25,19 @@ from sim.cloth.stiffness_tables import Evaluation
 
 
 def write_scene(file: ArcsimScene, folder: Path, *, name: str = "scene") -> Path:
-    """Writes `name`.json with its mesh `name`.obj and its material, by which `sim.arcsim.read_scene` gives it back.
+    """Writes `name`.json with its mesh `name`.obj and its material, by which
+    `sim.arcsim.read_scene` gives it back.
 
-    ArcSim looks for the mesh and the material from where it is run: run it in the folder. Positions have nine
-    significant digits, all else is exact.
+    ArcSim looks for the mesh and the material from where it is run: run it in the folder. Positions
+    have nine significant digits, all else is exact.
 
     Returns:
         The scene file.
 
     Raises:
-        InputError: handles that move or are rigid, a wind force other than the quadratic one, the corrected evaluation
-            of the tables, or strain limits without an upper one, all of them listed.
+        InputError: handles that move or are rigid, a wind force other than the quadratic one, the
+            corrected evaluation of the tables, or strain limits without an upper one, all of them
+            listed.
         ConflictError: one of the files is there already.
     """
     scene = file.scene
@@ -42,12 +45,16 @@ def write_scene(file: ArcsimScene, folder: Path, *, name: str = "scene") -> Path
     content, mesh, material = f"{name}.json", f"{name}.obj", f"{scene.material.name}.json"
     if content == material:
         raise InputError(
-            f"scene and material are both named {name}", where=str(folder), fix="give the scene another name"
+            f"scene and material are both named {name}",
+            where=str(folder),
+            fix="give the scene another name",
         )
     write_files(
         folder,
         {
-            mesh: obj_text(Obj(positions=scene.position, faces=scene.mesh.faces, rest=scene.mesh.rest)),
+            mesh: obj_text(
+                Obj(positions=scene.position, faces=scene.mesh.faces, rest=scene.mesh.rest)
+            ),
             material: _json(_material(scene.material)),
             content: _json(_content(file, air, mesh=mesh, material=material)),
         },
@@ -71,12 +78,16 @@ def _expressible(scene: Scene) -> QuadraticNormal:
         refused.append("strain limits without an upper one")
     if refused or air is None:
         raise InputError(
-            f"ArcSim does not know: {', '.join(refused)}", where="ArcSim scene", fix="write a scene without them"
+            f"ArcSim does not know: {', '.join(refused)}",
+            where="ArcSim scene",
+            fix="write a scene without them",
         )
     return air
 
 
-def _content(file: ArcsimScene, air: QuadraticNormal, *, mesh: str, material: str) -> dict[str, Any]:
+def _content(
+    file: ArcsimScene, air: QuadraticNormal, *, mesh: str, material: str
+) -> dict[str, Any]:
     scene = file.scene
     entry: dict[str, Any] = {"data": material, "damping": scene.material.damping}
     magic: dict[str, Any] = {"handle_stiffness": scene.handles.stiffness}

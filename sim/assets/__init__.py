@@ -1,7 +1,8 @@
 """Pictures that renders are made of, by name: textures of the cloth, and backgrounds.
 
-A name is `kind/member`: `flag/japan`, `stripes/81234` (procedural, drawn from the seed 81234), `photo/beach/3.jpg` (a
-file in the folder the user named). The same name gives the same picture, to the last byte.
+A name is `kind/member`: `flag/japan`, `stripes/81234` (procedural, drawn from the seed 81234),
+`photo/beach/3.jpg` (a file in the folder the user named). The same name gives the same picture, to
+the last byte.
 """
 
 from __future__ import annotations
@@ -66,7 +67,8 @@ class Assets:
     """Where textures and backgrounds come from.
 
     Attributes:
-        photos: a folder of photographs that take the place of procedural backgrounds; None for none.
+        photos: a folder of photographs that take the place of procedural backgrounds; None for
+            none.
 
     Raises:
         InputError: no such folder, or no photographs in it.
@@ -88,7 +90,8 @@ class Assets:
         return TEXTURES[kind].image(member)
 
     def background(self, name: str) -> UInt8Array:
-        """Renders a background by name: (height, width, 3) sRGB, read-only; the last few are not drawn anew.
+        """Renders a background by name: (height, width, 3) sRGB, read-only; the last few are not
+        drawn anew.
 
         Raises:
             UnknownNameError: there is no such background.
@@ -108,7 +111,8 @@ class Assets:
         return _draw(TEXTURES, kinds, rng)
 
     def draw_background(self, kinds: Sequence[str], rng: np.random.Generator) -> str:
-        """Draws the name of a photograph where there is a folder of them, else of a background of one of these kinds.
+        """Draws the name of a photograph where there is a folder of them, else of a background of
+        one of these kinds.
 
         Raises:
             UnknownNameError: a kind that does not exist.
@@ -119,11 +123,15 @@ class Assets:
 
     def _photos(self) -> Photos:
         if self.photos is None:
-            raise InputError("no folder of photographs was named", where=PHOTO, fix="name the folder they are in")
+            raise InputError(
+                "no folder of photographs was named", where=PHOTO, fix="name the folder they are in"
+            )
         return Photos.of(self.photos)
 
 
-@lru_cache(maxsize=8)  # a film's background is that of the next one where a fit looks for what differs in the cloth
+@lru_cache(
+    maxsize=8
+)  # a film's background is that of the next one where a fit looks for what differs in the cloth
 def _drawn_background(kind: str, member: str) -> UInt8Array:
     image = BACKGROUNDS[kind].image(member)
     image.flags.writeable = False
@@ -133,7 +141,9 @@ def _drawn_background(kind: str, member: str) -> UInt8Array:
 def _split(name: str, noun: str, example: str) -> tuple[str, str]:
     kind, slash, member = name.partition("/")
     if not slash or not member:
-        raise InputError(f"{name!r} does not name a {noun}", where=noun, fix=f"write kind/member, as {example!r}")
+        raise InputError(
+            f"{name!r} does not name a {noun}", where=noun, fix=f"write kind/member, as {example!r}"
+        )
     return kind, member
 
 

@@ -1,7 +1,8 @@
-"""Procedural backgrounds: skies, clouds, hills, foliage, buildings; weather, light, colours and focus of their own.
+"""Procedural backgrounds: skies, clouds, hills, foliage, buildings; weather, light, colours and
+focus of their own.
 
-They are no likenesses. They vary in what a picture's statistics have (brightness, colour, contrast, spectral slope,
-edges, horizons), so that the background carries no information about a scene.
+They are no likenesses. They vary in what a picture's statistics have (brightness, colour, contrast,
+spectral slope, edges, horizons), so that the background carries no information about a scene.
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ from sim.assets.seeded import Seeded
 from sim.assets.smooth_fields import Picture, Plane, defocus, fractal, over, ridge, smoothstep
 
 _ROWS, _COLUMNS = 400, 512  # px
-_HEIGHT: Plane = np.linspace(1.0, 0.0, _ROWS)[:, None] * np.ones((1, _COLUMNS))  # 1 at the upper edge
+_HEIGHT: Plane = np.linspace(1.0, 0.0, _ROWS)[:, None] * np.ones(
+    (1, _COLUMNS)
+)  # 1 at the upper edge
 _X: Plane = np.linspace(0.0, _COLUMNS / _ROWS, _COLUMNS)[None, :] * np.ones((_ROWS, 1))
 
 
@@ -34,7 +37,10 @@ _GROUNDS: tuple[Hue, ...] = (
     ((0.48, 0.62), (0.2, 0.6), (0.25, 0.7)),  # water
     ((0.55, 0.65), (0.0, 0.1), (0.8, 1.0)),  # snow
 )
-_WALLS: tuple[Hue, ...] = (((0.0, 0.15), (0.0, 0.45), (0.3, 0.95)), ((0.5, 0.7), (0.0, 0.3), (0.2, 0.9)))
+_WALLS: tuple[Hue, ...] = (
+    ((0.0, 0.15), (0.0, 0.45), (0.3, 0.95)),
+    ((0.5, 0.7), (0.0, 0.3), (0.2, 0.9)),
+)
 
 
 def _weather(rng: np.random.Generator) -> Picture:
@@ -42,15 +48,21 @@ def _weather(rng: np.random.Generator) -> Picture:
     kind = rng.choice(["clear", "clouds", "overcast", "dusk"], p=[0.2, 0.4, 0.25, 0.15])
     above, below = _SKIES[kind]
     zenith, horizon = hue(rng, *above), hue(rng, *below)
-    sky = over(np.broadcast_to(horizon, (_ROWS, _COLUMNS, 3)), zenith, _HEIGHT ** rng.uniform(0.5, 1.6))
+    sky = over(
+        np.broadcast_to(horizon, (_ROWS, _COLUMNS, 3)), zenith, _HEIGHT ** rng.uniform(0.5, 1.6)
+    )
     haze = fractal(rng, _ROWS, _COLUMNS, slope=2.0, stretch=4.0)[:, :, None]
     sky = sky * (1 + rng.uniform(0.005, 0.04) * haze)
     if kind == "clear":
         return sky
     stretch = rng.uniform(1.2, 3.0)
     form = fractal(rng, _ROWS, _COLUMNS, slope=rng.uniform(1.4, 2.0), stretch=stretch)
-    cover, edge = (rng.uniform(-1.3, 0.9), rng.uniform(0.2, 1.5)) if kind != "overcast" else (-3.0, 3.0)
-    lit = rng.uniform(0.75, 1.05) - rng.uniform(0.05, 0.2) * np.roll(form, -int(rng.integers(4, 14)), axis=0)
+    cover, edge = (
+        (rng.uniform(-1.3, 0.9), rng.uniform(0.2, 1.5)) if kind != "overcast" else (-3.0, 3.0)
+    )
+    lit = rng.uniform(0.75, 1.05) - rng.uniform(0.05, 0.2) * np.roll(
+        form, -int(rng.integers(4, 14)), axis=0
+    )
     tint = hue(rng, (0.0, 1.0), (0.0, 0.08), (0.85, 1.0)) if kind != "dusk" else horizon
     cloud = np.clip(lit, 0.25, 1.1)[:, :, None] * tint
     return over(sky, cloud, smoothstep(cover, cover + edge, form) * rng.uniform(0.6, 1.0))
@@ -59,7 +71,9 @@ def _weather(rng: np.random.Generator) -> Picture:
 def _ground(rng: np.random.Generator) -> Picture:
     """Grass, sand, asphalt, water or snow, with features that shrink towards the horizon."""
     colour = hue(rng, *_GROUNDS[int(rng.integers(len(_GROUNDS)))])
-    coarse = fractal(rng, _ROWS, _COLUMNS, slope=rng.uniform(0.9, 1.5), stretch=rng.uniform(2.0, 6.0))
+    coarse = fractal(
+        rng, _ROWS, _COLUMNS, slope=rng.uniform(0.9, 1.5), stretch=rng.uniform(2.0, 6.0)
+    )
     fine = fractal(rng, _ROWS, _COLUMNS, slope=rng.uniform(0.3, 0.8), stretch=rng.uniform(1.0, 4.0))
     light = 1 + rng.uniform(0.05, 0.25) * coarse + rng.uniform(0.03, 0.15) * fine
     return light[:, :, None] * colour
@@ -70,10 +84,13 @@ def _sky(rng: np.random.Generator) -> Picture:
 
 
 def _clouds(rng: np.random.Generator) -> Picture:
-    """Paints broken clouds before a clear sky: bright towards the sun, gray beneath, some with a thin veil above."""
+    """Paints broken clouds before a clear sky: bright towards the sun, gray beneath, some with a
+    thin veil above."""
     above, below = _SKIES["clear"]
     zenith, horizon = hue(rng, *above), hue(rng, *below)
-    sky = over(np.broadcast_to(horizon, (_ROWS, _COLUMNS, 3)), zenith, _HEIGHT ** rng.uniform(0.5, 1.6))
+    sky = over(
+        np.broadcast_to(horizon, (_ROWS, _COLUMNS, 3)), zenith, _HEIGHT ** rng.uniform(0.5, 1.6)
+    )
     veil = fractal(rng, _ROWS, _COLUMNS, slope=1.3, stretch=rng.uniform(2.0, 5.0))
     sky = over(sky, np.ones(3), smoothstep(-1.0, 2.5, veil) * rng.uniform(0.0, 0.4))
     form = fractal(rng, _ROWS, _COLUMNS, slope=rng.uniform(1.3, 1.7), stretch=rng.uniform(1.2, 2.5))
@@ -95,7 +112,9 @@ def _hills(rng: np.random.Generator) -> Picture:
         line = horizon * (1 - 0.75 * (layer / layers)) + rng.uniform(0.01, 0.08) * ridge(
             rng, _COLUMNS, slope=rng.uniform(0.9, 1.8)
         )
-        colour = hue(rng, (0.15, 0.45), (0.15, 0.6), (0.2, 0.5)) * (0.3 + 0.7 * nearness) + haze * 0.7 * (1 - nearness)
+        colour = hue(rng, (0.15, 0.45), (0.15, 0.6), (0.2, 0.5)) * (
+            0.3 + 0.7 * nearness
+        ) + haze * 0.7 * (1 - nearness)
         grain = fractal(rng, _ROWS, _COLUMNS, slope=rng.uniform(0.4, 1.2))
         body = (1 + 0.18 * nearness * grain)[:, :, None] * colour
         picture = over(picture, body, smoothstep(-0.004, 0.004, line - _HEIGHT))
@@ -113,10 +132,14 @@ def _foliage(rng: np.random.Generator) -> Picture:
     return picture
 
 
-def _tree(rng: np.random.Generator, picture: Picture, season: tuple[float, float], floor: float) -> Picture:
+def _tree(
+    rng: np.random.Generator, picture: Picture, season: tuple[float, float], floor: float
+) -> Picture:
     """Paints a crown of leaves on a trunk, lit from above, in front of a picture."""
     x, z, size = rng.uniform(-0.1, 1.4), rng.uniform(floor + 0.15, 0.9), rng.uniform(0.15, 0.45)
-    trunk = (np.abs(_X - x - 0.02 * np.sin(8 * _HEIGHT)) < 0.05 * size + 0.03 * size * (z - _HEIGHT)) & (z > _HEIGHT)
+    trunk = (
+        np.abs(_X - x - 0.02 * np.sin(8 * _HEIGHT)) < 0.05 * size + 0.03 * size * (z - _HEIGHT)
+    ) & (z > _HEIGHT)
     bark = hue(rng, (0.04, 0.12), (0.1, 0.5), (0.1, 0.4))
     picture = over(picture, bark, (trunk & (floor - 0.05 < _HEIGHT)).astype(np.float64))
     rough = fractal(rng, _ROWS, _COLUMNS, slope=rng.uniform(0.8, 1.2))
@@ -137,9 +160,16 @@ def _buildings(rng: np.random.Generator) -> Picture:
     return over(picture, _ground(rng), smoothstep(-0.004, 0.004, street - _HEIGHT))
 
 
-def _house(rng: np.random.Generator, picture: Picture, distance: float, haze: FloatArray) -> Picture:
-    """Paints a façade with rows of windows, some lit, some mirroring the sky, in front of a picture."""
-    left, width, top = rng.uniform(-0.2, 1.2), rng.uniform(0.12, 0.6), rng.uniform(0.25, 1.05) * (1 - 0.4 * distance)
+def _house(
+    rng: np.random.Generator, picture: Picture, distance: float, haze: FloatArray
+) -> Picture:
+    """Paints a façade with rows of windows, some lit, some mirroring the sky, in front of a
+    picture."""
+    left, width, top = (
+        rng.uniform(-0.2, 1.2),
+        rng.uniform(0.12, 0.6),
+        rng.uniform(0.25, 1.05) * (1 - 0.4 * distance),
+    )
     first, last = np.searchsorted(_X[0], [left, left + width])
     highest = int(np.searchsorted(-_HEIGHT[:, 0], -top))
     part = (slice(highest, None), slice(int(first), int(last)))
@@ -152,13 +182,19 @@ def _house(rng: np.random.Generator, picture: Picture, distance: float, haze: Fl
     down, along = (top - height) / storey - row, (x - left) / bay - column
     high, wide = rng.uniform(0.3, 0.8), rng.uniform(0.3, 0.85)
     pane = (np.abs(down - 0.5) < high / 2) & (np.abs(along - 0.5) < wide / 2)
-    states = rng.uniform(0.0, 1.0, (64, 64))[row.astype(np.int64) % 64, column.astype(np.int64) % 64]
+    states = rng.uniform(0.0, 1.0, (64, 64))[
+        row.astype(np.int64) % 64, column.astype(np.int64) % 64
+    ]
     glass = over(
         np.broadcast_to(hue(rng, (0.5, 0.65), (0.05, 0.4), (0.1, 0.5)), (*x.shape, 3)),
         haze,
         0.8 * smoothstep(0.55, 0.95, states),
     )
-    shade = 1 + 0.05 * fractal(rng, *x.shape, slope=rng.uniform(0.5, 1.2)) if min(x.shape) > 1 else np.ones(x.shape)
+    shade = (
+        1 + 0.05 * fractal(rng, *x.shape, slope=rng.uniform(0.5, 1.2))
+        if min(x.shape) > 1
+        else np.ones(x.shape)
+    )
     shade *= 1 - rng.uniform(0.0, 0.25) * (down < 0.08)
     shade *= 1 - rng.uniform(0.0, 0.4) * (x > left + width * 0.97)
     front = over(shade[:, :, None] * wall, glass, pane.astype(np.float64))
@@ -167,8 +203,11 @@ def _house(rng: np.random.Generator, picture: Picture, distance: float, haze: Fl
     return result
 
 
-def _photograph(paint: Callable[[np.random.Generator], Picture]) -> Callable[[np.random.Generator], Picture]:
-    """Wraps a painter so that its picture gets a focus, a tint, a contrast and a side of its own."""
+def _photograph(
+    paint: Callable[[np.random.Generator], Picture],
+) -> Callable[[np.random.Generator], Picture]:
+    """Wraps a painter so that its picture gets a focus, a tint, a contrast and a side of its
+    own."""
 
     def paint_and_expose(rng: np.random.Generator) -> Picture:
         picture = np.clip(paint(rng), 0.0, 1.2)

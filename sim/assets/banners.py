@@ -1,7 +1,8 @@
-"""Prints as on national flags: bands, crosses, discs, cantons, in colours and with a contrast that are drawn.
+"""Prints as on national flags: bands, crosses, discs, cantons, in colours and with a contrast that
+are drawn.
 
-They are no flag's likeness. They vary how much of a flag's motion its look shows: where its edges run and how far its
-parts differ, from one plain colour, white among them, to black on white.
+They are no flag's likeness. They vary how much of a flag's motion its look shows: where its edges
+run and how far its parts differ, from one plain colour, white among them, to black on white.
 """
 
 from __future__ import annotations
@@ -22,13 +23,15 @@ _WIDTH = 1.5
 """Of the sheet, its height 1; a cloth of another shape stretches it."""
 _COLOURS = 4
 _CONTRAST = (-0.15, 1.15)
-"""Drawn within, then cut to 0 and 1: one banner in nine has no contrast at all, and one in nine the full one."""
+"""Drawn within, then cut to 0 and 1: one banner in nine has no contrast at all, and one in nine the
+full one."""
 _WHITE, _DARK = 0.4, 0.15
 """Shares of the dyes that are white or nearly so, and black or nearly so; the others have a hue."""
 _GRAY = np.array([0.299, 0.587, 0.114])
 """Of encoded red, green and blue (ITU-R BT.601): cameras' films are read in gray."""
 _APART = 0.3
-"""Least difference of a part's dye and the field's, of 1 between black and white; a contrast below 1 lessens it."""
+"""Least difference of a part's dye and the field's, of 1 between black and white; a contrast below
+1 lessens it."""
 _PLAIN = 0.15
 """Share of the banners that have no parts; all other layouts are equally likely."""
 
@@ -40,7 +43,8 @@ class Banner:
     Attributes:
         layout: a key of `LAYOUTS`.
         colours: (4, 3) sRGB in [0, 1], encoded: the field's, then those of the parts.
-        contrast: of the parts with the field: 0 where they have its colour, 1 where they have a dye of their own.
+        contrast: of the parts with the field: 0 where they have its colour, 1 where they have a dye
+            of their own.
     """
 
     layout: str
@@ -114,7 +118,8 @@ def _horizontal(sheet: FlagSheet, parts: Sequence[str], rng: np.random.Generator
 
 
 def _bands(rng: np.random.Generator) -> list[tuple[float, float]]:
-    """Draws where two or three bands begin and end, as shares of their sum; half of them are equally wide."""
+    """Draws where two or three bands begin and end, as shares of their sum; half of them are
+    equally wide."""
     count = int(rng.integers(2, 4))
     widths = np.ones(count) if rng.random() < 0.5 else rng.uniform(0.5, 2.0, count)
     edges = np.concatenate([[0.0], np.cumsum(widths) / widths.sum()]).tolist()
@@ -129,7 +134,9 @@ def _nordic(sheet: FlagSheet, parts: Sequence[str], rng: np.random.Generator) ->
     _paint_cross(sheet, parts, rng, x=rng.uniform(0.45, 0.6))
 
 
-def _paint_cross(sheet: FlagSheet, parts: Sequence[str], rng: np.random.Generator, *, x: float) -> None:
+def _paint_cross(
+    sheet: FlagSheet, parts: Sequence[str], rng: np.random.Generator, *, x: float
+) -> None:
     """Paints an upright cross about (x, 1/2), with a border or without."""
     arm, border = rng.uniform(0.1, 0.3), rng.uniform(0.0, 0.08) * (rng.random() < 0.5)
     for width, colour in ((arm + 2 * border, parts[1]), (arm, parts[0])):
@@ -162,7 +169,8 @@ def _canton(sheet: FlagSheet, parts: Sequence[str], rng: np.random.Generator) ->
 
 
 def _paint_stripes(sheet: FlagSheet, parts: Sequence[str], rng: np.random.Generator) -> None:
-    """Paints stripes of two colours, and a canton that ends where a stripe does, some of them with rows of stars."""
+    """Paints stripes of two colours, and a canton that ends where a stripe does, some of them with
+    rows of stars."""
     stripes = int(rng.integers(3, 8)) * 2 - 1
     for index in range(0, stripes, 2):
         sheet.box(0.0, index / stripes, _WIDTH, 1 / stripes, parts[0])
@@ -173,7 +181,9 @@ def _paint_stripes(sheet: FlagSheet, parts: Sequence[str], rng: np.random.Genera
         radius = 0.4 * min(height / rows, width / columns)
         for row in range(rows):
             for column in range(columns):
-                sheet.star((column + 0.5) * width / columns, (row + 0.5) * height / rows, radius, parts[2])
+                sheet.star(
+                    (column + 0.5) * width / columns, (row + 0.5) * height / rows, radius, parts[2]
+                )
 
 
 def _triangle(sheet: FlagSheet, parts: Sequence[str], rng: np.random.Generator) -> None:
@@ -188,7 +198,9 @@ def _emblem(sheet: FlagSheet, parts: Sequence[str], rng: np.random.Generator) ->
     x, y, radius = rng.uniform(0.6, 0.9), rng.uniform(0.42, 0.55), rng.uniform(0.2, 0.34)
     sheet.disc(x, y, radius, parts[0])
     sheet.disc(x, y, rng.uniform(0.7, 0.92) * radius, parts[1])
-    sheet.star(x, y, rng.uniform(0.4, 0.65) * radius, parts[2], points_to=rng.uniform(0.0, math.tau))
+    sheet.star(
+        x, y, rng.uniform(0.4, 0.65) * radius, parts[2], points_to=rng.uniform(0.0, math.tau)
+    )
     marks, length = int(rng.integers(3, 10)), rng.uniform(0.7, 1.1)
     top, tall = y + radius + 0.02, rng.uniform(0.04, 0.09)
     for index in range(marks):
@@ -197,7 +209,8 @@ def _emblem(sheet: FlagSheet, parts: Sequence[str], rng: np.random.Generator) ->
 
 
 def _quarters(sheet: FlagSheet, parts: Sequence[str], rng: np.random.Generator) -> None:
-    """Paints the upper quarter at the fly and the lower one at the hoist, half of them in one colour."""
+    """Paints the upper quarter at the fly and the lower one at the hoist, half of them in one
+    colour."""
     x, y = rng.uniform(0.4, 0.6) * _WIDTH, rng.uniform(0.45, 0.55)
     sheet.box(x, 0.0, _WIDTH - x, y, parts[0])
     sheet.box(0.0, y, x, 1.0 - y, parts[1 if rng.random() < 0.5 else 0])

@@ -1,4 +1,5 @@
-"""Procedural textures of cloth: plain weave, stripes, checks, prints, all with the unevenness of yarns."""
+"""Procedural textures of cloth: plain weave, stripes, checks, prints, all with the unevenness of
+yarns."""
 
 from __future__ import annotations
 
@@ -22,7 +23,9 @@ def _yarn(rng: np.random.Generator) -> FloatArray:
     period = rng.uniform(2.0, 4.0)
     x, y = np.meshgrid(np.arange(_SIZE), np.arange(_SIZE))
     over = np.sin(np.pi * x / period) * np.sin(np.pi * y / period)
-    uneven = fractal(rng, _SIZE, _SIZE, slope=0.6, stretch=6.0) + fractal(rng, _SIZE, _SIZE, slope=0.6, stretch=1 / 6)
+    uneven = fractal(rng, _SIZE, _SIZE, slope=0.6, stretch=6.0) + fractal(
+        rng, _SIZE, _SIZE, slope=0.6, stretch=1 / 6
+    )
     return (1 + 0.06 * np.sign(over) * np.abs(over) ** 0.5 + 0.03 * uneven)[:, :, None]
 
 

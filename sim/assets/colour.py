@@ -16,8 +16,11 @@ Hue: TypeAlias = tuple[Band, Band, Band]
 
 
 def hue(rng: np.random.Generator, turn: Band, saturation: Band, brightness: Band) -> FloatArray:
-    """Draws (3,) encoded values of a colour, uniform in ranges of hue [turn], saturation and brightness."""
-    return np.array(colorsys.hsv_to_rgb(rng.uniform(*turn), rng.uniform(*saturation), rng.uniform(*brightness)))
+    """Draws (3,) encoded values of a colour, uniform in ranges of hue [turn], saturation and
+    brightness."""
+    return np.array(
+        colorsys.hsv_to_rgb(rng.uniform(*turn), rng.uniform(*saturation), rng.uniform(*brightness))
+    )
 
 
 def of_hex(text: str) -> FloatArray:
@@ -34,4 +37,6 @@ def decode_values(code: ArrayLike) -> FloatArray:
 def encode_values(linear: ArrayLike) -> FloatArray:
     """Converts linear values to encoded ones."""
     value = np.asarray(linear, dtype=np.float64)
-    return np.where(value <= 0.0031308, 12.92 * value, 1.055 * np.maximum(value, 0.0) ** (1 / 2.4) - 0.055)
+    return np.where(
+        value <= 0.0031308, 12.92 * value, 1.055 * np.maximum(value, 0.0) ** (1 / 2.4) - 0.055
+    )

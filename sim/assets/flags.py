@@ -2,7 +2,8 @@
 
 Where an act names colours only in words or as dyes, the usual sRGB values are taken.
 
-Flat shapes with smooth edges: a pixel takes a colour in proportion to the share of it that a shape covers.
+Flat shapes with smooth edges: a pixel takes a colour in proportion to the share of it that a shape
+covers.
 """
 
 from __future__ import annotations
@@ -50,7 +51,10 @@ class FlagSheet:
 
     def box(self, x: float, y: float, width: float, height: float, colour: str) -> None:
         px, py = self._grid
-        columns, rows = (px[0] >= x) & (px[0] < x + width), (py[:, 0] >= y) & (py[:, 0] < y + height)
+        columns, rows = (
+            (px[0] >= x) & (px[0] < x + width),
+            (py[:, 0] >= y) & (py[:, 0] < y + height),
+        )
         self.fine[np.ix_(rows, columns)] = self._index(colour)
 
     def disc(self, x: float, y: float, radius: float, colour: str) -> None:
@@ -65,25 +69,31 @@ class FlagSheet:
         """Fills a polygon, by the non-zero winding rule: a pentagram is filled."""
         self.where(self.inside(corners), colour)
 
-    def star(self, x: float, y: float, radius: float, colour: str, *, points_to: float = -math.pi / 2) -> None:
+    def star(
+        self, x: float, y: float, radius: float, colour: str, *, points_to: float = -math.pi / 2
+    ) -> None:
         """Fills a five-pointed star on a circle.
 
         Args:
-            points_to: direction of one point from the middle, from +x towards +y, so clockwise as seen [rad].
+            points_to: direction of one point from the middle, from +x towards +y, so clockwise as
+                seen [rad].
         """
         turns = [points_to + 4 * math.pi / 5 * k for k in range(5)]
         self.polygon([(x + radius * math.cos(t), y + radius * math.sin(t)) for t in turns], colour)
 
     def turned(self, x: float, y: float, direction: float) -> tuple[Float32Array, Float32Array]:
-        """Coordinates of all samples about (x, y): the first in a direction from +x towards +y [rad], the second a
-        quarter turn on, clockwise as seen."""
+        """Coordinates of all samples about (x, y): the first in a direction from +x towards +y
+        [rad], the second a quarter turn on, clockwise as seen."""
         px, py = self._grid
         dx, dy = px - np.float32(x), py - np.float32(y)
         c, s = np.float32(math.cos(direction)), np.float32(math.sin(direction))
-        return np.asarray(dx * c + dy * s, dtype=np.float32), np.asarray(dy * c - dx * s, dtype=np.float32)
+        return np.asarray(dx * c + dy * s, dtype=np.float32), np.asarray(
+            dy * c - dx * s, dtype=np.float32
+        )
 
     def inside(self, corners: Sequence[tuple[float, float]]) -> BoolArray:
-        """Masks samples (sub-rows, sub-columns) that a polygon covers, by the non-zero winding rule."""
+        """Masks samples (sub-rows, sub-columns) that a polygon covers, by the non-zero winding
+        rule."""
         px, py = self._grid
         winding = np.zeros(self.fine.shape, dtype=np.int8)
         for (ax, ay), (bx, by) in zip(corners, [*corners[1:], corners[0]], strict=True):
@@ -194,12 +204,15 @@ def _south_africa(sheet: FlagSheet) -> None:
 
 
 def _arm(half: float, mirrored: bool) -> list[tuple[float, float]]:
-    """Outlines one arm of the pall and its level part: half its width on either side of (0, 0), (0.75, 0.5), (1.5,
-    0.5)."""
+    """Outlines one arm of the pall and its level part: half its width on either side of (0, 0),
+    (0.75, 0.5), (1.5, 0.5)."""
     length = math.hypot(0.75, 0.5)
     along, aside = (0.75 / length, 0.5 / length), (0.5 / length * half, -0.75 / length * half)
     corners = [(1.5, 0.5 - half), (1.5, 0.5 + half)]
-    for sign in (-1, 1):  # the arm's lower edge to its start beyond the corner, then its upper edge back
+    for sign in (
+        -1,
+        1,
+    ):  # the arm's lower edge to its start beyond the corner, then its upper edge back
         x, y = sign * aside[0], sign * aside[1]
         reach = (0.5 - sign * half - y) / along[1]
         meets, starts = (x + reach * along[0], y + reach * along[1]), (x - along[0], y - along[1])
@@ -210,7 +223,9 @@ def _arm(half: float, mirrored: bool) -> list[tuple[float, float]]:
 def _south_korea(sheet: FlagSheet) -> None:
     red, blue, black = "#cd2e3a", "#0047a0", "#000000"
     diagonal = math.atan2(2, 3)
-    to_upper_hoist = sheet.turned(0.75, 0.5, math.pi + diagonal)  # its x axis runs to that corner, y to the right of it
+    to_upper_hoist = sheet.turned(
+        0.75, 0.5, math.pi + diagonal
+    )  # its x axis runs to that corner, y to the right of it
     x, y = to_upper_hoist
     disc = sheet.in_disc(0.75, 0.5, 0.25)
     lower = (y < 0) & ((x - 0.125) ** 2 + y**2 > 0.125**2)
@@ -255,33 +270,47 @@ FLAGS: Mapping[str, NationalFlag] = {
     "chile": NationalFlag(
         country="Chile",
         draw=_chile,
-        source="Decreto Supremo 1534 of 1967: canton a square of half the height, star of half its side",
+        source="Decreto Supremo 1534 of 1967: canton a square of half the height, star of half its "
+        "side",
     ),
-    "china": NationalFlag(country="China", source="GB 12982-2004, annex: stars on a grid of 15 × 10", draw=_china),
+    "china": NationalFlag(
+        country="China", source="GB 12982-2004, annex: stars on a grid of 15 × 10", draw=_china
+    ),
     "czechia": NationalFlag(country="Czechia", source="Act 3/1993 Coll., annex 3", draw=_czechia),
     "france": NationalFlag(
-        country="France", source="Constitution, article 2; colours of the State's graphic charter of 2020", draw=_france
+        country="France",
+        source="Constitution, article 2; colours of the State's graphic charter of 2020",
+        draw=_france,
     ),
     "greece": NationalFlag(
-        country="Greece", source="Law 851/1978, article 1: nine stripes, canton of five", draw=_greece
+        country="Greece",
+        source="Law 851/1978, article 1: nine stripes, canton of five",
+        draw=_greece,
     ),
     "italy": NationalFlag(
-        country="Italy", source="Constitution, article 12; colours of the D.P.C.M. of 14 April 2006", draw=_italy
+        country="Italy",
+        source="Constitution, article 12; colours of the D.P.C.M. of 14 April 2006",
+        draw=_italy,
     ),
     "japan": NationalFlag(
         country="Japan",
-        source="Act on National Flag and Anthem, No. 127 of 1999: disc of three fifths of the height",
+        source="Act on National Flag and Anthem, No. 127 of 1999: disc of three fifths of the "
+        "height",
         draw=_japan,
     ),
-    "netherlands": NationalFlag(country="Netherlands", source="Royal Decree of 19 February 1937", draw=_netherlands),
+    "netherlands": NationalFlag(
+        country="Netherlands", source="Royal Decree of 19 February 1937", draw=_netherlands
+    ),
     "south-africa": NationalFlag(
         country="South Africa",
-        source="Proclamation R. 59 of 20 April 1994: pall of a fifth of the height, borders of a fifteenth",
+        source="Proclamation R. 59 of 20 April 1994: pall of a fifth of the height, borders of a "
+        "fifteenth",
         draw=_south_africa,
     ),
     "south-korea": NationalFlag(
         country="South Korea",
-        source="National Flag Act, enforcement decree, annex: disc of half the height, trigrams on the diagonals",
+        source="National Flag Act, enforcement decree, annex: disc of half the height, trigrams on "
+        "the diagonals",
         draw=_south_korea,
     ),
     "turkey": NationalFlag(

@@ -41,7 +41,8 @@ class Photos:
         return self.members[int(rng.integers(len(self.members)))]
 
     def image(self, member: str) -> UInt8Array:
-        """Reads a photograph (height, width, 3), turned upright as its EXIF data say, at most 1024 px long.
+        """Reads a photograph (height, width, 3), turned upright as its EXIF data say, at most 1024
+        px long.
 
         Raises:
             UnknownNameError: it is not in the folder.
@@ -54,7 +55,9 @@ class Photos:
             with Image.open(path) as opened:
                 upright = ImageOps.exif_transpose(opened).convert("RGB")
         except (UnidentifiedImageError, OSError, Image.DecompressionBombError) as error:
-            raise InputError(f"cannot be read: {error}", where=str(path), fix="mend it or take it out") from error
+            raise InputError(
+                f"cannot be read: {error}", where=str(path), fix="mend it or take it out"
+            ) from error
         upright.thumbnail((_LONGEST, _LONGEST), Image.Resampling.LANCZOS, reducing_gap=None)
         return np.asarray(upright)
 
@@ -62,12 +65,18 @@ class Photos:
 @functools.cache
 def _list_photos(folder: Path) -> Photos:
     if not folder.is_dir():
-        raise InputError("there is no such folder", where=str(folder), fix="name a folder of photographs")
+        raise InputError(
+            "there is no such folder", where=str(folder), fix="name a folder of photographs"
+        )
     members = sorted(
-        path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.suffix.lower() in _SUFFIXES
+        path.relative_to(folder).as_posix()
+        for path in folder.rglob("*")
+        if path.suffix.lower() in _SUFFIXES
     )
     if not members:
         raise InputError(
-            "no photographs are in this folder", where=str(folder), fix=f"put files {', '.join(_SUFFIXES)} there"
+            "no photographs are in this folder",
+            where=str(folder),
+            fix=f"put files {', '.join(_SUFFIXES)} there",
         )
     return Photos(folder=folder, members=tuple(members))

@@ -37,6 +37,10 @@ class Seeded:
         """
         seed = read_bounded(member, most=SEED_LIMIT)
         if seed is None:
-            raise InputError(f"{member!r} is no seed", where=f"{self.kind}/…", fix=f"write {self.kind}/ and a number")
+            raise InputError(
+                f"{member!r} is no seed",
+                where=f"{self.kind}/…",
+                fix=f"write {self.kind}/ and a number",
+            )
         values = self.paint(stream(seed, "assets", self.kind))
         return np.rint(np.clip(values, 0.0, 1.0) * 255).astype(np.uint8)

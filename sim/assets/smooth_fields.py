@@ -13,8 +13,11 @@ Picture = FloatArray
 """(row, column, 3) sRGB in [0, 1], or about."""
 
 
-def fractal(rng: np.random.Generator, rows: int, columns: int, *, slope: float, stretch: float = 1.0) -> Plane:
-    """Draws a Gaussian field whose amplitude spectrum falls as f^−slope, scaled to mean 0 and standard deviation 1.
+def fractal(
+    rng: np.random.Generator, rows: int, columns: int, *, slope: float, stretch: float = 1.0
+) -> Plane:
+    """Draws a Gaussian field whose amplitude spectrum falls as f^−slope, scaled to mean 0 and
+    standard deviation 1.
 
     Photographs have slopes of about 1 (Field 1987, J. Opt. Soc. Am. A 4, 2379); clouds 1.5 to 2.
 
@@ -35,7 +38,8 @@ def fractal(rng: np.random.Generator, rows: int, columns: int, *, slope: float, 
 
 
 def ridge(rng: np.random.Generator, columns: int, *, slope: float) -> FloatArray:
-    """Draws a random line (columns,) with mean 0 and standard deviation 1, as `fractal`, not periodic."""
+    """Draws a random line (columns,) with mean 0 and standard deviation 1, as `fractal`, not
+    periodic."""
     return fractal(rng, 2, 2 * columns, slope=slope)[0, :columns]
 
 

@@ -19,7 +19,9 @@ class SettingUp(AsJson):
         metavar="DIR",
     )
     python: str | None = option(
-        "A Python 3.11 to make it with; by default one that is found.", default=None, metavar="PYTHON"
+        "A Python 3.11 to make it with; by default one that is found.",
+        default=None,
+        metavar="PYTHON",
     )
     check: bool = option("Only say which environment is used, and whether it works.", default=False)
 
@@ -28,12 +30,13 @@ class SettingUp(AsJson):
 def blender_setup(chosen: SettingUp) -> None:
     """Make the environment that the renderers cycles and workbench run in.
 
-    Blender's module needs Python 3.11 and NumPy 1. It gets a virtual environment of its own, so that flagdata's is free
-    of both. About 1 GB is downloaded and kept; pip's own settings apply. The command may be repeated: it completes what
-    it began. A folder that holds anything else is refused, also a virtual environment made for other work.
+    Blender's module needs Python 3.11 and NumPy 1. It gets a virtual environment of its own, so
+    that flagdata's is free of both. About 1 GB is downloaded and kept; pip's own settings apply.
+    The command may be repeated: it completes what it began. A folder that holds anything else is
+    refused, also a virtual environment made for other work.
 
-    The environment in the default folder is found without further settings. For one elsewhere, set the variable
-    FLAGDATA_BLENDER to the path of its Python.
+    The environment in the default folder is found without further settings. For one elsewhere, set
+    the variable FLAGDATA_BLENDER to the path of its Python.
 
     \b
       flagdata blender-setup
@@ -53,11 +56,20 @@ def blender_setup(chosen: SettingUp) -> None:
     if chosen.check:
         installed = environment.check(environment.find())
     else:
-        installed = environment.create(folder or environment.default_folder(), python=python, say=say)
-    content = {"python": str(installed.python), "blender": installed.blender, "numpy": installed.numpy}
+        installed = environment.create(
+            folder or environment.default_folder(), python=python, say=say
+        )
+    content = {
+        "python": str(installed.python),
+        "blender": installed.blender,
+        "numpy": installed.numpy,
+    }
     if chosen.as_json:
         document("blender", {**content, "python_version": installed.python_version})
         return
-    echo(f"Blender {installed.blender}, Python {installed.python_version}, NumPy {installed.numpy}: {installed.python}")
+    echo(
+        f"Blender {installed.blender}, Python {installed.python_version}, NumPy {installed.numpy}: "
+        f"{installed.python}"
+    )
     if folder:
         say(f"set {environment.SETTING}={installed.python.absolute()} to have it used")

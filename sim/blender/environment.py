@@ -1,7 +1,8 @@
 """Blender's own environment: where it is, how it is made, and whether the worker can use it.
 
 Blender's module needs one version of Python and NumPy 1. It is therefore installed apart, in a
-virtual environment that holds nothing else, and flagdata's own environment knows of it only by the path of its Python.
+virtual environment that holds nothing else, and flagdata's own environment knows of it only by the
+path of its Python.
 """
 
 from __future__ import annotations
@@ -53,7 +54,8 @@ _DEBIAN = {
     "libEGL.so.1": "libegl1",
     "libxcb.so.1": "libxcb1",
 }
-"""The Debian package of each shared library that the module is linked to and does not bring along."""
+"""The Debian package of each shared library that the module is linked to and does not bring
+along."""
 
 DEBIAN_PACKAGES = tuple(sorted(set(_DEBIAN.values())))
 
@@ -80,7 +82,8 @@ class Environment:
 
 
 def default_folder() -> Path:
-    """Returns where `flagdata blender-setup` makes the environment: `blender` in flagdata's cache folder."""
+    """Returns where `flagdata blender-setup` makes the environment: `blender` in flagdata's cache
+    folder."""
     return user_cache() / "blender"
 
 
@@ -100,7 +103,8 @@ def find() -> Path:
             raise NotFoundError(
                 f"there is no Python at {chosen}",
                 where=SETTING,
-                fix="set it to the Python of Blender's environment, or unset it and run flagdata blender-setup",
+                fix="set it to the Python of Blender's environment, or unset it and run flagdata "
+                "blender-setup",
             )
         return Path(chosen)
     python = interpreter(default_folder())
@@ -108,7 +112,8 @@ def find() -> Path:
         raise NotFoundError(
             "Blender is not installed",
             where=str(default_folder()),
-            fix=f"make its environment with flagdata blender-setup, name one with {SETTING}, or take the renderer "
+            fix=f"make its environment with flagdata blender-setup, name one with {SETTING}, or "
+            "take the renderer "
             "raster",
         )
     return python
@@ -123,17 +128,24 @@ def check(python: Path) -> Environment:
     """
     try:
         done = subprocess.run(
-            (str(python), "-I", "-c", _PROBE), capture_output=True, text=True, timeout=_CHECK_TIMEOUT, check=False
+            (str(python), "-I", "-c", _PROBE),
+            capture_output=True,
+            text=True,
+            timeout=_CHECK_TIMEOUT,
+            check=False,
         )
     except subprocess.TimeoutExpired:
         raise BlenderError(
             f"Blender could not be imported within {_CHECK_TIMEOUT:g} s",
             where=str(python),
-            fix="try again on a machine that is less busy, or make the environment anew with flagdata blender-setup",
+            fix="try again on a machine that is less busy, or make the environment anew with "
+            "flagdata blender-setup",
         ) from None
     except OSError as error:
         raise BlenderError(
-            f"this Python cannot be run: {error.strerror}", where=str(python), fix="run flagdata blender-setup"
+            f"this Python cannot be run: {error.strerror}",
+            where=str(python),
+            fix="run flagdata blender-setup",
         ) from None
     if done.returncode:
         raise _not_importable(python, done.stderr)
@@ -142,10 +154,14 @@ def check(python: Path) -> Environment:
         raise BlenderError(
             f"this is Blender {versions['blender']}, and the worker is written for {SERIES}",
             where=str(python),
-            fix=f"run flagdata blender-setup, or name an environment with {REQUIREMENT} with {SETTING}",
+            fix=f"run flagdata blender-setup, or name an environment with {REQUIREMENT} with "
+            f"{SETTING}",
         )
     return Environment(
-        python=python, blender=versions["blender"], python_version=versions["python"], numpy=versions["numpy"]
+        python=python,
+        blender=versions["blender"],
+        python_version=versions["python"],
+        numpy=versions["numpy"],
     )
 
 
@@ -156,7 +172,8 @@ def create(folder: Path, *, python: str | None = None, say: Callable[[str], None
 
     Args:
         folder: an empty or absent folder, or one in which this was begun before.
-        python: an interpreter of Python 3.11; by default the running one, or `python3.11` of the search path.
+        python: an interpreter of Python 3.11; by default the running one, or `python3.11` of the
+            search path.
         say: called with a sentence before each step that takes long.
 
     Raises:
@@ -171,7 +188,10 @@ def create(folder: Path, *, python: str | None = None, say: Callable[[str], None
         check_folder(folder)
     base = _python_for_blender(python)
     say(f"making an environment in {folder}")
-    rewrite(folder / _MARK, "the environment of flagdata blender-setup, which completes it when run again\n")
+    rewrite(
+        folder / _MARK,
+        "the environment of flagdata blender-setup, which completes it when run again\n",
+    )
     _run(
         (base, "-m", "venv", str(folder)),
         folder,
@@ -179,9 +199,18 @@ def create(folder: Path, *, python: str | None = None, say: Callable[[str], None
     )
     say(f"installing {REQUIREMENT}, about 1 GB on disk")
     _run(
-        (str(target), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", REQUIREMENT),
+        (
+            str(target),
+            "-m",
+            "pip",
+            "install",
+            "--quiet",
+            "--disable-pip-version-check",
+            REQUIREMENT,
+        ),
         folder,
-        fix="see what pip said above: the index that pip is set to must offer this version for Python "
+        fix="see what pip said above: the index that pip is set to must offer this version for "
+        "Python "
         f"{_dotted_version(PYTHON)}; delete the folder if it is of another Python",
     )
     check.cache_clear()
@@ -189,19 +218,26 @@ def create(folder: Path, *, python: str | None = None, say: Callable[[str], None
 
 
 def _is_own(folder: Path) -> bool:
-    """Returns whether the environment in a folder is Blender's: marked so, or with Blender's module in it."""
+    """Returns whether the environment in a folder is Blender's: marked so, or with Blender's module
+    in it."""
     return (folder / _MARK).is_file() or any(folder.glob("lib/python*/site-packages/bpy"))
 
 
 def _python_for_blender(requested: str | None) -> str:
     """Finds the path of a Python of version `PYTHON`."""
-    for candidate in (requested,) if requested else (sys.executable, f"python{_dotted_version(PYTHON)}", "python3"):
+    for candidate in (
+        (requested,)
+        if requested
+        else (sys.executable, f"python{_dotted_version(PYTHON)}", "python3")
+    ):
         path = shutil.which(candidate)
         if path and _version(path) == PYTHON:
             return path
     raise NotFoundError(
-        f"{requested or 'the running Python'} is not Python {_dotted_version(PYTHON)}, the only version that Blender {SERIES} "
-        "is built for" + ("" if requested else f", and the search path has no python{_dotted_version(PYTHON)}"),
+        f"{requested or 'the running Python'} is not Python {_dotted_version(PYTHON)}, the only "
+        f"version that Blender {SERIES} "
+        "is built for"
+        + ("" if requested else f", and the search path has no python{_dotted_version(PYTHON)}"),
         where="flagdata blender-setup",
         fix=f"install Python {_dotted_version(PYTHON)} and name it with --python",
     )
@@ -226,7 +262,8 @@ def _run(command: Sequence[str], folder: Path, *, fix: str) -> None:
 
 
 def _not_importable(python: Path, output: str) -> BlenderError:
-    """Makes the error for a module that does not import, by the last line of what Python printed."""
+    """Makes the error for a module that does not import, by the last line of what Python
+    printed."""
     reason = output.strip().splitlines()[-1] if output.strip() else "it said nothing"
     library = _MISSING_LIBRARY.search(reason)
     fix = "run flagdata blender-setup, which installs it"

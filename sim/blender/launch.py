@@ -1,7 +1,8 @@
 """Starts the worker with the Python of Blender's environment: `python -I launch.py`.
 
-The worker's source lies beside this file, in an installation that may be of another Python with another NumPy. Only its
-two packages are made importable, by name; its folder on `sys.path` would bring the rest of that installation along.
+The worker's source lies beside this file, in an installation that may be of another Python with
+another NumPy. Only its two packages are made importable, by name; its folder on `sys.path` would
+bring the rest of that installation along.
 """
 
 import sys
@@ -19,7 +20,9 @@ def expose(name: str, root: Path) -> None:
         ImportError: it is not there.
     """
     folder = root / name
-    spec = spec_from_file_location(name, folder / "__init__.py", submodule_search_locations=[str(folder)])
+    spec = spec_from_file_location(
+        name, folder / "__init__.py", submodule_search_locations=[str(folder)]
+    )
     if spec is None or spec.loader is None:
         raise ImportError(f"there is no package {name} in {root}")
     module = module_from_spec(spec)

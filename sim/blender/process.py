@@ -1,7 +1,9 @@
-"""The Blender worker as a process: started when first needed, restarted where it crashes or hangs, ended cleanly.
+"""The Blender worker as a process: started when first needed, restarted where it crashes or hangs,
+ended cleanly.
 
-Blender lives in that process alone: beside torch in one process it hung at exit. The worker knows nothing of lakes,
-recipes or torch; it gets resolved scenes and meshes, and gives pictures back (`sim.blender.protocol`).
+Blender lives in that process alone: beside torch in one process it hung at exit. The worker knows
+nothing of lakes, recipes or torch; it gets resolved scenes and meshes, and gives pictures back
+(`sim.blender.protocol`).
 """
 
 from __future__ import annotations
@@ -30,7 +32,8 @@ _LAUNCH = Path(__file__).with_name("launch.py")
 
 
 def blender_worker() -> tuple[str, ...]:
-    """Returns how the worker is started: by the Python of Blender's environment, isolated from this one's settings.
+    """Returns how the worker is started: by the Python of Blender's environment, isolated from this
+    one's settings.
 
     Raises:
         NotFoundError: Blender is not installed.
@@ -53,7 +56,8 @@ class WorkerProcess:
     """A worker that answers requests one after another; a context manager.
 
     Args:
-        command: how it is started; by default `blender_worker`, looked for when the worker is first needed.
+        command: how it is started; by default `blender_worker`, looked for when the worker is first
+            needed.
         attempts: how often a request is tried, each time by a fresh worker, before it is given up.
 
     Attributes:
@@ -71,7 +75,10 @@ class WorkerProcess:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         self.close()
 
@@ -80,15 +87,19 @@ class WorkerProcess:
         """Process number of the running worker."""
         return None if self._process is None else self._process.pid
 
-    def request(self, messages: Sequence[Message], *, timeout: float, setup: Message | None = None) -> list[Message]:
-        """Answers to some messages, in order. A worker that is lost on the way is replaced and the message redone.
+    def request(
+        self, messages: Sequence[Message], *, timeout: float, setup: Message | None = None
+    ) -> list[Message]:
+        """Answers to some messages, in order. A worker that is lost on the way is replaced and the
+        message redone.
 
         Args:
             timeout: for each answer [s].
             setup: first message to a fresh worker: the scene that later messages change.
 
         Raises:
-            RenderError: the worker refused a message, or was lost as often as `attempts` at the same one.
+            RenderError: the worker refused a message, or was lost as often as `attempts` at the
+                same one.
             NotFoundError, BlenderError: Blender is not installed, or cannot be used.
         """
         answers: list[Message] = []
@@ -109,7 +120,8 @@ class WorkerProcess:
                     raise RenderError(
                         f"the render worker failed {failures} times at the same frame: {lost}",
                         where="render worker",
-                        fix='look at its output above; give a longer timeout, or take renderer = "raster"',
+                        fix="look at its output above; give a longer timeout, or take renderer = "
+                        '"raster"',
                     ) from None
         return answers
 
@@ -154,7 +166,9 @@ class WorkerProcess:
         answer = self._answer(max(0.0, deadline - time.monotonic()), of=timeout)
         if answer.kind == "error":
             raise RenderError(
-                f"Blender refused: {answer.fields['what']}", where="render worker", fix="check the scene's values"
+                f"Blender refused: {answer.fields['what']}",
+                where="render worker",
+                fix="check the scene's values",
             )
         return answer
 
@@ -168,7 +182,9 @@ class WorkerProcess:
                 parts: list[bytes] = []
                 while count:
                     if not ready.select(max(0.0, deadline - time.monotonic())):
-                        raise _LostError(f"it did not answer for {timeout if of is None else of:g} s")
+                        raise _LostError(
+                            f"it did not answer for {timeout if of is None else of:g} s"
+                        )
                     part = os.read(source, min(count, _CHUNK))
                     if not part:
                         raise _LostError(self._last_words())

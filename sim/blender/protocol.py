@@ -1,8 +1,11 @@
-"""Messages between the renderer and the Blender worker: length-prefixed JSON heads with raw arrays behind them.
+"""Messages between the renderer and the Blender worker: length-prefixed JSON heads with raw arrays
+behind them.
 
-    head length (4 B, big-endian) | head, JSON: {"version", "kind", "fields", "arrays": [{name, dtype, shape}]} | arrays
+    head length (4 B, big-endian) | head, JSON: {"version", "kind", "fields", "arrays": [{name,
+    dtype, shape}]} | arrays
 
-The arrays follow one another in C order, little-endian, without padding. Nothing here imports torch or bpy.
+The arrays follow one another in C order, little-endian, without padding. Nothing here imports torch
+or bpy.
 """
 
 from __future__ import annotations
@@ -51,10 +54,14 @@ def encode(message: Message) -> bytes:
             "version": PROTOCOL_VERSION,
             "kind": message.kind,
             "fields": dict(message.fields),
-            "arrays": [{"name": n, "dtype": a.dtype.name, "shape": a.shape} for n, a in arrays.items()],
+            "arrays": [
+                {"name": n, "dtype": a.dtype.name, "shape": a.shape} for n, a in arrays.items()
+            ],
         }
     ).encode()
-    return b"".join([_LENGTH.pack(len(head)), head, *(array.tobytes() for array in arrays.values())])
+    return b"".join(
+        [_LENGTH.pack(len(head)), head, *(array.tobytes() for array in arrays.values())]
+    )
 
 
 def decode(read: Read) -> Message:
@@ -69,7 +76,12 @@ def decode(read: Read) -> Message:
         raise _broken(f"a head of {length} bytes")
     try:
         head = json.loads(read(length))
-        version, kind, fields, described = head["version"], head["kind"], head["fields"], head["arrays"]
+        version, kind, fields, described = (
+            head["version"],
+            head["kind"],
+            head["fields"],
+            head["arrays"],
+        )
     except (ValueError, KeyError, TypeError) as error:
         raise _broken(f"a head that is not one ({error})") from None
     if version != PROTOCOL_VERSION:

@@ -1,8 +1,9 @@
-"""The Blender worker, spoken to over its standard pipes; `launch.py` starts it in Blender's own environment.
+"""The Blender worker, spoken to over its standard pipes; `launch.py` starts it in Blender's own
+environment.
 
-One scene is kept for as long as the process lives; a "scene" message sets its camera, light and textures, a "frame"
-message swaps the meshes in place and is answered by the picture. It needs nothing but Blender, NumPy and the standard
-library.
+One scene is kept for as long as the process lives; a "scene" message sets its camera, light and
+textures, a "frame" message swaps the meshes in place and is answered by the picture. It needs
+nothing but Blender, NumPy and the standard library.
 
 Messages, and their answers:
 
@@ -94,7 +95,10 @@ class Studio:
     def _set_camera(self, camera: Mapping[str, Any], width: int, height: int) -> None:
         lens = self._camera.data
         larger = max(width, height)
-        lens.sensor_fit, lens.sensor_width = ("HORIZONTAL" if width >= height else "VERTICAL"), _SENSOR
+        lens.sensor_fit, lens.sensor_width = (
+            ("HORIZONTAL" if width >= height else "VERTICAL"),
+            _SENSOR,
+        )
         lens.sensor_height = _SENSOR
         lens.lens = camera["focal"] * _SENSOR / larger
         # The shifts are in units of the larger side; the picture's y goes down, the camera's up.
@@ -113,7 +117,9 @@ class Studio:
         sky.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
         sky.inputs["Strength"].default_value = fields["sky"]
 
-    def _set_objects(self, objects: list[Mapping[str, Any]], arrays: Mapping[str, AnyArray]) -> None:
+    def _set_objects(
+        self, objects: list[Mapping[str, Any]], arrays: Mapping[str, AnyArray]
+    ) -> None:
         data = self._bpy.data
         for thing in self._objects.values():
             mesh = thing.data
@@ -166,22 +172,39 @@ class Studio:
         """Renders the meshes of a "frame" message, (height, width, 4)."""
         for name, thing in self._objects.items():
             arrays = message.arrays
-            self._shape(name, thing, arrays[f"positions/{name}"], arrays[f"faces/{name}"], arrays[f"uv/{name}"])
+            self._shape(
+                name,
+                thing,
+                arrays[f"positions/{name}"],
+                arrays[f"faces/{name}"],
+                arrays[f"uv/{name}"],
+            )
         if self._scene.render.engine == "CYCLES":
             self._scene.cycles.seed = message.fields["seed"]
         self._bpy.ops.render.render(write_still=True)
         return self._read()
 
     def _shape(
-        self, name: str, thing: Any, positions: Float32Array, faces: NDArray[np.int32], uv: Float32Array
+        self,
+        name: str,
+        thing: Any,
+        positions: Float32Array,
+        faces: NDArray[np.int32],
+        uv: Float32Array,
     ) -> None:
         mesh = thing.data
-        same = name in self._faces and np.array_equal(self._faces[name], faces) and len(mesh.vertices) == len(positions)
+        same = (
+            name in self._faces
+            and np.array_equal(self._faces[name], faces)
+            and len(mesh.vertices) == len(positions)
+        )
         if not same:
             mesh.clear_geometry()
             mesh.from_pydata(np.zeros((len(positions), 3)).tolist(), [], faces.tolist())
             layer = mesh.uv_layers.new(name="uv")
-            layer.data.foreach_set("uv", np.ascontiguousarray(uv[faces.ravel()], dtype=np.float32).ravel())
+            layer.data.foreach_set(
+                "uv", np.ascontiguousarray(uv[faces.ravel()], dtype=np.float32).ravel()
+            )
             mesh.polygons.foreach_set("use_smooth", np.ones(len(faces), dtype=bool))
             self._faces[name] = faces
         mesh.vertices.foreach_set("co", np.ascontiguousarray(positions, dtype=np.float32).ravel())
@@ -189,7 +212,8 @@ class Studio:
         thing.update_tag()
 
     def _read(self) -> Float32Array:
-        """Reads the picture that was written; Blender gives the pixels of a render only by way of a file."""
+        """Reads the picture that was written; Blender gives the pixels of a render only by way of a
+        file."""
         image = self._bpy.data.images.load(str(self._picture))
         try:
             image.colorspace_settings.name = "Non-Color"

@@ -1,16 +1,17 @@
 """Forces of the air on the cloth, as named models.
 
-`QuadraticNormal` is the reference simulator's (ArcSim 0.2.1): on a face of rest area a with deformed unit normal n,
-with w = wind − face velocity, w_n = w·n and w_t = w − w_n n,
+`QuadraticNormal` is the reference simulator's (ArcSim 0.2.1): on a face of rest area a with
+deformed unit normal n, with w = wind − face velocity, w_n = w·n and w_t = w − w_n n,
 
     ρ a |w_n| w_n n + c a w_t,
 
-a third on each corner. There is no ½ and no drag coefficient: ρ is a parameter, 1 kg/m³ by default, not the air's
-density.
+a third on each corner. There is no ½ and no drag coefficient: ρ is a parameter, 1 kg/m³ by default,
+not the air's density.
 
-`Stokes` is what the paper's text says (Runia et al. 2020, section 4.1; Wejchert and Haumann 1991): a sphere's drag
-6 π R η w on every mass. The text leaves R open; here R = √(A/π) with A the rest area that belongs to the vertex, so
-that the total does not depend on orientation but, as for any such model, on the mesh.
+`Stokes` is what the paper's text says (Runia et al. 2020, section 4.1; Wejchert and Haumann 1991):
+a sphere's drag 6 π R η w on every mass. The text leaves R open; here R = √(A/π) with A the rest
+area that belongs to the vertex, so that the total does not depend on orientation but, as for any
+such model, on the mesh.
 """
 
 from __future__ import annotations
@@ -35,8 +36,8 @@ class AirForce(Protocol):
     """A model of the air's force on the cloth."""
 
     def force(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """Computes forces (vertex, 3, batch) [N] for a wind (3, batch), or (vertex, 3, batch) where it differs in space
-        [m/s]."""
+        """Computes forces (vertex, 3, batch) [N] for a wind (3, batch), or (vertex, 3, batch) where
+        it differs in space [m/s]."""
         ...
 
     @property
@@ -75,7 +76,8 @@ class FaceWind:
 
 
 def face_wind(cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> FaceWind:
-    """Computes the relative wind on the faces, for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
+    """Computes the relative wind on the faces, for a wind (3, batch) or (vertex, 3, batch)
+    [m/s]."""
     if on_mesh.usable(position, velocity, wind):
         normal, relative, across = on_mesh.face_wind(cloth.faces, position, velocity, wind)
         return FaceWind(normal=normal, relative=relative, across=across)
@@ -86,7 +88,9 @@ def face_wind(cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) ->
     at_vertices = wind - velocity
     r0, r1, r2 = cloth.at_corners(at_vertices)
     relative = (r0 + r1 + r2) / 3
-    return FaceWind(normal=normal, relative=relative, across=(relative * normal).sum(1, keepdim=True))
+    return FaceWind(
+        normal=normal, relative=relative, across=(relative * normal).sum(1, keepdim=True)
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,7 +109,9 @@ class QuadraticNormal:
         for name, value in (("density", self.density), ("drag", self.drag)):
             if not (math.isfinite(value) and value >= 0):
                 raise InputError(
-                    f"{name} {value!r} is negative or not finite", where="wind force", fix="give at least 0"
+                    f"{name} {value!r} is negative or not finite",
+                    where="wind force",
+                    fix="give at least 0",
                 )
 
     @property
@@ -119,11 +125,13 @@ class QuadraticNormal:
         return ()
 
     def force(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """Computes forces (vertex, 3, batch) [N] for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
+        """Computes forces (vertex, 3, batch) [N] for a wind (3, batch) or (vertex, 3, batch)
+        [m/s]."""
         relative = face_wind(cloth, position, velocity, wind)
         third = (cloth.areas / 3)[:, None, None]
         push = third * (
-            self.density * relative.across.abs() * relative.across * relative.normal + self.drag * relative.along
+            self.density * relative.across.abs() * relative.across * relative.normal
+            + self.drag * relative.along
         )
         return cloth.shared_out(push)
 
@@ -148,7 +156,9 @@ class Stokes:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.viscosity) and self.viscosity >= 0):
             raise InputError(
-                f"viscosity {self.viscosity!r} is negative or not finite", where="wind force", fix="give at least 0"
+                f"viscosity {self.viscosity!r} is negative or not finite",
+                where="wind force",
+                fix="give at least 0",
             )
 
     @property
@@ -162,7 +172,8 @@ class Stokes:
         return None
 
     def force(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """Computes forces (vertex, 3, batch) [N] for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
+        """Computes forces (vertex, 3, batch) [N] for a wind (3, batch) or (vertex, 3, batch)
+        [m/s]."""
         areas = torch.tensor(cloth.mesh.vertex_areas, dtype=position.dtype, device=position.device)
         coefficient = 6 * math.pi * self.viscosity * (areas / math.pi).sqrt()
         return coefficient[:, None, None] * (wind - velocity)

@@ -21,7 +21,8 @@ class AnchorTracks:
         samples: (n, held, 3, batch) [m], from where the system has the anchors.
 
     Raises:
-        InputError: fewer than two samples, another shape, values that are not finite, a period that is not positive.
+        InputError: fewer than two samples, another shape, values that are not finite, a period that
+            is not positive.
     """
 
     start: float
@@ -30,14 +31,23 @@ class AnchorTracks:
 
     def __post_init__(self) -> None:
         shape = tuple(self.samples.shape)
-        if len(shape) != 4 or shape[0] < 2 or shape[2] != 3 or not torch.isfinite(self.samples).all():
+        if (
+            len(shape) != 4
+            or shape[0] < 2
+            or shape[2] != 3
+            or not torch.isfinite(self.samples).all()
+        ):
             raise InputError(
                 f"the tracks of anchors have the shape {shape}, or are not finite",
                 where="anchors",
                 fix="give two or more samples, (n, held, 3, batch), in metres",
             )
         if not self.period > 0:
-            raise InputError(f"the period is {self.period!r} s", where="anchors", fix="give seconds between samples")
+            raise InputError(
+                f"the period is {self.period!r} s",
+                where="anchors",
+                fix="give seconds between samples",
+            )
 
     def displacement(self, time: float) -> Tensor:
         """Interpolates displacements (held, 3, batch) [m] at a time [s]."""

@@ -1,9 +1,10 @@
 """Out-of-plane forces: hinges with tabulated stiffness in the fold angle.
 
-For the edge i→j with face (i, j, k) on its left and (j, i, l) on its right, the fold angle θ is positive where k and l
-rise along the normals (a valley). The energy is k S θ²/4 with S = l²/(2(a0 + a1)), the force −k S (θ + d dθ/dt)/2 ∇θ, k
-frozen. The gradient is n/h at the opposite corners and −Σ w n/h at the edge's ends, with h the altitudes and w the
-barycentric feet (Bridson, Marino, Fedkiw 2003; Grinspun et al. 2003; as in ArcSim 0.2.1).
+For the edge i→j with face (i, j, k) on its left and (j, i, l) on its right, the fold angle θ is
+positive where k and l rise along the normals (a valley). The energy is k S θ²/4 with S = l²/(2(a0 +
+a1)), the force −k S (θ + d dθ/dt)/2 ∇θ, k frozen. The gradient is n/h at the opposite corners and
+−Σ w n/h at the edge's ends, with h the altitudes and w the barycentric feet (Bridson, Marino,
+Fedkiw 2003; Grinspun et al. 2003; as in ArcSim 0.2.1).
 """
 
 from __future__ import annotations
@@ -17,13 +18,15 @@ from sim.cloth import on_mesh
 from sim.cloth.cloth_batch import Cloth, gather_sum
 from sim.cloth.stiffness_tables import bending_stiffness
 
-# Lengths below this share of the edge are held there, so that a collapsed triangle pushes back with a finite force.
+# Lengths below this share of the edge are held there, so that a collapsed triangle pushes back with
+# a finite force.
 _MIN_ALTITUDE = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fold:
-    """Fold angles θ (hinge, batch) [rad] and their gradients at the corners i, j, k, l: (hinge, 3, batch) [1/m]."""
+    """Fold angles θ (hinge, batch) [rad] and their gradients at the corners i, j, k, l: (hinge, 3,
+    batch) [1/m]."""
 
     angle: Tensor
     gradient: tuple[Tensor, Tensor, Tensor, Tensor]
@@ -62,7 +65,11 @@ def fold(cloth: Cloth, position: Tensor) -> Fold:
 
 def fold_angle(cloth: Cloth, position: Tensor) -> Tensor:
     """Computes fold angles (hinge, batch) [rad] alone."""
-    return on_mesh.fold_angle(cloth.hinges, position) if on_mesh.usable(position) else fold(cloth, position).angle
+    return (
+        on_mesh.fold_angle(cloth.hinges, position)
+        if on_mesh.usable(position)
+        else fold(cloth, position).angle
+    )
 
 
 def stiffness(cloth: Cloth, angle: Tensor) -> Tensor:
@@ -74,13 +81,15 @@ def stiffness(cloth: Cloth, angle: Tensor) -> Tensor:
 
 
 def corner_forces(cloth: Cloth, position: Tensor, velocity: Tensor) -> list[Tensor]:
-    """Computes elastic and damping forces on the four corners of every hinge: (hinge, 3, batch) each [N]."""
+    """Computes elastic and damping forces on the four corners of every hinge: (hinge, 3, batch)
+    each [N]."""
     f = fold(cloth, position)
     return _corners(cloth, f, stiffness(cloth, f.angle), velocity)
 
 
 def _corners(cloth: Cloth, f: Fold, k: Tensor, velocity: Tensor) -> list[Tensor]:
-    """Computes corner forces (hinge, 3, batch) [N] of hinges of stiffness k (hinge, batch) [N·m/rad]."""
+    """Computes corner forces (hinge, 3, batch) [N] of hinges of stiffness k (hinge, batch)
+    [N·m/rad]."""
     rate = torch.zeros_like(f.angle)
     for corner, gradient in enumerate(f.gradient):
         rate = rate + (gradient * velocity[cloth.hinges[:, corner]]).sum(1)
@@ -120,7 +129,8 @@ class LinearisedBending:
         return gather_sum([moment * g for g in self.fold.gradient], self.cloth.hinge_slots)
 
     def corner_products(self, field: Tensor) -> list[Tensor]:
-        """Stiffness times a vertex field (vertex, 3, batch), at the corners: (hinge, 3, batch) each."""
+        """Stiffness times a vertex field (vertex, 3, batch), at the corners: (hinge, 3, batch)
+        each."""
         rate = torch.zeros_like(self.k)
         for corner, gradient in enumerate(self.fold.gradient):
             rate = rate + (gradient * field[self.cloth.hinges[:, corner]]).sum(1)

@@ -1,4 +1,5 @@
-"""A batch of cloths on one mesh as tensors: everything the forces need that does not change during a run."""
+"""A batch of cloths on one mesh as tensors: everything the forces need that does not change during
+a run."""
 
 from __future__ import annotations
 
@@ -31,8 +32,8 @@ _OF_MEMBERS = ("mass", "table_of", "segments", "damping")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cloth:
-    """Constants of a batch, which is the last axis of every tensor that has one. Every member has its own material on
-    the shared mesh.
+    """Constants of a batch, which is the last axis of every tensor that has one. Every member has
+    its own material on the shared mesh.
 
     Attributes:
         mesh: the rest state.
@@ -51,9 +52,11 @@ class Cloth:
         grid: the strains at which samples are taken.
         segments: (3, 5, batch) bending [N·m].
         damping: (batch,) d [s].
-        face_slots: (k, vertex) rows of the stacked corner forces (3·face, …) to sum at each vertex, padded with 3·face.
+        face_slots: (k, vertex) rows of the stacked corner forces (3·face, …) to sum at each vertex,
+            padded with 3·face.
         hinge_slots: the same for (4·hinge, …), padded with 4·hinge.
-        stiffening: (hinge, batch) bending stiffness on top, as a share of the table's; None where there is none.
+        stiffening: (hinge, batch) bending stiffness on top, as a share of the table's; None where
+            there is none.
     """
 
     mesh: Mesh
@@ -92,7 +95,9 @@ class Cloth:
             InputError: no materials.
         """
         if not materials:
-            raise InputError("the batch has no members", where="cloth", fix="give one material for each member")
+            raise InputError(
+                "the batch has no members", where="cloth", fix="give one material for each member"
+            )
 
         def real(values: FloatArray) -> Tensor:
             return torch.tensor(values, dtype=dtype, device=device)
@@ -102,7 +107,9 @@ class Cloth:
 
         tables: dict[bytes, int] = {}
         table_of = [tables.setdefault(m.stretching.tobytes(), len(tables)) for m in materials]
-        samples = [sample_stretching(np.frombuffer(key).reshape(6, 4), evaluation) for key in tables]
+        samples = [
+            sample_stretching(np.frombuffer(key).reshape(6, 4), evaluation) for key in tables
+        ]
         area_weight = np.array([m.area_weight for m in materials])
         lengths, hinge_areas = mesh.hinge_lengths, mesh.hinge_areas
         return cls(
@@ -134,33 +141,53 @@ class Cloth:
             UsageError: batches that differ in more than mass, bending and damping.
         """
         first = parts[0]
-        shared = {f.name for f in fields(cls)} - {"mesh", "evaluation", "grid", "materials", "stiffening", *_OF_MEMBERS}
+        shared = {f.name for f in fields(cls)} - {
+            "mesh",
+            "evaluation",
+            "grid",
+            "materials",
+            "stiffening",
+            *_OF_MEMBERS,
+        }
         for part in parts:
-            if part.mesh is not first.mesh or any(not torch.equal(getattr(part, f), getattr(first, f)) for f in shared):
+            if part.mesh is not first.mesh or any(
+                not torch.equal(getattr(part, f), getattr(first, f)) for f in shared
+            ):
                 raise UsageError(
-                    "the batches differ in mesh or stretching", where="cloth", fix="simulate them one by one"
+                    "the batches differ in mesh or stretching",
+                    where="cloth",
+                    fix="simulate them one by one",
                 )
         stiffening = None
         if any(part.stiffening is not None for part in parts):
             bare = [part.mass.new_zeros(len(part.hinges), part.batch) for part in parts]
             stiffening = torch.cat(
-                [z if p.stiffening is None else p.stiffening for p, z in zip(parts, bare, strict=True)], -1
+                [
+                    z if p.stiffening is None else p.stiffening
+                    for p, z in zip(parts, bare, strict=True)
+                ],
+                -1,
             )
         return replace(
             first,
             materials=tuple(m for part in parts for m in part.materials),
             stiffening=stiffening,
-            **{name: torch.cat([getattr(part, name) for part in parts], dim=-1) for name in _OF_MEMBERS},
+            **{
+                name: torch.cat([getattr(part, name) for part in parts], dim=-1)
+                for name in _OF_MEMBERS
+            },
         )
 
     def at_corners(self, field: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Selects a vertex field (vertex, …) at the three corners of the faces: (face, …) each."""
-        first, second, third = field.index_select(0, self._corner).unflatten(0, (3, len(self.faces)))
+        first, second, third = field.index_select(0, self._corner).unflatten(
+            0, (3, len(self.faces))
+        )
         return first, second, third
 
     def shared_out(self, share: Tensor) -> Tensor:
-        """Sums, at each vertex, the shares (face, 3, batch) that faces give to each of their corners: (vertex, 3,
-        batch)."""
+        """Sums, at each vertex, the shares (face, 3, batch) that faces give to each of their
+        corners: (vertex, 3, batch)."""
         return gather_sum([share], self._around)
 
     @cached_property
@@ -170,7 +197,8 @@ class Cloth:
 
     @cached_property
     def _around(self) -> Tensor:
-        """(k, vertex) faces around each vertex in the order of `face_slots`, padded with their number."""
+        """(k, vertex) faces around each vertex in the order of `face_slots`, padded with their
+        number."""
         count = len(self.faces)
         return torch.where(self.face_slots == 3 * count, count, self.face_slots % count)
 
@@ -194,12 +222,15 @@ def incidence(elements: IntArray, vertex_count: int) -> IntArray:
         elements: (element, corner) vertex indices.
 
     Returns:
-        (k, vertex) indices `corner * len(elements) + element` in ascending order, padded with `elements.size`.
+        (k, vertex) indices `corner * len(elements) + element` in ascending order, padded with
+            `elements.size`.
     """
     vertex = elements.T.ravel()
     order = np.argsort(vertex, kind="stable")
     counts = np.bincount(vertex, minlength=vertex_count)
-    slots = np.full((vertex_count, max(int(counts.max(initial=0)), 1)), elements.size, dtype=np.int64)
+    slots = np.full(
+        (vertex_count, max(int(counts.max(initial=0)), 1)), elements.size, dtype=np.int64
+    )
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
     rank = np.arange(len(vertex)) - np.repeat(starts, counts)
     slots[vertex[order], rank] = order
@@ -207,7 +238,8 @@ def incidence(elements: IntArray, vertex_count: int) -> IntArray:
 
 
 def gather_sum(corners: Sequence[Tensor], slots: Tensor) -> Tensor:
-    """Sums corner contributions at the vertices, in a fixed order: no atomics, so the same bits every time.
+    """Sums corner contributions at the vertices, in a fixed order: no atomics, so the same bits
+    every time.
 
     Args:
         corners: one (element, 3, batch) tensor for each corner.

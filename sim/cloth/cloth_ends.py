@@ -1,12 +1,14 @@
 """Fields of a cloth continued from within to its hoist and its fly.
 
-A vertex at the end of a cloth has faces on one side only. A mean over them is that of half a cell further in; a
-difference of such means along the cloth is then half of what it should be beside the end, however small the cells are.
-What is to be differentiated along the cloth is therefore continued to both ends from the vertices within, by a parabola
-through the three next to the end in its row: means within have errors that vary smoothly along the cloth, and so has
-the parabola, so that a difference keeps an error of the second order.
+A vertex at the end of a cloth has faces on one side only. A mean over them is that of half a cell
+further in; a difference of such means along the cloth is then half of what it should be beside the
+end, however small the cells are. What is to be differentiated along the cloth is therefore
+continued to both ends from the vertices within, by a parabola through the three next to the end in
+its row: means within have errors that vary smoothly along the cloth, and so has the parabola, so
+that a difference keeps an error of the second order.
 
-Where vertices are not in rows, it is by the least weights of the sixteen nearest that are right for all parabolas.
+Where vertices are not in rows, it is by the least weights of the sixteen nearest that are right for
+all parabolas.
 """
 
 from __future__ import annotations
@@ -23,7 +25,8 @@ _SAME = 1e-6
 """Share of the cloth's size within which vertices are at an end, or in one row."""
 _NEAREST = 16
 _LARGEST = 12.0
-"""Sum of the weights' sizes beyond which a vertex is left as it is: those next to it are nearly on a line."""
+"""Sum of the weights' sizes beyond which a vertex is left as it is: those next to it are nearly on
+a line."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -44,7 +47,9 @@ class Ends:
         """Replaces a field's values (vertex, …) at the ends by those continued from within."""
         if not len(self.vertices):
             return field
-        at, within = (torch.as_tensor(index, device=field.device) for index in (self.vertices, self.within))
+        at, within = (
+            torch.as_tensor(index, device=field.device) for index in (self.vertices, self.within)
+        )
         weights = torch.as_tensor(self.weights, dtype=field.dtype, device=field.device)
         return field.index_copy(0, at, torch.einsum("ek,ek...->e...", weights, field[within]))
 
@@ -75,12 +80,16 @@ def ends_of(rest: FloatArray) -> Ends:
     within, weights = np.zeros((len(ends), width), dtype=np.int64), np.zeros((len(ends), width))
     for index, (_, nearest, of_vertex) in enumerate(ends):
         within[index], weights[index, : len(nearest)] = np.resize(nearest, width), of_vertex
-    return Ends(vertices=np.array([vertex for vertex, *_ in ends], dtype=np.int64), within=within, weights=weights)
+    return Ends(
+        vertices=np.array([vertex for vertex, *_ in ends], dtype=np.int64),
+        within=within,
+        weights=weights,
+    )
 
 
 def _exact(terms: FloatArray) -> FloatArray | None:
-    """Computes least weights (k,) of values at offsets that give polynomials of terms (k, term) their value at no
-    offset; None where none do."""
+    """Computes least weights (k,) of values at offsets that give polynomials of terms (k, term)
+    their value at no offset; None where none do."""
     if len(terms) < terms.shape[1]:
         return None
     scaled = terms / np.maximum(np.abs(terms).max(0), np.finfo(float).tiny)

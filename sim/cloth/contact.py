@@ -1,16 +1,18 @@
 """Self-contact: layers of cloth keep a distance, and rub.
 
-A vertex of rest area a closer than h to a face that is no neighbour of it is pushed off along the line to the closest
-point, with the energy of the reference simulator, k a v³/(6 h), v = h − distance (ArcSim 0.2.1; Narain, Samii, O'Brien
-2012): force f = k a (v²/(2 h) + d v v̇/h), never pulling, with the cloth's damping d. The face takes the opposite force
-at the closest point. Friction is Coulomb's, −μ f w/max(|w|, w0) for a sliding velocity w, with sticking below w0
-smoothed, and never more than √(k a m) w/2, which is what an explicit step can follow that follows the repulsion.
+A vertex of rest area a closer than h to a face that is no neighbour of it is pushed off along the
+line to the closest point, with the energy of the reference simulator, k a v³/(6 h), v = h −
+distance (ArcSim 0.2.1; Narain, Samii, O'Brien 2012): force f = k a (v²/(2 h) + d v v̇/h), never
+pulling, with the cloth's damping d. The face takes the opposite force at the closest point.
+Friction is Coulomb's, −μ f w/max(|w|, w0) for a sliding velocity w, with sticking below w0
+smoothed, and never more than √(k a m) w/2, which is what an explicit step can follow that follows
+the repulsion.
 
-A vertex near the seam of two faces is close to both. It touches the closest face, and the closest of those that lie on
-the other side of it (a layer between two others).
+A vertex near the seam of two faces is close to both. It touches the closest face, and the closest
+of those that lie on the other side of it (a layer between two others).
 
-Only vertices against faces are looked at, from both layers; edges crossing edges between vertices are not. Every member
-of a batch has its own contacts.
+Only vertices against faces are looked at, from both layers; edges crossing edges between vertices
+are not. Every member of a batch has its own contacts.
 """
 
 from __future__ import annotations
@@ -30,8 +32,9 @@ from sim.cloth.mesh import Mesh
 
 # Sliding slower than this is sticking [m/s].
 STICKING_SPEED = 0.02
-# Vertices within this many thicknesses of a face's rim, at rest, are of its layer: the sides of a hairpin fold
-# shorter than this do not repel each other, which is left to bending. It also spares looking at them in every step.
+# Vertices within this many thicknesses of a face's rim, at rest, are of its layer: the sides of a
+# hairpin fold shorter than this do not repel each other, which is left to bending. It also spares
+# looking at them in every step.
 _NEIGHBOURHOOD = 6.0
 
 
@@ -56,10 +59,16 @@ class Contact:
         for name, value in (("thickness", self.thickness), ("stiffness", self.stiffness)):
             if not (math.isfinite(value) and value > 0):
                 raise InputError(
-                    f"{name} {value!r} is not positive", where="contact", fix="leave contact out, or give it"
+                    f"{name} {value!r} is not positive",
+                    where="contact",
+                    fix="leave contact out, or give it",
                 )
         if not (math.isfinite(self.friction) and self.friction >= 0):
-            raise InputError(f"friction {self.friction!r} is negative or not finite", where="contact", fix="give ≥ 0")
+            raise InputError(
+                f"friction {self.friction!r} is negative or not finite",
+                where="contact",
+                fix="give ≥ 0",
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,8 +95,11 @@ def neighbours(mesh: Mesh, contact: Contact) -> BoolArray:
     return distance < separation
 
 
-def candidates(cloth: Cloth, contact: Contact, position: Tensor, adjacent: BoolArray) -> ContactPairs:
-    """Finds all pairs closer than the thickness by their bounding spheres, by looking at every pair of every member.
+def candidates(
+    cloth: Cloth, contact: Contact, position: Tensor, adjacent: BoolArray
+) -> ContactPairs:
+    """Finds all pairs closer than the thickness by their bounding spheres, by looking at every pair
+    of every member.
 
     Args:
         position: (vertex, 3, batch) [m].
@@ -126,14 +138,15 @@ class Touch:
     area: Tensor
 
     def relative(self, cloth: Cloth, field: Tensor) -> Tensor:
-        """Subtracts a vertex field (vertex, 3, batch) at the closest point from that at the vertex: (pair, 3)."""
+        """Subtracts a vertex field (vertex, 3, batch) at the closest point from that at the vertex:
+        (pair, 3)."""
         p = self.pairs
         corners = field[cloth.faces[p.face], :, p.member[:, None]]
         return field[p.vertex, :, p.member] - (self.weights[..., None] * corners).sum(1)
 
     def spread(self, cloth: Cloth, push: Tensor, like: Tensor) -> Tensor:
-        """Adds up forces (pair, 3) on the vertices, and their opposites on the faces at the closest points: (vertex, 3,
-        batch)."""
+        """Adds up forces (pair, 3) on the vertices, and their opposites on the faces at the closest
+        points: (vertex, 3, batch)."""
         p = self.pairs
         total = torch.zeros_like(like).movedim(1, 2).contiguous()
         flat = total.view(-1, 3)
@@ -145,8 +158,8 @@ class Touch:
 
 
 def touching(cloth: Cloth, contact: Contact, position: Tensor, pairs: ContactPairs) -> Touch:
-    """Selects the pairs that are closer than the thickness, with their geometry, for positions (vertex, 3, batch)
-    [m]."""
+    """Selects the pairs that are closer than the thickness, with their geometry, for positions
+    (vertex, 3, batch) [m]."""
     point = position[pairs.vertex, :, pairs.member]
     corners = position[cloth.faces[pairs.face], :, pairs.member[:, None]]
     weights = closest(point, corners)
@@ -157,12 +170,18 @@ def touching(cloth: Cloth, contact: Contact, position: Tensor, pairs: ContactPai
     vertex_of = pairs.vertex[close] * cloth.batch + pairs.member[close]
     first = _closest_of_each(vertex_of, distance[close], pairs.face[close])
     # The normal of each vertex's closest face, at all pairs of that vertex.
-    groups = torch.zeros((cloth.mesh.vertex_count * cloth.batch, 3), dtype=normal.dtype, device=normal.device)
+    groups = torch.zeros(
+        (cloth.mesh.vertex_count * cloth.batch, 3), dtype=normal.dtype, device=normal.device
+    )
     groups[vertex_of[first]] = normal[first]
     behind = torch.nonzero((normal * groups[vertex_of]).sum(1) < 0)[:, 0]
-    second = behind[_closest_of_each(vertex_of[behind], distance[close][behind], pairs.face[close][behind])]
+    second = behind[
+        _closest_of_each(vertex_of[behind], distance[close][behind], pairs.face[close][behind])
+    ]
     keep = close[torch.cat([first, second])]
-    selected = ContactPairs(member=pairs.member[keep], vertex=pairs.vertex[keep], face=pairs.face[keep])
+    selected = ContactPairs(
+        member=pairs.member[keep], vertex=pairs.vertex[keep], face=pairs.face[keep]
+    )
     areas = torch.as_tensor(cloth.mesh.vertex_areas, dtype=position.dtype, device=position.device)
     return Touch(
         pairs=selected,
@@ -174,7 +193,8 @@ def touching(cloth: Cloth, contact: Contact, position: Tensor, pairs: ContactPai
 
 
 def _closest_of_each(group: Tensor, distance: Tensor, face: Tensor) -> Tensor:
-    """Indices of the entry with the least distance in each group; the lower face where two are equal."""
+    """Indices of the entry with the least distance in each group; the lower face where two are
+    equal."""
     order = torch.argsort(face, stable=True)
     order = order[torch.argsort(distance[order], stable=True)]
     order = order[torch.argsort(group[order], stable=True)]
@@ -185,8 +205,8 @@ def _closest_of_each(group: Tensor, distance: Tensor, face: Tensor) -> Tensor:
 
 
 def closest(point: Tensor, corners: Tensor) -> Tensor:
-    """Computes barycentric coordinates (pair, 3) of the points of triangles (pair, corner, 3) closest to points (pair,
-    3).
+    """Computes barycentric coordinates (pair, 3) of the points of triangles (pair, corner, 3)
+    closest to points (pair, 3).
 
     The foot on the plane where it is inside, else the closest of the three edges' clamped feet.
     """
@@ -220,7 +240,8 @@ def _square(point: Tensor, corners: Tensor, weights: Tensor) -> Tensor:
 
 @dataclass(frozen=True, kw_only=True)
 class LinearisedContact:
-    """The contacts of one state, ready to be applied to many fields: k a v/h n nᵀ, and friction as a drag."""
+    """The contacts of one state, ready to be applied to many fields: k a v/h n nᵀ, and friction as
+    a drag."""
 
     touch: Touch
     cloth: Cloth
@@ -251,13 +272,16 @@ class LinearisedContact:
         return self.touch.spread(self.cloth, (self.stiffness * along)[:, None] * normal, field)
 
     def drag(self, field: Tensor) -> Tensor:
-        """Multiplies friction's coefficients with a field (vertex, 3, batch) of velocities: what resists it [N]."""
+        """Multiplies friction's coefficients with a field (vertex, 3, batch) of velocities: what
+        resists it [N]."""
         relative, normal = self.touch.relative(self.cloth, field), self.touch.normal
         slide = relative - (relative * normal).sum(1, keepdim=True) * normal
         return self.touch.spread(self.cloth, self.rub[:, None] * slide, field)
 
 
-def force(cloth: Cloth, contact: Contact, position: Tensor, velocity: Tensor, pairs: ContactPairs) -> Tensor:
+def force(
+    cloth: Cloth, contact: Contact, position: Tensor, velocity: Tensor, pairs: ContactPairs
+) -> Tensor:
     """Computes repulsion and friction: (vertex, 3, batch) [N]."""
     touch = touching(cloth, contact, position, pairs)
     relative = touch.relative(cloth, velocity)
@@ -270,7 +294,8 @@ def force(cloth: Cloth, contact: Contact, position: Tensor, velocity: Tensor, pa
     speed = slide.norm(dim=1)
     mass = cloth.mass[touch.pairs.vertex, touch.pairs.member]
     rub = torch.minimum(
-        contact.friction * push / speed.clamp(min=STICKING_SPEED), (contact.stiffness * touch.area * mass).sqrt() / 2
+        contact.friction * push / speed.clamp(min=STICKING_SPEED),
+        (contact.stiffness * touch.area * mass).sqrt() / 2,
     )
     return touch.spread(cloth, push[:, None] * touch.normal - rub[:, None] * slide, position)
 

@@ -23,11 +23,12 @@ class Handles:
         vertices: indices of the held vertices, each once.
         stiffness: spring constant on each axis [N/m]; infinite for rigid.
         times: (n,) of the motion's key frames [s], increasing; one entry for handles at rest.
-        offsets: (n, 3) displacement of all anchors from where the vertices start [m]; linear between key frames,
-            constant outside.
+        offsets: (n, 3) displacement of all anchors from where the vertices start [m]; linear
+            between key frames, constant outside.
 
     Raises:
-        InputError: repeated or negative vertices, a stiffness that is not positive, key frames that do not fit.
+        InputError: repeated or negative vertices, a stiffness that is not positive, key frames that
+            do not fit.
     """
 
     vertices: tuple[int, ...]
@@ -37,10 +38,16 @@ class Handles:
 
     def __post_init__(self) -> None:
         if len(set(self.vertices)) != len(self.vertices) or any(v < 0 for v in self.vertices):
-            raise InputError("a vertex is held twice or negative", where="handles", fix="list each vertex index once")
+            raise InputError(
+                "a vertex is held twice or negative",
+                where="handles",
+                fix="list each vertex index once",
+            )
         if math.isnan(self.stiffness) or self.stiffness <= 0:
             raise InputError(
-                f"stiffness {self.stiffness!r} is not positive", where="handles", fix="give N/m, or infinity for rigid"
+                f"stiffness {self.stiffness!r} is not positive",
+                where="handles",
+                fix="give N/m, or infinity for rigid",
             )
         shape = np.shape(self.offsets)
         if shape != (len(self.times), 3) or not self.times or not np.isfinite(self.offsets).all():
@@ -50,7 +57,9 @@ class Handles:
                 fix="give one finite (x, y, z) offset for each key time",
             )
         if any(b <= a for a, b in zip(self.times, self.times[1:], strict=False)):
-            raise InputError("key times do not increase", where="handles", fix="sort them, each once")
+            raise InputError(
+                "key times do not increase", where="handles", fix="sort them, each once"
+            )
 
     @property
     def rigid(self) -> bool:
@@ -65,7 +74,8 @@ class Handles:
 
 
 def corners(rest: FloatArray) -> tuple[int, int]:
-    """Finds the two hoist corners of a flag: the lowest and the highest vertex of those with the smallest u.
+    """Finds the two hoist corners of a flag: the lowest and the highest vertex of those with the
+    smallest u.
 
     Args:
         rest: (vertex, 2) material coordinates [m].
@@ -82,7 +92,8 @@ def full_hoist(rest: FloatArray) -> tuple[int, ...]:
 
 
 def top_corners(rest: FloatArray) -> tuple[int, int]:
-    """Finds the two upper corners of a hanging cloth: smallest and largest u of those with the largest v."""
+    """Finds the two upper corners of a hanging cloth: smallest and largest u of those with the
+    largest v."""
     height = float(np.ptp(rest[:, 1]))
     edge: Sequence[int] = np.flatnonzero(rest[:, 1] >= rest[:, 1].max() - 1e-9 * height).tolist()
     ordered = sorted(edge, key=lambda v: float(rest[v, 0]))

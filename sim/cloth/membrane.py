@@ -4,9 +4,10 @@ On a face of rest area a, with F = [x_u x_v] (3×2) and G = (FᵀF − I)/2, the
 
     −a [k0 G00 ∇G00 + k2 G11 ∇G11 + k1 (G00 ∇G11 + G11 ∇G00) + 2 k3 G01 ∇G01]
 
-with k looked up at G and frozen (no ∂k/∂G), as ArcSim 0.2.1 does. Damping is Kelvin–Voigt: G + d dG/dt in place of G
-outside the look-up; it vanishes for rigid motion. For constant k the elastic part derives from
-a/2 (k0 G00² + 2 k1 G00 G11 + k2 G11² + 2 k3 G01²), which is what `energy` returns.
+with k looked up at G and frozen (no ∂k/∂G), as ArcSim 0.2.1 does. Damping is Kelvin–Voigt: G + d
+dG/dt in place of G outside the look-up; it vanishes for rigid motion. For constant k the elastic
+part derives from a/2 (k0 G00² + 2 k1 G00 G11 + k2 G11² + 2 k3 G01²), which is what `energy`
+returns.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ class Strain:
 
 
 def _derivatives(cloth: Cloth, field: Tensor) -> tuple[Tensor, Tensor]:
-    """Computes ∂/∂u and ∂/∂v of a vertex field (vertex, 3, batch) on the faces: (face, 3, batch) each."""
+    """Computes ∂/∂u and ∂/∂v of a vertex field (vertex, 3, batch) on the faces: (face, 3, batch)
+    each."""
     corners = cloth.at_corners(field)
     d = cloth.gradients[..., None, None]
     u = d[:, 0, 0] * corners[0] + d[:, 0, 1] * corners[1] + d[:, 0, 2] * corners[2]
@@ -57,7 +59,8 @@ def stiffness(cloth: Cloth, e: Strain) -> tuple[Tensor, Tensor, Tensor, Tensor]:
 
 
 def corner_forces(cloth: Cloth, position: Tensor, velocity: Tensor) -> list[Tensor]:
-    """Computes elastic and damping forces on the three corners of every face: (face, 3, batch) each [N]."""
+    """Computes elastic and damping forces on the three corners of every face: (face, 3, batch) each
+    [N]."""
     e = strain(cloth, position)
     k0, k1, k2, k3 = stiffness(cloth, e)
     vu, vv = _derivatives(cloth, velocity)
@@ -69,7 +72,8 @@ def corner_forces(cloth: Cloth, position: Tensor, velocity: Tensor) -> list[Tens
 
 
 def _corners(cloth: Cloth, e: Strain, t00: Tensor, t11: Tensor, t01: Tensor) -> list[Tensor]:
-    """Computes corner forces of a stress (face, batch) [N/m]: −a (t00 ∇G00 + t11 ∇G11 + 2 t01 ∇G01)."""
+    """Computes corner forces of a stress (face, batch) [N/m]: −a (t00 ∇G00 + t11 ∇G11 + 2 t01
+    ∇G01)."""
     a = cloth.areas[:, None]
     t00, t11, t01 = ((a * t).unsqueeze(1) for t in (t00, t11, t01))
     pu = t00 * e.xu + t01 * e.xv
@@ -95,8 +99,9 @@ def energy(cloth: Cloth, position: Tensor) -> Tensor:
 class LinearisedMembrane:
     """The stiffness of the faces at one state, ready to be applied to many fields.
 
-    The geometric part of the Hessian is kept where it is positive (tension); where it is not, and for the shear term,
-    it is left out, so that the operator is positive semi-definite (as ArcSim's).
+    The geometric part of the Hessian is kept where it is positive (tension); where it is not, and
+    for the shear term, it is left out, so that the operator is positive semi-definite (as
+    ArcSim's).
     """
 
     cloth: Cloth
@@ -118,11 +123,14 @@ class LinearisedMembrane:
         """Computes the elastic force at this state: (vertex, 3, batch) [N]."""
         k0, k1, k2, k3 = self.k
         e = self.e
-        corners = _corners(self.cloth, e, k0 * e.g00 + k1 * e.g11, k2 * e.g11 + k1 * e.g00, k3 * e.g01)
+        corners = _corners(
+            self.cloth, e, k0 * e.g00 + k1 * e.g11, k2 * e.g11 + k1 * e.g00, k3 * e.g01
+        )
         return gather_sum(corners, self.cloth.face_slots)
 
     def corner_products(self, field: Tensor) -> list[Tensor]:
-        """Stiffness times a vertex field (vertex, 3, batch), at the corners: (face, 3, batch) each."""
+        """Stiffness times a vertex field (vertex, 3, batch), at the corners: (face, 3, batch)
+        each."""
         k0, k1, k2, k3 = self.k
         e = self.e
         pu, pv = _derivatives(self.cloth, field)
@@ -135,7 +143,8 @@ class LinearisedMembrane:
         return [-c + g[:, 0, i] * tu + g[:, 1, i] * tv for i, c in enumerate(corners)]
 
     def diagonal(self) -> list[Tensor]:
-        """Computes the 3×3 diagonal blocks' diagonals at the corners: (face, 3, batch) each [N/m]."""
+        """Computes the 3×3 diagonal blocks' diagonals at the corners: (face, 3, batch) each
+        [N/m]."""
         k0, k1, k2, k3 = self.k
         e, a = self.e, self.cloth.areas[:, None, None]
         g = self.cloth.gradients[..., None, None]
@@ -145,5 +154,7 @@ class LinearisedMembrane:
             fuu, fvv = g[:, 0, c] * e.xu, g[:, 1, c] * e.xv
             fuv = (g[:, 0, c] * e.xv + g[:, 1, c] * e.xu) / 2
             elastic = a * (k0 * fuu**2 + k2 * fvv**2 + 2 * k1 * fuu * fvv + 2 * k3 * fuv**2)
-            blocks.append(elastic + g[:, 0, c] ** 2 * self.tension_u + g[:, 1, c] ** 2 * self.tension_v)
+            blocks.append(
+                elastic + g[:, 0, c] ** 2 * self.tension_u + g[:, 1, c] ** 2 * self.tension_v
+            )
         return blocks

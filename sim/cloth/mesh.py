@@ -12,8 +12,8 @@ from flagdata.core.arrays import FloatArray, IntArray
 from flagdata.errors import InputError
 from sim.cloth.cloth_ends import Ends, ends_of
 
-# Twice the area over the squared longest edge; an equilateral triangle has 0.87. Below this it is a sliver on which
-# shape derivatives lose half the digits of float32.
+# Twice the area over the squared longest edge; an equilateral triangle has 0.87. Below this it is a
+# sliver on which shape derivatives lose half the digits of float32.
 _MIN_ASPECT = 1e-3
 
 
@@ -26,8 +26,8 @@ class Mesh:
         faces: (face, 3) vertex indices, counter-clockwise in (u, v).
 
     Raises:
-        InputError: wrong shapes, indices out of range, inverted or degenerate triangles, edges with more than two faces
-            or faces of opposed orientation, vertices that no face uses.
+        InputError: wrong shapes, indices out of range, inverted or degenerate triangles, edges with
+            more than two faces or faces of opposed orientation, vertices that no face uses.
     """
 
     rest: FloatArray
@@ -38,10 +38,16 @@ class Mesh:
         faces = np.array(self.faces, dtype=np.int64)
         if rest.ndim != 2 or rest.shape[1:] != (2,):
             raise InputError(
-                f"rest coordinates have shape {rest.shape}", where="mesh", fix="give (vertex, 2) in metres"
+                f"rest coordinates have shape {rest.shape}",
+                where="mesh",
+                fix="give (vertex, 2) in metres",
             )
         if faces.ndim != 2 or faces.shape[1:] != (3,) or not len(faces):
-            raise InputError(f"faces have shape {faces.shape}", where="mesh", fix="give (face, 3), at least one face")
+            raise InputError(
+                f"faces have shape {faces.shape}",
+                where="mesh",
+                fix="give (face, 3), at least one face",
+            )
         for array in (rest, faces):
             array.setflags(write=False)
         object.__setattr__(self, "rest", rest)
@@ -51,11 +57,19 @@ class Mesh:
     def _check(self) -> None:
         if not np.isfinite(self.rest).all():
             vertex = int(np.flatnonzero(~np.isfinite(self.rest).all(axis=1))[0])
-            raise InputError("a rest coordinate is not finite", where=f"vertex {vertex}", fix="give finite metres")
-        if self.faces.min() < 0 or self.faces.max() >= len(self.rest):
-            face = int(np.flatnonzero(((self.faces < 0) | (self.faces >= len(self.rest))).any(axis=1))[0])
             raise InputError(
-                f"a vertex index is outside 0…{len(self.rest) - 1}", where=f"face {face}", fix="correct the face list"
+                "a rest coordinate is not finite",
+                where=f"vertex {vertex}",
+                fix="give finite metres",
+            )
+        if self.faces.min() < 0 or self.faces.max() >= len(self.rest):
+            face = int(
+                np.flatnonzero(((self.faces < 0) | (self.faces >= len(self.rest))).any(axis=1))[0]
+            )
+            raise InputError(
+                f"a vertex index is outside 0…{len(self.rest) - 1}",
+                where=f"face {face}",
+                fix="correct the face list",
             )
         doubled = self._doubled_areas
         corners = self.rest[self.faces]
@@ -81,14 +95,19 @@ class Mesh:
         if not used.all():
             vertex = int(np.flatnonzero(~used)[0])
             raise InputError(
-                f"{int((~used).sum())} vertices belong to no face", where=f"vertex {vertex}", fix="drop them"
+                f"{int((~used).sum())} vertices belong to no face",
+                where=f"vertex {vertex}",
+                fix="drop them",
             )
-        directed = np.concatenate([self.faces[:, [0, 1]], self.faces[:, [1, 2]], self.faces[:, [2, 0]]])
+        directed = np.concatenate(
+            [self.faces[:, [0, 1]], self.faces[:, [1, 2]], self.faces[:, [2, 0]]]
+        )
         unique, counts = np.unique(directed, axis=0, return_counts=True)
         if (counts > 1).any():
             edge = unique[counts > 1][0]
             raise InputError(
-                "an edge is used twice in one direction: three faces on it, or two of opposed orientation",
+                "an edge is used twice in one direction: three faces on it, or two of opposed "
+                "orientation",
                 where=f"edge {int(edge[0])}–{int(edge[1])}",
                 fix="make the surface manifold and consistently oriented",
             )
@@ -109,14 +128,16 @@ class Mesh:
 
     @cached_property
     def vertex_areas(self) -> FloatArray:
-        """(vertex,) a third of the rest areas around each vertex [m²]; times the density, the lumped mass."""
+        """(vertex,) a third of the rest areas around each vertex [m²]; times the density, the
+        lumped mass."""
         return np.bincount(
             self.faces.ravel(), weights=np.repeat(self.areas / 3, 3), minlength=self.vertex_count
         ).astype(np.float64)
 
     @cached_property
     def gradients(self) -> FloatArray:
-        """(face, 2, 3) derivatives of a linear field: ∂f/∂(u, v) = gradients @ (its three corner values) [1/m]."""
+        """(face, 2, 3) derivatives of a linear field: ∂f/∂(u, v) = gradients @ (its three corner
+        values) [1/m]."""
         a, b, c = (self.rest[self.faces[:, i]] for i in range(3))
         edges = np.stack([b - a, c - a], axis=2)
         inverse = np.linalg.inv(edges)
@@ -131,7 +152,8 @@ class Mesh:
 
     @cached_property
     def hinges(self) -> IntArray:
-        """(hinge, 4) inner edges as [i, j, k, l]: the edge runs i→j in face (i, j, k) and j→i in face (j, i, l)."""
+        """(hinge, 4) inner edges as [i, j, k, l]: the edge runs i→j in face (i, j, k) and j→i in
+        face (j, i, l)."""
         start = self.faces.ravel()
         end = np.roll(self.faces, -1, axis=1).ravel()
         opposite = np.roll(self.faces, -2, axis=1).ravel()
@@ -189,26 +211,41 @@ class Diagonals(StrEnum):
     """How the cells of a grid are cut in two."""
 
     ALTERNATE = "alternate"
-    """Cells with i + j even from their first corner, the others the other way: no direction is preferred."""
+    """Cells with i + j even from their first corner, the others the other way: no direction is
+    preferred."""
     FORWARD = "forward"
     """All from their first corner."""
 
 
-def grid(*, width: float, height: float, columns: int, rows: int, diagonals: Diagonals = Diagonals.ALTERNATE) -> Mesh:
+def grid(
+    *,
+    width: float,
+    height: float,
+    columns: int,
+    rows: int,
+    diagonals: Diagonals = Diagonals.ALTERNATE,
+) -> Mesh:
     """Makes a rectangle of `columns × rows` cells, each two triangles.
 
-    Vertex `i * (rows + 1) + j` is at u = width·i/columns, v = height·j/rows: the hoist (u = 0) comes first.
+    Vertex `i * (rows + 1) + j` is at u = width·i/columns, v = height·j/rows: the hoist (u = 0)
+    comes first.
 
     Raises:
         InputError: a size that is not positive, or no cells.
     """
     if not (width > 0 and height > 0):
-        raise InputError(f"the grid measures {width} m × {height} m", where="mesh", fix="give positive sizes")
+        raise InputError(
+            f"the grid measures {width} m × {height} m", where="mesh", fix="give positive sizes"
+        )
     if columns < 1 or rows < 1:
-        raise InputError(f"the grid has {columns} × {rows} cells", where="mesh", fix="give at least one of each")
+        raise InputError(
+            f"the grid has {columns} × {rows} cells", where="mesh", fix="give at least one of each"
+        )
     i, j = np.meshgrid(np.arange(columns + 1), np.arange(rows + 1), indexing="ij")
     rest = np.stack([width * i.ravel() / columns, height * j.ravel() / rows], axis=1)
-    ci, cj = (index.ravel() for index in np.meshgrid(np.arange(columns), np.arange(rows), indexing="ij"))
+    ci, cj = (
+        index.ravel() for index in np.meshgrid(np.arange(columns), np.arange(rows), indexing="ij")
+    )
     a = ci * (rows + 1) + cj
     b, c, d = a + rows + 1, a + rows + 2, a + 1
     first = ((ci + cj) % 2 == 0)[:, None, None] | (diagonals is Diagonals.FORWARD)

@@ -1,4 +1,5 @@
-"""Scenes: typed descriptions of one piece of cloth in the wind, and what they say about the batch they form."""
+"""Scenes: typed descriptions of one piece of cloth in the wind, and what they say about the batch
+they form."""
 
 from __future__ import annotations
 
@@ -46,8 +47,8 @@ class Scene:
         remeshing: how finely the cloth is divided after each frame; None keeps the mesh.
 
     Raises:
-        InputError: a shape that does not fit, a value that is not finite, a held vertex that is not there, or a
-            connected piece of cloth that nothing holds.
+        InputError: a shape that does not fit, a value that is not finite, a held vertex that is not
+            there, or a connected piece of cloth that nothing holds.
     """
 
     mesh: Mesh
@@ -71,12 +72,18 @@ class Scene:
                 fix=f"give ({self.mesh.vertex_count}, 3) in metres",
             )
         if not np.isfinite(position).all():
-            raise InputError("a start position is not finite", where="scene", fix="give finite metres")
+            raise InputError(
+                "a start position is not finite", where="scene", fix="give finite metres"
+            )
         position.setflags(write=False)
         object.__setattr__(self, "position", position)
         for name, vector in (("wind", self.wind), ("gravity", self.gravity)):
             if len(vector) != 3 or not all(math.isfinite(value) for value in vector):
-                raise InputError(f"{name} {vector!r} is not three finite numbers", where="scene", fix="give (x, y, z)")
+                raise InputError(
+                    f"{name} {vector!r} is not three finite numbers",
+                    where="scene",
+                    fix="give (x, y, z)",
+                )
         outside = [v for v in self.handles.vertices if v >= self.mesh.vertex_count]
         if outside:
             raise InputError(
@@ -96,7 +103,8 @@ class Scene:
 
 
 def upright(mesh: Mesh) -> FloatArray:
-    """Places the mesh in the y–z plane, u along y and v along z: across a wind in +x, as the reference scenes start.
+    """Places the mesh in the y–z plane, u along y and v along z: across a wind in +x, as the
+    reference scenes start.
 
     Returns:
         (vertex, 3) [m].
@@ -105,8 +113,11 @@ def upright(mesh: Mesh) -> FloatArray:
     return np.stack([zero, mesh.rest[:, 0], mesh.rest[:, 1]], axis=1)
 
 
-def roughen_start(flat: FloatArray, handles: Handles, rng: np.random.Generator, sigma: float) -> FloatArray:
-    """Returns a start (vertex, 3) [m]: a flat one, with normal noise of deviation `sigma` [m] on what nothing holds."""
+def roughen_start(
+    flat: FloatArray, handles: Handles, rng: np.random.Generator, sigma: float
+) -> FloatArray:
+    """Returns a start (vertex, 3) [m]: a flat one, with normal noise of deviation `sigma` [m] on
+    what nothing holds."""
     noise = rng.normal(0.0, sigma, flat.shape)
     noise[list(handles.vertices)] = 0.0
     return flat + noise
@@ -121,12 +132,15 @@ def flag(
     columns: int = 30,
     evaluation: Evaluation = Evaluation.ARCSIM,
 ) -> Scene:
-    """Makes a flag held at its two hoist corners, in a wind along +x [m/s]; rows follow from the aspect ratio.
+    """Makes a flag held at its two hoist corners, in a wind along +x [m/s]; rows follow from the
+    aspect ratio.
 
     Raises:
         InputError: see `Scene` and `sim.cloth.mesh.grid`.
     """
-    mesh = grid(width=width, height=height, columns=columns, rows=max(1, round(columns * height / width)))
+    mesh = grid(
+        width=width, height=height, columns=columns, rows=max(1, round(columns * height / width))
+    )
     return Scene(
         mesh=mesh,
         position=upright(mesh),
@@ -162,21 +176,25 @@ def hanging_cloth(
 
 
 def assemble(
-    scenes: Sequence[Scene], *, dtype: torch.dtype = torch.float32, device: torch.device | str = "cpu"
+    scenes: Sequence[Scene],
+    *,
+    dtype: torch.dtype = torch.float32,
+    device: torch.device | str = "cpu",
 ) -> tuple[System, State]:
-    """Assembles the batch of these scenes, and their start at rest. Members differ in start, material, wind and
-    gravity.
+    """Assembles the batch of these scenes, and their start at rest. Members differ in start,
+    material, wind and gravity.
 
     Raises:
-        UsageError: no scenes, or scenes with different meshes, handles, wind forces, evaluations, contacts, limits or
-            remeshing.
+        UsageError: no scenes, or scenes with different meshes, handles, wind forces, evaluations,
+            contacts, limits or remeshing.
     """
     if not scenes:
         raise UsageError("there are no scenes to simulate", fix="give at least one")
     first = scenes[0]
     for index, scene in enumerate(scenes):
         same = scene.mesh is first.mesh or (
-            np.array_equal(scene.mesh.rest, first.mesh.rest) and np.array_equal(scene.mesh.faces, first.mesh.faces)
+            np.array_equal(scene.mesh.rest, first.mesh.rest)
+            and np.array_equal(scene.mesh.faces, first.mesh.faces)
         )
         shared = ("handles", "air", "evaluation", "contact", "limits", "remeshing")
         if not same or any(getattr(scene, name) != getattr(first, name) for name in shared):
@@ -190,7 +208,11 @@ def assemble(
         return torch.tensor(values, dtype=dtype, device=device)
 
     cloth = Cloth.build(
-        first.mesh, [s.material for s in scenes], evaluation=first.evaluation, dtype=dtype, device=device
+        first.mesh,
+        [s.material for s in scenes],
+        evaluation=first.evaluation,
+        dtype=dtype,
+        device=device,
     )
     position = real(np.stack([s.position for s in scenes], axis=-1))
     vertices = list(first.handles.vertices)

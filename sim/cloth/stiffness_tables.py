@@ -1,23 +1,28 @@
-"""Evaluation of the measured stretching and bending tables, as the reference simulator does it and corrected.
+"""Evaluation of the measured stretching and bending tables, as the reference simulator does it and
+corrected.
 
-Stretching. The tables give four stiffnesses at zero strain and, for five directions of the larger principal strain, at
-full strain. They are sampled once on a regular grid over the Green strain (G00, G11, |G01|) and looked up trilinearly.
+Stretching. The tables give four stiffnesses at zero strain and, for five directions of the larger
+principal strain, at full strain. They are sampled once on a regular grid over the Green strain
+(G00, G11, |G01|) and looked up trilinearly.
 
-- `ARCSIM` (ArcSim 0.2.1): a 30³ grid from (−0.25, −0.25, 0) with spacing 1/30; strain weight clamp(6(√λ1 − 1), 0, 1),
-  λ1 the larger eigenvalue of C = 2G + I; angle weight from its eigenvector; negative values set to 0, then doubled.
-  Zero strain is not a node of this grid, so that even an unstrained cloth gets a mixture of its neighbours: results
-  of the reference depend on that, hence it is kept.
-- `CORRECTED`: nodes at zero strain, half the spacing, and over the range cloth reaches (−0.15 to 0.35); the coupling k1
-  keeps its sign, limited to |k1| ≤ 0.95 √(k0 k2) so that the energy stays positive; only k3 < 0 is set to 0.
+- `ARCSIM` (ArcSim 0.2.1): a 30³ grid from (−0.25, −0.25, 0) with spacing 1/30; strain weight
+  clamp(6(√λ1 − 1), 0, 1), λ1 the larger eigenvalue of C = 2G + I; angle weight from its
+  eigenvector; negative values set to 0, then doubled. Zero strain is not a node of this grid, so
+  that even an unstrained cloth gets a mixture of its neighbours: results of the reference depend on
+  that, hence it is kept.
+- `CORRECTED`: nodes at zero strain, half the spacing, and over the range cloth reaches (−0.15 to
+  0.35); the coupling k1 keeps its sign, limited to |k1| ≤ 0.95 √(k0 k2) so that the energy stays
+  positive; only k3 < 0 is set to 0.
 
-Bending. The stiffness is linear between the five curvature columns α = ½ θ l/(a0 + a1) = 0, 5, 10, 15, 20 1/m and
-between the three edge directions, constant above 20 1/m.
+Bending. The stiffness is linear between the five curvature columns α = ½ θ l/(a0 + a1) = 0, 5, 10,
+15, 20 1/m and between the three edge directions, constant above 20 1/m.
 
-- `ARCSIM`: a negative fold angle θ continues the first segment's line below zero curvature, clamped at 0: the two
-  faces of the cloth bend differently.
+- `ARCSIM`: a negative fold angle θ continues the first segment's line below zero curvature, clamped
+  at 0: the two faces of the cloth bend differently.
 - `CORRECTED`: |α| is looked up; both faces bend alike.
 
-Source: Wang, O'Brien, Ramamoorthi, ACM TOG 30(4):71 (2011), section 3; the clamps from ArcSim 0.2.1's behaviour.
+Source: Wang, O'Brien, Ramamoorthi, ACM TOG 30(4):71 (2011), section 3; the clamps from ArcSim
+0.2.1's behaviour.
 """
 
 from __future__ import annotations
@@ -105,9 +110,12 @@ def stretching_stiffness(
         k0, k1, k2, k3: (face, batch) [N/m].
     """
     cells, shares = [], []
-    for value, start, count in zip((g00, g11, g01.abs()), (grid.origin, grid.origin, 0.0), grid.counts, strict=True):
+    for value, start, count in zip(
+        (g00, g11, g01.abs()), (grid.origin, grid.origin, 0.0), grid.counts, strict=True
+    ):
         node = ((value - start) / grid.spacing).clamp(0, count - 1)
-        # A member that has diverged (NaN) stays so through its share; its cell must only be one that is there.
+        # A member that has diverged (NaN) stays so through its share; its cell must only be one
+        # that is there.
         cell = node.detach().nan_to_num(nan=0.0).floor().clamp(max=count - 2)
         cells.append(cell.long())
         shares.append(node - cell)
@@ -123,7 +131,8 @@ def stretching_stiffness(
 
 
 def bending_segments(materials: Sequence[Material]) -> FloatArray:
-    """Computes the bending rows as coefficients of 1, c, (c − 1)₊, (c − 2)₊, (c − 3)₊ with c the curvature in columns.
+    """Computes the bending rows as coefficients of 1, c, (c − 1)₊, (c − 2)₊, (c − 3)₊ with c the
+    curvature in columns.
 
     A piecewise linear function written as a sum vectorises where an indexed look-up does not.
 
@@ -135,7 +144,9 @@ def bending_segments(materials: Sequence[Material]) -> FloatArray:
     return np.concatenate([tables[:, :1], slopes[:, :1], np.diff(slopes, axis=1)], axis=1)
 
 
-def bending_stiffness(curvature: Tensor, segments: Tensor, rows: Tensor, evaluation: Evaluation) -> Tensor:
+def bending_stiffness(
+    curvature: Tensor, segments: Tensor, rows: Tensor, evaluation: Evaluation
+) -> Tensor:
     """Computes the bending stiffness of hinges.
 
     Args:

@@ -34,9 +34,11 @@ class InapplicableError(UsageError):
 class Effect(Protocol):
     """A force the base model lacks."""
 
-    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """Computes forces (vertex, 3, batch) [N] at a time [s], for a wind (3, batch), or (vertex, 3, batch) where it
-        varies [m/s]."""
+    def force(
+        self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor
+    ) -> Tensor:
+        """Computes forces (vertex, 3, batch) [N] at a time [s], for a wind (3, batch), or (vertex,
+        3, batch) where it varies [m/s]."""
         ...
 
 
@@ -44,8 +46,8 @@ class Flow(Protocol):
     """What makes the wind differ from place to place."""
 
     def field(self, time: float, position: Tensor, wind: Tensor) -> Tensor:
-        """Computes the air at the vertices, (vertex, 3, batch) [m/s], for a wind (3, batch) or (vertex, 3, batch) so
-        far."""
+        """Computes the air at the vertices, (vertex, 3, batch) [m/s], for a wind (3, batch) or
+        (vertex, 3, batch) so far."""
         ...
 
 
@@ -53,7 +55,8 @@ class Load(Protocol):
     """Mass of air that the cloth takes along."""
 
     def added_mass(self, cloth: Cloth) -> Tensor:
-        """Computes the added mass (vertex, batch) [kg], for motion along the normals (see `sim.cloth.inertia`)."""
+        """Computes the added mass (vertex, batch) [kg], for motion along the normals (see
+        `sim.cloth.inertia`)."""
         ...
 
 
@@ -80,12 +83,14 @@ class AnchorMotion(Protocol):
     """Anchors that move one by one, as observed."""
 
     def displacement(self, time: float) -> Tensor:
-        """Computes displacements (held, 3, batch) from where the system has the anchors [m], at a time [s]."""
+        """Computes displacements (held, 3, batch) from where the system has the anchors [m], at a
+        time [s]."""
         ...
 
 
 class Tie(Protocol):
-    """Springs beside the handles, damped as those are. Where it loosens handles it makes up the difference to them."""
+    """Springs beside the handles, damped as those are. Where it loosens handles it makes up the
+    difference to them."""
 
     def springs(self, cloth: Cloth) -> Springs:
         """Describes the tie as springs."""
@@ -100,14 +105,17 @@ class Tie(Protocol):
         ...
 
     def stiffest(self, cloth: Cloth) -> Tensor:
-        """Bounds the stiffness from above at any time and shape, (vertex, batch), at least 0 [N/m]."""
+        """Bounds the stiffness from above at any time and shape, (vertex, batch), at least 0
+        [N/m]."""
         ...
 
 
 class Remembering(Protocol):
-    """A force that depends on what the cloth has gone through: it remembers (see `State.memory`), in steps of any size.
+    """A force that depends on what the cloth has gone through: it remembers (see `State.memory`),
+    in steps of any size.
 
-    Positions and velocities are (vertex, 3, batch) [m, m/s], a wind (3, batch) or (vertex, 3, batch) [m/s].
+    Positions and velocities are (vertex, 3, batch) [m, m/s], a wind (3, batch) or (vertex, 3,
+    batch) [m/s].
     """
 
     def start(self, cloth: Cloth, position: Tensor) -> Tensor:
@@ -115,12 +123,20 @@ class Remembering(Protocol):
         ...
 
     def update(
-        self, cloth: Cloth, memory: Tensor, position: Tensor, velocity: Tensor, wind: Tensor, elapsed: float
+        self,
+        cloth: Cloth,
+        memory: Tensor,
+        position: Tensor,
+        velocity: Tensor,
+        wind: Tensor,
+        elapsed: float,
     ) -> Tensor:
         """Returns what is remembered after a step of `elapsed` [s] to a position."""
         ...
 
-    def force(self, cloth: Cloth, memory: Tensor, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+    def force(
+        self, cloth: Cloth, memory: Tensor, position: Tensor, velocity: Tensor, wind: Tensor
+    ) -> Tensor:
         """Computes forces (vertex, 3, batch) [N]."""
         ...
 
@@ -133,7 +149,8 @@ class Drive:
         wind: (3, batch) at the start and at the end [m/s].
         targets: (held, 3, batch) of the handles at the start and at the end [m].
         rate: (held, 3, batch) velocity of the handles [m/s].
-        offset: (3,) displacement of everything that moves with the handles, at the start and at the end [m].
+        offset: (3,) displacement of everything that moves with the handles, at the start and at the
+            end [m].
         drift: (3,) its velocity [m/s].
     """
 
@@ -149,7 +166,12 @@ class Drive:
         def between(pair: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
             return torch.lerp(*pair, start), torch.lerp(*pair, end)
 
-        return replace(self, wind=between(self.wind), targets=between(self.targets), offset=between(self.offset))
+        return replace(
+            self,
+            wind=between(self.wind),
+            targets=between(self.targets),
+            offset=between(self.offset),
+        )
 
     def select(self, members: slice) -> Drive:
         """Selects the drive of some members only."""
@@ -158,7 +180,10 @@ class Drive:
             return pair[0][..., members], pair[1][..., members]
 
         return replace(
-            self, wind=select_members(self.wind), targets=select_members(self.targets), rate=self.rate[..., members]
+            self,
+            wind=select_members(self.wind),
+            targets=select_members(self.targets),
+            rate=self.rate[..., members],
         )
 
 
@@ -182,7 +207,8 @@ class System:
         remembering: forces that remember.
         contact: how layers keep apart; None lets them pass through each other.
         limits: of strain; None lets faces stretch as their stiffness allows.
-        remeshing: how the mesh follows shape and motion (see `sim.run.simulation_loop.Batch`); None keeps it.
+        remeshing: how the mesh follows shape and motion (see `sim.run.simulation_loop.Batch`); None
+            keeps it.
     """
 
     cloth: Cloth
@@ -207,7 +233,8 @@ class System:
             raise InapplicableError(
                 "ties cannot act beside handles whose anchors move one by one",
                 where="system",
-                fix="leave out the effects that loosen or add attachments, or move all handles together",
+                fix="leave out the effects that loosen or add attachments, or move all handles "
+                "together",
             )
 
     @cached_property
@@ -223,7 +250,9 @@ class System:
         """(vertex, 1, 1): 0 for what the handles hold, rigidly or by springs, 1 for all others."""
         return torch.ones_like(self.cloth.mass[:, :1]).unsqueeze(-1).index_fill(0, self.held, 0.0)
 
-    def limit_strains(self, position: Tensor, velocity: Tensor, step: float) -> tuple[Tensor, Tensor]:
+    def limit_strains(
+        self, position: Tensor, velocity: Tensor, step: float
+    ) -> tuple[Tensor, Tensor]:
         """Positions and velocities after a step [s], brought within the strain limits."""
         if self.limits is None:
             return position, velocity
@@ -231,12 +260,14 @@ class System:
         return bring_within(self.cloth, self.limits, position, velocity, step, self.loose)
 
     def effective(self, position: Tensor, force: Tensor) -> Tensor:
-        """Computes the force that gives the cloth's own mass its acceleration (see `sim.cloth.inertia`): (vertex, 3,
-        batch) [N]."""
+        """Computes the force that gives the cloth's own mass its acceleration (see
+        `sim.cloth.inertia`): (vertex, 3, batch) [N]."""
         if not self.loads:
             return force
         normals = inertia.mean_normals(self.cloth, position)
-        return inertia.effective(force, mass=self.cloth.mass, added=self.added_mass, normals=normals)
+        return inertia.effective(
+            force, mass=self.cloth.mass, added=self.added_mass, normals=normals
+        )
 
     @property
     def added_mass(self) -> Tensor:
@@ -247,10 +278,15 @@ class System:
         return total
 
     def tied(self, time: float, position: Tensor) -> Tensor | None:
-        """Computes the stiffness of the ties (vertex, 1, batch) [N/m]; None where there are none."""
+        """Computes the stiffness of the ties (vertex, 1, batch) [N/m]; None where there are
+        none."""
         if not self.ties:
             return None
-        return torch.stack([tie.stiffness(self.cloth, time, position) for tie in self.ties]).sum(0).unsqueeze(1)
+        return (
+            torch.stack([tie.stiffness(self.cloth, time, position) for tie in self.ties])
+            .sum(0)
+            .unsqueeze(1)
+        )
 
     def remember_step(
         self,
@@ -262,8 +298,8 @@ class System:
         *,
         elapsed: float,
     ) -> tuple[Tensor, ...]:
-        """Computes what forces remember after a step of `elapsed` [s] to a time [s], a position and a velocity (vertex,
-        3, batch) [m, m/s], in a wind (3, batch) [m/s]."""
+        """Computes what forces remember after a step of `elapsed` [s] to a time [s], a position and
+        a velocity (vertex, 3, batch) [m, m/s], in a wind (3, batch) [m/s]."""
         if not self.remembering:
             return self.checked(memory)
         local = self.local(wind, time, position)
@@ -280,22 +316,26 @@ class System:
         """
         if len(memory) != len(self.remembering):
             raise UsageError(
-                f"the state has {len(memory)} memories for {len(self.remembering)} forces that remember",
+                f"the state has {len(memory)} memories for {len(self.remembering)} forces that "
+                "remember",
                 where="system",
                 fix="start from the state that `sim.effects.apply` returns with the system",
             )
         return memory
 
     def local(self, wind: Tensor, time: float, position: Tensor) -> Tensor:
-        """Computes the air at the vertices [m/s]: (vertex, 3, batch), or the wind (3, batch) itself where nothing
-        disturbs it."""
+        """Computes the air at the vertices [m/s]: (vertex, 3, batch), or the wind (3, batch) itself
+        where nothing disturbs it."""
         for flow in self.flows:
             wind = flow.field(time, position, wind)
         return wind
 
     def internal(self, position: Tensor, velocity: Tensor) -> Tensor:
-        """Computes membrane, bending and contact forces, elastic and damping: (vertex, 3, batch) [N]."""
-        total = membrane.force(self.cloth, position, velocity) + bending.force(self.cloth, position, velocity)
+        """Computes membrane, bending and contact forces, elastic and damping: (vertex, 3, batch)
+        [N]."""
+        total = membrane.force(self.cloth, position, velocity) + bending.force(
+            self.cloth, position, velocity
+        )
         if self.contact is None:
             return total
         pairs = contact.candidates(self.cloth, self.contact, position, self.neighbours)
@@ -303,7 +343,8 @@ class System:
 
     @cached_property
     def neighbours(self) -> BoolArray:
-        """(vertex, face) whether contact passes over them: too close at rest to be different layers."""
+        """(vertex, face) whether contact passes over them: too close at rest to be different
+        layers."""
         if self.contact is None:
             return np.ones((self.cloth.mesh.vertex_count, len(self.cloth.faces)), dtype=bool)
         return contact.neighbours(self.cloth.mesh, self.contact)
@@ -325,19 +366,29 @@ class System:
             wind: (3, batch) [m/s].
             time: of the effects [s].
             memory: of the forces that remember.
-            air_position: the shape the air sees, if another than `position` (see `integrate.implicit.AirShape`).
-            effect_velocity: the velocity the effects see, if another than `velocity` (see `integrate.symplectic`).
+            air_position: the shape the air sees, if another than `position` (see
+                `integrate.implicit.AirShape`).
+            effect_velocity: the velocity the effects see, if another than `velocity` (see
+                `integrate.symplectic`).
         """
         shape = position if air_position is None else air_position
         wind = self.local(wind, time, shape)
-        total = self.cloth.mass.unsqueeze(1) * self.gravity + self.air.force(self.cloth, shape, velocity, wind)
+        total = self.cloth.mass.unsqueeze(1) * self.gravity + self.air.force(
+            self.cloth, shape, velocity, wind
+        )
         for tie in self.ties:
             total = total + tie.force(self.cloth, time, position)
         moving = velocity if effect_velocity is None else effect_velocity
         return self._with_added(total, wind, time, position, moving, memory)
 
     def _with_added(
-        self, total: Tensor, wind: Tensor, time: float, position: Tensor, velocity: Tensor, memory: tuple[Tensor, ...]
+        self,
+        total: Tensor,
+        wind: Tensor,
+        time: float,
+        position: Tensor,
+        velocity: Tensor,
+        memory: tuple[Tensor, ...],
     ) -> Tensor:
         for effect in self.effects:
             total = total + effect.force(self.cloth, time, position, velocity, wind)
@@ -347,7 +398,9 @@ class System:
 
     def offset(self, time: float) -> Tensor:
         """Computes the displacement of the handles' anchors at a time, (3,) [m]."""
-        return torch.as_tensor(self.handles.offset(time), dtype=self.anchors.dtype, device=self.anchors.device)
+        return torch.as_tensor(
+            self.handles.offset(time), dtype=self.anchors.dtype, device=self.anchors.device
+        )
 
     def targets(self, time: float) -> Tensor:
         """Computes where the handles are at a time, (held, 3, batch) [m]."""
@@ -421,8 +474,11 @@ class System:
 
     @property
     def extra(self) -> bool:
-        """Whether anything acts beside the base model in the undisturbed wind, with ties and loads."""
-        return bool((*self.effects, *self.flows, *self.remembering)) or self.air is not self.air.plain
+        """Whether anything acts beside the base model in the undisturbed wind, with ties and
+        loads."""
+        return (
+            bool((*self.effects, *self.flows, *self.remembering)) or self.air is not self.air.plain
+        )
 
     @cached_property
     def base(self) -> System:
@@ -432,7 +488,9 @@ class System:
     @cached_property
     def alone(self) -> System:
         """The base model without loads, of the ties with those alone that loosen its handles."""
-        return replace(self.base, loads=(), ties=tuple(tie for tie in self.ties if self._loosened_by(tie)))
+        return replace(
+            self.base, loads=(), ties=tuple(tie for tie in self.ties if self._loosened_by(tie))
+        )
 
     @cached_property
     def beside(self) -> System:
@@ -453,7 +511,8 @@ class System:
         memory: tuple[Tensor, ...] = (),
         effect_velocity: Tensor | None = None,
     ) -> Tensor:
-        """Computes the part of `force` that is not the `base`'s: (vertex, 3, batch) [N]. Arguments as there.
+        """Computes the part of `force` that is not the `base`'s: (vertex, 3, batch) [N]. Arguments
+        as there.
 
         Of the air, it is the difference to the base's.
         """
@@ -469,7 +528,8 @@ class System:
         return self._with_added(total, wind, time, position, moving, memory)
 
     def _tie_damping(self, drive: Drive, time: float, position: Tensor, velocity: Tensor) -> Tensor:
-        """Computes Kelvin–Voigt damping of the ties, whose other ends move with the handles: (vertex, 3, batch) [N]."""
+        """Computes Kelvin–Voigt damping of the ties, whose other ends move with the handles:
+        (vertex, 3, batch) [N]."""
         tied = self.tied(time, position)
         if tied is None:
             return torch.zeros_like(velocity)
@@ -478,7 +538,14 @@ class System:
     def tensors(self) -> tuple[Tensor, ...]:
         """Lists the parameters that gradients may be wanted of."""
         cloth = self.cloth
-        base = (cloth.mass, cloth.samples, cloth.segments, cloth.damping, self.gravity, self.anchors)
+        base = (
+            cloth.mass,
+            cloth.samples,
+            cloth.segments,
+            cloth.damping,
+            self.gravity,
+            self.anchors,
+        )
         parts = (
             cloth.stiffening,
             self.wind,
@@ -494,7 +561,8 @@ class System:
     def energies(self, state: State) -> dict[str, Tensor]:
         """Computes kinetic, stretching, bending, gravity and handle energy: (batch,) each [J].
 
-        Gravity's is relative to the origin; stretching and bending are exact for constant stiffness.
+        Gravity's is relative to the origin; stretching and bending are exact for constant
+        stiffness.
         """
         mass = self.cloth.mass
         result = {

@@ -1,4 +1,5 @@
-"""The anemometer beside a simulated flag: what it would have logged, in the same form as a real log."""
+"""The anemometer beside a simulated flag: what it would have logged, in the same form as a real
+log."""
 
 from __future__ import annotations
 
@@ -23,7 +24,8 @@ from sim.effects.sensor import AnemometerEffect
 from sim.run.members import Crew, Member
 
 _FINE = 10.0
-"""Rate [Hz] at which the air is sampled and an instrument's response computed; of a faster one twice its own."""
+"""Rate [Hz] at which the air is sampled and an instrument's response computed; of a faster one
+twice its own."""
 _NAME = "simulated"
 
 
@@ -33,19 +35,23 @@ class SimulatedLog:
 
     Attributes:
         series: its samples.
-        parameters: what was drawn for it, "effect.parameter" → value, SI; with "anemometer.noise" [m/s].
+        parameters: what was drawn for it, "effect.parameter" → value, SI; with "anemometer.noise"
+            [m/s].
     """
 
     series: WindSeries
     parameters: Mapping[str, float]
 
 
-def read(spec: AnemometerSpec, crew: Crew, member: Member, *, instrument: int, seed: int, begin: int) -> SimulatedLog:
+def read(
+    spec: AnemometerSpec, crew: Crew, member: Member, *, instrument: int, seed: int, begin: int
+) -> SimulatedLog:
     """Simulates the log of one recording.
 
-    The instrument stands at the middle of the hoist in undisturbed air: effects that change the wind from place to
-    place do not reach it. Its samples are means over their period up to their stamp, after its effects in the recipe's
-    order, with noise, in steps of its resolution, and never below 0; stamps fall anywhere within a second.
+    The instrument stands at the middle of the hoist in undisturbed air: effects that change the
+    wind from place to place do not reach it. Its samples are means over their period up to their
+    stamp, after its effects in the recipe's order, with noise, in steps of its resolution, and
+    never below 0; stamps fall anywhere within a second.
 
     Args:
         instrument: seed of what it is, its effects and the size of its noise.
@@ -65,9 +71,13 @@ def log_of_air(
     seed: int,
     begin: int,
 ) -> SimulatedLog:
-    """Simulates what an anemometer logs of air at velocity (n, 3) [m/s] at times (n,) [s]; the others as of `read`."""
+    """Simulates what an anemometer logs of air at velocity (n, 3) [m/s] at times (n,) [s]; the
+    others as of `read`."""
     drawn = {
-        name: {key: _drawn(value, instrument, "anemometer", name, key) for key, value in parameters.items()}
+        name: {
+            key: _drawn(value, instrument, "anemometer", name, key)
+            for key, value in parameters.items()
+        }
         for name, parameters in spec.effects.items()
     }
     noise = _drawn(spec.noise, instrument, "anemometer", "noise")
@@ -76,7 +86,9 @@ def log_of_air(
         effect: AnemometerEffect = SENSOR_EFFECTS[name](**values)
         speed = effect.read(torch.from_numpy(time), speed)
     phase = stream(seed, "anemometer", "phase").random()
-    stamps, means = _means(time, np.column_stack([speed[:, 0].numpy(), velocity[:, :2]]), spec.rate, phase)
+    stamps, means = _means(
+        time, np.column_stack([speed[:, 0].numpy(), velocity[:, :2]]), spec.rate, phase
+    )
     readings = means[:, 0] + stream(seed, "anemometer", "samples").normal(0.0, noise, len(stamps))
     threshold = drawn.get("anemometer-dead-zone", {}).get("threshold")
     dead = np.zeros(len(stamps), dtype=bool) if threshold is None else means[:, 0] < threshold
@@ -95,14 +107,17 @@ def log_of_air(
             distance_constant=drawn.get("anemometer-lag", {}).get("distance"),
         ),
     )
-    parameters = {f"{name}.{key}": value for name, values in drawn.items() for key, value in values.items()}
+    parameters = {
+        f"{name}.{key}": value for name, values in drawn.items() for key, value in values.items()
+    }
     return SimulatedLog(series=series, parameters={**parameters, "anemometer.noise": noise})
 
 
 def air(spec: AnemometerSpec, crew: Crew, member: Member) -> tuple[FloatArray, FloatArray]:
     """Times (n,) since the simulation's start [s], and the air's velocity (n, 3) at them [m/s].
 
-    A wind that changes is known only from the start; one that does not began `before` the first frame.
+    A wind that changes is known only from the start; one that does not began `before` the first
+    frame.
     """
     time = crew.recipe.time
     end = (time.total - 1) / time.rate
@@ -117,18 +132,23 @@ def air(spec: AnemometerSpec, crew: Crew, member: Member) -> tuple[FloatArray, F
 
 
 def velocities(system: System, times: FloatArray) -> FloatArray:
-    """Returns the velocity (n, 3) [m/s] of the undisturbed air at the first of a batch, at times (n,) [s]."""
+    """Returns the velocity (n, 3) [m/s] of the undisturbed air at the first of a batch, at times
+    (n,) [s]."""
     with torch.no_grad():
         return np.stack([system.wind.velocity(float(t))[:, 0].double().numpy() for t in times])
 
 
 def blowing_from(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Returns where a wind (x to the east, y to the north) blows from, clockwise from north, in [0, 2π) [rad]."""
+    """Returns where a wind (x to the east, y to the north) blows from, clockwise from north, in [0,
+    2π) [rad]."""
     return np.mod(np.arctan2(-x, -y), 2 * math.pi)
 
 
-def _means(time: FloatArray, values: FloatArray, rate: float, phase: float) -> tuple[FloatArray, FloatArray]:
-    """Stamps (m,) a period apart, and the means (m, k) of values (n, k) over the period that ends with each."""
+def _means(
+    time: FloatArray, values: FloatArray, rate: float, phase: float
+) -> tuple[FloatArray, FloatArray]:
+    """Stamps (m,) a period apart, and the means (m, k) of values (n, k) over the period that ends
+    with each."""
     period = 1 / rate
     first = math.ceil((time[0] + period) * rate - phase) + phase
     stamps = np.arange(first, time[-1] * rate + 1e-9) / rate

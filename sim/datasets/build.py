@@ -1,8 +1,8 @@
 """Building a data set: sequences first, then their films, each commit a batch of them.
 
-Workers put what they make into the lake's store (`sim.datasets.build_jobs`); this process alone commits. What is in the
-lake is known by its identity, so that a build that was killed goes on where its last commit was, and ends with the same
-artifacts and objects as an unbroken one.
+Workers put what they make into the lake's store (`sim.datasets.build_jobs`); this process alone
+commits. What is in the lake is known by its identity, so that a build that was killed goes on where
+its last commit was, and ends with the same artifacts and objects as an unbroken one.
 """
 
 from __future__ import annotations
@@ -87,7 +87,8 @@ class Build:
         """Make what is missing.
 
         Raises:
-            ConflictError: the branch has films of this name by another recipe, or these films under another name.
+            ConflictError: the branch has films of this name by another recipe, or these films under
+                another name.
             RefusedError: too many sequences fail, or one of a cast that shards share.
             WorkerError: workers kept dying, or all of them are gone.
             FlagdataError: a renderer, an asset or the disk failed.
@@ -99,7 +100,11 @@ class Build:
         in_shard = None if self.shard is None else self.shard.sequences(rolls)
         sequences = self._simulate(rolls, in_shard)
         films = self._film(rolls, in_shard)
-        failed = [f"{roll.cast.simulation.name} {index}: {why}" for roll in rolls for index, why in roll.failed.items()]
+        failed = [
+            f"{roll.cast.simulation.name} {index}: {why}"
+            for roll in rolls
+            for index, why in roll.failed.items()
+        ]
         return BuildReport(
             sequences=sequences,
             films=len(films),
@@ -114,8 +119,11 @@ class Build:
     # Sequences
 
     def _simulate(self, rolls: Sequence[Roll], in_shard: Collection[str] | None) -> int:
-        """Simulates what is missing of the sequences that are made here, and returns how many those are."""
-        in_lake = whole(self.lake, [roll.id(i) for roll in rolls for i in roll.candidates], branch=self.branch)
+        """Simulates what is missing of the sequences that are made here, and returns how many those
+        are."""
+        in_lake = whole(
+            self.lake, [roll.id(i) for roll in rolls for i in roll.candidates], branch=self.branch
+        )
         total = sum(len(roll.pending((), in_shard)) for roll in rolls)
         with self.bars(total, f"{self.recipe.name}: simulate", "flag") as advance:
             todo = [(roll, roll.pending(in_lake, in_shard)) for roll in rolls]
@@ -128,10 +136,15 @@ class Build:
         return total
 
     def _refuse_replacing(self, rolls: Sequence[Roll], known: Mapping[str, set[int]]) -> None:
-        """Refuses a shard in which a sequence of a cast that other shards share failed: their films would change. Those
-        that are `known` to fail were replaced in an earlier build."""
+        """Refuses a shard in which a sequence of a cast that other shards share failed: their films
+        would change. Those that are `known` to fail were replaced in an earlier build."""
         shared = [roll for roll in rolls if not roll.in_one_batch]
-        failed = [(roll, i) for roll in shared for i in roll.failed if i not in known[roll.cast.simulation.name]]
+        failed = [
+            (roll, i)
+            for roll in shared
+            for i in roll.failed
+            if i not in known[roll.cast.simulation.name]
+        ]
         if self.shard is not None and failed:
             (roll, index), *_ = failed
             raise RefusedError(
@@ -141,7 +154,8 @@ class Build:
             )
 
     def _simulate_once(self, todo: Sequence[tuple[Roll, list[int]]], advance: Advance) -> None:
-        """Simulates all pending members of the rolls once; those that fail are noted on their roll."""
+        """Simulates all pending members of the rolls once; those that fail are noted on their
+        roll."""
         by_name = {roll.cast.simulation.name: roll for roll, _ in todo}
         replaced = {name: dict(roll.failed) for name, roll in by_name.items()}
 
@@ -158,20 +172,28 @@ class Build:
 
         self._commit_each(self._batches(todo), commit_sequences, advance)
 
-    def _commit_sequences(self, roll: Roll, stored: Mapping[int, Deposited], replaced: Mapping[int, str]) -> int:
-        """Commits sequences that are in the store and returns how many; the reports of those that take the place of
-        others name the members `replaced`."""
+    def _commit_sequences(
+        self, roll: Roll, stored: Mapping[int, Deposited], replaced: Mapping[int, str]
+    ) -> int:
+        """Commits sequences that are in the store and returns how many; the reports of those that
+        take the place of others name the members `replaced`."""
         if replaced:
             wanted = roll.cast.simulation.count
-            stored = {i: (_in_place_of(replaced, row) if i >= wanted else row, put) for i, (row, put) in stored.items()}
+            stored = {
+                i: (_in_place_of(replaced, row) if i >= wanted else row, put)
+                for i, (row, put) in stored.items()
+            }
         committed = commit(self.lake, roll.cast.simulation, stored, branch=self.branch)
         roll.done |= set(stored)
         self._new_sequences += len(committed.added)
         self._healed += len(committed.healed)
         return len(stored)
 
-    def _commit_each(self, work: Iterator[Job], commit_results: Callable[[Any], int], advance: Advance) -> None:
-        """Has jobs done and commits their results, some together; what is done stays where the work is stopped."""
+    def _commit_each(
+        self, work: Iterator[Job], commit_results: Callable[[Any], int], advance: Advance
+    ) -> None:
+        """Has jobs done and commits their results, some together; what is done stays where the work
+        is stopped."""
         waiting: list[Any] = []
         last = time.monotonic()
         try:
@@ -191,20 +213,32 @@ class Build:
                 indices = [index for index in pending if roll.crew.base(index) == base]
                 for first in range(0, len(indices), simulation.batch):
                     members = indices[first : first + simulation.batch]
-                    yield build_jobs.put_sequences, (self._address, simulation, base, members, self.device)
+                    yield (
+                        build_jobs.put_sequences,
+                        (self._address, simulation, base, members, self.device),
+                    )
 
     # Films
 
     def films(self, rolls: Iterable[Roll]) -> list[PlannedFilm]:
-        """Returns all films of the data set in the order they are rendered: small sides first, so that a network's
-        validation films exist while its training films are still being rendered."""
-        members: dict[str, list[tuple[Cast, int, str]]] = {side.name: [] for side in self.recipe.sides}
+        """Returns all films of the data set in the order they are rendered: small sides first, so
+        that a network's validation films exist while its training films are still being
+        rendered."""
+        members: dict[str, list[tuple[Cast, int, str]]] = {
+            side.name: [] for side in self.recipe.sides
+        }
         for roll in rolls:
-            members[roll.cast.side.name] += [(roll.cast, index, roll.id(index)) for index in roll.chosen]
+            members[roll.cast.side.name] += [
+                (roll.cast, index, roll.id(index)) for index in roll.chosen
+            ]
         return [
             film
-            for side, side_members in sorted(members.items(), key=lambda item: self.recipe.side(item[0]).renders)
-            for film in Sequences(recipe=self.recipe, side=side, members=tuple(side_members)).films()
+            for side, side_members in sorted(
+                members.items(), key=lambda item: self.recipe.side(item[0]).renders
+            )
+            for film in Sequences(
+                recipe=self.recipe, side=side, members=tuple(side_members)
+            ).films()
         ]
 
     def _film(self, rolls: Sequence[Roll], in_shard: Collection[str] | None) -> list[PlannedFilm]:
@@ -217,7 +251,9 @@ class Build:
         film_ids = {film.artifact().id for film in films}
         in_lake = whole(self.lake, film_ids, branch=self.branch)
         missing = [film for film in films if film.artifact().id not in in_lake]
-        clips = self.lake.rows({"kind": Kind.CLIP}, at=self.branch, columns=["recording"])["recording"].to_pylist()
+        clips = self.lake.rows({"kind": Kind.CLIP}, at=self.branch, columns=["recording"])[
+            "recording"
+        ].to_pylist()
         self._clips = sum(recording in film_ids for recording in clips)
         with self.bars(len(films), f"{self.recipe.name}: render", "film") as advance:
             advance(len(films) - len(missing))
@@ -227,31 +263,40 @@ class Build:
     def _refuse_mixture(self, film_ids: set[str], others: set[str]) -> None:
         """Make sure that all films of the data set's name are of this recipe.
 
-        Another shard may have replaced a sequence that failed: films of `others` are judged by how they are filmed.
+        Another shard may have replaced a sequence that failed: films of `others` are judged by how
+        they are filmed.
         """
         films = {"kind": Kind.RECORDING, "dataset": self.recipe.name}
         rows = self.lake.rows(films, at=self.branch, columns=["artifact", "parents"]).to_pylist()
         foreign = {row["artifact"] for row in rows} - film_ids
-        replaced = {row["artifact"] for row in rows if not others.isdisjoint(row["parents"])} & foreign
+        replaced = {
+            row["artifact"] for row in rows if not others.isdisjoint(row["parents"])
+        } & foreign
         foreign -= {artifact for artifact in replaced if self._films_alike(artifact)}
         if foreign:
             raise ConflictError(
-                f"{len(foreign)} recordings of the data set {self.recipe.name!r} are of another recipe",
+                f"{len(foreign)} recordings of the data set {self.recipe.name!r} are of another "
+                "recipe",
                 where=f"branch {self.branch}",
                 fix="give the recipe another name, or build on another branch",
             )
 
     def _films_alike(self, recording: str) -> bool:
         """Whether a recording of the branch is filmed as this recipe films."""
-        (row,) = self.lake.rows({"artifact": recording}, at=self.branch, columns=["recipe"]).to_pylist()
+        (row,) = self.lake.rows(
+            {"artifact": recording}, at=self.branch, columns=["recipe"]
+        ).to_pylist()
         recipe = column_json(row["recipe"], "recipe", artifact=recording)
         return canonical({**recipe, **self.recipe.filming()}) == canonical(recipe)
 
     def _refuse_other_names(self, films: Sequence[PlannedFilm]) -> None:
-        """Make sure that no film of this recipe is there under another data set's name, where it would stay."""
+        """Make sure that no film of this recipe is there under another data set's name, where it
+        would stay."""
         film_ids = [film.artifact().id for film in films]
         columns = ["artifact", "dataset"]
-        datasets = self.lake.rows({"artifact": film_ids}, at=self.branch, columns=columns)["dataset"].to_pylist()
+        datasets = self.lake.rows({"artifact": film_ids}, at=self.branch, columns=columns)[
+            "dataset"
+        ].to_pylist()
         other_datasets = sorted({str(dataset) for dataset in datasets} - {self.recipe.name})
         if other_datasets:
             raise ConflictError(
@@ -261,10 +306,15 @@ class Build:
             )
 
     def _shots(self, films: Sequence[PlannedFilm]) -> Iterator[Job]:
-        rows = self.lake.rows("kind = 'meshes'", at=self.branch, columns=["artifact", "object"]).to_pylist()
+        rows = self.lake.rows(
+            "kind = 'meshes'", at=self.branch, columns=["artifact", "object"]
+        ).to_pylist()
         objects = {row["artifact"]: row["object"] for row in rows}
         for film in films:
-            yield build_jobs.put_film, (self._address, self.recipe, film, objects[film.sequence], self.device)
+            yield (
+                build_jobs.put_film,
+                (self._address, self.recipe, film, objects[film.sequence], self.device),
+            )
 
     @property
     def _address(self) -> str:

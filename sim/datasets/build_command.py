@@ -19,17 +19,20 @@ if TYPE_CHECKING:
 
 @verb(Building, example='flagdata.build("flagsim-small", lake="lake", workers=2)')
 def build(chosen: Building) -> Iterator[Result]:
-    """Build a data set: simulate its sequences, film them, and lay both into the lake with their ground truth.
+    """Build a data set: simulate its sequences, film them, and lay both into the lake with their
+    ground truth.
 
-    RECIPE is a TOML file, or a recipe of the catalog: flagsim, flagsim-small, clothsim, field, outdoor (`flagdata
-    catalog datasets NAME` prints one to copy). --sequences and --films change how many are made: the data set is then
-    called after the counts. The lake is made if there is none.
+    RECIPE is a TOML file, or a recipe of the catalog: flagsim, flagsim-small, clothsim, field,
+    outdoor (`flagdata catalog datasets NAME` prints one to copy). --sequences and --films change
+    how many are made: the data set is then called after the counts. The lake is made if there is
+    none.
 
-    Builds of several machines each make a part, --shard 1/4 to 4/4, on branches that flagdata merge brings together;
-    the same command without --shard then writes the card.
+    Builds of several machines each make a part, --shard 1/4 to 4/4, on branches that flagdata merge
+    brings together; the same command without --shard then writes the card.
 
-    A build that was stopped or killed goes on where its last commit was when the command is given again, and ends with
-    the same objects. At the end the data set's card, an HTML page, is written into the lake's folder cards.
+    A build that was stopped or killed goes on where its last commit was when the command is given
+    again, and ends with the same objects. At the end the data set's card, an HTML page, is written
+    into the lake's folder cards.
 
     \b
       flagdata build flagsim-small --lake lake --plan
@@ -56,7 +59,9 @@ def build(chosen: Building) -> Iterator[Result]:
     if chosen.plan:
         from sim.datasets.build_plan import plan
 
-        planned = plan(loaded, lake, workers=_workers(chosen), branch=branch, device=device, shard=shard)
+        planned = plan(
+            loaded, lake, workers=_workers(chosen), branch=branch, device=device, shard=shard
+        )
         yield Result("build-plan", planned.as_dict())
         _print_plan(planned)
         return
@@ -70,7 +75,9 @@ def build(chosen: Building) -> Iterator[Result]:
     cards.check(chosen.card)
     lake = lake or _made(str(chosen.lake))
     lake.check_writable()
-    lasting = length(loaded, lake, workers=_workers(chosen), branch=branch, device=device, shard=shard)
+    lasting = length(
+        loaded, lake, workers=_workers(chosen), branch=branch, device=device, shard=shard
+    )
     if lasting is not None:
         say(lasting)
     with (
@@ -78,18 +85,31 @@ def build(chosen: Building) -> Iterator[Result]:
         connect_workers(scheduler, workers=chosen.processes, say=say_beside_bars) as workers,
     ):
         report = Build(
-            lake=lake, recipe=loaded, workers=workers, bars=progress, branch=branch, device=device, shard=shard
+            lake=lake,
+            recipe=loaded,
+            workers=workers,
+            bars=progress,
+            branch=branch,
+            device=device,
+            shard=shard,
         ).run()
     written = None
     if shard is None:
         with following(f"the data set {loaded.name}", "writing its card"):
             written = str(cards.write_card(lake, loaded, branch=branch, path=chosen.card))
-    yield Result("build", {"lake": str(lake.path), "recipe": loaded.name, "card": written, **vars(report)})
+    yield Result(
+        "build", {"lake": str(lake.path), "recipe": loaded.name, "card": written, **vars(report)}
+    )
     for failure in report.failed:
         say(f"replaced: {failure}")
-    replaced = f"; {count_of(report.healed, 'damaged or missing object')} replaced" if report.healed else ""
+    replaced = (
+        f"; {count_of(report.healed, 'damaged or missing object')} replaced"
+        if report.healed
+        else ""
+    )
     say(
-        f"{report.new_sequences} of {report.sequences} sequences and {report.new_films} of {report.films} films made "
+        f"{report.new_sequences} of {report.sequences} sequences and {report.new_films} of "
+        f"{report.films} films made "
         f"in {report.seconds:.0f} s; {report.clips} clips{replaced}"
     )
     if written is not None:
@@ -123,8 +143,13 @@ def _workers(chosen: Building) -> int:
 
 def _print_plan(planned: Plan) -> None:
     sides = list(planned.sequences)
-    rows = [(side, planned.sequences[side], planned.films[side], planned.clips[side]) for side in sides]
-    totals = ("all", *(sum(counts.values()) for counts in (planned.sequences, planned.films, planned.clips)))
+    rows = [
+        (side, planned.sequences[side], planned.films[side], planned.clips[side]) for side in sides
+    ]
+    totals = (
+        "all",
+        *(sum(counts.values()) for counts in (planned.sequences, planned.films, planned.clips)),
+    )
     table(("side", "sequences", "films", "clips"), [*rows, totals])
     rates = planned.rates
     say(
@@ -132,6 +157,8 @@ def _print_plan(planned: Plan) -> None:
         f"{planned.size / 1e9:.2f} GB, {planned.seconds / 3600:.2f} h on {planned.workers} workers"
     )
     say(
-        f"measured here: {rates.sequence_seconds:.2f} s and {rates.sequence_bytes / 1e6:.2f} MB a sequence, "
-        f"{rates.film_seconds:.2f} s and {rates.film_bytes / 1e6:.2f} MB a film ({planned.recipe.renderer})"
+        f"measured here: {rates.sequence_seconds:.2f} s and {rates.sequence_bytes / 1e6:.2f} MB a "
+        "sequence, "
+        f"{rates.film_seconds:.2f} s and {rates.film_bytes / 1e6:.2f} MB a film "
+        f"({planned.recipe.renderer})"
     )

@@ -1,8 +1,10 @@
-"""What workers do: pure functions from a recipe and a number to meshes and bytes (`simulate`, `film`), and the same put
-into a lake's store (`put_sequences`, `put_film`), so that only rows go back to the process that commits them.
+"""What workers do: pure functions from a recipe and a number to meshes and bytes (`simulate`,
+`film`), and the same put into a lake's store (`put_sequences`, `put_film`), so that only rows go
+back to the process that commits them.
 
-Renderers and crews are kept from one job to the next, since they take time to make; they change no result. Torch is
-left on one thread for good, since the last bits of its sums depend on how many it has.
+Renderers and crews are kept from one job to the next, since they take time to make; they change no
+result. Torch is left on one thread for good, since the last bits of its sums depend on how many it
+has.
 """
 
 from __future__ import annotations
@@ -107,7 +109,12 @@ def simulate(simulation: Simulation, base: int, indices: Sequence[int], device: 
     return Simulated(name=simulation.name, outcomes=tuple(outcomes), step=steppers[base].step)
 
 
-def film(recipe: DatasetRecipe, job: PlannedFilm, sequence: MeshSequence | RaggedMeshSequence, device: str) -> Filmed:
+def film(
+    recipe: DatasetRecipe,
+    job: PlannedFilm,
+    sequence: MeshSequence | RaggedMeshSequence,
+    device: str,
+) -> Filmed:
     """Films a sequence.
 
     Raises:
@@ -118,7 +125,9 @@ def film(recipe: DatasetRecipe, job: PlannedFilm, sequence: MeshSequence | Ragge
     zeta = recipe.prior.draw(job.look, assets)
     crew, _ = _crew(job.cast.simulation)
     member = crew.member(job.index)
-    reading = anemometer.read(recipe.anemometer, crew, member, instrument=job.look, seed=job.seed, begin=job.begin)
+    reading = anemometer.read(
+        recipe.anemometer, crew, member, instrument=job.look, seed=job.seed, begin=job.begin
+    )
     drawn = camera_picture.settings(recipe.camera, seed=job.look)
     rendered = shot(recipe, job, sequence, zeta, assets, device=device).cpu().numpy()
     frames = camera_picture.encode_pictures(rendered, drawn, recipe.camera, seed=job.seed)
@@ -144,7 +153,9 @@ def film(recipe: DatasetRecipe, job: PlannedFilm, sequence: MeshSequence | Ragge
     )
 
 
-def put_sequences(lake: str, simulation: Simulation, base: int, indices: Sequence[int], device: str) -> PutSequences:
+def put_sequences(
+    lake: str, simulation: Simulation, base: int, indices: Sequence[int], device: str
+) -> PutSequences:
     """Simulates members as `simulate`, and puts their meshes into the lake's store.
 
     Raises:
@@ -157,7 +168,9 @@ def put_sequences(lake: str, simulation: Simulation, base: int, indices: Sequenc
     return PutSequences(name=simulation.name, stored=stored, failed=failed)
 
 
-def put_film(lake: str, recipe: DatasetRecipe, job: PlannedFilm, meshes: str, device: str) -> PutFilm:
+def put_film(
+    lake: str, recipe: DatasetRecipe, job: PlannedFilm, meshes: str, device: str
+) -> PutFilm:
     """Films a sequence of the lake as `film`, and puts the record into its store.
 
     Args:
@@ -176,7 +189,12 @@ def put_film(lake: str, recipe: DatasetRecipe, job: PlannedFilm, meshes: str, de
     times = record.frame_times
     rate = (len(times) - 1) * NANOSECONDS / (done.end - done.start) if len(times) > 1 else None
     recording = replace(
-        job.artifact(), object=put.name, start=done.start, end=done.end, rate=rate, parameters=done.parameters
+        job.artifact(),
+        object=put.name,
+        start=done.start,
+        end=done.end,
+        rate=rate,
+        parameters=done.parameters,
     )
     return PutFilm(recording=recording, clips=tuple(clip_rows(record, recording)), put=put)
 
@@ -195,7 +213,8 @@ def _lake(address: str) -> Lake:
             raise NotFoundError(
                 "a worker does not see the lake",
                 where=f"{address} on {gethostname()}",
-                fix="keep the lake in a bucket (s3://bucket/prefix), or in a folder that all workers share",
+                fix="keep the lake in a bucket (s3://bucket/prefix), or in a folder that all "
+                "workers share",
             ) from None
     return lakes[address]
 
@@ -216,7 +235,9 @@ def shot(
     else:
         member = _crew(simulation)[0].member(job.index)
         toward = member.parameters["wind_toward"]
-        meshes = Meshes.flag(sequence, heading=float(toward) if isinstance(toward, float) else 0.0, device=device)
+        meshes = Meshes.flag(
+            sequence, heading=float(toward) if isinstance(toward, float) else 0.0, device=device
+        )
     with torch.no_grad():
         return _renderer(recipe.renderer, assets).render(meshes, zeta)
 
@@ -233,7 +254,8 @@ def _crew(simulation: Simulation) -> tuple[Crew, dict[int, Stepper]]:
 
 
 def _renderer(name: str, assets: Assets) -> Any:
-    """Returns this thread's renderer: Blender's has a process of its own, which answers one request at a time."""
+    """Returns this thread's renderer: Blender's has a process of its own, which answers one request
+    at a time."""
     renderers: dict[tuple[str, Assets], Any] = _own.__dict__.setdefault("renderers", {})
     if (name, assets) not in renderers:
         renderers[name, assets] = RENDERERS[name](assets=assets)

@@ -1,4 +1,5 @@
-"""What a build will take: counts from the recipe and the lake, bytes and hours from a measurement of a few frames."""
+"""What a build will take: counts from the recipe and the lake, bytes and hours from a measurement
+of a few frames."""
 
 from __future__ import annotations
 
@@ -28,7 +29,9 @@ T = TypeVar("T")
 _FEW, _MORE = 3, 9  # frames of the two runs between which costs are linear
 _BRIEF = 180.0  # s
 _USUAL_PACE = 25.0  # s of a flag in a second of one core
-_USUAL_FRAMES = 50.0  # of the raster renderer in a second of one core, docs/results/bench-render.json
+_USUAL_FRAMES = (
+    50.0  # of the raster renderer in a second of one core, docs/results/bench-render.json
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +39,8 @@ class Rates:
     """What one takes.
 
     Attributes:
-        sequence_seconds, film_seconds: of one core (or the device), for a whole sequence and a whole film.
+        sequence_seconds, film_seconds: of one core (or the device), for a whole sequence and a
+            whole film.
         sequence_bytes, film_bytes: in the lake.
     """
 
@@ -69,13 +73,19 @@ class Plan:
     @property
     def seconds(self) -> float:
         """Wall time [s]."""
-        work = self.missing_sequences * self.rates.sequence_seconds + self.missing_films * self.rates.film_seconds
+        work = (
+            self.missing_sequences * self.rates.sequence_seconds
+            + self.missing_films * self.rates.film_seconds
+        )
         return work / self.workers
 
     @property
     def size(self) -> float:
         """Size of what is missing [B]."""
-        return self.missing_sequences * self.rates.sequence_bytes + self.missing_films * self.rates.film_bytes
+        return (
+            self.missing_sequences * self.rates.sequence_bytes
+            + self.missing_films * self.rates.film_bytes
+        )
 
     def as_dict(self) -> dict[str, Any]:
         return {
@@ -124,16 +134,22 @@ def plan(
     frames: dict[str, list[int]] = {side.name: [] for side in recipe.sides}
     for side in recipe.sides:
         side_rolls = [roll for roll in rolls if roll.cast.side.name == side.name]
-        members = tuple((roll.cast, index, roll.id(index)) for roll in side_rolls for index in roll.chosen)
+        members = tuple(
+            (roll.cast, index, roll.id(index)) for roll in side_rolls for index in roll.chosen
+        )
         side_films = Sequences(recipe=recipe, side=side.name, members=members).films()
         for film in side_films:
-            films += film.artifact().id not in in_lake and (in_shard is None or film.sequence in in_shard)
+            films += film.artifact().id not in in_lake and (
+                in_shard is None or film.sequence in in_shard
+            )
             frames[side.name].append(film.cast.simulation.time.frames)
     return Plan(
         recipe=recipe,
         sequences={side.name: side.sequences for side in recipe.sides},
         films={side.name: side.renders for side in recipe.sides},
-        clips={side: sum(count // CLIP_FRAMES for count in counts) for side, counts in frames.items()},
+        clips={
+            side: sum(count // CLIP_FRAMES for count in counts) for side, counts in frames.items()
+        },
         missing_sequences=sum(len(roll.pending(in_lake, in_shard)) for roll in rolls),
         missing_films=films,
         rates=rates or measure(recipe, _typical([roll.cast for roll in rolls]), device=device),
@@ -150,8 +166,8 @@ def length(
     device: str = "cpu",
     shard: Shard | None = None,
 ) -> str | None:
-    """Describes what a build makes and for about how long; None where nothing is missing. Rates are measured where the
-    typical ones predict more than a few minutes.
+    """Describes what a build makes and for about how long; None where nothing is missing. Rates are
+    measured where the typical ones predict more than a few minutes.
 
     Raises:
         FlagdataError: the measurement failed, as the build would.
@@ -160,7 +176,11 @@ def length(
     usual = plan(recipe, lake, workers=workers, branch=branch, rates=_usual(typical), shard=shard)
     if not usual.missing_sequences and not usual.missing_films:
         return None
-    estimate = usual if usual.seconds < _BRIEF else replace(usual, rates=measure(recipe, typical, device=device))
+    estimate = (
+        usual
+        if usual.seconds < _BRIEF
+        else replace(usual, rates=measure(recipe, typical, device=device))
+    )
     return announce_work(
         f"building {estimate.missing_sequences} sequences and {estimate.missing_films} films",
         estimate.seconds * workers,
@@ -188,7 +208,8 @@ def _typical(sequences: Sequence[Cast]) -> Cast:
 
 
 def measure(recipe: DatasetRecipe, cast: Cast, *, device: str = "cpu") -> Rates:
-    """Simulates and films two short sequences of every material, and extrapolates in proportion to their frames.
+    """Simulates and films two short sequences of every material, and extrapolates in proportion to
+    their frames.
 
     Raises:
         FlagdataError: no sequence can be simulated, or a renderer that is not installed or fails.
@@ -197,13 +218,18 @@ def measure(recipe: DatasetRecipe, cast: Cast, *, device: str = "cpu") -> Rates:
     spec = cast.simulation.time
     bases = range(len(cast.simulation.material.bases))
     with one_thread():
-        runs = [(_simulate_few(shorter, base, device), _simulate_few(longer, base, device)) for base in bases]
+        runs = [
+            (_simulate_few(shorter, base, device), _simulate_few(longer, base, device))
+            for base in bases
+        ]
         films = [_film_cost(recipe, cast, run, device) for run in runs[0]]
     sequences = [_line(a.seconds, b.seconds, spec.total) for a, b in runs]
     return Rates(
         sequence_seconds=sum(sequences) / len(sequences),
         film_seconds=_line(films[0][0], films[1][0], spec.frames),
-        sequence_bytes=_line(_stored_size(runs[0][0].sequence), _stored_size(runs[0][1].sequence), spec.frames),
+        sequence_bytes=_line(
+            _stored_size(runs[0][0].sequence), _stored_size(runs[0][1].sequence), spec.frames
+        ),
         film_bytes=_line(films[0][1], films[1][1], spec.frames),
     )
 
@@ -225,12 +251,20 @@ def _shorten_cast(cast: Cast, frames: int) -> Cast:
 def _simulate_few(cast: Cast, base: int, device: str) -> _Run:
     simulation, crew = cast.simulation, Roll(cast=cast).crew
     indices = list(islice((i for i in itertools.count() if crew.base(i) == base), simulation.batch))
-    build_jobs.simulate(_shorten_cast(cast, 1).simulation, base, indices[:1], device)  # the kernel is compiled once
+    build_jobs.simulate(
+        _shorten_cast(cast, 1).simulation, base, indices[:1], device
+    )  # the kernel is compiled once
     done, seconds = _time_call(partial(build_jobs.simulate, simulation, base, indices, device))
     for outcome in done.outcomes:
         if outcome.sequence is not None:
-            return _Run(index=outcome.member.index, sequence=outcome.sequence, seconds=seconds / len(indices))
-    raise FlagdataError("no sequence could be simulated", where=simulation.name, fix="correct the scene")
+            return _Run(
+                index=outcome.member.index,
+                sequence=outcome.sequence,
+                seconds=seconds / len(indices),
+            )
+    raise FlagdataError(
+        "no sequence could be simulated", where=simulation.name, fix="correct the scene"
+    )
 
 
 def _film_cost(recipe: DatasetRecipe, cast: Cast, run: _Run, device: str) -> tuple[float, float]:
@@ -256,5 +290,6 @@ def _stored_size(sequence: MeshSequence | RaggedMeshSequence) -> float:
 
 
 def _line(of_few: float, of_more: float, frames: int) -> float:
-    """Extrapolates linearly to `frames` frames from two smaller numbers of them; never below the larger of the two."""
+    """Extrapolates linearly to `frames` frames from two smaller numbers of them; never below the
+    larger of the two."""
     return max(of_few, of_more, of_few + (of_more - of_few) / (_MORE - _FEW) * (frames - _FEW))

@@ -1,5 +1,5 @@
-"""From the renderer's colours to the camera's file: gray, noise, then JPEGs of one size, which reveals nothing, or
-H.264."""
+"""From the renderer's colours to the camera's file: gray, noise, then JPEGs of one size, which
+reveals nothing, or H.264."""
 
 from __future__ import annotations
 
@@ -25,7 +25,11 @@ def settings(spec: CameraSpec, *, seed: int) -> dict[str, float]:
     """Draws the settings of a recording's camera, "camera.…" → value."""
 
     def drawn(quantity: Quantity, name: str) -> float:
-        return quantity.at(stream(seed, "camera", name).random()) if isinstance(quantity, Range) else quantity
+        return (
+            quantity.at(stream(seed, "camera", name).random())
+            if isinstance(quantity, Range)
+            else quantity
+        )
 
     if spec.coding is Coding.JPEG:
         coding = {"camera.jpeg_quality": float(round(drawn(spec.jpeg_quality, "jpeg-quality")))}
@@ -38,7 +42,9 @@ def settings(spec: CameraSpec, *, seed: int) -> dict[str, float]:
     }
 
 
-def encode_pictures(frames: UInt8Array, drawn: dict[str, float], spec: CameraSpec, *, seed: int) -> list[bytes]:
+def encode_pictures(
+    frames: UInt8Array, drawn: dict[str, float], spec: CameraSpec, *, seed: int
+) -> list[bytes]:
     """Encodes frames (n, height, width, 3) as the camera stores them, one message each.
 
     Args:
@@ -52,15 +58,22 @@ def encode_pictures(frames: UInt8Array, drawn: dict[str, float], spec: CameraSpe
         drawn["camera.jpeg_quality"] = float(quality)
         return pictures
     encoder = VideoEncoder(
-        height=frames.shape[1], width=frames.shape[2], rate_factor=drawn["camera.rate_factor"], preset=_PRESET
+        height=frames.shape[1],
+        width=frames.shape[2],
+        rate_factor=drawn["camera.rate_factor"],
+        preset=_PRESET,
     )
     return [encoder.encode(gray) for gray in _noisy(frames, drawn, seed=seed)]
 
 
-def jpegs(frames: UInt8Array, drawn: dict[str, float], *, slot: int, seed: int) -> tuple[list[bytes], int]:
-    """JPEGs of frames (n, height, width, 3), gray (Rec. 601, as everywhere in `flagdata.ingest`), and their quality.
+def jpegs(
+    frames: UInt8Array, drawn: dict[str, float], *, slot: int, seed: int
+) -> tuple[list[bytes], int]:
+    """JPEGs of frames (n, height, width, 3), gray (Rec. 601, as everywhere in `flagdata.ingest`),
+    and their quality.
 
-    All are `slot` bytes long. Where one would be longer at the drawn quality, the whole film has the best at which none
+    All are `slot` bytes long. Where one would be longer at the drawn quality, the whole film has
+    the best at which none
     is: a camera with a limited rate does the same.
 
     Args:
@@ -79,7 +92,9 @@ def jpegs(frames: UInt8Array, drawn: dict[str, float], *, slot: int, seed: int) 
             continue
         if quality == 1:
             raise InputError(
-                f"a frame takes {len(jpeg):,} B at the lowest quality", where=f"frame-slot = {slot}", fix="raise it"
+                f"a frame takes {len(jpeg):,} B at the lowest quality",
+                where=f"frame-slot = {slot}",
+                fix="raise it",
             )
         quality -= 1
         coded.clear()
@@ -103,7 +118,9 @@ def noisy(gray: UInt8Array, drawn: Mapping[str, float], rng: np.random.Generator
         return gray
     light = gray.astype(np.float32)
     sigma = np.sqrt(read**2 + shot**2 * light / 255)
-    return np.clip(np.rint(light + sigma * rng.standard_normal(light.shape, dtype=np.float32)), 0, 255).astype(np.uint8)
+    return np.clip(
+        np.rint(light + sigma * rng.standard_normal(light.shape, dtype=np.float32)), 0, 255
+    ).astype(np.uint8)
 
 
 def pad_jpeg(jpeg: bytes, length: int) -> bytes:

@@ -1,4 +1,5 @@
-"""The card of a data set that was built: what is in it, how it was made, what it looks like. One HTML file."""
+"""The card of a data set that was built: what is in it, how it was made, what it looks like. One
+HTML file."""
 
 from __future__ import annotations
 
@@ -53,12 +54,15 @@ class Distribution:
 
 
 def check(path: Path | None) -> None:
-    """Refuse a path to which `write_card` cannot write, before anything is simulated; raises as `write_card`."""
+    """Refuse a path to which `write_card` cannot write, before anything is simulated; raises as
+    `write_card`."""
     if path is not None:
         check_file(path, command=_COMMAND)
 
 
-def write_card(lake: Lake, recipe: DatasetRecipe, *, branch: str = "main", path: Path | None = None) -> Place:
+def write_card(
+    lake: Lake, recipe: DatasetRecipe, *, branch: str = "main", path: Path | None = None
+) -> Place:
     """Write the card of a data set, read off the lake.
 
     Args:
@@ -72,7 +76,9 @@ def write_card(lake: Lake, recipe: DatasetRecipe, *, branch: str = "main", path:
         InputError: its folder is not there or cannot be written.
     """
     sides, rows = _sides(lake, recipe, branch)
-    parameters = [column_json(row["parameters"], "parameters", artifact=row["artifact"]) for row in rows]
+    parameters = [
+        column_json(row["parameters"], "parameters", artifact=row["artifact"]) for row in rows
+    ]
     values = {
         "recipe": recipe,
         "sides": sides,
@@ -102,19 +108,29 @@ def write_card(lake: Lake, recipe: DatasetRecipe, *, branch: str = "main", path:
 
 def _frames(recipe: DatasetRecipe) -> str:
     """Describes how many frames a film has, at each rate."""
-    times = sorted({(cast.simulation.time.rate, cast.simulation.time.frames) for cast in casts(recipe)})
+    times = sorted(
+        {(cast.simulation.time.rate, cast.simulation.time.frames) for cast in casts(recipe)}
+    )
     return "; ".join(f"{frames} frames at {rate:g} Hz" for rate, frames in times)
 
 
-def _sides(lake: Lake, recipe: DatasetRecipe, branch: str) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+def _sides(
+    lake: Lake, recipe: DatasetRecipe, branch: str
+) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     """Counts what each side holds, and lists all recordings by name."""
     sides: list[dict[str, Any]] = []
     recordings: list[dict[str, Any]] = []
     columns = ["artifact", "name", "seed", "session", "parameters", "object", "object_bytes"]
     for side in recipe.sides:
         of_side = {"dataset": recipe.name, "side": side.name}
-        rows = lake.rows({**of_side, "kind": Kind.RECORDING}, at=branch, columns=columns).to_pylist()
-        clips = lake.rows({**of_side, "kind": Kind.CLIP}, at=branch, columns=["wind"])["wind"].drop_null().to_numpy()
+        rows = lake.rows(
+            {**of_side, "kind": Kind.RECORDING}, at=branch, columns=columns
+        ).to_pylist()
+        clips = (
+            lake.rows({**of_side, "kind": Kind.CLIP}, at=branch, columns=["wind"])["wind"]
+            .drop_null()
+            .to_numpy()
+        )
         sides.append(
             {
                 "name": side.name,
@@ -122,8 +138,12 @@ def _sides(lake: Lake, recipe: DatasetRecipe, branch: str) -> tuple[list[dict[st
                 "films": len(rows),
                 "sessions": len({row["session"] for row in rows} - {None}),
                 "clips": len(clips),
-                "seeds": (min(row["seed"] for row in rows), max(row["seed"] for row in rows)) if rows else None,
-                "wind": (float(clips.min()), float(np.median(clips)), float(clips.max())) if len(clips) else None,
+                "seeds": (min(row["seed"] for row in rows), max(row["seed"] for row in rows))
+                if rows
+                else None,
+                "wind": (float(clips.min()), float(np.median(clips)), float(clips.max()))
+                if len(clips)
+                else None,
             }
         )
         recordings += sorted(rows, key=lambda row: row["name"])
@@ -136,17 +156,30 @@ def distributions(parameters: Sequence[dict[str, Any]], *, rendered: bool) -> li
     Args:
         parameters: of each film.
     """
-    names = dict.fromkeys(name for values in parameters for name, value in values.items() if not isinstance(value, str))
+    names = dict.fromkeys(
+        name
+        for values in parameters
+        for name, value in values.items()
+        if not isinstance(value, str)
+    )
     histograms: list[Distribution] = []
     for name in names:
         if name.startswith("render.") != rendered:
             continue
         values = np.array([entry[name] for entry in parameters if name in entry], dtype=np.float64)
         low, high = float(values.min()), float(values.max())
-        counts = None if math.isclose(low, high) else np.histogram(values, bins=_BINS, range=(low, high))[0].tolist()
+        counts = (
+            None
+            if math.isclose(low, high)
+            else np.histogram(values, bins=_BINS, range=(low, high))[0].tolist()
+        )
         histograms.append(
             Distribution(
-                name=name.removeprefix("render."), low=low, middle=float(np.median(values)), high=high, counts=counts
+                name=name.removeprefix("render."),
+                low=low,
+                middle=float(np.median(values)),
+                high=high,
+                counts=counts,
             )
         )
     return sorted(histograms, key=lambda distribution: by_numbers(distribution.name))
@@ -180,5 +213,8 @@ def _sheet(lake: Lake, recipe: DatasetRecipe, rows: Sequence[dict[str, Any]]) ->
         return ""
     blank = np.full((_PICTURE, _PICTURE), 255, dtype=np.uint8)
     pictures += [blank] * (-len(pictures) % _COLUMNS)
-    lines = [np.concatenate(pictures[i : i + _COLUMNS], axis=1) for i in range(0, len(pictures), _COLUMNS)]
+    lines = [
+        np.concatenate(pictures[i : i + _COLUMNS], axis=1)
+        for i in range(0, len(pictures), _COLUMNS)
+    ]
     return still(np.concatenate(lines))

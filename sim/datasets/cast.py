@@ -18,7 +18,8 @@ from sim.run.simulation_recipe import MaterialSpec
 from sim.run.simulation_recipe import Recipe as Simulation
 
 IN_PLACE_OF = "in_place_of"
-"""Entry in the report of a sequence that others failed before: index → why, of the members whose place it takes."""
+"""Entry in the report of a sequence that others failed before: index → why, of the members whose
+place it takes."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,7 +30,8 @@ class Cast:
         side: they belong to.
         session: number of their session on that side; None where each stands alone.
         simulation: its `count` is how many are wanted.
-        stated: what was drawn for all of them, name → value, SI; it goes into the ground truth of their films.
+        stated: what was drawn for all of them, name → value, SI; it goes into the ground truth of
+            their films.
     """
 
     side: Side
@@ -39,7 +41,8 @@ class Cast:
 
 
 def casts(recipe: DatasetRecipe) -> Iterator[Cast]:
-    """Yields all sequences of a data set: by side, then by session or group. No two sides share a seed."""
+    """Yields all sequences of a data set: by side, then by session or group. No two sides share a
+    seed."""
     for side in recipe.sides:
         root = replace(recipe.simulation, name=f"{recipe.name}-{side.name}", title=recipe.title)
         if recipe.groups is not None:
@@ -47,24 +50,37 @@ def casts(recipe: DatasetRecipe) -> Iterator[Cast]:
             continue
         if recipe.sessions is None or not side.sessions:
             seed = child_seed(recipe.seed, "sequences", side.name)
-            yield Cast(side=side, session=None, simulation=replace(root, seed=seed, count=side.sequences))
+            yield Cast(
+                side=side, session=None, simulation=replace(root, seed=seed, count=side.sequences)
+            )
             continue
         for session in range(side.sessions):
             seed = child_seed(recipe.seed, "sequences", side.name, session)
             count = len(range(session, side.sequences, side.sessions))
             simulation = _of_session(replace(root, seed=seed, count=count), recipe.sessions)
-            yield Cast(side=side, session=session, simulation=replace(simulation, name=f"{root.name}-{session:02d}"))
+            yield Cast(
+                side=side,
+                session=session,
+                simulation=replace(simulation, name=f"{root.name}-{session:02d}"),
+            )
 
 
-def _groups(recipe: DatasetRecipe, groups: GroupSpec, side: Side, root: Simulation) -> Iterator[Cast]:
+def _groups(
+    recipe: DatasetRecipe, groups: GroupSpec, side: Side, root: Simulation
+) -> Iterator[Cast]:
     """Yields the sequences of a side, a batch at a time."""
     for number, first in enumerate(range(0, side.sequences, root.batch)):
-        simulation = replace(root, name=f"{root.name}-{number:03d}", count=min(root.batch, side.sequences - first))
-        yield of_group(simulation, groups, side, seed=child_seed(recipe.seed, "sequences", side.name, number))
+        simulation = replace(
+            root, name=f"{root.name}-{number:03d}", count=min(root.batch, side.sequences - first)
+        )
+        yield of_group(
+            simulation, groups, side, seed=child_seed(recipe.seed, "sequences", side.name, number)
+        )
 
 
 def of_group(simulation: Simulation, groups: GroupSpec, side: Side, *, seed: int) -> Cast:
-    """Sequences with the height, the attachment and the rate that a group of this seed draws, as long as before [s]."""
+    """Sequences with the height, the attachment and the rate that a group of this seed draws, as
+    long as before [s]."""
 
     def drawn(name: str) -> float:
         return stream(seed, "group", name).random()
@@ -104,8 +120,9 @@ def _of_session(simulation: Simulation, spec: SessionSpec) -> Simulation:
 class Roll:
     """Which members of a cast are there: the first of its recipe that do not fail.
 
-    A member that diverges or crumples is left out, and the next index takes its place; since failing is a matter of
-    recipe and index alone, an interrupted build and an unbroken one choose the same.
+    A member that diverges or crumples is left out, and the next index takes its place; since
+    failing is a matter of recipe and index alone, an interrupted build and an unbroken one choose
+    the same.
 
     Attributes:
         cast: whose.
@@ -148,7 +165,8 @@ class Roll:
 
     @property
     def in_one_batch(self) -> bool:
-        """Whether all of its sequences are simulated together, those in place of any that fail too."""
+        """Whether all of its sequences are simulated together, those in place of any that fail
+        too."""
         return self.cast.simulation.count <= self.cast.simulation.batch
 
     @property
@@ -157,7 +175,9 @@ class Roll:
         count = self.cast.simulation.count
         return range(count + max(4, math.ceil(count / 4)))
 
-    def pending(self, in_lake: Collection[str], in_shard: Collection[str] | None = None) -> list[int]:
+    def pending(
+        self, in_lake: Collection[str], in_shard: Collection[str] | None = None
+    ) -> list[int]:
         """Returns the chosen members that are not in the lake.
 
         Args:
@@ -165,13 +185,19 @@ class Roll:
             in_shard: artifact ids that are to be made; None for all.
         """
         self.done |= {index for index in self.chosen if self.id(index) in in_lake}
-        return [i for i in self.chosen if i not in self.done and (in_shard is None or self.id(i) in in_shard)]
+        return [
+            i
+            for i in self.chosen
+            if i not in self.done and (in_shard is None or self.id(i) in in_shard)
+        ]
 
     def id(self, index: int) -> str:
         """Returns the identity of a member's mesh sequence."""
         if index not in self.ids:
             simulation = self.cast.simulation
-            self.ids[index] = member_artifact(simulation, self._recipe, index, self._crew.seed(index)).id
+            self.ids[index] = member_artifact(
+                simulation, self._recipe, index, self._crew.seed(index)
+            ).id
         return self.ids[index]
 
     @property
@@ -181,7 +207,8 @@ class Roll:
 
 
 def recall_failures(lake: Lake, rolls: Sequence[Roll], *, branch: str) -> None:
-    """Notes the members that failed in earlier builds, so that they are not simulated again to fail again.
+    """Notes the members that failed in earlier builds, so that they are not simulated again to fail
+    again.
 
     The reports of the sequences that took their places name them (`IN_PLACE_OF`).
 
@@ -190,7 +217,9 @@ def recall_failures(lake: Lake, rolls: Sequence[Roll], *, branch: str) -> None:
     """
     of = {roll.id(index): roll for roll in rolls for index in roll.candidates}
     rows = lake.rows({"artifact": list(of)}, at=branch, columns=["artifact", "report"])
-    for artifact, report in zip(rows["artifact"].to_pylist(), rows["report"].to_pylist(), strict=True):
+    for artifact, report in zip(
+        rows["artifact"].to_pylist(), rows["report"].to_pylist(), strict=True
+    ):
         if report is not None:
             failed = column_json(report, "report", artifact=artifact).get(IN_PLACE_OF, {})
             of[artifact].failed |= {int(index): why for index, why in failed.items()}

@@ -33,7 +33,8 @@ class PlannedFilm:
         sequence: artifact of the mesh sequence.
         sequence_seed: of the member; the recording's too, so that splits keep its films together.
         seed: of the camera's noise and the anemometer's.
-        look: seed of ζ and of what the instruments are; in a session the camera and the anemometer stay the same.
+        look: seed of ζ and of what the instruments are; in a session the camera and the anemometer
+            stay the same.
         begin: instant at which the simulation's time is 0 [UTC ns].
         filming: all that shapes it beside the sequence and the seeds.
     """
@@ -84,7 +85,8 @@ class Sequences:
         return self.recipe.filming()
 
     def films(self) -> Iterator[PlannedFilm]:
-        """Yields films in the order of their names, which is shuffled so that neighbours are unrelated."""
+        """Yields films in the order of their names, which is shuffled so that neighbours are
+        unrelated."""
         recipe, renders = self.recipe, self.recipe.side(self.side).renders
         order = stream(recipe.seed, "order", self.side).permutation(renders).tolist()
         for position, number in enumerate(order):
@@ -106,7 +108,8 @@ class Sequences:
             )
 
     def _begin(self, cast: Cast, index: int) -> int:
-        """Sessions are on days of their own, the sides' one after another; their recordings follow in the morning."""
+        """Sessions are on days of their own, the sides' one after another; their recordings follow
+        in the morning."""
         if cast.session is None:
             return EPOCH
         before = 0

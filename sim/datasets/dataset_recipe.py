@@ -15,7 +15,14 @@ from flagdata.core.provenance import canonical, digest, file_hash, recipe_hash
 from flagdata.core.rng import child_seed
 from flagdata.core.shell import command_line
 from flagdata.errors import UsageError
-from flagdata.recipes.typed_tables import Count, NotNegative, NotNegativeQuantity, Positive, Quantity, plain
+from flagdata.recipes.typed_tables import (
+    Count,
+    NotNegative,
+    NotNegativeQuantity,
+    Positive,
+    Quantity,
+    plain,
+)
 from flagdata.record.writer import Coding
 from sim.assets.photos import Photos
 from sim.render.render_prior import RenderPrior
@@ -26,8 +33,8 @@ _NOISE = Meta(ge=0.0, le=128.0)
 RECIPE_VERSION = 2
 """Raised whenever the same recipe makes other bytes."""
 _SESSIONS_DRAWN = 2
-"""Raised whenever the same recipe of sessions draws other flags and winds; 1 drew a session's wind from its first
-member's stream."""
+"""Raised whenever the same recipe of sessions draws other flags and winds; 1 drew a session's wind
+from its first member's stream."""
 
 
 class Truth(StrEnum):
@@ -47,7 +54,8 @@ class Side:
         name: "train", "validation", "test".
         sequences: mesh sequences, each of its own seed.
         renders: recordings in all; each sequence has as many as any other, or one more.
-        sessions: set-ups that the sequences are dealt to in turn; 0 where each sequence stands alone.
+        sessions: set-ups that the sequences are dealt to in turn; 0 where each sequence stands
+            alone.
     """
 
     name: str
@@ -61,13 +69,16 @@ class CameraSpec:
     """The camera behind the picture.
 
     Attributes:
-        coding: "jpeg", each frame by itself, or "h264", as field cameras do, in a tenth of the bytes.
+        coding: "jpeg", each frame by itself, or "h264", as field cameras do, in a tenth of the
+            bytes.
         jpeg_quality: 1 to 100; less where a frame would not fit into its slot. Of "jpeg" alone.
         rate_factor: x264's constant rate factor, 0 to 51; smaller is better. Of "h264" alone.
         read_noise: standard deviation that does not depend on the light, in 8-bit steps.
-        shot_noise: of a full-scale (255) pixel, in 8-bit steps; its square is in proportion to the light.
-        frame_slot: length of every stored JPEG, so that it reveals nothing; see `sim.datasets.camera_picture.jpegs`.
-            Records are a whole multiple of it long, those of H.264 too [B].
+        shot_noise: of a full-scale (255) pixel, in 8-bit steps; its square is in proportion to the
+            light.
+        frame_slot: length of every stored JPEG, so that it reveals nothing; see
+            `sim.datasets.camera_picture.jpegs`. Records are a whole multiple of it long, those of
+            H.264 too [B].
     """
 
     coding: Coding = Coding.JPEG
@@ -89,7 +100,8 @@ class AnemometerSpec:
         noise: standard deviation of a sample [m/s].
         resolution: step of its readings [m/s].
         accuracy: standard uncertainty that its data sheet states [m/s].
-        effects: names of `sim.effects.SENSOR_EFFECTS` → parameter → value, drawn for each recording.
+        effects: names of `sim.effects.SENSOR_EFFECTS` → parameter → value, drawn for each
+            recording.
     """
 
     truth: Truth = Truth.STATED
@@ -103,7 +115,8 @@ class AnemometerSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class SessionSpec:
-    """What the sequences of one session have in common beside the flag, camera and light, which are the same.
+    """What the sequences of one session have in common beside the flag, camera and light, which are
+    the same.
 
     Attributes:
         spread: the sequences' winds lie within this share of the session's mean, either way.
@@ -114,14 +127,16 @@ class SessionSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class GroupSpec:
-    """What sequences that are simulated in one batch have in common, drawn for each batch of a side.
+    """What sequences that are simulated in one batch have in common, drawn for each batch of a
+    side.
 
-    A batch has one mesh and one rate, so these cannot differ from member to member. All else differs.
+    A batch has one mesh and one rate, so these cannot differ from member to member. All else
+    differs.
 
     Attributes:
         height: of the cloth [m].
-        rates: of frames [Hz], of which each group takes one with equal chance; a rate that is listed twice is twice as
-            likely. Films of all rates are as long as the scene's [s].
+        rates: of frames [Hz], of which each group takes one with equal chance; a rate that is
+            listed twice is twice as likely. Films of all rates are as long as the scene's [s].
         attachments: where a flag is held, of which each group takes one with equal chance.
     """
 
@@ -201,7 +216,9 @@ class DatasetRecipe:
             "seed": self.seed,
             "simulation": self.simulation.identity(),
             "filming": self.filming(),
-            "sessions": None if self.sessions is None else {"drawn": _SESSIONS_DRAWN, **vars(self.sessions)},
+            "sessions": None
+            if self.sessions is None
+            else {"drawn": _SESSIONS_DRAWN, **vars(self.sessions)},
             "sides": [vars(side).copy() for side in self.sides],
             **_group_description(self.groups, self.simulation.batch),
         }
@@ -238,9 +255,11 @@ def _content(folder: Path) -> str:
     return digest(canonical({name: file_hash(folder / name) for name in Photos.of(folder).members}))
 
 
-def with_counts(recipe: DatasetRecipe, *, sequences: int | None, films: int | None) -> DatasetRecipe:
-    """Returns the recipe with so many sequences and films in all, which is another data set: its name says the counts,
-    and its seed is its own, so that a lake can hold several.
+def with_counts(
+    recipe: DatasetRecipe, *, sequences: int | None, films: int | None
+) -> DatasetRecipe:
+    """Returns the recipe with so many sequences and films in all, which is another data set: its
+    name says the counts, and its seed is its own, so that a lake can hold several.
 
     Args:
         sequences: of all sides together; None for as many as the recipe has.
@@ -254,7 +273,9 @@ def with_counts(recipe: DatasetRecipe, *, sequences: int | None, films: int | No
     before = sum(side.sequences for side in recipe.sides)
     sequences = before if sequences is None else sequences
     if films is None:
-        films = max(sequences, round(sum(side.renders for side in recipe.sides) * sequences / before))
+        films = max(
+            sequences, round(sum(side.renders for side in recipe.sides) * sequences / before)
+        )
     if sequences < len(recipe.sides):
         raise UsageError(
             f"{sequences} sequences cannot be on {len(recipe.sides)} sides",
@@ -266,16 +287,20 @@ def with_counts(recipe: DatasetRecipe, *, sequences: int | None, films: int | No
         raise UsageError(
             f"{films} films are fewer than the {sequences} sequences, and each sequence is filmed",
             where="--films",
-            fix=f"give {command_line('--films', sequences)} or more, or {command_line('--sequences', films)} or fewer",
+            fix=f"give {command_line('--films', sequences)} or more, or "
+            f"{command_line('--sequences', films)} or fewer",
         )
-    of_sides = _dealt(sequences, [side.sequences for side in recipe.sides], least=[1] * len(recipe.sides))
+    of_sides = _dealt(
+        sequences, [side.sequences for side in recipe.sides], least=[1] * len(recipe.sides)
+    )
     filmed = _dealt(films, [side.renders for side in recipe.sides], least=of_sides)
     sides = tuple(
         replace(
             side,
             sequences=count,
             renders=renders,
-            sessions=side.sessions and max(1, min(count, round(side.sessions * count / side.sequences))),
+            sessions=side.sessions
+            and max(1, min(count, round(side.sessions * count / side.sequences))),
         )
         for side, count, renders in zip(recipe.sides, of_sides, filmed, strict=True)
     )
@@ -286,13 +311,17 @@ def with_counts(recipe: DatasetRecipe, *, sequences: int | None, films: int | No
 
 
 def _dealt(total: int, shares: Sequence[int], *, least: Sequence[int]) -> list[int]:
-    """Divides a total in proportion to shares, none below its least, the largest remainders first."""
+    """Divides a total in proportion to shares, none below its least, the largest remainders
+    first."""
     exact = [total * share / sum(shares) for share in shares]
     counts = [max(floor, int(part)) for floor, part in zip(least, exact, strict=True)]
     while sum(counts) < total:
         most = max(range(len(counts)), key=lambda side: exact[side] - counts[side])
         counts[most] += 1
     while sum(counts) > total:
-        most = max(range(len(counts)), key=lambda side: (counts[side] > least[side], counts[side] - exact[side]))
+        most = max(
+            range(len(counts)),
+            key=lambda side: (counts[side] > least[side], counts[side] - exact[side]),
+        )
         counts[most] -= 1
     return counts

@@ -1,4 +1,5 @@
-"""The record of a simulated film: frames, anemometer and parameters in one MCAP file, as a real recording has them."""
+"""The record of a simulated film: frames, anemometer and parameters in one MCAP file, as a real
+recording has them."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ from sim.render.parameters import RenderParameters
 from sim.run.members import Member, Parameter
 
 FILL = "fill"
-"""Attachment that pads a record to a whole multiple of the camera's `frame_slot`, so that its length reveals little."""
+"""Attachment that pads a record to a whole multiple of the camera's `frame_slot`, so that its
+length reveals little."""
 MEAN_WIND = "mean_wind_speed"
 
 
@@ -46,7 +48,8 @@ class Content:
 
 
 def record_bytes(content: Content) -> bytes:
-    """Returns the record's bytes. It is written twice: the first one's length gives the padding of the second.
+    """Returns the record's bytes. It is written twice: the first one's length gives the padding of
+    the second.
 
     The code's version is in the catalog, not in the file: the same film gives the same bytes.
     """
@@ -62,7 +65,11 @@ def _write(path: Path, content: Content, *, fill: int) -> None:
     film, zeta, times = content.film, content.zeta, content.times
     row = film.artifact()
     start, end = int(times[0]), int(times[-1])
-    rate = (len(times) - 1) * NANOSECONDS / (end - start) if len(times) > 1 else film.cast.simulation.time.rate
+    rate = (
+        (len(times) - 1) * NANOSECONDS / (end - start)
+        if len(times) > 1
+        else film.cast.simulation.time.rate
+    )
     camera = CameraInfo(
         container="render",
         codec=film.filming["renderer"],
@@ -77,7 +84,11 @@ def _write(path: Path, content: Content, *, fill: int) -> None:
         duration=(end - start) / NANOSECONDS,
         crop=(0, 0, zeta.width, zeta.height),
     )
-    provenance = {"meshes": film.sequence, "recipe": canonical(row.recipe), "recipe_hash": recipe_hash(row.recipe)}
+    provenance = {
+        "meshes": film.sequence,
+        "recipe": canonical(row.recipe),
+        "recipe_hash": recipe_hash(row.recipe),
+    }
     metadata = {PROVENANCE: provenance, CAMERA: camera_metadata(camera)}
     with RecordWriter(path, metadata=metadata, coding=content.camera.coding) as record:
         for time, frame in zip(times.tolist(), content.frames, strict=True):
@@ -87,15 +98,20 @@ def _write(path: Path, content: Content, *, fill: int) -> None:
         record.attach(FILL, bytes(fill), media_type="application/octet-stream", log_time=start)
 
 
-def parameters_of(member: Member, zeta: RenderParameters, drawn: Mapping[str, float], truth: Truth) -> dict[str, float]:
-    """Returns θ, ζ and what the instruments drew, numbers by name in SI; lists as "name.0", "name.1", …
+def parameters_of(
+    member: Member, zeta: RenderParameters, drawn: Mapping[str, float], truth: Truth
+) -> dict[str, float]:
+    """Returns θ, ζ and what the instruments drew, numbers by name in SI; lists as "name.0",
+    "name.1", …
 
-    If the anemometer is the ground truth (`Truth.MEASURED`), the simulated mean wind is called mean_wind_speed, so that
-    nothing takes it for the truth.
+    If the anemometer is the ground truth (`Truth.MEASURED`), the simulated mean wind is called
+    mean_wind_speed, so that nothing takes it for the truth.
     """
     numbers: dict[str, float] = {}
     for name, value in member.parameters.items():
-        numbers |= _numbers(MEAN_WIND if name == "wind_speed" and truth is Truth.MEASURED else name, value)
+        numbers |= _numbers(
+            MEAN_WIND if name == "wind_speed" and truth is Truth.MEASURED else name, value
+        )
     for name, value in zeta.as_dict().items():
         numbers |= _numbers(f"render.{name}", value)
     return {**numbers, **drawn}
@@ -112,4 +128,8 @@ def _numbers(name: str, value: Parameter) -> dict[str, float]:
 def texts_of(member: Member, zeta: RenderParameters) -> dict[str, str]:
     """Returns the parameters that are names."""
     drawn = {f"render.{name}": value for name, value in zeta.as_dict().items()}
-    return {name: value for name, value in {**member.parameters, **drawn}.items() if isinstance(value, str)}
+    return {
+        name: value
+        for name, value in {**member.parameters, **drawn}.items()
+        if isinstance(value, str)
+    }

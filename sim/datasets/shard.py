@@ -16,8 +16,8 @@ _WRITTEN = re.compile(r"(\d{1,6})/(\d{1,6})")
 
 @dataclass(frozen=True, kw_only=True)
 class Shard:
-    """The sequences, with their films, that one of `of` builds makes: those simulated together stay together, and so do
-    those of their cast that take the place of any that fail.
+    """The sequences, with their films, that one of `of` builds makes: those simulated together stay
+    together, and so do those of their cast that take the place of any that fail.
 
     Attributes:
         number: which build, from 1.
@@ -51,6 +51,10 @@ class Shard:
         for roll in rolls:
             count, batch = roll.cast.simulation.count, roll.cast.simulation.batch
             batches = {index: min(index, count - 1) // batch for index in roll.candidates}
-            shard |= {roll.id(i) for i, number in batches.items() if (before + number) % self.of == self.number - 1}
+            shard |= {
+                roll.id(i)
+                for i, number in batches.items()
+                if (before + number) % self.of == self.number - 1
+            }
             before += math.ceil(count / batch)
         return frozenset(shard)

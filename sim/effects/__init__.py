@@ -1,6 +1,7 @@
 """Effects the base model lacks: one a file, each with null value, unit, prior and source.
 
-An entry here enrols it in the contract suites (`tests/contract/test_effects.py`, `test_sensor_effects.py`).
+An entry here enrols it in the contract suites (`tests/contract/test_effects.py`,
+`test_sensor_effects.py`).
 """
 
 from __future__ import annotations
@@ -24,7 +25,15 @@ if TYPE_CHECKING:
     from sim.effects.hem_mass import HemMass
     from sim.effects.internal_damping import InternalDamping
     from sim.effects.lift import Lift
-    from sim.effects.parameter import NOT_NEGATIVE, Parameter, Parametrised, Role, Value, shape, strength
+    from sim.effects.parameter import (
+        NOT_NEGATIVE,
+        Parameter,
+        Parametrised,
+        Role,
+        Value,
+        shape,
+        strength,
+    )
     from sim.effects.permeability import Permeability
     from sim.effects.porosity import Porosity
     from sim.effects.power_law_drag import PowerLawDrag
@@ -72,8 +81,8 @@ EFFECTS = Registry(
     group="flagdata.effects",
     accepts=lambda entry: isinstance(entry, type) and issubclass(entry, Effect),
 )
-"""On the cloth: kinds of `sim.effects.effect`; also those of installed packages, from the entry points
-`flagdata.effects`. Of files, see `sim.effects.effect_files`."""
+"""On the cloth: kinds of `sim.effects.effect`; also those of installed packages, from the entry
+points `flagdata.effects`. Of files, see `sim.effects.effect_files`."""
 
 SENSOR_EFFECTS = Registry(
     "sensor effect",

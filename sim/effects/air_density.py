@@ -25,7 +25,8 @@ class AirDensityChange(PressureEffect):
             unit="1",
             prior=(-0.25, 0.3),
             admissible=(-1.0, 10.0),
-            source="1.225 kg/m³ ± 15 % for −20 to 40 °C and 0 to 1,000 m (U.S. Standard Atmosphere 1976), around a "
+            source="1.225 kg/m³ ± 15 % for −20 to 40 °C and 0 to 1,000 m (U.S. Standard Atmosphere "
+            "1976), around a "
             "base of 1.0 to 1.3 kg/m³",
         ),
     ] = 0.0

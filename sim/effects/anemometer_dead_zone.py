@@ -14,7 +14,8 @@ from sim.effects.sensor import AnemometerEffect
 
 @dataclass(frozen=True, kw_only=True)
 class AnemometerDeadZone(AnemometerEffect):
-    """The reading is 0 below a threshold in size and u from it on: a jump, so that the threshold has no gradient.
+    """The reading is 0 below a threshold in size and u from it on: a jump, so that the threshold
+    has no gradient.
 
     Attributes:
         threshold: the starting speed.
@@ -26,7 +27,8 @@ class AnemometerDeadZone(AnemometerEffect):
             unit="m/s",
             prior=(0.1, 1.5),
             admissible=NOT_NEGATIVE,
-            source="starting thresholds of cups and vanes 0.2–1 m/s (WMO-No. 8, part I, ch. 5), worn bearings more",
+            source="starting thresholds of cups and vanes 0.2–1 m/s (WMO-No. 8, part I, ch. 5), "
+            "worn bearings more",
         ),
     ] = 0.0
 

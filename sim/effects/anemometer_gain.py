@@ -25,7 +25,8 @@ class AnemometerGain(AnemometerEffect):
             unit="1",
             prior=(0.85, 1.15),
             admissible=(0.0, 10.0),
-            source="1–3 % calibrated (IEC 61400-12-1), 5–10 % hand-held and worn bearings; the site adds as much",
+            source="1–3 % calibrated (IEC 61400-12-1), 5–10 % hand-held and worn bearings; the "
+            "site adds as much",
         ),
     ] = 1.0
 

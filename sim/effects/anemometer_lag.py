@@ -17,13 +17,16 @@ _TINY = 1e-12
 
 @dataclass(frozen=True, kw_only=True)
 class AnemometerLag(AnemometerEffect):
-    """First-order response: τ dm/dt = u − m, τ = ℓ/⟨u⟩ with the mean of the series; it starts in balance.
+    """First-order response: τ dm/dt = u − m, τ = ℓ/⟨u⟩ with the mean of the series; it starts in
+    balance.
 
-    Solved exactly for a speed that is linear between samples. (With u in place of its mean the response would be faster
+    Solved exactly for a speed that is linear between samples. (With u in place of its mean the
+    response would be faster
     in gusts than in lulls: that part is `Overspeeding`.)
 
     Attributes:
-        distance: ℓ, the distance constant: the run of wind in which the reading makes 63 % of a step.
+        distance: ℓ, the distance constant: the run of wind in which the reading makes 63 % of a
+            step.
     """
 
     distance: Annotated[
@@ -32,7 +35,8 @@ class AnemometerLag(AnemometerEffect):
             unit="m",
             prior=(0.3, 8.0),
             admissible=NOT_NEGATIVE,
-            source="cups 1.5–5 m, propellers 1–3 m, heavy instruments to 8 m (ISO 17713-1; WMO-No. 8)",
+            source="cups 1.5–5 m, propellers 1–3 m, heavy instruments to 8 m (ISO 17713-1; WMO-No. "
+            "8)",
         ),
     ] = 0.0
 

@@ -24,7 +24,8 @@ class AnemometerOffset(AnemometerEffect):
         strength(
             unit="m/s",
             prior=(-0.5, 0.5),
-            source="zero drift of thermal and pressure sensors 0.1–0.5 m/s; calibration intercepts of cups 0.2",
+            source="zero drift of thermal and pressure sensors 0.1–0.5 m/s; calibration intercepts "
+            "of cups 0.2",
         ),
     ] = 0.0
 

@@ -25,7 +25,8 @@ class ClockDrift(ClockEffect):
             unit="s/s",
             prior=(-1e-4, 1e-4),
             admissible=(-0.1, 0.1),
-            source="quartz: 20 ppm at room temperature, 100 ppm in sun and frost (data sheets of 32 kHz crystals)",
+            source="quartz: 20 ppm at room temperature, 100 ppm in sun and frost (data sheets of "
+            "32 kHz crystals)",
         ),
     ] = 0.0
 

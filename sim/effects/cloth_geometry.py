@@ -20,7 +20,8 @@ def norm(vectors: Tensor, *, axis: int = 1) -> Tensor:
 
 
 def origin(system: System, state: State) -> Tensor:
-    """Computes the middle of the attachments, or of the cloth where nothing holds it, (3, batch) [m]."""
+    """Computes the middle of the attachments, or of the cloth where nothing holds it, (3, batch)
+    [m]."""
     return (system.anchors if len(system.held) else state.position).mean(0)
 
 
@@ -31,7 +32,8 @@ def horizontal(vectors: Tensor, *, axis: int) -> Tensor:
 
 
 def left_of(vectors: Tensor, *, axis: int) -> Tensor:
-    """Computes z × the vectors: their horizontal part turned by 90° counter-clockwise seen from above."""
+    """Computes z × the vectors: their horizontal part turned by 90° counter-clockwise seen from
+    above."""
     x, y, z = vectors.unbind(axis)
     return torch.stack([-y, x, torch.zeros_like(z)], axis)
 
@@ -45,7 +47,12 @@ def disturbed_wind(wind: Tensor, relative: Tensor) -> Tensor:
     """
     level = horizontal(wind, axis=0)
     up = torch.zeros_like(wind).index_fill(0, torch.tensor(2, device=wind.device), 1.0)
-    return wind + relative[0] * level + relative[1] * left_of(wind, axis=0) + relative[2] * norm(level, axis=0) * up
+    return (
+        wind
+        + relative[0] * level
+        + relative[1] * left_of(wind, axis=0)
+        + relative[2] * norm(level, axis=0) * up
+    )
 
 
 def boundary_edges(mesh: Mesh) -> IntArray:
@@ -56,10 +63,13 @@ def boundary_edges(mesh: Mesh) -> IntArray:
 
 
 def hem_lengths(mesh: Mesh) -> FloatArray:
-    """Computes half the length of the boundary edges at each vertex, (vertex,) [m]; their sum is the perimeter."""
+    """Computes half the length of the boundary edges at each vertex, (vertex,) [m]; their sum is
+    the perimeter."""
     edges = boundary_edges(mesh)
     half = np.hypot(*(mesh.rest[edges[:, 1]] - mesh.rest[edges[:, 0]]).T) / 2
-    return np.bincount(edges.ravel(), weights=np.repeat(half, 2), minlength=mesh.vertex_count).astype(np.float64)
+    return np.bincount(
+        edges.ravel(), weights=np.repeat(half, 2), minlength=mesh.vertex_count
+    ).astype(np.float64)
 
 
 def edge_distances(mesh: Mesh) -> FloatArray:

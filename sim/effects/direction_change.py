@@ -16,7 +16,8 @@ from sim.effects.parameter import Value, shape, strength
 
 @dataclass(frozen=True, kw_only=True)
 class DirectionChange(WindEffect):
-    """The wind turns about the vertical by an angle, along the smooth ramp 3 s² − 2 s³, and stays there.
+    """The wind turns about the vertical by an angle, along the smooth ramp 3 s² − 2 s³, and stays
+    there.
 
     Attributes:
         angle: counter-clockwise seen from above: the wind backs.
@@ -30,12 +31,17 @@ class DirectionChange(WindEffect):
             unit="rad",
             prior=(-0.8, 0.8),
             admissible=(-2 * math.pi, 2 * math.pi),
-            source="standard deviation of the direction over 10 min: 0.17–0.44 rad (Pasquill classes D to A)",
+            source="standard deviation of the direction over 10 min: 0.17–0.44 rad (Pasquill "
+            "classes D to A)",
         ),
     ] = 0.0
     start: Annotated[
         Value,
-        shape(unit="s", prior=(0.0, 10.0), source="anywhere in the first part of a recording; a free choice"),
+        shape(
+            unit="s",
+            prior=(0.0, 10.0),
+            source="anywhere in the first part of a recording; a free choice",
+        ),
     ] = 0.0
     duration: Annotated[
         Value,
@@ -48,7 +54,9 @@ class DirectionChange(WindEffect):
     ] = 5.0
 
     def velocity(self, time: float, wind: Tensor) -> Tensor:
-        share = torch.as_tensor((time - self.start) / self.duration, dtype=wind.dtype, device=wind.device).clamp(0, 1)
+        share = torch.as_tensor(
+            (time - self.start) / self.duration, dtype=wind.dtype, device=wind.device
+        ).clamp(0, 1)
         angle = self.angle * share**2 * (3 - 2 * share)
         level = horizontal(wind, axis=0)
         return wind + (torch.cos(angle) - 1) * level + torch.sin(angle) * left_of(wind, axis=0)

@@ -1,6 +1,7 @@
 """The kinds of effects on the cloth. Each kind says where it enters the equations of motion.
 
-An effect is a frozen dataclass, pure, and at the null value of its strengths changes nothing, to the last bit.
+An effect is a frozen dataclass, pure, and at the null value of its strengths changes nothing, to
+the last bit.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ class Effect(Parametrised, ABC):
     """Something that acts on cloth and that the base model lacks.
 
     Attributes:
-        revision: raised where the same strengths act otherwise than before, so that what was simulated is made anew.
+        revision: raised where the same strengths act otherwise than before, so that what was
+            simulated is made anew.
     """
 
     revision: ClassVar[int] = 1
@@ -43,18 +45,24 @@ class Effect(Parametrised, ABC):
 
     def given(self, cloth: Cloth) -> Given:
         """Lists what its C++ reads, if there is any beside its class: its parameters, in order."""
-        return Given(of=type(self), numbers=tuple(getattr(self, name) for name in self.parameters()))
+        return Given(
+            of=type(self), numbers=tuple(getattr(self, name) for name in self.parameters())
+        )
 
 
 def apply(effects: Iterable[Effect], system: System, state: State) -> tuple[System, State]:
-    """Applies these effects to a batch, in order, and to its start. Effects at their null value leave it as it is.
+    """Applies these effects to a batch, in order, and to its start. Effects at their null value
+    leave it as it is.
 
     Raises:
-        UsageError: parameters for another number of members, or an effect that does not fit the system.
+        UsageError: parameters for another number of members, or an effect that does not fit the
+            system.
     """
     for effect in effects:
         if not effect.absent:
-            fitted = effect.for_batch(system.cloth.batch, dtype=system.cloth.dtype, device=system.cloth.device)
+            fitted = effect.for_batch(
+                system.cloth.batch, dtype=system.cloth.dtype, device=system.cloth.device
+            )
             system, state = fitted.apply(system, state)
     return system, state
 
@@ -63,8 +71,11 @@ class ForceEffect(Effect):
     """An additional force."""
 
     @abstractmethod
-    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """Computes forces (vertex, 3, batch) [N], for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
+    def force(
+        self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor
+    ) -> Tensor:
+        """Computes forces (vertex, 3, batch) [N], for a wind (3, batch) or (vertex, 3, batch)
+        [m/s]."""
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
         return replace(system, effects=(*system.effects, self)), state
@@ -123,11 +134,15 @@ class FactoredNormal:
         return self.effects
 
     def force(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """Computes forces (vertex, 3, batch) [N] for a wind (3, batch) or (vertex, 3, batch) [m/s]."""
-        return self.base.force(cloth, position, velocity, wind) + self.beyond(cloth, position, velocity, wind)
+        """Computes forces (vertex, 3, batch) [N] for a wind (3, batch) or (vertex, 3, batch)
+        [m/s]."""
+        return self.base.force(cloth, position, velocity, wind) + self.beyond(
+            cloth, position, velocity, wind
+        )
 
     def beyond(self, cloth: Cloth, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """Computes what the factors add to the force: (vertex, 3, batch) [N] for a wind as `force` has it."""
+        """Computes what the factors add to the force: (vertex, 3, batch) [N] for a wind as `force`
+        has it."""
         relative = face_wind(cloth, position, velocity, wind)
         factor = torch.ones_like(relative.across)
         for effect in self.effects:
@@ -168,12 +183,15 @@ class FlowEffect(Effect):
 
         Args:
             time: [s].
-            offset: (vertex, 3, batch) from the middle of the attachments at the start to the vertices [m].
+            offset: (vertex, 3, batch) from the middle of the attachments at the start to the
+                vertices [m].
             wind: (3, batch) or (vertex, 3, batch) so far [m/s].
         """
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
-        return replace(system, flows=(*system.flows, PlacedFlow(effect=self, origin=origin(system, state)))), state
+        return replace(
+            system, flows=(*system.flows, PlacedFlow(effect=self, origin=origin(system, state)))
+        ), state
 
 
 @dataclass(frozen=True, kw_only=True)

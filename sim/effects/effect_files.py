@@ -17,7 +17,8 @@ from sim.effects.effect import Effect
 
 
 def load(spec: str) -> type[Effect]:
-    """Loads the effect class that `FILE.py:Class` names. The file is run as a module named after its content.
+    """Loads the effect class that `FILE.py:Class` names. The file is run as a module named after
+    its content.
 
     Raises:
         UsageError: not of that form, a file that cannot be run, or a class that is no effect.
@@ -32,13 +33,21 @@ def load(spec: str) -> type[Effect]:
     effect = getattr(module, attribute, None)
     if effect is None:
         raise NotFoundError(
-            f"the file has no class {attribute!r}", where=text, fix="give the name of the effect's class"
+            f"the file has no class {attribute!r}",
+            where=text,
+            fix="give the name of the effect's class",
         )
-    if not (isinstance(effect, type) and issubclass(effect, Effect) and is_dataclass(effect) and effect.strengths()):
+    if not (
+        isinstance(effect, type)
+        and issubclass(effect, Effect)
+        and is_dataclass(effect)
+        and effect.strengths()
+    ):
         raise UsageError(
             f"{attribute!r} is no effect with a strength",
             where=text,
-            fix="derive a frozen dataclass from a kind of effect in flagdata.extend, with an annotated strength",
+            fix="derive a frozen dataclass from a kind of effect in flagdata.extend, with an "
+            "annotated strength",
         )
     return effect
 
@@ -57,5 +66,7 @@ def _module(path: Path) -> object:
         exec(compile(source, str(path), "exec"), vars(module))
     except Exception as error:
         del sys.modules[name]
-        raise UsageError(f"it cannot be run: {error}", where=str(path), fix="correct the file") from error
+        raise UsageError(
+            f"it cannot be run: {error}", where=str(path), fix="correct the file"
+        ) from error
     return module

@@ -17,7 +17,8 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 class ExposureBlur(CameraEffect):
     """The mean over an exposure of length e about the instant, by Gauss–Legendre with five nodes.
 
-    A motion of frequency f keeps the share sin(π f e)/(π f e) of its amplitude; five nodes give it to 1e-6 for f e < 1.
+    A motion of frequency f keeps the share sin(π f e)/(π f e) of its amplitude; five nodes give it
+    to 1e-6 for f e < 1.
 
     Attributes:
         exposure: e.
@@ -37,4 +38,8 @@ class ExposureBlur(CameraEffect):
         nodes = sampling.instants.new_tensor(_NODES)[:, None] / 2
         weights = sampling.instants.new_tensor(_WEIGHTS) / 2
         moved = sampling.instants.unsqueeze(3) + nodes * self.exposure
-        return replace(sampling, instants=moved.flatten(2, 3), weights=(sampling.weights[:, None] * weights).flatten())
+        return replace(
+            sampling,
+            instants=moved.flatten(2, 3),
+            weights=(sampling.weights[:, None] * weights).flatten(),
+        )

@@ -1,6 +1,7 @@
 """Forces per mass that are written down directly, as products of what a place on the cloth sees.
 
-The terms by which new effects are proposed from data are made of these pieces, and so are the files of the effects.
+The terms by which new effects are proposed from data are made of these pieces, and so are the files
+of the effects.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ _LOCAL = 0.1
 
 @dataclass(frozen=True, kw_only=True)
 class Flat:
-    """Shapes on the flat cloth: (vertex, 1, 1), without unit; u grows from hoist to fly, v from bottom to top.
+    """Shapes on the flat cloth: (vertex, 1, 1), without unit; u grows from hoist to fly, v from
+    bottom to top.
 
     Attributes:
         cloth: constants.
@@ -34,7 +36,8 @@ class Flat:
     cloth: Cloth
 
     def _shares(self) -> tuple[Tensor, Tensor]:
-        """Computes shares (vertex, 1, 1) each: of the width from the hoist, of the height from below."""
+        """Computes shares (vertex, 1, 1) each: of the width from the hoist, of the height from
+        below."""
         rest = self.cloth.mesh.rest
         shares = torch.as_tensor((rest - rest.min(axis=0)) / (rest.max(axis=0) - rest.min(axis=0)))
         u, v = shares.to(dtype=self.cloth.dtype, device=self.cloth.device).unbind(1)
@@ -53,8 +56,8 @@ class Flat:
         return _LOCAL * math.sqrt(math.prod(self._extents))
 
     def _bumps(self, u: float | None, v: float | None) -> Tensor:
-        """Computes exp(−d²/2) of the distance d to a point, a line of constant u or one of constant v, in local
-        radii."""
+        """Computes exp(−d²/2) of the distance d to a point, a line of constant u or one of constant
+        v, in local radii."""
         square = torch.zeros_like(self.everywhere)
         for share, centre, extent in zip(self._shares(), (u, v), self._extents, strict=True):
             if centre is not None:
@@ -62,16 +65,18 @@ class Flat:
         return torch.exp(-square / 2)
 
     def near(self, u: float, v: float) -> Tensor:
-        """Computes exp(−d²/(2 s²)) of the distance d to the point at shares u of the width and v of the height; the
-        local radius s is a tenth of √(width × height)."""
+        """Computes exp(−d²/(2 s²)) of the distance d to the point at shares u of the width and v of
+        the height; the local radius s is a tenth of √(width × height)."""
         return self._bumps(u, v)
 
     def stripe(self, u: float) -> Tensor:
-        """Computes the same of the distance to the line from bottom to top at a share u of the width."""
+        """Computes the same of the distance to the line from bottom to top at a share u of the
+        width."""
         return self._bumps(u, None)
 
     def band(self, v: float) -> Tensor:
-        """Computes the same of the distance to the line from hoist to fly at a share v of the height."""
+        """Computes the same of the distance to the line from hoist to fly at a share v of the
+        height."""
         return self._bumps(None, v)
 
     def _wave(self, axis: int) -> Tensor:
@@ -116,8 +121,8 @@ class Flat:
 
 @dataclass(frozen=True, kw_only=True)
 class Seen(Flat):
-    """What the vertices see. Fields are (vertex, 3, batch), or broadcast to it. Normals are the mean normals of
-    `sim.cloth.inertia`.
+    """What the vertices see. Fields are (vertex, 3, batch), or broadcast to it. Normals are the
+    mean normals of `sim.cloth.inertia`.
 
     Attributes:
         position: (vertex, 3, batch) [m].
@@ -164,12 +169,14 @@ class Seen(Flat):
 
     @property
     def toward_pole(self) -> Tensor:
-        """Horizontally from the vertex to the vertical through the middle of the attachments [m]."""
+        """Horizontally from the vertex to the vertical through the middle of the attachments
+        [m]."""
         return -horizontal(self.offset, axis=1)
 
     @property
     def to_pole(self) -> Tensor:
-        """d/√(|d|² + s²) of `toward_pole` d with s the local radius: its direction, but for near the vertical."""
+        """d/√(|d|² + s²) of `toward_pole` d with s the local radius: its direction, but for near
+        the vertical."""
         arm = self.toward_pole
         return arm / ((arm * arm).sum(1, keepdim=True) + self._radius**2).sqrt()
 
@@ -205,7 +212,8 @@ class Seen(Flat):
 
     @property
     def across_even(self) -> Tensor:
-        """(w·n)² n: toward the side that the normals point to, whichever side the wind is on [m²/s²]."""
+        """(w·n)² n: toward the side that the normals point to, whichever side the wind is on
+        [m²/s²]."""
         return self._across * self.across
 
     @property
@@ -285,7 +293,9 @@ class FieldEffect(Effect):
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
         placed = PlacedField(effect=self, origin=origin(system, state))
-        return replace(system, cloth=self.cloth(system.cloth), effects=(*system.effects, placed)), state
+        return replace(
+            system, cloth=self.cloth(system.cloth), effects=(*system.effects, placed)
+        ), state
 
 
 def heavier(cloth: Cloth, share: Tensor) -> Cloth:
@@ -300,7 +310,15 @@ class PlacedField:
     effect: FieldEffect
     origin: Tensor
 
-    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+    def force(
+        self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor
+    ) -> Tensor:
         """Computes forces (vertex, 3, batch) [N]; the time does not matter."""
-        state = Seen(cloth=cloth, position=position, offset=position - self.origin, velocity=velocity, wind=wind)
+        state = Seen(
+            cloth=cloth,
+            position=position,
+            offset=position - self.origin,
+            velocity=velocity,
+            wind=wind,
+        )
         return (cloth.mass.unsqueeze(1) * self.effect.acceleration(state)).expand(position.shape)

@@ -29,7 +29,8 @@ class FrameJitter(CameraEffect):
             unit="s",
             prior=(0.0, 5e-3),
             admissible=NOT_NEGATIVE,
-            source="stamps given by a computer at arrival: 1–5 ms; by the camera itself: microseconds",
+            source="stamps given by a computer at arrival: 1–5 ms; by the camera itself: "
+            "microseconds",
         ),
     ] = 0.0
     draws: Tensor = field(default_factory=lambda: torch.zeros(1, 1, dtype=torch.float64))
@@ -47,4 +48,7 @@ class FrameJitter(CameraEffect):
     @classmethod
     def drawn(cls, rng: np.random.Generator, *, batch: int) -> Self:
         """As for all effects, with draws for 10,000 frames of each member."""
-        return replace(super().drawn(rng, batch=batch), draws=torch.from_numpy(rng.standard_normal((10_000, batch))))
+        return replace(
+            super().drawn(rng, batch=batch),
+            draws=torch.from_numpy(rng.standard_normal((10_000, batch))),
+        )

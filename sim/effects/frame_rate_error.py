@@ -30,4 +30,6 @@ class FrameRateError(CameraEffect):
     def change_instants(self, sampling: Sampling) -> Sampling:
         elapsed = (sampling.stamps - sampling.stamps[0])[:, None, None, None]
         # t₀ + (t − t₀)/(1 + ε) as a change, so that it is exactly none at ε = 0.
-        return replace(sampling, instants=sampling.instants - elapsed * (self.error / (1 + self.error)))
+        return replace(
+            sampling, instants=sampling.instants - elapsed * (self.error / (1 + self.error))
+        )

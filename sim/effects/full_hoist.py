@@ -19,7 +19,8 @@ from sim.effects.parameter import NOT_NEGATIVE, Value, strength
 
 @dataclass(frozen=True, kw_only=True)
 class FullHoist(Effect):
-    """Springs along the hoist, between the handles, to where its vertices start; they move with the handles.
+    """Springs along the hoist, between the handles, to where its vertices start; they move with the
+    handles.
 
     Attributes:
         stiffness: of the springs on each axis, per length of hoist.
@@ -31,7 +32,8 @@ class FullHoist(Effect):
             unit="N/m²",
             prior=(1e2, 2e4),
             admissible=NOT_NEGATIVE,
-            source="loose lacing to a tight sleeve; 1e4 is the reference simulator's 1e3 N/m on vertices 0.1 m apart",
+            source="loose lacing to a tight sleeve; 1e4 is the reference simulator's 1e3 N/m on "
+            "vertices 0.1 m apart",
         ),
     ] = 0.0
 
@@ -43,13 +45,16 @@ class FullHoist(Effect):
             raise InapplicableError(
                 "every vertex of the hoist is held already",
                 where="full hoist",
-                fix="leave the effect out, or start from two corners on a mesh with rows between them",
+                fix="leave the effect out, or start from two corners on a mesh with rows between "
+                "them",
             )
         along = mesh.rest[list(hoist), 1]
         share = np.gradient(along) if len(hoist) > 2 else np.full(2, np.ptp(along) / 2)
         vertices = torch.tensor([hoist[i] for i in added], device=state.position.device)
         lace = Lace(
-            strength=torch.as_tensor(share[added], dtype=system.cloth.dtype, device=system.cloth.device)[:, None]
+            strength=torch.as_tensor(
+                share[added], dtype=system.cloth.dtype, device=system.cloth.device
+            )[:, None]
             * self.stiffness,
             vertices=vertices,
             anchors=state.position[vertices],
@@ -78,14 +83,22 @@ class Lace:
         """Describes the lace as springs."""
         stiffness = self.strength.expand(-1, cloth.batch)
         return Springs(
-            vertices=self.vertices, anchors=self.anchors, stiffness=stiffness, slack=0 * stiffness, share=1.0
+            vertices=self.vertices,
+            anchors=self.anchors,
+            stiffness=stiffness,
+            slack=0 * stiffness,
+            share=1.0,
         )
 
     def force(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
         """Computes forces (vertex, 3, batch) [N]."""
-        offset = torch.as_tensor(self.handles.offset(time), dtype=position.dtype, device=position.device)
+        offset = torch.as_tensor(
+            self.handles.offset(time), dtype=position.dtype, device=position.device
+        )
         stretch = position[self.vertices] - self.anchors - offset[:, None]
-        return torch.zeros_like(position).index_add(0, self.vertices, -self.strength.unsqueeze(1) * stretch)
+        return torch.zeros_like(position).index_add(
+            0, self.vertices, -self.strength.unsqueeze(1) * stretch
+        )
 
     def stiffness(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
         """Computes stiffnesses (vertex, batch) [N/m]."""
@@ -93,4 +106,6 @@ class Lace:
 
     def stiffest(self, cloth: Cloth) -> Tensor:
         """Computes stiffnesses (vertex, batch) [N/m]."""
-        return torch.zeros_like(cloth.mass).index_add(0, self.vertices, self.strength.expand(-1, cloth.batch))
+        return torch.zeros_like(cloth.mass).index_add(
+            0, self.vertices, self.strength.expand(-1, cloth.batch)
+        )

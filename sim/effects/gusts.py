@@ -34,16 +34,27 @@ class Gusts(WindEffect):
             unit="1",
             prior=(0.0, 0.43),
             admissible=NOT_NEGATIVE,
-            source="EN 1991-1-4 at 10 m: 1/ln(10 m/z₀) is 0.12 at sea, 0.19 in open land, 0.43 in towns",
+            source="EN 1991-1-4 at 10 m: 1/ln(10 m/z₀) is 0.12 at sea, 0.19 in open land, 0.43 in "
+            "towns",
         ),
     ] = 0.0
     lateral: Annotated[
         Value,
-        shape(unit="1", prior=(0.6, 1.0), admissible=NOT_NEGATIVE, source="0.75–0.8 near the ground (ESDU 85020)"),
+        shape(
+            unit="1",
+            prior=(0.6, 1.0),
+            admissible=NOT_NEGATIVE,
+            source="0.75–0.8 near the ground (ESDU 85020)",
+        ),
     ] = 0.78
     vertical: Annotated[
         Value,
-        shape(unit="1", prior=(0.3, 0.7), admissible=NOT_NEGATIVE, source="0.5–0.55 near the ground (ESDU 85020)"),
+        shape(
+            unit="1",
+            prior=(0.3, 0.7),
+            admissible=NOT_NEGATIVE,
+            source="0.5–0.55 near the ground (ESDU 85020)",
+        ),
     ] = 0.52
     times: tuple[float, ...] = (0.0, 1e9)
     samples: Tensor = field(default_factory=lambda: torch.zeros(2, 3, 1))
@@ -74,7 +85,8 @@ class Gusts(WindEffect):
     ) -> Self:
         """Draws a realisation of these gusts for each member.
 
-        The transverse parts take the same spectrum with half the length scale, as in isotropic turbulence.
+        The transverse parts take the same spectrum with half the length scale, as in isotropic
+        turbulence.
 
         Args:
             rng: a named stream.
@@ -96,4 +108,6 @@ class Gusts(WindEffect):
     @classmethod
     def drawn(cls, rng: np.random.Generator, *, batch: int) -> Self:
         """As for all effects, with two minutes of gusts for each member in a mean wind of 5 m/s."""
-        return super().drawn(rng, batch=batch).with_series(rng, batch=batch, speed=5.0, duration=120.0)
+        return (
+            super().drawn(rng, batch=batch).with_series(rng, batch=batch, speed=5.0, duration=120.0)
+        )

@@ -27,7 +27,8 @@ class HemMass(ClothEffect):
             unit="kg/m",
             prior=(0.0, 0.02),
             admissible=NOT_NEGATIVE,
-            source="two more layers over 10–25 mm of cloth of 0.1–0.3 kg/m²: 0.002–0.015 kg/m; thread and tape on top",
+            source="two more layers over 10–25 mm of cloth of 0.1–0.3 kg/m²: 0.002–0.015 kg/m; "
+            "thread and tape on top",
         ),
     ] = 0.0
 

@@ -19,8 +19,9 @@ from sim.effects.parameter import NOT_NEGATIVE, Value, shape, strength
 class HemStiffness(ClothEffect):
     """Within a strip along the boundary the cloth bends r times harder on top.
 
-    A hinge is stiffened by r times the share of its edge that lies within the strip, so that the result depends on the
-    hem and not on the mesh, as long as cells are wider than the hem or resolve it.
+    A hinge is stiffened by r times the share of its edge that lies within the strip, so that the
+    result depends on the hem and not on the mesh, as long as cells are wider than the hem or
+    resolve it.
 
     Attributes:
         ratio: r = (stiffness of the hem − stiffness of the cloth) / stiffness of the cloth.
@@ -33,7 +34,8 @@ class HemStiffness(ClothEffect):
             unit="1",
             prior=(0.0, 26.0),
             admissible=NOT_NEGATIVE,
-            source="three layers: 3³ − 1 = 26 where they are bonded and bend as one plate, 3 − 1 = 2 where they slide",
+            source="three layers: 3³ − 1 = 26 where they are bonded and bend as one plate, 3 − 1 = "
+            "2 where they slide",
         ),
     ] = 0.0
     width: Annotated[
@@ -49,13 +51,19 @@ class HemStiffness(ClothEffect):
     def cloth(self, cloth: Cloth) -> Cloth:
         within = self._within(cloth)
         added = (self.ratio * within).expand(len(cloth.hinges), cloth.batch)
-        return replace(cloth, stiffening=added if cloth.stiffening is None else cloth.stiffening + added)
+        return replace(
+            cloth, stiffening=added if cloth.stiffening is None else cloth.stiffening + added
+        )
 
     def _within(self, cloth: Cloth) -> Tensor:
         """Computes the share of the hinges' edges within the strip, (hinge, batch or 1)."""
         distance = edge_distances(cloth.mesh)[cloth.mesh.hinges[:, :2]]
-        nearest = torch.as_tensor(distance.min(axis=1), dtype=cloth.dtype, device=cloth.device)[:, None]
-        span = torch.as_tensor(np.ptp(distance, axis=1), dtype=cloth.dtype, device=cloth.device)[:, None]
+        nearest = torch.as_tensor(distance.min(axis=1), dtype=cloth.dtype, device=cloth.device)[
+            :, None
+        ]
+        span = torch.as_tensor(np.ptp(distance, axis=1), dtype=cloth.dtype, device=cloth.device)[
+            :, None
+        ]
         reach = torch.as_tensor(self.width, dtype=cloth.dtype, device=cloth.device) - nearest
         level = span <= 0
         sloped = (reach / torch.where(level, 1.0, span)).clamp(0, 1)

@@ -26,8 +26,9 @@ class Hysteresis(Effect):
 
         dz = (1 − z sgn dα) dα / α₀,    −1 ≤ z ≤ 1,
 
-    that is, over any monotone change Δα, z ← s + (z − s) exp(−|Δα|/α₀) with s = sgn Δα. It does not depend on the rate.
-    A cycle between −A and A dissipates 4 H (A − α₀ tanh(A/α₀)) per area of hinge. The force is explicit in both
+    that is, over any monotone change Δα, z ← s + (z − s) exp(−|Δα|/α₀) with s = sgn Δα. It does not
+    depend on the rate. A cycle between −A and A dissipates 4 H (A − α₀ tanh(A/α₀)) per area of
+    hinge. The force is explicit in both
     integrators: with backward Euler, H/α₀ should not exceed the cloth's bending stiffness by much.
 
     Attributes:
@@ -41,7 +42,8 @@ class Hysteresis(Effect):
             unit="N",
             prior=(0.0, 5e-4),
             admissible=NOT_NEGATIVE,
-            source="Kawabata's 2HB of 0.02–0.1 gf·cm/cm for apparel cloth (Kawabata, Standardization and Analysis of "
+            source="Kawabata's 2HB of 0.02–0.1 gf·cm/cm for apparel cloth (Kawabata, "
+            "Standardization and Analysis of "
             "Hand Evaluation, 1980), halved",
         ),
     ] = 0.0
@@ -51,7 +53,8 @@ class Hysteresis(Effect):
             unit="1/m",
             prior=(2.0, 50.0),
             admissible=(1e-2, 1e4),
-            source="initial slopes of Kawabata's bending curves: friction turns round within 10–50 1/m",
+            source="initial slopes of Kawabata's bending curves: friction turns round within 10–50 "
+            "1/m",
         ),
     ] = 10.0
 
@@ -61,29 +64,45 @@ class Hysteresis(Effect):
         return torch.stack([torch.zeros_like(angle), angle])
 
     def update(
-        self, cloth: Cloth, memory: Tensor, position: Tensor, velocity: Tensor, wind: Tensor, elapsed: float
+        self,
+        cloth: Cloth,
+        memory: Tensor,
+        position: Tensor,
+        velocity: Tensor,
+        wind: Tensor,
+        elapsed: float,
     ) -> Tensor:
-        """Computes z and the fold angles after a step to a position (vertex, 3, batch), however long: (2, hinge,
-        batch)."""
+        """Computes z and the fold angles after a step to a position (vertex, 3, batch), however
+        long: (2, hinge, batch)."""
         past, before = memory
         angle = bending.fold_angle(cloth, position)
         change = CURVATURE_SPACING * cloth.hinge_column[:, None] * (angle - before)
         goal = torch.sign(change)
-        return torch.stack([goal + (past - goal) * torch.exp(-change.abs() / self.curvature), angle])
+        return torch.stack(
+            [goal + (past - goal) * torch.exp(-change.abs() / self.curvature), angle]
+        )
 
-    def force(self, cloth: Cloth, memory: Tensor, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        """Computes −½ l H z ∇θ on every hinge, as the elastic couple −½ l k α ∇θ: (vertex, 3, batch) [N]."""
+    def force(
+        self, cloth: Cloth, memory: Tensor, position: Tensor, velocity: Tensor, wind: Tensor
+    ) -> Tensor:
+        """Computes −½ l H z ∇θ on every hinge, as the elastic couple −½ l k α ∇θ: (vertex, 3,
+        batch) [N]."""
         moment = (-_half_lengths(cloth)[:, None] * self.couple * memory[0]).unsqueeze(1)
-        return gather_sum([moment * g for g in bending.fold(cloth, position).gradient], cloth.hinge_slots)
+        return gather_sum(
+            [moment * g for g in bending.fold(cloth, position).gradient], cloth.hinge_slots
+        )
 
     def given(self, cloth: Cloth) -> Given:
-        """Lists what its C++ reads: its parameters, and of each hinge its curvature per angle and half its length."""
+        """Lists what its C++ reads: its parameters, and of each hinge its curvature per angle and
+        half its length."""
         columns = torch.stack([CURVATURE_SPACING * cloth.hinge_column, _half_lengths(cloth)], dim=1)
         return replace(super().given(cloth), own=columns.unsqueeze(-1).expand(-1, -1, cloth.batch))
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
         memory = (*state.memory, self.start(system.cloth, state.position))
-        return replace(system, remembering=(*system.remembering, self)), replace(state, memory=memory)
+        return replace(system, remembering=(*system.remembering, self)), replace(
+            state, memory=memory
+        )
 
 
 def _half_lengths(cloth: Cloth) -> Tensor:

@@ -12,7 +12,8 @@ from sim.effects.parameter import NOT_NEGATIVE, Value, strength
 
 @dataclass(frozen=True, kw_only=True)
 class InternalDamping(ClothEffect):
-    """Kelvin–Voigt: the strain E is replaced by E + d dE/dt in all elastic forces, d added to the material's.
+    """Kelvin–Voigt: the strain E is replaced by E + d dE/dt in all elastic forces, d added to the
+    material's.
 
     Attributes:
         time: d; the amplitude of a vibration of angular frequency ω falls by e^(−π d ω) each cycle.
@@ -24,7 +25,8 @@ class InternalDamping(ClothEffect):
             unit="s",
             prior=(0.0, 2.5e-3),
             admissible=NOT_NEGATIVE,
-            source="half the reference simulator's steps of 0.5 and 5 ms, whose backward Euler acts like it; loss "
+            source="half the reference simulator's steps of 0.5 and 5 ms, whose backward Euler "
+            "acts like it; loss "
             "factors d ω of 0.05–0.3 of woven cloth at 5–20 Hz",
         ),
     ] = 0.0

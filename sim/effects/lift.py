@@ -18,8 +18,8 @@ from sim.effects.quantities import AIR_DENSITY, AirDensity
 
 @dataclass(frozen=True, kw_only=True)
 class Lift(ForceEffect):
-    """The force on a face of rest area a and unit normal n is f = ½ ρ C a (w·n) (|w| n − (w·n) w/|w|), perpendicular to
-    the relative wind w and of size ½ ρ C a |w|² sin α cos α.
+    """The force on a face of rest area a and unit normal n is f = ½ ρ C a (w·n) (|w| n − (w·n)
+    w/|w|), perpendicular to the relative wind w and of size ½ ρ C a |w|² sin α cos α.
 
     α is the angle between the wind and the face. The face's two normals give the same force.
 
@@ -34,13 +34,16 @@ class Lift(ForceEffect):
             unit="1",
             prior=(0.0, 4.0),
             admissible=NOT_NEGATIVE,
-            source="thin-aerofoil slope 2π, π A/2 for slender plates of aspect ratio A, less where flow separates; "
+            source="thin-aerofoil slope 2π, π A/2 for slender plates of aspect ratio A, less where "
+            "flow separates; "
             "normal-force slopes of plates 1.5–4.5 (Hoerner and Borst, Fluid-Dynamic Lift, 1975)",
         ),
     ] = 0.0
     density: AirDensity = AIR_DENSITY
 
-    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+    def force(
+        self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor
+    ) -> Tensor:
         relative = face_wind(cloth, position, velocity, wind)
         speed = norm(relative.relative)
         direction = relative.relative / speed.clamp(min=torch.finfo(speed.dtype).tiny)

@@ -19,12 +19,14 @@ from sim.wind import sampled
 
 @dataclass(frozen=True, kw_only=True)
 class LoggedGusts(WindEffect):
-    """The wind u becomes u + q (R(φ) s/⟨s⟩ − 1) u_h: speed s and turn φ as logged, relative to their means.
+    """The wind u becomes u + q (R(φ) s/⟨s⟩ − 1) u_h: speed s and turn φ as logged, relative to
+    their means.
 
     Attributes:
         share: q; 1 to follow the log, 0 for its mean.
         times: (n,) of the samples since the start of the run [s].
-        samples: (n, 3, batch or 1) the log's relative deviations along the mean wind, to its left, and up.
+        samples: (n, 3, batch or 1) the log's relative deviations along the mean wind, to its left,
+            and up.
     """
 
     share: Annotated[
@@ -32,7 +34,8 @@ class LoggedGusts(WindEffect):
         strength(
             unit="1",
             prior=(0.5, 1.2),
-            source="1 at the anemometer; less where it is farther from the flag than the eddies are long",
+            source="1 at the anemometer; less where it is farther from the flag than the eddies "
+            "are long",
         ),
     ] = 0.0
     times: tuple[float, ...] = (0.0, 1e9)
@@ -47,20 +50,30 @@ class LoggedGusts(WindEffect):
         return disturbed_wind(wind, self.share * sampled.between(self.samples, *now))
 
     @classmethod
-    def of(cls, time: ArrayLike, speed: ArrayLike, *, direction: ArrayLike | None = None, share: Value = 1.0) -> Self:
+    def of(
+        cls,
+        time: ArrayLike,
+        speed: ArrayLike,
+        *,
+        direction: ArrayLike | None = None,
+        share: Value = 1.0,
+    ) -> Self:
         """Makes gusts from samples of a log.
 
         Args:
             time: (n,) since the start of the run [s].
             speed: (n,) [m/s].
-            direction: (n,) blowing from, clockwise from north [rad]; none to leave the direction constant.
+            direction: (n,) blowing from, clockwise from north [rad]; none to leave the direction
+                constant.
             share: q.
 
         Raises:
             InputError: gaps of more than 5 s, a mean speed of 0, or shapes that do not fit.
         """
         times, _, relative = sampled.about_mean(time, speed, direction, where="logged gusts")
-        samples = np.stack([np.real(relative), np.imag(relative), np.zeros_like(times)], axis=1)[..., None]
+        samples = np.stack([np.real(relative), np.imag(relative), np.zeros_like(times)], axis=1)[
+            ..., None
+        ]
         return cls(share=share, times=tuple(times.tolist()), samples=torch.from_numpy(samples))
 
     @classmethod
@@ -79,8 +92,14 @@ class LoggedGusts(WindEffect):
 
     @classmethod
     def drawn(cls, rng: np.random.Generator, *, batch: int) -> Self:
-        """As for all effects, with an hour of sway in place of a log: ± 30 % in speed, ± 0.3 rad in direction."""
+        """As for all effects, with an hour of sway in place of a log: ± 30 % in speed, ± 0.3 rad in
+        direction."""
         time = np.arange(0.0, 3600.0, 0.5)
         speed, direction = 5 + 1.5 * np.sin(0.7 * time), 0.3 * np.sin(0.4 * time)
         values = cls.parameters()["share"].prior
-        return cls.of(time, speed, direction=direction, share=torch.from_numpy(rng.uniform(*values, size=batch)))
+        return cls.of(
+            time,
+            speed,
+            direction=direction,
+            share=torch.from_numpy(rng.uniform(*values, size=batch)),
+        )

@@ -1,4 +1,5 @@
-"""A cup anemometer that reads too high in gusty wind, because it speeds up faster than it slows down."""
+"""A cup anemometer that reads too high in gusty wind, because it speeds up faster than it slows
+down."""
 
 from __future__ import annotations
 
@@ -15,10 +16,12 @@ from sim.effects.sensor import AnemometerEffect
 
 @dataclass(frozen=True, kw_only=True)
 class Overspeeding(AnemometerEffect):
-    """The reading is u (1 + c I²), with I² the variance over the squared mean of the speed about that time.
+    """The reading is u (1 + c I²), with I² the variance over the squared mean of the speed about
+    that time.
 
-    Mean and variance have exponential weights, exp(−|t − t′|/T). For a rotor that obeys dm/dt = (u − m) u/ℓ and is too
-    slow for the gusts, stationarity ⟨u (u − m)⟩ = 0 gives m = ⟨u²⟩/⟨u⟩ = ⟨u⟩ (1 + I²): c = 1.
+    Mean and variance have exponential weights, exp(−|t − t′|/T). For a rotor that obeys dm/dt = (u
+    − m) u/ℓ and is too slow for the gusts, stationarity ⟨u (u − m)⟩ = 0 gives m = ⟨u²⟩/⟨u⟩ = ⟨u⟩ (1
+    + I²): c = 1.
 
     Attributes:
         coefficient: c.
@@ -31,13 +34,19 @@ class Overspeeding(AnemometerEffect):
             unit="1",
             prior=(0.1, 1.2),
             admissible=NOT_NEGATIVE,
-            source="0 where the rotor follows the gusts, 1 where it does not (Kristensen, J. Atmos. Oceanic Technol. "
+            source="0 where the rotor follows the gusts, 1 where it does not (Kristensen, J. "
+            "Atmos. Oceanic Technol. "
             "15:5, 1998)",
         ),
     ] = 0.0
     window: Annotated[
         Value,
-        shape(unit="s", prior=(10.0, 120.0), admissible=(1e-2, 1e5), source="times of large eddies; 10-min statistics"),
+        shape(
+            unit="s",
+            prior=(10.0, 120.0),
+            admissible=(1e-2, 1e5),
+            source="times of large eddies; 10-min statistics",
+        ),
     ] = 30.0
 
     def read(self, time: Tensor, speed: Tensor) -> Tensor:
@@ -52,7 +61,8 @@ class Overspeeding(AnemometerEffect):
 
     @staticmethod
     def _smooth_values(values: Tensor, memory: Tensor) -> Tensor:
-        """Sums values (n, batch) with weights that decay on both sides, by `memory` (n − 1, batch) a step."""
+        """Sums values (n, batch) with weights that decay on both sides, by `memory` (n − 1, batch)
+        a step."""
         none = torch.zeros_like(values[:1])
         before = decaying_sum(torch.cat([none, memory]), values)
         after = decaying_sum(torch.cat([none, memory.flip(0)]), values.flip(0)).flip(0)

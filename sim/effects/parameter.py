@@ -1,4 +1,5 @@
-"""Parameters of effects: a value for all or for each member of a batch, with its unit, null value, prior and source.
+"""Parameters of effects: a value for all or for each member of a batch, with its unit, null value,
+prior and source.
 
 An effect is a frozen dataclass with fields such as
 
@@ -34,7 +35,8 @@ class Role(StrEnum):
     STRENGTH = "strength"
     """At its null value the effect is not there, whatever its shapes are."""
     SHAPE = "shape"
-    """Says how the effect looks where it is there; its null value is the usual one, where a search starts."""
+    """Says how the effect looks where it is there; its null value is the usual one, where a search
+    starts."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,28 +82,43 @@ class Parameter(Described):
         values = torch.as_tensor(value).detach()
         if values.ndim > 1 or not values.numel():
             raise InputError(
-                f"the value has the shape {tuple(values.shape)}", where=where, fix="give a number, or (batch,)"
+                f"the value has the shape {tuple(values.shape)}",
+                where=where,
+                fix="give a number, or (batch,)",
             )
         lowest, highest = (float(v) for v in torch.aminmax(values))
         least, most = self.admissible
-        if not (math.isfinite(lowest) and math.isfinite(highest) and least <= lowest and highest <= most):
+        if not (
+            math.isfinite(lowest) and math.isfinite(highest) and least <= lowest and highest <= most
+        ):
             range_text = f"{lowest:g}" if lowest == highest else f"{lowest:g} to {highest:g}"
             raise InputError(
                 f"{range_text}{'' if self.unit == '1' else f' {self.unit}'} is not admissible",
                 where=where,
-                fix=f"give a value from {least:g} to {most:g}; expected are {self.prior[0]:g} to {self.prior[1]:g}",
+                fix=f"give a value from {least:g} to {most:g}; expected are {self.prior[0]:g} to "
+                f"{self.prior[1]:g}",
             )
 
 
 def strength(
-    *, unit: str, prior: tuple[float, float], source: str, admissible: tuple[float, float] = EVERYTHING
+    *,
+    unit: str,
+    prior: tuple[float, float],
+    source: str,
+    admissible: tuple[float, float] = EVERYTHING,
 ) -> Described:
     """Annotates a field at whose default the effect is not there."""
-    return Described(role=Role.STRENGTH, unit=unit, prior=prior, admissible=admissible, source=source)
+    return Described(
+        role=Role.STRENGTH, unit=unit, prior=prior, admissible=admissible, source=source
+    )
 
 
 def shape(
-    *, unit: str, prior: tuple[float, float], source: str, admissible: tuple[float, float] = EVERYTHING
+    *,
+    unit: str,
+    prior: tuple[float, float],
+    source: str,
+    admissible: tuple[float, float] = EVERYTHING,
 ) -> Described:
     """Annotates a field that says how the effect looks."""
     return Described(role=Role.SHAPE, unit=unit, prior=prior, admissible=admissible, source=source)
@@ -122,7 +139,9 @@ class Parametrised:
     @classmethod
     def strengths(cls) -> tuple[str, ...]:
         """Names of the parameters that together switch the effect off."""
-        return tuple(name for name, entry in cls.parameters().items() if entry.role is Role.STRENGTH)
+        return tuple(
+            name for name, entry in cls.parameters().items() if entry.role is Role.STRENGTH
+        )
 
     @property
     def absent(self) -> bool:
@@ -155,13 +174,19 @@ class Parametrised:
 
     @classmethod
     def drawn(cls, rng: np.random.Generator, *, batch: int) -> Self:
-        """Draws from the prior for each member of a batch: every parameter uniform in its range, float64."""
+        """Draws from the prior for each member of a batch: every parameter uniform in its range,
+        float64."""
         return cls(**draw(cls.parameters(), rng, batch=batch))
 
 
-def draw(parameters: Mapping[str, Parameter], rng: np.random.Generator, *, batch: int) -> dict[str, Tensor]:
+def draw(
+    parameters: Mapping[str, Parameter], rng: np.random.Generator, *, batch: int
+) -> dict[str, Tensor]:
     """Values (batch,) float64 for each parameter, uniform in its prior range."""
-    return {name: torch.from_numpy(rng.uniform(*entry.prior, size=batch)) for name, entry in parameters.items()}
+    return {
+        name: torch.from_numpy(rng.uniform(*entry.prior, size=batch))
+        for name, entry in parameters.items()
+    }
 
 
 @functools.cache

@@ -16,8 +16,8 @@ from sim.effects.parameter import NOT_NEGATIVE, Value, strength
 class Permeability(PressureEffect):
     """Through the cloth seeps κ Δp; the push is that of the rest, Δp = ρ s² with s = |w_n| − κ Δp.
 
-    The positive root of κ ρ s² + s = |w_n| is s = 2 |w_n| / (1 + √(1 + 4 κ ρ |w_n|)), and the force is multiplied by
-    (s / |w_n|)²: 1 at low speed, falling as 1/|w_n| at high speed.
+    The positive root of κ ρ s² + s = |w_n| is s = 2 |w_n| / (1 + √(1 + 4 κ ρ |w_n|)), and the force
+    is multiplied by (s / |w_n|)²: 1 at low speed, falling as 1/|w_n| at high speed.
 
     Attributes:
         permeability: κ, face velocity per pressure difference.
@@ -29,7 +29,8 @@ class Permeability(PressureEffect):
             unit="m/(s Pa)",
             prior=(0.0, 0.02),
             admissible=NOT_NEGATIVE,
-            source="ISO 9237 at 100 Pa: 10–100 mm/s for dense weaves, 500–2,000 mm/s for open knits, divided by 100 Pa",
+            source="ISO 9237 at 100 Pa: 10–100 mm/s for dense weaves, 500–2,000 mm/s for open "
+            "knits, divided by 100 Pa",
         ),
     ] = 0.0
 

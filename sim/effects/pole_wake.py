@@ -17,13 +17,15 @@ from sim.effects.parameter import NOT_NEGATIVE, Value, shape, strength
 class PoleWake(FlowEffect):
     """The mean wake of a vertical cylinder through the middle of the attachments.
 
-    With x downstream of the axis, y across, and the momentum thickness θ = C_D D/2, the wind's horizontal part loses
+    With x downstream of the axis, y across, and the momentum thickness θ = C_D D/2, the wind's
+    horizontal part loses
 
         q · 1.58 √(θ/ξ) exp(−y²/(2 ℓ²)) · x/(x + D),    ℓ = 0.252 √(θ ξ),    ξ = x + 2.5 θ
 
-    of itself for x > 0: the self-preserving plane wake (Tennekes and Lumley, A First Course in Turbulence, 1972,
-    section 4.2), with its origin moved so that it starts at 1, and formed within about a diameter. Far behind, the loss
-    integrates to θ across the wake. Vortex shedding is not in it.
+    of itself for x > 0: the self-preserving plane wake (Tennekes and Lumley, A First Course in
+    Turbulence, 1972, section 4.2), with its origin moved so that it starts at 1, and formed within
+    about a diameter. Far behind, the loss integrates to θ across the wake. Vortex shedding is not
+    in it.
 
     Attributes:
         share: q; 1 for the wake of theory.
@@ -43,7 +45,10 @@ class PoleWake(FlowEffect):
     diameter: Annotated[
         Value,
         shape(
-            unit="m", prior=(0.02, 0.12), admissible=(1e-4, 2.0), source="flag poles: 20 mm hand-held to 120 mm at 10 m"
+            unit="m",
+            prior=(0.02, 0.12),
+            admissible=(1e-4, 2.0),
+            source="flag poles: 20 mm hand-held to 120 mm at 10 m",
         ),
     ] = 0.06
     drag: Annotated[
@@ -52,7 +57,8 @@ class PoleWake(FlowEffect):
             unit="1",
             prior=(0.6, 1.2),
             admissible=NOT_NEGATIVE,
-            source="circular cylinder: 1.2 below Re 2e5, 0.3–0.7 above (Hoerner, Fluid-Dynamic Drag, 1965, ch. 3)",
+            source="circular cylinder: 1.2 below Re 2e5, 0.3–0.7 above (Hoerner, Fluid-Dynamic "
+            "Drag, 1965, ch. 3)",
         ),
     ] = 1.1
 

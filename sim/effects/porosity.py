@@ -15,8 +15,8 @@ from sim.effects.parameter import Value, strength
 class Porosity(PressureEffect):
     """The normal force is multiplied by 1 − φ at every speed: holes that jets pass freely.
 
-    Under one steady speed this looks like another air density or wind gain; `Permeability` can, by its
-    dependence on speed.
+    Under one steady speed this looks like another air density or wind gain; `Permeability` can, by
+    its dependence on speed.
 
     Attributes:
         open_share: φ, the open share of the area.
@@ -28,7 +28,8 @@ class Porosity(PressureEffect):
             unit="1",
             prior=(0.0, 0.3),
             admissible=(0.0, 1.0),
-            source="open area of woven and knitted cloth 0–0.1, of mesh banners 0.2–0.35 (makers' data sheets)",
+            source="open area of woven and knitted cloth 0–0.1, of mesh banners 0.2–0.35 (makers' "
+            "data sheets)",
         ),
     ] = 0.0
 

@@ -16,7 +16,8 @@ _SLOWEST = 1e-3
 
 @dataclass(frozen=True, kw_only=True)
 class PowerLawDrag(PressureEffect):
-    """The normal force becomes ρ a |w_n| w_n (|w_n| / U₀)^(−m): a coefficient that falls as the Reynolds number's m.
+    """The normal force becomes ρ a |w_n| w_n (|w_n| / U₀)^(−m): a coefficient that falls as the
+    Reynolds number's m.
 
     Attributes:
         exponent: m, 0 for a constant coefficient, 1 for Stokes flow.
@@ -29,7 +30,8 @@ class PowerLawDrag(PressureEffect):
             unit="1",
             prior=(-0.3, 0.5),
             admissible=(-2.0, 1.9),
-            source="−dln C_D/dln Re: 0 for sharp-edged plates above Re 1000, to 0.5 for screens and threads at "
+            source="−dln C_D/dln Re: 0 for sharp-edged plates above Re 1000, to 0.5 for screens "
+            "and threads at "
             "Re 1–100 (Hoerner, Fluid-Dynamic Drag, 1965, ch. 3)",
         ),
     ] = 0.0
@@ -39,7 +41,8 @@ class PowerLawDrag(PressureEffect):
             unit="m/s",
             prior=(2.0, 8.0),
             admissible=(1e-2, 100.0),
-            source="middle of the winds of interest; shifts the coefficient only, so any value in them will do",
+            source="middle of the winds of interest; shifts the coefficient only, so any value in "
+            "them will do",
         ),
     ] = 5.0
 

@@ -19,9 +19,11 @@ from sim.kernel.effect_code import Given
 
 @dataclass(frozen=True, kw_only=True)
 class RestCurvature(Effect):
-    """Hinges rest at the fold angles θ₀ of the cloth rolled onto a cylinder along v: energy k S (θ − θ₀)²/4.
+    """Hinges rest at the fold angles θ₀ of the cloth rolled onto a cylinder along v: energy k S (θ
+    − θ₀)²/4.
 
-    The stiffness k is still looked up at θ. Only its explicit part is new: +k S θ₀/2 ∇θ on every hinge.
+    The stiffness k is still looked up at θ. Only its explicit part is new: +k S θ₀/2 ∇θ on every
+    hinge.
 
     Attributes:
         curvature: of the cylinder; positive where the cloth is hollow on the side of its normals.
@@ -33,7 +35,8 @@ class RestCurvature(Effect):
             unit="1/m",
             prior=(-3.0, 3.0),
             admissible=(-50.0, 50.0),
-            source="cloth stored on rolls of 0.3 m radius or more; the curl of knitted edges is stronger, but narrow",
+            source="cloth stored on rolls of 0.3 m radius or more; the curl of knitted edges is "
+            "stronger, but narrow",
         ),
     ] = 0.0
 
@@ -47,7 +50,9 @@ class RestCurvature(Effect):
         u, v = rest[:, :1], rest[:, 1:].expand(-1, cloth.batch)
         turn = (self.curvature * u / torch.pi).expand(-1, cloth.batch)
         # sin(κu)/κ and (1 − cos κu)/κ without the division.
-        return torch.stack([u * torch.sinc(turn), v, self.curvature * u**2 / 2 * torch.sinc(turn / 2) ** 2], dim=1)
+        return torch.stack(
+            [u * torch.sinc(turn), v, self.curvature * u**2 / 2 * torch.sinc(turn / 2) ** 2], dim=1
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +61,9 @@ class Curl:
 
     angle: Tensor
 
-    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+    def force(
+        self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor
+    ) -> Tensor:
         """Computes forces (vertex, 3, batch) [N]; time, velocity and wind do not matter."""
         f = bending.fold(cloth, position)
         moment = (bending.stiffness(cloth, f.angle) * self.angle).unsqueeze(1)

@@ -28,4 +28,7 @@ class RollingShutter(CameraEffect):
     ] = 0.0
 
     def change_instants(self, sampling: Sampling) -> Sampling:
-        return replace(sampling, instants=sampling.instants + (sampling.rows[:, None, None] - 0.5) * self.readout)
+        return replace(
+            sampling,
+            instants=sampling.instants + (sampling.rows[:, None, None] - 0.5) * self.readout,
+        )

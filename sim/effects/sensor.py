@@ -1,7 +1,7 @@
 """The kinds of sensor effects: what instruments do to an observation.
 
-Pure functions on float64 tensors, batch innermost. Times are seconds since the start of a record: over a day, float64
-resolves 0.02 ns.
+Pure functions on float64 tensors, batch innermost. Times are seconds since the start of a record:
+over a day, float64 resolves 0.02 ns.
 """
 
 from __future__ import annotations
@@ -39,13 +39,16 @@ class ClockEffect(Parametrised, ABC):
 
 @dataclass(frozen=True, kw_only=True)
 class Sampling:
-    """When a camera sees what: every pixel row of every frame averages the scene over some instants.
+    """When a camera sees what: every pixel row of every frame averages the scene over some
+    instants.
 
     Attributes:
         stamps: (frame,) the time each frame is stored with [s].
-        instants: (frame, row, node, batch) when it is really seen [s]; any axis but the first may be 1.
+        instants: (frame, row, node, batch) when it is really seen [s]; any axis but the first may
+            be 1.
         weights: (node,) of the average; their sum is 1.
-        rows: (row,) height in the image, 0 at the top and 1 at the bottom, of each tracked point or pixel row.
+        rows: (row,) height in the image, 0 at the top and 1 at the bottom, of each tracked point or
+            pixel row.
     """
 
     stamps: Tensor
@@ -55,11 +58,18 @@ class Sampling:
 
     @classmethod
     def ideal(cls, stamps: Tensor, rows: Tensor) -> Sampling:
-        """Frames (frame,) [s] that are taken at once when they say they are, of points at rows (row,)."""
-        return cls(stamps=stamps, rows=rows, weights=stamps.new_ones(1), instants=stamps[:, None, None, None])
+        """Frames (frame,) [s] that are taken at once when they say they are, of points at rows
+        (row,)."""
+        return cls(
+            stamps=stamps,
+            rows=rows,
+            weights=stamps.new_ones(1),
+            instants=stamps[:, None, None, None],
+        )
 
     def observe(self, time: Tensor, trajectory: Tensor) -> Tensor:
-        """Samples moving points as the camera does, linear between samples: (frame, row, 3, batch) [m].
+        """Samples moving points as the camera does, linear between samples: (frame, row, 3, batch)
+        [m].
 
         Args:
             time: (n,) increasing [s].
@@ -72,7 +82,8 @@ class Sampling:
         n, rows, axes, batch = trajectory.shape
         if n != len(time) or rows != len(self.rows) or axes != 3:
             raise InputError(
-                f"the trajectory has the shape {tuple(trajectory.shape)}, and there are {len(time)} "
+                f"the trajectory has the shape {tuple(trajectory.shape)}, and there are "
+                f"{len(time)} "
                 f"times and {len(self.rows)} rows",
                 where="camera",
                 fix="give (time, row, 3, batch)",
@@ -80,7 +91,8 @@ class Sampling:
         first, last = (float(v) for v in torch.aminmax(self.instants.detach()))
         if not float(time[0]) <= first <= last <= float(time[-1]):
             raise UsageError(
-                f"the camera sees from {first:g} to {last:g} s, the trajectory is known from {float(time[0]):g} to "
+                f"the camera sees from {first:g} to {last:g} s, the trajectory is known from "
+                f"{float(time[0]):g} to "
                 f"{float(time[-1]):g} s",
                 where="camera",
                 fix="simulate from an exposure before the first frame to one after the last",

@@ -14,7 +14,8 @@ from sim.effects.sensor import AnemometerEffect
 
 @dataclass(frozen=True, kw_only=True)
 class SensorHeight(AnemometerEffect):
-    """The reading is u r^α, of a wind u at the flag that grows with height as a power. It looks like a gain.
+    """The reading is u r^α, of a wind u at the flag that grows with height as a power. It looks
+    like a gain.
 
     Attributes:
         ratio: r, height of the sensor over height of the flag's middle.
@@ -27,7 +28,8 @@ class SensorHeight(AnemometerEffect):
             unit="1",
             prior=(0.3, 1.5),
             admissible=(1e-3, 1e3),
-            source="hand-held or tripod sensors at 1.5–3 m beside flags at 2–10 m; weather masts at 10 m",
+            source="hand-held or tripod sensors at 1.5–3 m beside flags at 2–10 m; weather masts "
+            "at 10 m",
         ),
     ] = 1.0
     exponent: Annotated[

@@ -16,7 +16,8 @@ _LOWEST = 0.05
 
 @dataclass(frozen=True, kw_only=True)
 class Shear(FlowEffect):
-    """The wind is multiplied by (z/H)^α, z the height above ground; it is as given at the attachments' middle, z = H.
+    """The wind is multiplied by (z/H)^α, z the height above ground; it is as given at the
+    attachments' middle, z = H.
 
     Attributes:
         exponent: α.
@@ -29,13 +30,17 @@ class Shear(FlowEffect):
             unit="1",
             prior=(-0.1, 0.5),
             admissible=(-2.0, 2.0),
-            source="0.1 over water, 0.14 open land, 0.2 by IEC 61400-1, 0.3–0.4 in towns; stable nights more",
+            source="0.1 over water, 0.14 open land, 0.2 by IEC 61400-1, 0.3–0.4 in towns; stable "
+            "nights more",
         ),
     ] = 0.0
     height: Annotated[
         Value,
         shape(
-            unit="m", prior=(1.5, 15.0), admissible=(0.1, 1e3), source="flag poles of 2–15 m; a wind tunnel has none"
+            unit="m",
+            prior=(1.5, 15.0),
+            admissible=(0.1, 1e3),
+            source="flag poles of 2–15 m; a wind tunnel has none",
         ),
     ] = 6.0
 

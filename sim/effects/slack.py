@@ -25,7 +25,8 @@ _SHORTEST = 1e-6
 class Slack(Effect):
     """The handles' springs −k d pull only beyond a length ℓ: −k (|d| − ℓ)₊ d/|d|.
 
-    The force has a kink at |d| = ℓ. With backward Euler the springs keep the stiffness k (1 − ℓ/|d|)₊ on every axis.
+    The force has a kink at |d| = ℓ. With backward Euler the springs keep the stiffness k (1 −
+    ℓ/|d|)₊ on every axis.
 
     Attributes:
         length: ℓ.
@@ -44,9 +45,13 @@ class Slack(Effect):
     def apply(self, system: System, state: State) -> tuple[System, State]:
         if not system.sprung:
             raise UsageError(
-                "slack needs handles that are springs", where="slack", fix="give the handles a finite stiffness"
+                "slack needs handles that are springs",
+                where="slack",
+                fix="give the handles a finite stiffness",
             )
-        play = Play(length=self.length, vertices=system.held, anchors=system.anchors, handles=system.handles)
+        play = Play(
+            length=self.length, vertices=system.held, anchors=system.anchors, handles=system.handles
+        )
         return replace(system, ties=(*system.ties, play)), state
 
 
@@ -81,7 +86,9 @@ class Play:
 
     def _stretch(self, time: float, position: Tensor) -> tuple[Tensor, Tensor]:
         """Computes d (held, 3, batch) [m], and the share of it that is slack (held, 1, batch)."""
-        offset = torch.as_tensor(self.handles.offset(time), dtype=position.dtype, device=position.device)
+        offset = torch.as_tensor(
+            self.handles.offset(time), dtype=position.dtype, device=position.device
+        )
         stretch = position[self.vertices] - self.anchors - offset[:, None]
         distance = norm(stretch).clamp(min=_SHORTEST)
         return stretch, (self.length / distance).clamp(max=1)
@@ -89,12 +96,16 @@ class Play:
     def force(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
         """Computes forces (vertex, 3, batch) [N]."""
         stretch, slack = self._stretch(time, position)
-        return torch.zeros_like(position).index_add(0, self.vertices, self.handles.stiffness * slack * stretch)
+        return torch.zeros_like(position).index_add(
+            0, self.vertices, self.handles.stiffness * slack * stretch
+        )
 
     def stiffness(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
         """Computes stiffnesses (vertex, batch), negative: less than the handles' [N/m]."""
         _, slack = self._stretch(time, position)
-        return torch.zeros_like(cloth.mass).index_add(0, self.vertices, -self.handles.stiffness * slack[:, 0])
+        return torch.zeros_like(cloth.mass).index_add(
+            0, self.vertices, -self.handles.stiffness * slack[:, 0]
+        )
 
     def stiffest(self, cloth: Cloth) -> Tensor:
         """Returns zeros (vertex, batch): nothing is added to the handles' [N/m]."""

@@ -1,4 +1,5 @@
-"""Friction of the air along the cloth, proportional to its speed (a laminar boundary layer of fixed thickness)."""
+"""Friction of the air along the cloth, proportional to its speed (a laminar boundary layer of fixed
+thickness)."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ from sim.effects.parameter import NOT_NEGATIVE, Value, strength
 
 @dataclass(frozen=True, kw_only=True)
 class TangentialLinearDrag(ForceEffect):
-    """On a face of rest area a with tangential relative wind w_t: f = c a w_t, a third on each corner.
+    """On a face of rest area a with tangential relative wind w_t: f = c a w_t, a third on each
+    corner.
 
     Attributes:
         coefficient: c, both sides together.
@@ -27,11 +29,14 @@ class TangentialLinearDrag(ForceEffect):
             unit="kg/(m² s)",
             prior=(0.0, 0.05),
             admissible=NOT_NEGATIVE,
-            source="Blasius plate, two sides: 1.328 ρ U / √(U L/ν) is 0.009 to 0.06 at 2–10 m/s and 0.1–1 m",
+            source="Blasius plate, two sides: 1.328 ρ U / √(U L/ν) is 0.009 to 0.06 at 2–10 m/s "
+            "and 0.1–1 m",
         ),
     ] = 0.0
 
-    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+    def force(
+        self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor
+    ) -> Tensor:
         along = face_wind(cloth, position, velocity, wind).along
         push = (cloth.areas / 3)[:, None, None] * (self.coefficient * along)
         return cloth.shared_out(push)

@@ -1,4 +1,5 @@
-"""Friction of the air along the cloth, proportional to its squared speed (a rough, turbulent boundary layer)."""
+"""Friction of the air along the cloth, proportional to its squared speed (a rough, turbulent
+boundary layer)."""
 
 from __future__ import annotations
 
@@ -17,7 +18,8 @@ from sim.effects.quantities import AIR_DENSITY, AirDensity
 
 @dataclass(frozen=True, kw_only=True)
 class TangentialQuadraticDrag(ForceEffect):
-    """On a face of rest area a with tangential relative wind w_t: f = ρ C_f a |w_t| w_t (½ for each of two sides).
+    """On a face of rest area a with tangential relative wind w_t: f = ρ C_f a |w_t| w_t (½ for each
+    of two sides).
 
     Attributes:
         coefficient: C_f, of one side.
@@ -30,13 +32,18 @@ class TangentialQuadraticDrag(ForceEffect):
             unit="1",
             prior=(0.0, 0.05),
             admissible=NOT_NEGATIVE,
-            source="flat plates at Reynolds 1e4–1e6: 0.003–0.013 smooth (Schlichting, Boundary-Layer Theory); "
+            source="flat plates at Reynolds 1e4–1e6: 0.003–0.013 smooth (Schlichting, "
+            "Boundary-Layer Theory); "
             "waving cloth several times that (Hoerner, Fluid-Dynamic Drag, flags and banners)",
         ),
     ] = 0.0
     density: AirDensity = AIR_DENSITY
 
-    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+    def force(
+        self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor
+    ) -> Tensor:
         along = face_wind(cloth, position, velocity, wind).along
-        push = (cloth.areas / 3)[:, None, None] * (self.density * self.coefficient * norm(along) * along)
+        push = (cloth.areas / 3)[:, None, None] * (
+            self.density * self.coefficient * norm(along) * along
+        )
         return cloth.shared_out(push)

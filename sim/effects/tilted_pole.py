@@ -76,11 +76,14 @@ class TiltedPole(Effect):
 
 
 def change(turn: Tensor, vectors: Tensor) -> Tensor:
-    """Applies R − I to vectors (n, 3, batch), for the rotation vector (3, batch); exactly 0 for none.
+    """Applies R − I to vectors (n, 3, batch), for the rotation vector (3, batch); exactly 0 for
+    none.
 
     Rodrigues: R − I = sin α/α [ω]× + (1 − cos α)/α² [ω]×², without the division.
     """
     angle = norm(turn, axis=0) / torch.pi
     axis = turn.expand_as(vectors)
     once = torch.linalg.cross(axis, vectors, dim=1)
-    return torch.sinc(angle) * once + torch.sinc(angle / 2) ** 2 / 2 * torch.linalg.cross(axis, once, dim=1)
+    return torch.sinc(angle) * once + torch.sinc(angle / 2) ** 2 / 2 * torch.linalg.cross(
+        axis, once, dim=1
+    )

@@ -24,7 +24,8 @@ class WetMass(ClothEffect):
             unit="1",
             prior=(0.0, 1.0),
             admissible=NOT_NEGATIVE,
-            source="moisture regain of 0.004 (polyester) to 0.085 (cotton) at 65 % humidity, ISO/TR 6741-4; dripping "
+            source="moisture regain of 0.004 (polyester) to 0.085 (cotton) at 65 % humidity, "
+            "ISO/TR 6741-4; dripping "
             "cloth 0.3–1.5",
         ),
     ] = 0.0

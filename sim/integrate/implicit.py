@@ -1,12 +1,14 @@
 """Backward Euler, one linearised solve a step, by batched preconditioned conjugate gradients.
 
-With K the positive semi-definite stiffness at the start of the step (see `membrane.Linearised`) and d the damping,
+With K the positive semi-definite stiffness at the start of the step (see `membrane.Linearised`) and
+d the damping,
 
     (M + h (h + d) K) Δv = h (F(x) + F_ext(v)) − h (h + d) K v,   v ← v + Δv,   x ← x + h v
 
-(Baraff and Witkin 1998; ArcSim 0.2.1 takes the same step, with a sparse Cholesky factorisation). Air, gravity, effects
-are those of the start of the step. Vibrations much faster than 1/h are damped away by the method itself: it acts
-like declared damping d = h on the slow ones (|amplification| 1/√(1 + ω² h²) against exp(−d ω² h/2)).
+(Baraff and Witkin 1998; ArcSim 0.2.1 takes the same step, with a sparse Cholesky factorisation).
+Air, gravity, effects are those of the start of the step. Vibrations much faster than 1/h are damped
+away by the method itself: it acts like declared damping d = h on the slow ones (|amplification|
+1/√(1 + ω² h²) against exp(−d ω² h/2)).
 """
 
 from __future__ import annotations
@@ -36,8 +38,9 @@ class AirShape(StrEnum):
     CURRENT = "current"
     """That of the start of the step."""
     PREVIOUS = "previous"
-    """That of the start of the step before, as in ArcSim 0.2.1, whose normals lag by one step. Measured: with it the
-    reference's 5 ms runs are followed to a micrometre at 8 m/s, without it to 5 mm after five frames."""
+    """That of the start of the step before, as in ArcSim 0.2.1, whose normals lag by one step.
+    Measured: with it the reference's 5 ms runs are followed to a micrometre at 8 m/s, without it to
+    5 mm after five frames."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,11 +49,13 @@ class BackwardEuler:
 
     Attributes:
         step: upper bound of the step [s]; the paper's simulations take 5 ms.
-        air_shape: the shape the wind's force is taken at; CURRENT unless ArcSim is to be reproduced.
+        air_shape: the shape the wind's force is taken at; CURRENT unless ArcSim is to be
+            reproduced.
         tolerance: relative residual at which a member's solve stops.
-        iterations: bound on conjugate-gradient steps. A member that has not converged by then gets NaN, which
-            `State.healthy` reports; the others go on.
-        backend: what computes the step; the kernel has all but contact, and but effects without C++.
+        iterations: bound on conjugate-gradient steps. A member that has not converged by then gets
+            NaN, which `State.healthy` reports; the others go on.
+        backend: what computes the step; the kernel has all but contact, and but effects without
+            C++.
     """
 
     step: float = 5e-3
@@ -61,10 +66,16 @@ class BackwardEuler:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.step) and self.step > 0):
-            raise UsageError(f"the step is {self.step!r} s", where="integrator implicit", fix="give a positive step")
+            raise UsageError(
+                f"the step is {self.step!r} s",
+                where="integrator implicit",
+                fix="give a positive step",
+            )
         if not (0 < self.tolerance < 1):
             raise UsageError(
-                f"the tolerance is {self.tolerance!r}", where="integrator implicit", fix="give one between 0 and 1"
+                f"the tolerance is {self.tolerance!r}",
+                where="integrator implicit",
+                fix="give one between 0 and 1",
             )
 
     def advance(self, system: System, state: State, duration: float) -> State:
@@ -81,7 +92,9 @@ class BackwardEuler:
     def _kernel(self, system: System, state: State) -> Kernel | None:
         """Returns the kernel where it can take the step."""
         kernel = kernel_for(system, state, self.backend)
-        lacking = kernel is None or (system.extra and kernel.beside is None) or system.contact is not None
+        lacking = (
+            kernel is None or (system.extra and kernel.beside is None) or system.contact is not None
+        )
         return None if lacking else kernel
 
     def _at_once(self, kernel: Kernel, system: System, state: State, h: float, steps: int) -> State:
@@ -104,8 +117,8 @@ class BackwardEuler:
         return h if self.air_shape is AirShape.PREVIOUS else 0.0
 
     def take_step(self, system: System, state: State, drive: Drive, h: float) -> State:
-        """Computes the state one step of `h` [s] later, whatever `step` is, with what moves the cloth from outside
-        meanwhile."""
+        """Computes the state one step of `h` [s] later, whatever `step` is, with what moves the
+        cloth from outside meanwhile."""
         cloth = system.cloth
         x, v, time = state.position, state.velocity, state.time
         if (kernel := self._kernel(system, state)) is not None:
@@ -138,7 +151,9 @@ class BackwardEuler:
             if folds is not None:
                 product = product + gather_sum(folds.corner_products(field), cloth.hinge_slots)
             if system.sprung:
-                product = product.index_add(0, system.held, system.handles.stiffness * field[system.held])
+                product = product.index_add(
+                    0, system.held, system.handles.stiffness * field[system.held]
+                )
             if tied is not None:
                 product = product + tied * field
             if contacts is not None:
@@ -153,7 +168,9 @@ class BackwardEuler:
 
         # The method's own update makes x − h v the positions one step ago.
         air_position = x - h * v if self.air_shape is AirShape.PREVIOUS else x
-        external = system.external(drive.wind[0], time, x, v, memory=state.memory, air_position=air_position)
+        external = system.external(
+            drive.wind[0], time, x, v, memory=state.memory, air_position=air_position
+        )
         force = faces.force() + external
         diagonal = gather_sum(faces.diagonal(), cloth.face_slots)
         if folds is not None:
@@ -185,18 +202,27 @@ class BackwardEuler:
             force = force + contacts.force(x) - contacts.drag(v)
         right = free * (h * force - factor * stiffness(v))
         change = conjugate_gradients(
-            operator, right, weight + factor * diagonal, tolerance=self.tolerance, iterations=self.iterations
+            operator,
+            right,
+            weight + factor * diagonal,
+            tolerance=self.tolerance,
+            iterations=self.iterations,
         )
         v = v + change
         return self._end_of_step(system, state, drive, *system.limit_strains(x + h * v, v, h), h)
 
-    def _end_of_step(self, system: System, state: State, drive: Drive, x: Tensor, v: Tensor, h: float) -> State:
-        """Computes the end of a step from a state, with what forces remember of it in the wind of its start."""
+    def _end_of_step(
+        self, system: System, state: State, drive: Drive, x: Tensor, v: Tensor, h: float
+    ) -> State:
+        """Computes the end of a step from a state, with what forces remember of it in the wind of
+        its start."""
         memory = system.remember_step(state.memory, drive.wind[0], state.time, x, v, elapsed=h)
         return State(position=x, velocity=v, time=state.time + h, memory=memory)
 
 
-def _contacts(system: System, position: Tensor, velocity: Tensor) -> contact.LinearisedContact | None:
+def _contacts(
+    system: System, position: Tensor, velocity: Tensor
+) -> contact.LinearisedContact | None:
     if system.contact is None:
         return None
     pairs = contact.candidates(system.cloth, system.contact, position, system.neighbours)
@@ -204,11 +230,17 @@ def _contacts(system: System, position: Tensor, velocity: Tensor) -> contact.Lin
 
 
 def conjugate_gradients(
-    operator: Callable[[Tensor], Tensor], right: Tensor, diagonal: Tensor, *, tolerance: float, iterations: int
+    operator: Callable[[Tensor], Tensor],
+    right: Tensor,
+    diagonal: Tensor,
+    *,
+    tolerance: float,
+    iterations: int,
 ) -> Tensor:
     """Solves operator(y) = right for every member of the batch by itself.
 
-    A member stops changing once its residual, in the norm of the diagonal preconditioner's inverse, has fallen by
+    A member stops changing once its residual, in the norm of the diagonal preconditioner's inverse,
+    has fallen by
     `tolerance`: what it gets does not depend on the others.
 
     Args:

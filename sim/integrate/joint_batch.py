@@ -1,4 +1,5 @@
-"""Batches of one cloth, each with effects of its own, advanced as one: small batches cost nearly as much as large ones.
+"""Batches of one cloth, each with effects of its own, advanced as one: small batches cost nearly as
+much as large ones.
 
 What the base model lacks is computed batch by batch, the base model's step for all of them at once.
 """
@@ -76,7 +77,9 @@ class _Loosening:
 
     def stiffness(self, cloth: Cloth, time: float, position: Tensor) -> Tensor:
         """Computes stiffnesses (vertex, batch) [N/m]."""
-        return self._widen_members(self.tie.stiffness(self.cloth, time, position[..., self.members]))
+        return self._widen_members(
+            self.tie.stiffness(self.cloth, time, position[..., self.members])
+        )
 
     def stiffest(self, cloth: Cloth) -> Tensor:
         """Computes stiffnesses (vertex, batch) [N/m]."""
@@ -101,7 +104,8 @@ class JointBatch:
 
     @classmethod
     def of(cls, batches: Sequence[tuple[System, State]]) -> tuple[JointBatch, State]:
-        """Batches with their starts, and the start of all: members in order, and what forces remember.
+        """Batches with their starts, and the start of all: members in order, and what forces
+        remember.
 
         Raises:
             UsageError: none, or starts at different times.
@@ -112,21 +116,25 @@ class JointBatch:
                 where="joint batch",
                 fix="start all of them at once",
             )
-        return cls(systems=tuple(system for system, _ in batches)), _join_states([state for _, state in batches])
+        return cls(systems=tuple(system for system, _ in batches)), _join_states(
+            [state for _, state in batches]
+        )
 
     @cached_property
     def plain(self) -> System:
         """The base model of all, without loads, of the ties with those alone that loosen handles.
 
         Raises:
-            UsageError: batches that differ in their mesh, handles, air, contact or strain limits, or in whether their
-                anchors move.
+            UsageError: batches that differ in their mesh, handles, air, contact or strain limits,
+                or in whether their anchors move.
         """
         parts = [system.alone for system in self.systems]
         first = parts[0]
         for part in parts:
             shared = ("handles", "air", "contact", "limits")
-            if not torch.equal(part.held, first.held) or any(getattr(part, s) != getattr(first, s) for s in shared):
+            if not torch.equal(part.held, first.held) or any(
+                getattr(part, s) != getattr(first, s) for s in shared
+            ):
                 raise UsageError(
                     f"the batches differ in one of: {', '.join(shared)}",
                     where="joint batch",
@@ -140,7 +148,9 @@ class JointBatch:
         motions = [part.motion for part in parts if part.motion is not None]
         if motions and len(motions) < len(parts):
             raise UsageError(
-                "some batches have anchors that move and some do not", where="joint batch", fix="run them one by one"
+                "some batches have anchors that move and some do not",
+                where="joint batch",
+                fix="run them one by one",
             )
         return replace(
             first,
@@ -164,7 +174,8 @@ class JointBatch:
         return [slice(*pair) for pair in pairwise(ends)]
 
     def parts(self, state: State) -> Iterator[tuple[System, slice, State]]:
-        """Yields, for every batch, what `plain` lacks of its system, its slice of the members, and its state."""
+        """Yields, for every batch, what `plain` lacks of its system, its slice of the members, and
+        its state."""
         memory = state.memory
         for system, members in zip(self.beside, self._members, strict=True):
             of_system, memory = memory[: len(system.remembering)], memory[len(system.remembering) :]

@@ -1,13 +1,15 @@
-"""Backward Euler with what the base model lacks as impulses between its steps: long steps, noisy states, effects.
+"""Backward Euler with what the base model lacks as impulses between its steps: long steps, noisy
+states, effects.
 
 A step of h is
 
     v ← v + h M⁻¹ F_extra(x, v),   a backward Euler step of the base model,
 
-Lie's splitting, of first order in h as the base step is. Air that moves with the cloth takes its share of the step's
-change of velocity (see `sim.cloth.inertia`); springs beside the handles act implicitly, vertex by vertex. What loosens
-the handles is part of the base model's solve, since no impulse can take back what they pull. The base step is the
-compiled kernel's, so that an effect costs one evaluation a step, not one an iteration of the solver.
+Lie's splitting, of first order in h as the base step is. Air that moves with the cloth takes its
+share of the step's change of velocity (see `sim.cloth.inertia`); springs beside the handles act
+implicitly, vertex by vertex. What loosens the handles is part of the base model's solve, since no
+impulse can take back what they pull. The base step is the compiled kernel's, so that an effect
+costs one evaluation a step, not one an iteration of the solver.
 """
 
 from __future__ import annotations
@@ -48,8 +50,12 @@ class SplitEuler:
         if (kernels := self._kernels(plain, [system], state)) is not None:
             return self._at_once(plain, *kernels, state, h, steps)
         for drive in system.drives(_times(state.time, h, steps)):
-            begun = replace(state, velocity=self._pushed_velocity(system, state, drive, h), memory=())
-            state = _carried_state(system, state, self.base.take_step(plain, begun, drive, h), drive, h)
+            begun = replace(
+                state, velocity=self._pushed_velocity(system, state, drive, h), memory=()
+            )
+            state = _carried_state(
+                system, state, self.base.take_step(plain, begun, drive, h), drive, h
+            )
         return state
 
     def advance_jointly(self, batches: JointBatch, state: State, duration: float) -> State:
@@ -67,12 +73,18 @@ class SplitEuler:
             velocity = state.velocity.clone()
             for system, members, part_state in parts:
                 if system.extra or system.ties:
-                    velocity[..., members] = self._pushed_velocity(system, part_state, drive.select(members), h)
-            after = self.base.take_step(plain, replace(state, velocity=velocity, memory=()), drive, h)
+                    velocity[..., members] = self._pushed_velocity(
+                        system, part_state, drive.select(members), h
+                    )
+            after = self.base.take_step(
+                plain, replace(state, velocity=velocity, memory=()), drive, h
+            )
             memory: list[Tensor] = []
             for system, members, part_state in parts:
                 if system.loads or system.remembering:
-                    carried = _carried_state(system, part_state, after.select(members), drive.select(members), h)
+                    carried = _carried_state(
+                        system, part_state, after.select(members), drive.select(members), h
+                    )
                     after.position[..., members] = carried.position
                     after.velocity[..., members] = carried.velocity
                     memory += carried.memory
@@ -82,8 +94,8 @@ class SplitEuler:
     def _kernels(
         self, plain: System, systems: Sequence[System], state: State
     ) -> tuple[Kernel, tuple[Kernel, ...]] | None:
-        """Chooses the kernels of the base model of all and of the batches; None where one of them cannot take the
-        steps."""
+        """Chooses the kernels of the base model of all and of the batches; None where one of them
+        cannot take the steps."""
         kernel = kernel_for(plain, state, self.base.backend)
         if kernel is None or plain.contact is not None or plain.limits is not None:
             return None
@@ -98,7 +110,13 @@ class SplitEuler:
         return kernel, tuple(parts)
 
     def _at_once(
-        self, plain: System, kernel: Kernel, parts: Sequence[Kernel], state: State, h: float, steps: int
+        self,
+        plain: System,
+        kernel: Kernel,
+        parts: Sequence[Kernel],
+        state: State,
+        h: float,
+        steps: int,
     ) -> State:
         """Steps of `h` [s] in one call of the kernel."""
         times = _times(state.time, h, steps)
@@ -140,13 +158,18 @@ def _times(start: float, h: float, steps: int) -> list[float]:
 
 
 def _carried_state(system: System, before: State, after: State, drive: Drive, h: float) -> State:
-    """Computes the end of a step, after the base model's: with air that moves along, and what forces remember of it in
-    the wind of its start."""
+    """Computes the end of a step, after the base model's: with air that moves along, and what
+    forces remember of it in the wind of its start."""
     if system.loads:
         x, v = before.position, before.velocity
         mass, normals = system.cloth.mass.unsqueeze(1), mean_normals(system.cloth, x)
         change = mass * (after.velocity - v)
-        change = effective(change, mass=system.cloth.mass, added=system.added_mass, normals=normals) / mass
+        change = (
+            effective(change, mass=system.cloth.mass, added=system.added_mass, normals=normals)
+            / mass
+        )
         after = replace(after, position=x + h * (v + change), velocity=v + change)
-    memory = system.remember_step(before.memory, drive.wind[0], before.time, after.position, after.velocity, elapsed=h)
+    memory = system.remember_step(
+        before.memory, drive.wind[0], before.time, after.position, after.velocity, elapsed=h
+    )
     return replace(after, memory=memory)

@@ -50,7 +50,8 @@ class Acting:
     """All that acts beside the base model of a system.
 
     Attributes:
-        entries: in the order of factors on the pressure, flows, forces and those forces that remember.
+        entries: in the order of factors on the pressure, flows, forces and those forces that
+            remember.
         remembering: how many of them, at the end, remember.
         tensors: what the entries point to, kept alive here.
     """
@@ -60,7 +61,8 @@ class Acting:
     tensors: list[Tensor] = field(repr=False)
 
     def with_memory(self, memory: Sequence[Tensor]) -> ctypes.Array[ActingEntry]:
-        """Returns the entries with what forces remember, which is changed in place and must outlive the entries."""
+        """Returns the entries with what forces remember, which is changed in place and must outlive
+        the entries."""
         array = (ActingEntry * len(self.entries))(*self.entries)
         for entry, past in zip(array[len(array) - self.remembering :], memory, strict=True):
             entry.memory = past.data_ptr()
@@ -68,7 +70,8 @@ class Acting:
 
 
 def acting(system: System, kind: str, pack: Callable[[Tensor], Tensor]) -> Acting | None:
-    """Compiles what acts beside the base model; None where any of it has no C++ beside it, or that cannot be built.
+    """Compiles what acts beside the base model; None where any of it has no C++ beside it, or that
+    cannot be built.
 
     Args:
         kind: of the kernel's functions, by numbers and lanes.
@@ -87,7 +90,9 @@ def acting(system: System, kind: str, pack: Callable[[Tensor], Tensor]) -> Actin
         cloth = system.cloth
         numbers = [torch.as_tensor(n, dtype=cloth.dtype).expand(cloth.batch) for n in given.numbers]
         numbers = pack(torch.stack(numbers) if numbers else cloth.mass[:0])
-        entry = ActingEntry(kind=number, act=act, numbers=numbers.shape[1], number=numbers.data_ptr())
+        entry = ActingEntry(
+            kind=number, act=act, numbers=numbers.shape[1], number=numbers.data_ptr()
+        )
         tensors.append(numbers)
         if given.own is not None:
             of_elements = pack(given.own)
@@ -98,8 +103,8 @@ def acting(system: System, kind: str, pack: Callable[[Tensor], Tensor]) -> Actin
 
 
 def _parts(system: System) -> Iterator[tuple[Compilable | None, tuple[Kind, ...]]]:
-    """Yields what acts beside the base model, None for what certainly has no C++; each with the kinds that it may be
-    of."""
+    """Yields what acts beside the base model, None for what certainly has no C++; each with the
+    kinds that it may be of."""
     factors = system.air.factors
     placed: list[tuple[Sequence[Any], tuple[Kind, ...]]] = [
         ((None,) if factors is None else factors, (Kind.PRESSURE_FACTOR,)),

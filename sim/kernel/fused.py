@@ -1,4 +1,5 @@
-"""Hands a system's tensors to the compiled kernel, in blocks of as many members as fit a vector register."""
+"""Hands a system's tensors to the compiled kernel, in blocks of as many members as fit a vector
+register."""
 
 from __future__ import annotations
 
@@ -55,7 +56,8 @@ _BLOCKED = (
 )
 
 _FEW = 8
-"""Members that fit a narrow block: half of a wide one, with 0.6 (backward Euler) to 0.9 (leapfrog) of its time."""
+"""Members that fit a narrow block: half of a wide one, with 0.6 (backward Euler) to 0.9 (leapfrog)
+of its time."""
 
 _CONTACT_POINTERS = ("face", "vertex_area", "centre", "apart", "group", "group_rest", "block")
 _CONTACT_SCALARS = ("thickness", "stiffness", "friction")
@@ -114,7 +116,8 @@ class _Part(ctypes.Structure):
 
 
 class _Lists:
-    """What the kernel's contact remembers from call to call of what is near: it saves time and changes no result.
+    """What the kernel's contact remembers from call to call of what is near: it saves time and
+    changes no result.
 
     Attributes:
         place: in memory.
@@ -155,11 +158,13 @@ class Kernel:
 
     @classmethod
     def of(cls, system: System, *, kind: str | None = None) -> Kernel | None:
-        """Builds the kernel for a system, or for its base where effects have no C++ (see `beside`); None where there is
+        """Builds the kernel for a system, or for its base where effects have no C++ (see `beside`);
+        None where there is
         none: not a CPU, not float32 or 64, or it cannot be built.
 
         Args:
-            kind: of the functions, as that of another kernel which it is run beside; None for what its batch needs.
+            kind: of the functions, as that of another kernel which it is run beside; None for what
+                its batch needs.
         """
         cloth = system.cloth
         if cloth.device.type != "cpu" or cloth.dtype not in (torch.float32, torch.float64):
@@ -240,7 +245,9 @@ class Kernel:
         if system.limits is not None:
             problem.lowest, problem.highest = system.limits.low, system.limits.high
             problem.sweeps = system.limits.sweeps
-            tensors["sweep_weights"] = torch.tensor(chebyshev_weights(system.limits.sweeps), dtype=cloth.dtype)
+            tensors["sweep_weights"] = torch.tensor(
+                chebyshev_weights(system.limits.sweeps), dtype=cloth.dtype
+            )
             problem.sweep_weights = tensors["sweep_weights"].data_ptr()
         return cls(
             code=code,
@@ -256,7 +263,8 @@ class Kernel:
         )
 
     def _drive(self, drive: Drive) -> tuple[_Problem, list[Tensor]]:
-        """Sets wind and handles of the problem; the tensors must outlive the call it is made for."""
+        """Sets wind and handles of the problem; the tensors must outlive the call it is made
+        for."""
         tensors = {
             "wind": self._stack_parts(drive.wind),
             "targets": self._stack_parts(drive.targets),
@@ -264,7 +272,9 @@ class Kernel:
         }
         if self.tied is not None:
             start, end = drive.offset
-            tensors["tie_targets"] = self._stack_parts((self.tied + start[:, None], self.tied + end[:, None]))
+            tensors["tie_targets"] = self._stack_parts(
+                (self.tied + start[:, None], self.tied + end[:, None])
+            )
             tensors["tie_rate"] = self.pack(drive.drift[:, None].expand(3, self.batch))
         return self._problem_with(**tensors)
 
@@ -272,7 +282,9 @@ class Kernel:
         """Locates the ties' anchors at displacements (3,) [m]; nothing where there are no ties."""
         if self.tied is None:
             return {}
-        return {"tie_targets": self._stack_parts([self.tied + offset[:, None] for offset in offsets])}
+        return {
+            "tie_targets": self._stack_parts([self.tied + offset[:, None] for offset in offsets])
+        }
 
     def _problem_with(self, **tensors: Tensor) -> tuple[_Problem, list[Tensor]]:
         """Sets some tensors of the problem, which must outlive the call it is made for."""
@@ -283,34 +295,60 @@ class Kernel:
 
     def _stack_parts(self, parts: Sequence[Tensor]) -> Tensor:
         """Stacks (…, batch) at several times to (time, block, …, lane)."""
-        return _to_blocks(torch.stack(tuple(parts)), self.lanes, self.blocks).movedim(1, 0).contiguous()
+        return (
+            _to_blocks(torch.stack(tuple(parts)), self.lanes, self.blocks)
+            .movedim(1, 0)
+            .contiguous()
+        )
 
     def pack(self, tensor: Tensor) -> Tensor:
         """Packs (…, batch) to (block, …, lane), contiguous and not shared with the argument."""
-        return _to_blocks(tensor, self.lanes, self.blocks).clone(memory_format=torch.contiguous_format)
+        return _to_blocks(tensor, self.lanes, self.blocks).clone(
+            memory_format=torch.contiguous_format
+        )
 
     def unpack(self, blocks: Tensor) -> Tensor:
         """Unpacks (block, …, lane) to (…, batch)."""
         return blocks.movedim(0, -2).flatten(-2)[..., : self.batch].contiguous()
 
     def advance(
-        self, drive: Drive, x: Tensor, v: Tensor, h: float, steps: int, *, memory: Sequence[Tensor] = ()
+        self,
+        drive: Drive,
+        x: Tensor,
+        v: Tensor,
+        h: float,
+        steps: int,
+        *,
+        memory: Sequence[Tensor] = (),
     ) -> tuple[Tensor, Tensor, tuple[Tensor, ...]]:
-        """Takes leapfrog steps: positions and velocities (vertex, 3, batch) after `steps` steps of `h` [s], and what
-        forces remember. Where `beside` is None it is that of the base model."""
+        """Takes leapfrog steps: positions and velocities (vertex, 3, batch) after `steps` steps of
+        `h` [s], and what forces remember. Where `beside` is None it is that of the base model."""
         problem, alive = self._drive(drive)
         past = self._remember(problem, memory)
         xb, vb = self.pack(x), self.pack(v)
         scratch = torch.empty_like(xb[0])
-        self._call("advance", problem, self.lists.place, xb, vb, scratch, ctypes.c_double(h), ctypes.c_int64(steps))
+        self._call(
+            "advance",
+            problem,
+            self.lists.place,
+            xb,
+            vb,
+            scratch,
+            ctypes.c_double(h),
+            ctypes.c_int64(steps),
+        )
         del alive
         return self.unpack(xb), self.unpack(vb), tuple(map(self.unpack, past))
 
     def _remember(self, problem: _Problem, memory: Sequence[Tensor]) -> list[Tensor]:
-        """Sets what acts beside the base model; returned is what forces remember, which a call changes."""
+        """Sets what acts beside the base model; returned is what forces remember, which a call
+        changes."""
         past = [self.pack(tensor) for tensor in memory]
         if self.beside is not None:
-            problem.effects, problem.effect = len(self.beside.entries), self.beside.with_memory(past)
+            problem.effects, problem.effect = (
+                len(self.beside.entries),
+                self.beside.with_memory(past),
+            )
         return past
 
     def forces(self, drive: Drive, share: float, x: Tensor, v: Tensor) -> Tensor:
@@ -323,9 +361,17 @@ class Kernel:
         return self.unpack(out)
 
     def extra(
-        self, drive: Drive, share: float, x: Tensor, v: Tensor, level: Tensor, *, memory: Sequence[Tensor] = ()
+        self,
+        drive: Drive,
+        share: float,
+        x: Tensor,
+        v: Tensor,
+        level: Tensor,
+        *,
+        memory: Sequence[Tensor] = (),
     ) -> Tensor:
-        """Computes what `System.extra_force` does, where `beside` is not None: (vertex, 3, batch) [N].
+        """Computes what `System.extra_force` does, where `beside` is not None: (vertex, 3, batch)
+        [N].
 
         Args:
             level: the velocity that effects see (vertex, 3, batch) [m/s].
@@ -352,13 +398,14 @@ class Kernel:
         offsets: Sequence[Tensor] = (),
         memory: Sequence[Tensor] = (),
     ) -> tuple[Tensor, Tensor]:
-        """Takes backward Euler steps of `h` [s] without contact and limits: positions and velocities (vertex, 3,
-        batch).
+        """Takes backward Euler steps of `h` [s] without contact and limits: positions and
+        velocities (vertex, 3, batch).
 
         Args:
             winds: (3, batch) at the start of each step [m/s].
             targets: (held, 3, batch) of the handles at the end of each [m].
-            offsets: (3,) displacement of the ties' anchors at the start of each [m]; none where there are no ties.
+            offsets: (3,) displacement of the ties' anchors at the start of each [m]; none where
+                there are no ties.
             memory: of the forces that remember, which is that of all steps.
             lag: the air sees the shape x − lag v [s].
 
@@ -366,7 +413,9 @@ class Kernel:
             NaN for members whose solve did not converge.
         """
         problem, alive = self._problem_with(
-            wind=self._stack_parts(winds), targets=self._stack_parts(targets), **self._tie_targets(offsets)
+            wind=self._stack_parts(winds),
+            targets=self._stack_parts(targets),
+            **self._tie_targets(offsets),
         )
         past = self._remember(problem, memory)
         xb, vb = self.pack(x), self.pack(v)
@@ -391,17 +440,19 @@ class Kernel:
         offsets: Sequence[Tensor],
         memory: Sequence[Tensor] = (),
     ) -> tuple[Tensor, Tensor, tuple[Tensor, ...]]:
-        """Takes steps of `h` [s] of the splitting (see `sim.integrate.split`): positions, velocities (vertex, 3,
-        batch), and what forces remember.
+        """Takes steps of `h` [s] of the splitting (see `sim.integrate.split`): positions,
+        velocities (vertex, 3, batch), and what forces remember.
 
         Args:
-            parts: of the batches, of this one's kind, whose members side by side are this one's; `beside` is none of
-                theirs None.
+            parts: of the batches, of this one's kind, whose members side by side are this one's;
+                `beside` is none of theirs None.
             winds, targets, offsets, tolerance, iterations: as of `implicit`.
             memory: of the forces of all parts that remember, in order.
         """
         problem, alive = self._problem_with(
-            wind=self._stack_parts(winds), targets=self._stack_parts(targets), **self._tie_targets(offsets)
+            wind=self._stack_parts(winds),
+            targets=self._stack_parts(targets),
+            **self._tie_targets(offsets),
         )
         problems: list[_Problem] = []
         remembered: list[tuple[Kernel, Tensor]] = []
@@ -432,17 +483,23 @@ class Kernel:
             ctypes.c_int64(len(parts)),
         )
         del alive, problems
-        return *self._solve_blocks(xb, vb, failed), tuple(part.unpack(tensor) for part, tensor in remembered)
+        return *self._solve_blocks(xb, vb, failed), tuple(
+            part.unpack(tensor) for part, tensor in remembered
+        )
 
     def _solve_blocks(self, x: Tensor, v: Tensor, failed: Tensor) -> tuple[Tensor, Tensor]:
-        """Positions and velocities (vertex, 3, batch) of blocks, NaN for members whose solve did not converge."""
+        """Positions and velocities (vertex, 3, batch) of blocks, NaN for members whose solve did
+        not converge."""
         after, lost = (self.unpack(x), self.unpack(v)), self.unpack(failed) != 0
         if bool(lost.any()):
             after = (after[0].masked_fill(lost, torch.nan), after[1].masked_fill(lost, torch.nan))
         return after
 
     def _call(
-        self, name: str, problem: _Problem, *arguments: Tensor | ctypes._SimpleCData[Any] | ctypes.Array[_Part]
+        self,
+        name: str,
+        problem: _Problem,
+        *arguments: Tensor | ctypes._SimpleCData[Any] | ctypes.Array[_Part],
     ) -> None:
         function = _function(self.code, name, self.kind)
         function.restype = None
@@ -464,15 +521,30 @@ def _set_ends(settings: _Ends, cloth: Cloth) -> dict[str, Tensor]:
     return {f"ends_{name}": tensor for name, tensor in tensors.items()}
 
 
-def _set_contact(settings: _Contact, system: System, contact: Contact, face: Tensor, width: int) -> dict[str, Tensor]:
+def _set_contact(
+    settings: _Contact, system: System, contact: Contact, face: Tensor, width: int
+) -> dict[str, Tensor]:
     """Fills in the contact's settings; the tensors it points to are returned, to be kept alive."""
     cloth = system.cloth
     centre, separation = layers(cloth.mesh, contact)
     group, block = _groups(cloth.mesh.rest, width), _groups(centre, width)
-    rest = np.where(group < 0, np.nan, cloth.mesh.rest.T[:, group]).swapaxes(0, 1)  # (group, 2, width)
-    real = {"vertex_area": cloth.mesh.vertex_areas, "centre": centre, "apart": separation**2, "group_rest": rest}
-    tensors = {name: torch.tensor(np.ascontiguousarray(values), dtype=cloth.dtype) for name, values in real.items()}
-    tensors |= {name: torch.tensor(values, dtype=torch.int32) for name, values in (("group", group), ("block", block))}
+    rest = np.where(group < 0, np.nan, cloth.mesh.rest.T[:, group]).swapaxes(
+        0, 1
+    )  # (group, 2, width)
+    real = {
+        "vertex_area": cloth.mesh.vertex_areas,
+        "centre": centre,
+        "apart": separation**2,
+        "group_rest": rest,
+    }
+    tensors = {
+        name: torch.tensor(np.ascontiguousarray(values), dtype=cloth.dtype)
+        for name, values in real.items()
+    }
+    tensors |= {
+        name: torch.tensor(values, dtype=torch.int32)
+        for name, values in (("group", group), ("block", block))
+    }
     settings.vertices, settings.faces = cloth.mesh.vertex_count, len(cloth.faces)
     settings.groups, settings.blocks = len(group), len(block)
     settings.thickness, settings.stiffness = contact.thickness, contact.stiffness
@@ -484,7 +556,8 @@ def _set_contact(settings: _Contact, system: System, contact: Contact, face: Ten
 
 
 def _groups(points: FloatArray, width: int) -> IntArray:
-    """Points (n, 2) in groups of `width` that lie close together: (group, width) indices, -1 where there is none.
+    """Points (n, 2) in groups of `width` that lie close together: (group, width) indices, -1 where
+    there is none.
 
     Halved across the longer side until few enough are left, always at a multiple of the width.
     """
@@ -508,10 +581,11 @@ def _function(code: ctypes.CDLL, name: str, kind: str) -> Any:
 
 
 def _kind(system: System) -> str:
-    """Names of the kernel's functions by the type of the numbers, with narrow blocks where members are few.
+    """Names of the kernel's functions by the type of the numbers, with narrow blocks where members
+    are few.
 
-    Contact adds forces up in groups as wide as a block: with it, blocks are as wide for few members as for many, so
-    that what one gets does not depend on their number.
+    Contact adds forces up in groups as wide as a block: with it, blocks are as wide for few members
+    as for many, so that what one gets does not depend on their number.
     """
     if system.cloth.dtype == torch.float64:
         return "f64"

@@ -1,21 +1,24 @@
-"""The base model's steps on a graphics processor, one flag a thread block, all steps of a call in one launch.
+"""The base model's steps on a graphics processor, one flag a thread block, all steps of a call in
+one launch.
 
-The torch source (sim/cloth: membrane.py, bending.py, air.py, system.py; sim/integrate/symplectic.py) is the definition,
-as it is of the C++ kernel. Positions, velocities and everything that threads hand to each other are tiles in shared
-memory; device memory is read for what does not change, and for the state before the first step. Warp has no shared
-arrays: a thread writes its element of a tile by `tile_scatter_masked`, which all threads of the block call and which
-ends with a barrier, and reads any element by `tile_extract`. There are no atomics; sums at the vertices are gathered in
-the order of `sim.cloth.cloth_batch.incidence`.
+The torch source (sim/cloth: membrane.py, bending.py, air.py, system.py;
+sim/integrate/symplectic.py) is the definition, as it is of the C++ kernel. Positions, velocities
+and everything that threads hand to each other are tiles in shared memory; device memory is read for
+what does not change, and for the state before the first step. Warp has no shared
+arrays: a thread writes its element of a tile by `tile_scatter_masked`, which all threads of the
+block call and which ends with a barrier, and reads any element by `tile_extract`. There are no
+atomics; sums at the vertices are gathered in the order of `sim.cloth.cloth_batch.incidence`.
 
 A step has four passes over threads:
 
-1. faces: normal, and for the edge opposite each corner its share in the rate of the fold and its inverse altitude;
+1. faces: normal, and for the edge opposite each corner its share in the rate of the fold and its
+   inverse altitude;
 2. hinges: the moment −k S/2 (θ + d θ̇), from the normals of their faces;
 3. faces: stress, air, and the moments of their three edges, as forces on the three corners;
 4. vertices: sum of these, springs, kick and drift.
 
-A fold's gradient at the opposite corner is n/h and at the edge's ends −(1 − w) n/h and −w n/h for each of its faces
-(see `sim.cloth.bending`), so that a face needs of a hinge only its moment.
+A fold's gradient at the opposite corner is n/h and at the edge's ends −(1 − w) n/h and −w n/h for
+each of its faces (see `sim.cloth.bending`), so that a face needs of a hinge only its moment.
 """
 
 # The kernel's body is Warp's language, of which its stubs type a part.
@@ -35,8 +38,8 @@ wp.config.log_level = wp.LOG_WARNING  # it would greet on stdout, which is for r
 THREADS = 256
 """Threads of a block."""
 BLOCKS = 3
-"""Blocks that a multiprocessor is to hold at once: 68 kB of shared memory each for 651 vertices, and 80 registers a
-thread."""
+"""Blocks that a multiprocessor is to hold at once: 68 kB of shared memory each for 651 vertices,
+and 80 registers a thread."""
 OPTIONS = {"fast_math": True}
 """Of the compiler: divisions and roots are right to two or three units of the last place."""
 
@@ -46,16 +49,18 @@ _TINY = wp.constant(1e-30)
 
 @wp.struct
 class Sheet:
-    """A mesh. What has a corner or a component is flat, that index first; two indices share a number, the second in its
-    upper half.
+    """A mesh. What has a corner or a component is flat, that index first; two indices share a
+    number, the second in its upper half.
 
     Attributes:
-        corner: (3, face) the vertices a and b; c and the hinge of the edge opposite a; the hinges of those opposite b
-            and c. An edge of the cloth has the number of hinges.
-        gradient: (4, face) ∂/∂u and ∂/∂v of the second corner's shape function, then of the third's [1/m].
+        corner: (3, face) the vertices a and b; c and the hinge of the edge opposite a; the hinges
+            of those opposite b and c. An edge of the cloth has the number of hinges.
+        gradient: (4, face) ∂/∂u and ∂/∂v of the second corner's shape function, then of the third's
+            [1/m].
         area: (face,) at rest [m²].
         end: (hinge,) vertices i and j.
-        side: (hinge,) 4 · face + the corner opposite, of the face on the left and of that on the right of i→j.
+        side: (hinge,) 4 · face + the corner opposite, of the face on the left and of that on the
+            right of i→j.
         column, shape: (hinge,) see `sim.cloth.cloth_batch.Cloth`.
         row: (hinge,) place among the bending rows, 0 to 2.
         around: (k, vertex) corner · faces + face, of the faces at each vertex.
@@ -79,11 +84,12 @@ class Members:
     """Materials and surroundings.
 
     Attributes:
-        samples: (2 · table · node,) stretching stiffness k0 to k3 [N/m], two to a number: Warp reads vectors one
-            component at a time.
+        samples: (2 · table · node,) stretching stiffness k0 to k3 [N/m], two to a number: Warp
+            reads vectors one component at a time.
         table: (batch,) of each member.
         counts: nodes of a table along G00, G11 and |G01|.
-        origin, fineness: of its nodes: where the first is, and how many there are in a unit of strain.
+        origin, fineness: of its nodes: where the first is, and how many there are in a unit of
+            strain.
         bending: (15, batch) nodes of the three bending rows [N·m].
         symmetric: 1 where bending looks up |curvature|.
         damping: (batch,) d [s].
@@ -179,16 +185,23 @@ def chosen(each: wp.vec3, index: int):
 
 @functools.cache
 def kernel(vertices: int, faces: int, hinges: int) -> Any:
-    """Compiles the kernel for meshes of these numbers; tiles have sizes that are known when it is compiled.
+    """Compiles the kernel for meshes of these numbers; tiles have sizes that are known when it is
+    compiled.
 
-    Launched by `wp.launch_tiled` with a block a member, of `THREADS` threads, on (sheet, members, motion, position,
-    velocity, step, steps), with position and velocity (vertex, 3, batch), which it overwrites. On a processor that is
-    no graphics processor a block has one thread, unless `warp.config.enable_cpu_blocks` is set.
+    Launched by `wp.launch_tiled` with a block a member, of `THREADS` threads, on (sheet, members,
+    motion, position, velocity, step, steps), with position and velocity (vertex, 3, batch), which
+    it overwrites. On a processor that is no graphics processor a block has one thread, unless
+    `warp.config.enable_cpu_blocks` is set.
     """
     count, sides, folds = wp.constant(vertices), wp.constant(faces), wp.constant(hinges)
     corners, places = wp.constant(3 * faces), wp.constant(hinges + 1)
 
-    @wp.kernel(module="unique", module_options=OPTIONS, enable_backward=False, launch_bounds=(THREADS, BLOCKS))
+    @wp.kernel(
+        module="unique",
+        module_options=OPTIONS,
+        enable_backward=False,
+        launch_bounds=(THREADS, BLOCKS),
+    )
     def leapfrog(
         sheet: Sheet,
         members: Members,
@@ -203,7 +216,8 @@ def kernel(vertices: int, faces: int, hinges: int) -> Any:
         x = wp.tile_empty(shape=count, dtype=wp.vec3, storage="shared")
         v = wp.tile_empty(shape=count, dtype=wp.vec3, storage="shared")
         inverse_mass = wp.tile_empty(shape=count, dtype=float, storage="shared")
-        # Of the faces: normals, rates of folds, inverse altitudes; later forces on the three corners.
+        # Of the faces: normals, rates of folds, inverse altitudes; later forces on the three
+        # corners.
         face = wp.tile_empty(shape=corners, dtype=wp.vec3, storage="shared")
         moment = wp.tile_zeros(shape=places, dtype=float, storage="shared")
         bending = wp.tile_empty(shape=15, dtype=float, storage="shared")
@@ -222,9 +236,16 @@ def kernel(vertices: int, faces: int, hinges: int) -> Any:
             wp.tile_scatter_masked(inverse_mass, i, members.inverse_mass[i, member], here)
         damping = members.damping[member]
         table = members.table[member] * members.counts[0] * members.counts[1] * members.counts[2]
-        gravity = wp.vec3(members.gravity[0, member], members.gravity[1, member], members.gravity[2, member])
-        calm = wp.vec3(motion.wind[0, 0, member], motion.wind[0, 1, member], motion.wind[0, 2, member])
-        change = wp.vec3(motion.wind[1, 0, member], motion.wind[1, 1, member], motion.wind[1, 2, member]) - calm
+        gravity = wp.vec3(
+            members.gravity[0, member], members.gravity[1, member], members.gravity[2, member]
+        )
+        calm = wp.vec3(
+            motion.wind[0, 0, member], motion.wind[0, 1, member], motion.wind[0, 2, member]
+        )
+        change = (
+            wp.vec3(motion.wind[1, 0, member], motion.wind[1, 1, member], motion.wind[1, 2, member])
+            - calm
+        )
 
         for s in range(steps + 1):
             share = float(s) / float(steps)
@@ -341,7 +362,9 @@ def kernel(vertices: int, faces: int, hinges: int) -> Any:
                 relative = wind - (va + vb + vc) / 3.0
                 across = wp.dot(relative, n)
                 drag = members.drag * third
-                push = (members.density * third * wp.abs(across) * across - drag * across) * n + drag * relative
+                push = (
+                    members.density * third * wp.abs(across) * across - drag * across
+                ) * n + drag * relative
 
                 ma = wp.tile_extract(moment, upper(c_and)) * p[0]
                 mb = wp.tile_extract(moment, lower(others)) * p[1]

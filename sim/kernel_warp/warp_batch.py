@@ -61,8 +61,9 @@ class WarpKernel:
         """Builds the kernel for a system.
 
         Raises:
-            UsageError: warp-lang is not installed, or has no such device; numbers that are not float32; a mesh that is
-                too large; a system with more than the base model, which is named.
+            UsageError: warp-lang is not installed, or has no such device; numbers that are not
+                float32; a mesh that is too large; a system with more than the base model, which is
+                named.
         """
         with _LAUNCHING:
             if system not in _KERNELS:
@@ -80,7 +81,9 @@ class WarpKernel:
         cloth = system.cloth
         if cloth.dtype != torch.float32:
             raise UsageError(
-                f"the numbers are of type {cloth.dtype}", where=_WHERE, fix="use float32, or another backend"
+                f"the numbers are of type {cloth.dtype}",
+                where=_WHERE,
+                fix="use float32, or another backend",
             )
         if len(cloth.faces) > FACES_LIMIT:
             raise UsageError(
@@ -116,17 +119,25 @@ class WarpKernel:
         members.symmetric = int(cloth.evaluation is Evaluation.CORRECTED)
         members.damping = array(cloth.damping)
         inverse = 1 / cloth.mass
-        members.inverse_mass = array(inverse.index_fill(0, system.held, 0.0) if system.is_clamped else inverse)
+        members.inverse_mass = array(
+            inverse.index_fill(0, system.held, 0.0) if system.is_clamped else inverse
+        )
         members.gravity = array(system.gravity)
         members.density, members.drag = system.air.plain.density, system.air.plain.drag
         members.stiffness = system.handles.stiffness if system.sprung else 0.0
         return cls(code=code, system=system, sheet=sheet, members=members, alive=tuple(alive))
 
-    def advance(self, drive: Drive, x: Tensor, v: Tensor, h: float, steps: int) -> tuple[Tensor, Tensor]:
-        """Takes leapfrog steps: positions and velocities (vertex, 3, batch) after `steps` steps of `h` [s]."""
+    def advance(
+        self, drive: Drive, x: Tensor, v: Tensor, h: float, steps: int
+    ) -> tuple[Tensor, Tensor]:
+        """Takes leapfrog steps: positions and velocities (vertex, 3, batch) after `steps` steps of
+        `h` [s]."""
         wp, mesh = self.code.wp, self.system.cloth.mesh
         tensors = [torch.stack(drive.wind), torch.stack(drive.targets), drive.rate.contiguous()]
-        after = (x.clone(memory_format=torch.contiguous_format), v.clone(memory_format=torch.contiguous_format))
+        after = (
+            x.clone(memory_format=torch.contiguous_format),
+            v.clone(memory_format=torch.contiguous_format),
+        )
         motion = self.code.Motion()
         motion.wind, motion.targets, motion.rate = (wp.from_torch(tensor) for tensor in tensors)
         where = wp.device_from_torch(x.device)
@@ -137,8 +148,17 @@ class WarpKernel:
                 dim=[self.system.cloth.batch],
                 block_dim=self.code.THREADS,
                 device=where,
-                inputs=[self.sheet, self.members, motion, *(wp.from_torch(tensor) for tensor in after), h, steps],
-                stream=wp.stream_from_torch(torch.cuda.current_stream(x.device)) if where.is_cuda else None,
+                inputs=[
+                    self.sheet,
+                    self.members,
+                    motion,
+                    *(wp.from_torch(tensor) for tensor in after),
+                    h,
+                    steps,
+                ],
+                stream=wp.stream_from_torch(torch.cuda.current_stream(x.device))
+                if where.is_cuda
+                else None,
             )
         return after
 
@@ -159,7 +179,9 @@ def _code(device: torch.device) -> ModuleType:
         if error.name != "warp":
             raise
         raise UsageError(
-            "warp-lang is not installed", where=_WHERE, fix="pip install 'flagdata[gpu]', or use another backend"
+            "warp-lang is not installed",
+            where=_WHERE,
+            fix="pip install 'flagdata[gpu]', or use another backend",
         ) from None
     devices = [str(device) for device in code.wp.get_devices()]
     name = "cpu" if device.type == "cpu" else f"{device.type}:{device.index or 0}"
@@ -178,10 +200,13 @@ def _check_room(mesh: Mesh, room: int) -> None:
     Raises:
         UsageError: it does not.
     """
-    taken = 28 * mesh.vertex_count + 36 * len(mesh.faces) + 4 * len(mesh.hinges) + 64  # see the tiles of the kernel
+    taken = (
+        28 * mesh.vertex_count + 36 * len(mesh.faces) + 4 * len(mesh.hinges) + 64
+    )  # see the tiles of the kernel
     if taken > room:
         raise UsageError(
-            f"a mesh of {mesh.vertex_count} vertices takes {taken} bytes of shared memory, of which there are {room}",
+            f"a mesh of {mesh.vertex_count} vertices takes {taken} bytes of shared memory, of "
+            f"which there are {room}",
             where=_WHERE,
             fix="take a coarser mesh, or another backend",
         )
@@ -191,10 +216,16 @@ def _sheet(mesh: Mesh, held: Tensor) -> dict[str, IntArray]:
     """Computes the index arrays of `leapfrog.Sheet`."""
     faces, hinges = mesh.faces, mesh.hinges
     place_of = {  # directed edge → face and the corner opposite
-        (int(face[(c + 1) % 3]), int(face[(c + 2) % 3])): (e, c) for e, face in enumerate(faces) for c in range(3)
+        (int(face[(c + 1) % 3]), int(face[(c + 2) % 3])): (e, c)
+        for e, face in enumerate(faces)
+        for c in range(3)
     }
-    left = np.array([place_of[int(i), int(j)] for i, j, *_ in hinges], dtype=np.int64).reshape(-1, 2)
-    right = np.array([place_of[int(j), int(i)] for i, j, *_ in hinges], dtype=np.int64).reshape(-1, 2)
+    left = np.array([place_of[int(i), int(j)] for i, j, *_ in hinges], dtype=np.int64).reshape(
+        -1, 2
+    )
+    right = np.array([place_of[int(j), int(i)] for i, j, *_ in hinges], dtype=np.int64).reshape(
+        -1, 2
+    )
     edge = np.full(faces.shape, len(hinges))
     edge[tuple(left.T)] = edge[tuple(right.T)] = np.arange(len(hinges))
     around = incidence(faces, mesh.vertex_count)

@@ -1,4 +1,5 @@
-"""Remeshing while simulating: triangles small where cloth bends, moves unevenly or is compressed, large elsewhere."""
+"""Remeshing while simulating: triangles small where cloth bends, moves unevenly or is compressed,
+large elsewhere."""
 
 from __future__ import annotations
 

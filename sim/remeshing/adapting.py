@@ -1,14 +1,16 @@
-"""Remeshing of a cloth as it is: flips, splits where edges are too long, collapses where they would not become so.
+"""Remeshing of a cloth as it is: flips, splits where edges are too long, collapses where they would
+not become so.
 
-After Narain, Samii and O'Brien (2012, section 4.2): edges longer than 1 in the metric are split, the longest first, and
-the mesh is made Delaunay in the metric around each; then vertices are merged into neighbours as long as no edge becomes
-longer than `SHORT` and no triangle a sliver. The metric is that of the cloth before; the middle of an edge has the mean
-of its ends'.
+After Narain, Samii and O'Brien (2012, section 4.2): edges longer than 1 in the metric are split,
+the longest first, and the mesh is made Delaunay in the metric around each; then vertices are merged
+into neighbours as long as no edge becomes longer than `SHORT` and no triangle a sliver. The metric
+is that of the cloth before; the middle of an edge has the mean of its ends'.
 
-A split keeps the momentum ρ Σ a v̄ (v̄ the mean of a face's corners, a its rest area), since a velocity that is linear
-on the face is linear on its halves. A flip and a collapse change it by ρ times the difference of Σ a v̄ over the faces
-concerned, which is zero where the velocity is linear in the material over all of them. For a flip of i–j into k–l on a
-parallelogram of area a that is (ρ a/6) (v_k + v_l − vᵢ − vⱼ).
+A split keeps the momentum ρ Σ a v̄ (v̄ the mean of a face's corners, a its rest area), since a
+velocity that is linear on the face is linear on its halves. A flip and a collapse change it by ρ
+times the difference of Σ a v̄ over the faces concerned, which is zero where the velocity is linear
+in the material over all of them. For a flip of i–j into k–l on a parallelogram of area a that is (ρ
+a/6) (v_k + v_l − vᵢ − vⱼ).
 """
 
 from __future__ import annotations
@@ -32,11 +34,14 @@ from sim.effects.effect import ForceEffect
 from sim.remeshing.triangles import Triangles
 
 SHORT = 0.8
-"""Length in the metric that a collapse may make an edge: below 1, so that it is not split again at once."""
+"""Length in the metric that a collapse may make an edge: below 1, so that it is not split again at
+once."""
 _FLIPPED = 0.01
-"""Excess, of the sum of both triangles' areas, by which an edge is not Delaunay before it is flipped."""
+"""Excess, of the sum of both triangles' areas, by which an edge is not Delaunay before it is
+flipped."""
 _FLIPS = 20
-"""Most flips of an edge's surroundings, for each edge: a metric that varies can go round in circles."""
+"""Most flips of an edge's surroundings, for each edge: a metric that varies can go round in
+circles."""
 
 _Metric: TypeAlias = tuple[float, float, float]
 """M_uu, M_uv, M_vv."""
@@ -62,7 +67,12 @@ class Adapted:
 
 
 def adapt_mesh(
-    mesh: Mesh, position: FloatArray, velocity: FloatArray, criteria: Remeshing, *, fixed: Iterable[int] = ()
+    mesh: Mesh,
+    position: FloatArray,
+    velocity: FloatArray,
+    criteria: Remeshing,
+    *,
+    fixed: Iterable[int] = (),
 ) -> Adapted:
     """Remeshes a cloth at positions and velocities (vertex, 3) [m, m/s].
 
@@ -79,8 +89,8 @@ def adapt_mesh(
 
 
 def remesh_state(system: System, state: State) -> tuple[System, State]:
-    """Returns a cloth on a mesh that suits its shape and motion, and its state there; both as they are where the system
-    has no remeshing.
+    """Returns a cloth on a mesh that suits its shape and motion, and its state there; both as they
+    are where the system has no remeshing.
 
     Raises:
         UsageError: several members, or what cannot be carried over to another mesh: see `check`.
@@ -90,9 +100,13 @@ def remesh_state(system: System, state: State) -> tuple[System, State]:
         return system, state
     check(system)
     old = system.cloth
-    position, velocity = (field[..., 0].double().cpu().numpy() for field in (state.position, state.velocity))
+    position, velocity = (
+        field[..., 0].double().cpu().numpy() for field in (state.position, state.velocity)
+    )
     new = adapt_mesh(old.mesh, position, velocity, criteria, fixed=system.handles.vertices)
-    cloth = Cloth.build(new.mesh, old.materials, evaluation=old.evaluation, dtype=old.dtype, device=old.device)
+    cloth = Cloth.build(
+        new.mesh, old.materials, evaluation=old.evaluation, dtype=old.dtype, device=old.device
+    )
     held = np.searchsorted(new.vertices, np.array(system.handles.vertices, dtype=np.int64)).tolist()
 
     def on_new(field: FloatArray) -> Tensor:
@@ -109,22 +123,31 @@ def remesh_state(system: System, state: State) -> tuple[System, State]:
 
 def check(system: System) -> None:
     """Raises:
-    UsageError: several members, or effects that know the vertices: ties, memories, moved anchors, and what changes the
-        cloth itself.
+    UsageError: several members, or effects that know the vertices: ties, memories, moved anchors,
+        and what changes the cloth itself.
     """
     if system.remeshing is None:
         return
     if system.cloth.batch != 1:
         raise UsageError(
-            f"{system.cloth.batch} members are simulated together, and each would have a mesh of its own",
+            f"{system.cloth.batch} members are simulated together, and each would have a mesh of "
+            "its own",
             where="remeshing",
             fix="simulate them one by one",
         )
     cloth = system.cloth
     plain = Cloth.build(
-        cloth.mesh, cloth.materials, evaluation=cloth.evaluation, dtype=cloth.dtype, device=cloth.device
+        cloth.mesh,
+        cloth.materials,
+        evaluation=cloth.evaluation,
+        dtype=cloth.dtype,
+        device=cloth.device,
     )
-    changed = not torch.equal(plain.mass, cloth.mass) or cloth.stiffening is not None or system.motion is not None
+    changed = (
+        not torch.equal(plain.mass, cloth.mass)
+        or cloth.stiffening is not None
+        or system.motion is not None
+    )
     bound = [part for part in system.effects if not isinstance(part, ForceEffect)]
     names = sorted({type(part).__name__ for part in (*bound, *system.ties, *system.remembering)})
     if names or changed:
@@ -132,7 +155,8 @@ def check(system: System) -> None:
             "what acts on single vertices or folds cannot follow a mesh that changes: "
             f"{', '.join(names) or 'mass, stiffness or anchors of the cloth'}",
             where="remeshing",
-            fix="leave out remeshing, or the effects that change the cloth or its attachment or have a memory",
+            fix="leave out remeshing, or the effects that change the cloth or its attachment or "
+            "have a memory",
         )
 
 
@@ -154,8 +178,13 @@ class _Editing:
         """Divides edges until none is too long, the longest first."""
         triangles = self._triangles
         while True:
-            sizes = [(self.size(i, j), i, j) for i, j in triangles.edges() if not triangles.held(i, j)]
-            long = sorted(((size, i, j) for size, i, j in sizes if size > 1), key=lambda entry: (-entry[0], *entry[1:]))
+            sizes = [
+                (self.size(i, j), i, j) for i, j in triangles.edges() if not triangles.held(i, j)
+            ]
+            long = sorted(
+                ((size, i, j) for size, i, j in sizes if size > 1),
+                key=lambda entry: (-entry[0], *entry[1:]),
+            )
             if not long:
                 return
             for _, i, j in long:
@@ -181,9 +210,9 @@ class _Editing:
 
     def _may_collapse(self, gone: int, target: int) -> bool:
         added = self._triangles.neighbours(gone) - self._triangles.neighbours(target) - {target}
-        return all(self.size(target, other) <= SHORT**2 for other in added) and self._triangles.collapsible(
-            gone, target
-        )
+        return all(
+            self.size(target, other) <= SHORT**2 for other in added
+        ) and self._triangles.collapsible(gone, target)
 
     def flip(self, edges: Iterable[tuple[int, int]]) -> None:
         """Makes these edges Delaunay in the metric, and those that are concerned by it."""
@@ -199,12 +228,16 @@ class _Editing:
                 waiting += [(i, l), (l, j), (j, k), (k, i)]
 
     def _wrong(self, i: int, j: int) -> bool:
-        """Whether the angles opposite to an edge are, in the metric, more than two right ones together."""
+        """Whether the angles opposite to an edge are, in the metric, more than two right ones
+        together."""
         triangles = self._triangles
         k, l = triangles.opposite(i, j), triangles.opposite(j, i)  # noqa: E741
         if k is None or l is None:
             return False
-        metric = [sum(entries) / 4 for entries in zip(*(self._metrics[n] for n in (i, j, k, l)), strict=True)]
+        metric = [
+            sum(entries) / 4
+            for entries in zip(*(self._metrics[n] for n in (i, j, k, l)), strict=True)
+        ]
         left, right = triangles.doubled_area(i, j, k), triangles.doubled_area(j, i, l)
         excess = left * self._product(metric, j, i, l) + self._product(metric, i, j, k) * right
         return excess < -_FLIPPED * (left + right)

@@ -1,8 +1,9 @@
 """A triangulation of the flat cloth that is edited: edges split, flipped and collapsed.
 
-Vertices keep their numbers; new ones are added at the end, and those that are gone have no faces left. A vertex is new
-only as the middle of an edge, so that any field on the cloth is carried over by means of two values, which is exact
-for fields that are linear on faces; flips and collapses move no vertex.
+Vertices keep their numbers; new ones are added at the end, and those that are gone have no faces
+left. A vertex is new only as the middle of an edge, so that any field on the cloth is carried over
+by means of two values, which is exact for fields that are linear on faces; flips and collapses move
+no vertex.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from flagdata.core.arrays import FloatArray, IntArray
 from sim.cloth.mesh import Mesh
 
 LEAST_QUALITY = 0.1
-"""Of a triangle that a flip or a collapse makes: 12 √3 times its area over its perimeter squared; 1 has equal sides."""
+"""Of a triangle that a flip or a collapse makes: 12 √3 times its area over its perimeter squared; 1
+has equal sides."""
 _STRAIGHT = 1e-12
 """Sine below which two edges of the rim lie on one line."""
 
@@ -41,7 +43,11 @@ class Triangles:
 
     def edges(self) -> list[tuple[int, int]]:
         """Lists every edge once, in ascending order of its vertices."""
-        both = {(min(i, j), max(i, j)) for i, star in enumerate(self.around) for j in (*star, *star.values())}
+        both = {
+            (min(i, j), max(i, j))
+            for i, star in enumerate(self.around)
+            for j in (*star, *star.values())
+        }
         return sorted(both)
 
     def opposite(self, i: int, j: int) -> int | None:
@@ -69,7 +75,8 @@ class Triangles:
         return 6 * math.sqrt(3) * self.doubled_area(i, j, k) / perimeter**2
 
     def split(self, i: int, j: int) -> int:
-        """Divides an edge in two at its middle, with the faces beside it; returns the new vertex."""
+        """Divides an edge in two at its middle, with the faces beside it; returns the new
+        vertex."""
         middle = len(self.rest)
         (ui, vi), (uj, vj) = self.rest[i], self.rest[j]
         self.rest.append(((ui + uj) / 2, (vi + vj) / 2))
@@ -84,8 +91,8 @@ class Triangles:
         return middle
 
     def flip(self, i: int, j: int) -> tuple[int, int] | None:
-        """Replaces an inner edge by the other diagonal, which is returned; None, and no change, where it would be one
-        of the mesh already, lie outside, or make slivers."""
+        """Replaces an inner edge by the other diagonal, which is returned; None, and no change,
+        where it would be one of the mesh already, lie outside, or make slivers."""
         k, l = self.opposite(i, j), self.opposite(j, i)  # noqa: E741  corners as in `Mesh.hinges`
         if k is None or l is None or self.held(i, j) or self.adjacent(k, l):
             return None
@@ -98,8 +105,8 @@ class Triangles:
         return k, l
 
     def collapsible(self, i: int, j: int) -> bool:
-        """Returns whether a vertex can be merged into its neighbour: the cloth keeps its outline and its topology, and
-        no triangle becomes a sliver."""
+        """Returns whether a vertex can be merged into its neighbour: the cloth keeps its outline
+        and its topology, and no triangle becomes a sliver."""
         if i in self.fixed:
             return False
         sides = {self.around[i].get(j), self.around[j].get(i)} - {None}
@@ -113,7 +120,8 @@ class Triangles:
         return bool(left) and all(self.quality(j, a, b) >= LEAST_QUALITY for a, b in left)
 
     def collapse(self, i: int, j: int) -> list[int]:
-        """Merges a vertex into its neighbour, where that is `collapsible`; returns those whose faces changed."""
+        """Merges a vertex into its neighbour, where that is `collapsible`; returns those whose
+        faces changed."""
         star = dict(self.around[i])
         for a, b in star.items():
             self._drop(i, a, b)
@@ -147,7 +155,8 @@ class Triangles:
         return Mesh(rest=rest, faces=np.array(sorted(faces))), np.array(left, dtype=np.int64)
 
     def carried(self, field: FloatArray) -> FloatArray:
-        """Returns a field (vertex, …) of the mesh it began with on all vertices that there have been since."""
+        """Returns a field (vertex, …) of the mesh it began with on all vertices that there have
+        been since."""
         values = np.empty((len(self.rest), *field.shape[1:]))
         values[: self._start] = field
         for vertex, (i, j) in enumerate(self.halves, start=self._start):

@@ -1,8 +1,8 @@
 """How meshes become pictures: the renderers' contract, and the renderers by name.
 
-A renderer turns meshes and render parameters ζ into frames. What all renderers share is one function each: `stage`
-places camera, sun, cloth and pole; `Camera.project` maps the world to pixels; `plate` fits the background; `develop`
-turns linear light into sRGB bytes.
+A renderer turns meshes and render parameters ζ into frames. What all renderers share is one
+function each: `stage` places camera, sun, cloth and pole; `Camera.project` maps the world to
+pixels; `plate` fits the background; `develop` turns linear light into sRGB bytes.
 """
 
 from __future__ import annotations
@@ -39,7 +39,8 @@ RENDERERS = Registry(
     group="flagdata.renderers",
     accepts=lambda entry: isinstance(entry, type) and callable(getattr(entry, "render", None)),
 )
-"""Name → class, made with the assets it takes backgrounds and textures from: `RENDERERS["raster"](assets=Assets())`.
-Installed packages add renderers by entry points of the group `flagdata.renderers`."""
+"""Name → class, made with the assets it takes backgrounds and textures from:
+`RENDERERS["raster"](assets=Assets())`. Installed packages add renderers by entry points of the
+group `flagdata.renderers`."""
 
 __getattr__ = lazy_exports(__name__, __file__)

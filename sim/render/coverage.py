@@ -1,7 +1,8 @@
 """Which samples a triangle covers: exact, watertight, and the same on every machine.
 
-Places are rounded to 1/256 px; edge functions are then whole numbers. A sample on an edge belongs to the one of two
-neighbours whose edge runs down, or level to the right, so that no sample is covered twice or not at all.
+Places are rounded to 1/256 px; edge functions are then whole numbers. A sample on an edge belongs
+to the one of two neighbours whose edge runs down, or level to the right, so that no sample is
+covered twice or not at all.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ _FRAGMENTS = 1 << 22  # candidates looked at together; bounds the memory
 
 @dataclass(frozen=True, kw_only=True)
 class Triangles:
-    """Triangles in an image, made counter-clockwise in a frame with y downwards (positive area); flat ones left out.
+    """Triangles in an image, made counter-clockwise in a frame with y downwards (positive area);
+    flat ones left out.
 
     Attributes:
         face: (triangle,) which face it is.
@@ -42,7 +44,9 @@ class Triangles:
         area = _cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
         turned = torch.where((area < 0)[:, None], corners[:, [0, 2, 1]], corners)
         faces = torch.nonzero(area != 0).flatten()
-        return cls(face=faces, corners=turned[faces], places=steps[turned[faces]], area=area[faces].abs())
+        return cls(
+            face=faces, corners=turned[faces], places=steps[turned[faces]], area=area[faces].abs()
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,8 +65,8 @@ class Fragments:
 
 
 def fragments(triangles: Triangles, *, width: int, height: int) -> list[Fragments]:
-    """Computes what the triangles cover of the samples at the middles of an image's pixels: one part or more, maybe
-    empty."""
+    """Computes what the triangles cover of the samples at the middles of an image's pixels: one
+    part or more, maybe empty."""
     low, high = triangles.places.amin(dim=1), triangles.places.amax(dim=1)
     half, size = GRID // 2, triangles.places.new_tensor([width, height])
     first = torch.div(low - half + GRID - 1, GRID, rounding_mode="floor").clamp_min(0)
@@ -74,18 +78,30 @@ def fragments(triangles: Triangles, *, width: int, height: int) -> list[Fragment
     begin = 0
     while begin < len(counts) or not parts:
         done = int(ends[begin - 1]) if begin else 0
-        end = min(len(counts), max(begin + 1, int(torch.searchsorted(ends, done + _FRAGMENTS, right=True))))
+        end = min(
+            len(counts),
+            max(begin + 1, int(torch.searchsorted(ends, done + _FRAGMENTS, right=True))),
+        )
         parts.append(_cover_pixels(triangles, begin, end, first, span, counts, width=width))
         begin = end
     return parts
 
 
 def _cover_pixels(
-    triangles: Triangles, begin: int, end: int, first: Tensor, span: Tensor, counts: Tensor, *, width: int
+    triangles: Triangles,
+    begin: int,
+    end: int,
+    first: Tensor,
+    span: Tensor,
+    counts: Tensor,
+    *,
+    width: int,
 ) -> Fragments:
     part = counts[begin:end]
     triangle = torch.repeat_interleave(torch.arange(begin, end, device=part.device), part)
-    cell = torch.arange(len(triangle), device=part.device) - torch.repeat_interleave(part.cumsum(0) - part, part)
+    cell = torch.arange(len(triangle), device=part.device) - torch.repeat_interleave(
+        part.cumsum(0) - part, part
+    )
     across = span[triangle, 0]
     column = first[triangle, 0] + cell % across
     row = first[triangle, 1] + cell // across
@@ -99,7 +115,8 @@ def _cover_pixels(
 
 
 def _edge(a: Tensor, b: Tensor, sample: Tensor) -> Tensor:
-    """Computes twice the area of (a, b, sample), less 1 where samples on the edge belong to the neighbour."""
+    """Computes twice the area of (a, b, sample), less 1 where samples on the edge belong to the
+    neighbour."""
     along = b - a
     owned = (along[:, 1] > 0) | ((along[:, 1] == 0) & (along[:, 0] > 0))
     return _cross(along, sample - a) - (~owned).long()

@@ -1,9 +1,10 @@
-"""Blender's renderers: Cycles, a path tracer, as the reference; Workbench, its viewport, as a peer in speed.
+"""Blender's renderers: Cycles, a path tracer, as the reference; Workbench, its viewport, as a peer
+in speed.
 
-Both run in a process of their own (`sim.blender`), which gets what `stage` placed and gives linear light back; the
-background, the exposure and the bytes are made here, as for every renderer. The motion blur of an exposure is the mean
-of as many pictures as it takes for the cloth to move by a pixel between them, at most `_MOST_PICTURES`; the samples of
-a pixel are dealt to them.
+Both run in a process of their own (`sim.blender`), which gets what `stage` placed and gives linear
+light back; the background, the exposure and the bytes are made here, as for every renderer. The
+motion blur of an exposure is the mean of as many pictures as it takes for the cloth to move by a
+pixel between them, at most `_MOST_PICTURES`; the samples of a pixel are dealt to them.
 """
 
 from __future__ import annotations
@@ -36,9 +37,9 @@ _SLOWEST = 2e-5  # s a sample of a pixel, with a margin of thirty on a core of 2
 class Cycles:
     """Cycles on the CPU: one `WorkerProcess` for as long as this lives. A context manager.
 
-    The sun is a disc light and the sky a uniform world, `cycles_samples` paths a pixel with `cycles_bounces` bounces;
-    their noise differs from frame to frame and stays in the picture. The same arguments give the same bytes on the same
-    machine.
+    The sun is a disc light and the sky a uniform world, `cycles_samples` paths a pixel with
+    `cycles_bounces` bounces; their noise differs from frame to frame and stays in the picture. The
+    same arguments give the same bytes on the same machine.
 
     Args:
         assets: that textures and backgrounds are taken from.
@@ -48,7 +49,9 @@ class Cycles:
 
     ENGINE: ClassVar[str] = "CYCLES"
 
-    def __init__(self, assets: Assets, *, threads: int = 1, command: Sequence[str] | None = None) -> None:
+    def __init__(
+        self, assets: Assets, *, threads: int = 1, command: Sequence[str] | None = None
+    ) -> None:
         self._assets = assets
         self._threads = threads
         self.worker = WorkerProcess(command)
@@ -57,7 +60,10 @@ class Cycles:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         self.close()
 
@@ -70,12 +76,16 @@ class Cycles:
 
         Raises:
             NotFoundError, BlenderError: Blender is not installed, or cannot be used.
-            RenderError: Blender refused the scene, or crashed or hung at the same frame three times.
+            RenderError: Blender refused the scene, or crashed or hung at the same frame three
+                times.
         """
         placed = stage(meshes, parameters)
         pictures = self._pictures(meshes, parameters, placed.camera)
         setup = self._scene(placed, parameters, pictures)
-        timeout = _LEAST_TIMEOUT + _SLOWEST * parameters.width * parameters.height * parameters.cycles_samples
+        timeout = (
+            _LEAST_TIMEOUT
+            + _SLOWEST * parameters.width * parameters.height * parameters.cycles_samples
+        )
         self.worker.request([setup], timeout=timeout)
         frames: list[Float32Array] = []
         for messages in _frames(meshes, placed, parameters, pictures):
@@ -88,7 +98,9 @@ class Cycles:
     def _pictures(self, meshes: Meshes, zeta: RenderParameters, camera: Camera) -> int:
         """Counts the pictures that make one exposure."""
         half = zeta.exposure_time / 2
-        first, last = (camera.project(move_frames(meshes, offset).positions)[0] for offset in (-half, half))
+        first, last = (
+            camera.project(move_frames(meshes, offset).positions)[0] for offset in (-half, half)
+        )
         return min(_MOST_PICTURES, max(1, math.ceil(float((last - first).norm(dim=-1).max()))))
 
     def _scene(self, placed: Stage, zeta: RenderParameters, pictures: int) -> Message:
@@ -120,12 +132,15 @@ class Cycles:
 
 
 class Workbench(Cycles):
-    """Blender's Workbench: flat studio light instead of sun and sky; for comparisons of speed and of silhouettes."""
+    """Blender's Workbench: flat studio light instead of sun and sky; for comparisons of speed and
+    of silhouettes."""
 
     ENGINE = "BLENDER_WORKBENCH"
 
 
-def _frames(meshes: Meshes, placed: Stage, zeta: RenderParameters, pictures: int) -> Iterator[list[Message]]:
+def _frames(
+    meshes: Meshes, placed: Stage, zeta: RenderParameters, pictures: int
+) -> Iterator[list[Message]]:
     """Yields the pictures of each frame: the meshes at instants that share out its exposure."""
     shift = torch.tensor(placed.shift, dtype=torch.float32)
     pole = {
@@ -133,7 +148,10 @@ def _frames(meshes: Meshes, placed: Stage, zeta: RenderParameters, pictures: int
         "faces/pole": placed.pole_faces.cpu().int().numpy(),
         "uv/pole": torch.zeros(len(placed.pole_positions), 2).numpy(),
     }
-    instants = [move_frames(meshes, zeta.exposure_time * ((k + 0.5) / pictures - 0.5)) for k in range(pictures)]
+    instants = [
+        move_frames(meshes, zeta.exposure_time * ((k + 0.5) / pictures - 0.5))
+        for k in range(pictures)
+    ]
     for index in range(len(meshes)):
         messages: list[Message] = []
         for picture, instant in enumerate(instants):
@@ -152,4 +170,8 @@ def _camera(camera: Camera) -> dict[str, Any]:
     """As the worker takes it: Blender's cameras look along their −z, with y up."""
     axes = (camera.right, [-v for v in camera.down], [-v for v in camera.forward], camera.position)
     rows = [[axis[i] for axis in axes] for i in range(3)]
-    return {"matrix": [*rows, [0.0, 0.0, 0.0, 1.0]], "focal": camera.focal, "centre": list(camera.centre)}
+    return {
+        "matrix": [*rows, [0.0, 0.0, 0.0, 1.0]],
+        "focal": camera.focal,
+        "centre": list(camera.centre),
+    }

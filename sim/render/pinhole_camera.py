@@ -17,7 +17,8 @@ class Camera:
 
     Attributes:
         position: (3,) of the centre of projection [m].
-        right, down, forward: (3,) unit vectors of its axes in the world: image x, image y, and the optical axis.
+        right, down, forward: (3,) unit vectors of its axes in the world: image x, image y, and the
+            optical axis.
         focal: focal length [px].
         centre: where the optical axis meets the image [px].
         width, height: of the image [px].
@@ -82,22 +83,29 @@ class Camera:
     def project(self, points: Tensor) -> tuple[Tensor, Tensor]:
         """Projects points in the world to image places and depths.
 
-        Image x grows to the right and y downwards; (0, 0) is the upper left corner of the image, and pixel (i, j) has
-        its centre at (j + 0.5, i + 0.5).
+        Image x grows to the right and y downwards; (0, 0) is the upper left corner of the image,
+        and pixel (i, j) has its centre at (j + 0.5, i + 0.5).
 
         Args:
             points: (…, 3) [m].
 
         Returns:
-            places (…, 2) [px], and depths (…) along the optical axis [m]; places mean nothing where a depth is not
+            places (…, 2) [px], and depths (…) along the optical axis [m]; places mean nothing where
+                a depth is not
             positive.
         """
-        axes = torch.tensor([self.right, self.down, self.forward], dtype=points.dtype, device=points.device)
+        axes = torch.tensor(
+            [self.right, self.down, self.forward], dtype=points.dtype, device=points.device
+        )
         relative = (points - points.new_tensor(self.position)) @ axes.T
         depth = relative[..., 2]
-        places = relative[..., :2] * (self.focal / depth).unsqueeze(-1) + points.new_tensor(self.centre)
+        places = relative[..., :2] * (self.focal / depth).unsqueeze(-1) + points.new_tensor(
+            self.centre
+        )
         return places, depth
 
 
-def _minus(a: tuple[float, float, float], b: tuple[float, float, float]) -> tuple[float, float, float]:
+def _minus(
+    a: tuple[float, float, float], b: tuple[float, float, float]
+) -> tuple[float, float, float]:
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])

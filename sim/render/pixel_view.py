@@ -23,6 +23,7 @@ class RasterView:
     samples: int
 
     def project(self, points: Tensor) -> tuple[Tensor, Tensor]:
-        """As `Camera.project`, moved so that the sample of pixel (i, j) lies at (j + 0.5, i + 0.5)."""
+        """As `Camera.project`, moved so that the sample of pixel (i, j) lies at (j + 0.5, i +
+        0.5)."""
         places, depth = self.camera.project(points)
         return places + places.new_tensor([0.5 - self.jitter[0], 0.5 - self.jitter[1]]), depth

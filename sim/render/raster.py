@@ -1,4 +1,5 @@
-"""The raster renderer: depth-tested triangles, many samples a pixel, shadow maps of points of the sun."""
+"""The raster renderer: depth-tested triangles, many samples a pixel, shadow maps of points of the
+sun."""
 
 from __future__ import annotations
 
@@ -29,8 +30,8 @@ _TOGETHER = 32  # frames; bounds the memory
 class Raster:
     """Renders on the device of the meshes.
 
-    Light is direct: what cloth reflects onto cloth (`cycles_bounces`) is left out, and the sky reaches into every fold.
-    Shadows come from `raster_samples` × 2 points of the sun.
+    Light is direct: what cloth reflects onto cloth (`cycles_bounces`) is left out, and the sky
+    reaches into every fold. Shadows come from `raster_samples` × 2 points of the sun.
 
     Attributes:
         assets: where textures and backgrounds come from.
@@ -48,8 +49,8 @@ class Raster:
         return self.part(meshes, parameters, 0, len(meshes))
 
     def part(self, meshes: Meshes, parameters: RenderParameters, first: int, last: int) -> Tensor:
-        """Frames `first` to `last` (the last not included) of what `render` makes of all: the camera aims at the
-        cloth of the whole sequence.
+        """Frames `first` to `last` (the last not included) of what `render` makes of all: the
+        camera aims at the cloth of the whole sequence.
 
         Raises:
             InputError, UnknownNameError: as `render`.
@@ -61,12 +62,16 @@ class Raster:
         samples = Samples.of(zeta, to_sun=placed.to_sun)
         motion = VertexMotion.of(meshes) if zeta.exposure_time > 0 else None
         for instant in (samples.time.min(), samples.time.max()):
-            check_in_front(meshes.positions if motion is None else motion.at(float(instant)), meshes, placed)
+            check_in_front(
+                meshes.positions if motion is None else motion.at(float(instant)), meshes, placed
+            )
         film = []
         for begin in range(first, last, _TOGETHER):
             end = min(begin + _TOGETHER, last)
             moving = motion and motion.part(meshes.vertex_offset[begin], meshes.vertex_offset[end])
-            scene = _accumulate_samples(meshes.part(begin, end), moving, placed, samples, zeta, pyramid)
+            scene = _accumulate_samples(
+                meshes.part(begin, end), moving, placed, samples, zeta, pyramid
+            )
             film.append(_develop_scene(scene, behind, gain=zeta.gain))
         return torch.cat(film)
 
@@ -79,7 +84,8 @@ def _accumulate_samples(
     zeta: RenderParameters,
     pyramid: Pyramid,
 ) -> Tensor:
-    """Accumulates linear radiance times coverage, and coverage, over the samples: (frame, height, width, 4)."""
+    """Accumulates linear radiance times coverage, and coverage, over the samples: (frame, height,
+    width, 4)."""
     out = torch.zeros((len(meshes), zeta.height, zeta.width, 4), device=meshes.device)
     geometry = Geometry.of(meshes, placed)
     code = _code(meshes.device)
@@ -97,7 +103,11 @@ def _accumulate_samples(
 
 def _develop_scene(scene: Tensor, behind: Tensor, *, gain: float) -> Tensor:
     code = _code(scene.device)
-    return develop(scene, behind, gain=gain) if code is None else raster_kernel.develop(code, scene, behind, gain=gain)
+    return (
+        develop(scene, behind, gain=gain)
+        if code is None
+        else raster_kernel.develop(code, scene, behind, gain=gain)
+    )
 
 
 def _code(device: torch.device) -> ctypes.CDLL | None:

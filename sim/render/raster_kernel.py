@@ -62,12 +62,20 @@ class _Film(ctypes.Structure):
 def library() -> ctypes.CDLL | None:
     """Compiles the kernel; None, with one warning, where it cannot be built."""
     return compile_library(
-        "sim.render", ("raster.cpp",), without="the raster renderer runs as plain torch, many times slower"
+        "sim.render",
+        ("raster.cpp",),
+        without="the raster renderer runs as plain torch, many times slower",
     )
 
 
 def add_sample(
-    code: ctypes.CDLL, out: Tensor, geometry: Geometry, *, view: RasterView, light: Light, pyramid: Pyramid
+    code: ctypes.CDLL,
+    out: Tensor,
+    geometry: Geometry,
+    *,
+    view: RasterView,
+    light: Light,
+    pyramid: Pyramid,
 ) -> None:
     """Adds a sample as `raster_torch.add_sample`, on the CPU."""
     places, depth = view.project(geometry.positions)

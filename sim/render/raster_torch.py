@@ -21,7 +21,8 @@ _LAST = (1 << 31) - 1
 
 @dataclass(frozen=True, kw_only=True)
 class _Visible:
-    """The surface each covered sample shows: (point,) pixels, faces, and (point, 3) weights of a face's corners."""
+    """The surface each covered sample shows: (point,) pixels, faces, and (point, 3) weights of a
+    face's corners."""
 
     pixel: Tensor
     face: Tensor
@@ -30,11 +31,14 @@ class _Visible:
     image_area: Tensor
 
 
-def add_sample(out: Tensor, geometry: Geometry, *, view: RasterView, light: Light, pyramid: Pyramid) -> None:
+def add_sample(
+    out: Tensor, geometry: Geometry, *, view: RasterView, light: Light, pyramid: Pyramid
+) -> None:
     """Adds one sample's share to all frames.
 
     Args:
-        out: (frame, height, width, 4) float32 radiance times coverage, and coverage; changed in place.
+        out: (frame, height, width, 4) float32 radiance times coverage, and coverage; changed in
+            place.
     """
     visible = _visible(geometry, view)
     x, normals = geometry.positions, geometry.normals()
@@ -48,7 +52,9 @@ def add_sample(out: Tensor, geometry: Geometry, *, view: RasterView, light: Ligh
     uv = (geometry.uv[visible.corners] * weights).sum(dim=1)
     cloth = geometry.cloth[visible.face]
     uv_edges = geometry.uv[visible.corners[:, 1:]] - geometry.uv[visible.corners[:, :1]]
-    uv_area = (uv_edges[:, 0, 0] * uv_edges[:, 1, 1] - uv_edges[:, 0, 1] * uv_edges[:, 1, 0]).abs() / 2
+    uv_area = (
+        uv_edges[:, 0, 0] * uv_edges[:, 1, 1] - uv_edges[:, 0, 1] * uv_edges[:, 1, 0]
+    ).abs() / 2
     level = pyramid.level(uv_area, visible.image_area, view.samples)
     albedo = torch.where(cloth[:, None], pyramid.at(uv, level), x.new_tensor(POLE_ALBEDO))
     through = torch.where(cloth, light.translucency, 0.0)
@@ -59,7 +65,10 @@ def add_sample(out: Tensor, geometry: Geometry, *, view: RasterView, light: Ligh
         share = torch.where(cosine > 0, (1 - through) * cosine, -through * cosine)
         cosines += share * ShadowMaps.of(geometry, direction).lit(point, normal, frame)
     diffuse = cosines * light.point + light.sky
-    radiance = torch.cat([albedo * diffuse[:, None], torch.ones_like(diffuse)[:, None]], dim=1) / view.samples
+    radiance = (
+        torch.cat([albedo * diffuse[:, None], torch.ones_like(diffuse)[:, None]], dim=1)
+        / view.samples
+    )
     out.view(-1, 4).index_add_(0, visible.pixel, radiance)
 
 
@@ -78,11 +87,17 @@ def _visible(geometry: Geometry, view: RasterView) -> _Visible:
         face = faces[triangles.face[part.triangle]]
         pixel = geometry.frame[face] * size + part.pixel
         n = nearness[triangles.corners[part.triangle]]
-        value = n[:, 0] + part.shares[:, 0] * (n[:, 1] - n[:, 0]) + part.shares[:, 1] * (n[:, 2] - n[:, 0])
+        value = (
+            n[:, 0]
+            + part.shares[:, 0] * (n[:, 1] - n[:, 0])
+            + part.shares[:, 1] * (n[:, 2] - n[:, 0])
+        )
         key = (value.view(torch.int32).long() << _BITS) | (_LAST - part.triangle)
         best.scatter_reduce_(0, pixel, key, "amax")
         fragments_of.append((pixel, key, part.triangle, part.shares, n))
-    pixel, key, triangle, shares, n = (torch.cat(parts) for parts in zip(*fragments_of, strict=True))
+    pixel, key, triangle, shares, n = (
+        torch.cat(parts) for parts in zip(*fragments_of, strict=True)
+    )
     won = best[pixel] == key
     pixel, triangle, shares, n = pixel[won], triangle[won], shares[won], n[won]
     linear = torch.cat([1 - shares.sum(dim=1, keepdim=True), shares], dim=1) * n

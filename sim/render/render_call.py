@@ -33,7 +33,9 @@ def render_film(
         FlagdataError: see `flagdata.render`.
     """
     if cloth not in ("flag", "hanging-cloth"):
-        raise UsageError(f"the cloth {cloth!r} is unknown", where="cloth", fix="give 'flag' or 'hanging-cloth'")
+        raise UsageError(
+            f"the cloth {cloth!r} is unknown", where="cloth", fix="give 'flag' or 'hanging-cloth'"
+        )
     if isinstance(sequence, Simulated):
         raise UsageError(
             f"the simulation has {len(sequence)} cloths",
@@ -41,14 +43,24 @@ def render_film(
             fix="give one of its members, as in simulated[0]",
         )
     assets = Assets(photos=photos)
-    zeta = render_prior.named_prior(look).with_quantities(dict(parameters), source="given").draw(seed, assets)
+    zeta = (
+        render_prior.named_prior(look)
+        .with_quantities(dict(parameters), source="given")
+        .draw(seed, assets)
+    )
     toward = _toward(sequence) if heading is None else heading
-    meshes = Meshes.flag(sequence, heading=toward) if cloth == "flag" else Meshes.hanging(sequence, heading=toward)
+    meshes = (
+        Meshes.flag(sequence, heading=toward)
+        if cloth == "flag"
+        else Meshes.hanging(sequence, heading=toward)
+    )
     with torch.no_grad():
         pictures = RENDERERS[renderer](assets=assets).render(meshes, zeta)
     first = int(sequence.time[0])
     name = str(sequence.attributes.get("recipe", "rendered"))
-    return Frames(images=pictures.cpu().numpy(), time=(sequence.time - first) / NANOSECONDS, name=name)
+    return Frames(
+        images=pictures.cpu().numpy(), time=(sequence.time - first) / NANOSECONDS, name=name
+    )
 
 
 def _toward(sequence: MeshSequence | RaggedMeshSequence) -> float:

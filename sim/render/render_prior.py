@@ -1,4 +1,5 @@
-"""What render parameters are drawn from: a catalog file of ranges with their sources, one named stream a parameter."""
+"""What render parameters are drawn from: a catalog file of ranges with their sources, one named
+stream a parameter."""
 
 from __future__ import annotations
 
@@ -10,7 +11,16 @@ from typing import Any
 from flagdata.core.rng import stream
 from flagdata.errors import InputError, UnknownNameError
 from flagdata.recipes.shelves import Shelf, parse_recipe
-from flagdata.recipes.typed_tables import DEGREES, NotNegative, Quantity, Range, ends, entries, in_radians, plain
+from flagdata.recipes.typed_tables import (
+    DEGREES,
+    NotNegative,
+    Quantity,
+    Range,
+    ends,
+    entries,
+    in_radians,
+    plain,
+)
 from sim.assets import Assets
 from sim.render.parameters import RenderParameters
 
@@ -23,14 +33,17 @@ class RenderPrior:
 
     Attributes:
         name: of the catalog file.
-        quantities: parameter → fixed value or range, in the parameter's own unit; the others keep their default.
+        quantities: parameter → fixed value or range, in the parameter's own unit; the others keep
+            their default.
         sources: parameter → where its range is from.
-        textures, backgrounds: kinds of which each draw takes one with equal chance, then one of that kind.
-        least_angle: between the heading and the camera's axis, taken as lines [rad]; draws below it are drawn again.
-            The camera does not look from upwind or downwind.
+        textures, backgrounds: kinds of which each draw takes one with equal chance, then one of
+            that kind.
+        least_angle: between the heading and the camera's axis, taken as lines [rad]; draws below it
+            are drawn again. The camera does not look from upwind or downwind.
 
     Raises:
-        InputError: a range outside of what is admissible, camera angles that all break the rule, no kinds.
+        InputError: a range outside of what is admissible, camera angles that all break the rule, no
+            kinds.
         UnknownNameError: a quantity that ζ does not have.
     """
 
@@ -65,10 +78,13 @@ class RenderPrior:
             )
         for noun, kinds in (("textures", self.textures), ("backgrounds", self.backgrounds)):
             if not kinds:
-                raise InputError(f"the prior has no {noun}", where=where, fix="name at least one kind")
+                raise InputError(
+                    f"the prior has no {noun}", where=where, fix="name at least one kind"
+                )
 
     def draw(self, seed: int, assets: Assets) -> RenderParameters:
-        """Draws one ζ. Each parameter has a stream of its own, so that changing one range moves no other parameter.
+        """Draws one ζ. Each parameter has a stream of its own, so that changing one range moves no
+        other parameter.
 
         Raises:
             UnknownNameError: a kind of texture or background that the assets do not have.
@@ -77,11 +93,18 @@ class RenderPrior:
         for name, quantity in self.quantities.items():
             rng = stream(seed, "render", name)
             value = _at(quantity, rng.random())
-            while name == "camera_angle" and _to_line(value) < self.least_angle and isinstance(quantity, Range):
+            while (
+                name == "camera_angle"
+                and _to_line(value) < self.least_angle
+                and isinstance(quantity, Range)
+            ):
                 value = _at(quantity, rng.random())
             is_integer = isinstance(getattr(RenderParameters, name), int)
             numbers[name] = round(value) if is_integer else value
-        texture, background = stream(seed, "render", "texture"), stream(seed, "render", "background")
+        texture, background = (
+            stream(seed, "render", "texture"),
+            stream(seed, "render", "background"),
+        )
         return RenderParameters(
             texture=assets.draw_texture(self.textures, texture),
             background=assets.draw_background(self.backgrounds, background),
@@ -95,7 +118,9 @@ class RenderPrior:
             InputError, UnknownNameError: as the class.
         """
         return replace(
-            self, quantities={**self.quantities, **changes}, sources={**self.sources, **dict.fromkeys(changes, source)}
+            self,
+            quantities={**self.quantities, **changes},
+            sources={**self.sources, **dict.fromkeys(changes, source)},
         )
 
     def identity(self) -> dict[str, Any]:
@@ -119,31 +144,45 @@ def named_prior(name: str) -> RenderPrior:
 
 
 def read(content: Mapping[str, Any], *, name: str) -> RenderPrior:
-    """Makes a prior from a parsed file: `title`, `least-angle-deg`, `textures`, `backgrounds`, and any number of tables
-    of quantities, each with the `source` of its ranges. Keys are ζ's names in kebab-case; angles end in `-deg`.
+    """Makes a prior from a parsed file: `title`, `least-angle-deg`, `textures`, `backgrounds`, and
+    any number of tables of quantities, each with the `source` of its ranges. Keys are ζ's names in
+    kebab-case; angles end in `-deg`.
 
     Raises:
         InputError: missing, unknown or ill-typed entries, or a parameter that is given twice.
     """
     where = f"render prior {name!r}"
     sections = {key: section for key, section in content.items() if key not in _GENERAL}
-    general = entries(_GENERAL, {key: value for key, value in content.items() if key in _GENERAL}, where=where)
+    general = entries(
+        _GENERAL, {key: value for key, value in content.items() if key in _GENERAL}, where=where
+    )
     described = RenderParameters.described()
-    keys = {key: key.replace("_", "-") + (DEGREES if entry.unit == "rad" else "") for key, entry in described.items()}
+    keys = {
+        key: key.replace("_", "-") + (DEGREES if entry.unit == "rad" else "")
+        for key, entry in described.items()
+    }
     quantities: dict[str, Quantity] = {}
     sources: dict[str, str] = {}
     for section, part in sections.items():
         inside = f"{where} [{section}]"
-        values = entries({"source": str, **dict.fromkeys(keys.values(), Quantity)}, part, where=inside)
+        values = entries(
+            {"source": str, **dict.fromkeys(keys.values(), Quantity)}, part, where=inside
+        )
         source = values.pop("source", None)
         if not source:
-            raise InputError("no source is given", where=inside, fix='say where the ranges are from: source = "…"')
+            raise InputError(
+                "no source is given",
+                where=inside,
+                fix='say where the ranges are from: source = "…"',
+            )
         for parameter, key in keys.items():
             if key not in values:
                 continue
             if parameter in quantities:
                 raise InputError(f"{key} is given twice", where=inside, fix="keep one")
-            quantities[parameter] = in_radians(values[key]) if key.endswith(DEGREES) else values[key]
+            quantities[parameter] = (
+                in_radians(values[key]) if key.endswith(DEGREES) else values[key]
+            )
             sources[parameter] = source
     return RenderPrior(
         name=name,
@@ -155,7 +194,12 @@ def read(content: Mapping[str, Any], *, name: str) -> RenderPrior:
     )
 
 
-_GENERAL = {"title": str, "least-angle-deg": NotNegative, "textures": tuple[str, ...], "backgrounds": tuple[str, ...]}
+_GENERAL = {
+    "title": str,
+    "least-angle-deg": NotNegative,
+    "textures": tuple[str, ...],
+    "backgrounds": tuple[str, ...],
+}
 """Keys of a prior beside its tables of quantities."""
 
 

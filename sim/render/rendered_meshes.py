@@ -1,4 +1,5 @@
-"""What is rendered: a sequence of meshes on any device, of one topology or of a new one each frame."""
+"""What is rendered: a sequence of meshes on any device, of one topology or of a new one each
+frame."""
 
 from __future__ import annotations
 
@@ -19,7 +20,8 @@ from flagdata.timebase import NANOSECONDS
 
 @dataclass(frozen=True, kw_only=True)
 class Frame:
-    """One mesh: positions (vertex, 3) [m], faces (face, 3) int64, uv (vertex, 2) in [0, 1], u rightwards, v upwards."""
+    """One mesh: positions (vertex, 3) [m], faces (face, 3) int64, uv (vertex, 2) in [0, 1], u
+    rightwards, v upwards."""
 
     positions: Tensor
     faces: Tensor
@@ -32,16 +34,19 @@ class Meshes:
 
     Attributes:
         positions: (all vertices, 3) float32 [m], z up.
-        faces: (all faces, 3) int64, counter-clockwise seen from the front, indices within their own frame.
-        uv: (all vertices, 2) float32 place in the texture: (0, 0) is its lower left corner, (1, 1) its upper right one.
+        faces: (all faces, 3) int64, counter-clockwise seen from the front, indices within their own
+            frame.
+        uv: (all vertices, 2) float32 place in the texture: (0, 0) is its lower left corner, (1, 1)
+            its upper right one.
         vertex_offset, face_offset: frame i has rows offset[i] to offset[i + 1].
         anchor: (3,) the point that stands at `mesh_height` above the ground [m].
-        heading: horizontal reference direction, counter-clockwise from +x [rad]: where the air goes to for a flag, the
-            normal of a hanging cloth.
+        heading: horizontal reference direction, counter-clockwise from +x [rad]: where the air goes
+            to for a flag, the normal of a hanging cloth.
         rate: frames a second [Hz].
 
     Raises:
-        InputError: shapes that disagree, values that are not finite, indices out of range, no frames.
+        InputError: shapes that disagree, values that are not finite, indices out of range, no
+            frames.
     """
 
     positions: Tensor
@@ -59,7 +64,10 @@ class Meshes:
             if values.ndim != 2 or values.shape[1] != width:
                 raise _wrong(f"{name} have shape {tuple(values.shape)}", f"(rows, {width})")
         if len(self.uv) != len(self.positions):
-            raise _wrong(f"there are {len(self.uv)} texture places for {len(self.positions)} vertices", "one for each")
+            raise _wrong(
+                f"there are {len(self.uv)} texture places for {len(self.positions)} vertices",
+                "one for each",
+            )
         for name, values, dtype in (
             ("positions", self.positions, torch.float32),
             ("faces", self.faces, torch.int64),
@@ -73,15 +81,29 @@ class Meshes:
         ):
             rising = all(a < b for a, b in itertools.pairwise(offset))
             if len(offset) < 2 or offset[0] != 0 or offset[-1] != total or not rising:
-                raise _wrong(f"{name} does not fit {total} rows", "from 0 to the rows, rising, at least one frame")
+                raise _wrong(
+                    f"{name} does not fit {total} rows",
+                    "from 0 to the rows, rising, at least one frame",
+                )
         if len(self.vertex_offset) != len(self.face_offset):
-            raise _wrong("the offsets are of different numbers of frames", "one more than frames, for both")
+            raise _wrong(
+                "the offsets are of different numbers of frames", "one more than frames, for both"
+            )
         if not (bool(self.positions.isfinite().all()) and bool(self.uv.isfinite().all())):
-            raise _wrong("a position or texture place is not finite", "finite ones; cut a sequence where it blew up")
+            raise _wrong(
+                "a position or texture place is not finite",
+                "finite ones; cut a sequence where it blew up",
+            )
         finite = all(math.isfinite(v) for v in (*self.anchor, self.heading, self.rate))
         if not finite or self.rate <= 0:
-            raise _wrong("an anchor, heading or rate that makes no sense", "finite numbers, and a rate above 0")
-        faces, counts = (torch.tensor(o, device=self.device).diff() for o in (self.face_offset, self.vertex_offset))
+            raise _wrong(
+                "an anchor, heading or rate that makes no sense",
+                "finite numbers, and a rate above 0",
+            )
+        faces, counts = (
+            torch.tensor(o, device=self.device).diff()
+            for o in (self.face_offset, self.vertex_offset)
+        )
         most = torch.repeat_interleave(counts, faces)[:, None]
         wrong = torch.nonzero(((self.faces < 0) | (self.faces >= most)).any(dim=1)).flatten()
         if len(wrong):
@@ -102,10 +124,14 @@ class Meshes:
     def one_topology(self) -> bool:
         """Whether all frames have the same faces and texture places."""
         n = len(self)
-        if len(self.faces) != n * self.face_offset[1] or len(self.positions) != n * self.vertex_offset[1]:
+        if (
+            len(self.faces) != n * self.face_offset[1]
+            or len(self.positions) != n * self.vertex_offset[1]
+        ):
             return False
         even = all(
-            offset == tuple(i * offset[1] for i in range(n + 1)) for offset in (self.vertex_offset, self.face_offset)
+            offset == tuple(i * offset[1] for i in range(n + 1))
+            for offset in (self.vertex_offset, self.face_offset)
         )
         if not even:
             return False
@@ -117,12 +143,16 @@ class Meshes:
         i = range(len(self))[index]
         vertices = slice(self.vertex_offset[i], self.vertex_offset[i + 1])
         faces = slice(self.face_offset[i], self.face_offset[i + 1])
-        return Frame(positions=self.positions[vertices], faces=self.faces[faces], uv=self.uv[vertices])
+        return Frame(
+            positions=self.positions[vertices], faces=self.faces[faces], uv=self.uv[vertices]
+        )
 
     def part(self, first: int, last: int) -> Meshes:
         """Frames `first` to `last`, the last not included."""
         vertices = slice(self.vertex_offset[first], self.vertex_offset[last])
-        vertex_offset, face_offset = (offset[first : last + 1] for offset in (self.vertex_offset, self.face_offset))
+        vertex_offset, face_offset = (
+            offset[first : last + 1] for offset in (self.vertex_offset, self.face_offset)
+        )
         return replace(
             self,
             positions=self.positions[vertices],
@@ -160,14 +190,21 @@ class Meshes:
             heading=heading,
             rate=rate,
             vertex_offset=tuple(range(0, frames * vertices + 1, vertices)) if vertices else (0,),
-            face_offset=tuple(range(0, frames * len(faces) + 1, len(faces))) if len(faces) else (0,),
+            face_offset=tuple(range(0, frames * len(faces) + 1, len(faces)))
+            if len(faces)
+            else (0,),
         )
 
     @classmethod
     def flag(
-        cls, sequence: MeshSequence | RaggedMeshSequence, *, heading: float, device: torch.device | str = "cpu"
+        cls,
+        sequence: MeshSequence | RaggedMeshSequence,
+        *,
+        heading: float,
+        device: torch.device | str = "cpu",
     ) -> Meshes:
-        """Makes meshes of a stored flag: hoist at the least u; its upper corner in the first frame is the anchor.
+        """Makes meshes of a stored flag: hoist at the least u; its upper corner in the first frame
+        is the anchor.
 
         Args:
             heading: where the air goes to, counter-clockwise from +x [rad].
@@ -179,10 +216,14 @@ class Meshes:
 
     @classmethod
     def hanging(
-        cls, sequence: MeshSequence | RaggedMeshSequence, *, heading: float = 0.0, device: torch.device | str = "cpu"
+        cls,
+        sequence: MeshSequence | RaggedMeshSequence,
+        *,
+        heading: float = 0.0,
+        device: torch.device | str = "cpu",
     ) -> Meshes:
-        """Makes meshes of a stored hanging cloth: the middle of its upper edge (greatest v) in the first frame is the
-        anchor.
+        """Makes meshes of a stored hanging cloth: the middle of its upper edge (greatest v) in the
+        first frame is the anchor.
 
         Args:
             heading: the cloth's normal, counter-clockwise from +x [rad].
@@ -209,9 +250,18 @@ class Meshes:
         uv = torch.from_numpy((rest - low) / span).to(device, torch.float32)
         x, y, z = (float(v) for v in np.asarray(anchor))
         rate = NANOSECONDS / float(np.median(np.diff(sequence.time))) if len(sequence) > 1 else 25.0
-        positions, faces = (torch.from_numpy(np.array(a)).to(device) for a in (sequence.positions, sequence.faces))
+        positions, faces = (
+            torch.from_numpy(np.array(a)).to(device) for a in (sequence.positions, sequence.faces)
+        )
         if isinstance(sequence, MeshSequence):
-            return cls.fixed(positions=positions, faces=faces, uv=uv, anchor=(x, y, z), heading=heading, rate=rate)
+            return cls.fixed(
+                positions=positions,
+                faces=faces,
+                uv=uv,
+                anchor=(x, y, z),
+                heading=heading,
+                rate=rate,
+            )
         return cls(
             positions=positions,
             faces=faces.long(),

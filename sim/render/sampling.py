@@ -1,4 +1,5 @@
-"""Where a pixel's samples lie: within the pixel, within the exposure, and on the sun's disc: always the same."""
+"""Where a pixel's samples lie: within the pixel, within the exposure, and on the sun's disc: always
+the same."""
 
 from __future__ import annotations
 
@@ -22,16 +23,17 @@ _FEW = 64
 class Samples:
     """The samples of every pixel.
 
-    Each coordinate takes one value in each of as many equal parts as there are samples. Places in the pixel keep far
-    from each other; instants and points of the sun are dealt out so that they hardly correlate with the places or with
-    each other, since a place that goes with an instant would look like motion.
+    Each coordinate takes one value in each of as many equal parts as there are samples. Places in
+    the pixel keep far from each other; instants and points of the sun are dealt out so that they
+    hardly correlate with the places or with each other, since a place that goes with an instant
+    would look like motion.
 
     Attributes:
         jitter: (sample, 2) place in the pixel, in [0, 1) from its upper left corner.
         time: (sample,) instant after the middle of the exposure [s].
         to_sun: (sample, SUNS, 3) unit vectors towards points of the sun.
-        sun_weight: irradiance of a surface that faces one of them, so that the sum over all samples and points is what
-            the whole sun gives [W/m²].
+        sun_weight: irradiance of a surface that faces one of them, so that the sum over all samples
+            and points is what the whole sun gives [W/m²].
     """
 
     jitter: FloatArray
@@ -56,7 +58,8 @@ class Samples:
 
 
 def _hammersley(count: int) -> FloatArray:
-    """Computes (count, 2) points in (0, 1)², each coordinate once in the middle of each of `count` equal parts."""
+    """Computes (count, 2) points in (0, 1)², each coordinate once in the middle of each of `count`
+    equal parts."""
     index, mirrored = np.arange(count), np.zeros(count)
     for bit in range(count.bit_length()):
         mirrored += (index >> bit & 1) * 0.5 ** (bit + 1)
@@ -65,8 +68,8 @@ def _hammersley(count: int) -> FloatArray:
 
 @functools.cache
 def _spread_out(count: int) -> FloatArray:
-    """Spreads (count, 2) points as of `_hammersley`; few ones in that one of some orders that keeps them farthest
-    apart, taken as a pattern that repeats, and on no diagonal."""
+    """Spreads (count, 2) points as of `_hammersley`; few ones in that one of some orders that keeps
+    them farthest apart, taken as a pattern that repeats, and on no diagonal."""
     points = _hammersley(count)
     if not 3 <= count <= _FEW:
         return points
@@ -83,8 +86,8 @@ def _spread_out(count: int) -> FloatArray:
 
 
 def _dealt(values: FloatArray, reference: FloatArray, name: str) -> FloatArray:
-    """Orders the rows of `values` so that, among some orders, their columns correlate least with those of
-    `reference`."""
+    """Orders the rows of `values` so that, among some orders, their columns correlate least with
+    those of `reference`."""
     count, rng = len(values), stream(0, "render", "samples", name)
     if count < 3:
         return values
@@ -97,10 +100,12 @@ def _dealt(values: FloatArray, reference: FloatArray, name: str) -> FloatArray:
 
 
 def _cone(points: FloatArray, middle: tuple[float, float, float], radius: float) -> FloatArray:
-    """Spreads directions (point, 3), equally dense in solid angle, within an angular radius [rad] of a middle.
+    """Spreads directions (point, 3), equally dense in solid angle, within an angular radius [rad]
+    of a middle.
 
-    A disc of uniform radiance L gives a surface that faces its middle E = π L sin² radius; a share 1/n of its solid
-    angle, 2π (1 − cos radius)/n, gives a surface that faces it 2 E/(n (1 + cos radius)).
+    A disc of uniform radiance L gives a surface that faces its middle E = π L sin² radius; a share
+    1/n of its solid angle, 2π (1 − cos radius)/n, gives a surface that faces it 2 E/(n (1 + cos
+    radius)).
     """
     axis = np.array(middle)
     aside = np.cross(axis, [1.0, 0.0, 0.0] if abs(axis[0]) < 0.7 else [0.0, 1.0, 0.0])

@@ -22,11 +22,12 @@ class Geometry:
     Attributes:
         positions: (vertex, 3) float32, in the world [m].
         uv: (vertex, 2) float32.
-        corners: (face, 3) int64 vertex indices: frame after frame, in each the cloth's faces, then the pole's.
+        corners: (face, 3) int64 vertex indices: frame after frame, in each the cloth's faces, then
+            the pole's.
         frame: (face,) int64 the frame that a face belongs to.
         cloth: (face,) whether it is cloth.
-        vertex_offset: (frame + 1,) int64; frame i has the cloth's vertices offset[i] to offset[i + 1], and the pole's,
-            which come after all of them.
+        vertex_offset: (frame + 1,) int64; frame i has the cloth's vertices offset[i] to offset[i +
+            1], and the pole's, which come after all of them.
         face_offset: (frame + 1,) int64.
         cloth_faces: (frame,) int64 how many of a frame's faces are cloth.
         shift: (3,) what brings meshes into the world [m].
@@ -46,18 +47,28 @@ class Geometry:
     def of(cls, meshes: Meshes, placed: Stage) -> Geometry:
         """Joins the meshes and their stage."""
         device, pole = meshes.device, len(meshes.positions)
-        vertex_offset, offset = (torch.tensor(o, device=device) for o in (meshes.vertex_offset, meshes.face_offset))
+        vertex_offset, offset = (
+            torch.tensor(o, device=device) for o in (meshes.vertex_offset, meshes.face_offset)
+        )
         poles = len(placed.pole_faces)
         corners = []
         for i in range(len(meshes)):
-            faces = meshes.faces[meshes.face_offset[i] : meshes.face_offset[i + 1]] + meshes.vertex_offset[i]
+            faces = (
+                meshes.faces[meshes.face_offset[i] : meshes.face_offset[i + 1]]
+                + meshes.vertex_offset[i]
+            )
             corners += [faces, placed.pole_faces + pole]
         index = torch.arange(len(meshes), device=device)
         frame = torch.repeat_interleave(index, offset.diff() + poles)
         face_offset = offset + poles * torch.arange(len(offset), device=device)
         face = torch.arange(len(frame), device=device) - face_offset[frame]
         return cls(
-            positions=torch.cat([meshes.positions + meshes.positions.new_tensor(placed.shift), placed.pole_positions]),
+            positions=torch.cat(
+                [
+                    meshes.positions + meshes.positions.new_tensor(placed.shift),
+                    placed.pole_positions,
+                ]
+            ),
             uv=torch.cat([meshes.uv, meshes.uv.new_zeros((len(placed.pole_positions), 2))]),
             corners=torch.cat(corners),
             frame=frame,
@@ -69,15 +80,19 @@ class Geometry:
         )
 
     def at(self, positions: Tensor) -> Geometry:
-        """Replaces the positions of the cloth's vertices: (all vertices, 3), as the meshes have them [m]."""
+        """Replaces the positions of the cloth's vertices: (all vertices, 3), as the meshes have
+        them [m]."""
         cloth = positions + positions.new_tensor(self.shift)
         return replace(self, positions=torch.cat([cloth, self.positions[len(cloth) :]]))
 
     def normals(self) -> Tensor:
-        """Computes float32 unit normals (vertex, 3): the mean of the faces around a vertex, weighted by their areas."""
+        """Computes float32 unit normals (vertex, 3): the mean of the faces around a vertex,
+        weighted by their areas."""
         a, b, c = (self.positions[self.corners[:, k]].double() for k in range(3))
         face = torch.linalg.cross(b - a, c - a)
-        total = torch.zeros((len(self.positions), 3), dtype=torch.float64, device=self.positions.device)
+        total = torch.zeros(
+            (len(self.positions), 3), dtype=torch.float64, device=self.positions.device
+        )
         for k in range(3):
             total.index_add_(0, self.corners[:, k], face)
         return torch.nn.functional.normalize(total, dim=1, eps=1e-30).float()
@@ -87,7 +102,8 @@ def check_in_front(positions: Tensor, meshes: Meshes, placed: Stage) -> None:
     """Checks that the cloth is in front of the camera.
 
     Args:
-        positions: (all vertices, 3) of the cloth at some instant of each frame, as the meshes have them [m].
+        positions: (all vertices, 3) of the cloth at some instant of each frame, as the meshes have
+            them [m].
 
     Raises:
         InputError: part of it is beside or behind the camera.

@@ -17,8 +17,8 @@ class Light:
 
     Attributes:
         to_sun: unit vectors towards the points of the sun that this sample sees.
-        point: radiance of white cloth that faces one of them and sees nothing else, so scaled that a sample's points
-            light as much as the whole sun does [W/(m² sr)].
+        point: radiance of white cloth that faces one of them and sees nothing else, so scaled that
+            a sample's points light as much as the whole sun does [W/(m² sr)].
         sky: radiance of the sky, from everywhere [W/(m² sr)].
         translucency: share of the diffuse light that leaves cloth on the far side.
     """

@@ -1,4 +1,5 @@
-"""Shadow maps: how far from the sun the first surface is, seen from one point of the sun, for every frame."""
+"""Shadow maps: how far from the sun the first surface is, seen from one point of the sun, for every
+frame."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ from sim.render.scene_light import Direction
 SIZE = 256
 """Texels of a map along each side; the frame's cloth just fits in."""
 _MARGIN = 2  # texels around it
-_AWAY = 1.5  # texels that a point is moved off its surface, times the sine of the light's angle to the normal
+# texels that a point is moved off its surface, times the sine of the light's angle to the normal
+_AWAY = 1.5
 _BIAS = 0.3  # texels that a surface may be nearer to the sun and still not shade
 
 
@@ -41,7 +43,8 @@ class ShadowMaps:
         basis: (3, 3) rows: across, across, towards the sun.
         middle: (frame, 2) middle of the cloth across [m].
         texel: (frame,) side of a texel [m].
-        nearest: (frame, SIZE, SIZE) coordinate towards the sun of the surface nearest to it [m]; −inf where none is.
+        nearest: (frame, SIZE, SIZE) coordinate towards the sun of the surface nearest to it [m];
+            −inf where none is.
     """
 
     basis: Tensor
@@ -57,9 +60,16 @@ class ShadowMaps:
         in_light = x @ across.T
         offset = geometry.vertex_offset.tolist()
         bounds = [torch.aminmax(in_light[a:b, :2], dim=0) for a, b in itertools.pairwise(offset)]
-        low, high = (torch.stack([getattr(bound, end) for bound in bounds]) for end in ("min", "max"))
-        middle, texel = (low + high) / 2, (high - low).amax(dim=1).clamp_min(1e-6) / (SIZE - 2 * _MARGIN)
-        nearest = torch.full((len(bounds) * SIZE * SIZE,), -torch.inf, dtype=x.dtype, device=x.device)
+        low, high = (
+            torch.stack([getattr(bound, end) for bound in bounds]) for end in ("min", "max")
+        )
+        middle, texel = (
+            (low + high) / 2,
+            (high - low).amax(dim=1).clamp_min(1e-6) / (SIZE - 2 * _MARGIN),
+        )
+        nearest = torch.full(
+            (len(bounds) * SIZE * SIZE,), -torch.inf, dtype=x.dtype, device=x.device
+        )
         corners, frame = geometry.corners, geometry.frame
         places = (in_light[corners, :2] - middle[frame, None]) / texel[frame, None, None] + SIZE / 2
         index = torch.arange(3 * len(corners), device=x.device).unflatten(0, (-1, 3))
@@ -67,13 +77,20 @@ class ShadowMaps:
         height = in_light[corners, 2].flatten()
         for part in fragments(triangles, width=SIZE, height=SIZE):
             h = height[triangles.corners[part.triangle]]
-            value = h[:, 0] + part.shares[:, 0] * (h[:, 1] - h[:, 0]) + part.shares[:, 1] * (h[:, 2] - h[:, 0])
+            value = (
+                h[:, 0]
+                + part.shares[:, 0] * (h[:, 1] - h[:, 0])
+                + part.shares[:, 1] * (h[:, 2] - h[:, 0])
+            )
             pixel = frame[triangles.face[part.triangle]] * SIZE * SIZE + part.pixel
             nearest.scatter_reduce_(0, pixel, value, "amax")
-        return cls(basis=across, middle=middle, texel=texel, nearest=nearest.unflatten(0, (-1, SIZE, SIZE)))
+        return cls(
+            basis=across, middle=middle, texel=texel, nearest=nearest.unflatten(0, (-1, SIZE, SIZE))
+        )
 
     def lit(self, points: Tensor, normals: Tensor, frame: Tensor) -> Tensor:
-        """Computes the share of the light that reaches points (point, 3) on surfaces with normals (point, 3): (point,).
+        """Computes the share of the light that reaches points (point, 3) on surfaces with normals
+        (point, 3): (point,).
 
         Bilinear over the four nearest texels' answers; 1 outside of the map.
         """

@@ -39,9 +39,9 @@ class Stage:
 def stage(meshes: Meshes, parameters: RenderParameters) -> Stage:
     """Places everything.
 
-    The camera aims at the middle of the cloth's bounding box over all frames, from `camera_radius` away horizontally.
-    The pole is a vertical cylinder from the ground to a little above the anchor; it touches the anchor from the side
-    that the heading comes from.
+    The camera aims at the middle of the cloth's bounding box over all frames, from `camera_radius`
+    away horizontally. The pole is a vertical cylinder from the ground to a little above the anchor;
+    it touches the anchor from the side that the heading comes from.
 
     Raises:
         InputError: see `Camera.looking`.
@@ -68,7 +68,10 @@ def stage(meshes: Meshes, parameters: RenderParameters) -> Stage:
     azimuth = meshes.heading + zeta.sun_azimuth
     away = math.hypot(zeta.sun_radius, zeta.sun_height)
     positions, faces = _pole(
-        radius=zeta.pole_radius, top=zeta.mesh_height + _POLE_ABOVE, heading=meshes.heading, device=meshes.device
+        radius=zeta.pole_radius,
+        top=zeta.mesh_height + _POLE_ABOVE,
+        heading=meshes.heading,
+        device=meshes.device,
     )
     return Stage(
         camera=camera,
@@ -83,16 +86,23 @@ def stage(meshes: Meshes, parameters: RenderParameters) -> Stage:
     )
 
 
-def _pole(*, radius: float, top: float, heading: float, device: torch.device) -> tuple[Tensor, Tensor]:
-    """Makes a closed upright cylinder: a ring on the ground, a ring at the top, and the middle of its lid."""
+def _pole(
+    *, radius: float, top: float, heading: float, device: torch.device
+) -> tuple[Tensor, Tensor]:
+    """Makes a closed upright cylinder: a ring on the ground, a ring at the top, and the middle of
+    its lid."""
     if radius == 0 or top <= 0:
-        return torch.zeros((0, 3), device=device), torch.zeros((0, 3), dtype=torch.int64, device=device)
+        return torch.zeros((0, 3), device=device), torch.zeros(
+            (0, 3), dtype=torch.int64, device=device
+        )
     n = _POLE_SIDES
     turn = torch.arange(n, dtype=torch.float64, device=device) * (2 * math.pi / n)
     x = radius * (turn.cos() - math.cos(heading))
     y = radius * (turn.sin() - math.sin(heading))
     low, high = (torch.stack([x, y, torch.full_like(x, level)], dim=1) for level in (0.0, top))
-    lid = torch.tensor([[-radius * math.cos(heading), -radius * math.sin(heading), top]], device=device).double()
+    lid = torch.tensor(
+        [[-radius * math.cos(heading), -radius * math.sin(heading), top]], device=device
+    ).double()
     a = torch.arange(n, device=device)
     b = (a + 1) % n
     faces = torch.cat(

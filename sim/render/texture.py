@@ -28,14 +28,17 @@ class Pyramid:
 
     @classmethod
     def of(cls, image: UInt8Array, *, device: torch.device) -> Pyramid:
-        """Makes the pyramid of an sRGB image (height, width, 3); halved in linear light, odd last rows and columns
-        dropped."""
+        """Makes the pyramid of an sRGB image (height, width, 3); halved in linear light, odd last
+        rows and columns dropped."""
         levels = [torch.from_numpy(to_linear(image)).to(device)]
         while min(levels[-1].shape[:2]) > 1:
             level = levels[-1]
             rows, columns = (n // 2 for n in level.shape[:2])
             levels.append(
-                level[: 2 * rows, : 2 * columns].unflatten(0, (rows, 2)).unflatten(2, (columns, 2)).mean((1, 3))
+                level[: 2 * rows, : 2 * columns]
+                .unflatten(0, (rows, 2))
+                .unflatten(2, (columns, 2))
+                .mean((1, 3))
             )
         sizes = [level.shape[0] * level.shape[1] for level in levels]
         return cls(
@@ -69,14 +72,20 @@ class Pyramid:
         return (0.5 * spacing.log2() + 0.5).round().long().clamp(0, len(self) - 1)
 
     def at(self, uv: Tensor, level: Tensor) -> Tensor:
-        """Interpolates linear colours (point, 3) at texture places (point, 2), bilinear within a level; edges are
-        continued."""
+        """Interpolates linear colours (point, 3) at texture places (point, 2), bilinear within a
+        level; edges are continued."""
         width, height, start = self.width[level], self.height[level], self.start[level]
         x = (uv[:, 0] * width - 0.5).clamp_min(0.0)
         y = ((1 - uv[:, 1]) * height - 0.5).clamp_min(0.0)
         left, top = torch.minimum(x.long(), width - 1), torch.minimum(y.long(), height - 1)
         right, bottom = torch.minimum(left + 1, width - 1), torch.minimum(top + 1, height - 1)
         s, t = ((p - q).clamp_max(1.0).unsqueeze(1) for p, q in ((x, left), (y, top)))
-        upper = self.texels[start + top * width + left] * (1 - s) + self.texels[start + top * width + right] * s
-        lower = self.texels[start + bottom * width + left] * (1 - s) + self.texels[start + bottom * width + right] * s
+        upper = (
+            self.texels[start + top * width + left] * (1 - s)
+            + self.texels[start + top * width + right] * s
+        )
+        lower = (
+            self.texels[start + bottom * width + left] * (1 - s)
+            + self.texels[start + bottom * width + right] * s
+        )
         return upper * (1 - t) + lower * t

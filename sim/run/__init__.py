@@ -1,6 +1,8 @@
-"""From a recipe to mesh sequences in a lake: members are drawn, run in batches, diagnosed and published.
+"""From a recipe to mesh sequences in a lake: members are drawn, run in batches, diagnosed and
+published.
 
-A recipe is a TOML file (see `sim.run.simulation_toml`), one of `catalogs/scenes` by name, or an ArcSim scene file.
+A recipe is a TOML file (see `sim.run.simulation_toml`), one of `catalogs/scenes` by name, or an
+ArcSim scene file.
 """
 
 from __future__ import annotations

@@ -27,7 +27,8 @@ class WindSamples:
     """What blows in every member.
 
     Attributes:
-        times: (n,) since the first frame that is kept [s], ascending; those alone that the run needs.
+        times: (n,) since the first frame that is kept [s], ascending; those alone that the run
+            needs.
         velocity: (n, 3) where the air goes to [m/s].
         artifact: the log's in the lake; empty for none.
     """
@@ -39,10 +40,13 @@ class WindSamples:
     def mean(self, frames: int, rate: float) -> FloatArray:
         """Returns the mean (3,) over the recorded frames [m/s]."""
         frame_times = np.arange(frames) / rate
-        return np.stack([np.interp(frame_times, self.times, component).mean() for component in self.velocity.T])
+        return np.stack(
+            [np.interp(frame_times, self.times, component).mean() for component in self.velocity.T]
+        )
 
     def wind(self, first: float, batch: int, like: Tensor) -> SampledWind:
-        """Returns the wind of a batch on the clock of its run; the first and the last sample last on.
+        """Returns the wind of a batch on the clock of its run; the first and the last sample last
+        on.
 
         Args:
             first: when the first frame that is kept is, on that clock [s].
@@ -69,7 +73,8 @@ TYPES: Mapping[str, Mapping[str, Any]] = {
 
 
 def source(content: Mapping[str, Any], *, where: str) -> str | None:
-    """Returns where the samples of a recipe's [wind] come from, a key of `TYPES`; None for a steady wind.
+    """Returns where the samples of a recipe's [wind] come from, a key of `TYPES`; None for a steady
+    wind.
 
     Raises:
         UsageError: a speed beside them, or both.
@@ -80,7 +85,9 @@ def source(content: Mapping[str, Any], *, where: str) -> str | None:
     return sources[0] if sources and sources[0] in TYPES else None
 
 
-def read(values: Mapping[str, Any], *, before: float, duration: float, logs: Logs | None, where: str) -> WindSamples:
+def read(
+    values: Mapping[str, Any], *, before: float, duration: float, logs: Logs | None, where: str
+) -> WindSamples:
     """Returns the samples of the part of a wind that a run needs.
 
     Args:
@@ -102,10 +109,12 @@ def read(values: Mapping[str, Any], *, before: float, duration: float, logs: Log
     refused = values.get("beyond", Beyond.REFUSE) is Beyond.REFUSE
     if refused and (times[0] > -before or times[-1] < duration):
         raise InputError(
-            f"the wind is known from {times[0]:g} to {times[-1]:g} s and the run lasts from {-before:g} to "
+            f"the wind is known from {times[0]:g} to {times[-1]:g} s and the run lasts from "
+            f"{-before:g} to "
             f"{duration:g} s, counted from the first frame that is kept",
             where=where,
-            fix='give a longer series, or beyond = "hold", with which the first and the last sample last on',
+            fix='give a longer series, or beyond = "hold", with which the first and the last '
+            "sample last on",
         )
     low = max(int(np.searchsorted(times, -before, side="right")) - 1, 0)
     high = min(int(np.searchsorted(times, duration, side="left")) + 1, len(times))
@@ -126,8 +135,11 @@ def _log(log: Any, logs: Logs | None, *, where: str) -> tuple[str, WindSeries | 
     return logs(name)
 
 
-def _velocity(values: Mapping[str, Any], series: WindSeries | Wind, *, where: str) -> tuple[FloatArray, FloatArray]:
-    """Returns times (n,) [s] and velocities (n, 3) [m/s] of a log whose vector mean goes where `toward` says."""
+def _velocity(
+    values: Mapping[str, Any], series: WindSeries | Wind, *, where: str
+) -> tuple[FloatArray, FloatArray]:
+    """Returns times (n,) [s] and velocities (n, 3) [m/s] of a log whose vector mean goes where
+    `toward` says."""
     start = int(series.time[0]) if isinstance(series, WindSeries) else 0
     if isinstance(series, WindSeries):
         time, speed, direction = usable(series, start=start, where=where)
@@ -140,7 +152,9 @@ def _velocity(values: Mapping[str, Any], series: WindSeries | Wind, *, where: st
         time, speed = series.time[good], series.speed[good]
     times, mean, relative = about_mean(time, speed, direction, where=where)
     toward = mean * np.exp(1j * values.get("toward", 0.0)) * (1 + relative)
-    return times - values.get("log-start", 0.0), np.stack([toward.real, toward.imag, 0.0 * times], axis=1)
+    return times - values.get("log-start", 0.0), np.stack(
+        [toward.real, toward.imag, 0.0 * times], axis=1
+    )
 
 
 def _array(samples: Any, *, where: str) -> tuple[FloatArray, FloatArray]:
@@ -152,8 +166,11 @@ def _array(samples: Any, *, where: str) -> tuple[FloatArray, FloatArray]:
         raise InputError(
             "samples of the wind are no table of numbers",
             where=where,
-            fix="give two rows or more, [[time, x, y, z], …], in s since the first frame that is kept and m/s",
+            fix="give two rows or more, [[time, x, y, z], …], in s since the first frame that is "
+            "kept and m/s",
         )
     if not (np.diff(rows[:, 0]) > 0).all():
-        raise InputError("times of the wind's samples do not ascend", where=where, fix="sort the rows by time")
+        raise InputError(
+            "times of the wind's samples do not ascend", where=where, fix="sort the rows by time"
+        )
     return rows[:, 0], rows[:, 1:]

@@ -1,12 +1,14 @@
-"""Cusick's drape test: a disc of cloth clamped between a pedestal and a plate, its border hanging freely.
+"""Cusick's drape test: a disc of cloth clamped between a pedestal and a plate, its border hanging
+freely.
 
-The cloth on the pedestal does not move. What hangs over comes to rest by dynamic relaxation (Day 1965; Otter, Cassell
-and Hobbs 1966): steps of backward Euler without air, in which every member's velocities are set to zero whenever its
-kinetic energy falls. The pedestal is a solid cylinder: after every step what hangs below its top is moved out to its
-side. Layers of cloth do not touch each other.
+The cloth on the pedestal does not move. What hangs over comes to rest by dynamic relaxation (Day
+1965; Otter, Cassell and Hobbs 1966): steps of backward Euler without air, in which every member's
+velocities are set to zero whenever its kinetic energy falls. The pedestal is a solid cylinder:
+after every step what hangs below its top is moved out to its side. Layers of cloth do not touch
+each other.
 
-Rest depends on stiffness over weight alone. Which of several resting shapes is found depends on the start, so that a
-drape has a random start, as a specimen laid on by hand has.
+Rest depends on stiffness over weight alone. Which of several resting shapes is found depends on the
+start, so that a drape has a random start, as a specimen laid on by hand has.
 """
 
 from __future__ import annotations
@@ -37,17 +39,21 @@ DISC = 0.15
 """Radius of the cloth [m], the medium one of the three that the standards have."""
 
 
-def disc(rng: np.random.Generator, *, radius: float = DISC, pedestal: float = PEDESTAL, rows: int = 7) -> Mesh:
-    """Makes a disc of nearly equilateral triangles, in rings turned against each other at random, so that no direction
-    is preferred.
+def disc(
+    rng: np.random.Generator, *, radius: float = DISC, pedestal: float = PEDESTAL, rows: int = 7
+) -> Mesh:
+    """Makes a disc of nearly equilateral triangles, in rings turned against each other at random,
+    so that no direction is preferred.
 
-    The pedestal's edge lies midway between two rings. What lies inside is held, and a hinge between held and free
-    triangles bends half of its width alone, so that this is where the cloth is clamped, to second order in the width.
+    The pedestal's edge lies midway between two rings. What lies inside is held, and a hinge between
+    held and free triangles bends half of its width alone, so that this is where the cloth is
+    clamped, to second order in the width.
 
     Args:
         rng: of the rings' turns.
         radius, pedestal: [m].
-        rows: of triangles from the edge outwards, beside half of one; vertices on the pedestal are farther apart.
+        rows: of triangles from the edge outwards, beside half of one; vertices on the pedestal are
+            farther apart.
 
     Raises:
         InputError: no border that could hang over, or less than three rows.
@@ -59,7 +65,9 @@ def disc(rng: np.random.Generator, *, radius: float = DISC, pedestal: float = PE
             fix="give a pedestal smaller than the cloth",
         )
     if rows < 3:
-        raise InputError(f"a border of {rows} rows of triangles", where="drape", fix="give at least 3")
+        raise InputError(
+            f"a border of {rows} rows of triangles", where="drape", fix="give at least 3"
+        )
     from scipy.spatial import Delaunay
 
     height = (radius - pedestal) / (rows + 0.5)
@@ -72,20 +80,29 @@ def disc(rng: np.random.Generator, *, radius: float = DISC, pedestal: float = PE
         angle = rng.uniform(0, 2 * math.pi) + 2 * math.pi * np.arange(count) / count
         points.append(ring * np.stack([np.cos(angle), np.sin(angle)], axis=1))
     rest = np.concatenate(points)
-    return Mesh(rest=rest, faces=Delaunay(rest).simplices.astype(np.int64))  # in two dimensions counter-clockwise
+    return Mesh(
+        rest=rest, faces=Delaunay(rest).simplices.astype(np.int64)
+    )  # in two dimensions counter-clockwise
 
 
 def on_pedestal(mesh: Mesh, pedestal: float = PEDESTAL) -> tuple[int, ...]:
-    """Lists the vertices that are clamped: those on the pedestal, and the ring half a row outside of it."""
+    """Lists the vertices that are clamped: those on the pedestal, and the ring half a row outside
+    of it."""
     radius = np.hypot(mesh.rest[:, 0], mesh.rest[:, 1])
     rings = np.unique(radius[radius > pedestal].round(9))
     return tuple(np.flatnonzero(radius <= rings[0] + 1e-8).tolist())
 
 
 def drape_scene(
-    mesh: Mesh, material: Material, rng: np.random.Generator, *, pedestal: float = PEDESTAL, sigma: float = 1e-3
+    mesh: Mesh,
+    material: Material,
+    rng: np.random.Generator,
+    *,
+    pedestal: float = PEDESTAL,
+    sigma: float = 1e-3,
 ) -> Scene:
-    """Makes the scene of one drape: the cloth flat on its pedestal, with normal noise of `sigma` [m] on its border."""
+    """Makes the scene of one drape: the cloth flat on its pedestal, with normal noise of `sigma`
+    [m] on its border."""
     handles = Handles(vertices=on_pedestal(mesh, pedestal), stiffness=math.inf)
     flat = np.concatenate([mesh.rest, np.zeros((mesh.vertex_count, 1))], axis=1)
     return Scene(
@@ -109,7 +126,8 @@ def at_rest(
 
     Args:
         pedestal: its radius [m].
-        limit: time that is simulated [s]. Within 0.8 s drapes of 0.06 m over the edge have come to rest.
+        limit: time that is simulated [s]. Within 0.8 s drapes of 0.06 m over the edge have come to
+            rest.
         advance: called with 1 after each step.
 
     Returns:
@@ -130,7 +148,8 @@ def at_rest(
 
 
 def _beside(state: State, pedestal: float, free: Tensor) -> State:
-    """Moves what is below the pedestal's top and within its radius out to its side, and stops its approach."""
+    """Moves what is below the pedestal's top and within its radius out to its side, and stops its
+    approach."""
     across = state.position[:, :2]
     radius = across.norm(dim=1, keepdim=True)
     inside = (free > 0) & (state.position[:, 2:] < 0) & (radius < pedestal)

@@ -1,4 +1,5 @@
-"""Models of a lake as recipes: the parameters of a row of kind "model" are those of a recipe's TOML."""
+"""Models of a lake as recipes: the parameters of a row of kind "model" are those of a recipe's
+TOML."""
 
 from __future__ import annotations
 
@@ -22,8 +23,8 @@ from sim.run.simulation_recipe import Recipe
 
 
 def load(source: str, lake: Lake, *, branch: str = "main") -> Recipe:
-    """Reads a recipe from a file or the catalog, as `sim.run.simulation_toml.load`, or a model of the lake by its name
-    or id.
+    """Reads a recipe from a file or the catalog, as `sim.run.simulation_toml.load`, or a model of
+    the lake by its name or id.
 
     Raises:
         UnknownNameError: neither a recipe nor a model has that name.
@@ -35,7 +36,9 @@ def load(source: str, lake: Lake, *, branch: str = "main") -> Recipe:
     rows = lake.rows({"kind": Kind.MODEL}, at=branch, columns=OF_RESULTS).to_pylist()
     ids = [row["artifact"] for row in meant(rows, source)]
     if len(ids) > 1:
-        raise NotFoundError(f"{len(ids)} models are meant by {source!r}", where=str(lake.path), fix=_one_of(ids))
+        raise NotFoundError(
+            f"{len(ids)} models are meant by {source!r}", where=str(lake.path), fix=_one_of(ids)
+        )
     if not ids:
         names = [*simulation_toml.SCENES.names(), *(row["name"] for row in rows)]
         raise UnknownNameError.of("recipe or model", source, names)
@@ -46,13 +49,17 @@ def _log(lake: Lake, branch: str, name: str) -> tuple[str, WindSeries]:
     rows = lake.rows({"kind": [Kind.WIND, Kind.RECORDING]}, at=branch, columns=COLUMNS).to_pylist()
     ids = [row["artifact"] for row in meant(rows, name, kinds=(Kind.WIND,))]
     if len(ids) > 1:
-        raise NotFoundError(f"{len(ids)} logs are meant by {name!r}", where=str(lake.path), fix=_one_of(ids))
+        raise NotFoundError(
+            f"{len(ids)} logs are meant by {name!r}", where=str(lake.path), fix=_one_of(ids)
+        )
     if not ids:
         raise UnknownNameError.of("log", name, [row["name"] for row in rows], where=str(lake.path))
     artifact = lake.artifact(ids[0], at=branch)
     series = None if artifact.object is None else open_parent(lake, artifact.object).wind()
     if series is None:
-        raise InputError("the record has no wind", where=f"artifact {artifact.id}", fix="name a wind artifact")
+        raise InputError(
+            "the record has no wind", where=f"artifact {artifact.id}", fix="name a wind artifact"
+        )
     return artifact.id, series
 
 
@@ -65,7 +72,9 @@ def of_artifact(artifact: Artifact) -> Recipe:
     """
     where = f"artifact {artifact.id}"
     if artifact.kind is not Kind.MODEL or artifact.parameters is None:
-        raise CorruptError("no model that can be simulated", where=where, fix="close the loop again")
+        raise CorruptError(
+            "no model that can be simulated", where=where, fix="close the loop again"
+        )
     content = present_recipe(json.loads(artifact.parameters))
     recipe = simulation_toml.of_content(content, name=artifact.name, folder=Path(), where=where)
     return replace(recipe, model=artifact.id)

@@ -1,6 +1,7 @@
 """A batch of members through time: frames kept, energies noted, members that fail taken out.
 
-What is measured of every member on the way: energies, strain, and whether its shape can be believed.
+What is measured of every member on the way: energies, strain, and whether its shape can be
+believed.
 """
 
 from __future__ import annotations
@@ -34,19 +35,24 @@ from sim.run.simulation_loop import Batch, Divergence
 from sim.run.simulation_recipe import Recipe
 
 CRUMPLED = 0.2
-"""Root mean square compression of the faces beyond which a sheet has crumpled. Cloth gives way to compression by
-buckling, so that its faces keep their area: flags of 12 and 30 columns in 0 to 10 m/s, at 0.12 and 0.284 kg/m², have at
-most 0.11 with the declared damping of 0.25 ms once they have settled, and at most 0.15 in the first frames.
+"""Root mean square compression of the faces beyond which a sheet has crumpled. Cloth gives way to
+compression by buckling, so that its faces keep their area: flags of 12 and 30 columns in 0 to 10
+m/s, at 0.12 and 0.284 kg/m², have at most 0.11 with the declared damping of 0.25 ms once they have
+settled, and at most 0.15 in the first frames.
 
-Without damping a sheet with a measured stretching table becomes a ball of noise, at 0.43 to 0.52. It is not the step's
-doing: as in the reference simulator, the force takes the table's stiffness at each strain as if it were constant, so
-that it derives from no energy, and gives some in every cycle. (12 columns without air: from 3 J at 0.6 s to 390 J at
-2.4 s. In 4 m/s of wind the compression passes 0.3 within 1.2 s in the automatic step, half of it and a quarter. With
-constant stiffness it stays at 0.02.) The declared damping takes more than the tables give. In the ball faces are
-stretched to twice their length and stiffer than the 15 % that the stable step is estimated for: in the automatic step
-most such sheets diverge within a second or two more, in half of it none. Both are reported and not stored."""
+Without damping a sheet with a measured stretching table becomes a ball of noise, at 0.43 to 0.52.
+It is not the step's
+doing: as in the reference simulator, the force takes the table's stiffness at each strain as if it
+were constant, so that it derives from no energy, and gives some in every cycle. (12 columns without
+air: from 3 J at 0.6 s to 390 J at 2.4 s. In 4 m/s of wind the compression passes 0.3 within 1.2 s
+in the automatic step, half of it and a quarter. With constant stiffness it stays at 0.02.) The
+declared damping takes more than the tables give. In the ball faces are stretched to twice their
+length and stiffer than the 15 % that the stable step is estimated for: in the automatic step most
+such sheets diverge within a second or two more, in half of it none. Both are reported and not
+stored."""
 _LATE = 4
-"""Share of the kept frames that is looked at, the last quarter: starts are rough, and no sheet uncrumples."""
+"""Share of the kept frames that is looked at, the last quarter: starts are rough, and no sheet
+uncrumples."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,10 +60,11 @@ class Diagnosis:
     """Diagnostics of one member.
 
     Attributes:
-        energies: name → value at each kept frame [J]: kinetic, stretching, bending, gravity, and where there are such,
-            handles, contact.
+        energies: name → value at each kept frame [J]: kinetic, stretching, bending, gravity, and
+            where there are such, handles, contact.
         largest_strain: at each kept frame, the largest principal stretch of any face, less 1.
-        compression: at each kept frame, how much faces are compressed, root mean square (see `CRUMPLED`).
+        compression: at each kept frame, how much faces are compressed, root mean square (see
+            `CRUMPLED`).
     """
 
     energies: Mapping[str, tuple[float, ...]]
@@ -143,7 +150,8 @@ class BatchOutcome:
 
 @dataclass(frozen=True, kw_only=True)
 class Stepper:
-    """Advances batches by frames, in steps that depend on the recipe and a material of it, not on what members drew.
+    """Advances batches by frames, in steps that depend on the recipe and a material of it, not on
+    what members drew.
 
     Attributes:
         method: None for the explicit method in `steps` equal steps a frame.
@@ -159,7 +167,8 @@ class Stepper:
             raise LimitError(
                 f"a stable simulation needs {self.steps:.3g} steps a frame",
                 where="recipe [integrator]",
-                fix=f"at most {STEPS_LIMIT} are taken: let the cells be larger, or the cloth softer or heavier",
+                fix=f"at most {STEPS_LIMIT} are taken: let the cells be larger, or the cloth "
+                "softer or heavier",
             )
 
     @classmethod
@@ -167,8 +176,8 @@ class Stepper:
         """Chooses the method and the steps of a recipe for the members of the material at an index.
 
         Raises:
-            UsageError: a forced step beyond the stability limit of a member at the ends of the recipe's ranges; a
-                backend that cannot run such a member.
+            UsageError: a forced step beyond the stability limit of a member at the ends of the
+                recipe's ranges; a backend that cannot run such a member.
             InputError: no step is stable.
             LimitError: more than `STEPS_LIMIT` steps a frame.
         """
@@ -182,7 +191,9 @@ class Stepper:
         if spec.backend is Backend.WARP:
             WarpKernel.of(system)
         with torch.no_grad():
-            return cls(recipe=recipe, method=None, steps=Symplectic(step=spec.step).steps(system, frame))
+            return cls(
+                recipe=recipe, method=None, steps=Symplectic(step=spec.step).steps(system, frame)
+            )
 
     @property
     def step(self) -> float:
@@ -193,7 +204,9 @@ class Stepper:
         """Returns the state one frame of `duration` [s] later."""
         if self.method is not None:
             return self.method.advance(system, state, duration)
-        return advance(system, state, duration, steps=self.steps, backend=self.recipe.integrator.backend)
+        return advance(
+            system, state, duration, steps=self.steps, backend=self.recipe.integrator.backend
+        )
 
     def unstable(self, system: System) -> Tensor:
         """Returns whether each member's stability limit is below the step, (batch,)."""
@@ -215,8 +228,8 @@ def run(
 ) -> list[BatchOutcome]:
     """Simulates members of one material together.
 
-    The batch always has `size` members, the last repeated as often as it takes: results then depend on a member and
-    the size alone, to the last bit.
+    The batch always has `size` members, the last repeated as often as it takes: results then depend
+    on a member and the size alone, to the last bit.
 
     Args:
         progress: called with 1 after each frame, settling included.
@@ -235,7 +248,9 @@ def run(
                 monitor.look(batch.system, state)
                 meshes.append(batch.system.cloth.mesh)
                 frames.append(state.position.to("cpu", torch.float32).numpy())
-                winds.append(system.wind.velocity(state.time).expand(3, size).double().cpu().numpy())
+                winds.append(
+                    system.wind.velocity(state.time).expand(3, size).double().cpu().numpy()
+                )
             if progress is not None:
                 progress(1)
     # Why members failed, and sequences of those that did not.
@@ -243,7 +258,8 @@ def run(
         unstable, ("unstable-step", f"its stable step is below the recipe's, {stepper.step:.3g} s")
     )
     failures |= {
-        index: ("diverged", f"it diverged before {last_good:.3f} s") for index, last_good in batch.diverged.items()
+        index: ("diverged", f"it diverged before {last_good:.3f} s")
+        for index, last_good in batch.diverged.items()
     }
     velocities = np.stack(winds)
     instants = [round((time.settling + i) / time.rate * NANOSECONDS) for i in range(time.frames)]
@@ -261,16 +277,24 @@ def run(
             )
         outcomes.append(
             BatchOutcome(
-                member=member, sequence=sequence, wind=velocities[..., index], diagnosis=diagnosis, failure=failure
+                member=member,
+                sequence=sequence,
+                wind=velocities[..., index],
+                diagnosis=diagnosis,
+                failure=failure,
             )
         )
     return outcomes
 
 
 def _sequence(
-    time: IntArray, meshes: Sequence[Mesh], positions: Sequence[Float32Array], attributes: Mapping[str, Any]
+    time: IntArray,
+    meshes: Sequence[Mesh],
+    positions: Sequence[Float32Array],
+    attributes: Mapping[str, Any],
 ) -> MeshSequence | RaggedMeshSequence:
-    """Puts frames together at their times [ns], with the mesh and the positions (vertex, 3) [m] of each."""
+    """Puts frames together at their times [ns], with the mesh and the positions (vertex, 3) [m] of
+    each."""
     if all(mesh is meshes[0] for mesh in meshes):
         return MeshSequence(
             time=time,
@@ -297,8 +321,11 @@ def _crumpled_reason(diagnosis: Diagnosis) -> tuple[str, str] | None:
     return "crumpled", f"it crumpled: its faces are compressed by {rate}; declare more damping"
 
 
-def _attributes(crew: Crew, stepper: Stepper, member: Member, diagnosis: Diagnosis, wind: FloatArray) -> dict[str, Any]:
-    """Returns what a sequence says of itself, also outside the lake; the wind where its recipe gives samples of it."""
+def _attributes(
+    crew: Crew, stepper: Stepper, member: Member, diagnosis: Diagnosis, wind: FloatArray
+) -> dict[str, Any]:
+    """Returns what a sequence says of itself, also outside the lake; the wind where its recipe
+    gives samples of it."""
     return {
         "source": "flagdata simulate",
         "recipe": crew.recipe.name,

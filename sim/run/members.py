@@ -1,4 +1,5 @@
-"""The members of a recipe: what each draws from its own named streams, and the batch that some of them form."""
+"""The members of a recipe: what each draws from its own named streams, and the batch that some of
+them form."""
 
 from __future__ import annotations
 
@@ -94,7 +95,9 @@ class Crew:
 
     def base(self, index: int) -> int:
         """Draws which of the recipe's materials a member has, as an index."""
-        return int(stream(self.seed(index), "material", "names").random() * len(self.recipe.material.bases))
+        return int(
+            stream(self.seed(index), "material", "names").random() * len(self.recipe.material.bases)
+        )
 
     def member(self, index: int) -> Member:
         """Draws a member, which depends on the recipe's seed and the index alone.
@@ -105,15 +108,23 @@ class Crew:
         seed = self.seed(index)
 
         def drawn(quantity: Quantity, *path: str) -> float:
-            return quantity.at(stream(seed, *path).random()) if isinstance(quantity, Range) else quantity
+            return (
+                quantity.at(stream(seed, *path).random())
+                if isinstance(quantity, Range)
+                else quantity
+            )
 
         spec, wind = self.recipe.material, self.recipe.wind
         material_index = self.base(index)
         base = spec.bases[material_index]
-        factors = _factors(spec, stream(seed, "material", "bending-factors").random(math.prod(BENDING_SHAPE)))
+        factors = _factors(
+            spec, stream(seed, "material", "bending-factors").random(math.prod(BENDING_SHAPE))
+        )
         material = _material(
             base,
-            area_weight=drawn(_of(spec.area_weight, base.area_weight), "material", hashed_key("area-weight"))
+            area_weight=drawn(
+                _of(spec.area_weight, base.area_weight), "material", hashed_key("area-weight")
+            )
             * drawn(spec.area_weight_factor, "material", hashed_key("area-weight-factor")),
             stretching=drawn(spec.stretching, "material", "stretching-factor"),
             bending=drawn(spec.bending, "material", "bending-factor") * factors,
@@ -121,7 +132,9 @@ class Crew:
         )
         speed, toward = drawn(wind.speed, "wind", "speed"), drawn(wind.toward, "wind", "toward")
         effects = {
-            name: {key: drawn(value, "effects", name, key) for key, value in effect.parameters.items()}
+            name: {
+                key: drawn(value, "effects", name, key) for key, value in effect.parameters.items()
+            }
             for name, effect in self.recipe.effects.items()
         }
         scene = Scene(
@@ -147,10 +160,23 @@ class Crew:
             "stretching": tuple(material.stretching.ravel().tolist()),
             "bending": tuple(material.bending.ravel().tolist()),
         }
-        parameters |= {f"{name}.{key}": value for name, chosen in effects.items() for key, value in chosen.items()}
-        return Member(index=index, seed=seed, base=material_index, scene=scene, parameters=parameters, effects=effects)
+        parameters |= {
+            f"{name}.{key}": value
+            for name, chosen in effects.items()
+            for key, value in chosen.items()
+        }
+        return Member(
+            index=index,
+            seed=seed,
+            base=material_index,
+            scene=scene,
+            parameters=parameters,
+            effects=effects,
+        )
 
-    def assemble(self, members: Sequence[Member], *, device: torch.device | str = "cpu") -> tuple[System, State]:
+    def assemble(
+        self, members: Sequence[Member], *, device: torch.device | str = "cpu"
+    ) -> tuple[System, State]:
         """Assembles the batch of these members with their effects, and its start.
 
         Raises:
@@ -159,11 +185,14 @@ class Crew:
         system, state = assemble([m.scene for m in members], dtype=self.recipe.dtype, device=device)
         samples = self.recipe.wind.samples
         if samples is not None:
-            system = replace(system, wind=samples.wind(self.recipe.time.first, len(members), system.anchors))
+            system = replace(
+                system, wind=samples.wind(self.recipe.time.first, len(members), system.anchors)
+            )
         return apply([self._effect(name, members) for name in self.recipe.effects], system, state)
 
     def corners(self, material_index: int) -> tuple[System, State]:
-        """Assembles members of a material at the ends of all ranges: a step that suits them suits all members."""
+        """Assembles members of a material at the ends of all ranges: a step that suits them suits
+        all members."""
         spec, wind = self.recipe.material, self.recipe.wind
         stiffest = np.full(BENDING_SHAPE, ends(spec.bending)[1] * ends(spec.bending_each)[1])
         members: list[Member] = []
@@ -171,7 +200,8 @@ class Crew:
         for end in (0, 1):
             material = _material(
                 base,
-                area_weight=ends(_of(spec.area_weight, base.area_weight))[0] * ends(spec.area_weight_factor)[0],
+                area_weight=ends(_of(spec.area_weight, base.area_weight))[0]
+                * ends(spec.area_weight_factor)[0],
                 damping=ends(_of(spec.damping, base.damping))[1],
                 stretching=ends(spec.stretching)[1],
                 bending=stiffest,
@@ -190,13 +220,26 @@ class Crew:
                 name: {key: ends(value)[end] for key, value in effect.parameters.items()}
                 for name, effect in self.recipe.effects.items()
             }
-            members.append(Member(index=end, seed=0, base=material_index, scene=scene, parameters={}, effects=effects))
+            members.append(
+                Member(
+                    index=end,
+                    seed=0,
+                    base=material_index,
+                    scene=scene,
+                    parameters={},
+                    effects=effects,
+                )
+            )
         return self.assemble(members)
 
     def _start(self, seed: int) -> FloatArray:
         spec = self.recipe.scene
         flat = self._flat(spec)
-        return roughen_start(flat, self.handles, stream(seed, "start"), spec.start_noise) if spec.start_noise else flat
+        return (
+            roughen_start(flat, self.handles, stream(seed, "start"), spec.start_noise)
+            if spec.start_noise
+            else flat
+        )
 
     def _flat(self, spec: SceneSpec) -> FloatArray:
         """Returns where the cloth starts, before its noise, (vertex, 3) [m]."""
@@ -213,7 +256,9 @@ class Crew:
 
     def _effect(self, name: str, members: Sequence[Member]) -> Effect:
         values = {
-            key: torch.tensor([member.effects[name][key] for member in members], dtype=torch.float64)
+            key: torch.tensor(
+                [member.effects[name][key] for member in members], dtype=torch.float64
+            )
             for key in self.recipe.effects[name].parameters
         }
         effect = EFFECTS[name](**values)
@@ -238,7 +283,9 @@ class Crew:
                     rate=_GUST_RATE,
                 )
             )
-        return replace(effect, times=series[0].times, samples=torch.cat([s.samples for s in series], dim=-1))
+        return replace(
+            effect, times=series[0].times, samples=torch.cat([s.samples for s in series], dim=-1)
+        )
 
 
 def _of(quantity: Quantity | None, default: float) -> Quantity:
@@ -247,7 +294,9 @@ def _of(quantity: Quantity | None, default: float) -> Quantity:
 
 def _factors(spec: MaterialSpec, shares: FloatArray) -> FloatArray:
     quantity = spec.bending_each
-    values = [quantity.at(share) if isinstance(quantity, Range) else quantity for share in shares.tolist()]
+    values = [
+        quantity.at(share) if isinstance(quantity, Range) else quantity for share in shares.tolist()
+    ]
     return np.array(values).reshape(BENDING_SHAPE)
 
 

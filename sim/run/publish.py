@@ -1,4 +1,5 @@
-"""A recipe's members into a lake: what is there already is not made again; each batch is one commit."""
+"""A recipe's members into a lake: what is there already is not made again; each batch is one
+commit."""
 
 from __future__ import annotations
 
@@ -30,7 +31,8 @@ from sim.run.simulation_recipe import Recipe
 Deposited: TypeAlias = tuple[Artifact, Deposit]
 """A row that is not committed yet, and its object in the store."""
 Progress: TypeAlias = Callable[[int], object]
-"""Called with the number of members done since the last call; a batch under way counts by its share of frames."""
+"""Called with the number of members done since the last call; a batch under way counts by its share
+of frames."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +42,8 @@ class RunReport:
     Attributes:
         added: artifact ids published now.
         existing: artifact ids that were there already, and whole.
-        healed: artifact ids that were there, whose objects were damaged or missing and were made again → how.
+        healed: artifact ids that were there, whose objects were damaged or missing and were made
+            again → how.
         failed: what was not stored: index, seed, kind and what of each.
         steps: material → step of the integrator [s].
         seconds: wall time of the simulation.
@@ -76,18 +79,21 @@ def simulate(
     workers: int = 1,
     progress: Progress | None = None,
 ) -> RunReport:
-    """Simulate the members of a recipe that are not on the branch yet, or whose object there is damaged or missing, and
-    publish them batch by batch.
+    """Simulate the members of a recipe that are not on the branch yet, or whose object there is
+    damaged or missing, and publish them batch by batch.
 
-    A run that was stopped goes on where its last commit was. Members that fail are reported and not stored; a later run
-    tries them again. What a member becomes depends neither on the workers nor on what it is simulated with.
+    A run that was stopped goes on where its last commit was. Members that fail are reported and not
+    stored; a later run tries them again. What a member becomes depends neither on the workers nor
+    on what it is simulated with.
 
     Args:
-        workers: batches at a time, each in a thread of its own; the compiled kernel lets them run side by side.
+        workers: batches at a time, each in a thread of its own; the compiled kernel lets them run
+            side by side.
         progress: may be called from any of these threads, never from two at once.
 
     Raises:
-        UsageError: no workers, a device that is not there, or a step or effect that does not fit the scene.
+        UsageError: no workers, a device that is not there, or a step or effect that does not fit
+            the scene.
         InputError: a scene that cannot be simulated.
     """
     check_device(device)
@@ -95,7 +101,10 @@ def simulate(
         raise UsageError(f"{workers} workers", where="--workers", fix="give at least one")
     crew = Crew(recipe)
     identity = recipe.identity()
-    ids = {index: member_artifact(recipe, identity, index, crew.seed(index)).id for index in range(recipe.count)}
+    ids = {
+        index: member_artifact(recipe, identity, index, crew.seed(index)).id
+        for index in range(recipe.count)
+    }
     # What the branch has already is left alone.
     in_lake = whole(lake, ids.values(), branch=branch)
     existing = [ids[index] for index in ids if ids[index] in in_lake]
@@ -123,24 +132,34 @@ def simulate(
         healed=healed,
         failed=tuple(failed),
         seconds=seconds,
-        steps={base.name: stepper.step for base, stepper in zip(recipe.material.bases, steppers, strict=True)},
+        steps={
+            base.name: stepper.step
+            for base, stepper in zip(recipe.material.bases, steppers, strict=True)
+        },
         rate=len(pending) / seconds if pending else 0.0,
     )
 
 
 def whole(lake: Lake, artifacts: Collection[str], *, branch: str) -> frozenset[str]:
-    """Returns those of some artifacts that a branch has and whose objects are neither damaged nor missing."""
-    present = lake.rows({"artifact": list(artifacts)}, at=branch, columns=["artifact"])["artifact"].to_pylist()
+    """Returns those of some artifacts that a branch has and whose objects are neither damaged nor
+    missing."""
+    present = lake.rows({"artifact": list(artifacts)}, at=branch, columns=["artifact"])[
+        "artifact"
+    ].to_pylist()
     return frozenset(present) - unsound(lake, present, at=branch)
 
 
-def batches(crew: Crew, steppers: Sequence[Stepper], pending: Sequence[int]) -> list[tuple[Stepper, list[int]]]:
+def batches(
+    crew: Crew, steppers: Sequence[Stepper], pending: Sequence[int]
+) -> list[tuple[Stepper, list[int]]]:
     """Groups members by material, since each material has its own steps."""
     size = crew.recipe.batch
     groups: list[tuple[Stepper, list[int]]] = []
     for base, stepper in enumerate(steppers):
         indices = [index for index in pending if crew.base(index) == base]
-        groups += [(stepper, indices[first : first + size]) for first in range(0, len(indices), size)]
+        groups += [
+            (stepper, indices[first : first + size]) for first in range(0, len(indices), size)
+        ]
     return groups
 
 
@@ -161,7 +180,9 @@ def outcomes(
     def simulate_batch(stepper: Stepper, indices: list[int]) -> tuple[Stepper, list[BatchOutcome]]:
         members = [crew.member(index) for index in indices]
         tick = ticks.of_batch(len(members))
-        return stepper, run(crew, stepper, members, size=crew.recipe.batch, device=device, progress=tick)
+        return stepper, run(
+            crew, stepper, members, size=crew.recipe.batch, device=device, progress=tick
+        )
 
     if device.startswith("cpu"):
         library()  # built once, before several threads ask for it
@@ -169,31 +190,41 @@ def outcomes(
     executor = ThreadPoolExecutor(max_workers=workers, thread_name_prefix="simulate")
     with one_thread():
         try:
-            running = {executor.submit(simulate_batch, *batch) for batch in islice(waiting, workers + 1)}
+            running = {
+                executor.submit(simulate_batch, *batch) for batch in islice(waiting, workers + 1)
+            }
             while running:
                 done, running = wait(running, return_when=FIRST_COMPLETED)
                 for future in done:
                     yield future.result()
-                    running |= {executor.submit(simulate_batch, *batch) for batch in islice(waiting, 1)}
+                    running |= {
+                        executor.submit(simulate_batch, *batch) for batch in islice(waiting, 1)
+                    }
         finally:
             ticks.stop()
             executor.shutdown(cancel_futures=True)
 
 
-def publish(lake: Lake, recipe: Recipe, outcomes: Sequence[BatchOutcome], *, step: float, branch: str) -> CommitResult:
+def publish(
+    lake: Lake, recipe: Recipe, outcomes: Sequence[BatchOutcome], *, step: float, branch: str
+) -> CommitResult:
     """Publish the outcomes that have meshes in one commit.
 
     Args:
         step: of the integrator [s].
     """
     identity = recipe.identity()
-    with lake.transaction(_message(recipe, [o.member.index for o in outcomes]), branch=branch) as transaction:
+    with lake.transaction(
+        _message(recipe, [o.member.index for o in outcomes]), branch=branch
+    ) as transaction:
         for outcome in outcomes:
             if outcome.sequence is None:
                 continue
             staged = transaction.staging(".zarr")
             write_meshes(staged, outcome.sequence)
-            transaction.add(_publish_row(recipe, identity, outcome, step, stored=transaction.put(staged)))
+            transaction.add(
+                _publish_row(recipe, identity, outcome, step, stored=transaction.put(staged))
+            )
     return transaction.result
 
 
@@ -210,11 +241,16 @@ def deposit_meshes(
     for outcome in outcomes:
         if outcome.sequence is not None:
             put = deposit(lake, ".zarr", partial(write_meshes, sequence=outcome.sequence))
-            stored[outcome.member.index] = _publish_row(recipe, identity, outcome, step, stored=put.name), put
+            stored[outcome.member.index] = (
+                _publish_row(recipe, identity, outcome, step, stored=put.name),
+                put,
+            )
     return stored
 
 
-def commit(lake: Lake, recipe: Recipe, stored: Mapping[int, Deposited], *, branch: str) -> CommitResult:
+def commit(
+    lake: Lake, recipe: Recipe, stored: Mapping[int, Deposited], *, branch: str
+) -> CommitResult:
     """Commits the rows of members whose meshes are in the store."""
     with lake.transaction(_message(recipe, stored), branch=branch) as transaction:
         for row, put in stored.values():
@@ -265,7 +301,12 @@ def _publish_row(
 
 def failure_of(outcome: BatchOutcome) -> dict[str, Any]:
     kind, reason = outcome.failure or ("failed", "it failed")
-    return {"index": outcome.member.index, "seed": outcome.member.seed, "kind": kind, "what": reason}
+    return {
+        "index": outcome.member.index,
+        "seed": outcome.member.seed,
+        "kind": kind,
+        "what": reason,
+    }
 
 
 def check_device(device: str) -> None:
@@ -276,7 +317,9 @@ def check_device(device: str) -> None:
         torch.zeros(1, device=device)
     except (RuntimeError, AssertionError) as error:
         raise UsageError(
-            f"device {device!r} is not there: {str(error).splitlines()[0]}", where="--device", fix="take cpu"
+            f"device {device!r} is not there: {str(error).splitlines()[0]}",
+            where="--device",
+            fix="take cpu",
         ) from None
 
 

@@ -22,11 +22,14 @@ PLAIN: Content = {"material": {"name": "camel-ponte-roma"}}
 """What is simulated where no recipe is named: a flag of a measured knit."""
 
 
-def simulate_members(recipe: str | Content | None, overrides: Content, *, device: str, workers: int) -> Simulated:
+def simulate_members(
+    recipe: str | Content | None, overrides: Content, *, device: str, workers: int
+) -> Simulated:
     """Simulates the members of a recipe, with entries of the caller's in place of its own.
 
     Args:
-        recipe: name of a recipe of the catalog, path of a TOML file, its content, or None for the overrides alone.
+        recipe: name of a recipe of the catalog, path of a TOML file, its content, or None for the
+            overrides alone.
         overrides: entries and tables put in place of the recipe's, a table's entries one by one.
 
     Raises:
@@ -56,26 +59,38 @@ def recipe_of(recipe: str | Content | None, overrides: Content) -> Recipe:
     content = dict(PLAIN if recipe is None else recipe)
     for key, value in overrides.items():
         entry = content.get(key)
-        content[key] = {**entry, **value} if isinstance(entry, Mapping) and isinstance(value, Mapping) else value
+        content[key] = (
+            {**entry, **value}
+            if isinstance(entry, Mapping) and isinstance(value, Mapping)
+            else value
+        )
     return of_content(content, name=name, folder=folder, where=where)
 
 
 def _answer(recipe: Recipe, members: list[BatchOutcome]) -> Simulated:
     complete = [member for member in members if member.sequence is not None]
-    failed = {member.member.index: member.failure[1] for member in members if member.failure is not None}
+    failed = {
+        member.member.index: member.failure[1] for member in members if member.failure is not None
+    }
     if not complete:
         raise InputError(
-            f"none of {len(members)} members was simulated to the end: {next(iter(failed.values()))}",
+            f"none of {len(members)} members was simulated to the end: "
+            f"{next(iter(failed.values()))}",
             where=recipe.name,
             fix="declare more damping, or a smaller step",
         )
-    names = [name for name, value in complete[0].member.parameters.items() if isinstance(value, float)]
+    names = [
+        name for name, value in complete[0].member.parameters.items() if isinstance(value, float)
+    ]
     return Simulated(
         name=recipe.name,
         members=tuple(member.sequence for member in complete if member.sequence is not None),
         failed=failed,
         wind=np.stack([member.wind for member in complete]),
         parameters={
-            name: np.array([member.member.parameters[name] for member in complete], dtype=np.float64) for name in names
+            name: np.array(
+                [member.member.parameters[name] for member in complete], dtype=np.float64
+            )
+            for name in names
         },
     )

@@ -27,12 +27,14 @@ class SimulateCommand(Members, Computed, OnBranch, OnLake):
 def simulate(chosen: SimulateCommand) -> Iterator[Result]:
     """Simulate cloth in the wind: mesh sequences, with their parameters, seeds and energies.
 
-    RECIPE is a TOML file, a recipe of the catalog by name, an ArcSim scene (.json), which is run with ArcSim's own
-    steps, or a model of the lake by its name or id, as closing the loop leaves them.
+    RECIPE is a TOML file, a recipe of the catalog by name, an ArcSim scene (.json), which is run
+    with ArcSim's own steps, or a model of the lake by its name or id, as closing the loop leaves
+    them.
 
-    Each batch is one commit: a run that is stopped goes on with what is missing when the command is given again. On
-    one machine the same recipe, seed and index give the same bits, whatever runs beside. A member that diverges or
-    crumples is reported and not stored, and the command ends with 1.
+    Each batch is one commit: a run that is stopped goes on with what is missing when the command is
+    given again. On one machine the same recipe, seed and index give the same bits, whatever runs
+    beside. A member that diverges or crumples is reported and not stored, and the command ends with
+    1.
 
     \b
       flagdata simulate flag-search-space --lake lake --count 200
@@ -47,7 +49,9 @@ def simulate(chosen: SimulateCommand) -> Iterator[Result]:
     lake.check_writable()
     loaded = load(chosen.recipe, lake, branch=branch)
     loaded = replace(loaded, count=chosen.count or loaded.count, batch=chosen.batch or loaded.batch)
-    workers = chosen.processes if device.startswith("cpu") else chosen.workers or 1  # others take a batch at a time
+    workers = (
+        chosen.processes if device.startswith("cpu") else chosen.workers or 1
+    )  # others take a batch at a time
     steps = in_steps(added_since(lake, branch))
     with steps, progress(loaded.count, label=loaded.name, unit="flag") as advance:
         report = run(lake, loaded, branch=branch, device=device, workers=workers, progress=advance)
@@ -66,8 +70,14 @@ def _print(report: RunReport) -> None:
     for failure in report.failed:
         say(f"member {failure['index']} is not stored: {failure['kind']}: {failure['what']}")
     steps = [f"{step * 1e3:.3g}" for step in sorted(report.steps.values())]
-    speed = f"{report.rate:.2f} flags/s, steps of {'–'.join(dict.fromkeys((steps[0], steps[-1])))} ms"
-    replaced = f", {count_of(len(report.healed), 'damaged or missing object')} replaced" if report.healed else ""
+    speed = (
+        f"{report.rate:.2f} flags/s, steps of {'–'.join(dict.fromkeys((steps[0], steps[-1])))} ms"
+    )
+    replaced = (
+        f", {count_of(len(report.healed), 'damaged or missing object')} replaced"
+        if report.healed
+        else ""
+    )
     say(
         f"{len(report.added) + len(report.healed)} simulated in {report.seconds:.1f} s ({speed}), "
         f"{len(report.existing)} in the lake already, {len(report.failed)} failed{replaced}"

@@ -1,6 +1,7 @@
 """Batches of flags through time: the one loop behind every simulation.
 
-Each caller states at which instants it looks (what comes before the first is the time to settle) and what a divergence
+Each caller states at which instants it looks (what comes before the first is the time to settle)
+and what a divergence
 leads to: figures that were published depend on both.
 """
 
@@ -26,11 +27,14 @@ class Divergence(StrEnum):
     """What happens to a batch in which a member diverges."""
 
     REFUSE = "refuse"
-    """The run ends with a `DivergedError`: the caller tries other steps or strengths, or reports it."""
+    """The run ends with a `DivergedError`: the caller tries other steps or strengths, or reports
+    it."""
     RESTART = "restart"
-    """The member begins anew, so that no infinity slows the others down; `Batch.diverged` names it."""
+    """The member begins anew, so that no infinity slows the others down; `Batch.diverged` names
+    it."""
     KEEP = "keep"
-    """The run goes on: the member's positions are NaN or infinite from then on, and the caller drops them."""
+    """The run goes on: the member's positions are NaN or infinite from then on, and the caller
+    drops them."""
 
 
 class DivergedError(FlagdataError):
@@ -60,12 +64,13 @@ class Batch:
     """Flags that are simulated together.
 
     Attributes:
-        system, state: the flags and where they are; the state moves on with the run, and so does the system where its
-            mesh follows the cloth (`System.remeshing`): at the start, and after each call of the integrator.
+        system, state: the flags and where they are; the state moves on with the run, and so does
+            the system where its mesh follows the cloth (`System.remeshing`): at the start, and
+            after each call of the integrator.
         integrator: advances them.
         divergence: what a member that diverges leads to.
-        speed_limit: of any vertex [m/s]: beyond it a member has diverged; infinite to wait for positions that are not
-            finite. Without meaning for `KEEP`, which looks for nothing.
+        speed_limit: of any vertex [m/s]: beyond it a member has diverged; infinite to wait for
+            positions that are not finite. Without meaning for `KEEP`, which looks for nothing.
         diverged: member → clock of the run at which its first divergence was seen [s].
     """
 
@@ -81,9 +86,11 @@ class Batch:
         self._start = self.system, self.state
 
     def states(self, numbers: Iterable[int], rate: float) -> Iterator[State]:
-        """Yields the states at these numbers of periods after the start, ascending; number 0 is the start itself.
+        """Yields the states at these numbers of periods after the start, ascending; number 0 is the
+        start itself.
 
-        Every number is one call of the integrator, which divides the time since the one before into equal steps.
+        Every number is one call of the integrator, which divides the time since the one before into
+        equal steps.
 
         Args:
             rate: periods a second [Hz].
@@ -96,15 +103,20 @@ class Batch:
         for number in numbers:
             if number > now:
                 with torch.no_grad():
-                    self.state = self.integrator.advance(self.system, self.state, (number - now) / rate)
+                    self.state = self.integrator.advance(
+                        self.system, self.state, (number - now) / rate
+                    )
                 now = number
                 if self.divergence is not Divergence.KEEP:
                     self._check()
                 self.system, self.state = remesh_state(self.system, self.state)
             yield self.state
 
-    def positions(self, numbers: range, rate: float, *, look: Callable[[State], object] | None = None) -> FloatArray:
-        """Returns (frame, vertex, 3, member) [m] at these numbers of periods after the start; see `states`.
+    def positions(
+        self, numbers: range, rate: float, *, look: Callable[[State], object] | None = None
+    ) -> FloatArray:
+        """Returns (frame, vertex, 3, member) [m] at these numbers of periods after the start; see
+        `states`.
 
         The periods before the first are simulated one by one and not kept.
 
@@ -145,7 +157,8 @@ class Batch:
 
 
 def after(settle: float, duration: float, rate: float) -> range:
-    """Returns the numbers of the frames of a recording that begins one period after the time to settle.
+    """Returns the numbers of the frames of a recording that begins one period after the time to
+    settle.
 
     Args:
         settle, duration: [s].
@@ -159,5 +172,8 @@ def _restart_failed(state: State, start: State, failed: Tensor) -> State:
         state,
         position=torch.where(failed, start.position, state.position),
         velocity=torch.where(failed, 0.0, state.velocity),
-        memory=tuple(torch.where(failed, old, new) for old, new in zip(start.memory, state.memory, strict=True)),
+        memory=tuple(
+            torch.where(failed, old, new)
+            for old, new in zip(start.memory, state.memory, strict=True)
+        ),
     )

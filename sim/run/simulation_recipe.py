@@ -68,8 +68,8 @@ class GivenCloth:
         rest: (u, v) of each vertex on the flat cloth [m].
         faces: three vertices each, counter-clockwise.
         held: vertices that are held.
-        anchors: (x, y, z) of each of them [m]; the others start flat in the x–z plane, u along x, as the lowest
-            anchor has it.
+        anchors: (x, y, z) of each of them [m]; the others start flat in the x–z plane, u along x,
+            as the lowest anchor has it.
     """
 
     rest: tuple[tuple[float, float], ...]
@@ -89,10 +89,12 @@ class SceneSpec:
         start_noise: standard deviation of the free vertices' start about the flat shape [m].
         evaluation: how the material's tables are read.
         gravity: downward [m/s²].
-        stiffness: of the handles on each axis [N/m]; infinite for rigid. An ArcSim scene has its own.
+        stiffness: of the handles on each axis [N/m]; infinite for rigid. An ArcSim scene has its
+            own.
         arcsim: the scene file, where the shape is that.
         given: the cloth, where the shape is a mesh.
-        content: SHA-256 of its mesh, start, handles and gravity, where it was read from a scene file or is given.
+        content: SHA-256 of its mesh, start, handles and gravity, where it was read from a scene
+            file or is given.
     """
 
     shape: Shape
@@ -151,7 +153,8 @@ class WindSpec:
         toward: where the air goes to, from +x towards +y [rad]; a flag starts in the y–z plane.
         vertical: upward speed of the air [m/s].
         force: how it pushes.
-        samples: what blows in place of a steady wind, whose mean the others then are; None where it is steady.
+        samples: what blows in place of a steady wind, whose mean the others then are; None where it
+            is steady.
     """
 
     speed: Quantity
@@ -163,7 +166,8 @@ class WindSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class IntegratorSpec:
-    """A method of `sim.integrate.INTEGRATORS`; `step` None lets the symplectic one take its stable step [s].
+    """A method of `sim.integrate.INTEGRATORS`; `step` None lets the symplectic one take its stable
+    step [s].
 
     `backend` is what computes the steps.
     """
@@ -208,7 +212,8 @@ class TimeSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class EffectSpec:
-    """An effect of `sim.effects.EFFECTS`, its parameters, and for gusts the eddies' length scale [m]."""
+    """An effect of `sim.effects.EFFECTS`, its parameters, and for gusts the eddies' length scale
+    [m]."""
 
     parameters: Mapping[str, Quantity]
     length: float | None = None
@@ -254,7 +259,9 @@ class Recipe:
         for counted, number in (("members", self.count), ("members a batch", self.batch)):
             if number > MEMBERS_LIMIT:
                 raise LimitError(
-                    f"the recipe has {number} {counted}", where=self.name, fix=f"have at most {MEMBERS_LIMIT}"
+                    f"the recipe has {number} {counted}",
+                    where=self.name,
+                    fix=f"have at most {MEMBERS_LIMIT}",
                 )
         vertices = self.scene.vertices
         if self.remeshing is not None:
@@ -264,7 +271,8 @@ class Recipe:
             raise LimitError(
                 f"the mesh has {vertices:.3g} vertices",
                 where=f"{self.name} [scene]",
-                fix=f"have at most {VERTICES_LIMIT}: lower columns, or mind the ratio of width and height",
+                fix=f"have at most {VERTICES_LIMIT}: lower columns, or mind the ratio of width and "
+                "height",
             )
         size = 12 * vertices * self.time.frames * min(self.batch, self.count)
         if size > BATCH_BYTES_LIMIT:
@@ -277,13 +285,15 @@ class Recipe:
     def _check_remeshing(self) -> None:
         if self.integrator.name != "implicit":
             raise UsageError(
-                f"the integrator {self.integrator.name} takes steps that suit one mesh, and remeshing changes it",
+                f"the integrator {self.integrator.name} takes steps that suit one mesh, and "
+                "remeshing changes it",
                 where=f"{self.name} [remeshing]",
                 fix='put name = "implicit" into [integrator]',
             )
         if self.batch != 1:
             raise UsageError(
-                f"batches of {self.batch} members are asked for, and with remeshing each has a mesh of its own",
+                f"batches of {self.batch} members are asked for, and with remeshing each has a "
+                "mesh of its own",
                 where=f"{self.name} [remeshing]",
                 fix="leave out batch: such members are simulated one by one",
             )
@@ -292,7 +302,9 @@ class Recipe:
     def parents(self) -> tuple[str, ...]:
         """Artifacts of the lake that it was read from: a model, a log."""
         samples = self.wind.samples
-        return tuple(artifact for artifact in (self.model, samples.artifact if samples else "") if artifact)
+        return tuple(
+            artifact for artifact in (self.model, samples.artifact if samples else "") if artifact
+        )
 
     @property
     def dtype(self) -> torch.dtype:
@@ -355,7 +367,8 @@ class Recipe:
 
 
 def _backend_entry(backend: Backend) -> dict[str, Any]:
-    """Describes the backend where it is not the default: its results differ from the others' by rounding."""
+    """Describes the backend where it is not the default: its results differ from the others' by
+    rounding."""
     return {} if backend is Backend.AUTO else {"backend": backend.value}
 
 
@@ -384,6 +397,7 @@ def _base(base: Material) -> dict[str, Any]:
 
 def _force(force: AirForce) -> dict[str, Any]:
     name = next(
-        (candidate for candidate in AIR_FORCES if isinstance(force, AIR_FORCES[candidate])), type(force).__name__
+        (candidate for candidate in AIR_FORCES if isinstance(force, AIR_FORCES[candidate])),
+        type(force).__name__,
     )
     return {"name": name, **vars(force)}

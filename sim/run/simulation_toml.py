@@ -1,7 +1,7 @@
 """Recipes as TOML. Parsed here and nowhere else; unknown keys are refused, the nearest is named.
 
-All values are SI, angles radians. A *quantity* is a number, or `{ low = …, high = …, scale = "linear" | "log" }`, from
-which each member draws its own value.
+All values are SI, angles radians. A *quantity* is a number, or `{ low = …, high = …, scale =
+"linear" | "log" }`, from which each member draws its own value.
 
     title, seed, count, batch, precision
     [scene]      shape = "flag" | "hanging-cloth" | "arcsim" | "mesh"; width, height, columns, attachment;
@@ -26,8 +26,8 @@ which each member draws its own value.
     [time]       settle, frames, rate
     [effects.NAME]  parameters of an effect (quantities, or "prior" for its prior range)
 
-Without [material], [wind], [contact], [limits] or [remeshing] an ArcSim scene's own are taken. `count`, `batch` and
-`title` do not change what a member is; everything else does.
+Without [material], [wind], [contact], [limits] or [remeshing] an ArcSim scene's own are taken.
+`count`, `batch` and `title` do not change what a member is; everything else does.
 """
 
 from __future__ import annotations
@@ -98,7 +98,8 @@ SCENES = Shelf(folder="scenes", noun="recipe")
 
 
 def load(source: str, *, logs: Logs | None = None) -> Recipe:
-    """Reads the recipe of that name in the catalog, of a `.toml` file, or of an ArcSim scene `.json`.
+    """Reads the recipe of that name in the catalog, of a `.toml` file, or of an ArcSim scene
+    `.json`.
 
     Args:
         logs: gives the logs of a lake that recipes name.
@@ -221,7 +222,9 @@ _BATCH = 16
 _LIMITS = {"low": float, "high": float, "sweeps": Count}
 
 
-def of_content(content: Mapping[str, Any], *, name: str, folder: Path, where: str, logs: Logs | None = None) -> Recipe:
+def of_content(
+    content: Mapping[str, Any], *, name: str, folder: Path, where: str, logs: Logs | None = None
+) -> Recipe:
     """Builds a recipe from the content of its TOML.
 
     Args:
@@ -255,9 +258,14 @@ def of_content(content: Mapping[str, Any], *, name: str, folder: Path, where: st
         contact=form.contact or (arcsim and arcsim.contact),
         limits=limits,
         remeshing=remeshing,
-        integrator=_integrator(form.integrator, content.get("integrator", {}), where=f"{where} [integrator]"),
+        integrator=_integrator(
+            form.integrator, content.get("integrator", {}), where=f"{where} [integrator]"
+        ),
         time=form.time,
-        effects={key: _effect(key, effect, where=f"{where} [effects] [{key}]") for key, effect in form.effects.items()},
+        effects={
+            key: _effect(key, effect, where=f"{where} [effects] [{key}]")
+            for key, effect in form.effects.items()
+        },
     )
 
 
@@ -273,7 +281,9 @@ def _scene(content: Mapping[str, Any], folder: Path, *, where: str) -> SceneSpec
     sheet, square = read(_Sheet, content, where=where), shape is Shape.HANGING_CLOTH
     width = sheet.width or (1.0 if square else 1.5)
     if square and sheet.attachment is Attachment.HOIST:
-        raise UsageError("a hanging cloth has no hoist", where=where, fix='take attachment = "corners"')
+        raise UsageError(
+            "a hanging cloth has no hoist", where=where, fix='take attachment = "corners"'
+        )
     return SceneSpec(
         shape=shape,
         width=width,
@@ -290,7 +300,9 @@ def _scene(content: Mapping[str, Any], folder: Path, *, where: str) -> SceneSpec
 def _stiffness(scene: _HandledScene, *, where: str) -> float:
     """Stiffness of the handles [N/m]."""
     if scene.rigid and scene.stiffness:
-        raise UsageError("both rigid and a stiffness are given", where=where, fix="keep one of them")
+        raise UsageError(
+            "both rigid and a stiffness are given", where=where, fix="keep one of them"
+        )
     return math.inf if scene.rigid else scene.stiffness or ARCSIM_STIFFNESS
 
 
@@ -299,7 +311,8 @@ def _given_mesh(mesh: _Mesh, *, where: str) -> SceneSpec:
     used = [vertex for face in cloth.faces for vertex in face]
     if not cloth.rest or not cloth.faces or not cloth.held or len(cloth.held) != len(cloth.anchors):
         raise InputError(
-            f"a mesh of {len(cloth.rest)} vertices and {len(cloth.faces)} faces, {len(cloth.held)} of them held at "
+            f"a mesh of {len(cloth.rest)} vertices and {len(cloth.faces)} faces, {len(cloth.held)} "
+            "of them held at "
             f"{len(cloth.anchors)} anchors",
             where=where,
             fix="give rest, faces, held, an anchor for each held",
@@ -365,7 +378,11 @@ def _material(cloth: _Cloth, folder: Path, scene: SceneSpec, *, where: str) -> M
 
 def _bases(cloth: _Cloth, folder: Path, scene: SceneSpec, *, where: str) -> tuple[Material, ...]:
     if sum(map(bool, (cloth.name, cloth.names, cloth.file, cloth.table))) > 1:
-        raise UsageError("more than one of name, names, file and table is given", where=where, fix="keep one of them")
+        raise UsageError(
+            "more than one of name, names, file and table is given",
+            where=where,
+            fix="keep one of them",
+        )
     if cloth.table:
         return (Material.from_mapping(cloth.table, name=str(cloth.table.get("title", "material"))),)
     chosen = (cloth.name,) if cloth.name is not None else cloth.names
@@ -375,7 +392,9 @@ def _bases(cloth: _Cloth, folder: Path, scene: SceneSpec, *, where: str) -> tupl
         return (material_file(folder / local_path(cloth.file)),)
     if scene.arcsim is not None:
         return (scene.arcsim.scene.material,)
-    raise InputError("no material is named", where=where, fix='add name = "camel-ponte-roma", or a file')
+    raise InputError(
+        "no material is named", where=where, fix='add name = "camel-ponte-roma", or a file'
+    )
 
 
 def material_file(path: Path) -> Material:
@@ -387,37 +406,58 @@ def material_file(path: Path) -> Material:
     """
     if path.suffix == ".json":
         return read_material(path)
-    return Material.from_mapping(parse_recipe(read_recipe(path).text, where=str(path)), name=path.stem)
+    return Material.from_mapping(
+        parse_recipe(read_recipe(path).text, where=str(path)), name=path.stem
+    )
 
 
 def _wind(
-    content: Mapping[str, Any], scene: SceneSpec, time: TimeSpec, logs: Logs | None = None, *, where: str
+    content: Mapping[str, Any],
+    scene: SceneSpec,
+    time: TimeSpec,
+    logs: Logs | None = None,
+    *,
+    where: str,
 ) -> WindSpec:
     if scene.arcsim is not None and not content:
         return _mean_wind(scene.arcsim.scene.wind, force=scene.arcsim.scene.air)
     force_types = _FORCES.get(str(content.get("force")), _FORCES[_FORCE])
     source = blowing.source(content, where=where)
     types = {"force": Annotated[str, Named("wind force", AIR_FORCES)], **force_types}
-    values = entries({**types, **(blowing.TYPES[source] if source else _STEADY)}, content, where=where)
+    values = entries(
+        {**types, **(blowing.TYPES[source] if source else _STEADY)}, content, where=where
+    )
     force: AirForce = AIR_FORCES[values.get("force", _FORCE)](
         **{key: values[key] for key in force_types if key in values}
     )
     if source:
         samples = blowing.read(
-            values, before=time.first, duration=(time.frames - 1) / time.rate, logs=logs, where=where
+            values,
+            before=time.first,
+            duration=(time.frames - 1) / time.rate,
+            logs=logs,
+            where=where,
         )
-        return _mean_wind(samples.mean(time.frames, time.rate).tolist(), force=force, samples=samples)
+        return _mean_wind(
+            samples.mean(time.frames, time.rate).tolist(), force=force, samples=samples
+        )
     if "speed" not in values:
         raise InputError(
-            "no wind speed is given", where=where, fix="add speed = 4.0 (m/s), or a range; a log or samples"
+            "no wind speed is given",
+            where=where,
+            fix="add speed = 4.0 (m/s), or a range; a log or samples",
         )
     return WindSpec(force=force, **{key: values[key] for key in _STEADY if key in values})
 
 
-def _mean_wind(velocity: Sequence[float], *, force: AirForce, samples: WindSamples | None = None) -> WindSpec:
+def _mean_wind(
+    velocity: Sequence[float], *, force: AirForce, samples: WindSamples | None = None
+) -> WindSpec:
     """Returns the wind whose mean is a velocity (3,) of the air [m/s]."""
     x, y, z = velocity
-    return WindSpec(speed=math.hypot(x, y), toward=math.atan2(y, x), vertical=z, force=force, samples=samples)
+    return WindSpec(
+        speed=math.hypot(x, y), toward=math.atan2(y, x), vertical=z, force=force, samples=samples
+    )
 
 
 def _integrator(spec: IntegratorSpec, content: Mapping[str, Any], *, where: str) -> IntegratorSpec:
@@ -444,7 +484,9 @@ def _effect(name: str, content: Mapping[str, Any], *, where: str) -> EffectSpec:
     described = EFFECTS[name].parameters()
     keys = {key: key.replace("_", "-") for key in described}
     types: dict[str, Any] = {
-        keys[key]: Literal["prior"] if content.get(keys[key]) == "prior" else within(Quantity, *entry.admissible)
+        keys[key]: Literal["prior"]
+        if content.get(keys[key]) == "prior"
+        else within(Quantity, *entry.admissible)
         for key, entry in described.items()
     }
     if name == "gusts":
@@ -454,7 +496,9 @@ def _effect(name: str, content: Mapping[str, Any], *, where: str) -> EffectSpec:
     parameters: dict[str, Quantity] = {}
     for key, entry in described.items():
         drawn = values.get(keys[key], entry.null)
-        parameters[key] = Range(low=entry.prior[0], high=entry.prior[1]) if drawn == "prior" else drawn
+        parameters[key] = (
+            Range(low=entry.prior[0], high=entry.prior[1]) if drawn == "prior" else drawn
+        )
     return EffectSpec(parameters=parameters, length=length)
 
 

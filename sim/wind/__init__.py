@@ -1,4 +1,5 @@
-"""Winds: the velocity of the undisturbed air at the cloth, for every member of a batch, as a function of time."""
+"""Winds: the velocity of the undisturbed air at the cloth, for every member of a batch, as a
+function of time."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
-"""Winds that samples describe: linear in time between them, one clamp at the ends that the caller states.
+"""Winds that samples describe: linear in time between them, one clamp at the ends that the caller
+states.
 
-An anemometer's log, a realisation of turbulence and the ways of attachments are read by the same two functions: `place`
-finds an instant among times, `between` interpolates there.
+An anemometer's log, a realisation of turbulence and the ways of attachments are read by the same
+two functions: `place` finds an instant among times, `between` interpolates there.
 """
 
 from __future__ import annotations
@@ -56,13 +57,18 @@ Times: TypeAlias = Even | tuple[float, ...]
 
 
 def place(times: Times, time: float, beyond: Beyond, *, where: str = "wind") -> tuple[int, float]:
-    """Returns the sample before an instant [s], and the share of the way from it to the next one, from 0 to 1.
+    """Returns the sample before an instant [s], and the share of the way from it to the next one,
+    from 0 to 1.
 
     Raises:
         UsageError: an instant outside the times, where that is refused.
     """
     even = isinstance(times, Even)
-    first, last = (times.start, times.start + times.period * (times.count - 1)) if even else (times[0], times[-1])
+    first, last = (
+        (times.start, times.start + times.period * (times.count - 1))
+        if even
+        else (times[0], times[-1])
+    )
     if beyond is Beyond.REFUSE and not first <= time <= last:
         raise UsageError(
             f"wind asked for at {time:g} s, known from {first:g} to {last:g} s",
@@ -92,13 +98,23 @@ def check(times: Times, samples: Tensor, *, where: str) -> None:
     even = isinstance(times, Even)
     count = times.count if even else len(times)
     if count < 2 or (not times.period > 0 if even else any(b <= a for a, b in pairwise(times))):
-        raise InputError("times do not increase, or fewer than two", where=where, fix="give two or more, in order")
+        raise InputError(
+            "times do not increase, or fewer than two",
+            where=where,
+            fix="give two or more, in order",
+        )
     if samples.ndim != 3 or samples.shape[:2] != (count, 3):
         raise InputError(
-            f"samples of shape {tuple(samples.shape)} for {count} times", where=where, fix="give (time, 3, batch)"
+            f"samples of shape {tuple(samples.shape)} for {count} times",
+            where=where,
+            fix="give (time, 3, batch)",
         )
     if not bool(torch.isfinite(samples).all()):
-        raise InputError("a sample is not finite", where=where, fix="leave gaps out; what is between is interpolated")
+        raise InputError(
+            "a sample is not finite",
+            where=where,
+            fix="leave gaps out; what is between is interpolated",
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -130,8 +146,11 @@ class SampledWind:
         return between(self.samples, *place(self.times, time, self.beyond, where="sampled wind"))
 
 
-def usable(series: WindSeries, *, start: int, where: str) -> tuple[FloatArray, FloatArray, FloatArray | None]:
-    """Returns (n,) times [s], speeds [m/s] and, where logged, directions [rad] of the usable samples of a log.
+def usable(
+    series: WindSeries, *, start: int, where: str
+) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+    """Returns (n,) times [s], speeds [m/s] and, where logged, directions [rad] of the usable
+    samples of a log.
 
     Args:
         start: instant that times count from, on the log's clock [UTC ns].
@@ -140,7 +159,9 @@ def usable(series: WindSeries, *, start: int, where: str) -> tuple[FloatArray, F
         InputError: a log without speeds.
     """
     if "wind_speed" not in series.channels:
-        raise InputError("there is no channel wind_speed", where=where, fix="give a log of a wind speed")
+        raise InputError(
+            "there is no channel wind_speed", where=where, fix="give a log of a wind speed"
+        )
     speed, direction = series.channels["wind_speed"], series.channels.get("wind_direction")
     good = ((series.flags & UNUSABLE) == 0) & np.isfinite(speed)
     if direction is not None:
@@ -152,8 +173,8 @@ def usable(series: WindSeries, *, start: int, where: str) -> tuple[FloatArray, F
 def about_mean(
     time: ArrayLike, speed: ArrayLike, direction: ArrayLike | None, *, where: str
 ) -> tuple[FloatArray, float, NDArray[np.complex128]]:
-    """Returns times (n,) [s], the speed of the vector mean [m/s], and deviations from it as shares of it: (n,) complex,
-    along the mean wind and, imaginary, to its left.
+    """Returns times (n,) [s], the speed of the vector mean [m/s], and deviations from it as shares
+    of it: (n,) complex, along the mean wind and, imaginary, to its left.
 
     Args:
         time: (n,) [s].
@@ -166,7 +187,11 @@ def about_mean(
     t, s = np.asarray(time, dtype=np.float64), np.asarray(speed, dtype=np.float64)
     from_north = np.zeros_like(s) if direction is None else np.asarray(direction, dtype=np.float64)
     if not (t.ndim == 1 and t.shape == s.shape == from_north.shape and len(t) > 1):
-        raise InputError(f"shapes {t.shape}, {s.shape}, {from_north.shape}", where=where, fix="give (n,) each, n > 1")
+        raise InputError(
+            f"shapes {t.shape}, {s.shape}, {from_north.shape}",
+            where=where,
+            fix="give (n,) each, n > 1",
+        )
     widest = float(np.max(np.diff(t)))
     if widest > _LONGEST_GAP:
         raise InputError(

@@ -34,7 +34,11 @@ class VonKarman:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.mean) and self.mean > 0):
-            raise InputError(f"the mean wind is {self.mean} m/s", where="VonKarman.mean", fix="give a speed above 0")
+            raise InputError(
+                f"the mean wind is {self.mean} m/s",
+                where="VonKarman.mean",
+                fix="give a speed above 0",
+            )
         if not 0 <= self.intensity <= 1:
             raise InputError(
                 f"the turbulence intensity is {self.intensity}",
@@ -43,7 +47,9 @@ class VonKarman:
             )
         if not (math.isfinite(self.length) and self.length > 0):
             raise InputError(
-                f"the length scale is {self.length} m", where="VonKarman.length", fix="give a length above 0"
+                f"the length scale is {self.length} m",
+                where="VonKarman.length",
+                fix="give a length above 0",
             )
 
     @property
@@ -58,25 +64,32 @@ class VonKarman:
         return 4 * self.sigma**2 * scale / (1 + 70.8 * reduced**2) ** (5 / 6)
 
     def series(self, rng: np.random.Generator, *, duration: float, rate: float) -> FloatArray:
-        """Draws a realisation of the speed [m/s], (round(duration · rate),), sampled at `rate` [Hz].
+        """Draws a realisation of the speed [m/s], (round(duration · rate),), sampled at `rate`
+        [Hz].
 
-        The Fourier coefficients are independent complex Gaussians with variance S(f) Δf over a period of at least
-        eight integral time scales and twice the duration, of which the first part is returned: so the series is a
-        Gaussian process, not a sum of equal sinusoids with random phase, and does not wrap around. Energy above the
-        Nyquist frequency is left out, as an instrument with a matching response would. Speeds below zero (possible at
-        high intensity) are kept: they are the wind blowing back.
+        The Fourier coefficients are independent complex Gaussians with variance S(f) Δf over a
+        period of at least eight integral time scales and twice the duration, of which the first
+        part is returned: so the series is a Gaussian process, not a sum of equal sinusoids with
+        random phase, and does not wrap around. Energy above the Nyquist frequency is left out, as
+        an instrument with a matching response would. Speeds below zero (possible at high intensity)
+        are kept: they are the wind blowing back.
         """
         count = round(duration * rate)
         if count < 2:
-            raise InputError(f"{duration} s at {rate} Hz are {count} samples", fix="ask for two samples or more")
+            raise InputError(
+                f"{duration} s at {rate} Hz are {count} samples", fix="ask for two samples or more"
+            )
         # Longer than asked for, so that the ends, which belong together, are far apart.
         period = max(2 * duration, 8 * self.length / self.mean)
         total = 2 * math.ceil(period * rate / 2)
         frequency = np.fft.rfftfreq(total, 1 / rate)
         width = rate / total
-        # A coefficient c stands for 2 Re(c e^iωt), of variance 2 E|c|² = S Δf: each of its parts has S Δf / 4. The bin
-        # at zero is half as wide in a one-sided spectrum and stands for c itself: variance S Δf / 2.
+        # A coefficient c stands for 2 Re(c e^iωt), of variance 2 E|c|² = S Δf: each of its parts
+        # has S Δf / 4. The bin at zero is half as wide in a one-sided spectrum and stands for c
+        # itself: variance S Δf / 2.
         scale = np.sqrt(self.density(frequency) * width / 4)
-        coefficient = scale * (rng.standard_normal(len(frequency)) + 1j * rng.standard_normal(len(frequency)))
+        coefficient = scale * (
+            rng.standard_normal(len(frequency)) + 1j * rng.standard_normal(len(frequency))
+        )
         coefficient[0] = coefficient[0].real * math.sqrt(2)
         return self.mean + np.fft.irfft(coefficient * total, total)[:count]

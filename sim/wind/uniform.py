@@ -26,13 +26,17 @@ class UniformWind:
     def __post_init__(self) -> None:
         if self.constant.ndim != 2 or self.constant.shape[0] != 3:
             raise InputError(
-                f"the wind has shape {tuple(self.constant.shape)}", where="uniform wind", fix="give (3, batch) in m/s"
+                f"the wind has shape {tuple(self.constant.shape)}",
+                where="uniform wind",
+                fix="give (3, batch) in m/s",
             )
         bad = ~torch.isfinite(self.constant).all(0)
         if bad.any():
             member = int(torch.nonzero(bad)[0])
             raise InputError(
-                "the wind velocity is not finite", where=f"uniform wind, member {member}", fix="give finite m/s"
+                "the wind velocity is not finite",
+                where=f"uniform wind, member {member}",
+                fix="give finite m/s",
             )
 
     def velocity(self, time: float) -> Tensor:

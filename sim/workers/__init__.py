@@ -1,4 +1,5 @@
-"""Who computes the jobs of a long command: this process, others of this machine, or workers of a Dask scheduler.
+"""Who computes the jobs of a long command: this process, others of this machine, or workers of a
+Dask scheduler.
 
 with connected(scheduler, workers=4, say=say) as workers:
     for result in workers.results(jobs):

@@ -13,10 +13,12 @@ from sim.workers.local import processes
 def connect_workers(
     scheduler: str | None, *, workers: int, say: Callable[[str], object] = lambda line: None
 ) -> AbstractContextManager[Workers]:
-    """Connects to the Dask scheduler at an address ("tcp://host:8786"), or takes this machine if it is None.
+    """Connects to the Dask scheduler at an address ("tcp://host:8786"), or takes this machine if it
+    is None.
 
     Args:
-        workers: processes on this machine, of one thread each; of no meaning with a scheduler, which has its own.
+        workers: processes on this machine, of one thread each; of no meaning with a scheduler,
+            which has its own.
         say: called with a line for the user when workers are gone or back.
 
     Raises:

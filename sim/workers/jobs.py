@@ -27,7 +27,8 @@ class Workers(Protocol):
         ...
 
     def results(self, jobs: Iterable[Job]) -> Iterator[Any]:
-        """Yields the jobs' results as they come; few jobs wait beside those that run, so that memory stays bounded.
+        """Yields the jobs' results as they come; few jobs wait beside those that run, so that
+        memory stays bounded.
 
         A job whose worker dies is done again. Leaving the iteration early cancels what still runs.
 

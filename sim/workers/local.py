@@ -25,13 +25,13 @@ _OF_PROCESSES = {
     "MALLOC_MMAP_THRESHOLD_": str(32 << 20),
     "MALLOC_TRIM_THRESHOLD_": str(1 << 30),
 }
-"""Numerical libraries take one thread, and memory stays with the process: filming takes and frees 1 to 30 MB a frame,
-and to have those mapped anew costs a fifth of the time."""
+"""Numerical libraries take one thread, and memory stays with the process: filming takes and frees 1
+to 30 MB a frame, and to have those mapped anew costs a fifth of the time."""
 
 
 def single_threaded() -> None:
-    """Limits a worker to one thread, since there are as many workers as cores, and to its parent's life, however that
-    ends; an interruption ends it without a word."""
+    """Limits a worker to one thread, since there are as many workers as cores, and to its parent's
+    life, however that ends; an interruption ends it without a word."""
     import torch
 
     torch.set_num_threads(1)
@@ -53,7 +53,8 @@ def _leave_with_parent() -> None:
 
 
 class LocalWorkers:
-    """Workers of this machine. Processes start with the first jobs, and end with the context of `processes`.
+    """Workers of this machine. Processes start with the first jobs, and end with the context of
+    `processes`.
 
     Args:
         workers: how many.
@@ -109,19 +110,28 @@ class LocalWorkers:
                     running.clear()
                     self._renew(lost)
                     self._submit(running, [(job, tries + 1) for job, tries in lost])
-                self._submit(running, ((job, 1) for job in islice(waiting, self._workers * _AHEAD - len(running))))
+                self._submit(
+                    running,
+                    ((job, 1) for job in islice(waiting, self._workers * _AHEAD - len(running))),
+                )
         finally:
             for future in running:
                 future.cancel()
 
-    def _submit(self, running: dict[Future[Any], tuple[Job, int]], entries: Iterable[tuple[Job, int]]) -> None:
+    def _submit(
+        self, running: dict[Future[Any], tuple[Job, int]], entries: Iterable[tuple[Job, int]]
+    ) -> None:
         for (function, arguments), tries in entries:
             if self._pool is None:
                 context = get_context("spawn")
-                self._pool = ProcessPoolExecutor(self._workers, mp_context=context, initializer=_end_with_parent)
+                self._pool = ProcessPoolExecutor(
+                    self._workers, mp_context=context, initializer=_end_with_parent
+                )
             try:
                 future = self._pool.submit(function, *arguments)
-            except BrokenProcessPool as error:  # broken since the last look: as if it had been submitted before that
+            except (
+                BrokenProcessPool
+            ) as error:  # broken since the last look: as if it had been submitted before that
                 future = Future()
                 future.set_exception(error)
             running[future] = (function, arguments), tries

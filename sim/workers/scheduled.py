@@ -42,7 +42,10 @@ def scheduler_at(address: str, *, say: Callable[[str], object]) -> Iterator[Sche
             where=address,
             fix="start one with dask scheduler, and workers with dask worker ADDRESS",
         ) from None
-    with silence_logging_cmgr(logging.CRITICAL, "distributed.client"), client:  # errors here say what is wrong
+    with (
+        silence_logging_cmgr(logging.CRITICAL, "distributed.client"),
+        client,
+    ):  # errors here say what is wrong
         _check(client, where=address)
         yield Scheduled(client, say=say)
 
@@ -52,7 +55,8 @@ def _check(client: Client, *, where: str) -> None:
 
     Raises:
         NotFoundError: no worker came within `_CONNECT_TIMEOUT`.
-        UsageError: a worker has another version of flagdata, which may make something else of the same job.
+        UsageError: a worker has another version of flagdata, which may make something else of the
+            same job.
     """
     try:
         client.wait_for_workers(1, timeout=_CONNECT_TIMEOUT)
@@ -73,7 +77,8 @@ def _check(client: Client, *, where: str) -> None:
 
 
 def _alone(function: Callable[..., Any], *arguments: Any) -> Any:
-    """Computes a job on one thread, since the last bits of torch's sums depend on how many it has."""
+    """Computes a job on one thread, since the last bits of torch's sums depend on how many it
+    has."""
     torch.set_num_threads(1)
     return function(*arguments)
 
@@ -109,11 +114,12 @@ class Scheduled:
     def results(self, jobs: Iterable[Job]) -> Iterator[Any]:
         """Yields the jobs' results as they come, as `sim.workers.Workers` has it.
 
-        A job whose worker dies is done again by another one, as often as Dask allows failures (three times). While
-        there are no workers, the jobs wait for new ones, for `PATIENCE`.
+        A job whose worker dies is done again by another one, as often as Dask allows failures
+        (three times). While there are no workers, the jobs wait for new ones, for `PATIENCE`.
 
         Raises:
-            WorkerError: workers kept dying over one job; no workers for `PATIENCE`; the scheduler is gone.
+            WorkerError: workers kept dying over one job; no workers for `PATIENCE`; the scheduler
+                is gone.
             FlagdataError: a job failed; its own error.
         """
         waiting = iter(jobs)
@@ -121,7 +127,9 @@ class Scheduled:
 
         def fill() -> None:
             """Submits jobs for the workers there are now."""
-            for function, arguments in islice(waiting, max(0, max(1, self.count) * _AHEAD - running.count())):
+            for function, arguments in islice(
+                waiting, max(0, max(1, self.count) * _AHEAD - running.count())
+            ):
                 running.add(self._client.submit(_alone, function, *arguments, pure=False))
 
         try:
@@ -137,7 +145,9 @@ class Scheduled:
                         where="dask",
                         fix="look at the workers' logs; they may lack memory",
                     ) from None
-                if isinstance(result, CancelledError):  # what Dask gives for the result of a job that was lost with it
+                if isinstance(
+                    result, CancelledError
+                ):  # what Dask gives for the result of a job that was lost with it
                     raise _lost()
                 future.release()
                 yield result
@@ -148,7 +158,8 @@ class Scheduled:
     def _next(self, running: as_completed) -> tuple[Future, Any]:
         """Waits for the next job that is done, and returns it with its result.
 
-        A result counts when it is here: that of a worker which died over sending it is made again by another.
+        A result counts when it is here: that of a worker which died over sending it is made again
+        by another.
 
         Raises:
             WorkerError: nobody has worked for `PATIENCE`, or the scheduler is gone.
@@ -171,6 +182,8 @@ class Scheduled:
                 self._say(f"all workers are gone; waiting {PATIENCE:g} s for new ones")
             elif now - lost_at > PATIENCE:
                 raise WorkerError(
-                    f"there were no workers for {PATIENCE:g} s", where="dask", fix=f"see that workers run, {RESUMED}"
+                    f"there were no workers for {PATIENCE:g} s",
+                    where="dask",
+                    fix=f"see that workers run, {RESUMED}",
                 )
         return cast("tuple[Future, Any]", next(running))

@@ -1,9 +1,10 @@
-"""Writes the archive of a small lake that the compatibility tests open: `python tests/compat/make_lake.py OUT.tar.xz`.
+"""Writes the archive of a small lake that the compatibility tests open: `python
+tests/compat/make_lake.py OUT.tar.xz`.
 
-Run it once for each `schema.FORMAT_VERSION`, with the code of that version, and commit the result as lake_v<N>.tar.xz;
-an archive is never made again once its version has been released. The lake has a record with frames and wind, a mesh
-sequence, a clip of the record, a tag, a branch with a row of its own, a withdrawn row, and a merged catalog. Since
-format 3 record and clip are of a data set.
+Run it once for each `schema.FORMAT_VERSION`, with the code of that version, and commit the result
+as lake_v<N>.tar.xz; an archive is never made again once its version has been released. The lake has
+a record with frames and wind, a mesh sequence, a clip of the record, a tag, a branch with a row of
+its own, a withdrawn row, and a merged catalog. Since format 3 record and clip are of a data set.
 """
 
 import sys
@@ -34,7 +35,9 @@ def write_record(path: Path) -> None:
         for i in range(40):
             time = START + i * PERIOD
             image = np.full((300, 300), 5 * i, dtype=np.uint8)
-            writer.frame(log_time=time, publish_time=time - 1_000_000_000, timestamp=time, image=image)
+            writer.frame(
+                log_time=time, publish_time=time - 1_000_000_000, timestamp=time, image=image
+            )
 
 
 def fill(lake: Lake) -> None:
@@ -89,7 +92,15 @@ def fill(lake: Lake) -> None:
             attributes={"wind": 4.0},
         )
         write_meshes(path, meshes)
-        tx.add(Artifact(kind=Kind.MESHES, name="square", object=tx.put(path), seed=7, parameters='{"wind": 4.0}'))
+        tx.add(
+            Artifact(
+                kind=Kind.MESHES,
+                name="square",
+                object=tx.put(path),
+                seed=7,
+                parameters='{"wind": 4.0}',
+            )
+        )
     with lake.transaction("by mistake") as tx:
         mistake = Artifact(kind=Kind.MODEL, name="mistake", recipe={"by": "mistake"})
         tx.add(mistake)

@@ -1,4 +1,5 @@
-"""Lakes of older formats stay readable and writable; lakes of newer ones are refused by their version."""
+"""Lakes of older formats stay readable and writable; lakes of newer ones are refused by their
+version."""
 
 from __future__ import annotations
 
@@ -42,13 +43,17 @@ def old(request: pytest.FixtureRequest, tmp_path: Path) -> Lake:
 
 
 def test_there_is_an_archive_of_every_format_version() -> None:
-    assert [path.name for path in ARCHIVES] == [f"lake_v{i + 1}.tar.xz" for i in range(FORMAT_VERSION)]
+    assert [path.name for path in ARCHIVES] == [
+        f"lake_v{i + 1}.tar.xz" for i in range(FORMAT_VERSION)
+    ]
 
 
 def test_an_old_lake_is_whole(old: Lake) -> None:
     assert doctor(old, grace=NOW) == ()
     assert verify(old, object_names(old)) == ()
-    assert {(f.kind, f.severity) for f in verify_catalog(old)} <= {("catalog-unhashed", Severity.NOTE)}
+    assert {(f.kind, f.severity) for f in verify_catalog(old)} <= {
+        ("catalog-unhashed", Severity.NOTE)
+    }
 
 
 def test_an_old_lake_shows_its_rows_at_each_ref(old: Lake) -> None:
@@ -56,7 +61,9 @@ def test_an_old_lake_shows_its_rows_at_each_ref(old: Lake) -> None:
     assert old.rows(at="simulated")["name"].to_pylist() == ["field", "field clip 0", "square"]
     measurements = [f"measurement {i}" for i in range(30)]
     assert old.rows()["name"].to_pylist() == ["field", "field clip 0", *measurements]
-    assert old.rows("kind = 'clip' and wind between 4 and 5", at="v1")["wind_sigma"].to_pylist() == [0.25]
+    assert old.rows("kind = 'clip' and wind between 4 and 5", at="v1")[
+        "wind_sigma"
+    ].to_pylist() == [0.25]
 
 
 def test_rows_of_an_old_lake_have_the_identity_they_had(old: Lake) -> None:
@@ -75,7 +82,9 @@ def test_the_objects_of_an_old_lake_are_read(old: Lake) -> None:
     assert np.abs(record.frames(12, 1).astype(int) - 60).max() <= 1
     wind = record.wind()
     assert wind is not None
-    assert wind.channels["wind_speed"][-1] == pytest.approx(5.75, abs=1e-6)  # stored as float32 or wider
+    assert wind.channels["wind_speed"][-1] == pytest.approx(
+        5.75, abs=1e-6
+    )  # stored as float32 or wider
     meshes = read_meshes(old.object_path(rows[2]["object"]))
     assert isinstance(meshes, MeshSequence)
     assert meshes.positions.ravel().tolist() == list(range(36))
@@ -99,7 +108,8 @@ def test_an_old_lake_takes_new_rows_and_its_tags_stay(old: Lake) -> None:
 
 @pytest.fixture
 def narrow(tmp_path: Path) -> Lake:
-    """A lake whose catalog was made before the columns `wind_staleness`, `clock_model` and `report` existed."""
+    """A lake whose catalog was made before the columns `wind_staleness`, `clock_model` and `report`
+    existed."""
     early = Artifact(kind=Kind.WIND, name="early", created=datetime(2020, 1, 1, tzinfo=UTC))
     return lake_without(tmp_path / "narrow", {"wind_staleness", "clock_model", "report"}, early)
 
@@ -127,14 +137,18 @@ def test_columns_that_a_catalog_did_not_have_yet_read_as_null(narrow: Lake) -> N
     assert doctor(narrow, grace=NOW) == ()
 
 
-def test_the_first_commit_adds_the_missing_columns_and_the_tag_still_shows_the_old_rows(narrow: Lake) -> None:
+def test_the_first_commit_adds_the_missing_columns_and_the_tag_still_shows_the_old_rows(
+    narrow: Lake,
+) -> None:
     with narrow.transaction("late") as tx:
         tx.add(Artifact(kind=Kind.WIND, name="late", recipe={"late": True}, report="[]"))
     assert narrow.rows(columns=["name", "report"]).to_pylist() == [
         {"name": "early", "report": None},
         {"name": "late", "report": "[]"},
     ]
-    assert narrow.rows(at="v1", columns=["name", "report"]).to_pylist() == [{"name": "early", "report": None}]
+    assert narrow.rows(at="v1", columns=["name", "report"]).to_pylist() == [
+        {"name": "early", "report": None}
+    ]
     assert doctor(Lake.open(narrow.path), grace=NOW) == ()
 
 
@@ -158,7 +172,9 @@ def test_films_built_before_the_catalog_had_data_sets_are_found_by_theirs_before
 def test_a_withdrawal_from_a_narrow_catalog_leaves_the_rest(narrow: Lake) -> None:
     with narrow.transaction("late") as tx:
         tx.add(Artifact(kind=Kind.WIND, name="late", recipe={"late": True}))
-    narrow.withdraw([narrow.artifact(narrow.rows("name = 'early'")["artifact"][0].as_py()).id], "test")
+    narrow.withdraw(
+        [narrow.artifact(narrow.rows("name = 'early'")["artifact"][0].as_py()).id], "test"
+    )
     assert narrow.rows()["name"].to_pylist() == ["late"]
 
 
@@ -172,7 +188,9 @@ def test_a_lake_of_a_newer_format_is_refused_by_its_version(tmp_path: Path) -> N
         Lake.open(lake.path)
 
 
-def test_a_catalog_with_columns_this_version_does_not_know_is_refused_by_their_names(tmp_path: Path) -> None:
+def test_a_catalog_with_columns_this_version_does_not_know_is_refused_by_their_names(
+    tmp_path: Path,
+) -> None:
     lake = Lake.create(tmp_path / "lake")
     with lake.transaction("one") as tx:
         tx.add(Artifact(kind=Kind.MODEL, name="m"))

@@ -1,7 +1,9 @@
-"""A record of format version 1, kept as it was written in November 2026: every later version must read it.
+"""A record of format version 1, kept as it was written in November 2026: every later version must
+read it.
 
-The file holds three frames of one gray level each, five wind samples on a clock 2 s behind, parameters, and two
-attachments, one of them packed. It is never rewritten; a new format version adds a file of its own.
+The file holds three frames of one gray level each, five wind samples on a clock 2 s behind,
+parameters, and two attachments, one of them packed. It is never rewritten; a new format version
+adds a file of its own.
 """
 
 from __future__ import annotations
@@ -35,7 +37,8 @@ def test_frames_and_their_three_times(record: Record) -> None:
     frames = record.frames(0, 3)
     assert frames.shape == (3, 16, 24)
     for frame, level in zip(frames, (10, 120, 240), strict=True):
-        # A constant block has a DC coefficient alone, quantised at quality 90 in steps of 3/8 gray level.
+        # A constant block has a DC coefficient alone, quantised at quality 90 in steps of 3/8 gray
+        # level.
         assert np.abs(frame.astype(int) - level).max() <= 1
 
 
@@ -59,7 +62,8 @@ def test_means_of_a_second(record: Record) -> None:
     means = record.wind_1hz()
     assert means is not None
     assert means.period == 1.0
-    # Samples at 2.0 s | 2.5 s, (3.0 s: missing) | 3.5 s, 4.0 s: bins end with the second, (end - 1 s, end].
+    # Samples at 2.0 s | 2.5 s, (3.0 s: missing) | 3.5 s, 4.0 s: bins end with the second, (end - 1
+    # s, end].
     np.testing.assert_array_equal(means.time, START + 10**9 * np.array([2, 3, 4]))
     np.testing.assert_array_equal(means.count, [1, 1, 2])
     np.testing.assert_allclose(means.speed, [4.0, 5.0, 3.5])

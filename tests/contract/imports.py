@@ -1,4 +1,5 @@
-"""Modules of the project and what each imports, read from its source: an import inside a function counts too."""
+"""Modules of the project and what each imports, read from its source: an import inside a function
+counts too."""
 
 from __future__ import annotations
 
@@ -43,7 +44,8 @@ def imported_names(source: str | ast.Module) -> set[str]:
 
 
 def statements(node: ast.AST) -> Iterator[ast.AST]:
-    """All statements below a node, also those in functions, classes and conditions; of their expressions none."""
+    """All statements below a node, also those in functions, classes and conditions; of their
+    expressions none."""
     for field in ("body", "orelse", "finalbody", "handlers", "cases"):
         for child in getattr(node, field, ()):
             yield child

@@ -1,4 +1,5 @@
-"""The fitted code cannot know what challenges are made of: neither by import nor while it runs, nor is it shipped."""
+"""The fitted code cannot know what challenges are made of: neither by import nor while it runs, nor
+is it shipped."""
 
 from __future__ import annotations
 
@@ -57,13 +58,17 @@ def test_what_fits_needs_no_challenge_and_a_run_loads_nothing_that_makes_one() -
         "from sim.effects import EFFECTS\n"
         "[EFFECTS[name] for name in EFFECTS]\n"
         "def loaded():\n"
-        "    return sorted(name for name in sys.modules if name.startswith('tests.studies.challenge'))\n"
+        "    return sorted(name for name in sys.modules if "
+        "name.startswith('tests.studies.challenge'))\n"
         "print(loaded())\n"
         "del sys.meta_path[0]\n"
-        "import tests.studies.challenge.run, tests.studies.challenge.filing, tests.studies.challenge.fitter\n"
+        "import tests.studies.challenge.run, tests.studies.challenge.filing, "
+        "tests.studies.challenge.fitter\n"
         "print(loaded())"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
+    )
     fitting, running = done.stdout.splitlines()
     assert fitting == "[]"
     makers = ("outside", "design", "filming", "simulation", "answer_key")

@@ -20,11 +20,15 @@ LONG = 14
 
 def ends() -> Iterator[tuple[str, click.Command]]:
     """Commands that do something: no groups."""
-    yield from ((name, command) for name, command in commands() if not isinstance(command, click.Group))
+    yield from (
+        (name, command) for name, command in commands() if not isinstance(command, click.Group)
+    )
 
 
 def test_every_command_takes_json() -> None:
-    without = [name for name, command in ends() if "as_json" not in {one.name for one in command.params}]
+    without = [
+        name for name, command in ends() if "as_json" not in {one.name for one in command.params}
+    ]
     assert len(list(ends())) > 40
     assert without == []
 
@@ -35,7 +39,9 @@ def test_json_before_a_command_is_json_after_it(monkeypatch: pytest.MonkeyPatch)
     for name, command in ends():
         given: dict[str, object] = {}
         words = name.removeprefix("flagdata ").split()
-        monkeypatch.setattr(command, "invoke", lambda context, given=given: given.update(context.params))
+        monkeypatch.setattr(
+            command, "invoke", lambda context, given=given: given.update(context.params)
+        )
         for parameter in command.params:
             monkeypatch.setattr(parameter, "required", False)
         cli.root.main(["--json", *words], "flagdata", standalone_mode=False)
@@ -48,7 +54,11 @@ def test_the_help_lists_every_command_once_in_its_group() -> None:
     assert sorted(grouped) == sorted(set(grouped)) == sorted(cli.VERBS)
     assert list(cli.GROUPS) == ["field", "look", "physics", "learn", "lake", "project"]
     ended = invoke("--help")
-    order = [line.split()[0] for line in ended.out.splitlines() if line[:2] == "  " and line.split()[0] in cli.VERBS]
+    order = [
+        line.split()[0]
+        for line in ended.out.splitlines()
+        if line[:2] == "  " and line.split()[0] in cli.VERBS
+    ]
     assert order == grouped
     assert "Physics (" in ended.out
 
@@ -64,13 +74,17 @@ def test_without_arguments_and_after_help_the_help_is_the_result() -> None:
 
 
 def test_a_long_help_is_in_sections_that_hold_each_option_once() -> None:
-    long = {name: c for name, c in ends() if sum(isinstance(p, click.Option) for p in c.params) >= LONG}
+    long = {
+        name: c for name, c in ends() if sum(isinstance(p, click.Option) for p in c.params) >= LONG
+    }
     assert len(long) > 6
     for name, command in long.items():
         assert isinstance(command, LongCommand), name
         assert len(command.sections()) > 1, name
         shown = [option.name for options in command.sections().values() for option in options]
-        assert sorted(shown) == sorted(str(p.name) for p in command.params if isinstance(p, click.Option)), name
+        assert sorted(shown) == sorted(
+            str(p.name) for p in command.params if isinstance(p, click.Option)
+        ), name
         assert len(command.sections()[REST]) <= LONG, name
 
 
@@ -92,9 +106,18 @@ def test_every_name_of_the_catalog_has_a_line() -> None:
     kinds = {kind["kind"]: kind["names"] for kind in ended.document["kinds"]}
     assert sorted(kinds) == sorted(cli.NAMES)
     assert kinds["materials"]["paper"] == "Paper"
-    assert kinds["models"]["flow"] == "Optical flow to a distribution of wind, area weight and bending"
-    assert [(kind, name) for kind, names in kinds.items() for name, line in names.items() if len(line) < 4] == []
-    assert [line for names in kinds.values() for line in names.values() if "functools" in line] == []
+    assert (
+        kinds["models"]["flow"] == "Optical flow to a distribution of wind, area weight and bending"
+    )
+    assert [
+        (kind, name)
+        for kind, names in kinds.items()
+        for name, line in names.items()
+        if len(line) < 4
+    ] == []
+    assert [
+        line for names in kinds.values() for line in names.values() if "functools" in line
+    ] == []
     alone = invoke("catalog", "effects").out
     assert "Lift of the faces as thin plates" in alone
     assert "paper" not in alone.split()

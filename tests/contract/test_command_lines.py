@@ -1,5 +1,5 @@
-"""A command in a text for people is written by `flagdata.core.shell`, which quotes its words. The test reads the
-source."""
+"""A command in a text for people is written by `flagdata.core.shell`, which quotes its words. The
+test reads the source."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ def is_quoted(value: ast.expr) -> bool:
 
 
 def text(node: ast.AST) -> str:
-    """What an expression writes: constants as they are, a `HOLE` for each value that is not quoted."""
+    """What an expression writes: constants as they are, a `HOLE` for each value that is not
+    quoted."""
     if isinstance(node, ast.Constant):
         return str(node.value)
     if isinstance(node, ast.JoinedStr):
@@ -41,9 +42,17 @@ def text(node: ast.AST) -> str:
         return text(node.value)
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
         return text(node.left) + text(node.right)
-    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod) and isinstance(node.left, ast.Constant):
+    if (
+        isinstance(node, ast.BinOp)
+        and isinstance(node.op, ast.Mod)
+        and isinstance(node.left, ast.Constant)
+    ):
         return re.sub(r"%[^%\s]*[a-z]", HOLE, str(node.left.value))
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "format":
+    if (
+        isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Attribute)
+        and node.func.attr == "format"
+    ):
         return re.sub(r"\{[^{}]*\}", HOLE, text(node.func.value))
     if isinstance(node, ast.IfExp):
         return text(node.body) + text(node.orelse)
@@ -53,7 +62,9 @@ def text(node: ast.AST) -> str:
 def unquoted(source: ast.AST) -> Iterator[tuple[int, str]]:
     """Texts of a module with a command one of whose words is a value, with the line of each."""
     for node in ast.walk(source):
-        whole = isinstance(node, ast.JoinedStr) or (isinstance(node, ast.BinOp | ast.Call) and _has_text(node))
+        whole = isinstance(node, ast.JoinedStr) or (
+            isinstance(node, ast.BinOp | ast.Call) and _has_text(node)
+        )
         if whole and (match := COMMAND.search(text(node))) is not None:
             yield node.lineno, match[0].replace(HOLE, "…")
 
@@ -61,9 +72,14 @@ def unquoted(source: ast.AST) -> Iterator[tuple[int, str]]:
 def _has_text(node: ast.AST) -> bool:
     if isinstance(node, ast.BinOp):
         return any(
-            isinstance(side, ast.JoinedStr | ast.Constant) or _has_text(side) for side in (node.left, node.right)
+            isinstance(side, ast.JoinedStr | ast.Constant) or _has_text(side)
+            for side in (node.left, node.right)
         )
-    return isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr == "format"
+    return (
+        isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Attribute)
+        and node.func.attr == "format"
+    )
 
 
 def test_no_text_puts_a_value_into_a_command_unquoted() -> None:

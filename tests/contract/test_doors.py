@@ -1,6 +1,7 @@
 """What a part hands out at its door is there, under a name of its own, and tests take it there.
 
-A part is a package and the folder below it, `measure.verdict`; its door is its `__init__.py` (decision 070).
+A part is a package and the folder below it, `measure.verdict`; its door is its `__init__.py`
+(decision 070).
 """
 
 from __future__ import annotations
@@ -21,7 +22,9 @@ from tests.contract.test_part_circles import part
 
 MODULES = {name_of(str(path.relative_to(ROOT))): path for path in modules(*PRODUCT)}
 DOORS = {
-    name: exports(str(path)) for name, path in MODULES.items() if path.stem == "__init__" and export_blocks(tree(path))
+    name: exports(str(path))
+    for name, path in MODULES.items()
+    if path.stem == "__init__" and export_blocks(tree(path))
 }
 
 
@@ -34,11 +37,19 @@ def defined(module: ast.Module) -> set[str]:
         for target in ast.walk(node)
         if isinstance(target, ast.Name)
     }
-    return names | {node.name for node in module.body if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+    return names | {
+        node.name for node in module.body if isinstance(node, ast.FunctionDef | ast.ClassDef)
+    }
 
 
 def test_there_are_doors() -> None:
-    assert {"flagdata", "flagdata.dataset", "measure.verdict", "sim.effects", "models.training"} <= set(DOORS)
+    assert {
+        "flagdata",
+        "flagdata.dataset",
+        "measure.verdict",
+        "sim.effects",
+        "models.training",
+    } <= set(DOORS)
 
 
 @pytest.mark.parametrize("door", DOORS)
@@ -46,14 +57,16 @@ def test_a_door_names_what_modules_of_its_part_define(door: str) -> None:
     assert [
         f"{module}.{name}"
         for name, module in DOORS[door].items()
-        if not module.startswith(f"{door}.") or module not in MODULES or name not in defined(tree(MODULES[module]))
+        if not module.startswith(f"{door}.")
+        or module not in MODULES
+        or name not in defined(tree(MODULES[module]))
     ] == []
 
 
 @pytest.mark.parametrize("door", DOORS)
 def test_no_name_at_a_door_is_a_modules(door: str) -> None:
-    """Once such a module is imported, the package's attribute is the module; a package that is called as a verb is
-    both."""
+    """Once such a module is imported, the package's attribute is the module; a package that is
+    called as a verb is both."""
     hidden = [f"{door}.{name}" for name in DOORS[door] if f"{door}.{name}" in MODULES]
     assert [name for name in hidden if not isinstance(import_module(name), VerbPackage)] == []
 
@@ -63,7 +76,9 @@ def test_tests_take_at_the_door_what_is_handed_out_there() -> None:
         f"{path.relative_to(ROOT)}:{node.lineno} from {node.module} import {alias.name}"
         for path in modules("tests")
         for node in statements(tree(path))
-        if isinstance(node, ast.ImportFrom) and node.module in MODULES and node.module.count(".") > 1
+        if isinstance(node, ast.ImportFrom)
+        and node.module in MODULES
+        and node.module.count(".") > 1
         for alias in node.names
         if DOORS.get(part(node.module), {}).get(alias.name) == node.module
     ]
@@ -76,7 +91,8 @@ def test_a_name_loads_its_own_module_and_no_other(tmp_path: Path) -> None:
     (tmp_path / "house" / "__init__.py").write_text("")
     (package / "__init__.py").write_text(
         "from typing import TYPE_CHECKING\nfrom flagdata.packages.lazy import lazy_exports\n"
-        "if TYPE_CHECKING:\n    from house.room.chair import Chair, legs\n    from house.room.table import top\n"
+        "if TYPE_CHECKING:\n    from house.room.chair import Chair, legs\n    from "
+        "house.room.table import top\n"
         "__getattr__ = lazy_exports(__name__, __file__)\n"
     )
     (package / "chair.py").write_text("class Chair: pass\nlegs = 4\n")

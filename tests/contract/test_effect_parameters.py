@@ -1,4 +1,5 @@
-"""Every effect, on the cloth or on a sensor, says of each parameter its unit, its null, its prior and their source."""
+"""Every effect, on the cloth or on a sensor, says of each parameter its unit, its null, its prior
+and their source."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""What a plain installation does, and what it says of the rest: one process in which the extras cannot be imported."""
+"""What a plain installation does, and what it says of the rest: one process in which the extras
+cannot be imported."""
 
 from __future__ import annotations
 
@@ -97,5 +98,7 @@ def test_what_is_missing_names_the_extra_on_the_command_line_and_in_python(light
 
 
 def test_every_extra_that_is_named_is_one_of_the_package() -> None:
-    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"][
+        "optional-dependencies"
+    ]
     assert set(EXTRAS.values()) <= set(extras)

@@ -1,4 +1,5 @@
-"""Which package may import which, read from the source, so that a lazy import inside a function counts too."""
+"""Which package may import which, read from the source, so that a lazy import inside a function
+counts too."""
 
 from __future__ import annotations
 
@@ -35,8 +36,13 @@ def packages(path: Path) -> set[str]:
 
 
 def test_every_top_level_folder_holds_something() -> None:
-    files = {package: [p for p in (ROOT / package).rglob("*") if p.suffix in (".py", ".toml")] for package in PACKAGES}
-    assert [package for package in PACKAGES if not any(p.stat().st_size > 400 for p in files[package])] == []
+    files = {
+        package: [p for p in (ROOT / package).rglob("*") if p.suffix in (".py", ".toml")]
+        for package in PACKAGES
+    }
+    assert [
+        package for package in PACKAGES if not any(p.stat().st_size > 400 for p in files[package])
+    ] == []
 
 
 def test_help_loads_neither_torch_nor_arrow_nor_a_decoder() -> None:
@@ -58,10 +64,13 @@ def test_help_loads_neither_torch_nor_arrow_nor_a_decoder() -> None:
         ("calibrate", "missing.csv", "--flag-size", "1.5x1.0"),
     ],
 )
-def test_a_file_that_is_missing_is_reported_before_anything_heavy_is_loaded(arguments: tuple[str, ...]) -> None:
+def test_a_file_that_is_missing_is_reported_before_anything_heavy_is_loaded(
+    arguments: tuple[str, ...],
+) -> None:
     heavy = ("torch", "scipy", "cv2", "pyarrow", "av", "deltalake")
     code = (
-        f"import sys\nfrom flagdata.cli import main\ntry:\n    main({list(arguments)!r})\nexcept SystemExit as stop:\n"
+        f"import sys\nfrom flagdata.cli import main\ntry:\n    main({list(arguments)!r})\nexcept "
+        "SystemExit as stop:\n"
         f"    print(stop.code, sorted(set({heavy!r}) & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -116,6 +125,7 @@ def test_physics_creates_no_random_generator_and_chooses_no_device() -> None:
         f"{path.relative_to(ROOT)}:{node.lineno} {node.attr}"
         for path in modules("sim", "models")
         for node in ast.walk(tree(path))
-        if isinstance(node, ast.Attribute) and node.attr in ("default_rng", "manual_seed", "is_available")
+        if isinstance(node, ast.Attribute)
+        and node.attr in ("default_rng", "manual_seed", "is_available")
     ]
     assert not offenders

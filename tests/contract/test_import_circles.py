@@ -1,6 +1,8 @@
-"""No module imports itself by way of others: imports at the top of a module, those for types alone included.
+"""No module imports itself by way of others: imports at the top of a module, those for types alone
+included.
 
-Names that a package hands out when they are asked for (`flagdata.lazy`) are no import of the package.
+Names that a package hands out when they are asked for (`flagdata.lazy`) are no import of the
+package.
 """
 
 from __future__ import annotations
@@ -20,15 +22,19 @@ def name_of(path: str) -> str:
 
 
 def at_the_top(node: ast.AST) -> Iterator[ast.stmt]:
-    """Statements that run, or that a type checker reads, when the module is imported: none inside a function."""
+    """Statements that run, or that a type checker reads, when the module is imported: none inside a
+    function."""
     for child in ast.iter_child_nodes(node):
-        if isinstance(child, ast.stmt) and not isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef):
+        if isinstance(child, ast.stmt) and not isinstance(
+            child, ast.FunctionDef | ast.AsyncFunctionDef
+        ):
             yield child
             yield from at_the_top(child)
 
 
 def circle(sources: dict[str, ast.Module]) -> list[str]:
-    """The first circle of imports among some modules, by their dotted names; empty where there is none."""
+    """The first circle of imports among some modules, by their dotted names; empty where there is
+    none."""
     graph: dict[str, set[str]] = {}
     for name, source in sources.items():
         handed_out = {id(node) for block in export_blocks(source) for node in block.body}
@@ -36,7 +42,11 @@ def circle(sources: dict[str, ast.Module]) -> list[str]:
         imports = [node for node in statements if isinstance(node, ast.Import | ast.ImportFrom)]
         names = imported_names(ast.Module(body=list(imports), type_ignores=[])) & set(sources)
         # `from package import module` is the module's, not the package's own.
-        parents = {node.module for node in imports if isinstance(node, ast.ImportFrom) and _only_modules(node, sources)}
+        parents = {
+            node.module
+            for node in imports
+            if isinstance(node, ast.ImportFrom) and _only_modules(node, sources)
+        }
         graph[name] = names - parents - {name}
     try:
         TopologicalSorter(graph).prepare()
@@ -56,7 +66,10 @@ def test_no_circle() -> None:
 
 def test_an_import_for_types_closes_a_circle_and_one_in_a_function_does_not() -> None:
     first = ast.parse("from flagdata.lake import second\n")
-    typed = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from flagdata.lake.first import X\n"
+    typed = (
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from flagdata.lake.first import "
+        "X\n"
+    )
     sources = {"flagdata.lake": ast.parse(""), "flagdata.lake.first": first}
     assert circle({**sources, "flagdata.lake.second": ast.parse(typed)}) != []
     lazy = "def late():\n    from flagdata.lake.first import X\n"

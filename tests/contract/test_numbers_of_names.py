@@ -1,7 +1,9 @@
-"""Numbers of names are read by `flagdata.core.numbered`, and no parsed number is a length. The test reads the source.
+"""Numbers of names are read by `flagdata.core.numbered`, and no parsed number is a length. The test
+reads the source.
 
-A name of a file may state any number. `int` of a part of a name is an offence outside `flagdata.core.numbered`, and so
-is a `range`, an array or a list as long as a number that the same function read from a text by `int`.
+A name of a file may state any number. `int` of a part of a name is an offence outside
+`flagdata.core.numbered`, and so is a `range`, an array or a list as long as a number that the same
+function read from a text by `int`.
 """
 
 from __future__ import annotations
@@ -19,24 +21,61 @@ READER = "flagdata/core/numbered.py"
 BOUNDED = {
     "flagdata/timebase.py": "hours and minutes of two digits, by the pattern of a zone",
     "flagdata/core/scheduling.py": "threads of this process, as the kernel numbers them",
-    "flagdata/ingest/camera/picture_names.py": "hours, minutes, seconds and nanoseconds, by the pattern of a clock",
+    "flagdata/ingest/camera/picture_names.py": "hours, minutes, seconds and nanoseconds, by the "
+    "pattern of a clock",
 }
 """Modules that read numbers of names by `int`, with what bounds these."""
 NAMES = {"name", "names", "stem", "stems", "digits"}
 """Variables that hold names, or parts of them."""
 OF_PATHS = {"name", "stem", "suffix", "parts"}
 OF_TEXTS = {
-    *("fullmatch", "match", "search", "finditer", "findall", "group", "groups", "split", "rsplit", "partition"),
-    *("rpartition", "removeprefix", "removesuffix", "strip", "lstrip", "rstrip", "ljust", "rjust", "lower", "casefold"),
+    *(
+        "fullmatch",
+        "match",
+        "search",
+        "finditer",
+        "findall",
+        "group",
+        "groups",
+        "split",
+        "rsplit",
+        "partition",
+    ),
+    *(
+        "rpartition",
+        "removeprefix",
+        "removesuffix",
+        "strip",
+        "lstrip",
+        "rstrip",
+        "ljust",
+        "rjust",
+        "lower",
+        "casefold",
+    ),
 }
 """Methods that give parts of a text."""
-KEEPING = {"zip", "sorted", "list", "tuple", "map", "enumerate", "filter", "reversed", "next", "iter", "str", "set"}
+KEEPING = {
+    "zip",
+    "sorted",
+    "list",
+    "tuple",
+    "map",
+    "enumerate",
+    "filter",
+    "reversed",
+    "next",
+    "iter",
+    "str",
+    "set",
+}
 LENGTHS = {"range", "arange", "zeros", "ones", "empty", "full", "linspace", "bytes", "bytearray"}
 
 
 @dataclass(frozen=True)
 class Parts:
-    """What a function has of a text: the expressions that hold a part of one, as far as its own statements say.
+    """What a function has of a text: the expressions that hold a part of one, as far as its own
+    statements say.
 
     Attributes:
         variables: names of the variables that do.
@@ -54,7 +93,9 @@ class Parts:
                 return name in self.variables
             case ast.Attribute(attr=attribute):
                 return attribute in self.attributes
-            case ast.Call(func=ast.Attribute(value=value, attr=method), args=arguments) if method in OF_TEXTS:
+            case ast.Call(func=ast.Attribute(value=value, attr=method), args=arguments) if (
+                method in OF_TEXTS
+            ):
                 return self.of_any or any(map(self.hold, (value, *arguments)))
             case ast.Call(func=ast.Name(id=function), args=arguments):
                 return function in KEEPING and any(map(self.hold, arguments))
@@ -66,7 +107,9 @@ class Parts:
                 return self.hold(body) or self.hold(other)
             case ast.BinOp(left=left, right=right):
                 return self.hold(left) or self.hold(right)
-            case ast.ListComp(elt=element) | ast.GeneratorExp(elt=element) | ast.SetComp(elt=element):
+            case (
+                ast.ListComp(elt=element) | ast.GeneratorExp(elt=element) | ast.SetComp(elt=element)
+            ):
                 return self.hold(element)
         return False
 
@@ -89,7 +132,11 @@ class Parts:
 def _given(function: ast.AST) -> Iterator[tuple[ast.expr, ast.expr]]:
     for node in ast.walk(function):
         if isinstance(node, ast.Assign):
-            yield from ((target, node.value) for target in node.targets if isinstance(target, ast.Name | ast.Tuple))
+            yield from (
+                (target, node.value)
+                for target in node.targets
+                if isinstance(target, ast.Name | ast.Tuple)
+            )
         elif isinstance(node, ast.NamedExpr):
             yield node.target, node.value
         elif isinstance(node, ast.For | ast.comprehension):
@@ -105,13 +152,21 @@ def readings(function: ast.AST, parts: Parts) -> Iterator[ast.Call]:
     known = parts.within(function)
     for node in ast.walk(function):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.args:
-            mapped = node.func.id == "map" and isinstance(node.args[0], ast.Name) and node.args[0].id == "int"
+            mapped = (
+                node.func.id == "map"
+                and isinstance(node.args[0], ast.Name)
+                and node.args[0].id == "int"
+            )
             if (mapped or node.func.id == "int") and any(map(known.hold, node.args)):
                 yield node
 
 
 def functions(source: ast.Module) -> Iterator[ast.AST]:
-    return (node for node in ast.walk(source) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef))
+    return (
+        node
+        for node in ast.walk(source)
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+    )
 
 
 def read_from_names(source: ast.Module) -> set[int]:
@@ -120,7 +175,8 @@ def read_from_names(source: ast.Module) -> set[int]:
 
 
 def counted_up_to(source: ast.Module) -> set[int]:
-    """Lines on which a function counts up to a number that it read by `int` from a text, or makes something so long."""
+    """Lines on which a function counts up to a number that it read by `int` from a text, or makes
+    something so long."""
     lines = set()
     for function in functions(source):
         calls = list(readings(function, OF_ANY))
@@ -134,23 +190,38 @@ def counted_up_to(source: ast.Module) -> set[int]:
         }
         for node in ast.walk(function):
             if isinstance(node, ast.Call):
-                called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+                called = (
+                    node.func.attr
+                    if isinstance(node.func, ast.Attribute)
+                    else getattr(node.func, "id", "")
+                )
                 lengths = node.args if called in LENGTHS else []
             elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult):
                 sides = (node.left, node.right)
-                lengths = sides if any(isinstance(side, ast.List | ast.Tuple) for side in sides) else []
+                lengths = (
+                    sides if any(isinstance(side, ast.List | ast.Tuple) for side in sides) else []
+                )
             else:
                 continue
             inner = [part for length in lengths for part in ast.walk(length)]
-            if any(id(part) in read or (isinstance(part, ast.Name) and part.id in parsed) for part in inner):
+            if any(
+                id(part) in read or (isinstance(part, ast.Name) and part.id in parsed)
+                for part in inner
+            ):
                 lines.add(node.lineno)
     return lines
 
 
 def test_numbers_of_names_are_read_by_one_module() -> None:
     found = {str(path.relative_to(ROOT)): read_from_names(tree(path)) for path in modules(*PRODUCT)}
-    assert {module: lines for module, lines in found.items() if lines and module not in {READER, *BOUNDED}} == {}
-    assert {module for module in BOUNDED if not found[module]} == set(), "bounded no more: take it off the list"
+    assert {
+        module: lines
+        for module, lines in found.items()
+        if lines and module not in {READER, *BOUNDED}
+    } == {}
+    assert {module for module in BOUNDED if not found[module]} == set(), (
+        "bounded no more: take it off the list"
+    )
 
 
 def test_nothing_is_as_long_as_a_number_that_a_text_states() -> None:
@@ -184,7 +255,11 @@ def test_a_length_that_a_text_states_is_found(body: str) -> None:
 
 
 def test_other_numbers_are_no_such_lengths() -> None:
-    for body in ("return range(len(text.split()))", "return int(values.max()) + int(times[0])", "return [0] * n"):
+    for body in (
+        "return range(len(text.split()))",
+        "return int(values.max()) + int(times[0])",
+        "return [0] * n",
+    ):
         source = ast.parse(f"def f(): {body}")
         assert not read_from_names(source)
         assert not counted_up_to(source)

@@ -1,4 +1,5 @@
-"""One function commits: whatever changes what a lake shows passes the checks of `flagdata.lake.commits`."""
+"""One function commits: whatever changes what a lake shows passes the checks of
+`flagdata.lake.commits`."""
 
 from __future__ import annotations
 
@@ -25,12 +26,18 @@ def publishers(source: str) -> list[int]:
 
 
 def test_a_call_that_publishes_is_found() -> None:
-    assert publishers("lake.catalog.append(rows, base=1, info={})\nlines.append(3)\nself._lake.catalog.drop(x)") == [
+    assert publishers(
+        "lake.catalog.append(rows, base=1, info={})\nlines.append(3)\nself._lake.catalog.drop(x)"
+    ) == [
         1,
         3,
     ]
 
 
 def test_only_the_commit_publishes() -> None:
-    found = {path.relative_to(ROOT).as_posix() for path in modules(*PACKAGES) if publishers(path.read_text())}
+    found = {
+        path.relative_to(ROOT).as_posix()
+        for path in modules(*PACKAGES)
+        if publishers(path.read_text())
+    }
     assert found == {COMMITS}

@@ -1,8 +1,9 @@
-"""The side that a data set states is its side, on every way from a lake to a tensor or to an exported file.
+"""The side that a data set states is its side, on every way from a lake to a tensor or to an
+exported file.
 
-Each film of a small lake shows its side: by the gray of its pictures and by its wind. Every way is walked for every
-side, and what comes out is looked at. Export formats, verbs, calls and modules that take clips are read from the
-registries and from the source; one that is not walked here fails.
+Each film of a small lake shows its side: by the gray of its pictures and by its wind. Every way is
+walked for every side, and what comes out is looked at. Export formats, verbs, calls and modules
+that take clips are read from the registries and from the source; one that is not walked here fails.
 """
 
 from __future__ import annotations
@@ -92,7 +93,9 @@ def write_film(path: Path, gray: int, wind: float, number: int) -> None:
         seconds = START + np.arange(-70, 2, dtype=np.int64) * 1_000_000_000
         speeds = {"wind_speed": np.full(len(seconds), wind)}
         flags = np.zeros(len(seconds), dtype=np.uint16)
-        record.wind(WindSeries(time=seconds, channels=speeds, flags=flags, sensor=Sensor(name="cup")))
+        record.wind(
+            WindSeries(time=seconds, channels=speeds, flags=flags, sensor=Sensor(name="cup"))
+        )
         record.truth({"wind_speed": wind, "area_weight": 0.1 + 0.01 * (number % 7)}, log_time=START)
 
 
@@ -142,7 +145,11 @@ def lake(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def by_call(lake: Path, side: str, folder: Path) -> set[str]:
     pairs = flagdata.pairs(lake, at="v1", split=side)
     films = {shown(pairs.film(k).mean()) for k in range(len(pairs))}
-    return films | {shown(float(pairs[k].clip.float().mean())) for k in range(len(pairs))} | winds(pairs.table.wind)
+    return (
+        films
+        | {shown(float(pairs[k].clip.float().mean())) for k in range(len(pairs))}
+        | winds(pairs.table.wind)
+    )
 
 
 @way("Source.pairs")
@@ -153,7 +160,9 @@ def by_loaders(lake: Path, side: str, folder: Path) -> set[str]:
     seen: set[str] = set()
     for workers in (0, 2, 2):
         for batch in pairs.loader(3, workers=workers):
-            seen |= {shown(float(clip.float().mean())) for clip in batch.clip} | winds(batch.wind.numpy())
+            seen |= {shown(float(clip.float().mean())) for clip in batch.clip} | winds(
+                batch.wind.numpy()
+            )
     for batch in DataLoader(pairs, batch_size=2, collate_fn=collate):
         seen |= {shown(float(clip.float().mean())) for clip in batch.clip}
     return seen
@@ -162,7 +171,9 @@ def by_loaders(lake: Path, side: str, folder: Path) -> set[str]:
 @way("Source.sides")
 def by_sizes(lake: Path, side: str, folder: Path) -> set[str]:
     sizes = flagdata.open(lake).sides()
-    assert {name: size.recordings for name, size in sizes.items()} == {name: SIDES[name][2] for name in SIDES}
+    assert {name: size.recordings for name, size in sizes.items()} == {
+        name: SIDES[name][2] for name in SIDES
+    }
     return {side}
 
 
@@ -171,7 +182,9 @@ def winds(values: Iterable[float]) -> set[str]:
 
 
 def pictures(data: Iterable[bytes]) -> set[str]:
-    return {shown(np.asarray(Image.open(io.BytesIO(picture)).convert("L")).mean()) for picture in data}
+    return {
+        shown(np.asarray(Image.open(io.BytesIO(picture)).convert("L")).mean()) for picture in data
+    }
 
 
 def of_shards(folder: Path) -> set[str]:
@@ -204,7 +217,9 @@ def of_films(folder: Path) -> set[str]:
     seen: set[str] = set()
     for path in folder.glob("*.mp4"):
         with av.open(str(path)) as container:
-            seen |= {shown(frame.to_ndarray(format="gray").mean()) for frame in container.decode(video=0)}
+            seen |= {
+                shown(frame.to_ndarray(format="gray").mean()) for frame in container.decode(video=0)
+            }
     return seen
 
 
@@ -287,9 +302,20 @@ def network(lake: Path) -> Mapping[str, Any]:
     """What `flagdata train` says of the small network, and what it prepared."""
     with pytest.MonkeyPatch.context() as patch:
         spy = Spy(patch)
-        trained = invoke("train", str(lake.parent / "small.toml"), "--at", "v1", "--lake", str(lake), "--workers", "1")
+        trained = invoke(
+            "train",
+            str(lake.parent / "small.toml"),
+            "--at",
+            "v1",
+            "--lake",
+            str(lake),
+            "--workers",
+            "1",
+        )
         assert trained.code == 0, trained.err
-    card = invoke("train", str(lake.parent / "small.toml"), "--at", "v1", "--lake", str(lake), "--json").document
+    card = invoke(
+        "train", str(lake.parent / "small.toml"), "--at", "v1", "--lake", str(lake), "--json"
+    ).document
     return {"seen": spy.seen, **card}
 
 
@@ -324,18 +350,24 @@ def by_training(lake: Path, side: str, folder: Path) -> set[str]:
 
 @way("FilmsOf")
 def by_gate(lake: Path, side: str, folder: Path) -> set[str]:
-    return {shown(frames.mean()) for frames in FilmsOf(lake, DataSpec(datasets=("made",)), side, at="v1")}
+    return {
+        shown(frames.mean())
+        for frames in FilmsOf(lake, DataSpec(datasets=("made",)), side, at="v1")
+    }
 
 
 @way("batches")
 def by_masks(lake: Path, side: str, folder: Path) -> set[str]:
-    """Sequences that films of the side were made from, and no others: their objects are their names here."""
+    """Sequences that films of the side were made from, and no others: their objects are their names
+    here."""
     opened = Lake.open(lake)
     with pytest.MonkeyPatch.context() as patch:
         table = opened.table(opened.view(None))
         named = table.set_column(table.column_names.index("object"), "object", table["name"])
         patch.setattr(opened, "table", lambda view: named)
-        return {name.split("-")[1] for batch in batches(opened, ["made"], side=side) for name in batch}
+        return {
+            name.split("-")[1] for batch in batches(opened, ["made"], side=side) for name in batch
+        }
 
 
 CALLERS = {
@@ -343,7 +375,9 @@ CALLERS = {
     "flagdata/dataset/tagged.py": ("the note of a tag, of all clips",),
     "flagdata/dataset/resolve.py": ("Source.pairs", "Source.sides"),
     "flagdata/export/export_plan.py": ("flagdata export",),
-    "measure/demo/recording_page.py": ("the one recording of the demo, of which no side is asked for",),
+    "measure/demo/recording_page.py": (
+        "the one recording of the demo, of which no side is asked for",
+    ),
     "models/evaluation/evaluate_command.py": ("flagdata evaluate",),
     "models/training/train_command.py": ("sides_of",),
     "tests/studies/gate.py": ("FilmsOf",),
@@ -368,12 +402,15 @@ def takes(path: Path) -> bool:
     """Whether a module calls `pairs` of a lake, or imports one of `TAKING`."""
     nodes = list(ast.walk(tree(path)))
     if any(
-        isinstance(node, ast.ImportFrom) and TAKING.get(str(node.module), set()) & {alias.name for alias in node.names}
+        isinstance(node, ast.ImportFrom)
+        and TAKING.get(str(node.module), set()) & {alias.name for alias in node.names}
         for node in nodes
     ):
         return True
     called = [node.func for node in nodes if isinstance(node, ast.Call)]
-    return any(isinstance(function, ast.Attribute) and function.attr == "pairs" for function in called)
+    return any(
+        isinstance(function, ast.Attribute) and function.attr == "pairs" for function in called
+    )
 
 
 def chosen_by(call: Callable[..., Any]) -> Collection[str]:
@@ -393,7 +430,9 @@ def test_every_way_to_clips_is_walked() -> None:
     assert {"pairs", "export", "evaluate", "Source.pairs", "Source.sides"} <= calls
     assert sorted((verbs | calls) - {name for names in WAYS for name in names}) == []
     product = modules("flagdata", "sim", "models", "measure")
-    studies = [path for path in modules("tests/studies") if not path.name.startswith(("test_", "bench_"))]
+    studies = [
+        path for path in modules("tests/studies") if not path.name.startswith(("test_", "bench_"))
+    ]
     callers = {str(path.relative_to(ROOT)) for path in (*product, *studies) if takes(path)}
     assert callers == set(CALLERS), "enrol it, with the way by which it takes clips"
 
@@ -402,7 +441,9 @@ def test_every_format_is_read_or_holds_no_clips(lake: Path, tmp_path: Path) -> N
     divided = {name for name in FORMATS if FORMATS[name]().kinds & DIVIDED}
     assert divided == set(READERS)
     for name in set(FORMATS) - divided:
-        ended = invoke("export", name, "--lake", str(lake), "--to", str(tmp_path / name), "--split", "test")
+        ended = invoke(
+            "export", name, "--lake", str(lake), "--to", str(tmp_path / name), "--split", "test"
+        )
         assert (ended.code, "a split cannot hold" in ended.err) == (2, True), name
 
 

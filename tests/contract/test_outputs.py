@@ -1,8 +1,8 @@
-"""What a user names goes through `flagdata.core.files.outputs`: of the other modules, those listed alone write or
-remove files.
+"""What a user names goes through `flagdata.core.files.outputs`: of the other modules, those listed
+alone write or remove files.
 
-The test reads the source. A module that needs to write something else is added here, with the reason why what it writes
-is never a user's.
+The test reads the source. A module that needs to write something else is added here, with the
+reason why what it writes is never a user's.
 """
 
 from __future__ import annotations
@@ -29,9 +29,11 @@ ALLOWED = {
     "flagdata/lake/place_probing.py": "tries what a disk can do, by files of its own in staging",
     "flagdata/lake/rowfiles.py": "writes into memory",
     "flagdata/lake/lake_locks.py": LAKE,
-    "flagdata/storage/path.py": "writes, removes and renames what its callers name, as pathlib does for folders",
+    "flagdata/storage/path.py": "writes, removes and renames what its callers name, as pathlib "
+    "does for folders",
     "flagdata/core/files/object_cache.py": "a cache of a lake's objects by their hash",
-    "sim/datasets/card.py": LAKE + "; a path that the user gives goes through flagdata.core.files.outputs",
+    "sim/datasets/card.py": LAKE
+    + "; a path that the user gives goes through flagdata.core.files.outputs",
     "flagdata/lake/deposit.py": LAKE,
     "flagdata/lake/restoring.py": LAKE,
     "measure/closing/verdict_artifacts.py": LAKE,
@@ -40,9 +42,11 @@ ALLOWED = {
     "sim/datasets/build_jobs.py": LAKE,
     "flagdata/core/files/checksums.py": "states the checksums inside a folder that its caller made",
     "flagdata/core/files/file_locks.py": "the lock in a run folder or a cache",
-    "flagdata/record/record_file.py": "writes a record into staging or to a scratch path, and only where nothing is",
+    "flagdata/record/record_file.py": "writes a record into staging or to a scratch path, and only "
+    "where nothing is",
     "flagdata/record/salvage.py": "removes the record that it has itself just made",
-    "flagdata/commands/ingest_sources.py": "removes the crop picture that it has itself just written",
+    "flagdata/commands/ingest_sources.py": "removes the crop picture that it has itself just "
+    "written",
     "flagdata/export/csv_text.py": INSIDE,
     "flagdata/export/mcap.py": INSIDE,
     "flagdata/export/mp4.py": INSIDE,
@@ -64,15 +68,20 @@ ALLOWED = {
     "sim/blender/worker.py": SCRATCH,
     "sim/datasets/film_record.py": SCRATCH,
     "sim/datasets/build_plan.py": SCRATCH,
-    "flagdata/packages/installed_names.py": "the building of a wheel, in the folder that it builds in",
-    "flagdata/dataset/cache.py": "a cache: files named by 64 hex digits and its own two, whichever folder it is in",
-    "measure/nulls/bank.py": "makes the folder of a bank that `challenge bank` has claimed; batches by put_if_absent",
+    "flagdata/packages/installed_names.py": "the building of a wheel, in the folder that it builds "
+    "in",
+    "flagdata/dataset/cache.py": "a cache: files named by 64 hex digits and its own two, whichever "
+    "folder it is in",
+    "measure/nulls/bank.py": "makes the folder of a bank that `challenge bank` has claimed; "
+    "batches by put_if_absent",
     "measure/cloth/calibration_artifact.py": LAKE,
     "measure/anemometer/reading_model_folder.py": LAKE,
-    "measure/cloth/design.py": "a cache: files named by 32 hex digits, by put_if_absent, whichever folder it is in",
+    "measure/cloth/design.py": "a cache: files named by 32 hex digits, by put_if_absent, whichever "
+    "folder it is in",
     "sim/compiler.py": "flagdata's own cache folder",
     "models/training/checkpoint.py": "the run folder of a training",
-    "models/trained/model_folder.py": "writes into folders that its callers make: staging, a run folder, shipped models",
+    "models/trained/model_folder.py": "writes into folders that its callers make: staging, a run "
+    "folder, shipped models",
 }
 
 ALWAYS = {
@@ -111,7 +120,8 @@ ALWAYS = {
 """Calls that write, rename or remove, by the last part of their name."""
 CALLED = {*ALWAYS, "open", "open_group", "OSFile", "FileIO", "replace", "link", "save"}
 TO_MEMORY = {"savefig", "savez", "savez_compressed", "save", "write_csv"}
-"""Of these, those that also write to a buffer: a call whose target is a name bound to BytesIO or StringIO."""
+"""Of these, those that also write to a buffer: a call whose target is a name bound to BytesIO or
+StringIO."""
 
 
 def buffers(module: ast.AST) -> set[str]:
@@ -128,19 +138,38 @@ def buffers(module: ast.AST) -> set[str]:
 
 def last_name(call: ast.Call) -> str:
     made = call.func
-    return made.attr if isinstance(made, ast.Attribute) else made.id if isinstance(made, ast.Name) else ""
+    return (
+        made.attr
+        if isinstance(made, ast.Attribute)
+        else made.id
+        if isinstance(made, ast.Name)
+        else ""
+    )
 
 
 def writes(call: ast.Call, memory: set[str]) -> bool:
     name = last_name(call)
     words = [*call.args, *(keyword.value for keyword in call.keywords)]
-    if name in TO_MEMORY and any(isinstance(word, ast.Name) and word.id in memory for word in words):
+    if name in TO_MEMORY and any(
+        isinstance(word, ast.Name) and word.id in memory for word in words
+    ):
         return False
     if name in ("open", "open_group", "OSFile", "FileIO"):
-        modes = [word.value for word in words if isinstance(word, ast.Constant) and isinstance(word.value, str)]
+        modes = [
+            word.value
+            for word in words
+            if isinstance(word, ast.Constant) and isinstance(word.value, str)
+        ]
         return any(mode.strip("bt+") in ("w", "a", "x", "w-") and mode for mode in modes)
-    if name in ("replace", "link"):  # Path.replace takes one argument, str.replace two, dataclasses.replace keywords
-        module = isinstance(call.func, ast.Attribute) and isinstance(call.func.value, ast.Name) and call.func.value.id
+    if name in (
+        "replace",
+        "link",
+    ):  # Path.replace takes one argument, str.replace two, dataclasses.replace keywords
+        module = (
+            isinstance(call.func, ast.Attribute)
+            and isinstance(call.func.value, ast.Name)
+            and call.func.value.id
+        )
         return module == "os" or (name == "replace" and len(call.args) == 1 and not call.keywords)
     if name == "save" and isinstance(call.func, ast.Attribute):
         return bool(call.args) and not isinstance(call.func.value, ast.Name | ast.Attribute)
@@ -163,7 +192,9 @@ def found() -> dict[str, list[str]]:
 
 
 def test_no_other_module_writes_renames_or_removes_files() -> None:
-    assert {path: lines for path, lines in found().items() if path not in SHARED | ALLOWED.keys()} == {}
+    assert {
+        path: lines for path, lines in found().items() if path not in SHARED | ALLOWED.keys()
+    } == {}
 
 
 def test_every_module_that_is_allowed_to_does() -> None:

@@ -1,4 +1,5 @@
-"""No part imports itself by way of others: a part is a package and the folder or the module below it."""
+"""No part imports itself by way of others: a part is a package and the folder or the module below
+it."""
 
 from __future__ import annotations
 
@@ -16,18 +17,24 @@ def part(module: str) -> str:
 
 
 def modules_imported(source: ast.Module, known: set[str]) -> Iterator[str]:
-    """Modules that a source imports anywhere; `from package import module` is the module's, not the package's."""
+    """Modules that a source imports anywhere; `from package import module` is the module's, not the
+    package's."""
     for node in statements(source):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name in known)
         elif isinstance(node, ast.ImportFrom) and node.module:
             for alias in node.names:
                 name = f"{node.module}.{alias.name}"
-                yield from (module for module in (name if name in known else node.module,) if module in known)
+                yield from (
+                    module
+                    for module in (name if name in known else node.module,)
+                    if module in known
+                )
 
 
 def circle_of_parts(sources: dict[str, ast.Module]) -> list[str]:
-    """The first circle among the parts of some modules, by their dotted names; empty where there is none."""
+    """The first circle among the parts of some modules, by their dotted names; empty where there is
+    none."""
     graph: dict[str, set[str]] = {}
     for name, source in sources.items():
         parts = {part(module) for module in modules_imported(source, set(sources))}
@@ -44,7 +51,9 @@ def test_no_part_is_in_a_circle() -> None:
     assert circle_of_parts({name: tree(path) for name, path in paths.items()}) == []
 
 
-def test_two_modules_of_two_parts_close_a_circle_without_one_among_modules_and_within_functions() -> None:
+def test_two_modules_of_two_parts_close_a_circle_without_one_among_modules_and_within_functions() -> (
+    None
+):
     lake = {"flagdata.lake.rows": "from flagdata.units import metres\n", "flagdata.lake.refs": ""}
     units = {
         "flagdata.units": "",

@@ -1,4 +1,5 @@
-"""What reads a log exactly knows nothing of drafts, and nothing branches on the wording of a message."""
+"""What reads a log exactly knows nothing of drafts, and nothing branches on the wording of a
+message."""
 
 from __future__ import annotations
 
@@ -24,7 +25,10 @@ def test_exact_parts_import_nothing_of_drafts() -> None:
         str(path.relative_to(HOUSE))
         for part in EXACT
         for path in modules(part)
-        if any(name.startswith(f"{PACKAGE}.draft") for name in imported_names(path.read_text(encoding="utf-8")))
+        if any(
+            name.startswith(f"{PACKAGE}.draft")
+            for name in imported_names(path.read_text(encoding="utf-8"))
+        )
     ]
     assert not offenders
 
@@ -39,7 +43,9 @@ def test_nothing_branches_on_the_wording_of_a_message() -> None:
     offenders: list[str] = []
     for path in HOUSE.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Compare) and any(isinstance(op, ast.In | ast.NotIn) for op in node.ops):
+            if isinstance(node, ast.Compare) and any(
+                isinstance(op, ast.In | ast.NotIn) for op in node.ops
+            ):
                 words = [one for one in node.comparators if isinstance(one, ast.Attribute)]
                 if any(one.attr in ("what", "fix") for one in words):
                     offenders.append(f"{path.relative_to(HOUSE)}:{node.lineno}")
@@ -47,7 +53,9 @@ def test_nothing_branches_on_the_wording_of_a_message() -> None:
 
 
 def test_every_kind_of_finding_is_named_by_a_test() -> None:
-    tests = "".join(path.read_text(encoding="utf-8") for path in (HOUSE.parents[2] / "tests").rglob("test_*.py"))
+    tests = "".join(
+        path.read_text(encoding="utf-8") for path in (HOUSE.parents[2] / "tests").rglob("test_*.py")
+    )
     kinds = {
         one.value: str(path.relative_to(HOUSE))
         for path in HOUSE.rglob("*.py")
@@ -57,7 +65,10 @@ def test_every_kind_of_finding_is_named_by_a_test() -> None:
             *node.args[: 1 if ast.unparse(node.func) == "Finding.of" else 2],
             *(word.value for word in node.keywords if word.arg == "kind"),
         )
-        if isinstance(one, ast.Constant) and _makes_a_finding(node) and isinstance(one.value, str) and "-" in one.value
+        if isinstance(one, ast.Constant)
+        and _makes_a_finding(node)
+        and isinstance(one.value, str)
+        and "-" in one.value
     }
     assert len(kinds) > 20
     assert {kind: place for kind, place in kinds.items() if f'"{kind}"' not in tests} == {}

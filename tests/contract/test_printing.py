@@ -1,4 +1,5 @@
-"""What a terminal is given goes through `flagdata.core.console`, which escapes it. The test reads the source."""
+"""What a terminal is given goes through `flagdata.core.console`, which escapes it. The test reads
+the source."""
 
 from __future__ import annotations
 
@@ -15,16 +16,31 @@ STREAMS = {"stdout", "stderr", "__stdout__", "__stderr__"}
 
 
 def _name(node: ast.expr) -> str:
-    return f"{_name(node.value)}.{node.attr}" if isinstance(node, ast.Attribute) else getattr(node, "id", "")
+    return (
+        f"{_name(node.value)}.{node.attr}"
+        if isinstance(node, ast.Attribute)
+        else getattr(node, "id", "")
+    )
 
 
 def printing(source: ast.AST) -> set[str]:
-    """What of a module writes to a terminal: `print`, what click and tqdm write, and the streams but for `isatty`."""
-    asked = {id(node.value) for node in ast.walk(source) if isinstance(node, ast.Attribute) and node.attr == "isatty"}
-    asked |= {id(node.value) for node in ast.walk(source) if isinstance(node, ast.Attribute) and node.attr == "flush"}
+    """What of a module writes to a terminal: `print`, what click and tqdm write, and the streams
+    but for `isatty`."""
+    asked = {
+        id(node.value)
+        for node in ast.walk(source)
+        if isinstance(node, ast.Attribute) and node.attr == "isatty"
+    }
+    asked |= {
+        id(node.value)
+        for node in ast.walk(source)
+        if isinstance(node, ast.Attribute) and node.attr == "flush"
+    }
     found = set()
     for node in ast.walk(source):
-        if isinstance(node, ast.Attribute) and _name(node) in {f"sys.{stream}" for stream in STREAMS}:
+        if isinstance(node, ast.Attribute) and _name(node) in {
+            f"sys.{stream}" for stream in STREAMS
+        }:
             found |= set() if id(node) in asked else {_name(node)}
         if isinstance(node, ast.Call):
             name = _name(node.func)

@@ -1,4 +1,5 @@
-"""How worker processes start is stated where they are made: Python's own choice differs between its versions."""
+"""How worker processes start is stated where they are made: Python's own choice differs between its
+versions."""
 
 from __future__ import annotations
 
@@ -17,13 +18,20 @@ def unstated(source: ast.Module) -> list[int]:
     return [
         call.lineno
         for call in calls
-        if (called := ast.unparse(call.func)) in {f"multiprocessing.{name}" for name in OF_NO_STATED_START}
-        or ((option := STATED_BY.get(called.rpartition(".")[2])) and option not in {word.arg for word in call.keywords})
+        if (called := ast.unparse(call.func))
+        in {f"multiprocessing.{name}" for name in OF_NO_STATED_START}
+        or (
+            (option := STATED_BY.get(called.rpartition(".")[2]))
+            and option not in {word.arg for word in call.keywords}
+        )
     ]
 
 
 def test_every_worker_process_states_how_it_starts() -> None:
-    source = "pool = ProcessPoolExecutor(2)\nfutures.ProcessPoolExecutor(2, mp_context=spawn)\nmultiprocessing.Pool()"
+    source = (
+        "pool = ProcessPoolExecutor(2)\nfutures.ProcessPoolExecutor(2, "
+        "mp_context=spawn)\nmultiprocessing.Pool()"
+    )
     assert unstated(ast.parse(source)) == [1, 3]
     places = [
         f"{path.relative_to(ROOT)}:{line}"

@@ -1,4 +1,5 @@
-"""Every public call takes a whole number of any library as Python's own, or refuses it; new calls are held to it."""
+"""Every public call takes a whole number of any library as Python's own, or refuses it; new calls
+are held to it."""
 
 from __future__ import annotations
 
@@ -31,7 +32,8 @@ _MADE_INSIDE = {"Pairs.__init__"}
 
 
 def public_calls() -> Iterator[tuple[str, Callable[..., Any]]]:
-    """The calls of `flagdata`, and those of the classes of `flagdata.dataset`; dataclasses are what they return."""
+    """The calls of `flagdata`, and those of the classes of `flagdata.dataset`; dataclasses are what
+    they return."""
     for name in flagdata.__all__:
         yield name, getattr(flagdata, name)
     for name in flagdata.dataset.__all__:
@@ -41,7 +43,9 @@ def public_calls() -> Iterator[tuple[str, Callable[..., Any]]]:
             continue
         for method, call in vars(one).items():
             own = not method.startswith("_") or method == "__getitem__"
-            if inspect.isfunction(call) and (own or (method == "__init__" and not dataclasses.is_dataclass(one))):
+            if inspect.isfunction(call) and (
+                own or (method == "__init__" and not dataclasses.is_dataclass(one))
+            ):
                 yield f"{name}.{method}", call
 
 
@@ -52,12 +56,16 @@ def numbered(call: Callable[..., Any]) -> frozenset[str]:
 
 
 NUMBERED = {
-    name: (call, names) for name, call in public_calls() if name not in _MADE_INSIDE and (names := numbered(call))
+    name: (call, names)
+    for name, call in public_calls()
+    if name not in _MADE_INSIDE and (names := numbered(call))
 }
 
 
 def test_the_calls_that_count_are_found() -> None:
-    assert {"pairs", "measure", "simulate", "PairLoader.order_hash", "Pairs.__getitem__"} <= set(NUMBERED)
+    assert {"pairs", "measure", "simulate", "PairLoader.order_hash", "Pairs.__getitem__"} <= set(
+        NUMBERED
+    )
 
 
 @pytest.mark.parametrize("name", NUMBERED)
@@ -93,7 +101,8 @@ NOT_WHOLE = {
     "none": None,
     "nan": float("nan"),
 }
-"""What is refused: a truth value counts nothing, and a number with a point may have been rounded."""
+"""What is refused: a truth value counts nothing, and a number with a point may have been
+rounded."""
 
 
 @pytest.mark.parametrize("kind", THREE)
@@ -108,12 +117,16 @@ def test_what_is_no_whole_number_is_refused_by_the_name_of_the_argument(kind: st
         whole(NOT_WHOLE[kind], "seed")
 
 
-@pytest.mark.parametrize("value", [0.2, np.float64(0.2), np.float32(0.2), torch.tensor(0.2), Decimal("0.2")])
+@pytest.mark.parametrize(
+    "value", [0.2, np.float64(0.2), np.float32(0.2), torch.tensor(0.2), Decimal("0.2")]
+)
 def test_a_number_is_the_one_that_was_written(value: object) -> None:
     assert real(value, "start") == 0.2
 
 
-@pytest.mark.parametrize("value", [True, "0.2", None, np.timedelta64(1, "s"), np.array([0.2]), pd.Timestamp(0)])
+@pytest.mark.parametrize(
+    "value", [True, "0.2", None, np.timedelta64(1, "s"), np.array([0.2]), pd.Timestamp(0)]
+)
 def test_what_is_no_number_is_refused_by_the_name_of_the_argument(value: object) -> None:
     with pytest.raises(UsageError, match=r"start is .*no number"):
         real(value, "start")
@@ -121,7 +134,14 @@ def test_what_is_no_number_is_refused_by_the_name_of_the_argument(value: object)
 
 def test_numbers_within_tables_become_pythons_own_and_arrays_stay() -> None:
     array = np.arange(3)
-    found = plain({"frames": np.int64(5), "speed": {"low": np.float32(2.5)}, "at": [torch.tensor(1)], "time": array})
+    found = plain(
+        {
+            "frames": np.int64(5),
+            "speed": {"low": np.float32(2.5)},
+            "at": [torch.tensor(1)],
+            "time": array,
+        }
+    )
     assert json.dumps({key: value for key, value in found.items() if key != "time"})
     assert found["time"] is array
 
@@ -141,7 +161,15 @@ class Path3:
 
 
 @pytest.mark.parametrize(
-    "given", ["film.mp4", np.str_("film.mp4"), b"film.mp4", Path("film.mp4"), PurePosixPath("film.mp4"), Path3()]
+    "given",
+    [
+        "film.mp4",
+        np.str_("film.mp4"),
+        b"film.mp4",
+        Path("film.mp4"),
+        PurePosixPath("film.mp4"),
+        Path3(),
+    ],
 )
 def test_whatever_names_a_path_is_that_path(given: object) -> None:
     @check_arguments

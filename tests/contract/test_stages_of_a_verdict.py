@@ -41,7 +41,11 @@ def test_a_stage_imports_only_earlier_ones() -> None:
 
 
 def test_every_stage_states_its_purpose() -> None:
-    assert [stage for stage in STAGES if not ast.get_docstring(tree(ROOT / "measure" / stage / "__init__.py"))] == []
+    assert [
+        stage
+        for stage in STAGES
+        if not ast.get_docstring(tree(ROOT / "measure" / stage / "__init__.py"))
+    ] == []
 
 
 def test_imports_within_functions_and_for_types_count() -> None:

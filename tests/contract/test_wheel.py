@@ -1,4 +1,5 @@
-"""The built wheel holds what an installation needs: every tracked file of the packages, and nothing besides."""
+"""The built wheel holds what an installation needs: every tracked file of the packages, and nothing
+besides."""
 
 from __future__ import annotations
 
@@ -25,7 +26,9 @@ PACKAGES = ("flagdata", "sim", "models", "measure", "catalogs")
 
 def tracked(*folders: str) -> list[str]:
     """Files under version control that are there, as paths from the root."""
-    listed = subprocess.run(("git", "ls-files", "-z", *folders), cwd=ROOT, capture_output=True, text=True, check=False)
+    listed = subprocess.run(
+        ("git", "ls-files", "-z", *folders), cwd=ROOT, capture_output=True, text=True, check=False
+    )
     if listed.returncode:
         pytest.skip(f"not a checkout: {listed.stderr.strip()}")
     return [name for name in listed.stdout.split("\0") if name and (ROOT / name).is_file()]
@@ -42,24 +45,44 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
         (source / "models" / "trained").mkdir(exist_ok=True)
         (source / "models" / "trained" / name).write_bytes(b"")
     subprocess.run(
-        (sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w", made, source),
+        (
+            sys.executable,
+            "-m",
+            "pip",
+            "wheel",
+            "--quiet",
+            "--no-deps",
+            "--no-build-isolation",
+            "-w",
+            made,
+            source,
+        ),
         check=True,
         capture_output=True,
     )
     return zipfile.ZipFile(next(made.glob("flagdata-*.whl")))
 
 
-def test_the_wheel_holds_the_tracked_files_of_the_packages_and_no_others(wheel: zipfile.ZipFile) -> None:
+def test_the_wheel_holds_the_tracked_files_of_the_packages_and_no_others(
+    wheel: zipfile.ZipFile,
+) -> None:
     held = {name for name in wheel.namelist() if ".dist-info/" not in name}
-    models = {f"models/trained/{name}" for name in ("weights.safetensors", "card.json", "recipe.toml")}
+    models = {
+        f"models/trained/{name}" for name in ("weights.safetensors", "card.json", "recipe.toml")
+    }
     wanted = {name for name in tracked(*PACKAGES) if not name.startswith(NO_DEFAULTS)} | models
-    inside = {name if name.startswith("flagdata/") else f"flagdata/_packages/{name}" for name in wanted}
+    inside = {
+        name if name.startswith("flagdata/") else f"flagdata/_packages/{name}" for name in wanted
+    }
     assert held == inside | {"flagdata/_packages/__init__.py"}
 
 
 def test_the_wheel_is_small(wheel: zipfile.ZipFile) -> None:
     assert wheel.filename is not None
-    assert sum(part.compress_size for part in wheel.infolist() if part.filename.endswith(DATA)) <= LARGEST_DATA
+    assert (
+        sum(part.compress_size for part in wheel.infolist() if part.filename.endswith(DATA))
+        <= LARGEST_DATA
+    )
     assert Path(wheel.filename).stat().st_size <= LARGEST
 
 
@@ -74,7 +97,9 @@ def test_the_wheel_names_its_pythons_and_binds_no_one_to_blender(wheel: zipfile.
 def test_every_dependency_has_a_version_in_both_sets(constraints: str) -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = [need for extra in project["optional-dependencies"].values() for need in extra]
-    needed = [need for need in [*project["dependencies"], *extras] if not need.startswith("flagdata[")]
+    needed = [
+        need for need in [*project["dependencies"], *extras] if not need.startswith("flagdata[")
+    ]
     names = {plain(need) for need in needed} - {"torch"}  # the Makefile chooses between its builds
     lines = (ROOT / constraints).read_text().splitlines()
     assert names <= {plain(line) for line in lines if not line.startswith("#")}
@@ -144,7 +169,8 @@ class Editable:
             return spec_from_file_location(name, Path({root!r}) / name / "__init__.py")
 sys.meta_path.insert(sys.meta_path.index(PathFinder) + 1, Editable())
 """
-"""What an editable installation leaves behind: a finder that is asked after the folders of `sys.path`."""
+"""What an editable installation leaves behind: a finder that is asked after the folders of
+`sys.path`."""
 
 
 @pytest.mark.parametrize("installation", ["wheel", "checkout", "editable"])
@@ -181,7 +207,8 @@ def test_a_users_own_files_of_the_packages_names_neither_break_an_installation_n
 def test_a_script_and_a_folder_of_weights_may_have_the_name_of_a_package_of_an_editable_installation(
     tmp_path: Path,
 ) -> None:
-    """An import of its name would find the script itself, and a folder that holds no module hides a package."""
+    """An import of its name would find the script itself, and a folder that holds no module hides a
+    package."""
     site, home = tmp_path / "site", tmp_path / "home"
     site.mkdir()
     (site / "sitecustomize.py").write_text(EDITABLE.format(packages=PACKAGES, root=str(ROOT)))
@@ -199,7 +226,10 @@ def test_a_script_and_a_folder_of_weights_may_have_the_name_of_a_package_of_an_e
 
 
 def test_a_checkout_keeps_its_names_where_no_file_of_a_user_has_one(tmp_path: Path) -> None:
-    code = "import sys, flagdata, sim.effects; print('flagdata._packages' in sys.modules, sim.effects.__name__)"
+    code = (
+        "import sys, flagdata, sim.effects; print('flagdata._packages' in sys.modules, "
+        "sim.effects.__name__)"
+    )
     done = subprocess.run(
         [sys.executable, "-c", code],
         cwd=tmp_path,

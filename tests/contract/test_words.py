@@ -1,4 +1,5 @@
-"""The words of messages, help, docstrings, names of tests, pages and catalogs: none that only this project uses so."""
+"""The words of messages, help, docstrings, names of tests, pages and catalogs: none that only this
+project uses so."""
 
 from __future__ import annotations
 
@@ -29,7 +30,8 @@ ANY = re.compile("|".join(FORBIDDEN), re.IGNORECASE)
 
 
 def strings(source: ast.Module) -> list[tuple[int, str]]:
-    """(line, text) of all string constants: docstrings, messages, help, the constant parts of f-strings."""
+    """(line, text) of all string constants: docstrings, messages, help, the constant parts of
+    f-strings."""
     return [
         (node.lineno, node.value)
         for node in ast.walk(source)
@@ -43,7 +45,8 @@ def comments(text: str) -> list[tuple[int, str]]:
 
 
 def laws(source: ast.Module) -> list[tuple[int, str]]:
-    """(line, text) of what a module of tests says of itself: its docstrings, and the names of its tests as words."""
+    """(line, text) of what a module of tests says of itself: its docstrings, and the names of its
+    tests as words."""
     found = [(1, ast.get_docstring(source) or "")]
     for node in statements(source):
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
@@ -87,7 +90,11 @@ def test_strings_and_comments_of_the_product_use_plain_words() -> None:
 
 
 def test_pages_templates_and_catalogs_use_plain_words() -> None:
-    found = [f"{path.relative_to(ROOT)}:{line}" for path in written() for line in offences(lines(path.read_text()))]
+    found = [
+        f"{path.relative_to(ROOT)}:{line}"
+        for path in written()
+        for line in offences(lines(path.read_text()))
+    ]
     assert found == []
 
 

@@ -1,4 +1,5 @@
-"""What the docstrings of the public calls hold: their examples and the parameters that they describe."""
+"""What the docstrings of the public calls hold: their examples and the parameters that they
+describe."""
 
 from __future__ import annotations
 
@@ -18,10 +19,14 @@ def undocumented(name: str) -> set[str]:
     function = getattr(flagdata, name)
     _, _, arguments = (inspect.getdoc(function) or "").partition("Args:\n")
     told = re.findall(r"^    (\w[\w, ]*): ", arguments.partition("\n\n")[0], re.MULTILINE)
-    return set(inspect.signature(function).parameters) - {one.strip() for names in told for one in names.split(",")}
+    return set(inspect.signature(function).parameters) - {
+        one.strip() for names in told for one in names.split(",")
+    }
 
 
 def example(name: str) -> str:
     """The example in a call's docstring."""
-    found = re.search(r"```python\n(.*?)```", inspect.getdoc(getattr(flagdata, name)) or "", re.DOTALL)
+    found = re.search(
+        r"```python\n(.*?)```", inspect.getdoc(getattr(flagdata, name)) or "", re.DOTALL
+    )
     return found[1] if found else ""

@@ -1,8 +1,10 @@
-"""Pages as their reader sees them: the files they show, the commands they give, and a runner of these commands.
+"""Pages as their reader sees them: the files they show, the commands they give, and a runner of
+these commands.
 
-Commands run in this process, because importing the package anew for each would take most of the time. The runner knows
-what the pages use of a shell: variables, `export`, `cd`, and the last line of a command's output as a variable. Other
-programs that they name are started.
+Commands run in this process, because importing the package anew for each would take most of the
+time. The runner knows
+what the pages use of a shell: variables, `export`, `cd`, and the last line of a command's output as
+a variable. Other programs that they name are started.
 """
 
 from __future__ import annotations
@@ -36,12 +38,19 @@ def blocks(page: str, language: str) -> list[str]:
 def files(page: str) -> dict[str, str]:
     """Name → text of the blocks whose title is a file's name."""
     text = (DOCS / page).read_text(encoding="utf-8")
-    return dict(re.findall(r"^```\w+ title=\"([^\"]+)\"\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE))
+    return dict(
+        re.findall(r"^```\w+ title=\"([^\"]+)\"\n(.*?)^```", text, flags=re.DOTALL | re.MULTILINE)
+    )
 
 
 def commands(page: str) -> list[str]:
     """The lines that begin with a prompt."""
-    return [line[2:] for block in blocks(page, "console") for line in block.splitlines() if line.startswith("$ ")]
+    return [
+        line[2:]
+        for block in blocks(page, "console")
+        for line in block.splitlines()
+        if line.startswith("$ ")
+    ]
 
 
 @dataclass(kw_only=True)
@@ -87,5 +96,7 @@ class Shell:
             contextlib.redirect_stderr(err),
         ):
             main(arguments, command=group)
-        assert ended.value.code == 0, f"{command}\nended with {ended.value.code}\n{out.getvalue()}{err.getvalue()}"
+        assert ended.value.code == 0, (
+            f"{command}\nended with {ended.value.code}\n{out.getvalue()}{err.getvalue()}"
+        )
         return out.getvalue()

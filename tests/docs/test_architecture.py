@@ -11,7 +11,8 @@ WORDS = 900
 
 
 def listed() -> list[tuple[str, str]]:
-    """Top-level folders and the names that are listed under each (folders with a slash, modules with their suffix)."""
+    """Top-level folders and the names that are listed under each (folders with a slash, modules
+    with their suffix)."""
     block = re.search(r"```\n(.*?)```", PAGE, re.DOTALL)
     assert block, "the list of packages is missing"
     named: list[tuple[str, str]] = []
@@ -23,7 +24,9 @@ def listed() -> list[tuple[str, str]]:
             listed = line.split("/", 1)[1] if top == "tests" else ""
         else:
             listed = line
-        named += [(top, name) for name in re.findall(r"(?<![\w/:.\"])([a-z_]+(?:/|\.py))(?=\s|$)", listed)]
+        named += [
+            (top, name) for name in re.findall(r"(?<![\w/:.\"])([a-z_]+(?:/|\.py))(?=\s|$)", listed)
+        ]
     return named
 
 
@@ -34,7 +37,9 @@ def test_the_map_is_one_page() -> None:
 def test_what_the_map_names_exists() -> None:
     places = [(ROOT / top / name, name.endswith(".py")) for top, name in listed()]
     assert len(places) > 50
-    assert [place for place, is_file in places if not (place.is_file() if is_file else place.is_dir())] == []
+    assert [
+        place for place, is_file in places if not (place.is_file() if is_file else place.is_dir())
+    ] == []
 
 
 def test_every_package_and_every_subpackage_is_on_the_map() -> None:
@@ -51,5 +56,7 @@ def test_every_package_and_every_subpackage_is_on_the_map() -> None:
 
 def test_every_decision_is_in_the_index() -> None:
     folder = ROOT / "docs" / "decisions"
-    linked = set(re.findall(r"\((\d{3}-[\w-]+\.md)\)", (folder / "index.md").read_text(encoding="utf-8")))
+    linked = set(
+        re.findall(r"\((\d{3}-[\w-]+\.md)\)", (folder / "index.md").read_text(encoding="utf-8"))
+    )
     assert linked == {path.name for path in folder.glob("[0-9]*.md")}

@@ -24,8 +24,14 @@ def test_the_scripts_call_commands_with_options_that_there_are() -> None:
     of_dask = {"scheduler": dask_scheduler.main, "worker": dask_worker.main}
     found = 0
     for text in SCRIPTS.values():
-        for program, rest in re.findall(r"^(?:.*; do )?(flagdata|dask) ([^;&\n]+)", text, flags=re.MULTILINE):
-            command = called(f"flagdata {rest}", "cluster.md") if program == "flagdata" else of_dask[rest.split()[0]]
+        for program, rest in re.findall(
+            r"^(?:.*; do )?(flagdata|dask) ([^;&\n]+)", text, flags=re.MULTILINE
+        ):
+            command = (
+                called(f"flagdata {rest}", "cluster.md")
+                if program == "flagdata"
+                else of_dask[rest.split()[0]]
+            )
             assert command is not None, rest
             known = {word for one in command.params for word in (*one.opts, *one.secondary_opts)}
             assert set(OPTION.findall(rest)) <= known, rest

@@ -12,7 +12,8 @@ from tests.docs.pages import DOCS, DOOR
 from tests.studies.__main__ import studies
 
 RECORDS = ("decisions/", "results/")
-"""Pages that say what was typed at their time: `flagdata challenge` was a command until it became a study."""
+"""Pages that say what was typed at their time: `flagdata challenge` was a command until it became a
+study."""
 
 
 def of_studies(start: str) -> dict[str, click.Command]:
@@ -42,7 +43,9 @@ def named(page: str) -> list[str]:
 def called(command: str, page: str) -> click.Command | None:
     """The command of a line, or `None` where no word of it is one."""
     known, words = {**COMMANDS, **(BEFORE if page.startswith(RECORDS) else {})}, command.split()
-    return next((known[start] for n in (5, 4, 3, 2) if (start := " ".join(words[:n])) in known), None)
+    return next(
+        (known[start] for n in (5, 4, 3, 2) if (start := " ".join(words[:n])) in known), None
+    )
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if named(page)])
@@ -55,7 +58,13 @@ def test_every_command_and_option_that_a_page_names_exists(page: str) -> None:
             continue
         if command.context_settings.get("ignore_unknown_options"):
             continue  # its words are those of another module's command line
-        known = {"--help"} | {word for one in command.params for word in (*one.opts, *one.secondary_opts)}
+        known = {"--help"} | {
+            word for one in command.params for word in (*one.opts, *one.secondary_opts)
+        }
         typed = re.split(r" [|>&#;] ?| && ", re.sub(r"\"[^\"]*\"|'[^']*'", "TEXT", line))[0]
-        wrong += [f"{line}: {option}" for option in OPTION.findall(typed.removeprefix(DOOR)) if option not in known]
+        wrong += [
+            f"{line}: {option}"
+            for option in OPTION.findall(typed.removeprefix(DOOR))
+            if option not in known
+        ]
     assert wrong == []

@@ -1,4 +1,5 @@
-"""The walks of CONTRIBUTING.md: what they name exists, each is one page, and that of the effect is walked."""
+"""The walks of CONTRIBUTING.md: what they name exists, each is one page, and that of the effect is
+walked."""
 
 from __future__ import annotations
 
@@ -33,7 +34,9 @@ def walk(title: str) -> str:
 
 def block(title: str) -> str:
     """The code of that title."""
-    found = re.search(rf'^ +```\w+ title="{re.escape(title)}"\n(.*?)^ +```', PAGE, flags=re.DOTALL | re.MULTILINE)
+    found = re.search(
+        rf'^ +```\w+ title="{re.escape(title)}"\n(.*?)^ +```', PAGE, flags=re.DOTALL | re.MULTILINE
+    )
     assert found, title
     return textwrap.dedent(found[1])
 
@@ -50,9 +53,17 @@ def test_a_walk_is_one_page_and_names_files_that_exist_and_a_test(title: str) ->
 
 
 def test_the_names_that_the_walks_give_are_in_the_files_that_they_give() -> None:
-    pairs = [pair for title in WALKS for pair in re.findall(r"`(\w+)` (?:in|of)\s+`([\w/]+\.py)`", walk(title))]
+    pairs = [
+        pair
+        for title in WALKS
+        for pair in re.findall(r"`(\w+)` (?:in|of)\s+`([\w/]+\.py)`", walk(title))
+    ]
     assert len(pairs) >= 8
-    assert [(name, path) for name, path in pairs if name not in (ROOT / path).read_text(encoding="utf-8")] == []
+    assert [
+        (name, path)
+        for name, path in pairs
+        if name not in (ROOT / path).read_text(encoding="utf-8")
+    ] == []
     modules = re.findall(r"`python -m ([\w.]+)`", PAGE)
     assert modules
     assert [name for name in modules if find_spec(name) is None] == []
@@ -133,9 +144,21 @@ def test_the_log_format_of_the_walk_is_read_once_its_steps_are_done(checkout: Pa
     write_line(checkout / registry, f"    {block(f'FORMATS in {registry}')}", below='"zentra": ')
     write_line(checkout / CLAIMS, f"    {block(f'SAMPLES in {CLAIMS}')}", below='"zentra": ')
     (line,) = re.findall(r"`(shows\(.*?\))`", walk("A log format"))
-    (checkout / "tests/flagdata/ingest/anemometer/test_harbour.py").write_text(VALUES.format(line=line))
+    (checkout / "tests/flagdata/ingest/anemometer/test_harbour.py").write_text(
+        VALUES.format(line=line)
+    )
     tests = [f"{CLAIMS}", "tests/flagdata/ingest/anemometer/test_harbour.py"]
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-k", "harbour or sample", *tests]
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        "-k",
+        "harbour or sample",
+        *tests,
+    ]
     done = subprocess.run(command, cwd=checkout, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr
     passed = re.search(r"(\d+) passed", done.stdout)

@@ -26,7 +26,9 @@ def keys(form: type) -> set[str]:
 
 
 def test_every_key_of_a_recipe_is_on_the_page_under_its_table() -> None:
-    section = (DOCS / "datasets.md").read_text(encoding="utf-8").partition("## A data set of your own")[2]
+    section = (
+        (DOCS / "datasets.md").read_text(encoding="utf-8").partition("## A data set of your own")[2]
+    )
     listed: dict[str, set[str]] = {}
     tables: list[str] = []
     for line in section.partition("\n## ")[0].splitlines():

@@ -22,7 +22,9 @@ def text(page: str) -> str:
 
 def test_the_forces_counted_on_markers_are_those_of_the_readme() -> None:
     readme = (DOCS.parent / "README.md").read_text(encoding="utf-8")
-    (result,) = re.findall(r"^\| forces missing from the cloth model \| [^|]+ \| ([^|]+) \|$", readme, re.MULTILINE)
+    (result,) = re.findall(
+        r"^\| forces missing from the cloth model \| [^|]+ \| ([^|]+) \|$", readme, re.MULTILINE
+    )
     assert f"of markers | {result} |" in text("closing-the-loop.md")
 
 
@@ -32,12 +34,15 @@ def test_the_verdicts_on_another_simulator_are_those_of_their_sheets() -> None:
         sheet("validate-foreign-nulls"),
         sheet("validate-foreign-effects"),
     )
-    density, bending, damping = (nulls["covered"][name] for name in ("density", "bending", "damping"))
+    density, bending, damping = (
+        nulls["covered"][name] for name in ("density", "bending", "damping")
+    )
     assert damping["hits"] == damping["count"]
     rejected = nulls["false_rejections"]
     assert f"[{rejected['count']} null experiments]" in page
     assert (
-        f"| {rejected['hits']} rejected; the intervals contain the area weight in {density['hits']}, the bending in "
+        f"| {rejected['hits']} rejected; the intervals contain the area weight in "
+        f"{density['hits']}, the bending in "
         f"{bending['hits']}, the damping in all |"
     ) in page
     right, missed, wrong = (effects[name] for name in ("right", "missed", "wrong"))
@@ -45,7 +50,8 @@ def test_the_verdicts_on_another_simulator_are_those_of_their_sheets() -> None:
     assert wrong["hits"] == 0
     assert f"[{right['count']} effects]" in page
     assert (
-        f"{right['hits']} named correctly, {part} named partly or by class, {missed['hits']} missed, none wrong" in page
+        f"{right['hits']} named correctly, {part} named partly or by class, {missed['hits']} "
+        "missed, none wrong" in page
     )
 
 
@@ -61,9 +67,14 @@ def test_the_errors_of_a_weight_are_those_of_the_sheet() -> None:
 
 def test_the_errors_of_a_reading_model_are_those_of_the_sheet() -> None:
     page, networks = text("anemometer.md"), sheet("validate-anemometer")["networks"]
-    default, flow = ([film["read"]["cup"]["rmse"] for film in networks[name]["films"][:2]] for name in networks)
+    default, flow = (
+        [film["read"]["cup"]["rmse"] for film in networks[name]["films"][:2]] for name in networks
+    )
     assert list(networks) == ["flow-outdoor", "flow"]
-    assert f"following five minutes to {default[0]:.2f} m/s and another day to {default[1]:.2f}" in page
+    assert (
+        f"following five minutes to {default[0]:.2f} m/s and another day to {default[1]:.2f}"
+        in page
+    )
     assert f"and `flow` to {flow[0]:.2f} and {flow[1]:.2f}" in page
 
 
@@ -71,5 +82,6 @@ def test_the_gain_of_a_refinement_is_that_of_the_sheet() -> None:
     alone, refined = sheet("validate-refinement-changed")["methods"]
     assert (alone["method"], refined["method"]) == ("regression alone", "refine")
     assert (
-        f"the median error is {refined['wind_error'][0]:.2f} m/s beside the network's {alone['wind_error'][0]:.2f}"
+        f"the median error is {refined['wind_error'][0]:.2f} m/s beside the network's "
+        f"{alone['wind_error'][0]:.2f}"
     ) in text("measure.md")

@@ -1,5 +1,5 @@
-"""The page of the method on films states what the code does and what was measured: each observable's unit, bias, sigma
-and blindness, and the map of what a minute of film shows."""
+"""The page of the method on films states what the code does and what was measured: each
+observable's unit, bias, sigma and blindness, and the map of what a minute of film shows."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ PAGE = Path(__file__).parents[2] / "docs" / "method" / "films.md"
 @pytest.mark.parametrize("name", list(OBSERVABLES))
 def test_every_observable_is_on_the_page(name: str) -> None:
     found: Observable = OBSERVABLES[name]
-    row = f"| {name} | {found.unit} | {found.meaning} | {found.bias:+.3f} | {found.sigma:.3f} | {found.blind} |"
+    row = (
+        f"| {name} | {found.unit} | {found.meaning} | {found.bias:+.3f} | {found.sigma:.3f} | "
+        f"{found.blind} |"
+    )
     assert row in PAGE.read_text(encoding="utf-8").splitlines()
 
 
@@ -31,7 +34,9 @@ def test_the_shares_that_last_are_those_that_are_drawn() -> None:
 
 
 def test_the_maps_of_effects_are_those_of_their_sheet() -> None:
-    sheet = json.loads((PAGE.parents[1] / "results" / "validate-power.json").read_text(encoding="utf-8"))["result"]
+    sheet = json.loads(
+        (PAGE.parents[1] / "results" / "validate-power.json").read_text(encoding="utf-8")
+    )["result"]
     for lines in (table(sheet), reference_table(sheet)):
         assert len(lines) > 7
         assert "\n".join(lines) in PAGE.read_text(encoding="utf-8")

@@ -1,4 +1,5 @@
-"""What a forge and an editor read: it names commands that there are, and asks what a developer would ask."""
+"""What a forge and an editor read: it names commands that there are, and asks what a developer
+would ask."""
 
 from __future__ import annotations
 
@@ -21,7 +22,11 @@ def content(path: Path) -> Any:
 
 def targets() -> set[str]:
     """Targets of the Makefile."""
-    return set(re.findall(r"^([a-z][\w-]*):", (ROOT / "Makefile").read_text(encoding="utf-8"), flags=re.MULTILINE))
+    return set(
+        re.findall(
+            r"^([a-z][\w-]*):", (ROOT / "Makefile").read_text(encoding="utf-8"), flags=re.MULTILINE
+        )
+    )
 
 
 def test_a_change_is_tried_by_the_commands_that_a_developer_types() -> None:

@@ -1,6 +1,8 @@
-"""The commands of the pages about the loop run: they read what they say, and write the report, the models, the lake.
+"""The commands of the pages about the loop run: they read what they say, and write the report, the
+models, the lake.
 
-The inference between is replaced by a made-up verdict or outcome: it takes minutes, and has tests of its own.
+The inference between is replaced by a made-up verdict or outcome: it takes minutes, and has tests
+of its own.
 """
 
 from __future__ import annotations
@@ -48,7 +50,9 @@ def arcsim_run(path: Path, speed: float) -> None:
         "frame_time": 0.04,
         "frame_steps": 8,
         "gravity": [0, 0, -9.81],
-        "cloths": [{"mesh": "flag.obj", "materials": [{"data": "materials/camel-ponte-roma.json"}]}],
+        "cloths": [
+            {"mesh": "flag.obj", "materials": [{"data": "materials/camel-ponte-roma.json"}]}
+        ],
         "handles": [{"nodes": np.flatnonzero(mesh.rest[:, 0] == 0).tolist()}],
         "wind": {"density": 1.0, "velocity": [speed, 0, 0], "drag": 0.0},
     }
@@ -57,14 +61,19 @@ def arcsim_run(path: Path, speed: float) -> None:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What the commands find: the demonstration's flag, shorter and of fewer markers; two runs of ArcSim; a log."""
+    """What the commands find: the demonstration's flag, shorter and of fewer markers; two runs of
+    ArcSim; a log."""
     path = tmp_path_factory.mktemp("loop")
     recipe = TrackedRecipe(seed=5, speeds=SPEEDS, duration=5.0, settle=0.4, vertices=40)
     make_tracks(recipe, path, advance=lambda count: None)
     for speed, name in zip((4.0, 8.0), ("run-4ms", "run-8ms"), strict=True):
         arcsim_run(path / name, speed)
-    stamps = (f"2026-05-14T09:30:{second:02d}Z,{5 + 0.3 * (second % 3):.1f}" for second in range(12))
-    (path / "anemometer.csv").write_text("\n".join(["time,wind_speed", *stamps]) + "\n", encoding="utf-8")
+    stamps = (
+        f"2026-05-14T09:30:{second:02d}Z,{5 + 0.3 * (second % 3):.1f}" for second in range(12)
+    )
+    (path / "anemometer.csv").write_text(
+        "\n".join(["time,wind_speed", *stamps]) + "\n", encoding="utf-8"
+    )
     Lake.create(path / "lake")
     return path
 
@@ -74,12 +83,19 @@ def concluded() -> Verdict:
     values = {"area_weight": 1.0, "bending": 0.8, "damping": 0.002}
     parameters = tuple(
         Parameter(name=name, before=one, after=one, shift=0.0)
-        for name, one in ((n, Estimate(value=v, low=0.9 * v, high=1.1 * v, unit="1")) for n, v in values.items())
+        for name, one in (
+            (n, Estimate(value=v, low=0.9 * v, high=1.1 * v, unit="1")) for n, v in values.items()
+        )
     )
-    return replace(verdict(Conclusion.EFFECT, Size(across=3, up=3, frames=20, stretch=2)), parameters=parameters)
+    return replace(
+        verdict(Conclusion.EFFECT, Size(across=3, up=3, frames=20, stretch=2)),
+        parameters=parameters,
+    )
 
 
-def test_every_command_of_closing_the_loop_runs(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_command_of_closing_the_loop_runs(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     judged: list[Experiment] = []
 
     def instead(experiment: Experiment, *_: object, **__: object) -> Verdict:
@@ -97,7 +113,10 @@ def test_every_command_of_closing_the_loop_runs(folder: Path, monkeypatch: pytes
         shell.run(command)
     speeds = [[round(r.wind.speed, 1) for r in experiment.recordings] for experiment in judged]
     assert speeds == [[4.0, 6.0], [4.0, 8.0], [5.3, 5.3], [4.0, 6.0]]
-    assert all((folder / "loop" / name).exists() for name in ("report.html", "verdict.json", "base.toml", "model.toml"))
+    assert all(
+        (folder / "loop" / name).exists()
+        for name in ("report.html", "verdict.json", "base.toml", "model.toml")
+    )
     kinds = [row["kind"] for row in Lake.open(folder / "lake").rows().to_pylist()]
     assert sorted(kinds) == sorted([Kind.MEASUREMENT, Kind.MODEL, Kind.MODEL, Kind.MESHES])
 
@@ -149,7 +168,9 @@ def nothing_taken() -> ProposalOutcome:
     )
 
 
-def test_every_command_of_proposing_runs(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_command_of_proposing_runs(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     calls: list[tuple[Sequence[object], dict[str, Any]]] = []
 
     def instead(experiment: Experiment, tried: Sequence[object], **given: Any) -> ProposalOutcome:

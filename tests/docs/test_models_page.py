@@ -1,5 +1,5 @@
-"""Who has read no code builds, exports, trains, is interrupted, resumes, and judges beside the shipped network by the
-page about networks, on the films that it builds."""
+"""Who has read no code builds, exports, trains, is interrupted, resumes, and judges beside the
+shipped network by the page about networks, on the films that it builds."""
 
 from __future__ import annotations
 
@@ -61,11 +61,16 @@ def test_the_page_leads_from_a_recipe_to_a_table_beside_the_shipped_network(
         ended = run(command)
         assert ended.code == 0, f"{command}\n{ended.err}"
     (page,) = (built / "evaluation").glob("*.json")
-    rows = {row["label"]: row for row in json.loads(page.read_text())["models"] if row["run"] is None}
+    rows = {
+        row["label"]: row for row in json.loads(page.read_text())["models"] if row["run"] is None
+    }
     assert set(rows) == {"my-wave", "flow-outdoor, as shipped"}
     assert rows["my-wave"]["runs"] == 2
     assert rows["my-wave"]["note"].startswith("12×24×24 of clips of 30 frames, wave-maps")
-    assert "not judged by log_aspect, which not all clips state" in rows["flow-outdoor, as shipped"]["note"]
+    assert (
+        "not judged by log_aspect, which not all clips state"
+        in rows["flow-outdoor, as shipped"]["note"]
+    )
     assert all(row["scores"]["rmse"]["clips"] == 4 for row in rows.values())
 
 

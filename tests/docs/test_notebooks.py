@@ -30,7 +30,8 @@ for path in map(Path, sys.argv[1:]):
             shell.run_cell("".join(cell["source"])).raise_error()
     print(f"ran {path.stem}", flush=True)
 """
-"""IPython, of which each notebook has all names to itself: a kernel of its own would load torch four times."""
+"""IPython, of which each notebook has all names to itself: a kernel of its own would load torch
+four times."""
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +50,12 @@ def printed(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 def test_the_four_main_jobs_have_a_notebook() -> None:
-    assert [path.stem for path in NOTEBOOKS] == ["close-the-loop", "field-recording", "measure", "simulate"]
+    assert [path.stem for path in NOTEBOOKS] == [
+        "close-the-loop",
+        "field-recording",
+        "measure",
+        "simulate",
+    ]
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

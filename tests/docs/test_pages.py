@@ -1,4 +1,5 @@
-"""Every command of the pages runs, on small data made here, in the order in which a reader meets it."""
+"""Every command of the pages runs, on small data made here, in the order in which a reader meets
+it."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ from tests.drawn.field import DrawnRecipe, write_drawn_film, write_drawn_log
 from tests.drawn.flag import DrawnFlag
 
 OF_INFERENCE = {"closing-the-loop.md", "proposals.md"}
-"""Pages whose commands take minutes each; tests/docs/test_loop_pages.py runs them without the inference."""
+"""Pages whose commands take minutes each; tests/docs/test_loop_pages.py runs them without the
+inference."""
 AFTER_START = (
     "alignment.md",
     "measure.md",
@@ -35,7 +37,8 @@ AFTER_START = (
 )
 ALONE = ("sensors.md", "simulator.md", "datasets.md")
 OF_NETWORKS = {"models.md"}
-"""The page that builds, trains and judges, which tests/docs/test_models_page.py runs with an interruption."""
+"""The page that builds, trains and judges, which tests/docs/test_models_page.py runs with an
+interruption."""
 RECIPE = DrawnRecipe(seed=2026, duration=150, clock=-26.24)
 """Its clocks differ as the demonstration's do, whose noted difference `start.md` gives."""
 FLAG = DrawnFlag(width=200, height=150, length=95)
@@ -45,7 +48,9 @@ def write_small_field(folder: Path, recipe: DrawnRecipe) -> None:
     """Files as the demonstration's, of a small flag that is drawn."""
     write_drawn_log(folder / "anemometer.csv", recipe)
     (folder / "cup-logger.toml").write_text(SENSOR, encoding="utf-8")
-    write_drawn_film(folder / "flag.mp4", recipe.at_frames(), rate=recipe.rate, seed=recipe.seed, flag=FLAG)
+    write_drawn_film(
+        folder / "flag.mp4", recipe.at_frames(), rate=recipe.rate, seed=recipe.seed, flag=FLAG
+    )
 
 
 def enter(folder: Path, patch: pytest.MonkeyPatch, page: str) -> None:
@@ -74,7 +79,9 @@ def started(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder in which the commands of start.md ran."""
     folder = tmp_path_factory.mktemp("started")
     write_small_field(folder, RECIPE)
-    shutil.copy(folder / "flag.mp4", folder / "cloth.mp4")  # what is measured as a cloth: the command is tested
+    shutil.copy(
+        folder / "flag.mp4", folder / "cloth.mp4"
+    )  # what is measured as a cloth: the command is tested
     with pytest.MonkeyPatch.context() as patch:
         enter(folder, patch, "start.md")
         assert "export FLAGDATA_LAKE=field.lake" in commands("start.md")
@@ -103,7 +110,11 @@ def test_the_python_of_the_five_minute_start_runs(
 
 @pytest.mark.parametrize("page", AFTER_START)
 def test_every_command_of_a_page_that_goes_on_from_the_start_runs(
-    page: str, started: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+    page: str,
+    started: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    request: pytest.FixtureRequest,
 ) -> None:
     folder = tmp_path / "copy"
     shutil.copytree(started, folder)
@@ -124,7 +135,11 @@ def test_every_command_of_a_page_that_stands_alone_runs(
         Lake.create(tmp_path / "lake")
         for number, row in enumerate(files(page)["fabrics.csv"].splitlines()[1:]):
             write_drawn_film(
-                tmp_path / row.split(",")[0], np.full(35, 3.0 + number), rate=RECIPE.rate, seed=RECIPE.seed, flag=FLAG
+                tmp_path / row.split(",")[0],
+                np.full(35, 3.0 + number),
+                rate=RECIPE.rate,
+                seed=RECIPE.seed,
+                flag=FLAG,
             )
     assert any(run_page(page, monkeypatch))
 
@@ -160,7 +175,9 @@ def test_the_format_of_the_page_reads_its_own_lines(tmp_path: Path) -> None:
     names: dict[str, Any] = {}
     exec(compile(files("wind-formats.md")["calmlog.py"], "calmlog.py", "exec"), names)
     path = tmp_path / "calm.log"
-    path.write_text("CALM 2026-05-01T12:00:00Z 4.2\nCALM 2026-05-01T12:00:01Z 4.3\n", encoding="utf-8")
+    path.write_text(
+        "CALM 2026-05-01T12:00:00Z 4.2\nCALM 2026-05-01T12:00:01Z 4.3\n", encoding="utf-8"
+    )
     source = open_log(path, WindOptions())
     reader = names["CalmLog"]()
     assert reader.recognise(Head(lines=tuple(source.head()))).format == "calmlog"

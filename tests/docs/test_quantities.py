@@ -30,7 +30,10 @@ OF_THE_AIR = {
     "sim/cloth/air.py",
     "sim/run/cusick_drape.py",
     "sim/run/simulation_toml.py",
-    *(f"sim/{part}/{name}.py" for part, name in (("kernel", "fused"), ("kernel_warp", "warp_batch"))),
+    *(
+        f"sim/{part}/{name}.py"
+        for part, name in (("kernel", "fused"), ("kernel_warp", "warp_batch"))
+    ),
     "sim/kernel_warp/leapfrog.py",
 }
 """Modules in which a density is the air's, beside those of effects."""
@@ -80,7 +83,12 @@ def texts() -> dict[str, str]:
 
 @pytest.fixture(scope="module")
 def options() -> list[click.Option]:
-    return [p for _, command in generate_cli.commands() for p in command.params if isinstance(p, click.Option)]
+    return [
+        p
+        for _, command in generate_cli.commands()
+        for p in command.params
+        if isinstance(p, click.Option)
+    ]
 
 
 def test_no_module_calls_an_area_weight_by_a_former_name(texts: dict[str, str]) -> None:
@@ -101,9 +109,17 @@ def test_the_lists_of_exceptions_name_modules_that_need_them(texts: dict[str, st
     assert [name for name in sorted(listed) if not RETIRED & set(words(texts[name]))] == []
 
 
-def test_no_column_option_or_catalogued_recipe_has_a_former_name(options: list[click.Option]) -> None:
+def test_no_column_option_or_catalogued_recipe_has_a_former_name(
+    options: list[click.Option],
+) -> None:
     assert not RETIRED & set(CATALOG)
-    former = {"--pins", "--size", "--offset", *(f"--{key}" for key in KEYS), "--density-uncertainty"}
+    former = {
+        "--pins",
+        "--size",
+        "--offset",
+        *(f"--{key}" for key in KEYS),
+        "--density-uncertainty",
+    }
     assert {name for one in options if not one.hidden for name in one.opts} & former == set()
     for path in (ROOT / "catalogs").rglob("*.toml"):
         tables = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -112,7 +128,9 @@ def test_no_column_option_or_catalogued_recipe_has_a_former_name(options: list[c
         assert not RETIRED & set(tables.get("loss", {}).get("targets", ())), path.name
 
 
-def test_each_quantity_is_met_where_the_glossary_says(texts: dict[str, str], options: list[click.Option]) -> None:
+def test_each_quantity_is_met_where_the_glossary_says(
+    texts: dict[str, str], options: list[click.Option]
+) -> None:
     opts = {name for one in options if not one.hidden for name in one.opts}
     parameters = {one.name for one in options}
     keys = {word.replace("_", "-") for name in RECIPES for word in words(texts[name])}

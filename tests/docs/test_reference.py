@@ -11,7 +11,13 @@ import pytest
 import flagdata
 from docs import generate_cli, generate_effects, generate_glossary
 from flagdata.ingest import FileLayout, QualityRules
-from flagdata.ingest.anemometer.sensor_recipe import MATCH, ChannelLayout, CheckLayout, Recipe, TimeLayout
+from flagdata.ingest.anemometer.sensor_recipe import (
+    MATCH,
+    ChannelLayout,
+    CheckLayout,
+    Recipe,
+    TimeLayout,
+)
 from flagdata.record.signals import Sensor
 from sim.effects import EFFECTS, SENSOR_EFFECTS
 from tests.docs.calls import lines, undocumented
@@ -37,19 +43,28 @@ def test_every_call_has_an_example_of_ten_lines_at_most_and_words_for_every_argu
 
 def test_every_call_has_a_row_with_its_lines_and_a_section() -> None:
     page = (DOCS / "api.md").read_text(encoding="utf-8")
-    rows = dict(re.findall(r"^\| [^|]+ \| \[`\w+`\]\(#(\w+)\) \| (\d+) \|$", page, flags=re.MULTILINE))
+    rows = dict(
+        re.findall(r"^\| [^|]+ \| \[`\w+`\]\(#(\w+)\) \| (\d+) \|$", page, flags=re.MULTILINE)
+    )
     assert rows == {name: str(lines(name)) for name in flagdata.__all__}
-    assert re.findall(r"^## (\w+)\n\n::: flagdata\.(?:api\.\w+\.)?(\w+)$", page, flags=re.MULTILINE) == [
-        (n, n) for n in rows
-    ]
+    assert re.findall(
+        r"^## (\w+)\n\n::: flagdata\.(?:api\.\w+\.)?(\w+)$", page, flags=re.MULTILINE
+    ) == [(n, n) for n in rows]
 
 
 def test_every_command_and_every_option_has_a_sentence() -> None:
     commands = dict(generate_cli.commands())
     assert len(commands) > 30
     assert [name for name, command in commands.items() if not command.help] == []
-    options = [(name, p) for name, command in commands.items() for p in command.params if isinstance(p, click.Option)]
-    assert [(name, option.name) for name, option in options if not (option.help or "").strip()] == []
+    options = [
+        (name, p)
+        for name, command in commands.items()
+        for p in command.params
+        if isinstance(p, click.Option)
+    ]
+    assert [
+        (name, option.name) for name, option in options if not (option.help or "").strip()
+    ] == []
 
 
 def test_every_effect_and_each_of_its_parameters_is_on_the_page() -> None:
@@ -77,9 +92,16 @@ def test_every_key_of_a_sensor_recipe_is_on_the_page() -> None:
 
 
 def test_every_key_of_a_recipes_match_is_on_the_page() -> None:
-    page = (DOCS / "wind-recipes.md").read_text(encoding="utf-8").split("Keys of `[match]`")[1].split("\n## ")[0]
+    page = (
+        (DOCS / "wind-recipes.md")
+        .read_text(encoding="utf-8")
+        .split("Keys of `[match]`")[1]
+        .split("\n## ")[0]
+    )
     rows = [line.split("|")[1] for line in page.splitlines() if line.startswith("| `")]
-    assert sorted(key.strip(" `") for row in rows for key in row.split(",")) == sorted(MATCH.split())
+    assert sorted(key.strip(" `") for row in rows for key in row.split(",")) == sorted(
+        MATCH.split()
+    )
 
 
 def test_every_table_of_a_sensor_recipe_is_on_the_page() -> None:

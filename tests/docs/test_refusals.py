@@ -1,4 +1,5 @@
-"""Refusals: each reason is on the page, states no cause as a fact, and no two of one command lead in a circle."""
+"""Refusals: each reason is on the page, states no cause as a fact, and no two of one command lead
+in a circle."""
 
 from __future__ import annotations
 
@@ -35,7 +36,11 @@ VERBS = {
         "measure/estimate",
     ),
     "align": ("flagdata/align", "flagdata/commands/align.py"),
-    "ingest": ("flagdata/ingest", "flagdata/commands/ingest_options.py", "flagdata/commands/confirm_recipe.py"),
+    "ingest": (
+        "flagdata/ingest",
+        "flagdata/commands/ingest_options.py",
+        "flagdata/commands/confirm_recipe.py",
+    ),
     "close-loop": (
         "measure/closing",
         "measure/commands/close_loop",
@@ -46,7 +51,9 @@ VERBS = {
 """Where the refusals of each command are."""
 CONDITIONAL = {
     "measure": {"--refine"},  # asked for beside --cache, which may be left out as well
-    "align": {"--by"},  # a film that cannot be estimated; refused of two logs, which are always compared
+    "align": {
+        "--by"
+    },  # a film that cannot be estimated; refused of two logs, which are always compared
     "ingest": {
         "--azimuth",  # components without a heading; refused where the log has a direction already
         "--date",  # stamps without a day; refused where stamps have one
@@ -58,8 +65,11 @@ CONDITIONAL = {
         "--unit",  # a heading without a unit; refused where the format states it
     },
 }
-"""Options that a refusal of one kind of source asks for, and one of another kind refuses: walked through by hand."""
-_ASKED = re.compile(r"(?:give|add|state|name|choose|use|by)\b[^;.]*?(?<!leave )(?<!leave out )(--[a-z][a-z-]+)")
+"""Options that a refusal of one kind of source asks for, and one of another kind refuses: walked
+through by hand."""
+_ASKED = re.compile(
+    r"(?:give|add|state|name|choose|use|by)\b[^;.]*?(?<!leave )(?<!leave out )(--[a-z][a-z-]+)"
+)
 _REFUSED = re.compile(r"leave (?:out )?(--[a-z][a-z-]+)(?! or)")
 
 
@@ -79,7 +89,9 @@ def test_every_reason_of_the_gate_is_on_the_page_and_no_other() -> None:
     assert shown[: len(REASONS)] == list(REASONS)
     assert set(shown) == {*REASONS, *WINDOWS, *CALIBRATED}
     for kind in CALIBRATED:
-        assert f'"{kind}"' in (ROOT / "measure" / "anemometer" / "novelty.py").read_text(encoding="utf-8"), kind
+        assert f'"{kind}"' in (ROOT / "measure" / "anemometer" / "novelty.py").read_text(
+            encoding="utf-8"
+        ), kind
 
 
 def test_every_reason_that_a_picture_can_show_has_one_and_all_are_small() -> None:
@@ -89,7 +101,9 @@ def test_every_reason_that_a_picture_can_show_has_one_and_all_are_small() -> Non
     assert sum(path.stat().st_size for path in FOLDER.iterdir()) < MOST_BYTES
     for reason in FAULTS:
         assert re.search(
-            rf"^### `{reason}`\n\n!\[[^]]+\]\(pictures/refusals/{reason}\.webp\)", page, flags=re.MULTILINE
+            rf"^### `{reason}`\n\n!\[[^]]+\]\(pictures/refusals/{reason}\.webp\)",
+            page,
+            flags=re.MULTILINE,
         )
 
 
@@ -103,7 +117,9 @@ def test_the_film_of_a_picture_is_refused_for_that_reason_as_the_page_says(reaso
 
 
 def test_what_a_reason_advises_can_be_done() -> None:
-    options = {o for name, c in commands() if name == "flagdata measure" for p in c.params for o in p.opts}
+    options = {
+        o for name, c in commands() if name == "flagdata measure" for p in c.params for o in p.opts
+    }
     for kind, reason in REASONS.items():
         assert set(re.findall(r"--[a-z-]+", reason.fix)) <= options, kind
 
@@ -124,7 +140,9 @@ def test_a_reason_states_what_was_found_and_what_it_may_mean(kind: str) -> None:
 def test_no_refusal_asks_for_what_another_one_of_the_command_refuses(verb: str) -> None:
     texts = list(fixes(*VERBS[verb]))
     assert len(texts) > 10
-    own = {o for name, c in commands() if name == f"flagdata {verb}" for p in c.params for o in p.opts}
+    own = {
+        o for name, c in commands() if name == f"flagdata {verb}" for p in c.params for o in p.opts
+    }
     asked = {option for text in texts for option in _ASKED.findall(text)} & own
     refused = {option for text in texts for option in _REFUSED.findall(text)} & own
     assert asked & refused == CONDITIONAL.get(verb, set())

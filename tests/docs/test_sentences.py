@@ -17,17 +17,21 @@ _CODE = re.compile(r"^( *)```.*?^\1```$|^\$\$.*?^\$\$$", re.DOTALL | re.MULTILIN
 _PARAGRAPH = re.compile(r"\n\s*\n|\n(?=\s*(?:[-*] |\d+\. |: ))")
 _NO_PROSE = re.compile(r"#|\||!\[|\*[^*]+\*$")
 """A heading, a table, a picture; a line all in italics, which repeats a message of the program."""
-_END = re.compile(r"(?<!et al)[.!?][)\"*]*\s+(?=[\"(*\[`$]*(?:[A-Z0-9`$]|flagdata|p ))|:\s*$|[.!?][)\"*]*$")
+_END = re.compile(
+    r"(?<!et al)[.!?][)\"*]*\s+(?=[\"(*\[`$]*(?:[A-Z0-9`$]|flagdata|p ))|:\s*$|[.!?][)\"*]*$"
+)
 
 
 def prose(text: str) -> list[str]:
-    """Returns the paragraphs and list items of a page, without code, tables, headings, pictures and quoted messages."""
+    """Returns the paragraphs and list items of a page, without code, tables, headings, pictures and
+    quoted messages."""
     lines = [line for line in _CODE.sub("", text).splitlines() if not _NO_PROSE.match(line.strip())]
     return [" ".join(part.split()) for part in _PARAGRAPH.split("\n".join(lines)) if part.strip()]
 
 
 def sentences(text: str) -> list[str]:
-    """Returns the sentences of a page; a link counts as its text, code and a formula as one word."""
+    """Returns the sentences of a page; a link counts as its text, code and a formula as one
+    word."""
     parts: list[str] = []
     for paragraph in prose(text):
         plain = re.sub(r"\[([^\]]+)\]\([^)]+\)", r"\1", paragraph)
@@ -44,7 +48,10 @@ def words(sentence: str) -> int:
 
 @pytest.mark.parametrize("page", PAGES)
 def test_sentences_of_a_page_are_short(page: str) -> None:
-    counts = {sentence: words(sentence) for sentence in sentences((DOCS / page).read_text(encoding="utf-8"))}
+    counts = {
+        sentence: words(sentence)
+        for sentence in sentences((DOCS / page).read_text(encoding="utf-8"))
+    }
     assert counts
     assert [sentence for sentence, count in counts.items() if count > MOST] == []
     assert sum(counts.values()) / len(counts) <= MEAN

@@ -16,7 +16,9 @@ import pytest
 import flagdata
 
 ROOT = Path(__file__).resolve().parents[2]
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+BROWSER = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+)
 
 
 @pytest.fixture(scope="module")
@@ -40,8 +42,16 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def dumped(address: str, profile: Path) -> str:
     """A page's elements after its scripts ran."""
-    options = ("--headless", "--no-sandbox", f"--user-data-dir={profile}", "--virtual-time-budget=8000", "--dump-dom")
-    return subprocess.run([str(BROWSER), *options, address], capture_output=True, text=True, check=False).stdout
+    options = (
+        "--headless",
+        "--no-sandbox",
+        f"--user-data-dir={profile}",
+        "--virtual-time-budget=8000",
+        "--dump-dom",
+    )
+    return subprocess.run(
+        [str(BROWSER), *options, address], capture_output=True, text=True, check=False
+    ).stdout
 
 
 def test_every_page_is_built_and_the_search_knows_it(site: Path) -> None:
@@ -65,7 +75,9 @@ def test_every_link_and_picture_of_the_site_leads_to_a_file_of_it(site: Path) ->
         f"{page.relative_to(site)}: {target}"
         for page in site.rglob("*.html")
         if page.name != "404.html"  # its links are from the root
-        for target in re.findall(r'(?:href|src)="([^"#?:]+)(?:[#?][^"]*)?"', page.read_text(encoding="utf-8"))
+        for target in re.findall(
+            r'(?:href|src)="([^"#?:]+)(?:[#?][^"]*)?"', page.read_text(encoding="utf-8")
+        )
         if not (page.parent / unquote(target)).exists()
     ]
     assert broken == []
@@ -73,8 +85,15 @@ def test_every_link_and_picture_of_the_site_leads_to_a_file_of_it(site: Path) ->
 
 def formulas(page: Path) -> list[str]:
     """The TeX of a page's source, between dollar signs outside code."""
-    text = re.sub(r"^```.*?^```|`[^`\n]+`", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
-    return [one or other for one, other in re.findall(r"\$\$(.+?)\$\$|\$(.+?)\$", text, flags=re.DOTALL)]
+    text = re.sub(
+        r"^```.*?^```|`[^`\n]+`",
+        "",
+        page.read_text(encoding="utf-8"),
+        flags=re.DOTALL | re.MULTILINE,
+    )
+    return [
+        one or other for one, other in re.findall(r"\$\$(.+?)\$\$|\$(.+?)\$", text, flags=re.DOTALL)
+    ]
 
 
 def test_every_formula_is_set_and_a_page_without_one_carries_nothing_for_it(site: Path) -> None:
@@ -100,7 +119,9 @@ def test_a_formula_that_cannot_be_set_ends_the_build_and_is_named() -> None:
 
     from docs.formulas import formulas_set
 
-    assert "<mfrac>" in formulas_set('<span class="arithmatex">\\(\\frac{a}{b}\\)</span>', "method/films.md")
+    assert "<mfrac>" in formulas_set(
+        '<span class="arithmatex">\\(\\frac{a}{b}\\)</span>', "method/films.md"
+    )
     with pytest.raises(PluginError, match=r"method/films\.md: \\frob in the formula a \\frob b "):
         formulas_set('<span class="arithmatex">\\(a \\frob b\\)</span>', "method/films.md")
 
@@ -134,7 +155,9 @@ def test_the_search_works_in_pages_that_are_opened_as_files(site: Path, tmp_path
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium on the path")
-def test_the_copy_button_copies_the_command_without_prompt_and_output(site: Path, tmp_path: Path) -> None:
+def test_the_copy_button_copies_the_command_without_prompt_and_output(
+    site: Path, tmp_path: Path
+) -> None:
     """As the theme does it: the block is marked while its visible text is taken."""
     page = (site / "versions-and-recovery.html").read_text(encoding="utf-8")
     probe = """<script>addEventListener("load", () => {

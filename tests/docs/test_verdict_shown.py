@@ -15,7 +15,9 @@ from tests.docs.pages import DOCS
 
 @pytest.fixture(scope="module")
 def stored() -> Verdict:
-    return from_document(json.loads((DOCS / "results" / "tracked-lift.json").read_text(encoding="utf-8")))
+    return from_document(
+        json.loads((DOCS / "results" / "tracked-lift.json").read_text(encoding="utf-8"))
+    )
 
 
 def test_the_stored_verdict_is_worded_as_the_program_words_it_now(stored: Verdict) -> None:
@@ -27,7 +29,9 @@ def test_a_verdict_on_a_page_is_the_stored_one_line_by_line(page: str, stored: V
     text = (DOCS / page).read_text(encoding="utf-8")
     if page.endswith(".ipynb"):
         text = "\n".join("".join(cell["source"]) for cell in json.loads(text)["cells"])
-    (shown,) = re.findall(r"^```text\n(The base model lacked .*?)\n```", text, flags=re.DOTALL | re.MULTILINE)
+    (shown,) = re.findall(
+        r"^```text\n(The base model lacked .*?)\n```", text, flags=re.DOTALL | re.MULTILINE
+    )
     said = words(stored).splitlines()
     place = 0
     for line in shown.splitlines():

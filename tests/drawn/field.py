@@ -1,4 +1,5 @@
-"""A drawn flag in a gusty wind and a cup's log of it on another clock, whose offset is drawn from the seed."""
+"""A drawn flag in a gusty wind and a cup's log of it on another clock, whose offset is drawn from
+the seed."""
 
 from __future__ import annotations
 
@@ -33,8 +34,10 @@ class DrawnRecipe:
         seed: root of all random streams.
         duration: of the film [s].
         rate: frames a second [Hz].
-        wind: the gusts; an intensity near zero makes the steady wind in which clocks cannot be found.
-        clock: what must be added to the camera's clock to reach the anemometer's [s]; drawn if `None`.
+        wind: the gusts; an intensity near zero makes the steady wind in which clocks cannot be
+            found.
+        clock: what must be added to the camera's clock to reach the anemometer's [s]; drawn if
+            `None`.
     """
 
     seed: int
@@ -52,7 +55,9 @@ class DrawnRecipe:
 
     def blown(self) -> FloatArray:
         """The true wind [m/s] at `WIND_RATE`, from `BEFORE` seconds before the first frame on."""
-        return self.wind.series(stream(self.seed, "wind"), duration=BEFORE + self.duration + _AFTER, rate=WIND_RATE)
+        return self.wind.series(
+            stream(self.seed, "wind"), duration=BEFORE + self.duration + _AFTER, rate=WIND_RATE
+        )
 
     def at_frames(self) -> FloatArray:
         """The wind at each frame [m/s]."""
@@ -67,20 +72,31 @@ def write_drawn_log(path: Path, recipe: DrawnRecipe) -> float:
     times = np.arange(len(wind)) / WIND_RATE
     begin = from_datetime(START) - round(BEFORE * NANOSECONDS)
     velocity = np.stack([wind, 0 * wind, 0 * wind], axis=1)
-    series = log_of_air(CUP, times, velocity, instrument=recipe.seed, seed=recipe.seed, begin=begin).series
+    series = log_of_air(
+        CUP, times, velocity, instrument=recipe.seed, seed=recipe.seed, begin=begin
+    ).series
     first = (int(series.time[0]) - begin) / NANOSECONDS - BEFORE
     stamp = START + timedelta(seconds=first + recipe.offset)
     write_log(
-        path, series.channels["wind_speed"], series.channels["wind_direction"], first=stamp, quiet=60, seed=recipe.seed
+        path,
+        series.channels["wind_speed"],
+        series.channels["wind_direction"],
+        first=stamp,
+        quiet=60,
+        seed=recipe.seed,
     )
     return recipe.offset
 
 
-def write_drawn_film(path: Path, winds: FloatArray, *, rate: int, seed: int, flag: DrawnFlag) -> None:
+def write_drawn_film(
+    path: Path, winds: FloatArray, *, rate: int, seed: int, flag: DrawnFlag
+) -> None:
     """A film of a drawn flag in the winds (n,) of its frames [m/s]."""
     with av.open(str(path), "w") as container:
         container.metadata["creation_time"] = START.isoformat()
-        video = container.add_stream("libx264", rate=rate, options={"preset": "ultrafast", "crf": "23"})
+        video = container.add_stream(
+            "libx264", rate=rate, options={"preset": "ultrafast", "crf": "23"}
+        )
         video.width, video.height, video.pix_fmt = flag.width, flag.height, "yuv420p"
         video.codec_context.time_base = Fraction(1, rate)
         for number, image in enumerate(flag.frames(winds, rate, stream(seed, "camera"))):

@@ -1,7 +1,8 @@
 """A drawn flag whose motion follows a wind series: kinematics, not mechanics.
 
-It stands in for a camera in tests of clocks and ingest, where only *when* something moves
-matters. Its droop, amplitude and frequency follow the wind by plain formulas; no physics is measured from it.
+It stands in for a camera in tests of clocks and ingest, where only *when* something moves matters.
+Its droop, amplitude and frequency follow the wind by plain formulas; no physics is measured from
+it.
 """
 
 from __future__ import annotations
@@ -37,11 +38,15 @@ class DrawnFlag:
         if self.width < 1.5 * self.length or self.height < 1.4 * self.length:
             raise InputError(
                 f"a flag of {self.length} px does not fit into {self.width} × {self.height}",
-                fix="give a picture at least 1.5 times as wide and 1.4 times as high as the flag is long",
+                fix="give a picture at least 1.5 times as wide and 1.4 times as high as the flag "
+                "is long",
             )
 
-    def frames(self, wind: FloatArray, rate: float, rng: np.random.Generator) -> Iterator[UInt8Array]:
-        """One gray picture (height, width) uint8 for each wind speed of `wind` [m/s] at `rate` [Hz]."""
+    def frames(
+        self, wind: FloatArray, rate: float, rng: np.random.Generator
+    ) -> Iterator[UInt8Array]:
+        """One gray picture (height, width) uint8 for each wind speed of `wind` [m/s] at `rate`
+        [Hz]."""
         scene = self._background(rng)
         grain = (self.noise * rng.standard_normal((16, self.height, self.width))).astype(np.float32)
         speed = _follow(np.maximum(wind, 0.0), self.response * rate)
@@ -55,7 +60,9 @@ class DrawnFlag:
         """Sky, haze, a tree line and the pole."""
         rows = np.arange(self.height, dtype=np.float32)[:, None]
         scene = np.broadcast_to(205 - 60 * rows / self.height, (self.height, self.width)).copy()
-        ridge = self.height * (0.9 - 0.03 * np.cumsum(rng.standard_normal(self.width)) / math.sqrt(self.width))
+        ridge = self.height * (
+            0.9 - 0.03 * np.cumsum(rng.standard_normal(self.width)) / math.sqrt(self.width)
+        )
         scene[rows > ridge] = 70
         scene[:, self._pole - 5 : self._pole] = 60
         return scene.astype(np.float32)
@@ -65,7 +72,8 @@ class DrawnFlag:
         return (self.width - self.length) // 3
 
     def _draw(self, picture: Float32Array, speed: float, phase: float, lean: float) -> None:
-        """Lay the flag over `picture`: hanging at no wind, streaming and rippling as the speed grows."""
+        """Lay the flag over `picture`: hanging at no wind, streaming and rippling as the speed
+        grows."""
         hoist = self.length * 2 / 3
         droop = math.atan2(1.0, 0.12 * speed**2 + 0.12) + lean
         reach, sag = self.length * math.cos(droop), self.length * math.sin(droop)
@@ -76,8 +84,12 @@ class DrawnFlag:
         ripple = amplitude * (np.sin(7 * fly - phase) + 0.35 * np.sin(12 * fly - 1.7 * phase))
         rows = np.arange(self.height, dtype=np.float32)[:, None]
         drop = (rows - 0.06 * self.height - sag * fly * 0.75 - ripple) / np.float32(hoist)
-        cover = np.clip(np.minimum(drop, 1 - drop) * hoist + 0.5, 0, 1) * np.clip((1 - fly) * reach + 0.5, 0, 1)
-        band = np.where(drop < 1 / 3, np.float32(95), np.where(drop < 2 / 3, np.float32(235), np.float32(45)))
+        cover = np.clip(np.minimum(drop, 1 - drop) * hoist + 0.5, 0, 1) * np.clip(
+            (1 - fly) * reach + 0.5, 0, 1
+        )
+        band = np.where(
+            drop < 1 / 3, np.float32(95), np.where(drop < 2 / 3, np.float32(235), np.float32(45))
+        )
         light = 1 + 0.25 * np.cos(7 * fly - phase) * np.minimum(fly * 3, 1)
         window += cover.astype(np.float32) * ((band * light).astype(np.float32) - window)
 

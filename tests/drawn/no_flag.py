@@ -1,7 +1,8 @@
-"""Drawn films that show no flag on a pole: a wall, text that scrolls, fire, birds, a curtain, umbrellas, leaves, palms,
-water, a crowd, a rotor, cloth below a bar, traffic.
+"""Drawn films that show no flag on a pole: a wall, text that scrolls, fire, birds, a curtain,
+umbrellas, leaves, palms, water, a crowd, a rotor, cloth below a bar, traffic.
 
-Each takes what is behind it, (n, height, width) at 25 Hz, and draws into a copy of it, by a random generator.
+Each takes what is behind it, (n, height, width) at 25 Hz, and draws into a copy of it, by a random
+generator.
 """
 
 from __future__ import annotations
@@ -33,7 +34,9 @@ def scroll(behind: UInt8Array, rng: np.random.Generator) -> UInt8Array:
     for row in range(0, len(page) - 12, 14):
         for left in range(4, width // 2 - 12, 12):
             if rng.random() < 0.8:
-                page[row : row + int(rng.integers(5, 9)), left : left + int(rng.integers(4, 10))] = 235
+                page[
+                    row : row + int(rng.integers(5, 9)), left : left + int(rng.integers(4, 10))
+                ] = 235
     film = behind.copy()
     for k, frame in enumerate(film):
         first = round(47.0 * k / RATE)
@@ -51,7 +54,9 @@ def fire(behind: UInt8Array, rng: np.random.Generator) -> UInt8Array:
     for frame, time in zip(film, times, strict=True):
         first = round(190 * time)
         rising = fuel[first : first + height]
-        shape = (rows - 0.25 * height) / (0.55 * height) - np.square((columns - width / 2) / (0.22 * width))
+        shape = (rows - 0.25 * height) / (0.55 * height) - np.square(
+            (columns - width / 2) / (0.22 * width)
+        )
         flames = (shape + 0.35 * rising > 0.35) & (rows < 0.8 * height)
         frame[flames] = np.clip(170 + 40 * rising, 0, 255)[flames]
     return film
@@ -68,12 +73,15 @@ def birds(behind: UInt8Array, rng: np.random.Generator) -> UInt8Array:
             across, down = (x + speed * time) * width, (y + 0.03 * np.sin(time + phase)) * height
             wing = down + 4 * np.sin(beat * time + phase)
             ends = [(across - 7, wing), (across, down), (across + 7, wing)]
-            cv2.polylines(frame, [np.rint(ends).astype(np.int32)], isClosed=False, color=15.0, thickness=2)
+            cv2.polylines(
+                frame, [np.rint(ends).astype(np.int32)], isClosed=False, color=15.0, thickness=2
+            )
     return film
 
 
 def curtain(behind: UInt8Array, rng: np.random.Generator) -> UInt8Array:
-    """A curtain at a window, whose folds wander and whose hem swings: a rail above it, a jamb at each side."""
+    """A curtain at a window, whose folds wander and whose hem swings: a rail above it, a jamb at
+    each side."""
     rows, columns, times = _grid(behind)
     height, width = behind.shape[1:]
     top, low, left, right = 0.2 * height, 0.85 * height, 0.3 * width, 0.7 * width
@@ -82,7 +90,12 @@ def curtain(behind: UInt8Array, rng: np.random.Generator) -> UInt8Array:
     film[:, round(top) - 5 : round(top), round(0.2 * width) : round(0.8 * width)] = 25
     down = (rows - top) / (low - top)
     for frame, time in zip(film, times, strict=True):
-        swing = 0.05 * width * np.square(down) * (np.sin(2.1 * time + first) + 0.6 * np.sin(3.7 * time + 1))
+        swing = (
+            0.05
+            * width
+            * np.square(down)
+            * (np.sin(2.1 * time + first) + 0.6 * np.sin(3.7 * time + 1))
+        )
         along = (columns - left - swing) / (right - left)
         folds = np.sin(2 * np.pi * 6 * along + 1.5 * np.sin(1.7 * time + 2 * down))
         own = (along >= 0) & (along < 1) & (down >= 0) & (down < 1)
@@ -98,9 +111,20 @@ def umbrellas(behind: UInt8Array, rng: np.random.Generator) -> UInt8Array:
     film = behind.copy()
     for frame, time in zip(film, times, strict=True):
         for x, y, speed, gray, phase in people:
-            at = (round((x + speed * time) * width), round((y + 0.012 * np.sin(9 * time + phase)) * height))
-            cv2.rectangle(frame, (at[0] - 6, at[1]), (at[0] + 6, at[1] + round(0.3 * height)), float(gray) / 2, -1)
-            cv2.ellipse(frame, at, (round(0.09 * width), round(0.11 * height)), 0, 180, 360, float(gray), -1)
+            at = (
+                round((x + speed * time) * width),
+                round((y + 0.012 * np.sin(9 * time + phase)) * height),
+            )
+            cv2.rectangle(
+                frame,
+                (at[0] - 6, at[1]),
+                (at[0] + 6, at[1] + round(0.3 * height)),
+                float(gray) / 2,
+                -1,
+            )
+            cv2.ellipse(
+                frame, at, (round(0.09 * width), round(0.11 * height)), 0, 180, 360, float(gray), -1
+            )
     return film
 
 
@@ -108,13 +132,20 @@ def leaves(behind: UInt8Array, rng: np.random.Generator) -> UInt8Array:
     """A tree's crown of leaves that sway, each by itself, on a trunk."""
     _, _, times = _grid(behind)
     height, width = behind.shape[1:]
-    crown = rng.normal((0.5 * width, 0.4 * height, 130, 9, 3), (0.1 * width, 0.1 * height, 45, 2, 2), (900, 5))
+    crown = rng.normal(
+        (0.5 * width, 0.4 * height, 130, 9, 3), (0.1 * width, 0.1 * height, 45, 2, 2), (900, 5)
+    )
     film = behind.copy()
     film[:, round(0.5 * height) :, round(0.49 * width) : round(0.51 * width)] = 40
     for frame, time in zip(film, times, strict=True):
         for x, y, gray, beat, phase in crown:
-            at = (round(x + 1.5 * np.sin(beat * time + phase)), round(y + 1.5 * np.cos(1.3 * beat * time + phase)))
-            cv2.ellipse(frame, at, (3, 2), 40 * float(phase), 0, 360, float(np.clip(gray, 20, 240)), -1)
+            at = (
+                round(x + 1.5 * np.sin(beat * time + phase)),
+                round(y + 1.5 * np.cos(1.3 * beat * time + phase)),
+            )
+            cv2.ellipse(
+                frame, at, (3, 2), 40 * float(phase), 0, 360, float(np.clip(gray, 20, 240)), -1
+            )
     return film
 
 
@@ -123,11 +154,19 @@ def palms(behind: UInt8Array, rng: np.random.Generator) -> UInt8Array:
     _, _, times = _grid(behind)
     height, width = behind.shape[1:]
     fronds = rng.uniform((-0.5, 0.25, 6, 0, 60), (0.9, 0.5, 16, 6, 130), (22, 5))
-    trunk = np.array([(0.25 * width, height), (0.26 * width, 0.7 * height), (0.32 * width, 0.42 * height)])
+    trunk = np.array(
+        [(0.25 * width, height), (0.26 * width, 0.7 * height), (0.32 * width, 0.42 * height)]
+    )
     film = behind.copy()
     for frame, time in zip(film, times, strict=True):
         top = trunk[-1] + (2.0 * np.sin(3.1 * time), 0.6 * np.cos(3.1 * time))
-        cv2.polylines(frame, [np.rint([*trunk[:-1], top]).astype(np.int32)], isClosed=False, color=50.0, thickness=7)
+        cv2.polylines(
+            frame,
+            [np.rint([*trunk[:-1], top]).astype(np.int32)],
+            isClosed=False,
+            color=50.0,
+            thickness=7,
+        )
         for slope, length, beat, phase, gray in fronds:
             along = np.linspace(0, 1, 9)
             swing = 0.12 * np.sin(beat * time + phase - 3 * along) * along
@@ -143,10 +182,17 @@ def water(behind: UInt8Array, rng: np.random.Generator) -> UInt8Array:
     rows, columns, times = _grid(behind)
     height, width = behind.shape[1:]
     waves = [rng.uniform((0.05, -0.3, 3, 0), (0.25, 0.3, 9, 6)) for _ in range(8)]
-    bed = (rows > 0.4 * height) & (rows < 0.92 * height) & (columns > 0.06 * width) & (columns < 0.94 * width)
+    bed = (
+        (rows > 0.4 * height)
+        & (rows < 0.92 * height)
+        & (columns > 0.06 * width)
+        & (columns < 0.94 * width)
+    )
     film = behind.copy()
     for frame, time in zip(film, times, strict=True):
-        level = sum(np.sin(a * columns + b * rows - rate * time + phase) for a, b, rate, phase in waves)
+        level = sum(
+            np.sin(a * columns + b * rows - rate * time + phase) for a, b, rate, phase in waves
+        )
         frame[bed] = np.clip(110 + 18 * np.asarray(level), 0, 255)[bed]
     return film
 
@@ -160,7 +206,10 @@ def crowd(behind: UInt8Array, rng: np.random.Generator) -> UInt8Array:
     film = behind.copy()
     for frame, time in zip(film, times, strict=True):
         for x, y, rate, phase, gray in heads:
-            at = (round(x + 7 * np.sin(rate * time + phase)), round(y + 3 * np.cos(1.3 * rate * time)))
+            at = (
+                round(x + 7 * np.sin(rate * time + phase)),
+                round(y + 3 * np.cos(1.3 * rate * time)),
+            )
             cv2.ellipse(frame, at, (5, 9), 0, 0, 360, float(gray), -1)
     return film
 
@@ -174,7 +223,13 @@ def rotor(behind: UInt8Array, rng: np.random.Generator) -> UInt8Array:
     film[:, y:, x - 2 : x + 2] = 20
     for frame, time in zip(film, times, strict=True):
         for angle in first + 5.3 * time + 0.4 * time**2 + np.array([0, 2, 4]) * np.pi / 3:
-            cv2.line(frame, (x, y), (round(x + blade * np.cos(angle)), round(y + blade * np.sin(angle))), 230.0, 4)
+            cv2.line(
+                frame,
+                (x, y),
+                (round(x + blade * np.cos(angle)), round(y + blade * np.sin(angle))),
+                230.0,
+                4,
+            )
     return film
 
 
@@ -209,7 +264,15 @@ def traffic(behind: UInt8Array, rng: np.random.Generator) -> UInt8Array:
             x = (start + (speed if number % 2 else -speed) * time) % 2.4 - 0.7
             y = (0.62 if number % 2 else 0.74) * height
             left, right = round(x * width), round((x + length) * width)
-            cv2.rectangle(frame, (left, round(y)), (right, round(y + 0.06 * height)), float(gray), -1)
+            cv2.rectangle(
+                frame, (left, round(y)), (right, round(y + 0.06 * height)), float(gray), -1
+            )
             roof = round(0.2 * length * width)
-            cv2.rectangle(frame, (left + roof, round(y - 0.04 * height)), (right - roof, round(y)), float(gray) / 2, -1)
+            cv2.rectangle(
+                frame,
+                (left + roof, round(y - 0.04 * height)),
+                (right - roof, round(y)),
+                float(gray) / 2,
+                -1,
+            )
     return film

@@ -20,7 +20,9 @@ from tests.confirming import CONFIRMED
 VIDEO_START = "2026-05-01T10:00:00Z"
 
 
-def write_video(path: Path, *, frames: int = 100, rate: int = 50, creation_time: str | None = VIDEO_START) -> Path:
+def write_video(
+    path: Path, *, frames: int = 100, rate: int = 50, creation_time: str | None = VIDEO_START
+) -> Path:
     """Writes an MP4 of a bright bar that sways, (48, 64) pixels, constant rate."""
     column, row = np.meshgrid(np.arange(64), np.arange(48))
     with av.open(str(path), "w") as container:

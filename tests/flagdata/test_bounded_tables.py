@@ -1,4 +1,5 @@
-"""Parquet tables and NumPy archives are read only where what they hold can be held, whatever their size."""
+"""Parquet tables and NumPy archives are read only where what they hold can be held, whatever their
+size."""
 
 from __future__ import annotations
 
@@ -42,7 +43,9 @@ def _one_long_text(path: Path) -> Path:
     return path
 
 
-def test_a_table_that_states_more_rows_than_can_be_held_is_refused_before_it_is_read(tmp_path: Path) -> None:
+def test_a_table_that_states_more_rows_than_can_be_held_is_refused_before_it_is_read(
+    tmp_path: Path,
+) -> None:
     path = _zeros(tmp_path / "a.parquet", rows=40_000_000)
     assert path.stat().st_size < 1 << 20
     before = pa.total_allocated_bytes()
@@ -61,7 +64,9 @@ def test_a_long_text_that_many_rows_name_is_refused_when_its_rows_are_too_many(
 
 
 def test_a_table_is_read_as_pyarrow_reads_it(tmp_path: Path) -> None:
-    table = pa.table({"a": list(range(2000)), "b": [[k] * (k % 3) for k in range(2000)], "c/d": ["x"] * 2000})
+    table = pa.table(
+        {"a": list(range(2000)), "b": [[k] * (k % 3) for k in range(2000)], "c/d": ["x"] * 2000}
+    )
     pq.write_table(table, tmp_path / "a.parquet")
     assert read_parquet(tmp_path / "a.parquet").equals(table)
     assert read_parquet(tmp_path / "a.parquet", ["c/d", "a"]).equals(table.select(["c/d", "a"]))
@@ -85,8 +90,13 @@ def test_a_lake_whose_rows_state_more_than_can_be_held_is_refused(tmp_path: Path
 def _zipped(path: Path, size: int) -> Path:
     """An archive of one array of zeros."""
     head = io.BytesIO()
-    np.lib.format.write_array_header_1_0(head, {"descr": "|u1", "fortran_order": False, "shape": (size,)})
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("a.npy", "w") as member:
+    np.lib.format.write_array_header_1_0(
+        head, {"descr": "|u1", "fortran_order": False, "shape": (size,)}
+    )
+    with (
+        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive,
+        archive.open("a.npy", "w") as member,
+    ):
         member.write(head.getvalue())
         for _ in range(size >> 20):
             member.write(bytes(1 << 20))
@@ -94,7 +104,9 @@ def _zipped(path: Path, size: int) -> Path:
 
 
 @pytest.mark.parametrize(
-    "read", [lambda path: read_arrays(path, what="an archive", fix="copy it again"), bank._content], ids=["any", "bank"]
+    "read",
+    [lambda path: read_arrays(path, what="an archive", fix="copy it again"), bank._content],
+    ids=["any", "bank"],
 )
 def test_an_archive_that_unpacks_to_more_than_can_be_held_is_refused(
     tmp_path: Path, read: Callable[[Path], object]

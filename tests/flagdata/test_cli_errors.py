@@ -13,10 +13,14 @@ from flagdata.errors import InputError, LimitError
 
 
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+def run(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., tuple[int, str, str]]:
     """Runs a command that raises the error given: exit code, stdout, stderr."""
 
-    def run(error: BaseException, *options: str, before: tuple[str, ...] = ()) -> tuple[int, str, str]:
+    def run(
+        error: BaseException, *options: str, before: tuple[str, ...] = ()
+    ) -> tuple[int, str, str]:
         @click.command()
         @click.option("--json", "as_json", is_flag=True)
         def broken(as_json: bool) -> None:
@@ -34,9 +38,12 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> 
 
 
 @pytest.mark.parametrize(
-    "error", [KeyError("x"), RecursionError(), ZeroDivisionError("no"), ExceptionGroup("g", [OSError()])]
+    "error",
+    [KeyError("x"), RecursionError(), ZeroDivisionError("no"), ExceptionGroup("g", [OSError()])],
 )
-def test_an_unforeseen_exception_is_one_line_with_the_request_to_report_it(run, error: Exception) -> None:
+def test_an_unforeseen_exception_is_one_line_with_the_request_to_report_it(
+    run, error: Exception
+) -> None:
     code, out, err = run(error)
     assert (code, out) == (1, "")
     assert err.startswith(f"flagdata: an unforeseen error occurred: {type(error).__name__}")
@@ -66,7 +73,10 @@ def test_programs_read_the_kind_of_what_was_unforeseen(run) -> None:
 def test_what_the_system_refuses_is_named_with_its_file(run) -> None:
     code, _, err = run(PermissionError(13, "Permission denied", "/data/x"))
     assert code == 1
-    assert err.splitlines()[:2] == ["flagdata: the system refused: Permission denied", "  where: /data/x"]
+    assert err.splitlines()[:2] == [
+        "flagdata: the system refused: Permission denied",
+        "  where: /data/x",
+    ]
 
 
 def test_a_file_that_ends_too_early_is_no_interruption_by_the_user(run) -> None:

@@ -38,13 +38,22 @@ def test_error_kinds_are_distinct_and_errors_survive_a_process_boundary() -> Non
 
 def test_every_kind_of_error_is_that_of_one_class_and_keeps_its_text() -> None:
     product = [tree(path) for path in modules("flagdata", "sim", "models", "measure")]
-    classes = [node for source in product for node in ast.walk(source) if isinstance(node, ast.ClassDef)]
+    classes = [
+        node for source in product for node in ast.walk(source) if isinstance(node, ast.ClassDef)
+    ]
     errors = {"FlagdataError"}
-    while more := {node.name for node in classes if errors & set(map(ast.unparse, node.bases))} - errors:
+    while (
+        more := {node.name for node in classes if errors & set(map(ast.unparse, node.bases))}
+        - errors
+    ):
         errors |= more
     kinds = {f"ErrorKind.{kind.name}" for kind in ErrorKind}
     used = [
-        [ast.unparse(line.value) for line in node.body if isinstance(line, ast.Assign | ast.AnnAssign) and line.value]
+        [
+            ast.unparse(line.value)
+            for line in node.body
+            if isinstance(line, ast.Assign | ast.AnnAssign) and line.value
+        ]
         for node in classes
         if node.name in errors
     ]
@@ -132,13 +141,18 @@ def test_a_recipe_hash_ignores_order_and_sees_values() -> None:
 def test_the_file_hash_is_sha256(tmp_path: Path) -> None:
     (tmp_path / "abc").write_bytes(b"abc")
     # FIPS 180-2, appendix B.1
-    assert provenance.file_hash(tmp_path / "abc") == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+    assert (
+        provenance.file_hash(tmp_path / "abc")
+        == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+    )
 
 
 def test_two_states_of_a_checkout_are_two_versions_of_the_code(tmp_path: Path) -> None:
     def git(*arguments: str) -> str:
         who = ("-c", "user.name=a", "-c", "user.email=a@b")
-        done = subprocess.run(["git", *who, *arguments], cwd=tmp_path, capture_output=True, text=True, check=True)
+        done = subprocess.run(
+            ["git", *who, *arguments], cwd=tmp_path, capture_output=True, text=True, check=True
+        )
         return done.stdout.strip()
 
     assert provenance.commit_of(tmp_path) is None
@@ -156,7 +170,9 @@ def test_two_states_of_a_checkout_are_two_versions_of_the_code(tmp_path: Path) -
     assert all(str(one).startswith(f"{commit}-dirty.") for one in found[1:])
 
 
-_REPOSITORYS_OWN = subprocess.run(["git", "rev-parse", "--local-env-vars"], capture_output=True, text=True, check=True)
+_REPOSITORYS_OWN = subprocess.run(
+    ["git", "rev-parse", "--local-env-vars"], capture_output=True, text=True, check=True
+)
 GIT_VARIABLES = {
     **dict.fromkeys(_REPOSITORYS_OWN.stdout.split(), "{other}/.git"),
     "GIT_WORK_TREE": "{other}",
@@ -171,7 +187,8 @@ GIT_VARIABLES = {
     "GIT_REFLOG_ACTION": "rebase",
     "GIT_TRACE": "1",
 }
-"""What git sets for a hook, `rebase -x` or an alias, or a user does → a value that means another repository."""
+"""What git sets for a hook, `rebase -x` or an alias, or a user does → a value that means another
+repository."""
 
 
 @pytest.mark.parametrize("variable", GIT_VARIABLES)
@@ -183,7 +200,11 @@ def test_the_version_of_the_code_is_its_checkouts_within_a_hook_of_another_repos
         folder.mkdir()
         (folder / "lift.py").write_text(folder.name)
         for arguments in (["init", "-q"], ["add", "."], ["commit", "-qm", folder.name]):
-            subprocess.run(["git", "-c", "user.name=a", "-c", "user.email=a@b", *arguments], cwd=folder, check=True)
+            subprocess.run(
+                ["git", "-c", "user.name=a", "-c", "user.email=a@b", *arguments],
+                cwd=folder,
+                check=True,
+            )
     (checkout / "lift.py").write_text("changed")
     commit = provenance.commit_of(checkout)
     monkeypatch.setenv(variable, GIT_VARIABLES[variable].format(other=other, parent=tmp_path))
@@ -204,7 +225,9 @@ def test_quality_flags_are_warnings_and_errors_once() -> None:
     def found(kind: str, severity: Severity) -> Finding:
         return Finding(kind=kind, severity=severity, what="")
 
-    kinds = quality_flags((found("b", Severity.WARNING), found("a", Severity.ERROR), found("b", Severity.ERROR)))
+    kinds = quality_flags(
+        (found("b", Severity.WARNING), found("a", Severity.ERROR), found("b", Severity.ERROR))
+    )
     assert kinds == ["a", "b"]
     assert quality_flags((found("c", Severity.NOTE),)) == []
 
@@ -215,7 +238,12 @@ def test_errors_on_the_command_line_say_what_and_how_to_mend_it(tmp_path: Path) 
 
 
 def test_a_misspelt_verb_exits_2() -> None:
-    done = subprocess.run([sys.executable, "-m", "flagdata.cli", "ingets"], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-m", "flagdata.cli", "ingets"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 2
     assert "ingest" in done.stderr
 

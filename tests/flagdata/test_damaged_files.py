@@ -1,4 +1,5 @@
-"""Every format of file that is read back, with its bytes changed: only errors of flagdata come out."""
+"""Every format of file that is read back, with its bytes changed: only errors of flagdata come
+out."""
 
 from __future__ import annotations
 
@@ -103,7 +104,10 @@ def write_mesh_store(path: Path) -> None:
     positions = np.zeros((4, 9, 3), dtype=np.float32)
     positions[..., :2] = GRID
     sequence = MeshSequence(
-        time=np.arange(4, dtype=np.int64), positions=positions, faces=faces, rest=GRID.astype(np.float32)
+        time=np.arange(4, dtype=np.int64),
+        positions=positions,
+        faces=faces,
+        rest=GRID.astype(np.float32),
     )
     write_meshes(path, sequence)
 
@@ -154,12 +158,16 @@ def test_a_chunk_that_states_another_length_than_it_has_is_refused_before_memory
 ) -> None:
     write, read = STORES[kind]
     write(tmp_path / "made.zarr")
-    (chunk,) = (path for path in (tmp_path / "made.zarr" / "positions" / "c").rglob("*") if path.is_file())
+    (chunk,) = (
+        path for path in (tmp_path / "made.zarr" / "positions" / "c").rglob("*") if path.is_file()
+    )
     data = bytearray(chunk.read_bytes())
     length = int.from_bytes(data[12:16], "little")  # of the first of the shard
     data[12:16] = (length + 1).to_bytes(4, "little")
     chunk.write_bytes(data)
-    with pytest.raises((CorruptError, ValueError), match=f"a chunk has {length} bytes and states {length + 1}"):
+    with pytest.raises(
+        (CorruptError, ValueError), match=f"a chunk has {length} bytes and states {length + 1}"
+    ):
         read(tmp_path / "made.zarr")
 
 
@@ -202,7 +210,9 @@ def test_a_store_that_claims_a_huge_shape_is_refused_before_memory_is_taken(
     write(tmp_path / "made.zarr")
     path = tmp_path / "made.zarr" / "positions" / "zarr.json"
     path.write_text(json.dumps(changed(json.loads(path.read_text()), keys, value)))
-    if kind == "meshes" and keys == ("shape",):  # read frame by frame: `time` says how many there are
+    if kind == "meshes" and keys == (
+        "shape",
+    ):  # read frame by frame: `time` says how many there are
         time = tmp_path / "made.zarr" / "time" / "zarr.json"
         time.write_text(json.dumps(changed(json.loads(time.read_text()), keys, value[:1])))
     with pytest.raises((LimitError, CorruptError)):
@@ -212,7 +222,12 @@ def test_a_store_that_claims_a_huge_shape_is_refused_before_memory_is_taken(
 def marker_rows(path: Path) -> None:
     names = [str(marker) for _ in range(4) for marker in range(9)]
     columns = {"marker": names, "frame": np.repeat(np.arange(4), 9), "u": np.tile(GRID[:, 0], 4)}
-    columns |= {"v": np.tile(GRID[:, 1], 4), "x": np.zeros(36), "y": np.zeros(36), "z": np.arange(36.0)}
+    columns |= {
+        "v": np.tile(GRID[:, 1], 4),
+        "x": np.zeros(36),
+        "y": np.zeros(36),
+        "z": np.arange(36.0),
+    }
     pyarrow.parquet.write_table(pa.table(columns), path, write_page_checksum=True)
 
 
@@ -244,7 +259,9 @@ def test_a_damaged_parquet_table_of_markers_is_read_or_refused_and_so_is_one_wit
             read_table(path, MarkerOptions(rate=25.0))
 
 
-def test_a_parquet_table_beyond_the_limit_says_which(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_parquet_table_beyond_the_limit_says_which(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     marker_rows(tmp_path / "markers.parquet")
     monkeypatch.setattr(marker_table, "POSITIONS_LIMIT", 35)
     with pytest.raises(LimitError, match="at most 35 rows"):
@@ -253,7 +270,10 @@ def test_a_parquet_table_beyond_the_limit_says_which(tmp_path: Path, monkeypatch
 
 def test_a_damaged_table_of_markers_in_text_is_read_or_refused(tmp_path: Path) -> None:
     path = tmp_path / "markers.csv"
-    rows = ["marker,u,v,x,y,z,frame", *(f"{m},{m % 3},{m // 3},0.1,0.2,0.3,{f}" for f in range(3) for m in range(9))]
+    rows = [
+        "marker,u,v,x,y,z,frame",
+        *(f"{m},{m % 3},{m // 3},0.1,0.2,0.3,{f}" for f in range(3) for m in range(9)),
+    ]
     sound = "\n".join(rows).encode()
 
     read_or_refused_when_damaged(path, sound)
@@ -273,8 +293,12 @@ def test_a_damaged_obj_file_is_read_or_refused(tmp_path: Path) -> None:
     law()
 
 
-@pytest.mark.parametrize("name", ["lake.json", "refs/tags/v1.json", "catalog/_delta_log/00000000000000000000.json"])
-def test_a_lake_whose_small_files_are_damaged_is_opened_or_refused(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "name", ["lake.json", "refs/tags/v1.json", "catalog/_delta_log/00000000000000000000.json"]
+)
+def test_a_lake_whose_small_files_are_damaged_is_opened_or_refused(
+    name: str, tmp_path: Path
+) -> None:
     made = Lake.create(tmp_path / "made")
     made.tag("v1")
     path = tmp_path / "lake" / name

@@ -1,5 +1,5 @@
-"""The package of docs/extending.md, as if it were installed: an effect, a log format, a data set, a network and a
-renderer from outside, by public names alone, each used by its command."""
+"""The package of docs/extending.md, as if it were installed: an effect, a log format, a data set, a
+network and a renderer from outside, by public names alone, each used by its command."""
 
 from __future__ import annotations
 
@@ -53,12 +53,17 @@ def shown() -> dict[str, str]:
     return {"calmlog.py": files("wind-formats.md")["calmlog.py"], **files(PAGE)}
 
 
-def installed(folder: Path, points: dict[str, dict[str, str]], monkeypatch: pytest.MonkeyPatch) -> None:
+def installed(
+    folder: Path, points: dict[str, dict[str, str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Makes what lies in a folder importable, with entry points as if it were installed."""
     info = folder / "meadow-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: meadow\nVersion: 1.0\n")
-    lines = [f"[{group}]\n" + "".join(f"{k} = {v}\n" for k, v in entries.items()) for group, entries in points.items()]
+    lines = [
+        f"[{group}]\n" + "".join(f"{k} = {v}\n" for k, v in entries.items())
+        for group, entries in points.items()
+    ]
     (info / "entry_points.txt").write_text("\n".join(lines))
     monkeypatch.syspath_prepend(str(folder))
     for registry in REGISTRIES.values():
@@ -87,7 +92,8 @@ def test_the_package_of_the_page_imports_public_names_alone_and_adds_one_of_each
         if name.endswith(".py")
         for node in ast.walk(ast.parse(text))
         if isinstance(node, ast.ImportFrom) and node.module is not None
-        if node.module.partition(".")[0] in ("flagdata", "sim", "models", "measure") and node.module != "flagdata"
+        if node.module.partition(".")[0] in ("flagdata", "sim", "models", "measure")
+        and node.module != "flagdata"
     }
     assert imported <= PUBLIC
     assert "flagdata.extend" in imported
@@ -96,17 +102,23 @@ def test_the_package_of_the_page_imports_public_names_alone_and_adds_one_of_each
 
 
 def test_the_page_lists_the_public_names_and_each_leads_to_something() -> None:
-    table = (DOCS / PAGE).read_text(encoding="utf-8").partition("## What `flagdata.extend` holds")[2]
+    table = (
+        (DOCS / PAGE).read_text(encoding="utf-8").partition("## What `flagdata.extend` holds")[2]
+    )
     assert set(re.findall(r"`(\w+)`", table)) == {*dir(extend)}
     assert all(getattr(extend, name) is not None for name in dir(extend))
     with pytest.raises(AttributeError, match="ForceEfect"):
         _ = extend.ForceEfect
 
 
-def test_an_effect_a_data_set_and_a_renderer_from_outside_are_used_by_build(meadow: Path, tmp_path: Path) -> None:
+def test_an_effect_a_data_set_and_a_renderer_from_outside_are_used_by_build(
+    meadow: Path, tmp_path: Path
+) -> None:
     assert "Drag of a fringe of threads on the cloth" in invoke("catalog", "effects").out
     assert "Flags with a fringe, as dots" in invoke("catalog", "datasets").out
-    planned = invoke("build", "meadow", "--lake", tmp_path / "lake", "--plan", "--workers", 1, "--json")
+    planned = invoke(
+        "build", "meadow", "--lake", tmp_path / "lake", "--plan", "--workers", 1, "--json"
+    )
     assert planned.code == 0, planned.err
     assert planned.document["films"] == {"train": 6, "validation": 2, "test": 2}
     names: dict[str, Any] = {}
@@ -119,7 +131,9 @@ def test_an_effect_a_data_set_and_a_renderer_from_outside_are_used_by_build(mead
 
 def test_a_log_format_from_outside_is_used_by_ingest(meadow: Path, tmp_path: Path) -> None:
     log, lake = tmp_path / "calm.log", Lake.create(tmp_path / "lake")
-    log.write_text("".join(f"CALM 2026-05-01T12:00:{second:02d}Z 4.{second % 10}\n" for second in range(30)))
+    log.write_text(
+        "".join(f"CALM 2026-05-01T12:00:{second:02d}Z 4.{second % 10}\n" for second in range(30))
+    )
     done = invoke("ingest", log, "--lake", lake.path)
     assert done.code == 0, done.err
     (row,) = Lake.open(lake.path).rows("kind = 'wind'").to_pylist()
@@ -151,9 +165,17 @@ def test_a_network_that_states_no_length_of_its_embedding_is_refused_with_what_t
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "unmeasured.py").write_text(
-        "from torch import nn\nclass Unmeasured(nn.Identity):\n    takes = 'frames'\n    recurrent = False\n"
+        "from torch import nn\nclass Unmeasured(nn.Identity):\n    takes = 'frames'\n    recurrent "
+        "= False\n"
     )
     installed(tmp_path, {"flagdata.networks": {"unmeasured": "unmeasured:Unmeasured"}}, monkeypatch)
     with pytest.raises(InputError, match=r"lacks one of .* flagdata\.extend\.Network"):
-        build("unmeasured", {}, loss=Loss.REGRESSION, targets=("wind_speed",), components=1, margin=1.0)
+        build(
+            "unmeasured",
+            {},
+            loss=Loss.REGRESSION,
+            targets=("wind_speed",),
+            components=1,
+            margin=1.0,
+        )
     del sys.modules["unmeasured"]

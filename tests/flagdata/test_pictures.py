@@ -16,7 +16,9 @@ def test_the_middle_of_a_clip_in_colour_is_shown_in_colour() -> None:
     clip = np.zeros((3, 20, 40, 3), dtype=np.uint8)
     clip[..., 0] = 200
     clip[:, :, 10:30] = (0, 0, 200)
-    with Image.open(io.BytesIO(base64.b64decode(moving(clip, rate=10, side=16).partition(",")[2]))) as image:
+    with Image.open(
+        io.BytesIO(base64.b64decode(moving(clip, rate=10, side=16).partition(",")[2]))
+    ) as image:
         shown = np.asarray(image.convert("RGB")).astype(int)
     assert shown.shape == (16, 16, 3)
     assert (shown[..., 2] > 150).all()

@@ -1,5 +1,5 @@
-"""Packages that add effects and formats by entry points: a defect of one is named with its package, and stops nothing
-else."""
+"""Packages that add effects and formats by entry points: a defect of one is named with its package,
+and stops nothing else."""
 
 from __future__ import annotations
 
@@ -57,7 +57,10 @@ DEFECTS = {
     "a number": ("Found = 5", "odd = anothers:Found"),
     "another class": ("class Found: pass", "odd = anothers:Found"),
     "a module": ("", "odd = anothers"),
-    "name of another": (EFFECT.format(name="Found"), "lift = anothers:Found\ntoa5 = anothers:Found"),
+    "name of another": (
+        EFFECT.format(name="Found"),
+        "lift = anothers:Found\ntoa5 = anothers:Found",
+    ),
 }
 
 
@@ -73,7 +76,9 @@ def test_a_plug_in_that_cannot_be_used_is_named_with_its_package_and_the_others_
     shown = invoke("catalog", kind, "--json")
     assert shown.code == 0
     (listed,) = shown.document["kinds"]
-    assert set(listed["names"]) & whole == whole - {line.partition(" ")[0] for line in point.splitlines()}
+    assert set(listed["names"]) & whole == whole - {
+        line.partition(" ")[0] for line in point.splitlines()
+    }
     assert "odd" not in listed["names"]
     assert PACKAGE in shown.err
     assert "\x1b" not in shown.err

@@ -1,4 +1,5 @@
-"""No command of the program gives a terminal what it would obey, also where other users named what is printed.
+"""No command of the program gives a terminal what it would obey, also where other users named what
+is printed.
 
 The commands are those of the click tree: one that is added has to be given arguments here.
 """
@@ -27,8 +28,11 @@ from flagdata.core.schema import CATALOG, catalog_schema
 from flagdata.lake import Lake
 from tests.program import invoke
 
-EVIL = "\x1b]0;pwned\x07\x1b[2J\x7f\x9b2J\u202eexe.\u2066\u2028\n      9  cdeadbeef  forged line\r\b"
-"""Sequences that set the title and clear the screen, in 7 and 8 bits; marks of direction; ends of lines."""
+EVIL = (
+    "\x1b]0;pwned\x07\x1b[2J\x7f\x9b2J\u202eexe.\u2066\u2028\n      9  cdeadbeef  forged line\r\b"
+)
+"""Sequences that set the title and clear the screen, in 7 and 8 bits; marks of direction; ends of
+lines."""
 UNIT = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
 
 
@@ -86,13 +90,18 @@ def of_another(folder: Path) -> tuple[Lake, str]:
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """A folder with the lake, and files of other users: their names, headers, recipes and values hold `EVIL`."""
+    """A folder with the lake, and files of other users: their names, headers, recipes and values
+    hold `EVIL`."""
     folder = tmp_path_factory.mktemp("scene")
     _, identity = of_another(folder / "lake")
     name = EVIL.replace("/", "").replace("\n", " ")
-    (folder / "log.csv").write_text(f"time,wind_speed {EVIL!r} (m/s),{name}\n2026-05-01T12:00:00Z,5,{name}\n")
+    (folder / "log.csv").write_text(
+        f"time,wind_speed {EVIL!r} (m/s),{name}\n2026-05-01T12:00:00Z,5,{name}\n"
+    )
     (folder / f"{name}.csv").write_text("time,wind_speed (m/s)\n2026-05-01T12:00:00Z,5\n")
-    (folder / "recipe.toml").write_text(f'"{json.dumps(EVIL)[1:-1]}" = "{json.dumps(EVIL)[1:-1]}"\n')
+    (folder / "recipe.toml").write_text(
+        f'"{json.dumps(EVIL)[1:-1]}" = "{json.dumps(EVIL)[1:-1]}"\n'
+    )
     (folder / "film.mcap").write_bytes(b"\x89MCAP0\r\n" + EVIL.encode() * 20)
     (folder / "soup").mkdir()
     (folder / "soup" / "flag_0.obj").write_text(UNIT + f"{name} 1\n")
@@ -104,10 +113,20 @@ def calls(folder: Path, identity: str) -> dict[tuple[str, ...], list[list[str]]]
     """What is typed for each command."""
     lake = ["--lake", str(folder / "lake")]
     names = sorted(path for path in folder.glob("*.csv") if path.name != "log.csv")
-    recipe, film, odd = str(folder / "recipe.toml"), str(folder / "film.mcap"), str(names[0] if names else folder)
+    recipe, film, odd = (
+        str(folder / "recipe.toml"),
+        str(folder / "film.mcap"),
+        str(names[0] if names else folder),
+    )
     log, out = str(folder / "log.csv"), str(folder / "out")
     return {
-        ("ingest",): [[log, *lake], [odd, *lake], [film, *lake], [str(folder / "soup"), "--dry-run", *lake], [EVIL]],
+        ("ingest",): [
+            [log, *lake],
+            [odd, *lake],
+            [film, *lake],
+            [str(folder / "soup"), "--dry-run", *lake],
+            [EVIL],
+        ],
         ("align",): [[EVIL, EVIL, *lake], [identity, identity, *lake]],
         ("realign",): [[identity, *lake], [EVIL, *lake]],
         ("declare",): [[identity, "--wind", "3", "--sigma", "1", *lake], [EVIL, *lake]],
@@ -143,7 +162,11 @@ def calls(folder: Path, identity: str) -> dict[tuple[str, ...], list[list[str]]]
         ("merge",): [[EVIL, *lake]],
         ("label",): [[identity, f"{EVIL}=1", *lake], [identity, f"a={EVIL}", *lake]],
         ("withdraw",): [[EVIL, "-m", EVIL, *lake]],
-        ("export",): [["parquet", "--to", out, *lake], ["csv", "--to", f"{out}2", *lake], [EVIL, "--to", out, *lake]],
+        ("export",): [
+            ["parquet", "--to", out, *lake],
+            ["csv", "--to", f"{out}2", *lake],
+            [EVIL, "--to", out, *lake],
+        ],
         ("push",): [[EVIL, *lake], [film, *lake]],
         ("pull",): [[EVIL, *lake]],
         ("clone",): [[str(folder / "lake"), str(folder / "copy")], [EVIL, out]],
@@ -172,7 +195,9 @@ def test_every_command_is_called_here() -> None:
 
 
 @pytest.mark.parametrize("path", COMMANDS, ids=" ".join)
-def test_a_command_prints_nothing_that_a_terminal_obeys(path: tuple[str, ...], scene: tuple[Path, str]) -> None:
+def test_a_command_prints_nothing_that_a_terminal_obeys(
+    path: tuple[str, ...], scene: tuple[Path, str]
+) -> None:
     assert path[0] in VERBS
     folder, identity = scene
     for arguments in calls(folder, identity)[path]:
@@ -190,7 +215,9 @@ def test_a_message_of_several_lines_forges_no_line_of_the_log(scene: tuple[Path,
     assert printable(EVIL) in shown.out
 
 
-def test_texts_that_come_from_another_lake_are_reported_and_stay_as_they_are(tmp_path: Path) -> None:
+def test_texts_that_come_from_another_lake_are_reported_and_stay_as_they_are(
+    tmp_path: Path,
+) -> None:
     of_another(tmp_path / "lake")
     done = invoke("clone", tmp_path / "lake", tmp_path / "copy")
     assert done.code == 0

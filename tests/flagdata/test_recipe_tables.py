@@ -123,7 +123,11 @@ def test_every_type_of_field_is_read() -> None:
 @pytest.mark.parametrize(
     ("content", "kind", "what"),
     [
-        ({"frame-rat": 1.0, "count": "many"}, UnknownNameError, "did you mean 'frame-rate'"),  # before any value
+        (
+            {"frame-rat": 1.0, "count": "many"},
+            UnknownNameError,
+            "did you mean 'frame-rate'",
+        ),  # before any value
         ({"frame-rate": 0}, InputError, "above 0"),
         ({"height": -1}, InputError, "above 0"),
         ({"count": 0}, InputError, "at least 1"),
@@ -143,21 +147,47 @@ def test_every_type_of_field_is_read() -> None:
         ({"kinds": ["larg"]}, UnknownNameError, "did you mean 'large'"),
         ({"sign": "at"}, InputError, 'give "from" or "to"'),
         ({"speed": {"low": 1, "high": 101}}, InputError, "at most 100"),
-        ({"speed": {"low": 2, "high": 1}}, InputError, "recipe speed: the range from 2.0 to 1.0 is empty"),
+        (
+            {"speed": {"low": 2, "high": 1}},
+            InputError,
+            "recipe speed: the range from 2.0 to 1.0 is empty",
+        ),
         ({"speed": {"low": 1, "high": 2, "scale": "lg"}}, UnknownNameError, "did you mean 'log'"),
         ({"points": [[0]]}, InputError, r"a list, \[\[0.0, 0.0\], …\]"),
-        ({"column": 10}, InputError, "text in quotes or a whole number of at least 1 and of at most 9"),
-        ({"renderer": "rastr"}, UnknownNameError, "unknown renderer 'rastr'; did you mean 'raster'"),
+        (
+            {"column": 10},
+            InputError,
+            "text in quotes or a whole number of at least 1 and of at most 9",
+        ),
+        (
+            {"renderer": "rastr"},
+            UnknownNameError,
+            "unknown renderer 'rastr'; did you mean 'raster'",
+        ),
         ({"toward": 10.0}, InputError, "toward-deg = 10"),
         ({"toward": 1.0, "toward-deg": 1.0}, InputError, "toward is given twice"),
         ({"north": {"low": 0, "high": 1}}, InputError, "north is"),
         ({"parts": {}}, InputError, "parts is"),
-        ({"parts": [{"weight": 1}, {"wight": 1}]}, UnknownNameError, r"recipe \[\[parts\]\] 2: unknown key 'wight'"),
-        ({"by-name": {"tran": {}}}, UnknownNameError, r"recipe \[by-name\]: unknown side 'tran'; did you mean 'train'"),
-        ({"by-name": {"train": {}}}, InputError, r"recipe \[by-name\] \[train\]: the key weight is missing"),
+        (
+            {"parts": [{"weight": 1}, {"wight": 1}]},
+            UnknownNameError,
+            r"recipe \[\[parts\]\] 2: unknown key 'wight'",
+        ),
+        (
+            {"by-name": {"tran": {}}},
+            UnknownNameError,
+            r"recipe \[by-name\]: unknown side 'tran'; did you mean 'train'",
+        ),
+        (
+            {"by-name": {"train": {}}},
+            InputError,
+            r"recipe \[by-name\] \[train\]: the key weight is missing",
+        ),
         ({"by-name": {"train": 3}}, InputError, r"recipe \[by-name\] \[train\]: 3 is not a table"),
     ],
 )
-def test_what_does_not_fit_is_refused(content: dict[str, object], kind: type[Exception], what: str) -> None:
+def test_what_does_not_fit_is_refused(
+    content: dict[str, object], kind: type[Exception], what: str
+) -> None:
     with pytest.raises(kind, match=what):
         spec(**content)

@@ -44,7 +44,8 @@ def _without_bars(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def check_told(run: Ended) -> None:
-    """Checks that a terminal was given what it may be given, and that what went wrong was an error of flagdata."""
+    """Checks that a terminal was given what it may be given, and that what went wrong was an error
+    of flagdata."""
     text = run.out + run.err
     assert "unforeseen" not in text, text
     assert all(letter.isprintable() or letter == "\n" for letter in text), text
@@ -57,11 +58,17 @@ def check_told(run: Ended) -> None:
 def _recording(path: Path, topic: str, attachment: str) -> Path:
     with path.open("wb") as stream, Writer(stream) as writer:
         for k, image in enumerate(pictures()[:10]):
-            message = stamped(CompressedImage(format="png", data=encoded(image, "PNG"), frame_id=topic), k)
+            message = stamped(
+                CompressedImage(format="png", data=encoded(image, "PNG"), frame_id=topic), k
+            )
             at = NOON + k * STEP
             writer.write_message(topic, message, log_time=at, publish_time=at)
         writer._writer.add_attachment(
-            create_time=NOON, log_time=NOON, name=attachment, media_type=attachment, data=b"not a file"
+            create_time=NOON,
+            log_time=NOON,
+            name=attachment,
+            media_type=attachment,
+            data=b"not a file",
         )
         writer._writer.add_metadata(attachment, {attachment: attachment})
     return path
@@ -94,11 +101,21 @@ def test_metadata_of_a_film_moves_no_cursor(name: str, tmp_path: Path) -> None:
     with av.open(str(film), "w", format="matroska") as container:
         stream: Any = container.add_stream("mjpeg", rate=Fraction(25))
         stream.width, stream.height, stream.pix_fmt = 64, 48, "yuvj420p"
-        for key in ("title", "comment", "make", "model", "encoder", "com.apple.quicktime.model", "location"):
+        for key in (
+            "title",
+            "comment",
+            "make",
+            "model",
+            "encoder",
+            "com.apple.quicktime.model",
+            "location",
+        ):
             container.metadata[key] = name
             stream.metadata[key] = name
         for image in pictures()[:20]:
-            frame = av.VideoFrame.from_ndarray(np.repeat(image[..., None], 3, axis=2), format="rgb24")
+            frame = av.VideoFrame.from_ndarray(
+                np.repeat(image[..., None], 3, axis=2), format="rgb24"
+            )
             for packet in stream.encode(frame.reformat(format="yuvj420p")):
                 container.mux(packet)
         for packet in stream.encode(None):
@@ -112,7 +129,9 @@ def test_metadata_of_a_film_moves_no_cursor(name: str, tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} == {"lake", "film.mkv"}
 
 
-@pytest.mark.parametrize("names", [(name, "b") for name in NAMES] + [("flag", "FLAG"), ("a", "a"), ("ſ", "s")])
+@pytest.mark.parametrize(
+    "names", [(name, "b") for name in NAMES] + [("flag", "FLAG"), ("a", "a"), ("ſ", "s")]
+)
 def test_names_of_markers_are_texts(names: tuple[str, str], tmp_path: Path) -> None:
     work = tmp_path / "work"
     work.mkdir()
@@ -135,25 +154,40 @@ def test_names_of_markers_are_texts(names: tuple[str, str], tmp_path: Path) -> N
 
 
 @pytest.fixture(scope="module", params=["png", "av1"])
-def data_set(known: Any, tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Path:
+def data_set(
+    known: Any, tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest
+) -> Path:
     folder = tmp_path_factory.mktemp("lerobot") / "set"
-    export(known.lake, Export(format="lerobot", where="kind = 'clip'", options={"frames": request.param}), folder)
+    export(
+        known.lake,
+        Export(format="lerobot", where="kind = 'clip'", options={"frames": request.param}),
+        folder,
+    )
     return folder
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_camera_of_a_data_set_names_no_file_elsewhere(name: str, data_set: Path, tmp_path: Path) -> None:
+def test_a_camera_of_a_data_set_names_no_file_elsewhere(
+    name: str, data_set: Path, tmp_path: Path
+) -> None:
     folder = tmp_path / "work" / "set"
     shutil.copytree(data_set, folder)
     key, old = f"observation.images.{name}", "observation.images.camera"
     info = json.loads((folder / "meta" / "info.json").read_text())
-    info["features"] = {key if feature == old else feature: value for feature, value in info["features"].items()}
+    info["features"] = {
+        key if feature == old else feature: value for feature, value in info["features"].items()
+    }
     (folder / "meta" / "info.json").write_text(json.dumps(info))
     for path in folder.rglob("*.parquet"):
         table = pq.read_table(path)
-        pq.write_table(table.rename_columns([column.replace(old, key) for column in table.column_names]), path)
+        pq.write_table(
+            table.rename_columns([column.replace(old, key) for column in table.column_names]), path
+        )
     lake = Lake.create(tmp_path / "work" / "lake")
-    for arguments in (("ingest", folder, "--episode", "1", "--lake", lake.path), ("ls", "--lake", lake.path)):
+    for arguments in (
+        ("ingest", folder, "--episode", "1", "--lake", lake.path),
+        ("ls", "--lake", lake.path),
+    ):
         check_told(invoke(*arguments))
     assert {path.name for path in tmp_path.iterdir()} == {"work"}
     assert {path.name for path in (tmp_path / "work").iterdir()} == {"lake", "set"}

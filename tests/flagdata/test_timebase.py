@@ -1,4 +1,5 @@
-"""Instants and wall clocks. Expected values from the calendar and the IANA rules, written out by hand."""
+"""Instants and wall clocks. Expected values from the calendar and the IANA rules, written out by
+hand."""
 
 from __future__ import annotations
 
@@ -35,7 +36,9 @@ def test_a_time_without_zone_is_refused_unless_one_is_named() -> None:
         timebase.parse("2026-05-01T12:00:00")
 
 
-@pytest.mark.parametrize("text", ["", "noon", "2026-13-01T00:00:00Z", "2026-02-30T00:00:00Z", "2026-05-01T25:00:00Z"])
+@pytest.mark.parametrize(
+    "text", ["", "noon", "2026-13-01T00:00:00Z", "2026-02-30T00:00:00Z", "2026-05-01T25:00:00Z"]
+)
 def test_what_is_not_a_time_is_an_error_with_a_fix(text: str) -> None:
     with pytest.raises(FlagdataError) as caught:
         timebase.parse(text)
@@ -106,7 +109,9 @@ def test_an_abbreviation_is_refused_with_the_offsets_and_places_that_it_may_mean
         assert [one for one in (offset, place) if one not in said] == []
 
 
-@pytest.mark.parametrize(("name", "offsets"), [("IST", ("+05:30", "+01:00", "+02:00")), ("CST", ("-06:00", "+08:00"))])
+@pytest.mark.parametrize(
+    ("name", "offsets"), [("IST", ("+05:30", "+01:00", "+02:00")), ("CST", ("-06:00", "+08:00"))]
+)
 def test_an_abbreviation_of_several_clocks_names_each(name: str, offsets: tuple[str, ...]) -> None:
     with pytest.raises(UnknownNameError) as refused:
         timebase.zone(name)

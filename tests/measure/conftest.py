@@ -32,7 +32,9 @@ def specimen() -> Specimen:
 
 @pytest.fixture(scope="session")
 def forecaster(specimen: Specimen) -> Forecaster:
-    return Forecaster(specimen=specimen, markers=specimen.mesh.rest, integrator=SplitEuler(), dtype=torch.float64)
+    return Forecaster(
+        specimen=specimen, markers=specimen.mesh.rest, integrator=SplitEuler(), dtype=torch.float64
+    )
 
 
 @pytest.fixture(scope="session")

@@ -1,5 +1,5 @@
-"""Every form of recipe that is read, with bytes changed and with values no one meant: only errors of flagdata come out,
-and nothing takes long."""
+"""Every form of recipe that is read, with bytes changed and with values no one meant: only errors
+of flagdata come out, and nothing takes long."""
 
 from __future__ import annotations
 
@@ -162,7 +162,9 @@ def test_a_json_file_nested_without_end_is_refused(tmp_path: Path) -> None:
         read_scene(tmp_path / "scene.json")
 
 
-def test_a_damaged_bank_of_nulls_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_damaged_bank_of_nulls_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(bank, "names", lambda: ("a", "b"))
     path = tmp_path / "nulls-0000.npz"
     np.savez_compressed(path, **arrays())
@@ -181,19 +183,25 @@ def test_a_damaged_bank_of_nulls_is_refused(tmp_path: Path, monkeypatch: pytest.
     law()
 
 
-def test_a_bank_of_an_earlier_version_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bank_of_an_earlier_version_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(bank, "names", lambda: ("a", "b"))
     np.savez(tmp_path / "nulls-0000.npz", **arrays() | {"version": np.array(bank._VERSION - 1)})
     with pytest.raises(CorruptError, match=r"another version.*build the bank again"):
         bank._content(tmp_path / "nulls-0000.npz")
 
 
-def test_a_bank_whose_arrays_do_not_fit_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bank_whose_arrays_do_not_fit_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(bank, "names", lambda: ("a", "b"))
     taken: list[tuple[str, np.ndarray | None]] = []
     for name in sorted(arrays()):
         for values in (np.zeros(0), np.array("x"), np.zeros((5, 1)), np.array([None, None]), None):
-            made = {key: array for key, array in {**arrays(), name: values}.items() if array is not None}
+            made = {
+                key: array for key, array in {**arrays(), name: values}.items() if array is not None
+            }
             np.savez(tmp_path / "nulls-0000.npz", **made)
             with suppress(CorruptError):
                 bank._content(tmp_path / "nulls-0000.npz")

@@ -1,4 +1,5 @@
-"""A small lake of films whose waves depend on the wind, for the tests of training and of what is trained."""
+"""A small lake of films whose waves depend on the wind, for the tests of training and of what is
+trained."""
 
 from __future__ import annotations
 
@@ -22,14 +23,17 @@ SIDES = {"train": (10, 2), "validation": (6, 1), "test": (6, 2)}
 
 
 def film(wind: float, look: int) -> UInt8Array:
-    """(frames, 40, 48): waves across a patch, whose frequency is in proportion to the wind; places differ by look."""
+    """(frames, 40, 48): waves across a patch, whose frequency is in proportion to the wind; places
+    differ by look."""
     rng = np.random.default_rng(look)
     t = np.arange(FILM_FRAMES)[:, None, None] / 25
     y, x = np.mgrid[0:40, 0:48]
     phase, dx, dy = rng.uniform(0, 6), rng.uniform(-3, 3), rng.uniform(-3, 3)
     patch = np.exp(-(((x - 24 - dx) / 12) ** 4) - ((y - 20 - dy) / 9) ** 4)
     waves = np.cos(0.5 * x - 2 * np.pi * (0.9 * wind + 1) * t + phase)
-    return np.clip(110 + 80 * patch * waves + rng.normal(0, 2, waves.shape), 0, 255).astype(np.uint8)
+    return np.clip(110 + 80 * patch * waves + rng.normal(0, 2, waves.shape), 0, 255).astype(
+        np.uint8
+    )
 
 
 def write_film(path: Path, wind: float, look: int, *, period: int = PERIOD) -> None:

@@ -1,5 +1,5 @@
-"""Training recipes with absurd numbers and models' cards with values no one meant: only errors of flagdata come out, at
-once and before memory is taken."""
+"""Training recipes with absurd numbers and models' cards with values no one meant: only errors of
+flagdata come out, at once and before memory is taken."""
 
 from __future__ import annotations
 
@@ -58,7 +58,9 @@ def test_a_card_with_another_value_is_read_or_refused(
 ) -> None:
     copy = Path(shutil.copytree(folder, tmp_path_factory.mktemp("card") / "small"))
     content = {"format": "flagdata.network/1", **changed(WORDS, path, value)}
-    (copy / CARD).write_text(json.dumps(content))  # numbers that are not finite, as Python's JSON writes them
+    (copy / CARD).write_text(
+        json.dumps(content)
+    )  # numbers that are not finite, as Python's JSON writes them
     write_sums(copy)
     began = time.process_time()
     with suppress(CorruptError):
@@ -103,7 +105,9 @@ def test_absurd_numbers_of_a_training_recipe_are_refused_before_any_work() -> No
         (("name",), None),
     ],
 )
-def test_absurd_numbers_of_a_card_are_refused(folder: Path, tmp_path: Path, path: tuple[Any, ...], value: Any) -> None:
+def test_absurd_numbers_of_a_card_are_refused(
+    folder: Path, tmp_path: Path, path: tuple[Any, ...], value: Any
+) -> None:
     copy = Path(shutil.copytree(folder, tmp_path / "small"))
     content = changed(WORDS, path, value)
     if value is None:
@@ -123,7 +127,9 @@ def test_a_card_that_is_nested_without_end_is_refused(folder: Path, tmp_path: Pa
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
-def test_weights_that_are_not_finite_are_refused(folder: Path, tmp_path: Path, value: float) -> None:
+def test_weights_that_are_not_finite_are_refused(
+    folder: Path, tmp_path: Path, value: float
+) -> None:
     copy = Path(shutil.copytree(folder, tmp_path / "small"))
     write_tensors(copy / CLOUD, {"centre": torch.full((4,), value)})
     write_sums(copy)
@@ -145,7 +151,9 @@ EPOCH = {"number": 0, "train": 1.0, "validation": 1.0, "rate": 0.1, "seconds": 1
 
 def test_the_checkpoint_is_whole(tmp_path: Path) -> None:
     taken = standing()
-    assert checkpoint.restore(checkpoint_with(tmp_path, ("course",), [EPOCH]), taken, identity=IDENTITY)
+    assert checkpoint.restore(
+        checkpoint_with(tmp_path, ("course",), [EPOCH]), taken, identity=IDENTITY
+    )
     assert taken.course.as_list() == [EPOCH]
     assert taken.optimiser.state_dict()["state"]
 
@@ -163,18 +171,25 @@ def test_the_checkpoint_is_whole(tmp_path: Path) -> None:
         (("course",), [{**EPOCH, "more": 1}]),
     ],
 )
-def test_absurd_values_of_a_checkpoint_are_refused(tmp_path: Path, path: tuple[Any, ...], value: Any) -> None:
+def test_absurd_values_of_a_checkpoint_are_refused(
+    tmp_path: Path, path: tuple[Any, ...], value: Any
+) -> None:
     run = checkpoint_with(tmp_path, path, value)
     with pytest.raises(CorruptError):
         checkpoint.restore(run, standing(), identity=IDENTITY)
 
 
 @pytest.mark.parametrize("file", ["weights.safetensors", "moments.safetensors", "best.safetensors"])
-def test_tensors_of_another_shape_are_refused_when_the_checkpoint_is_read(tmp_path: Path, file: str) -> None:
+def test_tensors_of_another_shape_are_refused_when_the_checkpoint_is_read(
+    tmp_path: Path, file: str
+) -> None:
     write_checkpoint(tmp_path)
     path = tmp_path / "last" / file
     tensors = read_tensors(path)
-    write_tensors(path, {**tensors, next(name for name in tensors if tensors[name].ndim): torch.zeros(1, 2, 3)})
+    write_tensors(
+        path,
+        {**tensors, next(name for name in tensors if tensors[name].ndim): torch.zeros(1, 2, 3)},
+    )
     write_sums(path.parent)
     with pytest.raises(CorruptError, match="does not fit its recipe"):
         checkpoint.restore(tmp_path, standing(), identity=IDENTITY)

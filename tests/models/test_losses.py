@@ -1,4 +1,5 @@
-"""Losses of heads and pairs against values worked out by hand, and their gradients against finite differences."""
+"""Losses of heads and pairs against values worked out by hand, and their gradients against finite
+differences."""
 
 from __future__ import annotations
 
@@ -41,7 +42,9 @@ def test_the_contrastive_loss_is_the_mean_over_all_pairs() -> None:
 def test_gradients_of_the_contrastive_loss_agree_with_finite_differences() -> None:
     x = embedding().requires_grad_()
     assert torch.autograd.gradcheck(lambda e: contrastive_loss(e, SEEDS), x)
-    assert torch.autograd.gradcheck(lambda e: contrastive_loss(e, SEEDS, margin=2.0, positive_share=0.3), x)
+    assert torch.autograd.gradcheck(
+        lambda e: contrastive_loss(e, SEEDS, margin=2.0, positive_share=0.3), x
+    )
 
 
 def test_coincident_embeddings_have_finite_gradients() -> None:
@@ -78,7 +81,8 @@ class Passing(nn.Module):
 
 
 def regression() -> Learner:
-    """A learner of two targets whose head passes the embedding on; means 5 and 0.2, deviations 2 and 0.1."""
+    """A learner of two targets whose head passes the embedding on; means 5 and 0.2, deviations 2
+    and 0.1."""
     learner = Learner(Passing(), loss=Loss.REGRESSION, targets=("wind_speed", "area_weight"))
     assert isinstance(learner.head, nn.Linear)
     with torch.no_grad():
@@ -89,17 +93,22 @@ def regression() -> Learner:
 
 
 def test_the_regression_loss_counts_errors_in_deviations_of_the_training_set() -> None:
-    """Errors of 1 and 0 deviations of the first target, 2 and 0 of the second: means of squares 0.5 and 2."""
+    """Errors of 1 and 0 deviations of the first target, 2 and 0 of the second: means of squares 0.5
+    and 2."""
     target = torch.tensor([[5.0, 0.2], [7.0, 0.3]])
     embedding = torch.tensor([[1.0, 2.0], [1.0, 1.0]])
-    assert regression().loss(embedding, target, torch.arange(2)).item() == pytest.approx(1.25, rel=1e-5)
+    assert regression().loss(embedding, target, torch.arange(2)).item() == pytest.approx(
+        1.25, rel=1e-5
+    )
 
 
 def test_predicting_the_training_mean_costs_one() -> None:
     target = torch.randn(50, 2, generator=torch.Generator().manual_seed(3)) * 7 - 3
     learner = regression()
     learner.fit_scale(target)
-    assert learner.loss(torch.zeros_like(target), target, torch.arange(50)).item() == pytest.approx(1, rel=1e-5)
+    assert learner.loss(torch.zeros_like(target), target, torch.arange(50)).item() == pytest.approx(
+        1, rel=1e-5
+    )
 
 
 def test_what_a_regression_predicts_is_in_the_targets_units() -> None:
@@ -108,7 +117,8 @@ def test_what_a_regression_predicts_is_in_the_targets_units() -> None:
 
 
 def test_the_posterior_loss_is_the_mean_negative_log_likelihood_of_standardised_logits() -> None:
-    """One component at zero with unit deviation, targets one deviation from their mean: ½ log 2π + ½ a dimension."""
+    """One component at zero with unit deviation, targets one deviation from their mean: ½ log 2π +
+    ½ a dimension."""
     learner = Learner(Passing(), loss=Loss.POSTERIOR, targets=("wind_speed",), components=1)
     values = torch.tensor([[4.0], [9.0]])
     learner.fit_scale(values)

@@ -1,4 +1,5 @@
-"""Every network by its line in the table: the contract, published sizes, and that training can reach all weights."""
+"""Every network by its line in the table: the contract, published sizes, and that training can
+reach all weights."""
 
 from __future__ import annotations
 
@@ -71,7 +72,11 @@ def test_a_network_keeps_the_contract(name: str) -> None:
 def test_every_weight_gets_a_gradient(name: str) -> None:
     network = NETWORKS[name](**SMALL[name])
     network(batch(network)).square().sum().backward()
-    idle = [key for key, p in network.named_parameters() if p.grad is None or not bool(p.grad.abs().max() > 0)]
+    idle = [
+        key
+        for key, p in network.named_parameters()
+        if p.grad is None or not bool(p.grad.abs().max() > 0)
+    ]
     assert idle == []
 
 
@@ -106,7 +111,8 @@ def test_recurrent_networks_say_so() -> None:
 
 
 def test_sizes_are_the_published_ones_or_as_stated() -> None:
-    """11,689,512 is ResNet-18's published size, of which 513,000 are the classes'; the others, Runia et al. section 6.
+    """11,689,512 is ResNet-18's published size, of which 513,000 are the classes'; the others,
+    Runia et al. section 6.
 
     By hand, an LSTM layer of h units and d inputs has 4h(d + h + 2) parameters.
     """
@@ -119,14 +125,21 @@ def test_sizes_are_the_published_ones_or_as_stated() -> None:
         assert round((count(Cardona()) + gray + 513_000) / 1e6, 1) == 42.1
         assert count(Yang()) == 44_666_688
         assert count(SpectralNetwork()) == 2_626_384
-    stated = {ResNetOfFrames: 11_170_240, Cardona: 41_618_240, Yang: 44_666_688, SpectralNetwork: 2_626_384}
+    stated = {
+        ResNetOfFrames: 11_170_240,
+        Cardona: 41_618_240,
+        Yang: 44_666_688,
+        SpectralNetwork: 2_626_384,
+    }
     for kind, parameters in stated.items():
         assert f"{parameters:,} parameters" in str(kind.__doc__)
 
 
 def test_the_spectral_network_takes_maps_of_both_sizes() -> None:
     cases = [112, 56]
-    assert [SpectralNetwork()(torch.rand(2, 4, side, side)).shape for side in cases] == [(2, 512) for side in cases]
+    assert [SpectralNetwork()(torch.rand(2, 4, side, side)).shape for side in cases] == [
+        (2, 512) for side in cases
+    ]
 
 
 @pytest.mark.parametrize("side", [112, 224])
@@ -140,7 +153,9 @@ def test_the_baselines_take_frames_of_both_sizes(name: str, side: int) -> None:
 def test_maps_are_scaled_as_stated() -> None:
     network = SpectralNetwork(floor=0.01, nyquist=12.5)
     maps = torch.tensor([0.01, 0.0, 12.5, 2.5]).reshape(1, 4, 1, 1)
-    torch.testing.assert_close(network.scaled(maps).flatten(), torch.tensor([math.log(2), 0.0, 1.0, 0.2]))
+    torch.testing.assert_close(
+        network.scaled(maps).flatten(), torch.tensor([math.log(2), 0.0, 1.0, 0.2])
+    )
 
 
 def test_a_block_that_adds_nothing_passes_its_input_on() -> None:
@@ -151,8 +166,11 @@ def test_a_block_that_adds_nothing_passes_its_input_on() -> None:
 
 
 def test_initial_weights_have_the_variance_of_he() -> None:
-    """N(0, 2/fan_out): the sample variance of m weights scatters by sqrt(2/m), of which five are allowed."""
-    layer = next(m for m in ResNet18(width=32).modules() if isinstance(m, nn.Conv2d) and m.in_channels == 128)
+    """N(0, 2/fan_out): the sample variance of m weights scatters by sqrt(2/m), of which five are
+    allowed."""
+    layer = next(
+        m for m in ResNet18(width=32).modules() if isinstance(m, nn.Conv2d) and m.in_channels == 128
+    )
     weight = layer.weight.detach()
     expected = 2 / (layer.out_channels * 9)
     assert weight.var().item() == pytest.approx(expected, rel=5 * (2 / weight.numel()) ** 0.5)
@@ -166,7 +184,8 @@ def test_frames_lie_in_the_middle_of_equal_parts() -> None:
 
 
 def test_averaged_frames_have_no_order_and_read_ones_have() -> None:
-    """Temporal average pooling forgets the order of frames; an LSTM that is worth its name does not."""
+    """Temporal average pooling forgets the order of frames; an LSTM that is worth its name does
+    not."""
     clip = torch.randn(1, 1, 4, 64, 64)
     pooled = ResNetOfFrames(frames=4, width=4).eval()
     torch.testing.assert_close(pooled(clip), pooled(clip.flip(2)), rtol=1e-4, atol=1e-5)

@@ -19,7 +19,8 @@ class Case:
         module: whose message it is.
         words: of the remedy, enough to distinguish it from others of the module.
         command: what is typed first, after "flagdata".
-        then: what is typed next, in this order; all of it succeeds. `OR` is between ways to go on, each from the begin.
+        then: what is typed next, in this order; all of it succeeds. `OR` is between ways to go on,
+            each from the begin.
         files: written before, by name.
         before: commands that are typed before, and succeed.
         shows: what the first command of each way prints, an expression.
@@ -42,7 +43,8 @@ class Case:
 
 
 def heal(user: User, case: Case) -> None:
-    """Meet the trouble of a case and do what its remedy says, in each way; what was refused is then done."""
+    """Meet the trouble of a case and do what its remedy says, in each way; what was refused is then
+    done."""
     ways: list[list[str]] = [[]]
     for command in case.then:
         if command == OR:

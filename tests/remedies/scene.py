@@ -1,4 +1,5 @@
-"""A folder with films, logs and meshes, and with a lake of some of them, a branch, a tag and what a crash leaves."""
+"""A folder with films, logs and meshes, and with a lake of some of them, a branch, a tag and what a
+crash leaves."""
 
 from __future__ import annotations
 
@@ -12,7 +13,11 @@ from flagdata.lake import Lake
 
 
 def write_film(
-    path: Path, *, frames: int = 40, begin: str = "2026-05-01T10:00:00Z", size: tuple[int, int] = (48, 64)
+    path: Path,
+    *,
+    frames: int = 40,
+    begin: str = "2026-05-01T10:00:00Z",
+    size: tuple[int, int] = (48, 64),
 ) -> Path:
     """Write a bright bar that sways, at 50 Hz, in a file that states when it began."""
     row, column = np.mgrid[0 : size[0], 0 : size[1]]
@@ -31,7 +36,10 @@ def write_film(
 def write_log(path: Path, *, speed: int) -> Path:
     """Write two minutes of wind at 1 Hz, whose stamps name their zone."""
     head = "time,wind_speed (m/s),wind_direction (deg)"
-    rows = [f"2026-05-01T12:{k // 60:02d}:{k % 60:02d}+02:00,{speed}.{k % 10},{200 + k % 9}" for k in range(120)]
+    rows = [
+        f"2026-05-01T12:{k // 60:02d}:{k % 60:02d}+02:00,{speed}.{k % 10},{200 + k % 9}"
+        for k in range(120)
+    ]
     path.write_text("\n".join([head, *rows, ""]))
     return path
 
@@ -48,8 +56,9 @@ def write_meshes(folder: Path) -> None:
 def make_scene(folder: Path) -> Path:
     """Make it in an empty folder.
 
-    The lake has the film `first` and the log `mast` on main, the film `third` on the branch side, the tag v0, a film
-    that was withdrawn, and an abandoned folder in staging; `cut.mcap` is a record that was cut off.
+    The lake has the film `first` and the log `mast` on main, the film `third` on the branch side,
+    the tag v0, a film that was withdrawn, and an abandoned folder in staging; `cut.mcap` is a
+    record that was cut off.
     """
     (folder / "frames.csv").write_text(
         "frame,marker,u,v,x,y,z\n0,a,0,0,0,0,0\n0,b,1,0,1,0,0\n1,a,0,0,0,0,0\n1,b,1,0,1,0,0\n"

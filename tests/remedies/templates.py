@@ -1,4 +1,5 @@
-"""Remedies that the product's source holds: the texts given as `fix` that name a command or an option."""
+"""Remedies that the product's source holds: the texts given as `fix` that name a command or an
+option."""
 
 from __future__ import annotations
 
@@ -47,7 +48,8 @@ class Remedy:
 
 @cache
 def remedies() -> tuple[Remedy, ...]:
-    """All texts given as `fix` that name a command or an option, and all others that name a command."""
+    """All texts given as `fix` that name a command or an option, and all others that name a
+    command."""
     named = {remedy for remedy in texts() if OPTION.search(remedy.text)}
     named |= {remedy for remedy in (*texts(), *others()) if verbs(remedy.text)}
     return tuple(sorted(named))
@@ -71,7 +73,9 @@ def others() -> Iterator[Remedy]:
         source = tree(path)
         aside = {id(part) for node in ast.walk(source) for part in _aside(node)}
         for node in ast.walk(source):
-            if id(node) not in aside and (isinstance(node, ast.Constant | ast.JoinedStr) or is_command_line(node)):
+            if id(node) not in aside and (
+                isinstance(node, ast.Constant | ast.JoinedStr) or is_command_line(node)
+            ):
                 for text in list(strings(node))[:1]:
                     yield Remedy(str(path.relative_to(ROOT)), text)
 
@@ -84,13 +88,19 @@ def _aside(node: ast.AST) -> Iterator[ast.AST]:
         yield from (part.value for part in node.values if isinstance(part, ast.FormattedValue))
     elif isinstance(node, ast.keyword) and node.arg == "help":
         yield from ast.walk(node.value)
-    elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("option", "argument"):
+    elif (
+        isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id in ("option", "argument")
+    ):
         yield from ast.walk(node.args[0])
 
 
 def _texts(source: ast.Module) -> Iterator[str]:
     given = list(_given(source))
-    names = {node.id for value in given for node in _beside_words(value) if isinstance(node, ast.Name)} | {"fix"}
+    names = {
+        node.id for value in given for node in _beside_words(value) if isinstance(node, ast.Name)
+    } | {"fix"}
     names |= {name for name in _assigned(source) if name.endswith("FIX")}
     for name, values in _assigned(source).items():
         if name in names:
@@ -130,18 +140,27 @@ def _assigned(source: ast.Module) -> dict[str, list[ast.expr]]:
                 for name, value in pairs:
                     if isinstance(name, ast.Name):
                         values.setdefault(name.id, []).append(value)
-        elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) and node.value is not None:
+        elif (
+            isinstance(node, ast.AnnAssign)
+            and isinstance(node.target, ast.Name)
+            and node.value is not None
+        ):
             values.setdefault(node.target.id, []).append(node.value)
     return values
 
 
 def is_command_line(node: ast.AST) -> bool:
     """Whether an expression writes words as a shell takes them."""
-    return isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "command_line"
+    return (
+        isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id == "command_line"
+    )
 
 
 def template(node: ast.AST) -> str:
-    """The text of an expression, a `HOLE` for what is put into it, and the words of a command line as they stand."""
+    """The text of an expression, a `HOLE` for what is put into it, and the words of a command line
+    as they stand."""
     if isinstance(node, ast.Constant):
         return str(node.value)
     if isinstance(node, ast.JoinedStr):
@@ -155,7 +174,8 @@ def template(node: ast.AST) -> str:
 
 
 def _word(node: ast.AST) -> str:
-    """A word of a command line, with the blank before it; of several words, of which there may be none, a `HOLE`."""
+    """A word of a command line, with the blank before it; of several words, of which there may be
+    none, a `HOLE`."""
     if isinstance(node, ast.Starred):
         return HOLE
     if isinstance(node, ast.Constant):
@@ -165,7 +185,8 @@ def _word(node: ast.AST) -> str:
 
 
 def strings(value: ast.AST) -> Iterator[str]:
-    """The texts of an expression: whole literals, holes for what is put into them, and the literals of these."""
+    """The texts of an expression: whole literals, holes for what is put into them, and the literals
+    of these."""
     if isinstance(value, ast.Constant):
         if isinstance(value.value, str) and value.value.strip():
             yield value.value
@@ -184,4 +205,8 @@ def strings(value: ast.AST) -> Iterator[str]:
 def relative(path: str) -> str | None:
     """A file's place in the repository, `None` where it is not of the product."""
     place = Path(path)
-    return str(place.relative_to(ROOT)) if any(place.is_relative_to(ROOT / folder) for folder in PRODUCT) else None
+    return (
+        str(place.relative_to(ROOT))
+        if any(place.is_relative_to(ROOT / folder) for folder in PRODUCT)
+        else None
+    )

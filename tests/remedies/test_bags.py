@@ -32,7 +32,9 @@ def two_cameras(path: Path, *, depth: bool = False) -> Path:
     """Two topics of pictures, of which the second holds depths where `depth`."""
     with bag(path) as writer:
         names = ("/left", "/right")
-        cameras = [channel(writer, name, "sensor_msgs/msg/CompressedImage", COMPRESSED) for name in names]
+        cameras = [
+            channel(writer, name, "sensor_msgs/msg/CompressedImage", COMPRESSED) for name in names
+        ]
         for k in range(20):
             at = NOON + k * STEP
             for number, camera in enumerate(cameras):
@@ -49,20 +51,46 @@ def test_one_of_several_topics_is_chosen(user: User) -> None:
 
 def test_another_topic_is_ingested_from_the_same_file(user: User) -> None:
     two_cameras(user.folder / "a.mcap")
-    user.meets("mcap/pictures.py", "ingest the file again wi", "ingest", "a.mcap", *SMALL, "--topic", "/left")
-    user.succeeds("ingest", "a.mcap", *SMALL, "--topic", "/right", shows="(?m)^[0-9a-f]{32}  camera")
+    user.meets(
+        "mcap/pictures.py",
+        "ingest the file again wi",
+        "ingest",
+        "a.mcap",
+        *SMALL,
+        "--topic",
+        "/left",
+    )
+    user.succeeds(
+        "ingest", "a.mcap", *SMALL, "--topic", "/right", shows="(?m)^[0-9a-f]{32}  camera"
+    )
     user.leaves(["--topic"])
 
 
 def test_a_topic_of_depths_is_left_for_one_of_grays(user: User) -> None:
     two_cameras(user.folder / "a.mcap", depth=True)
-    user.meets("mcap/pictures.py", "choose a topic of grays", "ingest", "a.mcap", *SMALL, "--topic", "/right")
+    user.meets(
+        "mcap/pictures.py",
+        "choose a topic of grays",
+        "ingest",
+        "a.mcap",
+        *SMALL,
+        "--topic",
+        "/right",
+    )
     user.follows("ingest", "a.mcap", *SMALL, "--topic", "/left")
 
 
 def test_pictures_with_stamps_need_no_rate(user: User) -> None:
     film(user.folder / "a.mcap", range(20))
-    user.meets("mcap/pictures.py", "leave out --sequence-fps", "ingest", "a.mcap", *SMALL, "--sequence-fps", 25)
+    user.meets(
+        "mcap/pictures.py",
+        "leave out --sequence-fps",
+        "ingest",
+        "a.mcap",
+        *SMALL,
+        "--sequence-fps",
+        25,
+    )
     user.again(without="--sequence-fps")
 
 
@@ -74,7 +102,9 @@ def test_messages_of_several_types_on_a_topic_are_chosen_by_their_type(user: Use
             at = NOON + k * STEP
             data = compressed(at, k) if k < 12 else plain(at, gray(k), "mono8")
             writer.add_message(one if k < 12 else other, at, data, at)
-    fix = user.meets("mcap/topics.py", "choose one by its type:", "ingest", "a.mcap", *SMALL, "--topic", "/cam")
+    fix = user.meets(
+        "mcap/topics.py", "choose one by its type:", "ingest", "a.mcap", *SMALL, "--topic", "/cam"
+    )
     user.follows("ingest", "a.mcap", *SMALL, *fix[fix.index("--topic") :].split())
 
 
@@ -85,14 +115,19 @@ def parts(folder: Path, *, described: bool) -> list[Path]:
     for part, name in enumerate(names):
         film(folder / name, range(8 * part, 8 * part + 8))
     if described:
-        text = "rosbag2_bagfile_information:\n  version: 8\n  storage_identifier: mcap\n  relative_file_paths:\n"
+        text = (
+            "rosbag2_bagfile_information:\n  version: 8\n  storage_identifier: mcap\n  "
+            "relative_file_paths:\n"
+        )
         (folder / "metadata.yaml").write_text(text + "".join(f"    - {name}\n" for name in names))
     return [folder / name for name in names]
 
 
 @pytest.mark.parametrize("described", [True, False])
 def test_the_parts_of_a_bag_are_one_recording_as_a_folder(user: User, described: bool) -> None:
-    given = [path.relative_to(user.folder) for path in parts(user.folder / "bag", described=described)]
+    given = [
+        path.relative_to(user.folder) for path in parts(user.folder / "bag", described=described)
+    ]
     command = ("ingest", *given, "--join")
     if described:
         fix = user.meets("mcap/bags.py", "the folder of the parts", *command)
@@ -116,7 +151,9 @@ def test_files_that_were_recorded_at_the_same_time_are_ingested_by_themselves(us
 
 def test_what_is_no_film_is_ingested_by_itself(user: User) -> None:
     film(user.folder / "a.mcap", range(20))
-    fix = user.meets("camera/joined.py", "ingest each by itself: f", "ingest", "second.mp4", "a.mcap", "--join")
+    fix = user.meets(
+        "camera/joined.py", "ingest each by itself: f", "ingest", "second.mp4", "a.mcap", "--join"
+    )
     user.follows(*fix.rpartition("flagdata ")[2].split())
 
 
@@ -128,7 +165,14 @@ def test_stamps_that_count_from_a_start_are_placed_when_the_film_is_ingested(use
     ended = user.types("doctor", "a.mcap")
     assert ended.code == 3
     user.meets("ingest/foreign.py", "give --start when you in", "doctor", "a.mcap")
-    user.follows("ingest", "a.mcap", *SMALL, "--start", "2026-05-01T12:00:00Z", shows="2026-05-01T12:00:00Z to")
+    user.follows(
+        "ingest",
+        "a.mcap",
+        *SMALL,
+        "--start",
+        "2026-05-01T12:00:00Z",
+        shows="2026-05-01T12:00:00Z to",
+    )
 
 
 def test_what_doctor_does_not_examine_is_looked_at_by_sniff(user: User) -> None:
@@ -166,7 +210,9 @@ def test_another_stream_of_a_film_is_chosen(user: User) -> None:
         for stream in streams:
             container.mux(stream.encode(None))
     start = ("--start", "2026-05-01T12:00:00Z")
-    user.meets("camera/video.py", "choose another with --st", "ingest", "two.mkv", *start, "--stream", 0)
+    user.meets(
+        "camera/video.py", "choose another with --st", "ingest", "two.mkv", *start, "--stream", 0
+    )
     user.leaves(["--stream"])
     user.succeeds("ingest", "two.mkv", *start, "--stream", 1, shows="stream 1 was taken")
 
@@ -186,5 +232,7 @@ def test_the_rate_that_a_phone_took_is_given(user: User) -> None:
 
 
 def test_a_crop_that_cuts_what_moves_is_taken_whole(user: User) -> None:
-    fix = user.meets("camera/stream.py", "takes it whole", "ingest", "second.mp4", "--crop", "32,0,32,48")
+    fix = user.meets(
+        "camera/stream.py", "takes it whole", "ingest", "second.mp4", "--crop", "32,0,32,48"
+    )
     user.follows("ingest", "second.mp4", *fix.partition(" takes")[0].split())

@@ -1,4 +1,5 @@
-"""Remedies of films whose rate, start or clock is not stated, of LeRobot's data sets, and of damaged bags."""
+"""Remedies of films whose rate, start or clock is not stated, of LeRobot's data sets, and of
+damaged bags."""
 
 from __future__ import annotations
 
@@ -58,7 +59,9 @@ def test_what_a_remedy_says_heals(case: Case, user: User) -> None:
 
 
 def test_one_of_several_cameras_of_a_data_set_is_chosen(user: User) -> None:
-    user.succeeds("export", "lerobot", "--to", "set", "--frames", "png", "--where", "name = 'first'")
+    user.succeeds(
+        "export", "lerobot", "--to", "set", "--frames", "png", "--where", "name = 'first'"
+    )
     info = user.folder / "set" / "meta" / "info.json"
     described = json.loads(info.read_text())
     (camera,) = (name for name, one in described["features"].items() if one["dtype"] == "image")
@@ -78,7 +81,15 @@ def test_raw_streams_are_ingested_by_themselves(user: User) -> None:
                 container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="gray")))
             container.mux(stream.encode(None))
     rate = ("--sequence-fps", 50, *START)
-    user.meets("camera/joined.py", "ingest the files by them", "ingest", "a.h264", "b.h264", "--join", *rate)
+    user.meets(
+        "camera/joined.py",
+        "ingest the files by them",
+        "ingest",
+        "a.h264",
+        "b.h264",
+        "--join",
+        *rate,
+    )
     for name in ("a.h264", "b.h264"):
         user.follows("ingest", name, *rate)
 
@@ -97,13 +108,23 @@ def pictures(folder: Path, *, taken: str = "") -> None:
 
 def test_the_zone_of_a_cameras_clock_is_named(user: User) -> None:
     pictures(user.folder / "pics", taken="2026:05:01 12:00:00")
-    user.meets("camera/start.py", ", or --zone, the zone of", "ingest", "pics", "--sequence-fps", 25)
+    user.meets(
+        "camera/start.py", ", or --zone, the zone of", "ingest", "pics", "--sequence-fps", 25
+    )
     user.again("--zone", "+02:00", shows="2026-05-01T10:00:00Z")
 
 
 def test_a_rate_that_lets_pictures_last_for_days_is_given_anew(user: User) -> None:
     pictures(user.folder / "pics")
-    user.meets("camera/stream.py", "give the rate at which t", "ingest", "pics", *START, "--sequence-fps", "0.0001")
+    user.meets(
+        "camera/stream.py",
+        "give the rate at which t",
+        "ingest",
+        "pics",
+        *START,
+        "--sequence-fps",
+        "0.0001",
+    )
     user.follows("ingest", "pics", *START, "--sequence-fps", 25)
 
 
@@ -119,7 +140,9 @@ def test_a_take_after_the_clock_started_anew_is_ingested_by_itself(user: User) -
             stream = container.add_stream("libx264", rate=25, options={"threads": "1", "bf": "0"})
             stream.height, stream.width, stream.pix_fmt = 48, 64, "yuv420p"
             for k in range(20):
-                frame = av.VideoFrame.from_ndarray(np.full((48, 64), 40 + 5 * k, np.uint8), format="gray")
+                frame = av.VideoFrame.from_ndarray(
+                    np.full((48, 64), 40 + 5 * k, np.uint8), format="gray"
+                )
                 frame.pts, frame.time_base = round(25 * begin) + k, Fraction(1, 25)
                 container.mux(stream.encode(frame))
             container.mux(stream.encode(None))
@@ -138,7 +161,9 @@ def test_a_topic_whose_pictures_are_whole_is_chosen(user: User) -> None:
             for k in range(20):
                 at = NOON + k * STEP
                 broken = Cdr().stamp(at).text("cam").text("png").data(b"nothing").done()
-                writer.add_message(camera, at, broken if topic == "/left" else compressed(at, k, said="png"), at)
+                writer.add_message(
+                    camera, at, broken if topic == "/left" else compressed(at, k, said="png"), at
+                )
     command = ("ingest", "a.mcap", "--rate", "native", "--topic")
     user.meets("mcap/pictures.py", "choose another topic: --", *command, "/left")
     user.follows(*command, "/right")
@@ -169,7 +194,9 @@ def test_what_is_whole_of_a_damaged_bag_is_saved(user: User, damage: str) -> Non
     else:
         chunks = [at for at in range(len(data)) if data[at : at + 4] == ZSTANDARD]
         middle = chunks[len(chunks) // 2] + 40
-        Path("a.mcap").write_bytes(data[:middle] + bytes([data[middle] ^ 0xFF]) + data[middle + 1 :])
+        Path("a.mcap").write_bytes(
+            data[:middle] + bytes([data[middle] ^ 0xFF]) + data[middle + 1 :]
+        )
         user.meets("record/unpacking.py", "run `flagdata recover` o", *command)
     user.follows("recover", "a.mcap", "NEW.mcap")
     user.succeeds("ingest", "NEW.mcap", "--rate", "native")

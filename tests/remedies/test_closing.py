@@ -47,7 +47,9 @@ def test_a_speed_has_an_axis(user: User, cloth: str) -> None:
 
 def test_options_of_a_log_are_left_out_where_none_is(user: User, cloth: str) -> None:
     command = ("close-loop", cloth, *PINS, *MATERIAL, *AXIS)
-    user.meets("closing/sources.py", "leave it out, or name a", *command, "--wind", 5, "--zone", "UTC")
+    user.meets(
+        "closing/sources.py", "leave it out, or name a", *command, "--wind", 5, "--zone", "UTC"
+    )
     user.follows(*command, "--wind", "second.csv", "--zone", "UTC", code=3, shows=BEGINS)
 
 

@@ -11,7 +11,10 @@ from tests.remedies.user import User
 STAMPS = "align first mast --by stamps --offset-sigma 0.1"
 LONG_SQL = "select count(*) from range(200000) a, range(200) b"
 AWAY = "".join(
-    ["time,wind_speed (m/s)\n", *(f"2026-05-01T12:{k // 60:02d}:{k % 60:02d},{5 + k % 7 / 10}\n" for k in range(200))]
+    [
+        "time,wind_speed (m/s)\n",
+        *(f"2026-05-01T12:{k // 60:02d}:{k % 60:02d},{5 + k % 7 / 10}\n" for k in range(200)),
+    ]
 )
 """A log whose zone is not in it."""
 CASES = [
@@ -50,7 +53,10 @@ CASES = [
         "say by --session which",
         "align one two --by stamps --offset-sigma 0.1",
         ("align one two --by stamps --offset-sigma 0.1 --session both",),
-        before=("ingest second.mp4 --session a --name one", "ingest second.csv --session b --name two"),
+        before=(
+            "ingest second.mp4 --session a --name one",
+            "ingest second.csv --session b --name two",
+        ),
     ),
     Case(
         "align/methods.py",
@@ -88,7 +94,10 @@ CASES = [
         "align/apart.py",
         "or search around the difference: --centre SECONDS",
         "align first away",
-        ("ingest away.csv --name near --zone +02:00", "align first near --by stamps --offset-sigma 1"),
+        (
+            "ingest away.csv --name near --zone +02:00",
+            "align first near --by stamps --offset-sigma 1",
+        ),
         files={"away.csv": AWAY},
         before=("ingest away.csv --zone -10:00",),
         untried="--start --date --centre",
@@ -133,7 +142,11 @@ CASES = [
         ("withdraw mast --everywhere -m x",),
     ),
     Case(
-        "commands/looking.py", "flagdata gc --dry-run lists it", "du", ("gc --dry-run --older-than 0s",), shows="left"
+        "commands/looking.py",
+        "flagdata gc --dry-run lists it",
+        "du",
+        ("gc --dry-run --older-than 0s",),
+        shows="left",
     ),
     Case(
         "commands/query.py",
@@ -238,17 +251,46 @@ def test_two_logs_are_aligned_as_the_remedies_say(user: User) -> None:
         1,
     )
     user.follows("align", "a", "b", "--dry-run", "--max-sigma", 1, shows=r"offset [+-]40\.")
-    user.meets("align/logs.py", "search around another offset: --centre, --search", "align", "a", "b", "--centre", 5000)
-    user.follows(
-        "align", "a", "b", "--centre", 60, "--search", 60, "--max-sigma", 1, "--dry-run", shows=r"offset [+-]40\."
+    user.meets(
+        "align/logs.py",
+        "search around another offset: --centre, --search",
+        "align",
+        "a",
+        "b",
+        "--centre",
+        5000,
     )
-    user.meets("align/logs.py", "or compare logs that last longer", "align", "a", "short", "--centre", 0)
+    user.follows(
+        "align",
+        "a",
+        "b",
+        "--centre",
+        60,
+        "--search",
+        60,
+        "--max-sigma",
+        1,
+        "--dry-run",
+        shows=r"offset [+-]40\.",
+    )
+    user.meets(
+        "align/logs.py", "or compare logs that last longer", "align", "a", "short", "--centre", 0
+    )
     user.follows("align", "a", "b", "--name", "c", "--search", 100, "--max-sigma", 1)
 
 
-def test_what_no_lake_was_named_for_is_found_in_one(user: User, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_no_lake_was_named_for_is_found_in_one(
+    user: User, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.delenv("FLAGDATA_LAKE")
-    user.meets("examples/__init__.py", "or name the lake by --lake", "observe", "first", "--flag-size", "1.5x1")
+    user.meets(
+        "examples/__init__.py",
+        "or name the lake by --lake",
+        "observe",
+        "first",
+        "--flag-size",
+        "1.5x1",
+    )
     user.follows("observe", "first", "--flag-size", "1.5x1", "--lake", "lake", code=3)
 
 
@@ -260,7 +302,15 @@ def test_salt_is_of_a_side(user: User) -> None:
     user.meets("api/lake_verbs.py", "name the side by --split", *command, "--salt", "x")
     user.leaves(["--split"])
     (user.folder / "out").rename(user.folder / "all")
-    user.meets("export/plan.py", "choose another side by --split", *command, "--salt", "x", "--split", "train")
+    user.meets(
+        "export/plan.py",
+        "choose another side by --split",
+        *command,
+        "--salt",
+        "x",
+        "--split",
+        "train",
+    )
     user.follows(*command)
 
 

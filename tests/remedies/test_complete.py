@@ -17,7 +17,11 @@ HERE = Path(__file__).parent
 EXECUTED = 250
 """Remedies at least that tests type."""
 OPTIONS = {
-    name: {word for parameter in command.params for word in (*parameter.opts, *parameter.secondary_opts)}
+    name: {
+        word
+        for parameter in command.params
+        for word in (*parameter.opts, *parameter.secondary_opts)
+    }
     for name, command in commands()
 }
 OF_PARTS = {
@@ -46,7 +50,8 @@ OF_PARTS = {
 
 
 def claimed() -> set[Remedy]:
-    """The remedies that tests of this folder type; each checks when it runs that this is what was printed."""
+    """The remedies that tests of this folder type; each checks when it runs that this is what was
+    printed."""
     claims: set[Remedy] = set()
     for path in HERE.glob("test_*.py"):
         source = tree(path)
@@ -58,8 +63,15 @@ def claimed() -> set[Remedy]:
             if isinstance(target, ast.Name)
         }
         for node in ast.walk(source):
-            if isinstance(node, ast.Call) and _callee(node) in ("Case", "meets") and len(node.args) > 2:
-                module, words = (names[a.id] if isinstance(a, ast.Name) else ast.literal_eval(a) for a in node.args[:2])
+            if (
+                isinstance(node, ast.Call)
+                and _callee(node) in ("Case", "meets")
+                and len(node.args) > 2
+            ):
+                module, words = (
+                    names[a.id] if isinstance(a, ast.Name) else ast.literal_eval(a)
+                    for a in node.args[:2]
+                )
                 claims.add(found(str(module), str(words)))
     return claims
 
@@ -81,9 +93,15 @@ def test_every_command_and_option_of_a_remedy_exists() -> None:
     wrong = []
     for remedy in texts():
         own = next((OF_PARTS[part] for part in OF_PARTS if remedy.module.startswith(part)), None)
-        allowed = verbs(remedy.text) | set(own or [name.removeprefix("flagdata ") for name in OPTIONS])
+        allowed = verbs(remedy.text) | set(
+            own or [name.removeprefix("flagdata ") for name in OPTIONS]
+        )
         options = {"--help", "--debug"}.union(*(OPTIONS[f"flagdata {verb}"] for verb in allowed))
-        wrong += [f"{remedy}: --{name}" for name in OPTION.findall(remedy.text) if f"--{name}" not in options]
+        wrong += [
+            f"{remedy}: --{name}"
+            for name in OPTION.findall(remedy.text)
+            if f"--{name}" not in options
+        ]
     assert wrong == []
 
 

@@ -33,7 +33,9 @@ def test_a_damaged_frame_is_listed_by_verify_and_the_others_are_saved(user: User
     user.follows("recover", name, "saved.mcap", shows="recovered: 14 messages")
 
 
-def test_a_record_that_is_damaged_outside_a_lake_comes_in_once_its_rest_is_saved(user: User) -> None:
+def test_a_record_that_is_damaged_outside_a_lake_comes_in_once_its_rest_is_saved(
+    user: User,
+) -> None:
     user.succeeds("export", "mcap", "--to", "out", "--where", "name = 'first'")
     (record,) = (user.folder / "out").glob("*.mcap")
     record.write_bytes(flipped(record.read_bytes()))
@@ -52,6 +54,14 @@ def test_a_record_that_was_cut_off_is_saved(user: User) -> None:
 
 def test_shards_are_raised_to_hold_a_recording(user: User) -> None:
     user.succeeds(*STAMPS.split())
-    command = ("export", "webdataset", "--to", "out", "--where", "kind = 'recording'", "--shard-bytes")
+    command = (
+        "export",
+        "webdataset",
+        "--to",
+        "out",
+        "--where",
+        "kind = 'recording'",
+        "--shard-bytes",
+    )
     user.meets("export/webdataset.py", "raise --shard-bytes", *command, 20_000)
     user.follows(*command, 10_000_000)

@@ -8,7 +8,13 @@ from tests.remedies.cases import Case, heal
 from tests.remedies.user import User
 
 CASES = [
-    Case("flagdata/cli.py", "see the command's --help", "ls --nothing --json", ("ls --help",), shows="--kind"),
+    Case(
+        "flagdata/cli.py",
+        "see the command's --help",
+        "ls --nothing --json",
+        ("ls --help",),
+        shows="--kind",
+    ),
     Case(
         "commands/ingest_sources.py",
         "ingest each by itself: f",

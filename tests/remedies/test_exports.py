@@ -1,4 +1,5 @@
-"""Remedies of exports, of alignments by the contents, of large answers, and of rows that go while a command runs."""
+"""Remedies of exports, of alignments by the contents, of large answers, and of rows that go while a
+command runs."""
 
 from __future__ import annotations
 
@@ -46,11 +47,15 @@ def test_what_a_remedy_says_heals(case: Case, user: User) -> None:
 
 @pytest.mark.usefixtures("short_films_compared")
 def test_a_film_that_cannot_be_aligned_is_looked_at_or_its_offset_given(user: User) -> None:
-    fix = user.meets("align/methods.py", "look at it with --plot FILE.png", "align", "first", "mast")
+    fix = user.meets(
+        "align/methods.py", "look at it with --plot FILE.png", "align", "first", "mast"
+    )
     user.follows("align", "first", "mast", "--plot", "FILE.png", code=3, shows="plot: FILE.png")
     assert (user.folder / "FILE.png").stat().st_size > 1000
     assert "--by given --clock-offset SECONDS --offset-sigma SECONDS" in fix
-    user.succeeds("align", "first", "mast", "--by", "given", "--clock-offset", 1, "--offset-sigma", "0.1")
+    user.succeeds(
+        "align", "first", "mast", "--by", "given", "--clock-offset", 1, "--offset-sigma", "0.1"
+    )
 
 
 def sized(name: str, size: int) -> None:
@@ -79,7 +84,9 @@ def test_sql_that_gives_more_than_can_be_held_is_limited_or_written(
     """A smaller limit stands for millions of values."""
     monkeypatch.setattr(selection, "CELL_LIMIT", 5000)
     large = "select range as a from range(60000)"
-    user.meets("flagdata/lake/selection.py", "aggregate in SQL, or giv", "query", "--json", "--sql", large)
+    user.meets(
+        "flagdata/lake/selection.py", "aggregate in SQL, or giv", "query", "--json", "--sql", large
+    )
     user.succeeds("query", "--json", "--sql", f"select count(*) as n from ({large})", shows="60000")
     user.succeeds("query", "--json", "--sql", f"{large} limit 100")
     user.follows("query", "--csv", "--sql", large)
@@ -89,15 +96,32 @@ def test_sql_that_gives_more_than_can_be_held_is_limited_or_written(
 def film_of(number: int, **columns: Any) -> str:
     """Commits a recording with a clip, whose data nobody reads."""
     day = f"2026-06-{number:02d}"
-    recording = Artifact(kind=Kind.RECORDING, name=f"film-{number}", recipe={"number": number}, day=day, **columns)
-    clip = replace(recording, kind=Kind.CLIP, name=f"clip-{number}", parents=(recording.id,), recording=recording.id)
+    recording = Artifact(
+        kind=Kind.RECORDING, name=f"film-{number}", recipe={"number": number}, day=day, **columns
+    )
+    clip = replace(
+        recording,
+        kind=Kind.CLIP,
+        name=f"clip-{number}",
+        parents=(recording.id,),
+        recording=recording.id,
+    )
     with Lake.open("lake").transaction(f"film {number}") as transaction:
         transaction.add(recording)
         transaction.add(clip)
     return recording.name
 
 
-CLIPS = ("export", "parquet", "--to", "out", "--where", "kind = 'clip' and side is not null", "--split", "train")
+CLIPS = (
+    "export",
+    "parquet",
+    "--to",
+    "out",
+    "--where",
+    "kind = 'clip' and side is not null",
+    "--split",
+    "train",
+)
 
 
 def test_a_salt_beside_stated_sides_is_left_out(user: User) -> None:
@@ -122,10 +146,17 @@ def test_a_field_recording_of_a_data_sets_session_is_left_out_or_withdrawn(user:
     side, *_ = HashedSplit().assign([Origin(recording="film-3", days=("2026-06-03",))])
     film_of(3)
     command = ("export", "parquet", "--to", "out", "--split", side, "--where")
-    user.meets("dataset/sides.py", "leave those that share it out", *command, "kind = 'clip' and side is null")
+    user.meets(
+        "dataset/sides.py",
+        "leave those that share it out",
+        *command,
+        "kind = 'clip' and side is null",
+    )
     user.succeeds(*command, "kind = 'clip' and side is null and name <> 'clip-2'")
     user.follows("withdraw", "film-2", "--with-descendants", "-m", "of the session of film-1")
-    user.succeeds("export", "parquet", "--to", "again", *command[4:], "kind = 'clip' and side is null")
+    user.succeeds(
+        "export", "parquet", "--to", "again", *command[4:], "kind = 'clip' and side is null"
+    )
 
 
 def gone_meanwhile(patch: pytest.MonkeyPatch, method: str, name: str) -> None:
@@ -167,7 +198,15 @@ def test_what_is_on_a_branch_that_somebody_deletes_meanwhile_is_not_listed(user:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Lake, "erase", late)
-        user.meets("lake/removal.py", "flagdata ls --at REF lis", "withdraw", "third", "--everywhere", "-m", "asked")
+        user.meets(
+            "lake/removal.py",
+            "flagdata ls --at REF lis",
+            "withdraw",
+            "third",
+            "--everywhere",
+            "-m",
+            "asked",
+        )
     listed = user.follows("ls", "--at", "main").out
     (other,) = (line.split()[0] for line in listed.splitlines() if " mast " in line)
     user.succeeds("withdraw", other, "--everywhere", "-m", "asked")

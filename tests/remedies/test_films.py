@@ -25,8 +25,18 @@ CASES = [
         f"{FILM} --sequence-fps 25",
         (FILM, OR, f"{FILM} --true-fps 100"),
     ),
-    Case("camera/stream.py", "choose a crop: --crop auto proposes one", FILM, (f"{FILM} --crop auto",)),
-    Case("camera/start.py", "or align the recording by its contents", FILM, (f"{FILM} --start 2026-05-01T10:00:00Z",)),
+    Case(
+        "camera/stream.py",
+        "choose a crop: --crop auto proposes one",
+        FILM,
+        (f"{FILM} --crop auto",),
+    ),
+    Case(
+        "camera/start.py",
+        "or align the recording by its contents",
+        FILM,
+        (f"{FILM} --start 2026-05-01T10:00:00Z",),
+    ),
     Case(
         "camera/stream.py",
         "or --true-fps HZ if the file states a wrong rate",
@@ -73,7 +83,10 @@ def test_a_cloth_whose_texture_is_in_millimetres_is_exported_in_metres(user: Use
         for path in (user.folder / "meshes").iterdir():
             lines = (line.split() for line in original[path.name].splitlines())
             factor = {"v": units[places], "vt": units[texture]}
-            rows = ([w, *(f"{factor[w] * float(x):g}" if w in factor else x for x in rest)] for w, *rest in lines)
+            rows = (
+                [w, *(f"{factor[w] * float(x):g}" if w in factor else x for x in rest)]
+                for w, *rest in lines
+            )
             path.write_text("\n".join(map(" ".join, rows)) + "\n")
 
     units = {"m": 1, "mm": 1000}
@@ -105,7 +118,14 @@ def pictures(user: User) -> list[Image.Image]:
 
 def test_pictures_need_a_rate_and_a_start(user: User, pictures: list[Image.Image]) -> None:
     rate = ("--sequence-fps", "25")
-    user.meets("camera/sequence.py", "--sequence-fps", "ingest", "pics", "--start", "2026-05-01T12:00:00+02:00")
+    user.meets(
+        "camera/sequence.py",
+        "--sequence-fps",
+        "ingest",
+        "pics",
+        "--start",
+        "2026-05-01T12:00:00+02:00",
+    )
     user.again(*rate)
     fix = user.meets("camera/start.py", "give --start with a zone, e.g.", "ingest", "pics", *rate)
     user.again(*fix[fix.index("--start 2") :].split()[:2])
@@ -126,21 +146,29 @@ def test_pictures_need_a_rate_and_a_start(user: User, pictures: list[Image.Image
 def test_the_rate_of_a_gif_is_given(user: User, pictures: list[Image.Image]) -> None:
     pictures[0].save(user.folder / "a.gif", save_all=True, append_images=pictures[1:], duration=40)
     start = ("--start", "2026-05-01T12:00:00Z")
-    user.meets("camera/video.py", "if the camera's rate is known, give it", "ingest", "a.gif", *start)
+    user.meets(
+        "camera/video.py", "if the camera's rate is known, give it", "ingest", "a.gif", *start
+    )
     user.again("--true-fps", 25)
     pictures[0].save(user.folder / "b.gif", save_all=True, append_images=pictures[1:], duration=0)
-    user.meets("camera/video.py", "give the rate at which the camera ran", "ingest", "b.gif", *start)
+    user.meets(
+        "camera/video.py", "give the rate at which the camera ran", "ingest", "b.gif", *start
+    )
     user.again("--true-fps", 25)
 
 
-@pytest.mark.parametrize("form", [("a.h264", "libx264", "yuv420p"), ("a.mjpeg", "mjpeg", "yuvj420p")])
+@pytest.mark.parametrize(
+    "form", [("a.h264", "libx264", "yuv420p"), ("a.mjpeg", "mjpeg", "yuvj420p")]
+)
 def test_a_raw_stream_is_a_film_whose_rate_is_given(user: User, form: tuple[str, str, str]) -> None:
     name, codec, pixels = form
     with av.open(name, "w", format=name.partition(".")[2]) as container:
         stream = cast(VideoStream, container.add_stream(codec, rate=50, options={"threads": "1"}))
         stream.height, stream.width, stream.pix_fmt = 48, 64, pixels
         for k in range(30):
-            image = av.VideoFrame.from_ndarray(np.full((48, 64), 40 + 3 * k, np.uint8), format="gray")
+            image = av.VideoFrame.from_ndarray(
+                np.full((48, 64), 40 + 3 * k, np.uint8), format="gray"
+            )
             container.mux(stream.encode(image.reformat(format=pixels)))
         container.mux(stream.encode(None))
     start = ("--start", "2026-05-01T12:00:00Z")
@@ -152,13 +180,22 @@ def test_files_that_are_no_chapters_are_ingested_by_themselves(user: User) -> No
     write_film(user.folder / "a.mp4", frames=25, begin="2026-05-01T10:00:00Z")
     write_film(user.folder / "b.mp4", frames=25, begin="2026-05-01T10:00:00Z", size=(32, 32))
     write_film(user.folder / "c.mp4", frames=25, begin="2026-05-01T11:00:00Z")
-    user.meets("camera/joined.py", "ingest it by itself, without --join", "ingest", "a.mp4", "b.mp4", "--join")
+    user.meets(
+        "camera/joined.py",
+        "ingest it by itself, without --join",
+        "ingest",
+        "a.mp4",
+        "b.mp4",
+        "--join",
+    )
     user.follows("ingest", "b.mp4")
     user.meets("camera/joined.py", "or leave out --join", "ingest", "a.mp4", "c.mp4", "--join")
     user.follows("ingest", "a.mp4", "c.mp4")
 
 
-def test_a_record_without_its_row_is_taken_off_and_named_or_ingested_from_the_export(user: User) -> None:
+def test_a_record_without_its_row_is_taken_off_and_named_or_ingested_from_the_export(
+    user: User,
+) -> None:
     user.succeeds("ingest", "second.mp4", "--session", "s")
     user.succeeds("export", "mcap", "--to", "out", "--where", "name = 'second'")
     (exported,) = (user.folder / "out").glob("*.mcap")

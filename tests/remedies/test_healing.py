@@ -1,4 +1,5 @@
-"""Remedies of lakes whose objects, refs or catalog are damaged, and of work that was killed halfway."""
+"""Remedies of lakes whose objects, refs or catalog are damaged, and of work that was killed
+halfway."""
 
 from __future__ import annotations
 
@@ -55,7 +56,9 @@ def test_a_film_whose_object_is_lost_is_put_back_by_its_file_or_by_a_clone(user:
     user.succeeds("verify")
 
 
-def test_a_measurement_whose_object_is_lost_comes_back_by_a_clone_or_is_withdrawn(user: User) -> None:
+def test_a_measurement_whose_object_is_lost_comes_back_by_a_clone_or_is_withdrawn(
+    user: User,
+) -> None:
     keep_measurement(the_lake(user))
     user.succeeds("clone", "lake", "copy.lake")
     lose(the_lake(user), object_of(the_lake(user), "wave"))
@@ -84,7 +87,11 @@ def test_a_file_of_the_lake_that_is_damaged_is_taken_from_an_older_clone(user: U
     user.succeeds("clone", "lake", "older.lake")
     user.succeeds("label", "mast", "later=1")
     log = user.folder / "lake" / "catalog" / "_delta_log"
-    for path in (user.folder / "lake" / "lake.json", log / f"{1:020d}.json", log / f"{0:020d}.json"):
+    for path in (
+        user.folder / "lake" / "lake.json",
+        log / f"{1:020d}.json",
+        log / f"{0:020d}.json",
+    ):
         overwrite(path, b"")
         user.meets("flagdata/core/files/durable.py", "flagdata heal FROM, a c", "ls")
         user.follows("heal", "older.lake", shows="1 item taken, .*; nothing still damaged")
@@ -117,7 +124,13 @@ def test_an_erasure_that_was_killed_is_ended_by_gc_or_by_the_same_command(user: 
         user.begins()
         lake = the_lake(user)
         with pytest.MonkeyPatch.context() as patch:
-            stopped(patch, Objects, "delete", partial(lake.erase, [lake.artifact("first").id], "asked"), at=0)
+            stopped(
+                patch,
+                Objects,
+                "delete",
+                partial(lake.erase, [lake.artifact("first").id], "asked"),
+                at=0,
+            )
         user.meets("lake/health.py", "run flagdata gc, which d", "doctor")
         user.follows(*words)
         user.succeeds("doctor", shows="(?m)^healthy")
@@ -135,7 +148,9 @@ def test_an_expiry_that_was_killed_is_ended_by_gc(user: User) -> None:
     assert not the_lake(user).objects.has(gone)
 
 
-def test_a_disk_that_lets_nothing_be_deleted_keeps_what_gc_or_the_same_command_deletes_later(user: User) -> None:
+def test_a_disk_that_lets_nothing_be_deleted_keeps_what_gc_or_the_same_command_deletes_later(
+    user: User,
+) -> None:
     erase = ("withdraw", "first", "--everywhere", "-m", "asked")
     for words in (("gc",), erase):
         user.begins()
@@ -152,7 +167,13 @@ def test_a_disk_that_lets_nothing_be_deleted_keeps_what_gc_or_the_same_command_d
 
 def test_a_clone_that_was_killed_is_ended_by_the_push_that_is_named(user: User) -> None:
     with pytest.MonkeyPatch.context() as patch:
-        stopped(patch, Objects, "publish", partial(clone, the_lake(user), Path("copy.lake"), bars=no_bar), at=0)
+        stopped(
+            patch,
+            Objects,
+            "publish",
+            partial(clone, the_lake(user), Path("copy.lake"), bars=no_bar),
+            at=0,
+        )
     fix = user.meets("lake/copying.py", "brings it up to date, a", "clone", "lake", "copy.lake")
     user.follows(*shlex.split(fix.partition("flagdata ")[2].partition(" brings")[0]))
     user.succeeds("doctor", "--lake", "copy.lake", shows="(?m)^healthy")

@@ -1,4 +1,5 @@
-"""Remedies of instruments' lines, loggers' tables and networks of vessels: what they name is typed, the log is read."""
+"""Remedies of instruments' lines, loggers' tables and networks of vessels: what they name is typed,
+the log is read."""
 
 from __future__ import annotations
 
@@ -21,11 +22,14 @@ ISO = "2026-05-01T12:{m}:{s}Z"
 
 def stamped(*lines: str) -> str:
     """Each line after a stamp, one a second, ten times over."""
-    return "".join(f"2026-05-01T12:{k // 60:02d}:{k % 60:02d}Z {lines[k % len(lines)]}\n" for k in S)
+    return "".join(
+        f"2026-05-01T12:{k // 60:02d}:{k % 60:02d}Z {lines[k % len(lines)]}\n" for k in S
+    )
 
 
 def network(*sources: int, reference: str = "fa", speed_over_ground: str = "") -> str:
-    """Wind of each device of an NMEA 2000 network, of which the last byte says what it refers to."""
+    """Wind of each device of an NMEA 2000 network, of which the last byte says what it refers
+    to."""
     text = ""
     for k in S:
         stamp = f"2026-05-01T12:00:{k:02d}.000Z"
@@ -38,7 +42,10 @@ def network(*sources: int, reference: str = "fa", speed_over_ground: str = "") -
 
 def vtg(*, knots: float) -> str:
     """The course and speed over ground of a stream whose wind is apparent."""
-    return "".join(mwv(k) + sentence(f"GPVTG,90.0,T,,M,{knots:.1f},N,{knots * 1.852:.1f},K,A") + "\n" for k in S)
+    return "".join(
+        mwv(k) + sentence(f"GPVTG,90.0,T,,M,{knots:.1f},N,{knots * 1.852:.1f},K,A") + "\n"
+        for k in S
+    )
 
 
 def framed(body: str) -> str:
@@ -118,7 +125,10 @@ CASES = [
         "samples/platform.py",
         "if the sensor is on a ma",
         "ingest a.csv --columns time,apparent_wind_speed[m/s],apparent_wind_direction[deg]",
-        ("ingest a.csv --columns time,apparent_wind_speed[m/s],apparent_wind_direction[deg] --platform fixed",),
+        (
+            "ingest a.csv --columns time,apparent_wind_speed[m/s],apparent_wind_direction[deg] "
+            "--platform fixed",
+        ),
         files={"a.csv": ZONED},
     ),
     Case(
@@ -194,7 +204,8 @@ CASES = [
         "ingest a.csv",
         ("ingest a.csv --clock last",),
         files={
-            "a.csv": rows("time,wind_speed (m/s)\n", "2000-01-01T00:{m}:{s}Z,{v}", 20) + rows("", ISO + ",{v}", 200),
+            "a.csv": rows("time,wind_speed (m/s)\n", "2000-01-01T00:{m}:{s}Z,{v}", 20)
+            + rows("", ISO + ",{v}", 200),
         },
     ),
     Case(
@@ -223,21 +234,30 @@ CASES = [
         "h its year: --date YYYY-",
         "ingest a.csv --sensor FILE.toml --zone UTC",
         ("ingest a.csv --sensor FILE.toml --zone UTC --date 2026-05-01",),
-        files={"a.csv": rows("time,wind_speed\n", "05-01 12:{m}:{s},{v}"), "FILE.toml": by("%m-%d %H:%M:%S")},
+        files={
+            "a.csv": rows("time,wind_speed\n", "05-01 12:{m}:{s},{v}"),
+            "FILE.toml": by("%m-%d %H:%M:%S"),
+        },
     ),
     Case(
         "instants/dates.py",
         "give its day with its ye",
         "ingest a.csv --sensor FILE.toml --zone UTC --date 2026-05-02",
         ("ingest a.csv --sensor FILE.toml --zone UTC --date 2026-05-01",),
-        files={"a.csv": rows("time,wind_speed\n", "05-01 12:{m}:{s},{v}"), "FILE.toml": by("%m-%d %H:%M:%S")},
+        files={
+            "a.csv": rows("time,wind_speed\n", "05-01 12:{m}:{s},{v}"),
+            "FILE.toml": by("%m-%d %H:%M:%S"),
+        },
     ),
     Case(
         "instants/dates.py",
         "give --date with the yea",
         "ingest a.csv --sensor FILE.toml --zone UTC --date 2026-02-28",
         ("ingest a.csv --sensor FILE.toml --zone UTC --date 2024-02-29",),
-        files={"a.csv": rows("time,wind_speed\n", "02-29 12:{m}:{s},{v}"), "FILE.toml": by("%m-%d %H:%M:%S")},
+        files={
+            "a.csv": rows("time,wind_speed\n", "02-29 12:{m}:{s},{v}"),
+            "FILE.toml": by("%m-%d %H:%M:%S"),
+        },
     ),
     Case(
         "instants/dates.py",
@@ -327,14 +347,19 @@ DRAFTED = [
         "ingest a.dat --zone UTC",
         ("ingest a.dat --zone UTC --as delimited --columns '1=time,3=wind_speed[m/s]'",),
         files={
-            "a.dat": TOA5.replace("WS_Avg", "Cups_Avg").replace("WindDir_Avg", "Vane_Avg").replace("degrees", "deg")
+            "a.dat": TOA5.replace("WS_Avg", "Cups_Avg")
+            .replace("WindDir_Avg", "Vane_Avg")
+            .replace("degrees", "deg")
         },
     ),
     Case(
         "formats/described.py",
         "to read the others, too,",
         "ingest a.dat --zone UTC",
-        ("ingest a.dat --zone UTC --as delimited --columns '1=time,4=wind_speed[m/s]' --name other",),
+        (
+            "ingest a.dat --zone UTC --as delimited --columns '1=time,4=wind_speed[m/s]' --name "
+            "other",
+        ),
         files={"a.dat": TWO_SPEEDS},
         untried="--unit",
     ),
@@ -342,7 +367,9 @@ DRAFTED = [
 
 
 @pytest.mark.parametrize("case", DRAFTED, ids=str)
-def test_a_table_that_is_drafted_by_a_remedy_is_read_once_it_is_confirmed(case: Case, user: User) -> None:
+def test_a_table_that_is_drafted_by_a_remedy_is_read_once_it_is_confirmed(
+    case: Case, user: User
+) -> None:
     for name, text in case.files.items():
         (user.folder / name).write_text(text)
     meet = user.meets
@@ -354,8 +381,12 @@ def test_a_table_that_is_drafted_by_a_remedy_is_read_once_it_is_confirmed(case: 
 
 
 def test_units_that_lack_a_cell_are_read_by_the_columns_that_are_named(user: User) -> None:
-    (user.folder / "a.csv").write_text(eddypro([unit for name, unit in EDDYPRO.items() if name != "DOY"]))
-    fix = user.meets("formats/described.py", "mend the line of units;", "ingest", "a.csv", "--zone", "UTC")
+    (user.folder / "a.csv").write_text(
+        eddypro([unit for name, unit in EDDYPRO.items() if name != "DOY"])
+    )
+    fix = user.meets(
+        "formats/described.py", "mend the line of units;", "ingest", "a.csv", "--zone", "UTC"
+    )
     (columns,) = re.findall(r"--columns '([^']*)'", fix)
     command = ("ingest", "a.csv", "--zone", "UTC", "--columns", columns, "--expect", "coarse")
     ended = user.follows(*command, code=3, shows="--accept")
@@ -365,7 +396,9 @@ def test_units_that_lack_a_cell_are_read_by_the_columns_that_are_named(user: Use
 def test_a_component_is_no_speed_and_is_named_with_the_other(user: User) -> None:
     lines = (f"2026-05-01T12:00:{k:02d}Z,{-2 - k % 7 / 10:.1f},{1 + k % 5 / 10:.1f}\n" for k in S)
     (user.folder / "a.csv").write_text("time,wind_speed,v\n" + "".join(lines))
-    fix = user.meets("samples/rules.py", "name both components and", "ingest", "a.csv", "--sensor", "generic-csv")
+    fix = user.meets(
+        "samples/rules.py", "name both components and", "ingest", "a.csv", "--sensor", "generic-csv"
+    )
     assert "wind_x[m/s] and wind_y[m/s]" in fix
     user.follows("ingest", "a.csv", "--columns", "time,wind_x[m/s],wind_y[m/s]", "--azimuth", 270)
 
@@ -384,7 +417,9 @@ def test_a_site_that_a_recipe_names_otherwise_than_the_file_is_named_as_the_file
 
 
 def test_of_many_sites_the_first_are_named(user: User) -> None:
-    lines = "".join(f"2026-05-01T12:00:{k:02d}Z,{letter},5.0\n" for letter in "abcdefghijklmnop" for k in S)
+    lines = "".join(
+        f"2026-05-01T12:00:{k:02d}Z,{letter},5.0\n" for letter in "abcdefghijklmnop" for k in S
+    )
     (user.folder / "a.csv").write_text("time,site,wind_speed (m/s)\n" + lines)
     (user.folder / "FILE.toml").write_text(SITE_RECIPE.format("A"))
     err = user.types("ingest", "a.csv", "--sensor", "FILE.toml").err
@@ -396,7 +431,14 @@ def test_a_count_that_starts_again_is_read_as_a_file_of_each_stretch(user: User)
     (user.folder / "FILE.toml").write_text(by("elapsed-s"))
     (user.folder / "a.csv").write_text(STRETCHES)
     start = ("--sensor", "FILE.toml", "--start")
-    user.meets("instants/dates.py", "make a file of each stre", "ingest", "a.csv", *start, "2026-05-01T12:00:00Z")
+    user.meets(
+        "instants/dates.py",
+        "make a file of each stre",
+        "ingest",
+        "a.csv",
+        *start,
+        "2026-05-01T12:00:00Z",
+    )
     head, *lines = STRETCHES.splitlines(keepends=True)
     for number in range(2):
         name = f"{number}.csv"
@@ -415,9 +457,13 @@ STREAMS = {
 
 
 @pytest.mark.parametrize("name", STREAMS)
-def test_a_stream_without_times_that_go_on_is_read_at_the_rate_at_which_it_came(user: User, name: str) -> None:
+def test_a_stream_without_times_that_go_on_is_read_at_the_rate_at_which_it_came(
+    user: User, name: str
+) -> None:
     (user.folder / "a.nmea").write_text(STREAMS[name])
-    fix = user.meets("marks.py", "if its wind came at a steady rate", "ingest", "a.nmea", "--platform", "fixed")
+    fix = user.meets(
+        "marks.py", "if its wind came at a steady rate", "ingest", "a.nmea", "--platform", "fixed"
+    )
     assert "column" not in fix
     user.again("--start", "2026-05-01T12:00:00Z", "--rate", 1, shows="median rate 1 Hz")
 
@@ -436,7 +482,9 @@ def test_a_log_that_is_hours_off_comes_in_anew_by_the_zone_of_the_other(user: Us
     wind = [4 + 3 * ((k * k + 7 * k) % 11) / 11 for k in range(1200)]
     text = "".join(line.format(h=k // 60, m=k % 60, v=v) for k, v in enumerate(wind))
     for name in ("a", "b"):
-        (user.folder / f"{name}.csv").write_text("time,wind_speed\n" + text.replace("4.0\n", f"4.0{name == 'b':d}\n"))
+        (user.folder / f"{name}.csv").write_text(
+            "time,wind_speed\n" + text.replace("4.0\n", f"4.0{name == 'b':d}\n")
+        )
     user.succeeds("ingest", "a.csv", "--sensor", "generic-csv", "--zone", "UTC")
     command = ("ingest", "b.csv", "--sensor", "generic-csv", "--zone")
     user.meets("samples/neighbours.py", "check --zone of both log", *command, "+02:00")
@@ -445,6 +493,10 @@ def test_a_log_that_is_hours_off_comes_in_anew_by_the_zone_of_the_other(user: Us
 
 
 def test_letters_of_another_encoding_are_read_by_the_one_that_is_named(user: User) -> None:
-    (user.folder / "a.csv").write_bytes(PLAIN.replace("Z,4.0", "Z,4.0,25 \N{DEGREE SIGN}C").encode("cp1252"))
-    user.meets("text/source.py", "name the encoding, e.g.", "ingest", "a.csv", "--sensor", "generic-csv")
+    (user.folder / "a.csv").write_bytes(
+        PLAIN.replace("Z,4.0", "Z,4.0,25 \N{DEGREE SIGN}C").encode("cp1252")
+    )
+    user.meets(
+        "text/source.py", "name the encoding, e.g.", "ingest", "a.csv", "--sensor", "generic-csv"
+    )
     user.again("--encoding", "cp1252")

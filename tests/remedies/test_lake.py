@@ -15,7 +15,9 @@ NOBODY = "0123456789abcdef0123456789abcdef"
 
 def aligned(user: User, *more: str) -> str:
     """The id of the recording that a user makes of the film and the log."""
-    ended = user.succeeds("align", "first", "mast", "--by", "stamps", "--offset-sigma", "0.1", "--json", *more)
+    ended = user.succeeds(
+        "align", "first", "mast", "--by", "stamps", "--offset-sigma", "0.1", "--json", *more
+    )
     return ended.document["recording"]
 
 
@@ -33,7 +35,9 @@ def test_a_name_of_a_branch_is_listed_with_the_branch_that_was_asked(user: User)
 
 def test_a_name_of_several_is_made_certain_by_the_ids_that_are_listed(user: User) -> None:
     one = aligned(user)
-    user.succeeds("align", "first", "mast", "--by", "given", "--clock-offset", 1, "--offset-sigma", "0.1")
+    user.succeeds(
+        "align", "first", "mast", "--by", "given", "--clock-offset", 1, "--offset-sigma", "0.1"
+    )
     user.meets("lake/store.py", "flagdata ls lists them", "show", "first")
     user.follows("ls", shows=one[:12])
     user.succeeds("show", one[:12])
@@ -69,7 +73,9 @@ def test_where_there_is_no_lake_one_is_made_or_named(user: User, monkeypatch) ->
 
 def test_a_log_that_a_recording_needs_is_withdrawn_with_it(user: User) -> None:
     aligned(user)
-    user.meets("lake/removal.py", "flagdata withdraw --with-descendants", "withdraw", "mast", "-m", "zero")
+    user.meets(
+        "lake/removal.py", "flagdata withdraw --with-descendants", "withdraw", "mast", "-m", "zero"
+    )
     user.follows("withdraw", "mast", "-m", "zero", "--with-descendants")
     user.succeeds("doctor")
 
@@ -176,9 +182,15 @@ def test_what_a_killed_ingest_leaves_is_young_at_first_and_then_taken_by_gc(user
     record.write_bytes((user.folder / "cut.mcap").read_bytes())
     half = user.folder / "lake" / "catalog" / "0123.parquet"
     half.write_text("half")
-    fix = user.meets("lake/health.py", "; to save its unfinished record first: flagdata recover", "doctor")
-    user.follows("recover", *fix.partition("flagdata recover ")[2].split(), "saved.mcap", shows="recovered")
-    user.meets("lake/health.py", "; to save its unfinished record first: flagdata recover", "doctor")
+    fix = user.meets(
+        "lake/health.py", "; to save its unfinished record first: flagdata recover", "doctor"
+    )
+    user.follows(
+        "recover", *fix.partition("flagdata recover ")[2].split(), "saved.mcap", shows="recovered"
+    )
+    user.meets(
+        "lake/health.py", "; to save its unfinished record first: flagdata recover", "doctor"
+    )
     user.follows("gc", shows="0123")
     user.meets("lake/health.py", "none needed; flagdata gc takes it", "doctor")
     user.follows("gc")
@@ -219,7 +231,9 @@ def test_what_was_erased_is_left_out_of_an_export(user: User) -> None:
     )
 
 
-def test_labels_that_a_merge_would_bring_into_one_column_are_taken_off_as_the_fix_says(user: User) -> None:
+def test_labels_that_a_merge_would_bring_into_one_column_are_taken_off_as_the_fix_says(
+    user: User,
+) -> None:
     user.succeeds("branch", "other")
     user.succeeds("label", "mast", "A=1")
     user.succeeds("label", "first", "a=1", "--branch", "other")

@@ -1,4 +1,5 @@
-"""Remedies of commands that measure, simulate and learn, as far as a second's work brings them about."""
+"""Remedies of commands that measure, simulate and learn, as far as a second's work brings them
+about."""
 
 from __future__ import annotations
 
@@ -39,7 +40,13 @@ CASES = [
         shows=TOO_SHORT,
         code=1,
     ),
-    Case("film/source.py", "see flagdata measure --help", "measure", ("measure --help",), shows="--query"),
+    Case(
+        "film/source.py",
+        "see flagdata measure --help",
+        "measure",
+        ("measure --help",),
+        shows="--query",
+    ),
     Case(
         "film/source.py",
         "look with flagdata query --where",
@@ -105,9 +112,19 @@ def test_what_a_remedy_says_heals(case: Case, user: User, monkeypatch: pytest.Mo
 
 
 def test_a_film_without_a_log_is_aligned_before_it_is_calibrated(user: User) -> None:
-    user.meets("cloth/sources.py", "and name the recording that comes out", "calibrate", "first", "--flag-size", "1x1")
+    user.meets(
+        "cloth/sources.py",
+        "and name the recording that comes out",
+        "calibrate",
+        "first",
+        "--flag-size",
+        "1x1",
+    )
     recording = user.follows(*STAMPS.split(), "--json").document["recording"]
-    assert "no log of the wind is beside" not in user.types("calibrate", recording, "--flag-size", "1x1").err
+    assert (
+        "no log of the wind is beside"
+        not in user.types("calibrate", recording, "--flag-size", "1x1").err
+    )
 
 
 def test_a_query_of_clips_needs_a_lake(user: User, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,5 @@
-"""Remedies of flags as anemometers: what windows of a film show is made, as in `tests.measure.anemometer`."""
+"""Remedies of flags as anemometers: what windows of a film show is made, as in
+`tests.measure.anemometer`."""
 
 from __future__ import annotations
 
@@ -70,14 +71,20 @@ def monday(user: User, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("monday")
-def test_a_film_is_read_by_the_model_that_was_calibrated(user: User, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_film_is_read_by_the_model_that_was_calibrated(
+    user: User, monkeypatch: pytest.MonkeyPatch
+) -> None:
     said = user.meets("commands/calibrate.py", "agdata measure: --model", *CALIBRATE, "garden")
     assert said.endswith("--model garden")
     command = ("measure", "monday", "--model", "garden")
     user.follows(*command, shows=READ)
-    user.meets("anemometer/measuring.py", "out, or choose a networ", *command, "--area-weight", "0.1")
+    user.meets(
+        "anemometer/measuring.py", "out, or choose a networ", *command, "--area-weight", "0.1"
+    )
     user.again(without="--area-weight", shows=READ)
-    user.meets("anemometer/measuring.py", "check --flag-size, or ca", *command, "--flag-size", "3x1")
+    user.meets(
+        "anemometer/measuring.py", "check --flag-size, or ca", *command, "--flag-size", "3x1"
+    )
     user.again(without="--flag-size", shows=READ)
     shown(monkeypatch, seed=1, where=place(seed=9))
     user.meets("anemometer/novelty.py", "calibrate this flag from", *command)
@@ -88,7 +95,9 @@ def test_a_film_is_read_by_the_model_that_was_calibrated(user: User, monkeypatch
 
 
 @pytest.mark.usefixtures("monday")
-def test_what_does_not_follow_the_wind_may_be_another_flag(user: User, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_does_not_follow_the_wind_may_be_another_flag(
+    user: User, monkeypatch: pytest.MonkeyPatch
+) -> None:
     shown(monkeypatch, seed=5)
     user.meets("anemometer/calibration.py", "check the flag with --cr", *CALIBRATE, "garden")
     shown(monkeypatch, seed=1)
@@ -100,7 +109,11 @@ def test_what_does_not_follow_the_wind_may_be_another_flag(user: User, monkeypat
 def test_a_film_is_calibrated_beside_its_log(user: User) -> None:
     film("tuesday", Kind.CAMERA)
     options = ("--only", "anemometer", *SIZED)
-    user.meets("anemometer/calibration.py", "align a film and a log (", "calibrate", "tuesday", *options)
-    aligned = user.follows("align", "tuesday", "mast", "--by", "stamps", "--offset-sigma", "0.1", "--json")
+    user.meets(
+        "anemometer/calibration.py", "align a film and a log (", "calibrate", "tuesday", *options
+    )
+    aligned = user.follows(
+        "align", "tuesday", "mast", "--by", "stamps", "--offset-sigma", "0.1", "--json"
+    )
     ended = user.types("calibrate", aligned.document["recording"], *options)
     assert "no log of the wind is beside" not in ended.err

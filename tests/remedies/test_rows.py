@@ -20,7 +20,8 @@ EXPORT = "export mcap --to out --where \"name = 'one'\""
 
 
 def changed(user: User, kind: Kind, column: str, value: object) -> dict[Path, bytes]:
-    """Change a value of the row of a kind that is called `one`, as a program would that wrote it wrongly.
+    """Change a value of the row of a kind that is called `one`, as a program would that wrote it
+    wrongly.
 
     The hashes that the log and the refs state are those of what is there.
 
@@ -89,10 +90,24 @@ MADE = {
 """What makes each kind that is changed; a clip is `add_clip`'s."""
 CHANGES = [
     (Case("export/source.py", "run flagdata doctor", EXPORT), Kind.CAMERA, "object", None),
-    (Case("export/source.py", "names the rows that are damaged", EXPORT), Kind.CLIP, "frame_count", 9000),
-    (Case("export/obj.py", "run flagdata doctor", EXPORT.replace("mcap", "obj")), Kind.MESHES, "object", None),
     (
-        Case("flagdata/recipes/documents.py", "run flagdata doctor", EXPORT.replace("mcap", "webdataset")),
+        Case("export/source.py", "names the rows that are damaged", EXPORT),
+        Kind.CLIP,
+        "frame_count",
+        9000,
+    ),
+    (
+        Case("export/obj.py", "run flagdata doctor", EXPORT.replace("mcap", "obj")),
+        Kind.MESHES,
+        "object",
+        None,
+    ),
+    (
+        Case(
+            "flagdata/recipes/documents.py",
+            "run flagdata doctor",
+            EXPORT.replace("mcap", "webdataset"),
+        ),
         Kind.CLIP,
         "parameters",
         "{",

@@ -1,7 +1,8 @@
-"""Remedies of `flagdata calibrate` that weighs a cloth: simulations are a known function, films are read as they show.
+"""Remedies of `flagdata calibrate` that weighs a cloth: simulations are a known function, films are
+read as they show.
 
-What a table or a film shows comes from `tests.measure.cloth.calibration`; the messages and what is typed are the
-program's.
+What a table or a film shows comes from `tests.measure.cloth.calibration`; the messages and what is
+typed are the program's.
 """
 
 from __future__ import annotations
@@ -32,7 +33,9 @@ START = 1_777_629_600 * NANOSECONDS
 def shown(speed: FloatArray, *, azimuth: float = 70.0) -> FloatArray:
     """(window, 3) what windows in these winds show of one cloth."""
     values = {"area_weight": 0.2, "gain": 1.0, "damping": 0.01, "azimuth": math.radians(azimuth)}
-    return readings({name: np.array([value]) for name, value in values.items()}, speed, seed=3)[0, :, :3]
+    return readings({name: np.array([value]) for name, value in values.items()}, speed, seed=3)[
+        0, :, :3
+    ]
 
 
 def gusts(windows: int = 48, *, swing: float = 1.5) -> FloatArray:
@@ -57,7 +60,9 @@ DROOPING = table("time,droop,extension,middle-speed", shown(gusts(30)))
 JOINED = f"calibrate t.csv {SIZED} --log mast --clock-offset 1777629605±0.1"
 """The table's clock begins at 0, the log at the scene's time."""
 GAP = "time,wind_speed (m/s),wind_direction (deg)\n" + "".join(
-    f"2026-05-01T10:0{k // 60}:{k % 60:02d}Z,{5 + k % 10 / 10},{200 + k % 9}\n" for k in range(180) if not 75 < k < 100
+    f"2026-05-01T10:0{k // 60}:{k % 60:02d}Z,{5 + k % 10 / 10},{200 + k % 9}\n"
+    for k in range(180)
+    if not 75 < k < 100
 )
 """A log of three minutes that was interrupted."""
 CASES = [
@@ -138,7 +143,10 @@ CASES = [
         "cloth/wind.py",
         "choose a part of the fil",
         f"calibrate long.csv {SIZED} --log mast --clock-offset 1777629605±0.1",
-        (f"calibrate long.csv {SIZED} --log mast --clock-offset 1777629605±0.1 --start 0s --end 100s",),
+        (
+            f"calibrate long.csv {SIZED} --log mast --clock-offset 1777629605±0.1 --start 0s --end "
+            "100s",
+        ),
         files={"long.csv": table("time,droop,extension,middle-speed", shown(gusts(60)))},
         shows=WEIGHED,
     ),
@@ -147,7 +155,10 @@ CASES = [
         "choose a part without ga",
         f"calibrate t.csv {SIZED} --log gap --clock-offset 1777629605±0.1",
         (f"calibrate t.csv {SIZED} --log gap --clock-offset 1777629605±0.1 --start 0s --end 60s",),
-        files={"t.csv": table("time,droop,extension,middle-speed", shown(gusts(40))), "gap.csv": GAP},
+        files={
+            "t.csv": table("time,droop,extension,middle-speed", shown(gusts(40))),
+            "gap.csv": GAP,
+        },
         before=("ingest gap.csv",),
         shows=WEIGHED,
     ),
@@ -178,9 +189,18 @@ def test_a_log_of_a_table_is_in_a_lake(user: User, monkeypatch: pytest.MonkeyPat
 @pytest.mark.usefixtures("cheap")
 def test_the_weight_that_was_found_is_given_to_a_measurement(user: User) -> None:
     (user.folder / "t.csv").write_text(GUSTY)
-    said = user.meets("commands/calibrate.py", "measure: --area-weight", "calibrate", "t.csv", *SIZED.split())
+    said = user.meets(
+        "commands/calibrate.py", "measure: --area-weight", "calibrate", "t.csv", *SIZED.split()
+    )
     weight = shlex.split(said.partition("--area-weight ")[2].splitlines()[0])[0]
-    user.follows("measure", "second.mp4", "--area-weight", weight, code=1, shows="s of film, a measurement takes")
+    user.follows(
+        "measure",
+        "second.mp4",
+        "--area-weight",
+        weight,
+        code=1,
+        shows="s of film, a measurement takes",
+    )
 
 
 def simulated(patch: pytest.MonkeyPatch, shows: Any) -> None:
@@ -200,7 +220,9 @@ def test_flags_that_are_simulated_otherwise_do_not_show_what_the_film_shows(
 
     def shows(design: Design, every: FloatArray) -> FloatArray:
         rare = design.flag.length > 2
-        return np.where((np.arange(len(every)) % 12 < (9 if rare else 0))[:, None, None], np.nan, every)
+        return np.where(
+            (np.arange(len(every)) % 12 < (9 if rare else 0))[:, None, None], np.nan, every
+        )
 
     simulated(monkeypatch, shows)
     (user.folder / "t.csv").write_text(GUSTY)
@@ -227,14 +249,18 @@ def test_windows_with_more_wind_show_the_cloth(user: User, monkeypatch: pytest.M
 
 
 @pytest.mark.usefixtures("cheap")
-def test_more_simulations_widen_intervals_that_are_too_narrow(user: User, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_more_simulations_widen_intervals_that_are_too_narrow(
+    user: User, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """What is found of simulations left out stands in: few are held of 64."""
     plain = calibrate.check_coverage
 
     def checked(made: Any, options: calibrate.Options) -> calibrate.Check:
         found = plain(made, options)
         return calibrate.Check(
-            count=found.count, contained=found.count * (options.simulations > 100), error=found.error
+            count=found.count,
+            contained=found.count * (options.simulations > 100),
+            error=found.error,
         )
 
     monkeypatch.setattr(calibrate, "check_coverage", checked)
@@ -255,6 +281,22 @@ def test_more_simulations_widen_intervals_that_are_too_narrow(user: User, monkey
 def test_a_flag_from_another_side_looks_like_no_simulated_one(user: User) -> None:
     (user.folder / "t.csv").write_text(GUSTY)
     command = ("calibrate", "t.csv", "--flag-size", "1.5x1.0")
-    user.meets("cloth/calibration.py", "look at the readings with flagdata observe", *command, "--azimuth", "160±2")
+    user.meets(
+        "cloth/calibration.py",
+        "look at the readings with flagdata observe",
+        *command,
+        "--azimuth",
+        "160±2",
+    )
     user.follows(*command, "--azimuth", "70±7", shows=WEIGHED)
-    user.leaves(["observe", "--picture", "--flag-size", "--attachment", "--elevation", "--distance", "close-loop"])
+    user.leaves(
+        [
+            "observe",
+            "--picture",
+            "--flag-size",
+            "--attachment",
+            "--elevation",
+            "--distance",
+            "close-loop",
+        ]
+    )

@@ -1,4 +1,5 @@
-"""Remedies of anemometer logs: options that they name are given as they say, and the log is read."""
+"""Remedies of anemometer logs: options that they name are given as they say, and the log is
+read."""
 
 from __future__ import annotations
 
@@ -15,7 +16,10 @@ from tests.remedies.user import User
 def rows(head: str, line: str, count: int = 40) -> str:
     """A text of lines in which {s} is the second of a minute and {v} a speed."""
     body = "".join(
-        line.format(s=f"{k % 60:02d}", m=f"{k // 60:02d}", v=f"{4 + k % 7 / 10:.1f}", d=200 + k % 5, k=k) + "\n"
+        line.format(
+            s=f"{k % 60:02d}", m=f"{k // 60:02d}", v=f"{4 + k % 7 / 10:.1f}", d=200 + k % 5, k=k
+        )
+        + "\n"
         for k in range(count)
     )
     return head + body
@@ -57,7 +61,9 @@ name = "mine"
 HOSTED = rows("laptop_time,raw_line\n", "2026-05-01T12:{m}:{s}.5Z,{v}")
 
 
-def mwv(second: int, *, talker: str = "WI", date: bool = True, time: bool = True, reference: str = "R") -> str:
+def mwv(
+    second: int, *, talker: str = "WI", date: bool = True, time: bool = True, reference: str = "R"
+) -> str:
     lines = []
     if time:
         lines.append(
@@ -65,7 +71,9 @@ def mwv(second: int, *, talker: str = "WI", date: bool = True, time: bool = True
             if date
             else sentence(f"GPGGA,1200{second:02d}.00,5222.0,N,00452.0,E,1,08,1.0,1.0,M,46.0,M,,")
         )
-    lines.append(sentence(f"{talker}MWV,{200 + second % 5}.0,{reference},{4 + second % 7 / 10:.1f},M,A"))
+    lines.append(
+        sentence(f"{talker}MWV,{200 + second % 5}.0,{reference},{4 + second % 7 / 10:.1f},M,A")
+    )
     return "\n".join(lines) + "\n"
 
 
@@ -127,7 +135,11 @@ CASES = [
         "draft/questions.py",
         QUESTION,
         "ingest a.csv --zone UTC",
-        ("ingest a.csv --zone UTC --date-order dmy", OR, "ingest a.csv --zone UTC --date-order mdy"),
+        (
+            "ingest a.csv --zone UTC --date-order dmy",
+            OR,
+            "ingest a.csv --zone UTC --date-order mdy",
+        ),
         files={"a.csv": NUMBERS},
         untried="--sensor",
     ),
@@ -192,7 +204,13 @@ CASES = [
         ("ingest a.csv",),
         files={"a.csv": ZONED},
     ),
-    Case("text/source.py", "leave out --topic", "ingest a.csv --topic /x", ("ingest a.csv",), files={"a.csv": ZONED}),
+    Case(
+        "text/source.py",
+        "leave out --topic",
+        "ingest a.csv --topic /x",
+        ("ingest a.csv",),
+        files={"a.csv": ZONED},
+    ),
     Case(
         "text/source.py",
         "name the encoding it is in, e.g. --encoding cp1252",
@@ -267,7 +285,13 @@ CASES = [
         "draft/doubts.py",
         "--clock corrects a clock that was set",
         "ingest a.csv",
-        ("ingest a.csv --clock last", OR, "ingest a.csv --clock first", OR, "ingest a.csv --clock sort"),
+        (
+            "ingest a.csv --clock last",
+            OR,
+            "ingest a.csv --clock first",
+            OR,
+            "ingest a.csv --clock sort",
+        ),
         files={"a.csv": BACK.replace("wind_speed", "wind_speed (m/s)")},
     ),
     Case(
@@ -369,7 +393,12 @@ def test_utf_16_without_a_mark_is_read_as_the_encoding_that_is_named(user: User)
 def test_a_site_of_a_table_is_chosen_by_the_recipe_that_sniff_prints(user: User) -> None:
     line = ISO + "Z,north,{v}\n" + ISO + "Z,south,{v}"
     (user.folder / "a.csv").write_text(rows("time,site,wind_speed (m/s)\n", line))
-    fix = user.meets("draft/questions.py", "save the recipe that flagdata ingest --sniff prints", "ingest", "a.csv")
+    fix = user.meets(
+        "draft/questions.py",
+        "save the recipe that flagdata ingest --sniff prints",
+        "ingest",
+        "a.csv",
+    )
     ended = user.follows("ingest", "--sniff", "a.csv")
     recipe = textwrap.dedent("      name = " + ended.out.partition("name = ")[2])
     chosen = fix.partition("and add\n")[2].partition("\nfor the one")[0]
@@ -377,7 +406,9 @@ def test_a_site_of_a_table_is_chosen_by_the_recipe_that_sniff_prints(user: User)
     user.follows("ingest", "a.csv", "--sensor", "FILE.toml")
 
 
-def test_a_log_that_was_read_by_a_wrong_option_is_taken_off_by_the_id_that_is_named(user: User) -> None:
+def test_a_log_that_was_read_by_a_wrong_option_is_taken_off_by_the_id_that_is_named(
+    user: User,
+) -> None:
     (user.folder / "a.csv").write_text(NAKED)
     user.succeeds("ingest", "a.csv", "--zone", "+01:00")
     fix = user.meets("ingest/before.py", "flagdata withdraw", "ingest", "a.csv", "--zone", "+02:00")
@@ -388,14 +419,21 @@ def test_a_log_that_was_read_by_a_wrong_option_is_taken_off_by_the_id_that_is_na
 def test_the_lines_of_no_format_are_looked_at_by_sniff(user: User) -> None:
     (user.folder / "a.csv").write_text(ZONED)
     user.meets(
-        "serial_lines.py", "or look at the lines with flagdata ingest --sniff", "ingest", "a.csv", "--as", "metek"
+        "serial_lines.py",
+        "or look at the lines with flagdata ingest --sniff",
+        "ingest",
+        "a.csv",
+        "--as",
+        "metek",
     )
     user.follows("ingest", "--sniff", "a.csv", shows="anemometer: delimited")
     user.succeeds("ingest", "a.csv", "--as", "delimited")
 
 
 def test_a_table_of_which_most_is_not_read_is_looked_at_by_sniff(user: User) -> None:
-    recipe = RECIPE.replace('zone = "+01:00"', "").replace('format = "iso"', 'format = "%d.%m.%Y %H:%M:%S"')
+    recipe = RECIPE.replace('zone = "+01:00"', "").replace(
+        'format = "iso"', 'format = "%d.%m.%Y %H:%M:%S"'
+    )
     (user.folder / "FILE.toml").write_text(recipe)
     (user.folder / "a.csv").write_text(PLAIN + "01.05.2026 13:00:00,4.0\n")
     user.meets(

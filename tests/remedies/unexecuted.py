@@ -13,8 +13,11 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
     ),
     "a change of bytes between two reads": (("flagdata/lake/copying.py", "run flagdata verify"),),
     "a definition, no remedy": (("flagdata/pages/glossary.py", "A regression that makes"),),
-    "a disk that fails while it confirms": (("flagdata/core/files/durable.py", "check the disk, then run"),),
-    "a film of a minute or more that is itself looked at by a network, beside a log whose clock is off": (
+    "a disk that fails while it confirms": (
+        ("flagdata/core/files/durable.py", "check the disk, then run"),
+    ),
+    "a film of a minute or more that is itself looked at by a network, beside a log whose clock is "
+    "off": (
         ("measure/anemometer/reading_calibration.py", "align the film with the"),
         ("measure/anemometer/reading_calibration.py", "check the clocks with fl"),
         ("measure/anemometer/window_features.py", "choose another part by -"),
@@ -56,7 +59,8 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("flagdata/export/wind_csv.py", "leave it out by --where"),
         ("flagdata/ingest/records.py", "see flagdata doctor"),
     ),
-    "a ref or parent that is lost between a command's first look at the lake, which names it, and its work": (
+    "a ref or parent that is lost between a command's first look at the lake, which names it, and "
+    "its work": (
         ("flagdata/lake/catalog.py", "it lists the refs that c"),
         ("flagdata/lake/lineage.py", "run flagdata doctor"),
         ("flagdata/lake/merging.py", "run flagdata doctor"),
@@ -99,7 +103,9 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("flagdata/commands/completion.py", 'ion bash)"  in ~/.bashrc'),
         ("flagdata/commands/completion.py", "~/.zshrc, after compinit"),
     ),
-    "it is of the programs of a cloud": (("flagdata/storage/connection.py", "put its keys into the en"),),
+    "it is of the programs of a cloud": (
+        ("flagdata/storage/connection.py", "put its keys into the en"),
+    ),
     "it needs Blender's environment, or makes one of 1 GB": (
         ("sim/blender/blender_setup.py", "flagdata blender-setup"),
         ("sim/blender/environment.py", "ame an environment with"),
@@ -126,7 +132,9 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("flagdata/view/server.py", "open the address that fl"),
         ("flagdata/view/server.py", "open the whole address t"),
     ),
-    "several flags that a network refuses to tell apart": (("measure/gate/reasons.py", "choose one by --flag, or"),),
+    "several flags that a network refuses to tell apart": (
+        ("measure/gate/reasons.py", "choose one by --flag, or"),
+    ),
     "what nobody foresaw cannot be provoked; tests/contract has --debug": (
         ("flagdata/core/console.py", "this is a defect of flag"),
     ),
@@ -144,5 +152,8 @@ BY_REASON: dict[str, tuple[tuple[str, str], ...]] = {
         ("measure/commands/measurement_artifact.py", "run flagdata verify; mea"),
     ),
 }
-"""Reason → module of the remedy, and enough of its words to distinguish it from others of the module."""
-UNEXECUTED = tuple((module, words, reason) for reason, rows in BY_REASON.items() for module, words in rows)
+"""Reason → module of the remedy, and enough of its words to distinguish it from others of the
+module."""
+UNEXECUTED = tuple(
+    (module, words, reason) for reason, rows in BY_REASON.items() for module, words in rows
+)

@@ -21,7 +21,8 @@ from tests.remedies.templates import OPTION, Remedy, relative, remedies, verbs
 
 @dataclass(frozen=True)
 class Made:
-    """An error or finding that a command made: its kind, its fix, and the modules that had a part in it."""
+    """An error or finding that a command made: its kind, its fix, and the modules that had a part
+    in it."""
 
     kind: str
     fix: str
@@ -48,14 +49,15 @@ class User:
     origin: Path
     folder: Path
     met: dict[Remedy, set[str]] = field(default_factory=dict)
-    """Remedies that were printed, each with the commands and options it names that are still to be typed."""
+    """Remedies that were printed, each with the commands and options it names that are still to be
+    typed."""
     _made: list[Made] = field(default_factory=list)
     _last: tuple[Remedy, str] | None = None
     _command: tuple[str, ...] = ()
 
     def begins(self) -> None:
-        """Go to a folder that is as it was before the first command. The one before stays, since the process that
-        answers queries may work in it."""
+        """Go to a folder that is as it was before the first command. The one before stays, since
+        the process that answers queries may work in it."""
         if self.folder.exists():
             self.folder.rename(self.folder.with_name(f"{self.folder.name}-{uuid.uuid4().hex}"))
         shutil.copytree(self.origin, self.folder, symlinks=True)
@@ -75,7 +77,8 @@ class User:
         return ended
 
     def meets(self, module: str, words: str, *command: object) -> str:
-        """Run a command that prints the remedy of `module` that has `words`; what was printed after "fix:"."""
+        """Run a command that prints the remedy of `module` that has `words`; what was printed after
+        "fix:"."""
         remedy = found(module, words)
         ended = self.types(*command)
         printed = f"{ended.out}\n{ended.err}"
@@ -84,13 +87,16 @@ class User:
         fix = next((fix for fix in there if fix and " ".join(fix.split()) in words_printed), None)
         if fix is None and (said := remedy.printed(printed)) is not None:
             fix = said
-        assert fix is not None, f"no fix of {remedy} in\n{printed}\nmade: {[(m.kind, m.fix) for m in self._made]}"
+        assert fix is not None, (
+            f"no fix of {remedy} in\n{printed}\nmade: {[(m.kind, m.fix) for m in self._made]}"
+        )
         self._last, self._command = (remedy, fix), tuple(str(word) for word in command)
         self.met.setdefault(remedy, named(remedy.text))
         return fix
 
     def follows(self, *command: object, code: int = 0, shows: str = "") -> Ended:
-        """Type what the last remedy says; it ends with `code` and prints what the expression `shows` finds.
+        """Type what the last remedy says; it ends with `code` and prints what the expression
+        `shows` finds.
 
         At least one command or option that the remedy names is in it, or is left out of it.
         """
@@ -104,7 +110,9 @@ class User:
         said = f"{ended.out}\n{ended.err}"
         assert ended.code == code, f"{' '.join(words)}: exit {ended.code}\n{said}"
         assert re.search(shows, said), f"{shows!r} is not in:\n{said}"
-        assert fix not in said or code or "--sniff" in words, f"after {' '.join(words)} it still says: {fix}"
+        assert fix not in said or code or "--sniff" in words, (
+            f"after {' '.join(words)} it still says: {fix}"
+        )
         return ended
 
     def leaves(self, words: list[str]) -> None:
@@ -113,8 +121,11 @@ class User:
         assert set(words) <= named(self._last[0].text)
         self.met[self._last[0]] -= set(words)
 
-    def again(self, *more: object, without: str = "", value: bool = True, code: int = 0, shows: str = "") -> Ended:
-        """Follow the last remedy by typing the command again: with more options, or without one (and its value)."""
+    def again(
+        self, *more: object, without: str = "", value: bool = True, code: int = 0, shows: str = ""
+    ) -> Ended:
+        """Follow the last remedy by typing the command again: with more options, or without one
+        (and its value)."""
         command = list(self._command)
         if without:
             at = command.index(without)
@@ -169,7 +180,8 @@ def named(text: str) -> set[str]:
 
 
 def done(words: list[str], before: tuple[str, ...]) -> set[str]:
-    """What a command does of what may be named: its verb, its options, and those that it leaves out."""
+    """What a command does of what may be named: its verb, its options, and those that it leaves
+    out."""
     options = {word.partition("=")[0] for word in words if word.startswith("--")}
     left = {word.partition("=")[0] for word in before if word.startswith("--")} - options
     return {words[0]} | options | left

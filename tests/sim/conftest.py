@@ -46,7 +46,8 @@ def make_system(
     evaluation: Evaluation = Evaluation.ARCSIM,
     dtype: torch.dtype = torch.float64,
 ) -> tuple[System, State]:
-    """A float64 system of any mesh and materials, held or free, without gravity and wind unless given."""
+    """A float64 system of any mesh and materials, held or free, without gravity and wind unless
+    given."""
     batch = len(materials)
     cloth = Cloth.build(mesh, materials, evaluation=evaluation, dtype=dtype)
     held = handles or Handles(vertices=())

@@ -1,4 +1,5 @@
-"""ArcSim's scenes and materials: what is simulated is read, what is not is refused, all of it at once."""
+"""ArcSim's scenes and materials: what is simulated is read, what is not is refused, all of it at
+once."""
 
 from __future__ import annotations
 
@@ -33,7 +34,10 @@ from sim.integrate import AirShape, BackwardEuler
 from tests.refusals import unrefused
 
 MATERIAL = {"density": 0.284, "stretching": [[50, 1, 60, 40]] * 6, "bending": [[1e-5] * 5] * 3}
-SQUARE = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
+SQUARE = (
+    "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1/1 2/2 3/3\nf 1/1 3/3 "
+    "4/4\n"
+)
 SCENE: dict[str, Any] = {
     "frame_time": 0.04,
     "frame_steps": 8,
@@ -54,7 +58,9 @@ def write(tmp_path: Path) -> Write:
         (tmp_path / "m.json").write_text(json.dumps(MATERIAL))
         path = tmp_path / "scene.json"
         content = {**SCENE, **changes}
-        path.write_text(json.dumps({key: value for key, value in content.items() if value is not None}))
+        path.write_text(
+            json.dumps({key: value for key, value in content.items() if value is not None})
+        )
         return path
 
     return make
@@ -86,7 +92,9 @@ def test_a_mesh_is_scaled_then_turned_then_moved(write: Write) -> None:
     transform = {"scale": 2, "rotate": [120, 1, 1, 1], "translate": [0, 0, 5]}
     # A third of a turn about (1, 1, 1) takes x to y, y to z and z to x.
     scene = read_scene(write(cloth(transform=transform))).scene
-    np.testing.assert_allclose(scene.position, [[0, 0, 5], [0, 2, 5], [0, 2, 7], [0, 0, 7]], atol=1e-12)
+    np.testing.assert_allclose(
+        scene.position, [[0, 0, 5], [0, 2, 5], [0, 2, 7], [0, 0, 7]], atol=1e-12
+    )
     # ArcSim scales the material coordinates along: the cloth is larger, not stretched.
     np.testing.assert_allclose(scene.mesh.rest, [[0, 0], [2, 0], [2, 2], [0, 2]])
 
@@ -101,8 +109,15 @@ def test_thickening_scales_density_and_both_tables(write: Write) -> None:
 
 
 def test_the_end_may_be_given_in_three_ways(write: Write) -> None:
-    cases = [({"duration": 1}, 25), ({"end_time": 0.1}, 2), ({"end_frame": 7}, 7), ({"duration": 0.12}, 3)]
-    assert [read_scene(write({"duration": None, **end})).frames for end, _ in cases] == [frames for _, frames in cases]
+    cases = [
+        ({"duration": 1}, 25),
+        ({"end_time": 0.1}, 2),
+        ({"end_frame": 7}, 7),
+        ({"duration": 0.12}, 3),
+    ]
+    assert [read_scene(write({"duration": None, **end})).frames for end, _ in cases] == [
+        frames for _, frames in cases
+    ]
 
 
 def test_everything_unsupported_is_reported_at_once(write: Write) -> None:
@@ -117,7 +132,13 @@ def test_everything_unsupported_is_reported_at_once(write: Write) -> None:
     with pytest.raises(InputError) as caught:
         read_scene(write(changes), accept=["collision"])
     what = caught.value.what
-    for key in ("camera", "cloths[0].texture", "cloths[0].materials[0].sheen", "wind.gusts", "obstacles"):
+    for key in (
+        "camera",
+        "cloths[0].texture",
+        "cloths[0].materials[0].sheen",
+        "wind.gusts",
+        "obstacles",
+    ):
         assert key in what
     assert "the stages separation, popfilter" in what
     for stage in ("strainlimiting", "remeshing", "proximity", "plasticity", "collision"):
@@ -125,18 +146,33 @@ def test_everything_unsupported_is_reported_at_once(write: Write) -> None:
 
 
 def test_accepted_stages_are_left_out_and_stated(write: Write) -> None:
-    path = write({**cloth(materials=[{"data": "m.json", "strain_limits": [0.9, 1.1]}]), "disable": []})
+    path = write(
+        {**cloth(materials=[{"data": "m.json", "strain_limits": [0.9, 1.1]}]), "disable": []}
+    )
     read = read_scene(path, accept=STAGES)
-    assert read.left_out == ("strainlimiting", "remeshing", "proximity", "collision", "separation", "popfilter")
+    assert read.left_out == (
+        "strainlimiting",
+        "remeshing",
+        "proximity",
+        "collision",
+        "separation",
+        "popfilter",
+    )
     assert (read.scene.contact, read.scene.limits) == (None, None)
 
 
 @pytest.mark.parametrize(
     ("disable", "left"),
     # Separation and the pop filter are parts of ArcSim's remeshing step.
-    [(["remeshing"], ("collision",)), (["collision"], ("remeshing", "separation", "popfilter")), ([*STAGES], ())],
+    [
+        (["remeshing"], ("collision",)),
+        (["collision"], ("remeshing", "separation", "popfilter")),
+        ([*STAGES], ()),
+    ],
 )
-def test_stages_of_remeshing_act_only_with_it(write: Write, disable: list[str], left: tuple[str, ...]) -> None:
+def test_stages_of_remeshing_act_only_with_it(
+    write: Write, disable: list[str], left: tuple[str, ...]
+) -> None:
     accept = ("remeshing", "collision", "separation", "popfilter")
     assert read_scene(write({"disable": disable}), accept=accept).left_out == left
 
@@ -149,7 +185,12 @@ def test_remeshing_is_the_scenes_where_the_cloth_has_settings_for_it(write: Writ
     read = read_scene(write({**cloth(remeshing=SETTINGS), "disable": []}), accept=BESIDE)
     # ArcSim's null value of a criterion that is not given is infinite: it asks for nothing.
     assert read.scene.remeshing == Remeshing(
-        refine_angle=0.3, refine_velocity=1, refine_compression=math.inf, size_min=0.02, size_max=0.5, aspect_min=0.2
+        refine_angle=0.3,
+        refine_velocity=1,
+        refine_compression=math.inf,
+        size_min=0.02,
+        size_max=0.5,
+        aspect_min=0.2,
     )
     assert read.left_out == BESIDE
     written = write_scene(read, write({}).parent / "out")
@@ -157,7 +198,9 @@ def test_remeshing_is_the_scenes_where_the_cloth_has_settings_for_it(write: Writ
     with pytest.raises(InputError, match="the stages remeshing"):
         read_scene(write({"disable": []}), accept=BESIDE)
     with pytest.raises(InputError, match=r"size is 0\.02"):
-        read_scene(write({**cloth(remeshing={**SETTINGS, "size": 0.02}), "disable": []}), accept=BESIDE)
+        read_scene(
+            write({**cloth(remeshing={**SETTINGS, "size": 0.02}), "disable": []}), accept=BESIDE
+        )
 
 
 DISABLED = ["remeshing", "collision"]
@@ -171,7 +214,10 @@ def test_proximity_is_contact_with_arcsims_defaults(write: Write) -> None:
     magic = {"repulsion_thickness": 10e-3, "collision_stiffness": 1e6, "projection_thickness": 1e-3}
     scene = read_scene(write({"disable": DISABLED, "magic": magic, "friction": 0.1})).scene
     assert scene.contact == Contact(thickness=0.01, stiffness=1e6, friction=0.1)
-    assert read_scene(write({"disable": [*DISABLED, "proximity"], "magic": magic})).scene.contact is None
+    assert (
+        read_scene(write({"disable": [*DISABLED, "proximity"], "magic": magic})).scene.contact
+        is None
+    )
 
 
 def test_strain_limits_are_the_materials_unless_disabled(write: Write) -> None:
@@ -179,8 +225,13 @@ def test_strain_limits_are_the_materials_unless_disabled(write: Write) -> None:
     limits = read_scene(write({**changes, "disable": DISABLED})).scene.limits
     assert limits is not None
     assert (limits.low, limits.high) == (0.9, 1.2)
-    assert read_scene(write({**changes, "disable": [*DISABLED, "strainlimiting"]})).scene.limits is None
-    assert read_scene(write({"disable": DISABLED})).scene.limits is None  # ArcSim's default is without
+    assert (
+        read_scene(write({**changes, "disable": [*DISABLED, "strainlimiting"]})).scene.limits
+        is None
+    )
+    assert (
+        read_scene(write({"disable": DISABLED})).scene.limits is None
+    )  # ArcSim's default is without
 
 
 @pytest.mark.parametrize("contact", [None, Contact(thickness=0.02, stiffness=1e5, friction=0.3)])
@@ -188,7 +239,9 @@ def test_strain_limits_are_the_materials_unless_disabled(write: Write) -> None:
 def test_a_scene_that_is_written_comes_back(
     contact: Contact | None, limits: StrainLimits | None, tmp_path: Path
 ) -> None:
-    scene = flag(material=replace(named_material("gray-interlock"), damping=1e-3), wind_speed=4.5, columns=6)
+    scene = flag(
+        material=replace(named_material("gray-interlock"), damping=1e-3), wind_speed=4.5, columns=6
+    )
     scene = replace(
         scene,
         air=QuadraticNormal(density=1.2, drag=0.1),
@@ -227,7 +280,9 @@ def test_a_scene_that_is_written_comes_back(
         ({"limits": StrainLimits(high=math.inf)}, "without an upper one"),
     ],
 )
-def test_what_arcsim_cannot_represent_is_not_written(changes: dict[str, Any], word: str, tmp_path: Path) -> None:
+def test_what_arcsim_cannot_represent_is_not_written(
+    changes: dict[str, Any], word: str, tmp_path: Path
+) -> None:
     scene = replace(flag(material=named_material("paper"), wind_speed=4, columns=6), **changes)
     with pytest.raises(InputError, match=word):
         write_scene(ArcsimScene(scene=scene, frame_time=0.04, frame_steps=8, frames=1), tmp_path)
@@ -236,7 +291,10 @@ def test_what_arcsim_cannot_represent_is_not_written(changes: dict[str, Any], wo
 
 def test_a_scene_and_its_material_do_not_take_each_others_place(tmp_path: Path) -> None:
     file = ArcsimScene(
-        scene=flag(material=named_material("paper"), wind_speed=4, columns=6), frame_time=0.04, frame_steps=8, frames=1
+        scene=flag(material=named_material("paper"), wind_speed=4, columns=6),
+        frame_time=0.04,
+        frame_steps=8,
+        frames=1,
     )
     with pytest.raises(InputError, match="both named paper"):
         write_scene(file, tmp_path, name="paper")
@@ -268,7 +326,10 @@ def test_impossible_scenes_are_refused(write: Write) -> None:
         ({"duration": 0.01}, InputError, "at least one frame"),
         (cloth(materials=[{"data": "m.json", "density_mult": -1}]), InputError, "area weight"),
         (
-            {**cloth(materials=[{"data": "m.json", "strain_limits": 1.05}]), "disable": ["remeshing", "collision"]},
+            {
+                **cloth(materials=[{"data": "m.json", "strain_limits": 1.05}]),
+                "disable": ["remeshing", "collision"],
+            },
             InputError,
             "strain_limits",
         ),
@@ -280,7 +341,11 @@ def test_impossible_scenes_are_refused(write: Write) -> None:
             InputError,
             "exclude the rest state",
         ),
-        ({"disable": ["remeshing", "collision"], "magic": {"repulsion_thickness": 0}}, InputError, "thickness"),
+        (
+            {"disable": ["remeshing", "collision"], "magic": {"repulsion_thickness": 0}},
+            InputError,
+            "thickness",
+        ),
         ({"magic": {"friction": 0.6}}, InputError, "magic.friction"),
     ]
     assert not unrefused(lambda changes: read_scene(write(changes)), cases)
@@ -324,7 +389,9 @@ def papers_scene(reference_data: Path, tmp_path: Path) -> Scene:
     shutil.copy(folder / "flag.obj", tmp_path / "meshes")
     shutil.copy(reference_data / "materials" / "camel-ponte-roma.json", tmp_path / "materials")
     shutil.copy(folder / "conf.json", tmp_path)
-    return read_scene(tmp_path / "conf.json", accept=("remeshing", "collision", "separation", "popfilter")).scene
+    return read_scene(
+        tmp_path / "conf.json", accept=("remeshing", "collision", "separation", "popfilter")
+    ).scene
 
 
 @pytest.mark.reference
@@ -345,25 +412,36 @@ def centre(positions: NDArray[np.floating], mesh: Mesh | MeshFrame) -> FloatArra
 
 
 @pytest.mark.reference
-def test_with_its_limits_the_papers_flag_goes_where_arcsims_does(papers_scene: Scene, reference_data: Path) -> None:
-    # ArcSim's run is remeshed from 72 to 2,261 vertices, so that only the whole is compared: its centre of mass, which
-    # moves by 1.65 m in these twelve frames. On a fixed grid of 25 cm it is followed to 63 mm, on one of 10 cm to
-    # 69 mm; without limits the cloth stretches to 1.9 times its length, and it is half a metre off.
+def test_with_its_limits_the_papers_flag_goes_where_arcsims_does(
+    papers_scene: Scene, reference_data: Path
+) -> None:
+    # ArcSim's run is remeshed from 72 to 2,261 vertices, so that only the whole is compared: its
+    # centre of mass, which moves by 1.65 m in these twelve frames. On a fixed grid of 25 cm it is
+    # followed to 63 mm, on one of 10 cm to 69 mm; without limits the cloth stretches to 1.9 times
+    # its length, and it is half a metre off.
     run = read_folder(reference_data / "arcsim" / "raw_remeshed")
     grid_ = flag(material=papers_scene.material, wind_speed=6.0, width=3.0, height=2.0, columns=12)
     assert grid_.wind == papers_scene.wind
     furthest = {}
     for limits in (papers_scene.limits, None):
-        # Layers do not meet in these frames: with contact the result is the same, after forty times as long.
+        # Layers do not meet in these frames: with contact the result is the same, after forty times
+        # as long.
         scene = replace(
-            papers_scene, mesh=grid_.mesh, position=grid_.position, handles=grid_.handles, limits=limits, contact=None
+            papers_scene,
+            mesh=grid_.mesh,
+            position=grid_.position,
+            handles=grid_.handles,
+            limits=limits,
+            contact=None,
         )
         system, state = assemble([scene], dtype=torch.float64)
         gaps = []
         for frame in range(1, len(run)):
             state = BackwardEuler(air_shape=AirShape.PREVIOUS).advance(system, state, 0.04)
             theirs = run.frame(frame)
-            gap = centre(state.position[..., 0].numpy(), grid_.mesh) - centre(theirs.positions, theirs)
+            gap = centre(state.position[..., 0].numpy(), grid_.mesh) - centre(
+                theirs.positions, theirs
+            )
             gaps.append(float(np.linalg.norm(gap)))
         furthest[limits] = max(gaps)
     assert furthest[papers_scene.limits] < 0.1

@@ -44,7 +44,9 @@ def test_force_is_minus_the_gradient_of_the_energy_for_constant_stiffness(part, 
 
 @pytest.mark.parametrize("part", [membrane, bending])
 @pytest.mark.parametrize("evaluation", list(Evaluation))
-def test_internal_forces_turn_with_the_cloth_and_do_not_see_where_it_is(part, evaluation, distorted) -> None:
+def test_internal_forces_turn_with_the_cloth_and_do_not_see_where_it_is(
+    part, evaluation, distorted
+) -> None:
     system, _ = make_system(distorted, [named_material("camel-ponte-roma")], evaluation=evaluation)
     position = crumpled(distorted, 1)
     velocity = velocity_like(position)
@@ -52,9 +54,13 @@ def test_internal_forces_turn_with_the_cloth_and_do_not_see_where_it_is(part, ev
     shift = torch.tensor([3.0, -2.0, 1.0], dtype=torch.float64)[:, None]
     force = part.force(system.cloth, position, velocity)
     moved = part.force(
-        system.cloth, torch.einsum("ij,vjb->vib", turn, position) + shift, torch.einsum("ij,vjb->vib", turn, velocity)
+        system.cloth,
+        torch.einsum("ij,vjb->vib", turn, position) + shift,
+        torch.einsum("ij,vjb->vib", turn, velocity),
     )
-    torch.testing.assert_close(moved, torch.einsum("ij,vjb->vib", turn, force), rtol=1e-9, atol=1e-11)
+    torch.testing.assert_close(
+        moved, torch.einsum("ij,vjb->vib", turn, force), rtol=1e-9, atol=1e-11
+    )
 
 
 @pytest.mark.parametrize("part", [membrane, bending])
@@ -65,7 +71,8 @@ def test_internal_forces_have_no_resultant_and_no_moment(part, distorted) -> Non
     scale = float(force.abs().sum())
     moment = torch.linalg.cross(position, force, dim=1).sum(0)
     assert float(force.sum(0).abs().max()) < 1e-12 * scale
-    # The floor on hinge altitudes is not reached here, so the fold gradient is exact and moments balance as well.
+    # The floor on hinge altitudes is not reached here, so the fold gradient is exact and moments
+    # balance as well.
     assert float(moment.abs().max()) < 1e-11 * scale
 
 
@@ -76,7 +83,9 @@ def test_rigid_motion_is_not_damped_and_damping_takes_energy(part, distorted) ->
     still = part.force(system.cloth, position, torch.zeros_like(position))
     spin = torch.tensor([0.4, -2.0, 1.3], dtype=torch.float64)[None, :, None].expand_as(position)
     rigid = torch.linalg.cross(spin, position, dim=1) + 1.7
-    torch.testing.assert_close(part.force(system.cloth, position, rigid), still, rtol=1e-9, atol=1e-12)
+    torch.testing.assert_close(
+        part.force(system.cloth, position, rigid), still, rtol=1e-9, atol=1e-12
+    )
     velocity = velocity_like(position)
     power = ((part.force(system.cloth, position, velocity) - still) * velocity).sum()
     assert float(power) < 0
@@ -85,7 +94,9 @@ def test_rigid_motion_is_not_damped_and_damping_takes_energy(part, distorted) ->
 def test_patch_a_uniform_stretch_leaves_inner_vertices_free_on_a_distorted_mesh(distorted) -> None:
     # Patch test: constant strain gives constant stress, whose forces cancel at inner vertices.
     system, state = make_system(distorted, [named_material("camel-ponte-roma")])
-    stretch = torch.tensor([[1.0, 0.0, 0.0], [0.0, 1.08, 0.05], [0.0, 0.02, 0.97]], dtype=torch.float64)
+    stretch = torch.tensor(
+        [[1.0, 0.0, 0.0], [0.0, 1.08, 0.05], [0.0, 0.02, 0.97]], dtype=torch.float64
+    )
     position = torch.einsum("ij,vjb->vib", stretch, state.position)
     force = membrane.force(system.cloth, position, state.velocity)
     inner = np.setdiff1d(np.arange(distorted.vertex_count), distorted.boundary)
@@ -94,8 +105,8 @@ def test_patch_a_uniform_stretch_leaves_inner_vertices_free_on_a_distorted_mesh(
 
 
 def test_uniaxial_stretch_pulls_with_stiffness_times_strain(distorted) -> None:
-    # One dimension: force per width = K λ (λ² − 1)/2 (first Piola–Kirchhoff stress of K G²/2), K = 50 N/m, λ = 1.1,
-    # width 0.4 m: 50 · 1.1 · 0.105 · 0.4 = 2.31 N.
+    # One dimension: force per width = K λ (λ² − 1)/2 (first Piola–Kirchhoff stress of K G²/2), K =
+    # 50 N/m, λ = 1.1, width 0.4 m: 50 · 1.1 · 0.105 · 0.4 = 2.31 N.
     system, state = make_system(distorted, [PLAIN])
     position = state.position * torch.tensor([1.0, 1.1, 1.0], dtype=torch.float64)[:, None]
     force = membrane.force(system.cloth, position, state.velocity)
@@ -104,9 +115,15 @@ def test_uniaxial_stretch_pulls_with_stiffness_times_strain(distorted) -> None:
 
 
 def test_fold_angle_and_moment_of_two_triangles_by_hand() -> None:
-    # A square folded along its diagonal by 60° into a valley: θ = π/3; S = 2/(2 · 1) = 1; α = ½ θ √2 = 0.740 1/m.
+    # A square folded along its diagonal by 60° into a valley: θ = π/3; S = 2/(2 · 1) = 1; α = ½ θ
+    # √2 = 0.740 1/m.
     material = Material(
-        name="m", source="test", area_weight=1.0, damping=0.0, stretching=np.ones((6, 4)), bending=np.full((3, 5), 0.3)
+        name="m",
+        source="test",
+        area_weight=1.0,
+        damping=0.0,
+        stretching=np.ones((6, 4)),
+        bending=np.full((3, 5), 0.3),
     )
     mesh = Mesh(rest=[[0, 0], [1, 0], [1, 1], [0, 1]], faces=[[0, 1, 2], [0, 2, 3]])
     system, _ = make_system(mesh, [material])
@@ -120,7 +137,9 @@ def test_fold_angle_and_moment_of_two_triangles_by_hand() -> None:
     position = torch.tensor(np.stack([[0, 0, 0], corner1, np.sqrt(2) * along, corner3]))[..., None]
     fold = bending.fold(system.cloth, position)
     assert float(fold.angle) == pytest.approx(np.pi / 3)
-    assert float(bending.energy(system.cloth, position)) == pytest.approx(0.3 * (np.pi / 3) ** 2 / 4)
+    assert float(bending.energy(system.cloth, position)) == pytest.approx(
+        0.3 * (np.pi / 3) ** 2 / 4
+    )
     # The moment k S θ / 2 acts on the corners with arm h, pressing them back towards flat.
     force = bending.force(system.cloth, position, torch.zeros_like(position))
     assert float(force[1].norm()) == pytest.approx(0.3 * (np.pi / 3) / 2 / h)
@@ -163,7 +182,10 @@ def test_null_values_of_the_air_give_exactly_no_force(distorted) -> None:
     position = crumpled(distorted, 1)
     wind = torch.ones((3, 1), dtype=torch.float64)
     for air in (QuadraticNormal(density=0.0), Stokes(viscosity=0.0)):
-        assert float(air.force(system.cloth, position, velocity_like(position), wind).abs().max()) == 0.0
+        assert (
+            float(air.force(system.cloth, position, velocity_like(position), wind).abs().max())
+            == 0.0
+        )
 
 
 def test_negative_parameters_of_the_air_are_refused() -> None:
@@ -194,8 +216,12 @@ def test_linearised_stiffness_is_the_derivative_of_the_force_at_small_strain(dis
         product = gather_sum(at.corner_products(field), slots)
         forward = part.force(system.cloth, state.position + step * field, state.velocity)
         backward = part.force(system.cloth, state.position - step * field, state.velocity)
-        torch.testing.assert_close(product, -(forward - backward) / (2 * step), rtol=1e-6, atol=1e-6)
+        torch.testing.assert_close(
+            product, -(forward - backward) / (2 * step), rtol=1e-6, atol=1e-6
+        )
         diagonal = gather_sum(at.diagonal(), slots)
         unit = torch.zeros_like(field)
         unit[7, 1] = 1.0
-        assert float(diagonal[7, 1]) == pytest.approx(float(gather_sum(at.corner_products(unit), slots)[7, 1]))
+        assert float(diagonal[7, 1]) == pytest.approx(
+            float(gather_sum(at.corner_products(unit), slots)[7, 1])
+        )

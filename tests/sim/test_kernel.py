@@ -24,7 +24,9 @@ from tests.sim.conftest import PLAIN, make_system
 
 @pytest.fixture
 def materials() -> list:
-    return [named_material(name) for name in ("camel-ponte-roma", "white-swim-solid", "royal-target")]
+    return [
+        named_material(name) for name in ("camel-ponte-roma", "white-swim-solid", "royal-target")
+    ]
 
 
 def stirred(state: State) -> State:
@@ -38,8 +40,15 @@ def stirred(state: State) -> State:
 @pytest.mark.parametrize("evaluation", list(Evaluation))
 @pytest.mark.parametrize("stiffness", [1e3, float("inf")])
 @pytest.mark.parametrize(("dtype", "tolerance"), [(torch.float64, 1e-11), (torch.float32, 2e-4)])
-def test_kernel_and_torch_agree_to_rounding(evaluation, stiffness, dtype, tolerance, materials, distorted) -> None:
-    handles = Handles(vertices=(0, 4), stiffness=stiffness, times=(0.0, 0.1), offsets=((0, 0, 0), (0.02, 0.0, 0.01)))
+def test_kernel_and_torch_agree_to_rounding(
+    evaluation, stiffness, dtype, tolerance, materials, distorted
+) -> None:
+    handles = Handles(
+        vertices=(0, 4),
+        stiffness=stiffness,
+        times=(0.0, 0.1),
+        offsets=((0, 0, 0), (0.02, 0.0, 0.01)),
+    )
     system, state = make_system(
         distorted,
         materials,
@@ -51,7 +60,8 @@ def test_kernel_and_torch_agree_to_rounding(evaluation, stiffness, dtype, tolera
         dtype=dtype,
     )
     start = stirred(state)
-    # Forces: relative to the largest. Float32 loses digits in G = (C − 1)/2, which the stiffest table entry amplifies.
+    # Forces: relative to the largest. Float32 loses digits in G = (C − 1)/2, which the stiffest
+    # table entry amplifies.
     drive = system.drive(0.0, 0.04)
     kernel = Kernel.of(system)
     assert kernel is not None
@@ -60,21 +70,38 @@ def test_kernel_and_torch_agree_to_rounding(evaluation, stiffness, dtype, tolera
     scale = float(expected.abs().max())
     assert float((computed - expected).abs().max()) < tolerance * scale
     # Twenty steps: rounding has not been amplified yet.
-    results = [advance(system, start, 0.002, steps=20, backend=b) for b in (Backend.TORCH, Backend.KERNEL)]
-    torch.testing.assert_close(results[1].position, results[0].position, rtol=0, atol=0.1 * tolerance)
-    torch.testing.assert_close(results[1].velocity, results[0].velocity, rtol=0, atol=100 * tolerance)
+    results = [
+        advance(system, start, 0.002, steps=20, backend=b) for b in (Backend.TORCH, Backend.KERNEL)
+    ]
+    torch.testing.assert_close(
+        results[1].position, results[0].position, rtol=0, atol=0.1 * tolerance
+    )
+    torch.testing.assert_close(
+        results[1].velocity, results[0].velocity, rtol=0, atol=100 * tolerance
+    )
 
 
 def test_a_members_result_does_not_depend_on_the_others_to_the_bit(materials, distorted) -> None:
     first, second, third = materials
     outcomes = []
-    for batch in ([first, second, third], [first, third, third], [first] * 3, [first, *[second] * 40]):
+    for batch in (
+        [first, second, third],
+        [first, third, third],
+        [first] * 3,
+        [first, *[second] * 40],
+    ):
         system, state = make_system(
             distorted, batch, gravity=(0.0, 0.0, -9.81), wind=(5.0, 1.0, 0.0), dtype=torch.float32
         )
         explicit = advance(system, stirred(state), 0.04, steps=200, backend=Backend.KERNEL)
-        implicit = BackwardEuler(step=2e-3, backend=Backend.KERNEL).advance(system, stirred(state), 0.04)
-        moved = [field[..., 0] for final in (explicit, implicit) for field in (final.position, final.velocity)]
+        implicit = BackwardEuler(step=2e-3, backend=Backend.KERNEL).advance(
+            system, stirred(state), 0.04
+        )
+        moved = [
+            field[..., 0]
+            for final in (explicit, implicit)
+            for field in (final.position, final.velocity)
+        ]
         outcomes.append(torch.stack(moved))
     for outcome in outcomes[1:]:
         assert torch.equal(outcome, outcomes[0])
@@ -100,15 +127,19 @@ def test_other_air_and_effects_are_added_to_the_kernels_forces(materials, distor
 
     from dataclasses import replace
 
-    system, state = make_system(distorted, materials, wind=(5.0, 1.0, 0.0), air=Stokes(viscosity=0.1))
+    system, state = make_system(
+        distorted, materials, wind=(5.0, 1.0, 0.0), air=Stokes(viscosity=0.1)
+    )
     system = replace(system, effects=(Push(),))
     start = stirred(state)
-    results = [advance(system, start, 0.002, steps=20, backend=b) for b in (Backend.TORCH, Backend.KERNEL)]
+    results = [
+        advance(system, start, 0.002, steps=20, backend=b) for b in (Backend.TORCH, Backend.KERNEL)
+    ]
     torch.testing.assert_close(results[1].velocity, results[0].velocity, rtol=0, atol=1e-9)
 
 
-# Central differences of a smooth function err by the square of the step. The tables have kinks, which the difference
-# crosses for some faces and the gradient does not see: 0.1 %.
+# Central differences of a smooth function err by the square of the step. The tables have kinks,
+# which the difference crosses for some faces and the gradient does not see: 0.1 %.
 @pytest.mark.parametrize(("measured", "tolerance"), [(False, 1e-7), (True, 1e-3)])
 def test_gradients_go_through_torch_and_are_right(measured, tolerance, distorted) -> None:
     system, state = make_system(
@@ -120,7 +151,9 @@ def test_gradients_go_through_torch_and_are_right(measured, tolerance, distorted
         moved = State(position=start.position + shift, velocity=start.velocity)
         return (advance(system, moved, 0.002, steps=10).position[-1] ** 2).sum()
 
-    direction = torch.sin(torch.arange(start.position.numel(), dtype=torch.float64)).reshape(start.position.shape)
+    direction = torch.sin(torch.arange(start.position.numel(), dtype=torch.float64)).reshape(
+        start.position.shape
+    )
     scale = torch.zeros((), dtype=torch.float64, requires_grad=True)
     (gradient,) = torch.autograd.grad(outcome(scale * direction), scale)
     step = 1e-6
@@ -154,7 +187,10 @@ def test_without_a_compiler_torch_does_the_work_after_one_warning(distorted) -> 
 
 def test_processes_that_build_at_once_all_get_a_kernel(tmp_path) -> None:
     code = "from sim.compiler import library; assert library() is not None"
-    cache, quick = tmp_path / "cache", tmp_path / "quick"  # the same compiler, which does not optimise
+    cache, quick = (
+        tmp_path / "cache",
+        tmp_path / "quick",
+    )  # the same compiler, which does not optimise
     quick.write_text(f'#!/bin/sh\nexec "{build.compiler()}" "$@" -O0\n')
     quick.chmod(0o755)
     environment = {
@@ -176,7 +212,8 @@ def test_a_forced_step_beyond_the_limit_is_refused_with_the_limit(distorted) -> 
 
 
 def test_just_below_the_limit_is_stable_and_well_above_is_not(distorted) -> None:
-    # The estimate is for 15 % stretch and the largest table entries; at small strain the true limit is some way above.
+    # The estimate is for 15 % stretch and the largest table entries; at small strain the true limit
+    # is some way above.
     from sim.integrate import stable_step
 
     system, state = make_system(distorted, [named_material("11oz-black-denim")])

@@ -1,4 +1,5 @@
-"""The Warp kernel computes what the torch source defines, on Warp's own device for the processor."""
+"""The Warp kernel computes what the torch source defines, on Warp's own device for the
+processor."""
 
 from __future__ import annotations
 
@@ -44,10 +45,11 @@ def flapping(distorted):
 
 
 def test_a_second_of_flags_is_the_compiled_kernels_to_a_tenth_of_a_millimetre() -> None:
-    # Where rounding grows little: the compiled kernel in float64 is 1e-5 m away by then. On fine meshes, where it grows
-    # a hundredfold in 0.2 s, no two ways of adding up agree for a second.
+    # Where rounding grows little: the compiled kernel in float64 is 1e-5 m away by then. On fine
+    # meshes, where it grows a hundredfold in 0.2 s, no two ways of adding up agree for a second.
     flags = [
-        flag(material=named_material("camel-ponte-roma"), wind_speed=speed, columns=6) for speed in (1.0, 2.0, 3.0)
+        flag(material=named_material("camel-ponte-roma"), wind_speed=speed, columns=6)
+        for speed in (1.0, 2.0, 3.0)
     ]
     system, start = assemble(flags)
     steps = Symplectic().steps(system, 0.04)
@@ -64,7 +66,12 @@ def test_a_second_of_flags_is_the_compiled_kernels_to_a_tenth_of_a_millimetre() 
 @pytest.mark.parametrize("evaluation", list(Evaluation))
 @pytest.mark.parametrize("stiffness", [1e3, float("inf")])
 def test_twenty_steps_agree_with_torch_to_rounding(evaluation, stiffness, distorted) -> None:
-    handles = Handles(vertices=(0, 4), stiffness=stiffness, times=(0.0, 0.1), offsets=((0, 0, 0), (0.02, 0.0, 0.01)))
+    handles = Handles(
+        vertices=(0, 4),
+        stiffness=stiffness,
+        times=(0.0, 0.1),
+        offsets=((0, 0, 0), (0.02, 0.0, 0.01)),
+    )
     system, state = make_system(
         distorted,
         [named_material(name) for name in FABRICS],
@@ -79,7 +86,9 @@ def test_twenty_steps_agree_with_torch_to_rounding(evaluation, stiffness, distor
     bump = 0.05 * torch.sin(23 * x[:, 1]) * torch.cos(17 * x[:, 2])
     folded = x * 1.02 + torch.stack([bump, 0.1 * bump, torch.zeros_like(bump)], dim=1)
     start = State(position=folded, velocity=3 * torch.cos(11 * folded.roll(1, 1)))
-    final, defined = (advance(system, start, 0.002, steps=20, backend=b) for b in (Backend.WARP, Backend.TORCH))
+    final, defined = (
+        advance(system, start, 0.002, steps=20, backend=b) for b in (Backend.WARP, Backend.TORCH)
+    )
     # As for the compiled kernel in float32.
     torch.testing.assert_close(final.position, defined.position, rtol=0, atol=2e-5)
     torch.testing.assert_close(final.velocity, defined.velocity, rtol=0, atol=2e-2)
@@ -146,7 +155,8 @@ def test_implicit_steps_float64_and_gradients_are_refused(flapping, distorted) -
 
 
 def test_a_mesh_that_does_not_fit_is_refused(flapping, monkeypatch) -> None:
-    # 651 vertices, 1,200 faces and 1,750 hinges take 68,528 bytes as compiled for the H200, which has 232,448.
+    # 651 vertices, 1,200 faces and 1,750 hinges take 68,528 bytes as compiled for the H200, which
+    # has 232,448.
     warp_batch._check_room(grid(width=1.5, height=1.0, columns=30, rows=20), 68_528)
     with pytest.raises(UsageError, match="bytes of shared memory"):
         warp_batch._check_room(grid(width=1.5, height=1.0, columns=60, rows=40), 232_448)
@@ -155,7 +165,9 @@ def test_a_mesh_that_does_not_fit_is_refused(flapping, monkeypatch) -> None:
         advance(flapping[0], flapping[1], 0.002, steps=2, backend=Backend.WARP)
 
 
-def test_a_device_that_is_not_there_and_warp_that_is_not_installed_are_errors(flapping, monkeypatch) -> None:
+def test_a_device_that_is_not_there_and_warp_that_is_not_installed_are_errors(
+    flapping, monkeypatch
+) -> None:
     system, start = flapping
     with pytest.raises(UsageError, match="no device 'cuda:7'"):
         warp_batch._code(torch.device("cuda", 7))
@@ -166,7 +178,9 @@ def test_a_device_that_is_not_there_and_warp_that_is_not_installed_are_errors(fl
 
 
 def test_a_recipe_names_the_backend_and_its_hash_changes_only_then() -> None:
-    scene = '[scene]\nshape = "flag"\n[material]\nname = "paper"\n[wind]\nspeed = 4.0\n[integrator]\n'
+    scene = (
+        '[scene]\nshape = "flag"\n[material]\nname = "paper"\n[wind]\nspeed = 4.0\n[integrator]\n'
+    )
 
     def recipe(integrator: str) -> Recipe:
         return parse(scene + integrator, name="r", folder=Path(), where="r")

@@ -28,20 +28,30 @@ def drawn(name: str, *, batch: int = 2) -> Any:
     return EFFECTS[name].drawn(stream(5, name), batch=batch)
 
 
-def flying(*effects: Any, winds: tuple[float, ...] = (4.0, 5.0), dtype: torch.dtype = torch.float64):
-    """Flags of 9 columns, a tenth of a second under way without the effects, and the system with them."""
-    scenes = [flag(material=named_material("camel-ponte-roma"), wind_speed=speed, columns=9) for speed in winds]
+def flying(
+    *effects: Any, winds: tuple[float, ...] = (4.0, 5.0), dtype: torch.dtype = torch.float64
+):
+    """Flags of 9 columns, a tenth of a second under way without the effects, and the system with
+    them."""
+    scenes = [
+        flag(material=named_material("camel-ponte-roma"), wind_speed=speed, columns=9)
+        for speed in winds
+    ]
     system, state = assemble(scenes, dtype=dtype)
     state = replace(Symplectic(step=STEP).advance(system, state, 0.1), time=0.0)
     return apply(effects, system, state)
 
 
-def test_friction_slows_a_sliding_sheet_exponentially_and_at_second_order_of_the_outer_step() -> None:
+def test_friction_slows_a_sliding_sheet_exponentially_and_at_second_order_of_the_outer_step() -> (
+    None
+):
     """σ v̇ = −c v along the sheet: v₀ e^(−c t/σ), here e^(−1)."""
     mesh = grid(width=1.0, height=1.0, columns=2, rows=2)
     system, state = make_system(mesh, [PLAIN], air=NO_AIR)
     sliding = torch.tensor([0.0, 3.0, 0.0], dtype=torch.float64)[:, None].expand_as(state.position)
-    system, state = apply([TangentialLinearDrag(coefficient=0.4)], system, replace(state, velocity=sliding))
+    system, state = apply(
+        [TangentialLinearDrag(coefficient=0.4)], system, replace(state, velocity=sliding)
+    )
     errors = []
     for outer in (10, 20, 40):
         final = advance(system, state, 0.5, steps=320, outer=outer)
@@ -53,7 +63,8 @@ def test_friction_slows_a_sliding_sheet_exponentially_and_at_second_order_of_the
 
 
 def test_the_error_falls_with_the_square_of_the_outer_step(distorted) -> None:
-    # Neither damping nor air in the base model, whose own error would depend on how often it starts afresh.
+    # Neither damping nor air in the base model, whose own error would depend on how often it starts
+    # afresh.
     system, state = make_system(
         distorted,
         [PLAIN],
@@ -77,7 +88,9 @@ def test_the_error_falls_with_the_square_of_the_outer_step(distorted) -> None:
 def test_outer_steps_agree_with_every_step(name: str) -> None:
     system, state = flying(drawn(name))
     base = flying()
-    every, outer = (Symplectic(step=STEP, outer=longer).advance(system, state, 0.1) for longer in (None, 2e-3))
+    every, outer = (
+        Symplectic(step=STEP, outer=longer).advance(system, state, 0.1) for longer in (None, 2e-3)
+    )
     none = Symplectic(step=STEP).advance(*base, 0.1)
     error = (outer.position - every.position).norm(dim=1).mean(0)
     moved = (every.position - none.position).norm(dim=1).mean(0)
@@ -89,10 +102,22 @@ def test_outer_steps_agree_with_every_step(name: str) -> None:
 
 def test_kernel_and_torch_take_the_same_outer_steps() -> None:
     effects = [
-        drawn(name) for name in ("lift", "porosity", "pole-wake", "added-mass", "hysteresis", "full-hoist", "slack")
+        drawn(name)
+        for name in (
+            "lift",
+            "porosity",
+            "pole-wake",
+            "added-mass",
+            "hysteresis",
+            "full-hoist",
+            "slack",
+        )
     ]
     system, state = flying(*effects)
-    results = [advance(system, state, 0.008, steps=20, outer=5, backend=b) for b in (Backend.TORCH, Backend.KERNEL)]
+    results = [
+        advance(system, state, 0.008, steps=20, outer=5, backend=b)
+        for b in (Backend.TORCH, Backend.KERNEL)
+    ]
     torch.testing.assert_close(results[1].position, results[0].position, rtol=0, atol=1e-10)
     torch.testing.assert_close(results[1].velocity, results[0].velocity, rtol=0, atol=1e-8)
     assert len(results[0].memory) == 1
@@ -104,15 +129,20 @@ def test_a_members_result_does_not_depend_on_the_others_to_the_bit() -> None:
     for other in (0.3, 1.9):
         lift = Lift(coefficient=torch.tensor([0.8, other], dtype=torch.float64))
         system, state = flying(lift, winds=(4.0, 3.0 + other), dtype=torch.float32)
-        outcomes.append(Symplectic(step=STEP, outer=2e-3).advance(system, state, 0.04).position[..., 0])
+        outcomes.append(
+            Symplectic(step=STEP, outer=2e-3).advance(system, state, 0.04).position[..., 0]
+        )
     assert torch.equal(*outcomes)
 
 
 def test_air_of_another_kind_may_act_as_impulses() -> None:
     system, state = flying()
     system = replace(system, air=Stokes(viscosity=0.05))
-    every, outer = (Symplectic(step=STEP, outer=longer).advance(system, state, 0.1) for longer in (None, 2e-3))
-    # The flag falls by 0.1 m; the base model's own error of its step, over as many steps, is 0.2 mm.
+    every, outer = (
+        Symplectic(step=STEP, outer=longer).advance(system, state, 0.1) for longer in (None, 2e-3)
+    )
+    # The flag falls by 0.1 m; the base model's own error of its step, over as many steps, is 0.2
+    # mm.
     assert float((outer.position - every.position).norm(dim=1).mean()) < 3e-4
 
 
@@ -132,7 +162,8 @@ def test_gradients_go_through_outer_steps() -> None:
 
 
 def test_an_outer_step_that_is_too_long_is_refused_with_the_limit() -> None:
-    # A force per mass of −r v with r = 300 /s overshoots in steps of 10 ms: the estimate is 0.5/r = 1.7 ms.
+    # A force per mass of −r v with r = 300 /s overshoots in steps of 10 ms: the estimate is 0.5/r =
+    # 1.7 ms.
     system, state = flying(TangentialLinearDrag(coefficient=300 * 0.284))
     with pytest.raises(UsageError, match=r"within 0\.001[67].* s, the longest"):
         Symplectic(step=STEP, outer=0.01).advance(system, state, 0.04)

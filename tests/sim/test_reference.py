@@ -35,9 +35,11 @@ def test_grid_is_the_references(reference_data: Path) -> None:
 
 
 @pytest.mark.parametrize("wind", [0, 4])
-def test_small_steps_with_declared_damping_follow_the_half_millisecond_runs(wind: int, reference_data: Path) -> None:
-    # The acceptance: mean vertex distance at most 5 mm through frame 5, 15 mm through frame 10, d = 0.25 ms. Observed
-    # at 4 m/s 1.0 and 6.1 mm, the vertices having moved 0.9 m.
+def test_small_steps_with_declared_damping_follow_the_half_millisecond_runs(
+    wind: int, reference_data: Path
+) -> None:
+    # The acceptance: mean vertex distance at most 5 mm through frame 5, 15 mm through frame 10, d =
+    # 0.25 ms. Observed at 4 m/s 1.0 and 6.1 mm, the vertices having moved 0.9 m.
     expected = reference(reference_data, f"flag_w{wind}_dt05")
     system, state = assemble([flag(material=CAMEL, wind_speed=wind)], dtype=torch.float64)
     for frame in range(1, 11):
@@ -47,9 +49,12 @@ def test_small_steps_with_declared_damping_follow_the_half_millisecond_runs(wind
 
 
 @pytest.mark.parametrize("wind", [0, 4, 8])
-def test_backward_euler_with_the_references_steps_is_the_reference(wind: int, reference_data: Path) -> None:
-    # Same equations, same steps, the air's shape one step ago, no declared damping: equal to the rounding of the stored
-    # float32 and six-digit files, until a bifurcation amplifies it (without wind the sheet buckles in frame 5).
+def test_backward_euler_with_the_references_steps_is_the_reference(
+    wind: int, reference_data: Path
+) -> None:
+    # Same equations, same steps, the air's shape one step ago, no declared damping: equal to the
+    # rounding of the stored float32 and six-digit files, until a bifurcation amplifies it (without
+    # wind the sheet buckles in frame 5).
     expected = reference(reference_data, f"flag_w{wind}_dt5")
     scene = flag(material=replace(CAMEL, damping=0.0), wind_speed=wind)
     system, state = assemble([scene], dtype=torch.float64)
@@ -61,16 +66,22 @@ def test_backward_euler_with_the_references_steps_is_the_reference(wind: int, re
         assert distance < band, f"frame {frame}"
 
 
-def settled(scene: Scene, method: Symplectic | BackwardEuler, *, frames: int, first: int) -> list[EdgeMotion]:
-    """Motion of the free edge in sixteen runs from starts that differ by noise, from frame `first` on.
+def settled(
+    scene: Scene, method: Symplectic | BackwardEuler, *, frames: int, first: int
+) -> list[EdgeMotion]:
+    """Motion of the free edge in sixteen runs from starts that differ by noise, from frame `first`
+    on.
 
-    In wind 0.1 mm are forgotten. Without, a flag falls in its plane until noise folds it, and the sooner that is, the
+    In wind 0.1 mm are forgotten. Without, a flag falls in its plane until noise folds it, and the
+    sooner that is, the
     less motion is left: the reference starts without any, these with 1 nm.
     """
     size, dtype = (1e-4, torch.float32) if any(scene.wind) else (1e-9, torch.float64)
     edge = np.flatnonzero(scene.mesh.rest[:, 0] > 1.5 - 1e-6)
     noise = np.random.default_rng(1).normal(0, size, (16, *scene.position.shape))
-    system, state = assemble([replace(scene, position=scene.position + n) for n in noise], dtype=dtype)
+    system, state = assemble(
+        [replace(scene, position=scene.position + n) for n in noise], dtype=dtype
+    )
     track = []
     for _ in range(frames):
         track.append(state.position[edge].numpy())
@@ -91,8 +102,9 @@ def settled(scene: Scene, method: Symplectic | BackwardEuler, *, frames: int, fi
 def test_settled_motion_has_the_references_statistics(
     name: str, wind: int, method: Symplectic | BackwardEuler, reference_data: Path
 ) -> None:
-    # The noise is forgotten by the second the statistics begin at. The spread between runs, each as long as the part of
-    # the reference's one run that is used, is the sampling error that both have.
+    # The noise is forgotten by the second the statistics begin at. The spread between runs, each as
+    # long as the part of the reference's one run that is used, is the sampling error that both
+    # have.
     first, frames = 50, 151
     scene = flag(material=CAMEL, wind_speed=wind)
     if isinstance(method, BackwardEuler):
@@ -100,10 +112,13 @@ def test_settled_motion_has_the_references_statistics(
     runs = settled(scene, method, frames=frames, first=first)
     edge = np.flatnonzero(scene.mesh.rest[:, 0] > 1.5 - 1e-6)
     expected = edge_motion(reference(reference_data, name)[first:frames, edge], rate=RATE)
-    # Observed: 2.8, 0.8, 5.0 and 2.9 cm; speed +7, +3, +1 and −2 %; frequency −9, +1, −4 and +3 %. Sideways the flag
-    # drifts for seconds, so that four seconds of one run are off by several centimetres of their own.
+    # Observed: 2.8, 0.8, 5.0 and 2.9 cm; speed +7, +3, +1 and −2 %; frequency −9, +1, −4 and +3 %.
+    # Sideways the flag drifts for seconds, so that four seconds of one run are off by several
+    # centimetres of their own.
     places = np.array([run.position for run in runs])
-    assert np.linalg.norm(places.mean(axis=0) - expected.position) < 0.05 + np.linalg.norm(places.std(axis=0, ddof=1))
+    assert np.linalg.norm(places.mean(axis=0) - expected.position) < 0.05 + np.linalg.norm(
+        places.std(axis=0, ddof=1)
+    )
     for quantity, band in (("speed", 0.15), ("frequency", 0.20)):
         values = np.array([getattr(run, quantity) for run in runs])
         goal = getattr(expected, quantity)

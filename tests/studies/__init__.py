@@ -1,1 +1,2 @@
-"""Studies: what grades the product and makes what it ships. One door: `python -m tests.studies NAME`."""
+"""Studies: what grades the product and makes what it ships. One door: `python -m tests.studies
+NAME`."""

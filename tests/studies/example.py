@@ -1,8 +1,9 @@
-"""The example that comes with the package: a short recording of a simulated flag, made from its seed.
+"""The example that comes with the package: a short recording of a simulated flag, made from its
+seed.
 
-`python -m tests.studies example --out flagdata/examples/flag` makes it anew. The flag is of the scene
-`flag-outdoor-damped`, from which the network learned, with a seed of its own and in gusts, which the network did not
-learn from.
+`python -m tests.studies example --out flagdata/examples/flag` makes it anew. The flag is of the
+scene `flag-outdoor-damped`, from which the network learned, with a seed of its own and in gusts,
+which the network did not learn from.
 """
 
 from __future__ import annotations
@@ -85,11 +86,15 @@ def make(folder: Path, *, seed: int) -> None:
     wind = float(np.hypot(velocity[:, 0], velocity[:, 1])[times >= settled].mean())
     begin = from_datetime(START) - round(settled * NANOSECONDS)
     series = log_of_air(CUP, times, velocity, instrument=seed, seed=seed, begin=begin).series
-    first = START + timedelta(seconds=(int(series.time[0]) - from_datetime(START)) / NANOSECONDS + OFFSET)
+    first = START + timedelta(
+        seconds=(int(series.time[0]) - from_datetime(START)) / NANOSECONDS + OFFSET
+    )
     speeds, degrees = series.channels["wind_speed"], np.degrees(series.channels["wind_direction"])
     lines = [
         f"{(first + timedelta(seconds=second)).isoformat(timespec='milliseconds')},{speed:.1f},{direction:.0f}"
-        for second, (speed, direction) in enumerate(zip(speeds.tolist(), degrees.tolist(), strict=True))
+        for second, (speed, direction) in enumerate(
+            zip(speeds.tolist(), degrees.tolist(), strict=True)
+        )
     ]
     (folder / "anemometer.csv").write_text("\n".join([_HEADING, *lines]) + "\n", encoding="utf-8")
     (folder / "example.toml").write_text(
@@ -107,8 +112,12 @@ def make(folder: Path, *, seed: int) -> None:
 
 
 @click.command()
-@click.option("--out", type=LocalPath(), required=True, help="Folder of the example, which is not there yet.")
-@click.option("--seed", type=int, default=SEED, show_default=True, help="Seed of all that is random.")
+@click.option(
+    "--out", type=LocalPath(), required=True, help="Folder of the example, which is not there yet."
+)
+@click.option(
+    "--seed", type=int, default=SEED, show_default=True, help="Seed of all that is random."
+)
 def main(out: Path, seed: int) -> None:
     """Make the example that comes with the package."""
     with fresh_folder(out) as scratch:

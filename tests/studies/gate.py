@@ -1,7 +1,8 @@
 """Calibrate the gate of a model on the films of a lake: `python -m tests.studies gate --help`.
 
-It is run anew whenever a network is replaced. Training-side films shape the checks, some five minutes of one core;
-validation-side films alone, one of each simulation, decide where the gate refuses.
+It is run anew whenever a network is replaced. Training-side films shape the checks, some five
+minutes of one core; validation-side films alone, one of each simulation, decide where the gate
+refuses.
 """
 
 from __future__ import annotations
@@ -53,7 +54,8 @@ def calibrated(
         validation: films of other simulations, which the network was not trained on, one of each.
         seed: of the distortions.
         advance: called with the number of clips measured.
-        plain, distorted: how many of the training films are taken as they are, and how many are distorted.
+        plain, distorted: how many of the training films are taken as they are, and how many are
+            distorted.
 
     Raises:
         InputError: too few films, or films that are too short.
@@ -78,14 +80,18 @@ def calibrated(
             for index in range(distorted):
                 other = training[plain + (index + 1) % distorted]
                 rng = stream(seed, "distortion", name, index)
-                clips.append(measured(distortion.apply(training[plain + index], other, rng, count)).vector(model))
+                clips.append(
+                    measured(distortion.apply(training[plain + index], other, rng, count)).vector(
+                        model
+                    )
+                )
             made[name] = np.array(clips)
     return Gate.of(np.array(plains), made, np.array([one.vector(model) for one in references]))
 
 
 class FilmsOf(Sequence[Film]):
-    """One film of each simulation of one side of data sets, in a random order that is always the same, read when asked
-    for.
+    """One film of each simulation of one side of data sets, in a random order that is always the
+    same, read when asked for.
 
     Args:
         lake_path: of the lake.
@@ -100,14 +106,22 @@ class FilmsOf(Sequence[Film]):
     """
 
     def __init__(
-        self, lake_path: Path, data: DataSpec, side: str, *, at: str | None = None, rate: float | None = None
+        self,
+        lake_path: Path,
+        data: DataSpec,
+        side: str,
+        *,
+        at: str | None = None,
+        rate: float | None = None,
     ) -> None:
         import flagdata
 
         self._lake, self._rate = flagdata.open(lake_path).lake, rate
         catalog = self._lake.table(self._lake.view(at))
         films = matching(catalog, {"kind": Kind.RECORDING, **data.rows})
-        of_side = divide(catalog, select_columns(films), hashed=HashedSplit()).artifacts.get(side, frozenset())
+        of_side = divide(catalog, select_columns(films), hashed=HashedSplit()).artifacts.get(
+            side, frozenset()
+        )
         rows = matching(films, {"artifact": of_side}).select(["name", "seed", "object"]).to_pylist()
         if not rows:
             raise InputError(
@@ -132,7 +146,9 @@ class FilmsOf(Sequence[Film]):
         film = record.frames(0, record.frame_count)
         if self._rate is None:
             return film
-        return FitFilm.of(film, (record.frame_times - record.frame_times[0]) / NANOSECONDS).whole(self._rate)
+        return FitFilm.of(film, (record.frame_times - record.frame_times[0]) / NANOSECONDS).whole(
+            self._rate
+        )
 
 
 def data_of(model: Estimator) -> DataSpec:
@@ -142,7 +158,8 @@ def data_of(model: Estimator) -> DataSpec:
 
 
 def rate_of(model: Estimator) -> float | None:
-    """The rate at which a model's films are conditioned [Hz]; None where they are taken as they are."""
+    """The rate at which a model's films are conditioned [Hz]; None where they are taken as they
+    are."""
     return model.front_end.rate if model.cropping.conditioned else None
 
 
@@ -156,11 +173,18 @@ def rate_of(model: Estimator) -> float | None:
     help="Where the films are that the network was trained on and validated by.",
 )
 @click.option(
-    "--dataset", "datasets", multiple=True, help="Name of the films' data set; by default all that it was trained on."
+    "--dataset",
+    "datasets",
+    multiple=True,
+    help="Name of the films' data set; by default all that it was trained on.",
 )
 @click.option("--at", metavar="REF", help="Version of the lake; by default its head.")
-@click.option("--seed", type=int, default=1, show_default=True, help="Random seed of the distortions.")
-def main(model: Path, lake_path: Path, datasets: tuple[str, ...], at: str | None, seed: int) -> None:
+@click.option(
+    "--seed", type=int, default=1, show_default=True, help="Random seed of the distortions."
+)
+def main(
+    model: Path, lake_path: Path, datasets: tuple[str, ...], at: str | None, seed: int
+) -> None:
     """Calibrate the gate of the model in the folder MODEL and store it there."""
     from measure.gate import write
 
@@ -168,8 +192,11 @@ def main(model: Path, lake_path: Path, datasets: tuple[str, ...], at: str | None
     loaded = load(model)
     data = DataSpec(datasets=datasets) if datasets else data_of(loaded)
     training, validation = (
-        FilmsOf(lake_path, data, side, at=at, rate=rate_of(loaded)) for side in ("train", "validation")
+        FilmsOf(lake_path, data, side, at=at, rate=rate_of(loaded))
+        for side in ("train", "validation")
     )
-    with progress(len(validation) + PLAIN + DISTORTED * len(DISTORTIONS), label="measure", unit="clip") as advance:
+    with progress(
+        len(validation) + PLAIN + DISTORTED * len(DISTORTIONS), label="measure", unit="clip"
+    ) as advance:
         gate = calibrated(loaded, training, validation, seed=seed, advance=advance)
     say(f"{len(gate.calibration)} calibration clips; stored in {write(model, gate, loaded)}")

@@ -1,7 +1,9 @@
-"""Long films of the cloths that a model was trained on, with their truth, which show what its windows have in common.
+"""Long films of the cloths that a model was trained on, with their truth, which show what its
+windows have in common.
 
-Films of a training set are two seconds long, in which two windows overlap. Here the same scenes are simulated for
-longer, from seeds of their own, and filmed by one camera each, with the data set's noise and coding. Nothing is stored.
+Films of a training set are two seconds long, in which two windows overlap. Here the same scenes are
+simulated for longer, from seeds of their own, and filmed by one camera each, with the data set's
+noise and coding. Nothing is stored.
 """
 
 from __future__ import annotations
@@ -19,7 +21,16 @@ from flagdata.record import decode
 from models.trained.estimator import Estimator
 from models.training import DataSpec, FitFilm
 from sim.assets import Assets
-from sim.datasets import EPOCH, Cast, DatasetRecipe, PlannedFilm, build_jobs, camera_picture, load, velocities
+from sim.datasets import (
+    EPOCH,
+    Cast,
+    DatasetRecipe,
+    PlannedFilm,
+    build_jobs,
+    camera_picture,
+    load,
+    velocities,
+)
 from sim.datasets.cast import of_group
 from sim.datasets.film_record import parameters_of
 from sim.run import Crew, Recipe, recipe_of
@@ -42,7 +53,8 @@ class LongFilm:
         dataset: whose scene, light and camera it was drawn from.
         windows: (k, frames, height, width) uint8, gray, one right after the other.
         parameters: name → value, SI, as simulated records state them.
-        winds: (k, 2) mean horizontal speed of the undisturbed air over both halves of each window [m/s].
+        winds: (k, 2) mean horizontal speed of the undisturbed air over both halves of each window
+            [m/s].
     """
 
     dataset: str
@@ -54,8 +66,8 @@ class LongFilm:
 def simulated(model: Estimator, *, count: int, windows: int, seed: int) -> Iterator[LongFilm]:
     """Films of so many windows of a model's length.
 
-    The data sets that the network was trained on share the films as they share its training simulations. A cloth that
-    cannot be simulated to the end is left out.
+    The data sets that the network was trained on share the films as they share its training
+    simulations. A cloth that cannot be simulated to the end is left out.
 
     Args:
         count: of films.
@@ -66,7 +78,9 @@ def simulated(model: Estimator, *, count: int, windows: int, seed: int) -> Itera
         InputError: a model whose card does not say what it was trained on.
     """
     for name, share in _shares(model, count).items():
-        yield from _of_dataset(load(name), share, model, windows=windows, seed=child_seed(seed, "long-films", name))
+        yield from _of_dataset(
+            load(name), share, model, windows=windows, seed=child_seed(seed, "long-films", name)
+        )
 
 
 def gusty(
@@ -79,7 +93,8 @@ def gusty(
     speed: tuple[float, float],
     intensity: tuple[float, float],
 ) -> Iterator[LongFilm]:
-    """Films of the cloths of one data set in gusts of the von Kármán spectrum (`sim.effects.gusts`).
+    """Films of the cloths of one data set in gusts of the von Kármán spectrum
+    (`sim.effects.gusts`).
 
     Args:
         dataset: whose cloths, light and cameras are drawn.
@@ -99,7 +114,12 @@ def gusty(
     )
     blown = replace(recipe, simulation=simulation)
     yield from _of_dataset(
-        blown, count, model, windows=windows, seed=child_seed(seed, "gusty-films", dataset), batch=_GUSTY_BATCH
+        blown,
+        count,
+        model,
+        windows=windows,
+        seed=child_seed(seed, "gusty-films", dataset),
+        batch=_GUSTY_BATCH,
     )
 
 
@@ -119,11 +139,24 @@ def _shares(model: Estimator, count: int) -> dict[str, int]:
 
 
 def _of_dataset(
-    recipe: DatasetRecipe, count: int, model: Estimator, *, windows: int, seed: int, batch: int = _BATCH
+    recipe: DatasetRecipe,
+    count: int,
+    model: Estimator,
+    *,
+    windows: int,
+    seed: int,
+    batch: int = _BATCH,
 ) -> Iterator[LongFilm]:
     frames = model.front_end.frames
     time = replace(recipe.simulation.time, frames=windows * frames, rate=model.front_end.rate)
-    simulation = replace(recipe.simulation, name=f"{recipe.name}-long", seed=seed, count=count, batch=batch, time=time)
+    simulation = replace(
+        recipe.simulation,
+        name=f"{recipe.name}-long",
+        seed=seed,
+        count=count,
+        batch=batch,
+        time=time,
+    )
     for cast in _casts(recipe, simulation):
         crew = Crew(cast.simulation)
         bases: dict[int, list[int]] = {}
@@ -131,11 +164,14 @@ def _of_dataset(
             bases.setdefault(crew.member(index).base, []).append(index)
         for base, indices in bases.items():
             for first in range(0, len(indices), batch):
-                yield from _batch(recipe, cast, base, indices[first : first + batch], model, windows)
+                yield from _batch(
+                    recipe, cast, base, indices[first : first + batch], model, windows
+                )
 
 
 def _casts(recipe: DatasetRecipe, simulation: Recipe) -> Iterator[Cast]:
-    """The films' cloths: together, or batch by batch where each draws its own shape; the rate is the model's."""
+    """The films' cloths: together, or batch by batch where each draws its own shape; the rate is
+    the model's."""
     side = recipe.side(_SIDE)
     if recipe.groups is None:
         yield Cast(side=side, session=None, simulation=simulation)
@@ -147,7 +183,12 @@ def _casts(recipe: DatasetRecipe, simulation: Recipe) -> Iterator[Cast]:
 
 
 def _batch(
-    recipe: DatasetRecipe, cast: Cast, base: int, indices: Sequence[int], model: Estimator, windows: int
+    recipe: DatasetRecipe,
+    cast: Cast,
+    base: int,
+    indices: Sequence[int],
+    model: Estimator,
+    windows: int,
 ) -> Iterator[LongFilm]:
     assets, simulation = Assets(photos=recipe.photos), cast.simulation
     for outcome in build_jobs.simulate(simulation, base, indices, "cpu").outcomes:
@@ -167,21 +208,32 @@ def _batch(
             begin=EPOCH,
             filming={},
         )
-        zeta, drawn = recipe.prior.draw(seed, assets), camera_picture.settings(recipe.camera, seed=seed)
+        zeta, drawn = (
+            recipe.prior.draw(seed, assets),
+            camera_picture.settings(recipe.camera, seed=seed),
+        )
         seen = build_jobs.shot(recipe, job, outcome.sequence, zeta, assets, device="cpu").numpy()
-        film = np.stack(decode(camera_picture.encode_pictures(seen, drawn, recipe.camera, seed=seed), where=job.name))
+        film = np.stack(
+            decode(
+                camera_picture.encode_pictures(seen, drawn, recipe.camera, seed=seed),
+                where=job.name,
+            )
+        )
         if model.cropping.conditioned:
             film = FitFilm.of(film, np.arange(len(film)) / simulation.time.rate).frames
         yield LongFilm(
             dataset=recipe.name,
             windows=film.reshape(windows, -1, *film.shape[1:]),
-            parameters=parameters_of(member, zeta, {**cast.stated, **drawn}, recipe.anemometer.truth),
+            parameters=parameters_of(
+                member, zeta, {**cast.stated, **drawn}, recipe.anemometer.truth
+            ),
             winds=_winds(Crew(simulation), member, windows),
         )
 
 
 def _winds(crew: Crew, member: Member, windows: int) -> FloatArray:
-    """Mean horizontal speed of the undisturbed air at the flag over both halves of each window (k, 2) [m/s]."""
+    """Mean horizontal speed of the undisturbed air at the flag over both halves of each window (k,
+    2) [m/s]."""
     time = crew.recipe.time
     half = time.frames / time.rate / windows / 2
     count = round(half * _AIR_RATE)

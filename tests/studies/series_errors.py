@@ -1,19 +1,21 @@
-"""How a model errs in the windows of a gusty film: what its card states for `measure.estimate.gusty_series`.
+"""How a model errs in the windows of a gusty film: what its card states for
+`measure.estimate.gusty_series`.
 
-Each window's error is d, m_w of `measure.estimate.gusty_series` less the logarithm of the true mean wind of the window,
-and s is s_w. Over films of 10 windows, and the 9 that share halves with two:
+Each window's error is d, m_w of `measure.estimate.gusty_series` less the logarithm of the true mean
+wind of the window, and s is s_w. Over films of 10 windows, and the 9 that share halves with two:
 
-- *own*: σ_e² is the mean of (d_v − d_w)²/(s_v² + s_w²) over pairs of windows of a film that begin two lengths apart or
-  more. What is common to a film drops out of the difference.
-- *correlations*: 1 − ρ is the same mean over pairs half a length apart, or one, over σ_e²; averaged over both pairs of
-  constants, and moved to the nearest values at which the correlation is convex.
-- *shared*: σ_b² is the mean over films of the square of the mean d over s̄², less the part of the windows' own errors.
+- *own*: σ_e² is the mean of (d_v − d_w)²/(s_v² + s_w²) over pairs of windows of a film that begin
+  two lengths apart or more. What is common to a film drops out of the difference.
+- *correlations*: 1 − ρ is the same mean over pairs half a length apart, or one, over σ_e²; averaged
+  over both pairs of constants, and moved to the nearest values at which the correlation is convex.
+- *shared*: σ_b² is the mean over films of the square of the mean d over s̄², less the part of the
+  windows' own errors.
 
-Errors count about 0: an offset common to all films is part of the shared error. Two films of one cloth are unlike each
-other in weight, damping, light and view, so that films are independent.
+Errors count about 0: an offset common to all films is part of the shared error. Two films of one
+cloth are unlike each other in weight, damping, light and view, so that films are independent.
 
-`python -m tests.studies series-errors NAME` measures them on films of its own seed and writes them into the card of the
-shipped model NAME.
+`python -m tests.studies series-errors NAME` measures them on films of its own seed and writes them
+into the card of the shipped model NAME.
 """
 
 from __future__ import annotations
@@ -67,11 +69,14 @@ def size_of(film: LongFilm) -> FlagSize:
 
 
 def half_steps(film: LongFilm) -> tuple[UInt8Array, FloatArray]:
-    """Windows (2 k − 1, frames, height, width) that begin half a window apart, and the true mean wind of each [m/s]."""
+    """Windows (2 k − 1, frames, height, width) that begin half a window apart, and the true mean
+    wind of each [m/s]."""
     count, frames = film.windows.shape[:2]
     whole = film.windows.reshape(count * frames, *film.windows.shape[2:])
     step = frames // 2
-    windows = np.stack([whole[first : first + frames] for first in range(0, (count - 1) * frames + 1, step)])
+    windows = np.stack(
+        [whole[first : first + frames] for first in range(0, (count - 1) * frames + 1, step)]
+    )
     halves = film.winds.ravel()
     return windows, (halves[:-1] + halves[1:]) / 2
 
@@ -84,7 +89,9 @@ def errors_of_film(film: LongFilm, model: Estimator, *, stated: bool, seed: int)
         stated: whether the weight of the cloth is given too.
     """
     options = Options(
-        size=size_of(film), seed=seed, area_weight=Stated.of(film.parameters["area_weight"]) if stated else None
+        size=size_of(film),
+        seed=seed,
+        area_weight=Stated.of(film.parameters["area_weight"]) if stated else None,
     )
     considered = sizes(
         options.size,
@@ -109,13 +116,17 @@ def errors_of_film(film: LongFilm, model: Estimator, *, stated: bool, seed: int)
 
 
 def variogram(films: Sequence[FilmErrors], *, least: int, most: int) -> float:
-    """Mean of (d_v − d_w)²/(s_v² + s_w²) over pairs of windows of a film from `least` to `most` half windows apart."""
+    """Mean of (d_v − d_w)²/(s_v² + s_w²) over pairs of windows of a film from `least` to `most`
+    half windows apart."""
     squares = []
     for film in films:
         first, second = np.triu_indices(len(film.off), k=least)
         near = second - first <= most
         first, second = first[near], second[near]
-        squares.append((film.off[first] - film.off[second]) ** 2 / (film.sigma[first] ** 2 + film.sigma[second] ** 2))
+        squares.append(
+            (film.off[first] - film.off[second]) ** 2
+            / (film.sigma[first] ** 2 + film.sigma[second] ** 2)
+        )
     return float(np.concatenate(squares).mean())
 
 
@@ -124,7 +135,9 @@ def own_variance(films: Sequence[FilmErrors]) -> float:
     return variogram(films, least=_APART, most=max(len(film.off) for film in films))
 
 
-def shared_variance(films: Sequence[FilmErrors], *, own: float, halves: float, neighbours: float) -> float:
+def shared_variance(
+    films: Sequence[FilmErrors], *, own: float, halves: float, neighbours: float
+) -> float:
     """σ_b², 0 where the windows' own errors explain all."""
     parts = []
     for film in films:
@@ -135,7 +148,9 @@ def shared_variance(films: Sequence[FilmErrors], *, own: float, halves: float, n
     return max(float(np.mean(parts)), 0.0)
 
 
-def series_errors(opened: Sequence[FilmErrors], stated: Sequence[FilmErrors], *, source: str) -> SeriesErrors:
+def series_errors(
+    opened: Sequence[FilmErrors], stated: Sequence[FilmErrors], *, source: str
+) -> SeriesErrors:
     """The constants of a model.
 
     Args:
@@ -146,7 +161,9 @@ def series_errors(opened: Sequence[FilmErrors], stated: Sequence[FilmErrors], *,
         InputError: fewer than ten films.
     """
     if len(opened) < _LEAST_FILMS or len(opened) != len(stated):
-        raise InputError(f"{len(opened)} and {len(stated)} films", where="films", fix="give ten or more of both")
+        raise InputError(
+            f"{len(opened)} and {len(stated)} films", where="films", fix="give ten or more of both"
+        )
     own = [own_variance(films) for films in (opened, stated)]
 
     def correlation(halves: int) -> float:
@@ -160,15 +177,20 @@ def series_errors(opened: Sequence[FilmErrors], stated: Sequence[FilmErrors], *,
     halves = float(np.clip(correlation(1), 1.5 * neighbours, (1 + neighbours) / 2))
     pairs = [
         Pair(
-            shared=shared_variance(films, own=variance, halves=halves, neighbours=neighbours) ** 0.5,
+            shared=shared_variance(films, own=variance, halves=halves, neighbours=neighbours)
+            ** 0.5,
             own=variance**0.5,
         )
         for films, variance in zip((opened, stated), own, strict=True)
     ]
-    return SeriesErrors(opened=pairs[0], stated=pairs[1], halves=halves, neighbours=neighbours, source=source)
+    return SeriesErrors(
+        opened=pairs[0], stated=pairs[1], halves=halves, neighbours=neighbours, source=source
+    )
 
 
-def spread(opened: Sequence[FilmErrors], stated: Sequence[FilmErrors], *, seed: int) -> dict[str, list[float]]:
+def spread(
+    opened: Sequence[FilmErrors], stated: Sequence[FilmErrors], *, seed: int
+) -> dict[str, list[float]]:
     """90 % of the constants by resampling films, by their names."""
     generator = stream(seed, "series-errors")
     rows = []
@@ -196,23 +218,43 @@ def card_entry(films: Sequence[LongFilm], model: Estimator, *, seed: int) -> dic
     with progress(len(films), label="errors", unit="film") as advance:
         for number, film in enumerate(films):
             for stated, found in both.items():
-                found.append(errors_of_film(film, model, stated=stated, seed=child_seed(seed, "film", number)))
+                found.append(
+                    errors_of_film(
+                        film, model, stated=stated, seed=child_seed(seed, "film", number)
+                    )
+                )
             advance(1)
     windows = len(films[0].windows)
     errors = series_errors(
-        both[False], both[True], source=f"{len(films)} simulated films of {windows} windows in gusts, of seed {seed}"
+        both[False],
+        both[True],
+        source=f"{len(films)} simulated films of {windows} windows in gusts, of seed {seed}",
     )
     return {**errors.entry(), "spread": spread(both[False], both[True], seed=seed)}
 
 
 @click.command()
 @click.argument("name")
-@click.option("--films", type=click.IntRange(_LEAST_FILMS), default=FILMS, show_default=True, help="How many films.")
+@click.option(
+    "--films",
+    type=click.IntRange(_LEAST_FILMS),
+    default=FILMS,
+    show_default=True,
+    help="How many films.",
+)
 @click.option("--seed", type=int, default=SEED, show_default=True, help="Seed of the films.")
-@click.option("--kept", type=LocalPath(), required=True, help="Folder of the films, where missing ones are made.")
-@click.option("--out", type=LocalPath(), default=SHIPPED, help="Folder of the models that are shipped.")
+@click.option(
+    "--kept",
+    type=LocalPath(),
+    required=True,
+    help="Folder of the films, where missing ones are made.",
+)
+@click.option(
+    "--out", type=LocalPath(), default=SHIPPED, help="Folder of the models that are shipped."
+)
 def main(name: str, films: int, seed: int, kept: Path, out: Path) -> None:
-    """Measure how the shipped model NAME errs in windows of gusty films, and write it into its card."""
+    """Measure how the shipped model NAME errs in windows of gusty films, and write it into its
+    card."""
     from models.trained.estimator import load
 
     torch.set_num_threads(1)
@@ -222,5 +264,11 @@ def main(name: str, films: int, seed: int, kept: Path, out: Path) -> None:
     renew(out / name, CARD, card_bytes({**card, SERIES_KEY: entry}))
     for weight in ("open", "stated"):
         pair = entry[weight]
-        say(f"weight {weight}: a shared error of {pair['shared']:.2f} and an own of {pair['own']:.2f} of the network's")
-    say(f"own errors correlate by {entry['halves']:.2f} at half a window and {entry['neighbours']:.2f} at one")
+        say(
+            f"weight {weight}: a shared error of {pair['shared']:.2f} and an own of "
+            f"{pair['own']:.2f} of the network's"
+        )
+    say(
+        f"own errors correlate by {entry['halves']:.2f} at half a window and "
+        f"{entry['neighbours']:.2f} at one"
+    )

@@ -1,8 +1,10 @@
-"""From trained networks of a lake to one model that comes with the package: `python -m tests.studies shipping --help`.
+"""From trained networks of a lake to one model that comes with the package: `python -m
+tests.studies shipping --help`.
 
-Several seeds of one recipe become one estimator; its distributions are spread so that their intervals on validation
-clips cover what they say; the summaries of the training clips are kept, so that a clip unlike them is known. Weights
-are stored as float16, which moves an estimate by a hundredth of its standard deviation.
+Several seeds of one recipe become one estimator; its distributions are spread so that their
+intervals on validation clips cover what they say; the summaries of the training clips are kept, so
+that a clip unlike them is known. Weights are stored as float16, which moves an estimate by a
+hundredth of its standard deviation.
 """
 
 from __future__ import annotations
@@ -41,8 +43,9 @@ _KEPT = ("title", "recipe", "recipe_hash", "data", "code_version", "front_end", 
 def widening(estimator: Estimator, validation: Prepared) -> tuple[float, ...]:
     """(target,) factors that bring the covered shares nearest to what the intervals say.
 
-    The factor of a target is that of a geometric grid from 0.5 to 2 at which the summed squared differences between
-    nominal and covered shares of `LEVELS` are smallest over the validation clips.
+    The factor of a target is that of a geometric grid from 0.5 to 2 at which the summed squared
+    differences between nominal and covered shares of `LEVELS` are smallest over the validation
+    clips.
     """
     entries = np.arange(len(validation))
     inputs = validation.batch(entries, np.zeros(len(entries), dtype=np.int64))
@@ -55,7 +58,13 @@ def widening(estimator: Estimator, validation: Prepared) -> tuple[float, ...]:
     centre = logits.mean(dim=1)
     factors = np.geomspace(_NARROWEST, _WIDEST, _TRIED)
     return tuple(
-        float(factors[np.argmin([_miss(logits[..., k], centre[:, k], truth[:, k], factor) for factor in factors])])
+        float(
+            factors[
+                np.argmin(
+                    [_miss(logits[..., k], centre[:, k], truth[:, k], factor) for factor in factors]
+                )
+            ]
+        )
         for k in range(len(names))
     )
 
@@ -68,14 +77,18 @@ def _miss(logits: Tensor, centre: Tensor, truth: Tensor, factor: float) -> float
 
 
 def familiar(estimator: Estimator, train: Prepared, validation: Prepared) -> Familiarity:
-    """The summaries of the training clips; the false-alarm rate is that of one validation clip a simulation."""
+    """The summaries of the training clips; the false-alarm rate is that of one validation clip a
+    simulation."""
     first = np.unique(validation.sequence, return_index=True)[1]
     return Familiarity.of(
-        embed_entries(estimator.learners[0], train), embed_entries(estimator.learners[0], validation)[first]
+        embed_entries(estimator.learners[0], train),
+        embed_entries(estimator.learners[0], validation)[first],
     )
 
 
-def write(folder: Path, members: Sequence[Path], *, train: Prepared, validation: Prepared, name: str) -> Estimator:
+def write(
+    folder: Path, members: Sequence[Path], *, train: Prepared, validation: Prepared, name: str
+) -> Estimator:
     """Make one model of trained ones.
 
     Args:
@@ -120,13 +133,16 @@ def write(folder: Path, members: Sequence[Path], *, train: Prepared, validation:
     with fresh_folder(folder) as scratch:
         write_card(scratch, card)
         write_tensors(scratch / WEIGHTS, tensors)
-        write_tensors(scratch / CLOUD, {key: torch.from_numpy(value) for key, value in cloud.arrays().items()})
+        write_tensors(
+            scratch / CLOUD, {key: torch.from_numpy(value) for key, value in cloud.arrays().items()}
+        )
         write_sums(scratch)
     return load(folder)
 
 
 def _learned(data: Any) -> dict[str, Any]:
-    """What a network learned from; how its sides were decided, which older cards do not say, follows from it."""
+    """What a network learned from; how its sides were decided, which older cards do not say,
+    follows from it."""
     return {key: value for key, value in data.items() if key != "split_by"}
 
 
@@ -137,12 +153,23 @@ def _seedless(recipe: object) -> dict[str, Any]:
 
 @click.command()
 @click.argument("name")
-@click.option("--lake", "lake_path", type=LocalPath(exists=True), required=True, help="Where the networks are.")
+@click.option(
+    "--lake",
+    "lake_path",
+    type=LocalPath(exists=True),
+    required=True,
+    help="Where the networks are.",
+)
 @click.option("--at", help="Version of the lake that they were trained at.")
-@click.option("--cache", type=LocalPath(), help="Folder of prepared inputs; by default LAKE.inputs.")
-@click.option("--out", type=LocalPath(), default=SHIPPED, help="Folder of the models that are shipped.")
+@click.option(
+    "--cache", type=LocalPath(), help="Folder of prepared inputs; by default LAKE.inputs."
+)
+@click.option(
+    "--out", type=LocalPath(), default=SHIPPED, help="Folder of the models that are shipped."
+)
 def main(name: str, lake_path: Path, at: str | None, cache: Path | None, out: Path) -> None:
-    """Make a model that comes with the package of all seeds that the training recipe NAME has in a lake."""
+    """Make a model that comes with the package of all seeds that the training recipe NAME has in a
+    lake."""
     import flagdata
     from models.training import load as recipe_of
     from models.training import prepare_clips, prepare_films, sides_of
@@ -156,10 +183,15 @@ def main(name: str, lake_path: Path, at: str | None, cache: Path | None, out: Pa
     members = [
         source.lake.object_path(row["object"])
         for row in rows
-        if _seedless(column_json(row["recipe"], "recipe", artifact=row["artifact"])["recipe"]) == wanted
+        if _seedless(column_json(row["recipe"], "recipe", artifact=row["artifact"])["recipe"])
+        == wanted
     ]
     if not members:
-        raise UsageError(f"no network {recipe.name!r} was trained by its recipe", where=str(lake_path), fix="train it")
+        raise UsageError(
+            f"no network {recipe.name!r} was trained by its recipe",
+            where=str(lake_path),
+            fix="train it",
+        )
     folder = cache if cache is not None else Path(f"{str(lake_path).rstrip('/')}.inputs")
     workers = os.cpu_count() or 1
     train, validation = (sides_of(source, recipe, side, at=at) for side in ("train", "validation"))
@@ -178,7 +210,15 @@ def main(name: str, lake_path: Path, at: str | None, cache: Path | None, out: Pa
         )
     with progress(len(validation), label="prepare", unit="clip") as advance:
         judged = prepare_clips(
-            validation, recipe.front_end, recipe.cropping, folder=folder, workers=workers, advance=advance
+            validation,
+            recipe.front_end,
+            recipe.cropping,
+            folder=folder,
+            workers=workers,
+            advance=advance,
         )
     shipped = write(out / recipe.name, members, train=inputs, validation=judged, name=recipe.name)
-    say(f"{len(members)} networks, spread by {', '.join(f'{factor:.2f}' for factor in shipped.widening.tolist())}")
+    say(
+        f"{len(members)} networks, spread by "
+        f"{', '.join(f'{factor:.2f}' for factor in shipped.widening.tolist())}"
+    )

@@ -1,4 +1,5 @@
-"""How alike windows err: recovered from problems with a known correlation, and written into a model's card."""
+"""How alike windows err: recovered from problems with a known correlation, and written into a
+model's card."""
 
 from __future__ import annotations
 
@@ -19,10 +20,14 @@ def simulated(correlation: float, *, noise: float, films: int = 4000) -> Errors:
     truth = rng.normal(size=(films, 2))
     common = rng.normal(size=(films, 1, 2))
     own = rng.normal(size=(films, 2, 2))
-    observed = truth[:, None] + np.sqrt(noise) * (np.sqrt(correlation) * common + np.sqrt(1 - correlation) * own)
+    observed = truth[:, None] + np.sqrt(noise) * (
+        np.sqrt(correlation) * common + np.sqrt(1 - correlation) * own
+    )
     variance = 1 / (1 + 1 / noise)
     # Two draws with the mean and the variance of the posterior.
-    draws = (observed / noise * variance)[:, :, None] + np.sqrt(variance) * np.array([-1.0, 1.0])[:, None]
+    draws = (observed / noise * variance)[:, :, None] + np.sqrt(variance) * np.array([-1.0, 1.0])[
+        :, None
+    ]
     names = ("wind_speed", "area_weight")
     found = errors_of(draws, truth, names)
     return Errors(names=names, values=found)

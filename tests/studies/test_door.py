@@ -1,4 +1,5 @@
-"""The one door to the studies: each name leads somewhere, and nothing is imported before it is asked for."""
+"""The one door to the studies: each name leads somewhere, and nothing is imported before it is
+asked for."""
 
 from __future__ import annotations
 
@@ -24,7 +25,9 @@ def command(name: str) -> click.Command:
 
 
 def test_each_name_leads_to_a_study_with_a_help_of_its_own() -> None:
-    assert len(door.Studies.verbs) == sum(len(studies) for _, studies in door.GROUPS.values()), "a name twice"
+    assert len(door.Studies.verbs) == sum(len(studies) for _, studies in door.GROUPS.values()), (
+        "a name twice"
+    )
     for name, (target, about) in door.Studies.verbs.items():
         assert command(name).help, name
         assert about.endswith("."), name
@@ -58,7 +61,9 @@ def test_all_that_follows_a_modules_name_is_passed_on(monkeypatch: pytest.Monkey
     monkeypatch.setattr(door.os, "execv", start)
     with pytest.raises(SystemExit):
         main(["failing", "export", "--out", "x", "--help"], command=door.studies, name="studies")
-    assert started == [[sys.executable, "-m", "tests.studies.failing.campaign", "export", "--out", "x", "--help"]]
+    assert started == [
+        [sys.executable, "-m", "tests.studies.failing.campaign", "export", "--out", "x", "--help"]
+    ]
 
 
 @pytest.mark.parametrize(
@@ -67,7 +72,12 @@ def test_all_that_follows_a_modules_name_is_passed_on(monkeypatch: pytest.Monkey
         ("gate-clips", ["validate-gate.json"]),
         ("sim-gpu", ["bench-sim-gpu.json"]),
         ("bench", sorted(f"bench-{name}.json" for name in door.GROUPS["speed"][1])),
-        ("validate", sorted(f"validate-{door.FILES.get(name, name)}.json" for name in door.GROUPS["evidence"][1])),
+        (
+            "validate",
+            sorted(
+                f"validate-{door.FILES.get(name, name)}.json" for name in door.GROUPS["evidence"][1]
+            ),
+        ),
     ],
 )
 def test_evidence_is_kept_by_kind_and_name_with_its_circumstances(
@@ -84,7 +94,11 @@ def test_evidence_is_kept_by_kind_and_name_with_its_circumstances(
     monkeypatch.setattr(evidence, "import_module", lambda module: Study)
     monkeypatch.setattr(evidence, "circumstances", lambda seed: {"seed": seed})
     with pytest.raises(SystemExit) as ended:
-        main([name, "--out", str(tmp_path / "kept"), "--seed", "3"], command=door.studies, name="studies")
+        main(
+            [name, "--out", str(tmp_path / "kept"), "--seed", "3"],
+            command=door.studies,
+            name="studies",
+        )
     assert ended.value.code == 0
     assert sorted(path.name for path in (tmp_path / "kept").iterdir()) == files
     for path in (tmp_path / "kept").iterdir():
@@ -99,7 +113,11 @@ def test_evidence_is_kept_by_kind_and_name_with_its_circumstances(
 def test_from_the_root_of_a_checkout_it_helps_and_refuses_as_the_program_does() -> None:
     def run(*words: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run(
-            [sys.executable, "-m", "tests.studies", *words], capture_output=True, text=True, check=False, cwd=ROOT
+            [sys.executable, "-m", "tests.studies", *words],
+            capture_output=True,
+            text=True,
+            check=False,
+            cwd=ROOT,
         )
 
     shown = run("--help")
@@ -117,8 +135,12 @@ def test_from_the_root_of_a_checkout_it_helps_and_refuses_as_the_program_does() 
 def test_its_help_imports_no_study() -> None:
     code = (
         "import sys\nfrom flagdata.cli import main\nfrom tests.studies.__main__ import studies\n"
-        "try:\n    main(['--help'], command=studies, name='studies')\nexcept SystemExit:\n    pass\n"
-        "print('LOADED', sorted(n for n in sys.modules if n == 'torch' or n.startswith('tests.studies.')))"
+        "try:\n    main(['--help'], command=studies, name='studies')\nexcept SystemExit:\n    "
+        "pass\n"
+        "print('LOADED', sorted(n for n in sys.modules if n == 'torch' or "
+        "n.startswith('tests.studies.')))"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
+    )
     assert done.stdout.splitlines()[-1] == "LOADED ['tests.studies.__main__']"

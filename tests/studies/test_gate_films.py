@@ -1,4 +1,5 @@
-"""The films that a gate is calibrated on and those that decide where it refuses share no simulation."""
+"""The films that a gate is calibrated on and those that decide where it refuses share no
+simulation."""
 
 from __future__ import annotations
 
@@ -39,19 +40,26 @@ def test_sides_that_share_a_sequence_are_refused(tmp_path: Path) -> None:
     sequence = Artifact(kind=Kind.MESHES, name="flag", seed=1)
     data = lake_of(tmp_path / "lake", {"train": sequence, "validation": sequence})
     for side in ("train", "validation"):
-        with pytest.raises(RefusedError, match=f"meshes {sequence.id} is in train and in validation"):
+        with pytest.raises(
+            RefusedError, match=f"meshes {sequence.id} is in train and in validation"
+        ):
             FilmsOf(tmp_path / "lake", data, side)
 
 
 def test_a_side_has_its_own_films(tmp_path: Path) -> None:
-    own = {side: Artifact(kind=Kind.MESHES, name=side, recipe={"of": side}) for side in ("train", "validation")}
+    own = {
+        side: Artifact(kind=Kind.MESHES, name=side, recipe={"of": side})
+        for side in ("train", "validation")
+    }
     data = lake_of(tmp_path / "lake", own)
     assert FilmsOf(tmp_path / "lake", data, "validation").names == ("o'brien-validation-00000",)
     with pytest.raises(InputError, match="no films of the test side"):
         FilmsOf(tmp_path / "lake", data, "test")
 
 
-def test_films_of_a_network_of_conditioned_films_are_conditioned_and_shown_at_its_rate(tmp_path: Path) -> None:
+def test_films_of_a_network_of_conditioned_films_are_conditioned_and_shown_at_its_rate(
+    tmp_path: Path,
+) -> None:
     """14 frames at 30 Hz are 0.433 s: 11 pictures at 25 Hz, of 300 px, as they are measured."""
     fill(Lake.create(tmp_path / "lake"), period=33_333_333)
     data = DataSpec(datasets=("made",))

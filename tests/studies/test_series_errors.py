@@ -1,4 +1,5 @@
-"""How a series of windows errs: constants recovered from errors drawn with known ones, and films of half steps."""
+"""How a series of windows errs: constants recovered from errors drawn with known ones, and films of
+half steps."""
 
 from __future__ import annotations
 
@@ -12,14 +13,18 @@ from tests.studies.series_errors import FilmErrors, half_steps, series_errors, s
 
 
 def drawn(shared: float, own: float, *, films: int, seed: int) -> list[FilmErrors]:
-    """Errors of 19 windows half a window apart: white noise of half windows, w₂ₖ + w₂ₖ₊₁, gives a correlation of a half
-    at half a step and none from one step on."""
+    """Errors of 19 windows half a window apart: white noise of half windows, w₂ₖ + w₂ₖ₊₁, gives a
+    correlation of a half at half a step and none from one step on."""
     rng = stream(seed, "films")
     out = []
     for _ in range(films):
         sigma = rng.uniform(0.15, 0.25) * np.ones(19)
         white = rng.normal(size=20) / np.sqrt(2)
-        out.append(FilmErrors(off=sigma * (shared * rng.normal() + own * (white[:-1] + white[1:])), sigma=sigma))
+        out.append(
+            FilmErrors(
+                off=sigma * (shared * rng.normal() + own * (white[:-1] + white[1:])), sigma=sigma
+            )
+        )
     return out
 
 

@@ -19,8 +19,9 @@ class EdgeMotion:
     Attributes:
         position: (3,) mean [m].
         speed: mean of |velocity| [m/s].
-        frequency: root mean square velocity over 2π times root mean square displacement from the mean [Hz]: that of a
-            sinusoid, and for any motion the root mean square frequency of its displacement spectrum.
+        frequency: root mean square velocity over 2π times root mean square displacement from the
+            mean [Hz]: that of a sinusoid, and for any motion the root mean square frequency of its
+            displacement spectrum.
     """
 
     position: FloatArray
@@ -31,8 +32,8 @@ class EdgeMotion:
 def edge_motion(positions: NDArray[np.floating], *, rate: float) -> EdgeMotion:
     """Motion of vertices from frames.
 
-    Velocities are differences of successive frames, so that frequencies beyond a quarter of the rate are underestimated
-    (by 10 % there).
+    Velocities are differences of successive frames, so that frequencies beyond a quarter of the
+    rate are underestimated (by 10 % there).
 
     Args:
         positions: (frame, vertex, 3) [m].
@@ -42,7 +43,9 @@ def edge_motion(positions: NDArray[np.floating], *, rate: float) -> EdgeMotion:
         UsageError: fewer than two frames.
     """
     if len(positions) < 2:
-        raise UsageError("the motion of fewer than two frames", where="edge motion", fix="give more frames")
+        raise UsageError(
+            "the motion of fewer than two frames", where="edge motion", fix="give more frames"
+        )
     track = np.asarray(positions, dtype=np.float64)
     velocity = np.diff(track, axis=0) * rate
     swing = track - track.mean(axis=0)

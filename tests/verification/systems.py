@@ -30,7 +30,8 @@ def build(
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0),
     air: AirForce | None = None,
 ) -> tuple[System, State]:
-    """A float64 system: one member a material, at rest at `position` (the y–z plane unless given)."""
+    """A float64 system: one member a material, at rest at `position` (the y–z plane unless
+    given)."""
     batch = len(materials)
     held = handles or Handles(vertices=())
     start = upright(mesh) if position is None else position
@@ -48,11 +49,14 @@ def build(
     return system, State(position=x, velocity=torch.zeros_like(x))
 
 
-def settle(system: System, state: State, *, block: float = 5e-3, blocks: int = 3000, rest: float = 1e-6) -> State:
-    """Dynamic relaxation: run, and stop all motion whenever a member's kinetic energy has passed its peak.
+def settle(
+    system: System, state: State, *, block: float = 5e-3, blocks: int = 3000, rest: float = 1e-6
+) -> State:
+    """Dynamic relaxation: run, and stop all motion whenever a member's kinetic energy has passed
+    its peak.
 
-    At rest: each member has had three blocks of 5 ms in a row that end with no vertex faster than `rest`, so that its
-    accelerations are below rest/5 ms.
+    At rest: each member has had three blocks of 5 ms in a row that end with no vertex faster than
+    `rest`, so that its accelerations are below rest/5 ms.
 
     Raises:
         AssertionError: it did not come to rest.

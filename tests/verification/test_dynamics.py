@@ -1,4 +1,5 @@
-"""Verification 4 and 5: pendulum modes of a hanging sheet, and the terminal velocity of a falling one."""
+"""Verification 4 and 5: pendulum modes of a hanging sheet, and the terminal velocity of a falling
+one."""
 
 from __future__ import annotations
 

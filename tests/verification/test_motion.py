@@ -29,7 +29,9 @@ def test_of_two_sinusoids_the_frequency_is_their_root_mean_square() -> None:
     time = np.arange(2000) / RATE
     track = np.zeros((len(time), 1, 3))
     track[:, 0, 0] = np.sin(2 * math.pi * time) + np.sin(2 * math.pi * 3 * time)
-    assert edge_motion(track, rate=RATE).frequency == pytest.approx(math.sqrt((1 + 9) / 2), rel=5e-3)
+    assert edge_motion(track, rate=RATE).frequency == pytest.approx(
+        math.sqrt((1 + 9) / 2), rel=5e-3
+    )
 
 
 def test_what_stands_still_has_no_frequency_and_one_frame_is_refused() -> None:

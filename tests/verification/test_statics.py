@@ -27,7 +27,9 @@ def test_clamped_strip_droops_as_the_heavy_elastica() -> None:
     tables = [4e-4, 1e-3, 4e-3, 1.5e-2]
     tips = drooped_tips(tables, columns=24, length=length, area_weight=area_weight)
     for k, tip in zip(tables, tips, strict=True):
-        assert tip == pytest.approx(elastica_tip(k / 5, area_weight * G, length), abs=0.01 * length), f"k = {k}"
+        assert tip == pytest.approx(
+            elastica_tip(k / 5, area_weight * G, length), abs=0.01 * length
+        ), f"k = {k}"
     # The range covers limp (tip hanging below) to stiff (barely bent).
     assert elastica_tip(tables[0] / 5, area_weight * G, length)[0] < 0.4 * length
     assert elastica_tip(tables[-1] / 5, area_weight * G, length)[1] < 0.3 * length

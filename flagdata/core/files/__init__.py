@@ -1,1 +1,2 @@
-"""Files and folders at the boundary: addresses, writing that survives a crash, checksums, caches, limits."""
+"""Files and folders at the boundary: addresses, writing that survives a crash, checksums, caches,
+limits."""

@@ -1,7 +1,9 @@
-"""Work on files and queries of other users, in a process of its own with limited memory, which is ended in time.
+"""Work on files and queries of other users, in a process of its own with limited memory, which is
+ended in time.
 
-A library of C++ or Rust may ask for any memory that one number of a file or a query states; where it gets none it may
-end its process, and it may heed no interrupt. So it works in a child, which the caller outlives.
+A library of C++ or Rust may ask for any memory that one number of a file or a query states; where
+it gets none it may end its process, and it may heed no interrupt. So it works in a child, which the
+caller outlives.
 """
 
 from __future__ import annotations
@@ -30,12 +32,21 @@ _LOOK = 1.0
 """Seconds between looks of a child whether its parent is still there."""
 _BY_MEMORY = 3
 """Exit code of a child that was refused memory."""
-_OF_MEMORY = ("bad_alloc", "memory allocation", "memoryerror", "out of memory", "cannot allocate memory")
-"""What libraries of C++, Rust, Python and C write last where they end their process for want of memory."""
+_OF_MEMORY = (
+    "bad_alloc",
+    "memory allocation",
+    "memoryerror",
+    "out of memory",
+    "cannot allocate memory",
+)
+"""What libraries of C++, Rust, Python and C write last where they end their process for want of
+memory."""
 _ENDING = frozenset({signal.SIGABRT, signal.SIGILL, signal.SIGTRAP})
-"""Signals by which a library ends its own process: for want of memory, or of any other fault that it finds."""
+"""Signals by which a library ends its own process: for want of memory, or of any other fault that
+it finds."""
 _LAST = 64 << 10
-"""Bytes within which a library writes why it ends its process, the frames of its stack after it [B]."""
+"""Bytes within which a library writes why it ends its process, the frames of its stack after it
+[B]."""
 _SHOWN = 200  # letters of these for people
 
 
@@ -72,15 +83,19 @@ class Child:
     """A process that answers one message after another.
 
     Args:
-        serve: "module:name" of what makes a function, which answers a message by a value; both can be pickled.
+        serve: "module:name" of what makes a function, which answers a message by a value; both can
+            be pickled.
         memory: most that it may take beyond what it has with its modules loaded [B].
 
-    The child starts meanwhile; its first answer waits for it. It ends with its owner, and is of no use in a process
-    that was forked from this one.
+    The child starts meanwhile; its first answer waits for it. It ends with its owner, and is of no
+    use in a process that was forked from this one.
     """
 
     def __init__(self, serve: str, *, memory: int) -> None:
-        code = f"import sys; sys.path[:] = {sys.path!r}; from flagdata.core.files.bounded import run; run({serve!r}, {memory})"
+        code = (
+            f"import sys; sys.path[:] = {sys.path!r}; from flagdata.core.files.bounded import run; "
+            f"run({serve!r}, {memory})"
+        )
         self._said: IO[bytes] = TemporaryFile()  # noqa: SIM115  closed with the pipes
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-c", code],
@@ -91,7 +106,9 @@ class Child:
         self._pipes = cast(tuple[IO[bytes], IO[bytes]], (self._process.stdin, self._process.stdout))
         self._owner = os.getpid()
         self._ready = False
-        self._end = weakref.finalize(self, _end, self._process, (*self._pipes, self._said), self._owner)
+        self._end = weakref.finalize(
+            self, _end, self._process, (*self._pipes, self._said), self._owner
+        )
 
     @property
     def usable(self) -> bool:
@@ -138,7 +155,9 @@ class Child:
             end, detail = (End.LATE, "") if late.is_set() else self._find_end()
             self.close()
             raise EndedError(end, detail) from None
-        except BaseException:  # an interrupt: what it answers later would be taken for the next answer
+        except (
+            BaseException
+        ):  # an interrupt: what it answers later would be taken for the next answer
             self.close()
             raise
         finally:
@@ -154,15 +173,17 @@ class Child:
     def _find_end(self) -> tuple[End, str]:
         """Finds out how it ended without having been asked to.
 
-        A limit of memory leaves no trace in the exit code: the library that is refused memory aborts, as for any other
-        fault. That it was memory is only known from what it wrote last.
+        A limit of memory leaves no trace in the exit code: the library that is refused memory
+        aborts, as for any other fault. That it was memory is only known from what it wrote last.
         """
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(timeout=_LOOK)
         code = self._process.poll()
         size = self._said.seek(0, os.SEEK_END)
         self._said.seek(max(0, size - _LAST))
-        lines = [line for line in self._said.read().decode(errors="replace").split("\n") if line.strip()]
+        lines = [
+            line for line in self._said.read().decode(errors="replace").split("\n") if line.strip()
+        ]
         said = " ".join(lines)[-_SHOWN:]
         if code == _BY_MEMORY:
             return End.MEMORY, said
@@ -212,7 +233,8 @@ def run(serve: str, memory: int) -> None:
             data = pickle.dumps((False, error), protocol=5)
         except Exception as error:  # noqa: BLE001  the parent reports it
             data = pickle.dumps(
-                (False, RuntimeError(f"its process raised {type(error).__name__}: {error}")), protocol=5
+                (False, RuntimeError(f"its process raised {type(error).__name__}: {error}")),
+                protocol=5,
             )
         answers.write(data)
         answers.flush()
@@ -226,8 +248,14 @@ def _leave_with(parent: int) -> None:
 
 def _limit(memory: int) -> None:
     """Limits the memory that this process may write to: what it has, and so much more."""
-    (line,) = (line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmData:"))
+    (line,) = (
+        line
+        for line in Path("/proc/self/status").read_text().splitlines()
+        if line.startswith("VmData:")
+    )
     most = int(line.split()[1]) * 1024 + memory
     _, hard = resource.getrlimit(resource.RLIMIT_DATA)
-    resource.setrlimit(resource.RLIMIT_DATA, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+    resource.setrlimit(
+        resource.RLIMIT_DATA, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard)
+    )
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

@@ -1,7 +1,7 @@
 """Parquet files of other users, read no further than what they hold can be held in memory.
 
-A few bytes of Parquet may state any number of rows, and a dictionary of one long text any number of times: what its
-footer states is checked first, and the rows are counted in bytes as they are read.
+A few bytes of Parquet may state any number of rows, and a dictionary of one long text any number of
+times: what its footer states is checked first, and the rows are counted in bytes as they are read.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from flagdata.errors import LimitError
 HELD = 256 << 20
 """Most bytes that a table may take which is read whole."""
 EXPANSION = 100
-"""Most times its own size that a larger file may take: rows of a catalog take 20 to 30 times theirs."""
+"""Most times its own size that a larger file may take: rows of a catalog take 20 to 30 times
+theirs."""
 _CELL = 8
 _BATCH = 512
 """Rows that are read at once: as many long texts may be held."""
@@ -38,7 +39,8 @@ def check_stated(file: pq.FileMetaData, size: int, *, where: str, fix: str) -> N
     most = max(HELD, EXPANSION * size)
     if stated_size > most:
         raise LimitError(
-            f"a Parquet file of {size} bytes states {file.num_rows} rows, which take {stated_size} bytes",
+            f"a Parquet file of {size} bytes states {file.num_rows} rows, which take {stated_size} "
+            "bytes",
             where=where,
             fix=f"at most {most} are read: {fix}",
         )
@@ -64,6 +66,12 @@ def read_parquet(path: Path, columns: Sequence[str] | None = None) -> pa.Table:
         for batch in file.iter_batches(_BATCH, columns=names):
             size_read += batch.nbytes
             if size_read > most:
-                raise LimitError(f"its rows take more than {most} bytes", where=where, fix="split it")
+                raise LimitError(
+                    f"its rows take more than {most} bytes", where=where, fix="split it"
+                )
             batches.append(batch)
-        return pa.Table.from_batches(batches) if batches else file.schema_arrow.empty_table().select(names)
+        return (
+            pa.Table.from_batches(batches)
+            if batches
+            else file.schema_arrow.empty_table().select(names)
+        )

@@ -17,10 +17,12 @@ def user_cache() -> Path:
 
 
 def beside(lake: Place, suffix: str) -> Path:
-    """Returns a folder for what was made of a lake: beside its folder, or in the user's cache where it is in a
-    bucket."""
+    """Returns a folder for what was made of a lake: beside its folder, or in the user's cache where
+    it is in a bucket."""
     if isinstance(lake, Path):
         absolute = lake.absolute()
         return absolute.with_name(absolute.name + suffix)
-    address = hashlib.sha256(str(lake).encode()).hexdigest()[:12]  # "a/b-c" and "a/b/c" would have one name without
+    address = hashlib.sha256(str(lake).encode()).hexdigest()[
+        :12
+    ]  # "a/b-c" and "a/b/c" would have one name without
     return user_cache() / f"{lake.bucket}-{lake.key.replace('/', '-')}-{address}{suffix}"

@@ -1,8 +1,9 @@
-"""Whether files are as they were written: SHA-256 of a folder's files beside them, or of one file's bytes at its end.
+"""Whether files are as they were written: SHA-256 of a folder's files beside them, or of one file's
+bytes at its end.
 
-A folder that something is made from (a model, a checkpoint) holds `SHA256SUMS`, a line a file as `sha256sum` prints it,
-so that `sha256sum -c SHA256SUMS` checks it without this package. A single file of a cache ends with the 32 bytes of the
-SHA-256 of all before them, which numpy does not read.
+A folder that something is made from (a model, a checkpoint) holds `SHA256SUMS`, a line a file as
+`sha256sum` prints it, so that `sha256sum -c SHA256SUMS` checks it without this package. A single
+file of a cache ends with the 32 bytes of the SHA-256 of all before them, which numpy does not read.
 """
 
 from __future__ import annotations
@@ -22,15 +23,17 @@ _DIGEST = 32  # B
 
 
 def files_of(path: Path) -> list[Path]:
-    """Lists the regular files of a folder, sorted by relative path, without what `files.is_beside`; the file itself if
-    it is one.
+    """Lists the regular files of a folder, sorted by relative path, without what `files.is_beside`;
+    the file itself if it is one.
 
     Raises:
         InputError: a symbolic link or special file, whose content the hash would not cover.
     """
     if path.is_symlink() or not path.exists():
         raise InputError(
-            "this is neither a file nor a folder", where=str(path), fix="give the object itself, not a link to it"
+            "this is neither a file nor a folder",
+            where=str(path),
+            fix="give the object itself, not a link to it",
         )
     if path.is_file():
         return [path]
@@ -38,7 +41,9 @@ def files_of(path: Path) -> list[Path]:
     for entry in sorted(path.rglob("*"), key=lambda p: p.relative_to(path).as_posix()):
         if entry.is_symlink() or not (entry.is_dir() or entry.is_file()):
             raise InputError(
-                "an object contains a link or special file", where=str(entry), fix="store plain files only"
+                "an object contains a link or special file",
+                where=str(entry),
+                fix="store plain files only",
             )
         if entry.is_file() and not any(map(is_beside, entry.relative_to(path).parts)):
             files.append(entry)
@@ -55,11 +60,11 @@ def size_of(path: Path) -> int:
 
 
 def content_hash(path: Path) -> str:
-    """Computes the SHA-256 of a file; of a folder, SHA-256 over the lines "<file sha256>  <relative path>\n" sorted by
-    path.
+    """Computes the SHA-256 of a file; of a folder, SHA-256 over the lines "<file sha256>  <relative
+    path>\n" sorted by path.
 
-    The folder's form is what `sha256sum` prints, so that it can be checked without this package. Empty folders and
-    file modes do not count.
+    The folder's form is what `sha256sum` prints, so that it can be checked without this package.
+    Empty folders and file modes do not count.
 
     Raises:
         InputError: as `files_of`.
@@ -97,8 +102,8 @@ def write_sums(folder: Path) -> None:
 
 
 def renewed_sums(folder: Path, name: str, content: bytes) -> str:
-    """Writes the text of a folder's `SHA256SUMS` once a file of it, or a new one, has that content. What is stated of
-    the others stays, so that damage to them is still found.
+    """Writes the text of a folder's `SHA256SUMS` once a file of it, or a new one, has that content.
+    What is stated of the others stays, so that damage to them is still found.
 
     Raises:
         CorruptError: `SHA256SUMS` cannot be read.
@@ -108,7 +113,8 @@ def renewed_sums(folder: Path, name: str, content: bytes) -> str:
 
 
 def check_sums(folder: Path, *, fix: str) -> None:
-    """Make sure that a folder holds the files that its `SHA256SUMS` states, each with that content, and no others.
+    """Make sure that a folder holds the files that its `SHA256SUMS` states, each with that content,
+    and no others.
 
     Raises:
         CorruptError: it does not; the message names the first file.
@@ -121,7 +127,9 @@ def check_sums(folder: Path, *, fix: str) -> None:
         if name not in sums:
             raise CorruptError(f"{SUMS} does not list this file", where=str(folder / name), fix=fix)
         if file_hash(present[name]) != sums[name]:
-            raise CorruptError("its bytes have changed since it was written", where=str(folder / name), fix=fix)
+            raise CorruptError(
+                "its bytes have changed since it was written", where=str(folder / name), fix=fix
+            )
 
 
 def seal_bytes(data: bytes) -> bytes:
@@ -130,13 +138,17 @@ def seal_bytes(data: bytes) -> bytes:
 
 
 def is_sealed(path: Path) -> bool:
-    """Checks whether a file ends with the SHA-256 of all bytes before; a damaged, cut or foreign file does not.
+    """Checks whether a file ends with the SHA-256 of all bytes before; a damaged, cut or foreign
+    file does not.
 
     Raises:
         OSError: it cannot be read.
     """
     content = path.read_bytes()
-    return len(content) > _DIGEST and hashlib.sha256(memoryview(content)[:-_DIGEST]).digest() == content[-_DIGEST:]
+    return (
+        len(content) > _DIGEST
+        and hashlib.sha256(memoryview(content)[:-_DIGEST]).digest() == content[-_DIGEST:]
+    )
 
 
 def _files_by_path(folder: Path) -> dict[str, Path]:
@@ -152,8 +164,12 @@ def _sums_in(folder: Path, *, fix: str) -> dict[str, str]:
     try:
         return read_sums(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise CorruptError("there are no checksums of its files", where=str(path), fix=fix) from None
+        raise CorruptError(
+            "there are no checksums of its files", where=str(path), fix=fix
+        ) from None
     except (OSError, UnicodeDecodeError) as error:
-        raise CorruptError(f"the checksums cannot be read: {error}", where=str(path), fix=fix) from None
+        raise CorruptError(
+            f"the checksums cannot be read: {error}", where=str(path), fix=fix
+        ) from None
     except ValueError as error:
         raise CorruptError(str(error), where=str(path), fix=fix) from None

@@ -1,7 +1,7 @@
 """Writing that survives a crash: flush file, then folder; put a file only if its name is free.
 
-Once a name is public nothing takes it back: what the disk refuses after that is a warning (the logger "flagdata"),
-never an error, since an error means to the caller that nothing was published.
+Once a name is public nothing takes it back: what the disk refuses after that is a warning (the
+logger "flagdata"), never an error, since an error means to the caller that nothing was published.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ LACKS = frozenset(
 )
 """What a file system answers where it lacks what it was asked for: a link, a lock, a flush."""
 DENIED = frozenset({errno.EACCES, errno.EPERM})
-"""What it answers where it lacks that (exFAT and FAT32 so refuse links; CIFS and FUSE as their servers do), and what it
-answers to a user who may not."""
+"""What it answers where it lacks that (exFAT and FAT32 so refuse links; CIFS and FUSE as their
+servers do), and what it answers to a user who may not."""
 
 
 def lacks(error: OSError, folder: Path) -> bool:
-    """Checks whether a file system refused something in a folder since it lacks that: not where it takes no new file
-    from this user either, which is a matter of permissions."""
+    """Checks whether a file system refused something in a folder since it lacks that: not where it
+    takes no new file from this user either, which is a matter of permissions."""
     if error.errno not in DENIED:
         return error.errno in LACKS
     scratch = folder / f".{uuid.uuid4().hex}"
@@ -60,7 +60,8 @@ def lacks(error: OSError, folder: Path) -> bool:
 
 
 def lacking(lack: str, where: Path, *, error: OSError | None = None) -> RefusedError:
-    """Returns the error for a disk that cannot do what writing that survives a crash, or other processes, takes.
+    """Returns the error for a disk that cannot do what writing that survives a crash, or other
+    processes, takes.
 
     Args:
         lack: goes on with "this disk".
@@ -70,7 +71,8 @@ def lacking(lack: str, where: Path, *, error: OSError | None = None) -> RefusedE
     return RefusedError(
         f"this disk {lack}{said}",
         where=str(where),
-        fix="use a disk of this machine that is formatted as ext4, XFS, Btrfs or APFS, or for a lake a bucket "
+        fix="use a disk of this machine that is formatted as ext4, XFS, Btrfs or APFS, or for a "
+        "lake a bucket "
         "(s3://bucket/prefix); what lies here can be read, and copied there",
     )
 
@@ -86,7 +88,8 @@ def flush_file(path: Path) -> None:
 
 
 def flush_folder(path: Path) -> None:
-    """Forces a folder's entries (names that were added, renamed, removed) to the disk; raises as `flush_file`."""
+    """Forces a folder's entries (names that were added, renamed, removed) to the disk; raises as
+    `flush_file`."""
     _flush(path, "a folder")
 
 
@@ -103,7 +106,8 @@ def _flush(path: Path, noun: str) -> None:
 
 
 def make_folders(*paths: Place) -> None:
-    """Makes folders, and those above them that are missing; their names are on the disk when this returns.
+    """Makes folders, and those above them that are missing; their names are on the disk when this
+    returns.
 
     Raises:
         FileExistsError: there is a file of that name.
@@ -113,7 +117,9 @@ def make_folders(*paths: Place) -> None:
     for path in paths:
         if isinstance(path, RemotePath):  # a bucket has no folders
             continue
-        holding |= dict.fromkeys(folder.parent for folder in (path, *path.parents) if not folder.exists())
+        holding |= dict.fromkeys(
+            folder.parent for folder in (path, *path.parents) if not folder.exists()
+        )
         path.mkdir(parents=True, exist_ok=True)
     for folder in holding:
         flush_folder(folder)
@@ -148,13 +154,15 @@ def write_durably(path: Place, data: bytes) -> None:
 def put_if_absent(path: Place, data: bytes, *, noun: str | None = None) -> bool:
     """Create `path` with all of `data`, or leave what is there; False when the name was taken.
 
-    The bytes are written and flushed beside it under another name, then linked: the name appears whole or not at all.
+    The bytes are written and flushed beside it under another name, then linked: the name appears
+    whole or not at all.
 
     Args:
         noun: is published by it, for a warning; the file by its name if `None`.
 
     Raises:
-        RefusedError: the disk has no hard links, or does not confirm what is written; the name was not taken.
+        RefusedError: the disk has no hard links, or does not confirm what is written; the name was
+            not taken.
         OSError: whatever else the disk refused; the name was not taken.
     """
     if isinstance(path, RemotePath):
@@ -201,7 +209,8 @@ def link(file: Path, path: Path) -> None:
 def replace_durably(path: Place, data: bytes) -> None:
     """Put a file in place of what is there, or of nothing; durable when it returns.
 
-    The bytes are written and flushed beside it, so that the name has all of them or what it had before.
+    The bytes are written and flushed beside it, so that the name has all of them or what it had
+    before.
 
     Raises:
         OSError: what the disk refused; the name has what it had before.
@@ -223,14 +232,16 @@ def replace_durably(path: Place, data: bytes) -> None:
 
 @contextmanager
 def confirming(noun: str, where: Place) -> Iterator[None]:
-    """Works on `noun` after it was published: what the disk refuses is a warning, since it stays published."""
+    """Works on `noun` after it was published: what the disk refuses is a warning, since it stays
+    published."""
     try:
         yield
     except (OSError, FlagdataError) as error:
         refused = isinstance(error, OSError)
         refusal = (error.strerror or str(error)) if refused else error.what
         _LOG.warning(
-            "flagdata: warning: %s is published, but the disk did not confirm it (%s)\n  where: %s\n  fix:   %s",
+            "flagdata: warning: %s is published, but the disk did not confirm it (%s)\n  where: "
+            "%s\n  fix:   %s",
             noun,
             " ".join(refusal.split()),
             (error.filename if refused else error.where) or where,
@@ -240,7 +251,8 @@ def confirming(noun: str, where: Place) -> Iterator[None]:
 
 @contextmanager
 def disk_errors(doing: str, where: Place) -> Iterator[None]:
-    """Turn what the operating system refuses (no space, no permission, read-only) into a clear error.
+    """Turn what the operating system refuses (no space, no permission, read-only) into a clear
+    error.
 
     Raises:
         FlagdataError: for any OSError inside the block.
@@ -250,17 +262,21 @@ def disk_errors(doing: str, where: Place) -> Iterator[None]:
     except OSError as error:
         text = " ".join(COLOUR.sub("", error.strerror or str(error)).split())
         number = error.errno or (
-            int(number_in_text[1] or number_in_text[2]) if (number_in_text := _NUMBER.search(text)) else 0
+            int(number_in_text[1] or number_in_text[2])
+            if (number_in_text := _NUMBER.search(text))
+            else 0
         )
         fix = error.fix if isinstance(error, StoreError) else _FIXES.get(number, "check the disk")
         raise FlagdataError(
-            f"{doing} failed: {text}", where=str(error.filename or where), fix=f"{fix}, then do it again"
+            f"{doing} failed: {text}",
+            where=str(error.filename or where),
+            fix=f"{fix}, then do it again",
         ) from error
 
 
 def unreadable(noun: str, where: Place, error: OSError) -> FlagdataError:
-    """Returns the error for a file of the lake that cannot be read: damaged or closed to this user on a disk; in a
-    bucket, what the store says and its remedy, since the file itself may be whole.
+    """Returns the error for a file of the lake that cannot be read: damaged or closed to this user
+    on a disk; in a bucket, what the store says and its remedy, since the file itself may be whole.
 
     Args:
         noun: is read.
@@ -268,7 +284,9 @@ def unreadable(noun: str, where: Place, error: OSError) -> FlagdataError:
     message = f"{noun} cannot be read: {error.strerror}"
     if isinstance(error, StoreError):
         return FlagdataError(message, where=str(where), fix=error.fix)
-    return CorruptError(message, where=str(where), fix=f"give yourself read permission on it, or {HEAL}")
+    return CorruptError(
+        message, where=str(where), fix=f"give yourself read permission on it, or {HEAL}"
+    )
 
 
 _NUMBER = re.compile(r"\(os error (\d+)\)|\bOs \{ code: (\d+)")  # as the Delta library writes it

@@ -1,4 +1,5 @@
-"""Locks of the kernel (flock): whether a disk keeps them, and folders that one process at a time works in.
+"""Locks of the kernel (flock): whether a disk keeps them, and folders that one process at a time
+works in.
 
 They belong to an open file, so two that one process opens compete as those of two processes do.
 """
@@ -20,8 +21,8 @@ LOCK = "lock"
 
 
 def lock(file: IO[Any], mode: int, *, where: Path) -> bool:
-    """Takes the lock of an open file, which lies `where`; false where another has it and `mode` (of `fcntl.flock`) does
-    not wait.
+    """Takes the lock of an open file, which lies `where`; false where another has it and `mode` (of
+    `fcntl.flock`) does not wait.
 
     Raises:
         RefusedError: the disk has no locks.
@@ -49,9 +50,14 @@ def check_locks(folder: Path) -> None:
     path = folder / f".{uuid.uuid4().hex}"
     try:
         with path.open("wb") as first, path.open("wb") as second:
-            taken = [lock(file, fcntl.LOCK_EX | fcntl.LOCK_NB, where=folder) for file in (first, second)]
+            taken = [
+                lock(file, fcntl.LOCK_EX | fcntl.LOCK_NB, where=folder) for file in (first, second)
+            ]
             if taken != [True, False]:
-                message = "grants a lock to everybody, so that a process could delete what another one has just written"
+                message = (
+                    "grants a lock to everybody, so that a process could delete what another one "
+                    "has just written"
+                )
                 raise lacking(message, folder)
     finally:
         path.unlink(missing_ok=True)
@@ -59,10 +65,11 @@ def check_locks(folder: Path) -> None:
 
 @contextmanager
 def alone_in(folder: Path, *, occupied: Callable[[], object]) -> Iterator[None]:
-    """Allows work in a folder, made if it is missing, that no other process or thread works in by this function.
+    """Allows work in a folder, made if it is missing, that no other process or thread works in by
+    this function.
 
-    Where one does, `occupied` is called, which raises, or says that its end is waited for. The lock (flock on the file
-    `lock` in the folder) ends with the process, however that ends.
+    Where one does, `occupied` is called, which raises, or says that its end is waited for. The lock
+    (flock on the file `lock` in the folder) ends with the process, however that ends.
 
     Raises:
         RefusedError: the disk has no locks, or grants one to everybody.

@@ -1,4 +1,5 @@
-"""manifest.json: the list of all files of a folder that a command made, with size and SHA-256 of each."""
+"""manifest.json: the list of all files of a folder that a command made, with size and SHA-256 of
+each."""
 
 from __future__ import annotations
 
@@ -14,38 +15,51 @@ MANIFEST = "manifest.json"
 
 
 def _entry(path: Path, folder: Path) -> dict[str, Any]:
-    return {"path": path.relative_to(folder).as_posix(), "bytes": path.stat().st_size, "sha256": file_hash(path)}
+    return {
+        "path": path.relative_to(folder).as_posix(),
+        "bytes": path.stat().st_size,
+        "sha256": file_hash(path),
+    }
 
 
 def write_manifest(
-    folder: Path, about: Mapping[str, Any], describe: Callable[[Mapping[str, Any]], Path | None] = lambda content: None
+    folder: Path,
+    about: Mapping[str, Any],
+    describe: Callable[[Mapping[str, Any]], Path | None] = lambda content: None,
 ) -> dict[str, Any]:
     """Writes manifest.json: `about`, and path, size and SHA-256 of every file. Returns its content.
 
     It holds no time of day, so that the same files give the same bytes.
 
     Args:
-        describe: writes another file about the content, which is then listed as well; returns its path.
+        describe: writes another file about the content, which is then listed as well; returns its
+            path.
     """
-    content = {**about, "files": [_entry(path, folder) for path in sorted(folder.rglob("*")) if path.is_file()]}
+    content = {
+        **about,
+        "files": [_entry(path, folder) for path in sorted(folder.rglob("*")) if path.is_file()],
+    }
     if (description := describe(content)) is not None:
-        content["files"] = sorted([*content["files"], _entry(description, folder)], key=lambda entry: entry["path"])
+        content["files"] = sorted(
+            [*content["files"], _entry(description, folder)], key=lambda entry: entry["path"]
+        )
     text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False)
     (folder / MANIFEST).write_text(text + "\n", encoding="utf-8")
     return content
 
 
 def unlisted_files(folder: Path, *, schema: str) -> list[str]:
-    """Paths of what lies in a folder and is not listed in its manifest as it is now: other files, changed files, links,
-    and the manifest itself where it cannot be read or is of another schema. Missing files and empty folders do not
-    count."""
+    """Paths of what lies in a folder and is not listed in its manifest as it is now: other files,
+    changed files, links, and the manifest itself where it cannot be read or is of another schema.
+    Missing files and empty folders do not count."""
     listed = _listed_entries(folder / MANIFEST, schema)
     paths = [path for path in sorted(_entries(folder)) if path != MANIFEST or not listed]
     return [path for path in paths if not _same(folder / path, listed.get(path))]
 
 
 def remove_listed(folder: Path, *, schema: str) -> None:
-    """Remove the files that the manifest lists and that are as they were written, then the folders, itself among them.
+    """Remove the files that the manifest lists and that are as they were written, then the folders,
+    itself among them.
 
     The manifest goes last, so that a removal that was interrupted can be repeated.
 
@@ -53,7 +67,9 @@ def remove_listed(folder: Path, *, schema: str) -> None:
         OSError: the disk refuses it, or something else lies in the folder (see `unlisted_files`).
     """
     listed = _listed_entries(folder / MANIFEST, schema)
-    for path in _entries(folder):  # never a path of the manifest's own making, which may lead elsewhere
+    for path in _entries(
+        folder
+    ):  # never a path of the manifest's own making, which may lead elsewhere
         if _same(folder / path, listed.get(path)):
             (folder / path).unlink()
     for inner, _, _ in os.walk(folder, topdown=False):
@@ -64,7 +80,8 @@ def remove_listed(folder: Path, *, schema: str) -> None:
 
 
 def _listed_entries(manifest: Path, schema: str) -> dict[str, Mapping[str, Any]]:
-    """Reads the entries of a manifest by path; none where it is absent, cannot be read or is of another schema."""
+    """Reads the entries of a manifest by path; none where it is absent, cannot be read or is of
+    another schema."""
     try:
         content = json.loads(manifest.read_text(encoding="utf-8"))
         if manifest.is_symlink() or content["schema"] != schema:

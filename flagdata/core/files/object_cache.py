@@ -1,14 +1,17 @@
-"""Local copies of a lake's objects, found by their hash: an object never changes, so a copy needs no renewal.
+"""Local copies of a lake's objects, found by their hash: an object never changes, so a copy needs
+no renewal.
 
-The folder is `objects` in the user's cache (see `flagdata.core.files.caches`); it keeps at most FLAGDATA_CACHE_LIMIT
-bytes, 20 GB if that is not set, of all lakes together. When it is full, the copies that were used least recently go,
-but none that was used within the last 15 minutes, by which a process may be reading it. Of large objects that are read
-in parts there are blocks instead, `<object>.blocks/<block>`, each with its own CRC-32 behind it.
+The folder is `objects` in the user's cache (see `flagdata.core.files.caches`); it keeps at most
+FLAGDATA_CACHE_LIMIT bytes, 20 GB if that is not set, of all lakes together. When it is full, the
+copies that were used least recently go, but none that was used within the last 15 minutes, by which
+a process may be reading it. Of large objects that are read in parts there are blocks instead,
+`<object>.blocks/<block>`, each with its own CRC-32 behind it.
 
-Each copy is compared with its hash, and on the disk, before it appears. Then its stamp is written beside it,
-`<object>.stamp`: since when this machine runs, and size, times and inode of each file. A copy is believed while these
-are as its stamp says. Any other, as one that a power cut left or another program changed, is compared again, once, and
-fetched anew where it is wrong. The stamp's own time is when the copy was used last.
+Each copy is compared with its hash, and on the disk, before it appears. Then its stamp is written
+beside it, `<object>.stamp`: since when this machine runs, and size, times and inode of each file. A
+copy is believed while these are as its stamp says. Any other, as one that a power cut left or
+another program changed, is compared again, once, and fetched anew where it is wrong. The stamp's
+own time is when the copy was used last.
 """
 
 from __future__ import annotations
@@ -34,7 +37,8 @@ LIMIT = 20 * 10**9
 """Most bytes that are kept where FLAGDATA_CACHE_LIMIT does not say."""
 _IN_USE = 900.0  # s
 _FILLED = 0.9
-"""Share of the limit that is kept once it was reached, so that room is not made for each new copy alone."""
+"""Share of the limit that is kept once it was reached, so that room is not made for each new copy
+alone."""
 _PART = "part-"
 _TALLY = "tally"
 _BLOCKS = ".blocks"
@@ -44,8 +48,9 @@ _LOG = logging.getLogger("flagdata")
 
 
 def copy_of(name: str, suffix: str) -> Path | None:
-    """Finds the local copy of the object called `name` ("mcap/<sha256>"), if there is one; it counts as used now. One
-    that its stamp does not vouch for is compared with its name, and deleted where it is wrong."""
+    """Finds the local copy of the object called `name` ("mcap/<sha256>"), if there is one; it
+    counts as used now. One that its stamp does not vouch for is compared with its name, and deleted
+    where it is wrong."""
     path = _cached_path(name, suffix)
     stamp = _stamp_of(path)
     with suppress(FileNotFoundError):
@@ -61,8 +66,8 @@ def has_copy(name: str, suffix: str) -> bool:
 
 
 def is_whole(name: str, suffix: str) -> bool:
-    """Compares the local copy of an object with its name, and deletes it where it is wrong; false where there is none
-    then."""
+    """Compares the local copy of an object with its name, and deletes it where it is wrong; false
+    where there is none then."""
     path = _cached_path(name, suffix)
     try:
         before = _state(path)
@@ -78,7 +83,8 @@ def is_whole(name: str, suffix: str) -> bool:
         if _state(path) == before:  # else another process has fetched it meanwhile
             forget(name, suffix)
             _LOG.warning(
-                "flagdata: the local copy of %s had changed, as a power cut may leave it: it was deleted\n"
+                "flagdata: the local copy of %s had changed, as a power cut may leave it: it was "
+                "deleted\n"
                 "  where: %s\n  fix:   none needed, it is fetched again",
                 name,
                 path,
@@ -86,7 +92,9 @@ def is_whole(name: str, suffix: str) -> bool:
     return False
 
 
-def fetch_copy(name: str, suffix: str, *, size: int, fetch: Callable[[Path], None], where: str) -> Path:
+def fetch_copy(
+    name: str, suffix: str, *, size: int, fetch: Callable[[Path], None], where: str
+) -> Path:
     """Fetches a local copy of an object anew.
 
     Args:
@@ -122,7 +130,8 @@ def fetch_copy(name: str, suffix: str, *, size: int, fetch: Callable[[Path], Non
 
 
 def kept(name: str, suffix: str, finished: Path) -> None:
-    """Make the local copy of an object out of the file or folder that was stored, which is moved."""
+    """Make the local copy of an object out of the file or folder that was stored, which is
+    moved."""
     path = _cached_path(name, suffix)
     _take_room(path.parent, size_of(finished))
     try:
@@ -140,7 +149,9 @@ def block_of(name: str, block: str) -> bytes | None:
     except FileNotFoundError:
         return None
     data, checksum = content[:-_CRC], content[-_CRC:]
-    return data if data and checksum == _crc(data) else None  # the machine stopped before its disk had it
+    return (
+        data if data and checksum == _crc(data) else None
+    )  # the machine stopped before its disk had it
 
 
 def keep_blocks(name: str, blocks: Mapping[str, bytes]) -> None:
@@ -164,7 +175,9 @@ def keep_blocks(name: str, blocks: Mapping[str, bytes]) -> None:
 def forget(name: str, suffix: str) -> None:
     """Delete what there is of an object on this machine; that is on the disk when this returns."""
     path = _cached_path(name, suffix)
-    kept_of_it = [entry for entry in (path, _stamp_of(path), _cached_path(name, _BLOCKS)) if _is_left(entry)]
+    kept_of_it = [
+        entry for entry in (path, _stamp_of(path), _cached_path(name, _BLOCKS)) if _is_left(entry)
+    ]
     for entry in kept_of_it:
         _remove(entry)
     if kept_of_it:
@@ -172,7 +185,8 @@ def forget(name: str, suffix: str) -> None:
 
 
 def _keep(part: Path, path: Path) -> None:
-    """Give a finished part the name of a copy, after its bytes are on the disk, and write its stamp."""
+    """Give a finished part the name of a copy, after its bytes are on the disk, and write its
+    stamp."""
     flush_tree(part)
     part.rename(path)
     flush_folder(path.parent)
@@ -231,12 +245,17 @@ def _limit() -> int:
     if text is None:
         return LIMIT
     if not text.isdecimal():
-        raise UsageError(f"{text!r} is no number of bytes", where="FLAGDATA_CACHE_LIMIT", fix="give a whole number")
+        raise UsageError(
+            f"{text!r} is no number of bytes",
+            where="FLAGDATA_CACHE_LIMIT",
+            fix="give a whole number",
+        )
     return int(text)
 
 
 def _take_room(folder: Path, size: int) -> None:
-    """Delete the copies that were used least recently until there is room; parts that a killed process left, too."""
+    """Delete the copies that were used least recently until there is room; parts that a killed
+    process left, too."""
     limit = _limit()
     with alone_in(folder, occupied=lambda: None):
         tally = folder / _TALLY  # counted before the copy is there: it is too high at worst
@@ -248,13 +267,16 @@ def _take_room(folder: Path, size: int) -> None:
 
 
 def _swept(folder: Path, size: int, limit: int) -> int:
-    """Delete what was used least recently until there is room for `size` more; bytes that are there then, with it."""
+    """Delete what was used least recently until there is room for `size` more; bytes that are there
+    then, with it."""
     old = time.time() - _IN_USE
     entries: list[tuple[float, Path, int]] = []
     for path in folder.iterdir():
         if path.name not in (LOCK, _TALLY) and path.suffix != _STAMP:
             for entry in path.iterdir() if path.suffix == _BLOCKS else (path,):
-                with suppress(FileNotFoundError, InputError):  # another process has just renamed its part
+                with suppress(
+                    FileNotFoundError, InputError
+                ):  # another process has just renamed its part
                     entries.append((_use(entry), entry, size_of(entry)))
     total = sum(bytes_held for _, _, bytes_held in entries) + size
     room = limit if total <= limit else limit * _FILLED
@@ -283,7 +305,8 @@ def _going(path: Path) -> Path:
 
 
 def _remove(path: Path) -> None:
-    """Delete a file or folder; a process that dies meanwhile leaves a part, never a copy that lacks files."""
+    """Delete a file or folder; a process that dies meanwhile leaves a part, never a copy that lacks
+    files."""
     going = _going(path)
     shutil.rmtree(going, ignore_errors=True)
     if not path.is_dir():

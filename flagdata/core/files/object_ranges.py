@@ -1,8 +1,9 @@
 """Ranges of an object in a bucket, read in blocks that are kept on this machine: see
 `flagdata.core.files.object_cache`.
 
-What lies within 1 MiB of each other is fetched by one request, and what is read from one end to the other in pieces of
-8 MiB. Nothing here knows whether the bytes are right: who reads them compares them with checksums of their own.
+What lies within 1 MiB of each other is fetched by one request, and what is read from one end to the
+other in pieces of 8 MiB. Nothing here knows whether the bytes are right: who reads them compares
+them with checksums of their own.
 """
 
 from __future__ import annotations
@@ -42,7 +43,9 @@ class ObjectRanges:
         status = remote.stat()
         self.size = status.st_size
         self._name = f"{remote.parent.name}/{remote.stem}"
-        self._version = f"{zlib.crc32((status.e_tag or '').encode()):08x}"  # a damaged object may be put anew
+        self._version = (
+            f"{zlib.crc32((status.e_tag or '').encode()):08x}"  # a damaged object may be put anew
+        )
         self._prepared: dict[int, bytes] = {}
         self._fetched = -1  # the last block of the last request
         self._guard = threading.Lock()
@@ -67,9 +70,12 @@ class ObjectRanges:
         return data[offset - first * BLOCK : end - first * BLOCK]
 
     def prepare(self, spans: Sequence[tuple[int, int]]) -> None:
-        """Fetches spans, first byte and end each, that will be read next; those before them are kept on disk only."""
+        """Fetches spans, first byte and end each, that will be read next; those before them are
+        kept on disk only."""
         wanted = {
-            number for start, end in spans for number in range(max(start, 0) // BLOCK, -(-min(end, self.size) // BLOCK))
+            number
+            for start, end in spans
+            for number in range(max(start, 0) // BLOCK, -(-min(end, self.size) // BLOCK))
         }
         with self._guard:
             self._prepared = self._blocks(sorted(wanted), ahead=False)
@@ -79,7 +85,8 @@ class ObjectRanges:
         self._prepared = {}
 
     def _blocks(self, wanted: Iterable[int], *, ahead: bool) -> dict[int, bytes]:
-        """Maps the number of each block to its content; those that are not on this machine are fetched together.
+        """Maps the number of each block to its content; those that are not on this machine are
+        fetched together.
 
         Args:
             ahead: the object is read in its order, so that what follows is fetched, too.
@@ -107,5 +114,7 @@ class ObjectRanges:
         for (first, _), data in zip(runs, self._place.read_ranges(offsets, lengths), strict=True):
             new |= {first + at // BLOCK: data[at : at + BLOCK] for at in range(0, len(data), BLOCK)}
         self._fetched = max(new)
-        object_cache.keep_blocks(self._name, {f"{self._version}-{number}": data for number, data in new.items()})
+        object_cache.keep_blocks(
+            self._name, {f"{self._version}-{number}": data for number, data in new.items()}
+        )
         return blocks | new

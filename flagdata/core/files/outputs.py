@@ -1,19 +1,23 @@
-"""Files and folders under names that a user gave: whole or not there at all, and never on top of what is not ours.
+"""Files and folders under names that a user gave: whole or not there at all, and never on top of
+what is not ours.
 
 One policy for all commands:
 
-- A name is checked before work begins (`check_file`, `check_folder`): a command fails in its first second.
-- What is written goes under a scratch name beside it, `.flagdata-<hex>.partial`, is flushed to the disk, and takes its
-  name in one step. What fails is removed; what a killed process leaves behind does not hinder the next one.
-- A name that is taken is refused, with two exceptions that are replaced: a file that the same command wrote and that is
-  unchanged since, as its signature shows, and a folder that holds only what its manifest lists,
-  unchanged (`flagdata.core.files.manifest`). An empty folder is free.
+- A name is checked before work begins (`check_file`, `check_folder`): a command fails in its first
+  second.
+- What is written goes under a scratch name beside it, `.flagdata-<hex>.partial`, is flushed to the
+  disk, and takes its name in one step. What fails is removed; what a killed process leaves behind
+  does not hinder the next one.
+- A name that is taken is refused, with two exceptions that are replaced: a file that the same
+  command wrote and that is unchanged since, as its signature shows, and a folder that holds only
+  what its manifest lists, unchanged (`flagdata.core.files.manifest`). An empty folder is free.
 - Links are never followed, and nothing but a regular file is ever replaced.
 
-A file's own statement of which command wrote it, with a hash of the rest: whether anybody changed it since.
+A file's own statement of which command wrote it, with a hash of the rest: whether anybody changed
+it since.
 
-The statement is a comment at the end of HTML, Markdown, SVG, TOML, Python and PDF, the last member of a JSON object,
-and a text chunk of a PNG. Other formats carry none.
+The statement is a comment at the end of HTML, Markdown, SVG, TOML, Python and PDF, the last member
+of a JSON object, and a text chunk of a PNG. Other formats carry none.
 """
 
 from __future__ import annotations
@@ -29,7 +33,14 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from flagdata.core.files.durable import confirming, disk_errors, flush_file, flush_folder, lacks, make_folders
+from flagdata.core.files.durable import (
+    confirming,
+    disk_errors,
+    flush_file,
+    flush_folder,
+    lacks,
+    make_folders,
+)
 from flagdata.core.files.manifest import remove_listed, unlisted_files, write_manifest
 from flagdata.errors import ConflictError, InputError
 
@@ -84,7 +95,9 @@ def _block(data: bytes, name: str, command: str, digest: str) -> tuple[bytes, in
         return f',\n "written": "{words}"'.encode(), len(_OBJECT_END)
     if suffix == ".png" and data.startswith(_PNG):
         body = b"tEXtSoftware\0" + words.encode("latin-1")
-        return struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body)), _PNG_END
+        return struct.pack(">I", len(body) - 4) + body + struct.pack(
+            ">I", zlib.crc32(body)
+        ), _PNG_END
     return b"", 0
 
 
@@ -95,7 +108,8 @@ def check_file(path: Path, *, command: str | None = None) -> None:
     """Refuse a name that a new file cannot take.
 
     Args:
-        command: what writes it, without "flagdata"; its own unchanged file may be replaced. None replaces nothing.
+        command: what writes it, without "flagdata"; its own unchanged file may be replaced. None
+            replaces nothing.
 
     Raises:
         ConflictError: something is there.
@@ -103,7 +117,11 @@ def check_file(path: Path, *, command: str | None = None) -> None:
     """
     with disk_errors("looking at the output's name", path):
         if not path.absolute().parent.is_dir():
-            raise InputError("there is no such folder", where=str(path.parent), fix="create it first, or name another")
+            raise InputError(
+                "there is no such folder",
+                where=str(path.parent),
+                fix="create it first, or name another",
+            )
         _check_writable(path.absolute().parent)
         _check_free(path, command)
 
@@ -112,8 +130,8 @@ def check_folder(path: Path, *, schema: str | None = None) -> None:
     """Refuse a name that a new folder cannot take; an empty folder is free.
 
     Args:
-        schema: of the manifest that `fresh_folder` writes. A folder that holds only what such a manifest lists, as it
-            was written, may be replaced. None replaces nothing.
+        schema: of the manifest that `fresh_folder` writes. A folder that holds only what such a
+            manifest lists, as it was written, may be replaced. None replaces nothing.
 
     Raises:
         ConflictError: something is there.
@@ -130,7 +148,8 @@ def check_folder(path: Path, *, schema: str | None = None) -> None:
         if foreign := unlisted_files(path, schema=schema):
             further = f" and {len(foreign) - _NAMED:,} more" if len(foreign) > _NAMED else ""
             raise ConflictError(
-                f"the folder holds what this command did not write there, or what was changed since: "
+                "the folder holds what this command did not write there, or what was changed "
+                "since: "
                 f"{', '.join(foreign[:_NAMED])}{further}",
                 where=str(path),
                 fix="move away what you want to keep and remove the folder, or name another one",
@@ -138,7 +157,8 @@ def check_folder(path: Path, *, schema: str | None = None) -> None:
 
 
 def check_files(folder: Path, *names: str, command: str | None = None) -> None:
-    """Refuse a folder in which one of these files cannot be written; the folder may be there or not.
+    """Refuse a folder in which one of these files cannot be written; the folder may be there or
+    not.
 
     Raises:
         ConflictError: one of them is there and is not the command's own; the folder is no folder.
@@ -151,7 +171,8 @@ def check_files(folder: Path, *names: str, command: str | None = None) -> None:
 
 
 def check_rewrite(path: Path) -> None:
-    """Refuse a file that `rewrite` cannot replace; that it is the program's own, the caller makes sure of.
+    """Refuse a file that `rewrite` cannot replace; that it is the program's own, the caller makes
+    sure of.
 
     Raises:
         ConflictError: it is a folder or a link.
@@ -174,11 +195,14 @@ def write_file(path: Path, content: str | bytes, *, command: str | None = None) 
         scratch.write_bytes(_bytes(path.name, content, command))
 
 
-def write_files(folder: Path, contents: Mapping[str, str | bytes | None], *, command: str | None = None) -> None:
-    """Write files into a folder, which is made; all of them are on the disk before the first takes its name.
+def write_files(
+    folder: Path, contents: Mapping[str, str | bytes | None], *, command: str | None = None
+) -> None:
+    """Write files into a folder, which is made; all of them are on the disk before the first takes
+    its name.
 
-    They take their names one after the other: a process that is killed in this moment leaves files of two runs, each
-    whole, which the same command replaces when it is given again.
+    They take their names one after the other: a process that is killed in this moment leaves files
+    of two runs, each whole, which the same command replaces when it is given again.
 
     Args:
         contents: by name; None removes the command's own file of that name from an earlier run.
@@ -204,9 +228,9 @@ def write_files(folder: Path, contents: Mapping[str, str | bytes | None], *, com
 
 
 def rewrite(path: Path, content: str | bytes) -> None:
-    """Replaces a file of the program's own by its next state, such as a log with one more entry; a reader sees the old
-    one or the new one. The folder is made where it is missing. That it is the program's own, the caller has made sure
-    of.
+    """Replaces a file of the program's own by its next state, such as a log with one more entry; a
+    reader sees the old one or the new one. The folder is made where it is missing. That it is the
+    program's own, the caller has made sure of.
 
     Raises:
         ConflictError, InputError: as `check_rewrite`.
@@ -223,7 +247,8 @@ def rewrite(path: Path, content: str | bytes) -> None:
 
 @contextmanager
 def fresh_file(path: Path, *, command: str | None = None) -> Iterator[Path]:
-    """Makes a scratch path beside `path`, nothing at it yet; what the block writes there becomes `path` when it ends.
+    """Makes a scratch path beside `path`, nothing at it yet; what the block writes there becomes
+    `path` when it ends.
 
     Raises:
         ConflictError: `path` is taken, before or after the block.
@@ -242,7 +267,8 @@ def fresh_folder(path: Path, *, schema: str | None = None) -> Iterator[Path]:
     """Makes a scratch folder beside `path` that becomes `path` when the block ends.
 
     Args:
-        schema: the folder gets a manifest of this schema at the end, and replaces an earlier one of the same schema.
+        schema: the folder gets a manifest of this schema at the end, and replaces an earlier one of
+            the same schema.
 
     Raises:
         ConflictError: `path` is taken, before or after the block.
@@ -275,9 +301,19 @@ def fresh_folder(path: Path, *, schema: str | None = None) -> Iterator[Path]:
 def _check_free(path: Path, command: str | None) -> None:
     if not path.is_symlink() and not path.exists():
         return
-    if not path.is_symlink() and path.is_file() and command is not None and is_signed(path, command=command):
+    if (
+        not path.is_symlink()
+        and path.is_file()
+        and command is not None
+        and is_signed(path, command=command)
+    ):
         return
-    raise _taken(path, "" if command is None else f", and flagdata {command} did not write it, or it was changed since")
+    raise _taken(
+        path,
+        ""
+        if command is None
+        else f", and flagdata {command} did not write it, or it was changed since",
+    )
 
 
 def _taken(path: Path, why: str = "") -> ConflictError:
@@ -286,16 +322,22 @@ def _taken(path: Path, why: str = "") -> ConflictError:
 
 def _check_writable(folder: Path) -> None:
     if not folder.is_dir():
-        raise ConflictError("this is no folder", where=str(folder), fix="name another, or move this one away first")
+        raise ConflictError(
+            "this is no folder", where=str(folder), fix="name another, or move this one away first"
+        )
     if not os.access(folder, os.W_OK | os.X_OK):
         raise InputError(
-            "the folder cannot be written", where=str(folder), fix="name another, or give yourself the permission"
+            "the folder cannot be written",
+            where=str(folder),
+            fix="name another, or give yourself the permission",
         )
 
 
 def _nearest(folder: Path) -> Path:
     """Finds the folder, or the nearest above it that is there."""
-    return next(above for above in (folder, *folder.parents) if above.exists() or above.is_symlink())
+    return next(
+        above for above in (folder, *folder.parents) if above.exists() or above.is_symlink()
+    )
 
 
 def _scratch(folder: Path) -> Path:
@@ -304,13 +346,16 @@ def _scratch(folder: Path) -> Path:
 
 @contextmanager
 def _scratch_paths() -> Iterator[dict[str, Path]]:
-    """Collects scratch paths by the name that each is for; what is left of them is removed at the end."""
+    """Collects scratch paths by the name that each is for; what is left of them is removed at the
+    end."""
     scratch: dict[str, Path] = {}
     try:
         yield scratch
     finally:
         for path in scratch.values():
-            with suppress(OSError):  # gone, since it has its name; or a disk that refuses everything
+            with suppress(
+                OSError
+            ):  # gone, since it has its name; or a disk that refuses everything
                 if path.is_dir():
                     shutil.rmtree(path, ignore_errors=True)
                 else:
@@ -342,5 +387,7 @@ def _take(scratch: Path, path: Path) -> None:
     except OSError as error:
         if not lacks(error, path.absolute().parent):
             raise
-        _check_free(path, None)  # a file system without hard links: a name taken in this very moment would be lost
+        _check_free(
+            path, None
+        )  # a file system without hard links: a name taken in this very moment would be lost
         scratch.rename(path)

@@ -1,4 +1,5 @@
-"""The text of small files that people write and programs of an office save: recipes, tables, effects."""
+"""The text of small files that people write and programs of an office save: recipes, tables,
+effects."""
 
 from __future__ import annotations
 
@@ -13,7 +14,8 @@ _MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
-"""Byte-order marks and their codecs, which leave them out; the mark of UTF-16 begins that of UTF-32."""
+"""Byte-order marks and their codecs, which leave them out; the mark of UTF-16 begins that of
+UTF-32."""
 
 
 def encoding_of(head: bytes) -> str:
@@ -22,7 +24,8 @@ def encoding_of(head: bytes) -> str:
 
 
 def plain_text(data: bytes, *, noun: str, where: str) -> str:
-    """Decodes the text of a file, UTF-8 or what its byte-order mark says; where lines end in CR alone they end in LF.
+    """Decodes the text of a file, UTF-8 or what its byte-order mark says; where lines end in CR
+    alone they end in LF.
 
     Args:
         noun: what the file is called in the error message.

@@ -18,7 +18,13 @@ from flagdata.core.findings import Finding
 from flagdata.core.provenance import digest
 from flagdata.core.schema import CHANNELS, UNUSABLE, SampleFlag
 from flagdata.core.shell import command_line
-from flagdata.errors import InputError, NothingMeasuredError, TimeError, UsageError, ZoneMissingError
+from flagdata.errors import (
+    InputError,
+    NothingMeasuredError,
+    TimeError,
+    UsageError,
+    ZoneMissingError,
+)
 from flagdata.ingest.anemometer import sensor_recipe as recipes
 from flagdata.ingest.anemometer import untimed
 from flagdata.ingest.anemometer.draft import doubts
@@ -40,7 +46,8 @@ _FIRST = 2
 
 
 def shown_rows(source: TextFile, reading: Reading) -> tuple[LogRow, ...]:
-    """Selects the first two rows with a speed, the slowest, the fastest and the last, in the order of the file.
+    """Selects the first two rows with a speed, the slowest, the fastest and the last, in the order
+    of the file.
 
     Args:
         source: the text that was read.
@@ -65,7 +72,8 @@ def shown_rows(source: TextFile, reading: Reading) -> tuple[LogRow, ...]:
 
 
 def wind_of(reading: Reading, row: int) -> str:
-    """Describes the wind of a row: speed in m/s and direction in degrees, or components, and its flags."""
+    """Describes the wind of a row: speed in m/s and direction in degrees, or components, and its
+    flags."""
     speeds = [reading.channels[name][row] for name in _SPEEDS if name in reading.channels]
     parts = [f"{speed:.2f} m/s" if np.isfinite(speed) else "no speed," for speed in speeds]
     if not parts:
@@ -78,7 +86,11 @@ def wind_of(reading: Reading, row: int) -> str:
     directions = [name for name in _DIRECTIONS if name in reading.channels]
     if directions and np.isfinite(reading.channels[directions[0]][row]):
         parts.append(f"from {np.rad2deg(reading.channels[directions[0]][row]):.0f}°")
-    flags = [flag.name.lower().replace("_", " ") for flag in SampleFlag if flag.name and flag & int(reading.flags[row])]
+    flags = [
+        flag.name.lower().replace("_", " ")
+        for flag in SampleFlag
+        if flag.name and flag & int(reading.flags[row])
+    ]
     return " ".join(parts) + (f" ({', '.join(flags)})" if flags else "")
 
 
@@ -93,15 +105,20 @@ def _speed(reading: Reading) -> Series:
 def _lines(source: TextFile, wanted: set[int]) -> dict[int, str]:
     texts: dict[int, str] = {}
     for first, lines in source.blocks():
-        texts |= {number: lines[number - first] for number in wanted if first <= number < first + len(lines)}
+        texts |= {
+            number: lines[number - first]
+            for number in wanted
+            if first <= number < first + len(lines)
+        }
         if len(texts) == len(wanted):
             break
     return texts
 
 
 READER = 3
-"""Version of the readers of logs: raised with each change of code after which a file that was read gives other times,
-values or flags, or has other channels. What a TOML file says needs no raise: its digest is in the plan.
+"""Version of the readers of logs: raised with each change of code after which a file that was read
+gives other times, values or flags, or has other channels. What a TOML file says needs no raise: its
+digest is in the plan.
 
     2   formats of tables are TOML files; instruments' lines are read where they are whole and stamped; numbers that may
         mean no value, and directions of 0 that may be calm air, are asked about or reported, and stay as written
@@ -116,7 +133,8 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
         options: what the file does not say about itself.
 
     Raises:
-        InputError, TimeError, LimitError: the file cannot be read as this format; names the line and the fix.
+        InputError, TimeError, LimitError: the file cannot be read as this format; names the line
+            and the fix.
         UsageError: options that do not fit the format, or a file of no known format.
         NotFoundError: no such file, or no such recipe.
     """
@@ -126,14 +144,22 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
     source = open_log(path, options, recipe.file.encoding if recipe else None)
     if options.rate is not None:
         options = replace(options, start=None, rate=None)
-    if recipe is None and options.columns is None and not signing_formats(source) and untimed.has_clock_times(source):
+    if (
+        recipe is None
+        and options.columns is None
+        and not signing_formats(source)
+        and untimed.has_clock_times(source)
+    ):
         if options.date is None:
             day = untimed.year_alone(source)
             lacking = "dates without a year" if day else "times of day without a date"
             message = f"the lines of an instrument stand after {lacking}"
             example = f"YYYY-{day}" if day else "2026-05-01"
             year = ", with its year in place of YYYY" if day else ""
-            fix = f"give the day of the first: {command_line('--date', example)}{year}, and its --zone"
+            fix = (
+                f"give the day of the first: {command_line('--date', example)}{year}, and its "
+                "--zone"
+            )
             raise TimeError(message, where=str(path), fix=fix)
         source, options = untimed.add_date(source, options.date), replace(options, date=None)
     name, options, reasons = _choose(source, options)
@@ -141,7 +167,9 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
     unused = options.given() - reader.uses
     if unused:
         raise UsageError(
-            f"the format {name} has no use for: {', '.join(sorted(unused))}", where=str(path), fix="leave it out"
+            f"the format {name} has no use for: {', '.join(sorted(unused))}",
+            where=str(path),
+            fix="leave it out",
         )
     statement = zones.stated_zone(source.head(zones.LINES))
     try:
@@ -157,14 +185,18 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
         and reported.isdisjoint({"zone-contradicts", "zone-not-needed"})
     ):
         says = f"line {statement.line} ({statement.text!r}) says"
-        reading = reading.with_findings(zones.contradiction(says, statement.name, options.zone, reading.time))
+        reading = reading.with_findings(
+            zones.contradiction(says, statement.name, options.zone, reading.time)
+        )
     if "platform" not in reader.uses:
         reading = platform.settle(reading, options.platform, where=str(path))
     platform.check_corrected(reading, options.platform, where=str(path))
     reading = reading.with_findings(source.findings)
     if len(reading.time) == 0:
         raise InputError(
-            "there are no samples in the file", where=str(path), fix="check that the logger recorded anything"
+            "there are no samples in the file",
+            where=str(path),
+            fix="check that the logger recorded anything",
         )
     zero.check(reading, options.zero_offset, where=str(path))
     choice = options.zero_offset if options.zero_offset is not None else reading.rules.zero_offset
@@ -177,7 +209,10 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
         raise InputError(error.what, where=f"{path}, {error.where}", fix=error.fix) from None
     reading = rules.future(reading, now=time.time_ns())
     answered = recipe.expect if isinstance(recipe, recipes.Recipe) else frozenset[str]()
-    findings = (*reading.findings, *(() if reading.drafted else doubts.report_doubts(reading, answered)))
+    findings = (
+        *reading.findings,
+        *(() if reading.drafted else doubts.report_doubts(reading, answered)),
+    )
     findings = (*findings, *_nothing_measured(reading, where=str(path)))
     series = WindSeries(
         time=reading.time,
@@ -187,7 +222,11 @@ def read_log(path: Path | str, options: WindOptions | None = None) -> WindLog:
         host_time=reading.host_time,
     )
     reasons = reading.understood or reasons
-    text = reading.drafted or reading.described or (_text(options.recipe) if options.recipe is not None else None)
+    text = (
+        reading.drafted
+        or reading.described
+        or (_text(options.recipe) if options.recipe is not None else None)
+    )
     rows = shown_rows(source, reading) if reading.drafted else ()
     return WindLog(
         series=series,
@@ -210,7 +249,8 @@ def _nothing_measured(reading: Reading, *, where: str) -> tuple[Finding, ...]:
     """Reports that no wind can be used, but the log measured something else.
 
     Raises:
-        NothingMeasuredError: nothing else either; a direction beside speeds that are all missing is none.
+        NothingMeasuredError: nothing else either; a direction beside speeds that are all missing is
+            none.
     """
     winds = [values for name, values in reading.channels.items() if name in WIND_CHANNELS]
     usable = (reading.flags & UNUSABLE) == 0
@@ -219,17 +259,30 @@ def _nothing_measured(reading: Reading, *, where: str) -> tuple[Finding, ...]:
     quantities = sorted(
         name
         for name, values in reading.channels.items()
-        if name not in WIND_CHANNELS and (CHANNELS[name].unit != "rad" or not winds) and np.isfinite(values).any()
+        if name not in WIND_CHANNELS
+        and (CHANNELS[name].unit != "rad" or not winds)
+        and np.isfinite(values).any()
     )
     counts = ((flag, int(((reading.flags & flag) != 0).sum())) for flag in UNUSABLE)
-    why = ", ".join(f"{count} {flag.name.lower().replace('_', ' ')}" for flag, count in counts if count and flag.name)
-    message = f"not one value of the wind in {len(reading.time)} rows can be used{f' ({why})' if why else ''}"
+    why = ", ".join(
+        f"{count} {flag.name.lower().replace('_', ' ')}"
+        for flag, count in counts
+        if count and flag.name
+    )
+    message = (
+        f"not one value of the wind in {len(reading.time)} rows can be "
+        f"used{f' ({why})' if why else ''}"
+    )
     if not quantities:
         fix = "check the sensor, and which columns are read"
-        below = any((values < 0).any() for name, values in reading.channels.items() if name in rules.SPEEDS)
+        below = any(
+            (values < 0).any() for name, values in reading.channels.items() if name in rules.SPEEDS
+        )
         fix += "; if calm air reads below zero, give --zero-offset" if below else ""
         raise NothingMeasuredError(
-            f"there is nothing to measure: {message}", where=f"{where}, line {reading.line[0]}", fix=fix
+            f"there is nothing to measure: {message}",
+            where=f"{where}, line {reading.line[0]}",
+            fix=fix,
         )
     text = f"{message}; kept for {', '.join(quantities)}: no ground truth comes of it"
     return (
@@ -259,13 +312,19 @@ def _choose(source: TextFile, options: WindOptions) -> tuple[str, WindOptions, t
         if draft_recipe(source, options) is None:
             guess = unknown(source)
             message = f"not a log of a known format: {'; '.join(guess.reasons)}"
-            raise InputError(message, where=str(source.path), fix=guess.fix or "describe it by a recipe")
+            raise InputError(
+                message, where=str(source.path), fix=guess.fix or "describe it by a recipe"
+            )
         return Delimited.name, options, ()
     best = guesses[0]
     return best.format, replace(options, recipe=best.recipe), best.reasons
 
 
 def understood(format_name: str, recipe: str | None) -> Mapping[str, Any]:
-    """Describes the plan by which a log was read: its format, the digest of the recipe (TOML), of the user or of the
-    catalog's format, if one was used, and the reader."""
-    return {"format": format_name, "recipe": None if recipe is None else digest(recipe), "reader": READER}
+    """Describes the plan by which a log was read: its format, the digest of the recipe (TOML), of
+    the user or of the catalog's format, if one was used, and the reader."""
+    return {
+        "format": format_name,
+        "recipe": None if recipe is None else digest(recipe),
+        "reader": READER,
+    }

@@ -1,4 +1,5 @@
-"""What a file is: of a format by its maker's signature, of a recipe by its heading, a table, or something else."""
+"""What a file is: of a format by its maker's signature, of a recipe by its heading, a table, or
+something else."""
 
 from __future__ import annotations
 
@@ -25,18 +26,28 @@ _MESHES = {".obj"}
 
 
 def open_log(path: Path, options: WindOptions, encoding: str | None = None) -> TextFile:
-    """Opens a log as lines: JSON lines as a table, rows that carry no time on the clock that was given.
+    """Opens a log as lines: JSON lines as a table, rows that carry no time on the clock that was
+    given.
 
     Raises:
         FlagdataError: it cannot be read as text, or does not fit the options.
     """
-    source = open_text(path, limits=options.limits, encoding=options.encoding or encoding, topic=options.topic)
+    source = open_text(
+        path, limits=options.limits, encoding=options.encoding or encoding, topic=options.topic
+    )
     first = next((line.strip() for line in source.head() if line.strip()), "")
     flat = first.startswith("{") and first.endswith("}")
     if options.rate is not None:
         table = json_lines.as_table(source) if flat else source
-        return untimed.add_times(table, rate=options.rate, start=options.start, columns=options.columns)
-    if not flat or options.format is not None or options.recipe is not None or recognise_file(source):
+        return untimed.add_times(
+            table, rate=options.rate, start=options.start, columns=options.columns
+        )
+    if (
+        not flat
+        or options.format is not None
+        or options.recipe is not None
+        or recognise_file(source)
+    ):
         return source
     return json_lines.as_table(source)
 
@@ -48,7 +59,8 @@ def signing_formats(source: TextFile) -> tuple[str, ...]:
 
 
 def recognise_file(source: TextFile) -> tuple[Guess, ...]:
-    """Lists the formats and recipes that know a file, the surest first; none where it is unknown."""
+    """Lists the formats and recipes that know a file, the surest first; none where it is
+    unknown."""
     return tuple(guess for guess in _guesses(source) if guess.score >= SURE)
 
 
@@ -100,25 +112,48 @@ def sniff(path: Path | str, *, encoding: str | None = None) -> tuple[Guess, ...]
     other_file = None if is_workbook(path, head) else signature(head)
     if other_file is not None:
         message, fix = other_file
-        kind: GuessKind = "camera" if "video" in message else "record" if "MCAP" in message else "other"
+        kind: GuessKind = (
+            "camera" if "video" in message else "record" if "MCAP" in message else "other"
+        )
         reason = f"this is {message}: its first bytes are {head[:8].hex(' ')}"
         return (
-            Guess(format="video" if kind == "camera" else message, score=0.99, reasons=(reason,), kind=kind, fix=fix),
+            Guess(
+                format="video" if kind == "camera" else message,
+                score=0.99,
+                reasons=(reason,),
+                kind=kind,
+                fix=fix,
+            ),
         )
     if path.suffix.lower() in _MESHES:
         reason = f"the name ends in {path.suffix}"
-        return (Guess(format="mesh", score=0.9, reasons=(reason,), kind="meshes", fix="ingest the folder it is in"),)
+        return (
+            Guess(
+                format="mesh",
+                score=0.9,
+                reasons=(reason,),
+                kind="meshes",
+                fix="ingest the folder it is in",
+            ),
+        )
     try:
         source = open_log(path, WindOptions(limits=Limits(), encoding=encoding))
         rewritten = tuple(finding.what for finding in source.findings)
-        formats = recognise_file(source) or tuple(filter(None, [complete_guess(path, WindOptions(encoding=encoding))]))
+        formats = recognise_file(source) or tuple(
+            filter(None, [complete_guess(path, WindOptions(encoding=encoding))])
+        )
     except FlagdataError as error:
-        return (Guess(format="unknown", score=0.0, reasons=(error.what,), kind="other", fix=error.fix),)
-    return tuple(replace(guess, notes=(*rewritten, *guess.notes)) for guess in formats) or (unknown(source),)
+        return (
+            Guess(format="unknown", score=0.0, reasons=(error.what,), kind="other", fix=error.fix),
+        )
+    return tuple(replace(guess, notes=(*rewritten, *guess.notes)) for guess in formats) or (
+        unknown(source),
+    )
 
 
 def complete_guess(path: Path | str, options: WindOptions) -> Guess | None:
-    """Drafts a table that no recipe describes, with what the user gives; `None` where it is no table of a log.
+    """Drafts a table that no recipe describes, with what the user gives; `None` where it is no
+    table of a log.
 
     Raises:
         FlagdataError: the file cannot be read as text.
@@ -128,7 +163,8 @@ def complete_guess(path: Path | str, options: WindOptions) -> Guess | None:
 
 
 def anemometers(path: Path | str, options: WindOptions | None = None) -> tuple[str, ...]:
-    """Labels of the anemometers of a table that no recipe describes, where it holds several; else none.
+    """Labels of the anemometers of a table that no recipe describes, where it holds several; else
+    none.
 
     Each can be read by itself: `read_log(path, replace(options, wind=label))`.
 
@@ -136,7 +172,11 @@ def anemometers(path: Path | str, options: WindOptions | None = None) -> tuple[s
         FlagdataError: the file cannot be read as text.
     """
     options = options or WindOptions()
-    if options.recipe is not None or options.format not in (None, Delimited.name) or options.wind is not None:
+    if (
+        options.recipe is not None
+        or options.format not in (None, Delimited.name)
+        or options.wind is not None
+    ):
         return ()
     source = open_log(Path(path), options)
     if options.format is None and options.columns is None and recognise_file(source):
@@ -146,15 +186,20 @@ def anemometers(path: Path | str, options: WindOptions | None = None) -> tuple[s
 
 
 def unknown(source: TextFile) -> Guess:
-    """Describes a text that no format and no recipe knows, and that is no table of a time and a wind; or what a format
-    says."""
+    """Describes a text that no format and no recipe knows, and that is no table of a time and a
+    wind; or what a format says."""
     refused = next((guess for guess in _guesses(source) if guess.fix), None)
     if refused is not None:
         return refused
-    text = "its text is neither a table with a time and a wind, nor lines of an instrument that is known"
+    text = (
+        "its text is neither a table with a time and a wind, nor lines of an instrument that is "
+        "known"
+    )
     fix = (
-        'if it is a log, say what its columns are, in order: --columns "time[FORMAT],wind_speed[UNIT]"; where none is '
-        'a time, and readings came at a steady rate: --columns "wind_speed[UNIT]" --start TIME --rate HZ; or describe '
+        "if it is a log, say what its columns are, in order: --columns "
+        '"time[FORMAT],wind_speed[UNIT]"; where none is '
+        'a time, and readings came at a steady rate: --columns "wind_speed[UNIT]" --start TIME '
+        "--rate HZ; or describe "
         "it by a recipe: --sensor FILE.toml"
     )
     return Guess(format="unknown", score=0.0, reasons=(text,), kind="other", fix=fix)
@@ -171,10 +216,22 @@ def _folder(path: Path) -> Guess:
     if meshes and len(meshes) >= len(pictures):
         arcsim = " with an ArcSim conf.json" if "conf.json" in names else ""
         reason = f"a folder of {len(meshes)} mesh files{arcsim}, the first {meshes[0]}"
-        return Guess(format="mesh folder", score=0.95, reasons=(reason,), kind="meshes", fix="ingest it as meshes")
+        return Guess(
+            format="mesh folder",
+            score=0.95,
+            reasons=(reason,),
+            kind="meshes",
+            fix="ingest it as meshes",
+        )
     if pictures:
         reason = f"a folder of {len(pictures)} pictures, the first {pictures[0]}"
-        return Guess(format="image sequence", score=0.9, reasons=(reason,), kind="camera", fix="ingest it as a camera")
+        return Guess(
+            format="image sequence",
+            score=0.9,
+            reasons=(reason,),
+            kind="camera",
+            fix="ingest it as a camera",
+        )
     foreign = Counter(filter(None, map(others.format_of, names)))
     if foreign:
         (mesh, count), *_ = foreign.most_common(1)

@@ -1,8 +1,8 @@
 """What the program drafted from a log's own text counts only when somebody confirmed it.
 
-A format that recognised its file, a recipe that the user gave, and a table that states time, unit and quantity itself
-need no question. Any other reading is a draft: it is shown, and confirmed at a terminal, by the hash of what was shown,
-or replaced by a recipe.
+A format that recognised its file, a recipe that the user gave, and a table that states time, unit
+and quantity itself need no question. Any other reading is a draft: it is shown, and confirmed at a
+terminal, by the hash of what was shown, or replaced by a recipe.
 """
 
 from __future__ import annotations
@@ -46,28 +46,45 @@ class Drafted:
         """Hash of the file's bytes, of what was drafted and of what the user answered."""
         content = {
             "source": self.source_hash,
-            "drafts": [[log.drafted, dict(log.plan), dict(options.as_dict())] for log, options in self.readings],
+            "drafts": [
+                [log.drafted, dict(log.plan), dict(options.as_dict())]
+                for log, options in self.readings
+            ],
         }
         return digest(canonical(content))[:_HASH]
 
     def sentences(self) -> tuple[str, ...]:
         """Describes one row of each reading in a sentence."""
         several = len(self.readings) > 1
-        return tuple(_sentence(log, f" at {log.series.sensor.name!r}" if several else "") for log, _ in self.readings)
+        return tuple(
+            _sentence(log, f" at {log.series.sensor.name!r}" if several else "")
+            for log, _ in self.readings
+        )
 
     def preview(self) -> str:
-        """Shows how the file was understood: reasons, rows beside what was read of them, findings."""
+        """Shows how the file was understood: reasons, rows beside what was read of them,
+        findings."""
         lines = [f"{self.path.name} is a table that no recipe describes. This is how it is read:"]
         for number, (log, _) in enumerate(self.readings, start=1):
             if len(self.readings) > 1:
-                lines.append(f"anemometer {number} of {len(self.readings)}: {log.series.sensor.name}")
+                lines.append(
+                    f"anemometer {number} of {len(self.readings)}: {log.series.sensor.name}"
+                )
             lines += [f"  {reason}" for reason in log.reasons]
             for row in log.rows:
-                lines.append(f"    line {row.line}  {row.text[:_WIDE]}  →  {iso(row.time)}  {row.wind}")
+                lines.append(
+                    f"    line {row.line}  {row.text[:_WIDE]}  →  {iso(row.time)}  {row.wind}"
+                )
             series = log.series
-            lines.append(f"  {len(series)} rows from {iso(int(series.time[0]))} to {iso(int(series.time[-1]))}")
+            lines.append(
+                f"  {len(series)} rows from {iso(int(series.time[0]))} to "
+                f"{iso(int(series.time[-1]))}"
+            )
             for finding in log.findings:
-                lines.append(f"  {finding.severity}: {finding.what}{f'; {finding.fix}' if finding.fix else ''}")
+                lines.append(
+                    f"  {finding.severity}: "
+                    f"{finding.what}{f'; {finding.fix}' if finding.fix else ''}"
+                )
         return "\n".join(lines)
 
 
@@ -76,7 +93,9 @@ class UnconfirmedError(RefusedError):
 
     kind = ErrorKind.UNCONFIRMED
 
-    def __init__(self, what: str, *, where: str | None = None, fix: str, accept: str = "", preview: str = "") -> None:
+    def __init__(
+        self, what: str, *, where: str | None = None, fix: str, accept: str = "", preview: str = ""
+    ) -> None:
         super().__init__(what, where=where, fix=fix)
         self.accept = accept
         self.preview = preview
@@ -89,8 +108,10 @@ class UnconfirmedError(RefusedError):
             where=str(drafted.path),
             accept=drafted.accept,
             preview=drafted.preview(),
-            fix=f"compare the rows above with what you know of the wind; if they are right, repeat the command with "
-            f"{command_line('--accept', drafted.accept)}; if not, describe the file by a recipe: --sensor FILE.toml "
+            fix="compare the rows above with what you know of the wind; if they are right, repeat "
+            "the command with "
+            f"{command_line('--accept', drafted.accept)}; if not, describe the file by a recipe: "
+            "--sensor FILE.toml "
             "(flagdata ingest --sniff prints a recipe to begin with)",
         )
 
@@ -107,7 +128,8 @@ class Confirm(Protocol):
         ...
 
     def answered(self, read: Callable[[Answers], T]) -> T:
-        """Calls `read` with answers to all that the file leaves open, at first with none, and returns what it gives.
+        """Calls `read` with answers to all that the file leaves open, at first with none, and
+        returns what it gives.
 
         Raises:
             ZoneMissingError, OpenFactsError: there is nobody to ask.
@@ -115,7 +137,8 @@ class Confirm(Protocol):
         ...
 
     def __call__(self, drafted: Drafted) -> str:
-        """Returns how the readings were confirmed, for the report. Raises UnconfirmedError where they were not."""
+        """Returns how the readings were confirmed, for the report. Raises UnconfirmedError where
+        they were not."""
         ...
 
 
@@ -146,7 +169,8 @@ UNASKED = Accepting()
 def confirm_readings(
     path: Path, source_hash: str, readings: Sequence[tuple[WindLog, WindOptions]], confirm: Confirm
 ) -> str | None:
-    """Confirms the drafted ones of a file's readings and returns how; `None` where none of them is a draft.
+    """Confirms the drafted ones of a file's readings and returns how; `None` where none of them is
+    a draft.
 
     Raises:
         UnconfirmedError: nobody confirmed them.
@@ -159,4 +183,7 @@ def confirm_readings(
 
 def _sentence(log: WindLog, where: str) -> str:
     row = log.rows[0]
-    return f"On {iso(row.time)[:10]} at {iso(row.time)[11:].removesuffix('Z')} UTC the wind{where} was {row.wind}."
+    return (
+        f"On {iso(row.time)[:10]} at {iso(row.time)[11:].removesuffix('Z')} UTC the wind{where} "
+        f"was {row.wind}."
+    )

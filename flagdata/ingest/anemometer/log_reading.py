@@ -43,8 +43,10 @@ class Reading:
         rules: what is known about the instrument's errors.
         host_time: (n,) the logging computer's clock, where the file has it.
         findings: of the format.
-        stamped: whether each row has a stamp of its own; the lines of a stream have not, and cannot be sorted.
-        described: the recipe (TOML) of the catalog's format that the file is of, "" where code reads it.
+        stamped: whether each row has a stamp of its own; the lines of a stream have not, and cannot
+            be sorted.
+        described: the recipe (TOML) of the catalog's format that the file is of, "" where code
+            reads it.
         drafted: the recipe (TOML) that was drafted from the file, "" where it was read by another.
         stated: whether the file itself states all that the draft says.
         understood: what in the file spoke for that draft, completed by what the user said.
@@ -71,7 +73,9 @@ class Reading:
         if self.host_time is not None:
             arrays.append(self.host_time)
         if any(len(a) != n for a in arrays):
-            raise InputError("columns of different lengths", fix="this is a defect of the format's reader")
+            raise InputError(
+                "columns of different lengths", fix="this is a defect of the format's reader"
+            )
 
     def take(self, rows: IntArray | BoolArray) -> Reading:
         """Returns the rows chosen, in the order given."""
@@ -84,10 +88,14 @@ class Reading:
             host_time=None if self.host_time is None else self.host_time[rows],
         )
 
-    def with_findings(self, further: tuple[Finding, ...], *, flags: NDArray[np.uint16] | None = None) -> Reading:
+    def with_findings(
+        self, further: tuple[Finding, ...], *, flags: NDArray[np.uint16] | None = None
+    ) -> Reading:
         """Returns the same rows with findings added, and other flags."""
         return replace(
-            self, findings=(*self.findings, *further), flags=self.flags if flags is None else flags.astype(np.uint16)
+            self,
+            findings=(*self.findings, *further),
+            flags=self.flags if flags is None else flags.astype(np.uint16),
         )
 
     def marked(
@@ -101,7 +109,8 @@ class Reading:
         value: float | None = None,
         fix: str | None = None,
     ) -> Reading:
-        """Returns the same rows with a finding about some of them, at the first of these, and a flag at each.
+        """Returns the same rows with a finding about some of them, at the first of these, and a
+        flag at each.
 
         Args:
             rows: (n,); where there are none, nothing is found.
@@ -132,7 +141,9 @@ class Reading:
         fix: str | None = None,
     ) -> Reading:
         """Returns the other rows, with a finding about those left out; see `marked`."""
-        marked = self.marked(rows, kind, f"{text}; left out", severity=severity, value=value, fix=fix)
+        marked = self.marked(
+            rows, kind, f"{text}; left out", severity=severity, value=value, fix=fix
+        )
         return marked.take(~rows) if rows.any() else marked
 
 
@@ -148,14 +159,16 @@ def followed_finding(by: str) -> Finding:
 def streams(channels: Mapping[str, Series]) -> tuple[tuple[tuple[str, ...], IntArray], ...]:
     """Kinds of wind that come in rows of their own, as sentences do, and the rows of each.
 
-    Channels that share a row are of one kind, whatever is missing from other rows. Of a log with one kind all rows are
-    its own, those without a value among them; of a log with several, those in which a channel of the kind has a value.
+    Channels that share a row are of one kind, whatever is missing from other rows. Of a log with
+    one kind all rows are its own, those without a value among them; of a log with several, those in
+    which a channel of the kind has a value.
 
     Args:
         channels: names → (n,) values, NaN where missing.
 
     Returns:
-        (names, indices of rows) of each kind; a kind is one of wind, so temperatures between are none.
+        (names, indices of rows) of each kind; a kind is one of wind, so temperatures between are
+            none.
     """
     n = len(next(iter(channels.values()))) if channels else 0
     present = {

@@ -1,6 +1,7 @@
 """Sensor recipes: a delimited log described in TOML, so that a new logger needs no code.
 
-A recipe is parsed here and nowhere else; unknown keys are refused with the nearest known one. Tables:
+A recipe is parsed here and nowhere else; unknown keys are refused with the nearest known one.
+Tables:
 
     name, about, source       what it is, and where its facts come from
     [file]                    delimiter, decimal, encoding, preamble, header, comment, missing, host
@@ -44,7 +45,21 @@ COLUMNS_LIMIT = 10_000
 """Highest number of a column."""
 Column: TypeAlias = str | Annotated[int, Meta(ge=1, le=COLUMNS_LIMIT)]
 ChannelName: TypeAlias = Annotated[str, Named("channel", CHANNELS)]
-MISSING = ("", "nan", "na", "n/a", "n.a.", "#n/a", "#value!", "null", "none", "m", "mm", "missing", "no data")
+MISSING = (
+    "",
+    "nan",
+    "na",
+    "n/a",
+    "n.a.",
+    "#n/a",
+    "#value!",
+    "null",
+    "none",
+    "m",
+    "mm",
+    "missing",
+    "no data",
+)
 """Spellings of "no value" that every recipe knows, lower-case."""
 MISSING_SIGNS = r"^[-–—_./*#]+$"
 """Cells of signs alone ("----", "--.-", "/////", "***") are no value either."""
@@ -59,11 +74,12 @@ class FileLayout:
         decimal: "." or ",".
         encoding: Python codec name, `None` to decide by the bytes.
         preamble: lines before the header.
-        header: header lines; the first names the columns, further ones (units) are skipped. 0: columns have no names.
+        header: header lines; the first names the columns, further ones (units) are skipped. 0:
+            columns have no names.
         comment: lines that start with it are skipped; "" for none.
         missing: further spellings of "no value"; those that are numbers are compared as numbers.
-        host: format of the stamp that the logging computer wrote before each raw line (see `TimeLayout.format`), "" for
-            none. Columns are then numbered within the raw line.
+        host: format of the stamp that the logging computer wrote before each raw line (see
+            `TimeLayout.format`), "" for none. Columns are then numbered within the raw line.
     """
 
     delimiter: str = ","
@@ -87,11 +103,21 @@ class FileLayout:
         if self.host and self.host not in EPOCH:
             pattern(self.host)
         if self.delimiter not in DELIMITERS.values():
-            raise UnknownNameError.of("delimiter", self.delimiter, DELIMITERS, where="[file] delimiter")
+            raise UnknownNameError.of(
+                "delimiter", self.delimiter, DELIMITERS, where="[file] delimiter"
+            )
         if self.decimal == self.delimiter:
-            raise UsageError("the decimal mark is also the delimiter", where="[file]", fix="correct one of the two")
+            raise UsageError(
+                "the decimal mark is also the delimiter",
+                where="[file]",
+                fix="correct one of the two",
+            )
         if not 0 <= self.preamble <= 1000 or not 0 <= self.header <= 10:
-            raise UsageError("preamble beyond 1000 or header beyond 10 lines", where="[file]", fix="count the lines")
+            raise UsageError(
+                "preamble beyond 1000 or header beyond 10 lines",
+                where="[file]",
+                fix="count the lines",
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,9 +125,10 @@ class TimeLayout:
     """How a row says when it was.
 
     Attributes:
-        columns: names or numbers (from 1) of the columns that are joined with a blank; none where the host's stamp is
-            all there is.
-        format: "iso", "epoch-s", "epoch-ms", strptime directives or a count (see instants/stamps.py).
+        columns: names or numbers (from 1) of the columns that are joined with a blank; none where
+            the host's stamp is all there is.
+        format: "iso", "epoch-s", "epoch-ms", strptime directives or a count (see
+            instants/stamps.py).
         zone: of wall-clock stamps; `None` leaves it to the user.
     """
 
@@ -124,11 +151,13 @@ class ChannelLayout:
         column: name or number (from 1) of the column.
         unit: as `flagdata.core.units` spells it.
         gain, offset: of the cell, in the file's unit.
-        range: smallest and largest value the instrument can give, in the file's unit, after gain and offset.
+        range: smallest and largest value the instrument can give, in the file's unit, after gain
+            and offset.
         convention: of a direction: the wind blows "from" it or "to" it.
         rotation: added to a direction [deg in the file's sense, clockwise].
         optional: whether files without the column are read all the same.
-        suffix: text behind every number of the column, such as its unit; numbers with another are unreadable.
+        suffix: text behind every number of the column, such as its unit; numbers with another are
+            unreadable.
     """
 
     column: Column
@@ -144,9 +173,15 @@ class ChannelLayout:
     def __post_init__(self) -> None:
         unit(self.unit, where=f"unit of column {self.column}")
         if self.gain == 0:
-            raise UsageError("the gain is 0", where=f"column {self.column}", fix="give the factor of the calibration")
+            raise UsageError(
+                "the gain is 0",
+                where=f"column {self.column}",
+                fix="give the factor of the calibration",
+            )
         if self.range is not None and not self.range[0] < self.range[1]:
-            raise UsageError("the range is empty", where=f"column {self.column}", fix="give [lowest, highest]")
+            raise UsageError(
+                "the range is empty", where=f"column {self.column}", fix="give [lowest, highest]"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -177,7 +212,9 @@ class CheckLayout:
     def __post_init__(self) -> None:
         if not self.values:
             raise UsageError(
-                "a check without values", where=f"column {self.column}", fix="list the texts that are right"
+                "a check without values",
+                where=f"column {self.column}",
+                fix="list the texts that are right",
             )
 
 
@@ -187,9 +224,12 @@ class QualityRules:
 
     Attributes:
         zero_offset: see options.ZeroOffset.
-        stale_after: repeats longer than this [s] are stale; `None` derives it from the readings themselves.
-        frame_rate_of: channels that are frequencies found in frames, one a row: checked against the Nyquist limit.
-        fault_where_zero: channels that are exactly 0 when the instrument saw nothing: such rows are SENSOR_FAULT.
+        stale_after: repeats longer than this [s] are stale; `None` derives it from the readings
+            themselves.
+        frame_rate_of: channels that are frequencies found in frames, one a row: checked against the
+            Nyquist limit.
+        fault_where_zero: channels that are exactly 0 when the instrument saw nothing: such rows are
+            SENSOR_FAULT.
     """
 
     zero_offset: ZeroOffset = "report"
@@ -200,7 +240,11 @@ class QualityRules:
     def __post_init__(self) -> None:
         check_zero_offset(self.zero_offset, where="[quality] zero-offset")
         if self.stale_after is not None and self.stale_after <= 0:
-            raise UsageError("stale-after is not positive", where="[quality] stale-after", fix="give seconds above 0")
+            raise UsageError(
+                "stale-after is not positive",
+                where="[quality] stale-after",
+                fix="give seconds above 0",
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -221,9 +265,15 @@ class Recipe:
 
     def __post_init__(self) -> None:
         if not self.time.columns and not self.file.host:
-            raise UsageError("there is no time column", where="[time] columns", fix="name the column of the stamps")
+            raise UsageError(
+                "there is no time column",
+                where="[time] columns",
+                fix="name the column of the stamps",
+            )
         if not self.channels:
-            raise UsageError("there are no channels", where=self.name, fix="add a table [channels.wind_speed]")
+            raise UsageError(
+                "there are no channels", where=self.name, fix="add a table [channels.wind_speed]"
+            )
         for name, layout in self.channels.items():
             if name not in CHANNELS:
                 raise UnknownNameError.of("channel", name, CHANNELS, where=self.name)
@@ -233,10 +283,18 @@ class Recipe:
                     where=self.name,
                     fix="correct the unit or the channel",
                 )
-        columns_used = [c.column for c in (*self.channels.values(), *self.checks)] + list(self.time.columns)
+        columns_used = [c.column for c in (*self.channels.values(), *self.checks)] + list(
+            self.time.columns
+        )
         columns_used += [self.rows.column] if self.rows is not None else []
-        if (self.file.header == 0 or self.file.host) and any(isinstance(column, str) for column in columns_used):
-            raise UsageError("columns by name where no header names them", where=self.name, fix="give their numbers")
+        if (self.file.header == 0 or self.file.host) and any(
+            isinstance(column, str) for column in columns_used
+        ):
+            raise UsageError(
+                "columns by name where no header names them",
+                where=self.name,
+                fix="give their numbers",
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -299,11 +357,14 @@ def load(recipe: str) -> Recipe | OpenRecipe:
     """
     file = SENSORS.find(recipe)
     data = parse_recipe(file.text, where=file.where)
-    return _open_recipe(data, where=file.where) if _is_open(data) else of_data(data, where=file.where)
+    return (
+        _open_recipe(data, where=file.where) if _is_open(data) else of_data(data, where=file.where)
+    )
 
 
 def parse(text: str, *, where: str) -> Recipe:
-    """Reads the complete recipe written in `text`; raises as `of_data`, and InputError for what is not TOML."""
+    """Reads the complete recipe written in `text`; raises as `of_data`, and InputError for what is
+    not TOML."""
     return of_data(parse_recipe(text, where=where), where=where)
 
 
@@ -335,7 +396,9 @@ def of_data(data: Mapping[str, Any], *, where: str) -> Recipe:
             checks=form.check,
         )
     except UnknownNameError as error:
-        raise UnknownNameError(error.what, where=_inside(where, error.where), fix=error.fix) from None
+        raise UnknownNameError(
+            error.what, where=_inside(where, error.where), fix=error.fix
+        ) from None
     except FlagdataError as error:
         raise InputError(error.what, where=_inside(where, error.where), fix=error.fix) from None
 
@@ -349,11 +412,16 @@ def _is_open(data: Mapping[str, Any]) -> bool:
         and (isinstance(layout.get("column"), list) or isinstance(layout.get("unit"), Mapping))
         for layout in layouts
     )
-    return listed or "match" in data or (isinstance(time, Mapping) and isinstance(time.get("format"), list))
+    return (
+        listed
+        or "match" in data
+        or (isinstance(time, Mapping) and isinstance(time.get("format"), list))
+    )
 
 
 def _open_recipe(data: Mapping[str, Any], *, where: str) -> OpenRecipe:
-    """Checks every key of an open recipe, as far as that is possible without a file, and returns the recipe."""
+    """Checks every key of an open recipe, as far as that is possible without a file, and returns
+    the recipe."""
     typed_tables.entries(
         {"header": tuple[str, ...], **dict.fromkeys(MATCH.split()[1:], Any)},
         data.get("match", {}),
@@ -369,7 +437,9 @@ def _open_recipe(data: Mapping[str, Any], *, where: str) -> OpenRecipe:
             inside = f"{where} [channels.{name}] unit"
             typed_tables.check_keys(units, ("in", "else", "whole"), where=inside)
             if units.get("in") != "heading":
-                raise InputError("the unit is in no heading", where=inside, fix='write { in = "heading" }')
+                raise InputError(
+                    "the unit is in no heading", where=inside, fix='write { in = "heading" }'
+                )
             layout_keys["unit"] = CHANNELS[name].unit if name in CHANNELS else "m/s"
         channels[name] = layout_keys
     time, sensor = (_without_facts(_table(data, key, where)) for key in ("time", "sensor"))
@@ -382,7 +452,9 @@ def _open_recipe(data: Mapping[str, Any], *, where: str) -> OpenRecipe:
 def _without_facts(table: Mapping[str, Any]) -> dict[str, Any]:
     """Removes the keys whose texts occur nowhere in the file; a name counts as it is."""
     return {
-        key: value for key, value in table.items() if key == "name" or not (isinstance(value, str) and "{" in value)
+        key: value
+        for key, value in table.items()
+        if key == "name" or not (isinstance(value, str) and "{" in value)
     }
 
 

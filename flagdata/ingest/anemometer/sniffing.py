@@ -13,13 +13,15 @@ class Guess:
     """What a file may be.
 
     Attributes:
-        format: a name of `formats.FORMATS`, or a word for what else it is ("video", "mesh folder", "gzip").
+        format: a name of `formats.FORMATS`, or a word for what else it is ("video", "mesh folder",
+            "gzip").
         score: 0 to 1; from `SURE` upwards it is taken without asking.
         reasons: what in the file speaks for it, with places.
         kind: which ingest it belongs to.
         recipe: the sensor recipe, for the format "delimited" and "host-stamped".
         fix: what to do next, where that is not to ingest it.
-        draft: a recipe (TOML) for a table that no recipe describes; "?" stands where it is to be completed.
+        draft: a recipe (TOML) for a table that no recipe describes; "?" stands where it is to be
+            completed.
         notes: what was left out, and what is odd.
         doubts: what must be given before it can be read, each with the option that gives it.
         winds: labels of the anemometers, where a draft names several.
@@ -48,7 +50,8 @@ class Head:
 
     Attributes:
         lines: up to `HEAD_LINES`, without their ends.
-        counted: whether the stamps before them are none of the file's, but counted at a rate that the user gave.
+        counted: whether the stamps before them are none of the file's, but counted at a rate that
+            the user gave.
     """
 
     lines: tuple[str, ...]

@@ -1,8 +1,8 @@
 """Logs whose rows carry no time at all, put on the clock that the user gives: a start and a rate.
 
-A serial print, a tunnel's recording or a boat's stream of wind sentences without a clock can be used where its owner
-knows when it began and how many readings a second the instrument sends. Rows that were lost are not noticed: each loss
-moves all that follows.
+A serial print, a tunnel's recording or a boat's stream of wind sentences without a clock can be
+used where its owner knows when it began and how many readings a second the instrument sends. Rows
+that were lost are not noticed: each loss moves all that follows.
 """
 
 from __future__ import annotations
@@ -28,13 +28,16 @@ from flagdata.timebase import NANOSECONDS, iso
 
 _NUMBER = re.compile(r"\s*[-+]?(\d+([.,]\d*)?|[.,]\d+)\s*")
 _WIND = re.compile(r"[$!](?P<key>[A-Z0-9]{2}(?:MWV,[^,]*,[RT]|MWD|VWR|VWT|MDA))")
-_TIMED = re.compile(r"^\\|[$!][A-Z0-9]{2}(?:(?:ZDA|RMC|GGA),|GLL,(?:[^,]*,){4})(?P<time>[^,*]*\d{4}[^,*]*)")
+_TIMED = re.compile(
+    r"^\\|[$!][A-Z0-9]{2}(?:(?:ZDA|RMC|GGA),|GLL,(?:[^,]*,){4})(?P<time>[^,*]*\d{4}[^,*]*)"
+)
 _CLOCK_BEFORE = re.compile(
     r"\s*[\[(<\"]?(?:(?P<month>[A-Za-z]{3})\s+(?P<day>\d{1,2})\s+)?"
     r"(?P<time>\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,9})?)[\])>\"]?[\s,;>:-]+"
     r"(?(month)(?:\S+ [\w./-]+(?:\[\d+\])?: )?)(?P<rest>\S.*)$"
 )
-"""A time of day before a line, with a date without its year or none; and the host and program that syslog writes."""
+"""A time of day before a line, with a date without its year or none; and the host and program that
+syslog writes."""
 _TABLES = frozenset({"delimited", "host-stamped"})
 """Formats of tables, which have a way of their own."""
 
@@ -42,13 +45,16 @@ _CLOCK = "time (UTC), as given"
 """Heading of the instants that are counted."""
 
 
-def add_times(source: TextFile, *, rate: float, start: int | None, columns: str | None = None) -> TextFile:
+def add_times(
+    source: TextFile, *, rate: float, start: int | None, columns: str | None = None
+) -> TextFile:
     """Puts a time in every row of a file.
 
     Args:
         rate: readings a second.
         start: instant of the first reading [UTC ns].
-        columns: what the columns of a table are, by the user's word; where it names no time, no column is one.
+        columns: what the columns of a table are, by the user's word; where it names no time, no
+            column is one.
 
     Raises:
         UsageError: no start, or rows that say when they were.
@@ -67,9 +73,15 @@ def add_times(source: TextFile, *, rate: float, start: int | None, columns: str 
     if columns is not None:
         text, findings = _table(source, rate, start, where)
         return _file_of_lines(source, text, rate, start, findings)
-    if sum(bool(_WIND.search(line)) for line in lines) and sum(line.startswith(("$", "!", "\\")) for line in lines):
+    if sum(bool(_WIND.search(line)) for line in lines) and sum(
+        line.startswith(("$", "!", "\\")) for line in lines
+    ):
         _refuse_times(_runs(_all_lines(source)), where)
-        text = [line for line in _sentences(source, rate, start) if _TIMED.search(line.partition(" ")[2]) is None]
+        text = [
+            line
+            for line in _sentences(source, rate, start)
+            if _TIMED.search(line.partition(" ")[2]) is None
+        ]
     else:
         _refuse_times(any(split_stamp(line)[0] for line in lines), where)
         stamped = list(_stamped_lines(source, rate, start))
@@ -92,19 +104,29 @@ def of_an_instrument(lines: Sequence[str]) -> bool:
 
 
 def has_clock_times(source: TextFile) -> bool:
-    """Checks whether the lines are those of an instrument, each after a time of day without a date, and say no other
-    time."""
+    """Checks whether the lines are those of an instrument, each after a time of day without a date,
+    and say no other time."""
     lines = [line for line in source.head(HEAD_LINES) if line.strip()]
     timed = [match for line in lines if (match := _CLOCK_BEFORE.match(line)) is not None]
-    if not timed or 2 * len(timed) < len(lines) or any(_TIMED.search(match["rest"]) for match in timed):
+    if (
+        not timed
+        or 2 * len(timed) < len(lines)
+        or any(_TIMED.search(match["rest"]) for match in timed)
+    ):
         return False
     return of_an_instrument([f"2000-01-01T{match['time']} {match['rest']}" for match in timed])
 
 
 def year_alone(source: TextFile) -> str | None:
-    """Finds the month and day of the first line, as 12-31, where the lines stand after dates without a year."""
+    """Finds the month and day of the first line, as 12-31, where the lines stand after dates
+    without a year."""
     match = next(
-        (match_of_clock for line in source.head(HEAD_LINES) if (match_of_clock := _CLOCK_BEFORE.match(line))), None
+        (
+            match_of_clock
+            for line in source.head(HEAD_LINES)
+            if (match_of_clock := _CLOCK_BEFORE.match(line))
+        ),
+        None,
     )
     if match is None or not match["month"] or match["month"].lower() not in ENGLISH:
         return None
@@ -127,9 +149,13 @@ def _of_year(match: re.Match[str], before: dt.date, *, first: bool, where: str) 
         date = dt.date(year, month, int(match["day"]))
     except ValueError:
         message = f"{match['month']} {match['day']} is no day of {year}"
-        raise TimeError(message, where=where, fix="give --date with the year in which the log began") from None
+        raise TimeError(
+            message, where=where, fix="give --date with the year in which the log began"
+        ) from None
     if first and date != before:
-        message = f"the first line is of {match['month']} {match['day']}, not of {before.isoformat()}"
+        message = (
+            f"the first line is of {match['month']} {match['day']}, not of {before.isoformat()}"
+        )
         fix = f"give its day with its year, such as {command_line('--date', date)}"
         raise TimeError(message, where=where, fix=fix)
     return date
@@ -139,7 +165,8 @@ def add_date(source: TextFile, date: dt.date) -> TextFile:
     """Puts the date before the lines of an instrument, each after a time of day.
 
     Args:
-        date: of the first line; the next day begins where the time of day falls by more than two hours.
+        date: of the first line; the next day begins where the time of day falls by more than two
+            hours.
     """
     text: list[str] = []
     day, last = date, ""
@@ -158,10 +185,13 @@ def add_date(source: TextFile, date: dt.date) -> TextFile:
         text.append(f"{day.isoformat()}T{clock} {match['rest']}")
     days = (day - date).days
     if year_alone(source):
-        message = f"dates without a year before each line; the first is of {date.isoformat()}, as given"
+        message = (
+            f"dates without a year before each line; the first is of {date.isoformat()}, as given"
+        )
         return TableText.of(source, text, [Finding.of("date-given", message)])
     message = (
-        f"times of day before each line; the first is of {date.isoformat()}, as given, and {days} midnights follow"
+        f"times of day before each line; the first is of {date.isoformat()}, as given, and {days} "
+        "midnights follow"
     )
     finding = Finding.of("date-given", message)
     return TableText.of(source, text, [finding])
@@ -175,16 +205,21 @@ def _of_day(clock: str) -> int:
 def _file_of_lines(
     source: TextFile, text: Sequence[str], rate: float, start: int, findings: Sequence[Finding] = ()
 ) -> TextFile:
-    """Returns the file with these lines, and the finding that says whose clock they are on beside others."""
+    """Returns the file with these lines, and the finding that says whose clock they are on beside
+    others."""
     often = f"at {rate:g} Hz" if rate >= 1 else f"every {1 / rate:g} s"
     message = (
-        f"its rows carry no time: counted {often} from {iso(start)}, as given; rows that were lost are not noticed"
+        f"its rows carry no time: counted {often} from {iso(start)}, as given; rows that were lost "
+        "are not noticed"
     )
-    return TableText.of(source, text, [Finding(kind=RATE_GIVEN, severity=Severity.WARNING, what=message), *findings])
+    return TableText.of(
+        source, text, [Finding(kind=RATE_GIVEN, severity=Severity.WARNING, what=message), *findings]
+    )
 
 
 def _runs(lines: Iterable[str]) -> bool:
-    """Checks whether lines of a stream state more than one time, as those of a clock do that does not stand still.
+    """Checks whether lines of a stream state more than one time, as those of a clock do that does
+    not stand still.
 
     A line with a TAG block states a time of its own.
     """
@@ -200,7 +235,9 @@ def _runs(lines: Iterable[str]) -> bool:
 
 def _refuse_times(has_times: bool, where: str) -> None:
     if has_times:
-        raise UsageError("the rows say when they were: --rate is not used", where=where, fix="leave it out")
+        raise UsageError(
+            "the rows say when they were: --rate is not used", where=where, fix="leave it out"
+        )
 
 
 def _all_lines(source: TextFile) -> Iterator[str]:
@@ -210,7 +247,11 @@ def _all_lines(source: TextFile) -> Iterator[str]:
 
 def _sentences(source: TextFile, rate: float, start: int) -> Iterator[str]:
     """Sentences with a stamp that moves on with each wind sentence of the most frequent kind."""
-    keys = Counter(_key(match["key"]) for line in _all_lines(source) if (match := _WIND.search(line)) is not None)
+    keys = Counter(
+        _key(match["key"])
+        for line in _all_lines(source)
+        if (match := _WIND.search(line)) is not None
+    )
     main = keys.most_common(1)[0][0]
     count = -1
     for line in _all_lines(source):
@@ -235,9 +276,11 @@ def _stamp(start: int, count: int, rate: float) -> str:
     return iso(start + round(count * NANOSECONDS / rate))
 
 
-def _table(source: TextFile, rate: float, start: int, where: str) -> tuple[list[str], list[Finding]]:
-    """Puts a column of instants behind a table's own, whose numbers stay what they are; also reports what is not of the
-    table."""
+def _table(
+    source: TextFile, rate: float, start: int, where: str
+) -> tuple[list[str], list[Finding]]:
+    """Puts a column of instants behind a table's own, whose numbers stay what they are; also
+    reports what is not of the table."""
     layout = shape_of(source.head(HEAD_LINES))
     if layout is None:
         return _single(source, rate, start, where), []
@@ -253,8 +296,13 @@ def _table(source: TextFile, rate: float, start: int, where: str) -> tuple[list[
             left_out += 1
     findings: list[Finding] = []
     if left_out:
-        message = f"{left_out} lines have another number of columns than the table; left out, each counted as a reading"
-        findings.append(Finding(kind="malformed-lines", severity=Severity.ERROR, count=left_out, what=message))
+        message = (
+            f"{left_out} lines have another number of columns than the table; left out, each "
+            "counted as a reading"
+        )
+        findings.append(
+            Finding(kind="malformed-lines", severity=Severity.ERROR, count=left_out, what=message)
+        )
     names = [
         f"{name} [{unit.strip('[]()')}]" if unit else name
         for name, unit in zip(layout.names, layout.units, strict=True)
@@ -268,14 +316,20 @@ def _single(source: TextFile, rate: float, start: int, where: str) -> list[str]:
     heading = filled[0] if filled and not _NUMBER.fullmatch(filled[0]) else ""
     rows = filled[1:] if heading else filled
     if not rows or sum(bool(_NUMBER.fullmatch(row)) for row in rows) < 0.9 * len(rows):
-        raise UsageError("neither a table nor sentences of wind: --rate is not used", where=where, fix="leave it out")
+        raise UsageError(
+            "neither a table nor sentences of wind: --rate is not used",
+            where=where,
+            fix="leave it out",
+        )
     cells = ([row.replace(",", "."), _stamp(start, at, rate)] for at, row in enumerate(rows))
     return _written([heading, _CLOCK], cells)
 
 
 def _lines_from(source: TextFile, first: int) -> Iterator[str]:
     for number, lines in source.blocks():
-        yield from (line for at, line in enumerate(lines, start=number) if at >= first and line.strip())
+        yield from (
+            line for at, line in enumerate(lines, start=number) if at >= first and line.strip()
+        )
 
 
 def _points(row: Sequence[str], layout: TableShape) -> list[str]:

@@ -1,4 +1,5 @@
-"""The boxes of an MP4 or MOV file (ISO/IEC 14496-12, 4.2): where it is cut off, and what its edit lists show."""
+"""The boxes of an MP4 or MOV file (ISO/IEC 14496-12, 4.2): where it is cut off, and what its edit
+lists show."""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ class Box:
     """One box.
 
     Attributes:
-        at, body, end: bytes of the file at which it begins, at which its content begins, and behind its last.
+        at, body, end: bytes of the file at which it begins, at which its content begins, and behind
+            its last.
     """
 
     kind: bytes
@@ -52,7 +54,8 @@ def is_mp4(path: Path) -> bool:
 
 
 def boxes(stream: BufferedIOBase, at: int, end: int) -> Iterator[Box]:
-    """Boxes of the bytes from `at` to `end`; the last may reach beyond, and what is no box ends them."""
+    """Boxes of the bytes from `at` to `end`; the last may reach beyond, and what is no box ends
+    them."""
     while at + 8 <= end:
         stream.seek(at)
         head = stream.read(16)
@@ -68,23 +71,26 @@ def boxes(stream: BufferedIOBase, at: int, end: int) -> Iterator[Box]:
 
 
 def top(path: Path) -> tuple[list[Box], int]:
-    """Lists the file's own boxes, but for its metadata's and fragments' content, and returns its length."""
+    """Lists the file's own boxes, but for its metadata's and fragments' content, and returns its
+    length."""
     length = path.stat().st_size
     with path.open("rb") as stream:
         return list(islice(boxes(stream, 0, length), _MOST)), length
 
 
 def is_cut(path: Path) -> bool:
-    """Checks whether a file ends within one of its boxes, or behind a fragment's head without its frames."""
+    """Checks whether a file ends within one of its boxes, or behind a fragment's head without its
+    frames."""
     found_boxes, length = top(path)
     return not found_boxes or found_boxes[-1].end != length or found_boxes[-1].kind == b"moof"
 
 
 def whole_part(path: Path) -> int | None:
-    """Finds where the whole boxes of a file end that is cut off within a further one other than its frames; else None.
+    """Finds where the whole boxes of a file end that is cut off within a further one other than its
+    frames; else None.
 
-    A reader that looks at the heads of all fragments first would give up the file for the last one. Of frames that are
-    cut off, those before the cut can be read.
+    A reader that looks at the heads of all fragments first would give up the file for the last one.
+    Of frames that are cut off, those before the cut can be read.
     """
     if not is_mp4(path):
         return None
@@ -97,7 +103,8 @@ def whole_part(path: Path) -> int | None:
 
 
 def edits(path: Path, track: int) -> list[Edit]:
-    """Reads the edit list of a track by its number; empty where it has none, or the file is not an MP4 or MOV."""
+    """Reads the edit list of a track by its number; empty where it has none, or the file is not an
+    MP4 or MOV."""
     if not is_mp4(path):
         return []
     found_boxes, length = top(path)
@@ -108,15 +115,22 @@ def edits(path: Path, track: int) -> list[Edit]:
                 if box.kind == b"mvhd":
                     scale = _number(stream, box, 12, 20)
                 elif box.kind == b"trak":
-                    inside = {part.kind: part for part in islice(boxes(stream, box.body, box.end), _MOST)}
+                    inside = {
+                        part.kind: part for part in islice(boxes(stream, box.body, box.end), _MOST)
+                    }
                     header, listed = inside.get(b"tkhd"), inside.get(b"edts")
-                    if header is not None and listed is not None and _number(stream, header, 12, 20) == track:
+                    if (
+                        header is not None
+                        and listed is not None
+                        and _number(stream, header, 12, 20) == track
+                    ):
                         return _entries(stream, listed, scale)
     return []
 
 
 def _number(stream: BufferedIOBase, box: Box, plain: int, wide: int) -> int:
-    """Reads a number of four bytes of a full box, which lies at `plain` in version 0 and at `wide` in version 1."""
+    """Reads a number of four bytes of a full box, which lies at `plain` in version 0 and at `wide`
+    in version 1."""
     stream.seek(box.body)
     content = stream.read(wide + 4)
     at = wide if content[:1] == b"\1" else plain
@@ -124,7 +138,14 @@ def _number(stream: BufferedIOBase, box: Box, plain: int, wide: int) -> int:
 
 
 def _entries(stream: BufferedIOBase, listed: Box, scale: int) -> list[Edit]:
-    box = next((box for box in islice(boxes(stream, listed.body, listed.end), _MOST) if box.kind == b"elst"), None)
+    box = next(
+        (
+            box
+            for box in islice(boxes(stream, listed.body, listed.end), _MOST)
+            if box.kind == b"elst"
+        ),
+        None,
+    )
     if box is None:
         return []
     stream.seek(box.body)
@@ -140,8 +161,8 @@ def _entries(stream: BufferedIOBase, listed: Box, scale: int) -> list[Edit]:
 
 
 def edit_list_remark(edit_list: Sequence[Edit]) -> str | None:
-    """Describes how an edit list shows a medium otherwise than from one place on at its own pace; None where it does
-    not."""
+    """Describes how an edit list shows a medium otherwise than from one place on at its own pace;
+    None where it does not."""
     parts = [edit for edit in edit_list if edit.begins >= 0]
     speeds = sorted({edit.rate for edit in parts} - {1.0})
     if speeds:

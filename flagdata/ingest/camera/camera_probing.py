@@ -68,7 +68,8 @@ class CameraProbe:
 
 @dataclass(frozen=True, kw_only=True)
 class Pictured:
-    """The container and the codec of a file that holds pictures, whether or not it says when they were taken."""
+    """The container and the codec of a file that holds pictures, whether or not it says when they
+    were taken."""
 
     container: str
     codec: str
@@ -98,7 +99,8 @@ def probe(path: Path | str, options: CameraOptions | None = None) -> CameraProbe
     """Look at a camera file or image sequence: headers, all packets, one decoded frame.
 
     Raises:
-        NotFoundError, InputError, LimitError, TimeError, UsageError: as `open_camera`, but a missing start is no error.
+        NotFoundError, InputError, LimitError, TimeError, UsageError: as `open_camera`, but a
+            missing start is no error.
     """
     path = local_path(path)
     options = options or CameraOptions()

@@ -1,10 +1,12 @@
-"""Chapters: the files into which a camera splits one recording, each stamped with the creation time of the whole.
+"""Chapters: the files into which a camera splits one recording, each stamped with the creation time
+of the whole.
 
-A later chapter begins where the earlier ones end. Where the file's name says that it is a later chapter, and all
-earlier ones lie beside it and state the same creation time, its start is that time plus their durations. Names are
-GoPro's: GH010042, GH020042, … (also GX, GL, GS) of the HERO6 and later ones, and GOPR0042, GP010042, … of those before.
-Cameras that stamp each file by itself, as AVCHD camcorders do, need none of it. Of other cameras, two files with
-successive numbers and one creation time are reported, and neither is moved: they may as well be clips of one film.
+A later chapter begins where the earlier ones end. Where the file's name says that it is a later
+chapter, and all earlier ones lie beside it and state the same creation time, its start is that time
+plus their durations. Names are GoPro's: GH010042, GH020042, … (also GX, GL, GS) of the HERO6 and
+later ones, and GOPR0042, GP010042, … of those before. Cameras that stamp each file by itself, as
+AVCHD camcorders do, need none of it. Of other cameras, two files with successive numbers and one
+creation time are reported, and neither is moved: they may as well be clips of one film.
 """
 
 from __future__ import annotations
@@ -34,7 +36,8 @@ class Chapter:
     """What the files beside a file say of where it begins within its recording.
 
     Attributes:
-        before: length of all earlier chapters, by their containers' stamps [s]; 0 where it is not known.
+        before: length of all earlier chapters, by their containers' stamps [s]; 0 where it is not
+            known.
         finding: what to report where the start is taken from the creation time.
     """
 
@@ -43,8 +46,8 @@ class Chapter:
 
 
 def chapter_of(path: Path) -> Chapter | None:
-    """Finds where a later chapter begins; None for any other file, and for a chapter that states its own creation
-    time."""
+    """Finds where a later chapter begins; None for any other file, and for a chapter that states
+    its own creation time."""
     counted = _COUNTED.fullmatch(path.name)
     header = _header(path) if counted is not None and not path.is_dir() else None
     if counted is None or header is None or header[0] is None:
@@ -57,25 +60,34 @@ def chapter_of(path: Path) -> Chapter | None:
             return None
         former = f"{counted['head']}{number - 1:0{len(digits)}}{counted['rest']}"
         other_header = _header(path.with_name(former))
-        text = f"{former} beside it states the same creation time: if both are of one recording, this one starts later"
+        text = (
+            f"{former} beside it states the same creation time: if both are of one recording, this "
+            "one starts later"
+        )
         return (
-            _not_placed(text, fix="give --start") if other_header is not None and other_header[0] == header[0] else None
+            _not_placed(text, fix="give --start")
+            if other_header is not None and other_header[0] == header[0]
+            else None
         )
     before = Fraction(0)
     for name in earlier:
         other_header = _header(path.with_name(name))
         if other_header is None or other_header[1] is None:
             message = (
-                f"chapter {len(earlier) + 1} of a recording carries the creation time of the whole one; it begins "
+                f"chapter {len(earlier) + 1} of a recording carries the creation time of the whole "
+                "one; it begins "
                 f"after the earlier chapters, of which {name} is not beside it or cannot be read"
             )
-            return _not_placed(message, fix="put the earlier chapters into its folder, or give --start")
+            return _not_placed(
+                message, fix="put the earlier chapters into its folder, or give --start"
+            )
         if other_header[0] != header[0]:
             return None
         before += other_header[1]
     placed = Finding.of(
         "chapter-placed",
-        f"chapter {len(earlier) + 1} of a recording carries the creation time of the whole one; it begins "
+        f"chapter {len(earlier) + 1} of a recording carries the creation time of the whole one; it "
+        "begins "
         f"{float(before):.3f} s later, after {', '.join(earlier)}",
         value=float(before),
     )
@@ -87,7 +99,8 @@ def _not_placed(text: str, *, fix: str) -> Chapter:
 
 
 def place_by_name(name: str) -> tuple[str, int] | None:
-    """Reads the recording that a GoPro's file name states, and its chapter from 1 on; None for any other name."""
+    """Reads the recording that a GoPro's file name states, and its chapter from 1 on; None for any
+    other name."""
     if match := _NEW.fullmatch(name):
         return f"{match['head']}{match['file']}".upper(), _chapter(match)
     if match := _OLD.fullmatch(name):
@@ -102,7 +115,8 @@ def _chapter(match: re.Match[str]) -> int:
 
 
 def _earlier(name: str) -> list[str]:
-    """Names of the chapters before a file; empty where its name does not say that it is a later chapter."""
+    """Names of the chapters before a file; empty where its name does not say that it is a later
+    chapter."""
     if match := _NEW.fullmatch(name):
         return [f"{match['head']}{k:02}{match['file']}" for k in range(1, _chapter(match))]
     if match := _OLD.fullmatch(name):
@@ -113,7 +127,8 @@ def _earlier(name: str) -> list[str]:
 
 
 def _header(path: Path) -> tuple[str | None, Fraction | None] | None:
-    """Reads creation time and length [s] from the header of a file; None where there is none that can be read."""
+    """Reads creation time and length [s] from the header of a file; None where there is none that
+    can be read."""
     if not path.is_file():
         return None
     try:
@@ -121,6 +136,12 @@ def _header(path: Path) -> tuple[str | None, Fraction | None] | None:
     except FlagdataError:
         return None
     with container:
-        metadata = {key.lower(): value for key, value in {**container.metadata, **stream.metadata}.items()}
-        length = None if stream.duration is None or stream.time_base is None else stream.duration * stream.time_base
+        metadata = {
+            key.lower(): value for key, value in {**container.metadata, **stream.metadata}.items()
+        }
+        length = (
+            None
+            if stream.duration is None or stream.time_base is None
+            else stream.duration * stream.time_base
+        )
         return metadata.get("creation_time"), length

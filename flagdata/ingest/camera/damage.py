@@ -57,12 +57,14 @@ class Damage:
             findings.append(
                 Finding.of(
                     "damaged-references",
-                    f"{self.suspect} frames between damage and the next key frame may show traces of it",
+                    f"{self.suspect} frames between damage and the next key frame may show traces "
+                    "of it",
                     count=self.suspect,
                 )
             )
         findings += resized_findings(
-            self.resized, fix="bring all frames to one size: ffmpeg -i IN -vf scale=WIDTH:HEIGHT OUT"
+            self.resized,
+            fix="bring all frames to one size: ffmpeg -i IN -vf scale=WIDTH:HEIGHT OUT",
         )
         missing = expected - self.packets - self.decoded
         if missing > 0:
@@ -97,7 +99,10 @@ def undecoded_findings(count: int, *, total: int, first: str | None = None) -> l
 
 
 def resized_findings(
-    count: int, *, than: str = "the first", fix: str = "ingest the frames of each size as a recording of their own"
+    count: int,
+    *,
+    than: str = "the first",
+    fix: str = "ingest the frames of each size as a recording of their own",
 ) -> list[Finding]:
     """Reports frames of another size than the one that was kept; empty where `count` is 0.
 
@@ -108,6 +113,9 @@ def resized_findings(
         return []
     return [
         Finding.of(
-            "size-changed", f"{count} frames have another size than {than} and were left out", count=count, fix=fix
+            "size-changed",
+            f"{count} frames have another size than {than} and were left out",
+            count=count,
+            fix=fix,
         )
     ]

@@ -1,4 +1,5 @@
-"""The white of grays that are stored in 16 bits, by the bits used: cameras of 10, 12 or 14 bits store theirs so."""
+"""The white of grays that are stored in 16 bits, by the bits used: cameras of 10, 12 or 14 bits
+store theirs so."""
 
 from __future__ import annotations
 
@@ -11,7 +12,8 @@ WHITE = float(2 ** _DEPTHS[-1] - 1)
 
 
 def fills(brightest: int) -> bool:
-    """Checks whether a gray shows that all 16 bits are used: no brighter one can change what `white` says."""
+    """Checks whether a gray shows that all 16 bits are used: no brighter one can change what
+    `white` says."""
     return brightest >> _DEPTHS[-2] > 0
 
 
@@ -29,7 +31,8 @@ def white(brightest: int, *, which: str, otherwise: str = "") -> tuple[float, tu
     most = 2**bits - 1
     finding = Finding.of(
         "depth-by-content",
-        f"no pixel of {which}, of 16 bits, is brighter than {brightest}: they are read as gray of {bits} bits, 0 "
+        f"no pixel of {which}, of 16 bits, is brighter than {brightest}: they are read as gray of "
+        f"{bits} bits, 0 "
         f"to {most}",
         value=float(bits),
         fix=f"if they are only dark, convert them to 8 bits first{otherwise}",

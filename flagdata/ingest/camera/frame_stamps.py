@@ -1,4 +1,5 @@
-"""Stamps of a file's frames: what their rate is, and a strictly increasing sequence out of imperfect ones."""
+"""Stamps of a file's frames: what their rate is, and a strictly increasing sequence out of
+imperfect ones."""
 
 from __future__ import annotations
 
@@ -25,13 +26,16 @@ class Timing:
     Attributes:
         tick: seconds of one stamp unit.
         origin: stamp of the first frame; instants are counted from it.
-        period: ticks from frame to frame: the mean where the rate is constant, the median where it varies.
-        variable: more than one frame in a hundred is off that rate by more than the stamps' own rounding.
+        period: ticks from frame to frame: the mean where the rate is constant, the median where it
+            varies.
+        variable: more than one frame in a hundred is off that rate by more than the stamps' own
+            rounding.
         span: ticks from the first to the last stamp.
         shortest, longest: steps between neighbouring stamps [ticks].
         count: frames with a stamp.
         missing: frames without one.
-        end: packets of the file that belong to it, from the first on; None for all. The clock starts anew after them.
+        end: packets of the file that belong to it, from the first on; None for all. The clock
+            starts anew after them.
     """
 
     tick: Fraction
@@ -53,7 +57,11 @@ class Timing:
     @property
     def mean_rate(self) -> Fraction:
         """Frames a second over the whole, which is the `rate` where that is constant."""
-        return Fraction(self.count - 1) / (self.span * self.tick) if self.variable and self.span else self.rate
+        return (
+            Fraction(self.count - 1) / (self.span * self.tick)
+            if self.variable and self.span
+            else self.rate
+        )
 
     @property
     def duration(self) -> float:
@@ -71,8 +79,8 @@ def survey(
 ) -> Timing:
     """Reads what the stamps say, (n,) in the order of the file.
 
-    The period of a constant-rate file is the mean step, steps over missing frames left aside: exact where single steps
-    are rounded to the container's ticks (33 or 34 ms in Matroska).
+    The period of a constant-rate file is the mean step, steps over missing frames left aside: exact
+    where single steps are rounded to the container's ticks (33 or 34 ms in Matroska).
 
     Args:
         fallback_rate: frames a second where there are fewer than two different stamps.
@@ -84,7 +92,11 @@ def survey(
     steps = np.diff(ordered)
     if len(steps) == 0:
         if fallback_rate is None:
-            raise InputError("fewer than two time stamps: no frame rate", where=where, fix="give a longer recording")
+            raise InputError(
+                "fewer than two time stamps: no frame rate",
+                where=where,
+                fix="give a longer recording",
+            )
         period = 1 / (fallback_rate * tick)
         origin = int(ordered[0]) if len(ordered) else 0
         return Timing(
@@ -121,11 +133,13 @@ def survey(
 
 
 class StampRepair(Generic[T]):
-    """Makes strictly increasing instants of the stamps of decoded frames; reports what it had to do.
+    """Makes strictly increasing instants of the stamps of decoded frames; reports what it had to
+    do.
 
     - no stamp: one period after its predecessor;
     - the same stamp as before: two frames cannot share an instant, the later is left out;
-    - a single stamp out of order: the frame that lies farther from where the period puts it is left out;
+    - a single stamp out of order: the frame that lies farther from where the period puts it is left
+      out;
     - a jump forward is a gap, and kept as such.
 
     Holds one frame, to know whether its successor agrees with it.
@@ -177,7 +191,9 @@ class StampRepair(Generic[T]):
     def _held_is_the_odd_one(self, stamp: int) -> bool:
         if self._held is None or self._last is None or stamp <= self._last:
             return False
-        return abs(self._held[0] - self._last - self._period) > abs(stamp - self._last - 2 * self._period)
+        return abs(self._held[0] - self._last - self._period) > abs(
+            stamp - self._last - 2 * self._period
+        )
 
     def _note(self, kind: str, index: int) -> None:
         self._where.setdefault(kind, index)

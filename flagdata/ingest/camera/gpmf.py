@@ -1,9 +1,11 @@
-"""GPS time in the telemetry of GoPro's cameras (GPMF): key-length-value records in a track of their own.
+"""GPS time in the telemetry of GoPro's cameras (GPMF): key-length-value records in a track of their
+own.
 
-A record is a key of four letters, a type, the size of an element [B], their number, and the elements, big-endian and
-filled up to four bytes; type 0 holds further records (https://github.com/gopro/gpmf-parser). Cameras up to the HERO10
-state in each payload one `GPSU`, "yymmddhhmmss.sss" in UTC, and in `GPSF` whether satellites were found; later ones
-state both in each row of `GPS9`. The time of a payload without a fix is the camera's own, and is not used.
+A record is a key of four letters, a type, the size of an element [B], their number, and the
+elements, big-endian and filled up to four bytes; type 0 holds further records
+(https://github.com/gopro/gpmf-parser). Cameras up to the HERO10 state in each payload one `GPSU`,
+"yymmddhhmmss.sss" in UTC, and in `GPSF` whether satellites were found; later ones state both in
+each row of `GPS9`. The time of a payload without a fix is the camera's own, and is not used.
 """
 
 from __future__ import annotations
@@ -29,7 +31,9 @@ _ENOUGH = 60
 _HEAD = struct.Struct(">4scBH")
 _NESTED = b"\0"
 _FIXED = (2, 3)  # dimensions of a fix
-_ROW = struct.Struct(">7l2H")  # GPS9: latitude, longitude, altitude, speeds, days since 2000, ms of the day, DOP, fix
+_ROW = struct.Struct(
+    ">7l2H"
+)  # GPS9: latitude, longitude, altitude, speeds, days since 2000, ms of the day, DOP, fix
 _ROW_TYPE = b"lllllllSS"
 
 
@@ -50,15 +54,18 @@ class GpsTimes:
     def start(self, scale: float) -> tuple[int, float]:
         """Computes when the first frame was taken [UTC ns], and its standard uncertainty [s].
 
-        The median over payloads of the instant less the time since the first frame. At which moment of its payload a
-        time was taken, nothing states: it is taken as the begin, and the uncertainty is the root mean square for any
-        moment within, together with the scatter.
+        The median over payloads of the instant less the time since the first frame. At which moment
+        of its payload a
+        time was taken, nothing states: it is taken as the begin, and the uncertainty is the root
+        mean square for any moment within, together with the scatter.
 
         Args:
             scale: seconds that pass in one second of the container's clock.
         """
         first = self.instants[0]
-        starts = np.array([instant - first for instant in self.instants]) / NANOSECONDS - scale * np.array(self.after)
+        starts = np.array(
+            [instant - first for instant in self.instants]
+        ) / NANOSECONDS - scale * np.array(self.after)
         middle = float(np.median(starts))
         scatter = 1.4826 * float(np.median(np.abs(starts - middle)))
         sigma = float(np.hypot(scale * self.length / 3**0.5, scatter))
@@ -68,13 +75,18 @@ class GpsTimes:
 def telemetry_of(container: InputContainer) -> DataStream | None:
     """Finds the track with GPMF, if there is one."""
     streams = (
-        stream for stream in container.streams.data if stream.metadata.get("handler_name", "").strip() == _HANDLER
+        stream
+        for stream in container.streams.data
+        if stream.metadata.get("handler_name", "").strip() == _HANDLER
     )
     return next(streams, None)
 
 
-def gps_times(container: InputContainer, stream: DataStream, *, origin: Fraction) -> GpsTimes | None:
-    """Reads the times of the first payloads with a fix; None if no payload has one that can be read.
+def gps_times(
+    container: InputContainer, stream: DataStream, *, origin: Fraction
+) -> GpsTimes | None:
+    """Reads the times of the first payloads with a fix; None if no payload has one that can be
+    read.
 
     Args:
         container: at its begin; it is read on.
@@ -91,15 +103,22 @@ def gps_times(container: InputContainer, stream: DataStream, *, origin: Fraction
     )
 
 
-def _time(container: InputContainer, stream: DataStream) -> Iterator[tuple[int, Fraction, Fraction]]:
-    """Yields (instant, begin, length) of each payload with a fix; damage of the container ends them."""
+def _time(
+    container: InputContainer, stream: DataStream
+) -> Iterator[tuple[int, Fraction, Fraction]]:
+    """Yields (instant, begin, length) of each payload with a fix; damage of the container ends
+    them."""
     try:
         for packet in container.demux(stream):
             if packet.pts is None or packet.time_base is None or not packet.size:
                 continue
             instant = _instant(bytes(packet))
             if instant is not None:
-                yield instant, packet.pts * packet.time_base, (packet.duration or 0) * packet.time_base
+                yield (
+                    instant,
+                    packet.pts * packet.time_base,
+                    (packet.duration or 0) * packet.time_base,
+                )
     except (av.error.FFmpegError, IndexError):
         return
 
@@ -125,7 +144,9 @@ def _row_instant(rows: bytes) -> int | None:
     *_, days, milliseconds, _, fix = _ROW.unpack_from(rows)
     if fix not in _FIXED or not (0 <= days < 36525 and 0 <= milliseconds < 86_400_000):
         return None
-    return from_datetime(datetime(2000, 1, 1, tzinfo=UTC) + timedelta(days=days, milliseconds=milliseconds))
+    return from_datetime(
+        datetime(2000, 1, 1, tzinfo=UTC) + timedelta(days=days, milliseconds=milliseconds)
+    )
 
 
 def _text_instant(text: bytes, fix: bytes) -> int | None:
@@ -133,7 +154,9 @@ def _text_instant(text: bytes, fix: bytes) -> int | None:
     if len(fix) < 4 or int.from_bytes(fix[:4], "big") not in _FIXED:
         return None
     try:
-        return from_datetime(datetime.strptime(text.decode("ascii"), "%y%m%d%H%M%S.%f").replace(tzinfo=UTC))
+        return from_datetime(
+            datetime.strptime(text.decode("ascii"), "%y%m%d%H%M%S.%f").replace(tzinfo=UTC)
+        )
     except ValueError:
         return None
 
@@ -143,7 +166,8 @@ def _within(records: Iterable[tuple[bytes, bytes, bytes]], key: bytes) -> Iterat
 
 
 def _records(data: bytes) -> Iterator[tuple[bytes, bytes, bytes]]:
-    """Yields (key, type, content) of successive records; one that is longer than its payload ends them."""
+    """Yields (key, type, content) of successive records; one that is longer than its payload ends
+    them."""
     position = 0
     while position + _HEAD.size <= len(data):
         key, kind, size, count = _HEAD.unpack_from(data, position)

@@ -1,8 +1,9 @@
 """Resampling by time stamps: for each instant of an exact grid the nearest source frame, or none.
 
-Nearest, not a blend: a frame stays one exposure of the scene. Blending neighbours would draw a flapping flag twice, and
-its motion blur would depend on where the grid falls between them. The price is a time error of up to half a source
-period (8.3 ms from 60 Hz), which is reported with each frame.
+Nearest, not a blend: a frame stays one exposure of the scene. Blending neighbours would draw a
+flapping flag twice, and its motion blur would depend on where the grid falls between them. The
+price is a time error of up to half a source period (8.3 ms from 60 Hz), which is reported with each
+frame.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, kw_only=True)
 class Pick(Generic[T]):
-    """One output frame: its instant [ns], the source frame that stands for it, and its distance from it [ns]."""
+    """One output frame: its instant [ns], the source frame that stands for it, and its distance
+    from it [ns]."""
 
     time: int
     source: T
@@ -38,7 +40,8 @@ class GridReport:
         left_out: grid instants without a source frame within tolerance.
         first_left_out: index of the first of them on the grid.
         gaps: runs of such instants.
-        longest_gap: largest distance between the source frames around such a run, or from the start [ns].
+        longest_gap: largest distance between the source frames around such a run, or from the start
+            [ns].
         worst_error: largest distance of an output frame from its source frame [ns].
     """
 
@@ -108,7 +111,8 @@ class EveryFrame(Generic[T]):
 
 
 class Resampler(Generic[T]):
-    """Picks the nearest source frame for each instant `start + k / rate`, k = 0, 1, …, as stamps come in.
+    """Picks the nearest source frame for each instant `start + k / rate`, k = 0, 1, …, as stamps
+    come in.
 
     An instant half-way between two source frames takes the earlier. Holds one source frame.
 
@@ -116,13 +120,15 @@ class Resampler(Generic[T]):
         start: first instant of the grid [ns].
         rate: grid instants a second.
         tolerance: farthest a source frame may be from the instant it stands for [ns].
-        tail: how far beyond the last source frame the grid goes on [ns]; half a source period keeps the errors at the
-            end what they are elsewhere.
+        tail: how far beyond the last source frame the grid goes on [ns]; half a source period keeps
+            the errors at the end what they are elsewhere.
     """
 
     def __init__(self, *, start: int, rate: Fraction, tolerance: int, tail: int) -> None:
         if rate <= 0 or tolerance < 0 or tail < 0:
-            raise UsageError("a grid needs rate > 0, tolerance ≥ 0 and tail ≥ 0", fix="give such values")
+            raise UsageError(
+                "a grid needs rate > 0, tolerance ≥ 0 and tail ≥ 0", fix="give such values"
+            )
         self._start = start
         self.rate = rate
         self._tolerance = tolerance
@@ -132,7 +138,8 @@ class Resampler(Generic[T]):
         self.report = GridReport()
 
     def instant(self, index: int) -> int:
-        """Computes the instant of grid point `index` [ns], rounded to the nearest nanosecond, half up."""
+        """Computes the instant of grid point `index` [ns], rounded to the nearest nanosecond, half
+        up."""
         twice = 2 * index * NANOSECONDS * self.rate.denominator
         return self._start + (twice + self.rate.numerator) // (2 * self.rate.numerator)
 
@@ -181,7 +188,8 @@ class Resampler(Generic[T]):
     def _skip_before(self, time: int) -> int:
         """Leaves out the instants before `time`, without walking over them; returns how many."""
         index = self._next
-        # Largest step that surely stays at or before `time`, then at most a few single ones for the rounding.
+        # Largest step that surely stays at or before `time`, then at most a few single ones for the
+        # rounding.
         index = max(index, int(Fraction(time - self._start, NANOSECONDS) * self.rate) - 1)
         while self.instant(index) < time:
             index += 1

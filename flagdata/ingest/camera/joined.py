@@ -1,8 +1,10 @@
-"""Chapters of one recording read as one file: the user names them, and each has to begin where the one before ends.
+"""Chapters of one recording read as one file: the user names them, and each has to begin where the
+one before ends.
 
-What proves it is what the files state. Cameras that stamp all chapters with the creation time of the whole number them
-by their names (GoPro); others stamp each by itself (DJI, dash cameras), and its creation time is the end of the one
-before, to within the whole seconds in which both are stated.
+What proves it is what the files state. Cameras that stamp all chapters with the creation time of
+the whole number them by their names (GoPro); others stamp each by itself (DJI, dash cameras), and
+its creation time is the end of the one before, to within the whole seconds in which both are
+stated.
 """
 
 from __future__ import annotations
@@ -29,10 +31,11 @@ from flagdata.ingest.mcap.bags import to_join
 from flagdata.timebase import NANOSECONDS, parse
 
 _ROUNDED = 2.5
-"""s by which a chapter may seem to begin beside the end of the one before: both times are stated in whole seconds, and
-a camera takes up to a second to open a file."""
+"""s by which a chapter may seem to begin beside the end of the one before: both times are stated in
+whole seconds, and a camera takes up to a second to open a file."""
 _RATE, _VARIES = Fraction(1, 100), Fraction(1, 4)
-"""Parts by which the frame rates of one recording's chapters differ at most: of constant rates, and of varying ones."""
+"""Parts by which the frame rates of one recording's chapters differ at most: of constant rates, and
+of varying ones."""
 
 
 def in_order(paths: Sequence[Path]) -> tuple[Path, ...]:
@@ -43,7 +46,11 @@ def in_order(paths: Sequence[Path]) -> tuple[Path, ...]:
     """
     check_films(paths)
     if len(paths) < 2:
-        raise UsageError("a single file cannot be joined", where="--join", fix="name all chapters of the recording")
+        raise UsageError(
+            "a single file cannot be joined",
+            where="--join",
+            fix="name all chapters of the recording",
+        )
     if len({path.resolve() for path in paths}) < len(paths):
         raise UsageError("a file is named twice", where="--join", fix="name each chapter once")
 
@@ -57,7 +64,8 @@ def in_order(paths: Sequence[Path]) -> tuple[Path, ...]:
 
 
 def check_films(paths: Sequence[Path]) -> None:
-    """Make sure that all that is to be joined are files of the kind that is: no folders, no MCAP files.
+    """Make sure that all that is to be joined are files of the kind that is: no folders, no MCAP
+    files.
 
     Raises:
         UsageError: one is not.
@@ -76,8 +84,8 @@ def check_films(paths: Sequence[Path]) -> None:
 class JoinedSource:
     """Several video files, one after another. See `Source`.
 
-    Stamps are counted in the first file's ticks from its first frame; a later chapter's first frame comes one period
-    after the last of the one before.
+    Stamps are counted in the first file's ticks from its first frame; a later chapter's first frame
+    comes one period after the last of the one before.
 
     Args:
         paths: in the order of the recording.
@@ -110,7 +118,11 @@ class JoinedSource:
         for path, part in zip(self._paths[1:], self._parts[1:], strict=True):
             facts = part.facts
             for noun, mine, theirs in (
-                ("size of the pictures", f"{facts.width} × {facts.height}", f"{first.width} × {first.height}"),
+                (
+                    "size of the pictures",
+                    f"{facts.width} × {facts.height}",
+                    f"{first.width} × {first.height}",
+                ),
                 ("shape of a pixel", facts.aspect, first.aspect),
                 ("coding", facts.codec, first.codec),
                 ("pixel format", facts.pixel_format, first.pixel_format),
@@ -130,7 +142,8 @@ class JoinedSource:
 
     def _differing(self, path: Path, noun: str, mine: object, theirs: object) -> UsageError:
         return UsageError(
-            f"the {noun} differs from that of {self._paths[0].name}: {mine} and {theirs}; they are not one recording",
+            f"the {noun} differs from that of {self._paths[0].name}: {mine} and {theirs}; they are "
+            "not one recording",
             where=str(path),
             fix="ingest it by itself, without --join",
         )
@@ -139,7 +152,8 @@ class JoinedSource:
         """Refuse chapters that do not follow one another, by their creation times.
 
         Returns:
-            what to report: how they were joined, and a warning where nothing states that they follow one another.
+            what to report: how they were joined, and a warning where nothing states that they
+                follow one another.
         """
         created = [_creation_time(part.facts) for part in self._parts]
         lengths = [_length(part.facts.timing) for part in self._parts]
@@ -151,7 +165,11 @@ class JoinedSource:
             count=len(self._paths),
         )
         chapters_by_name = [chapter for chapter in by_name if chapter is not None]
-        if len(chapters_by_name) == len(by_name) and len(set(created)) == 1 and created[0] is not None:
+        if (
+            len(chapters_by_name) == len(by_name)
+            and len(set(created)) == 1
+            and created[0] is not None
+        ):
             chapters = [chapter for _, chapter in chapters_by_name]
             successive = all(after - before == 1 for before, after in pairwise(chapters))
             if len({recording for recording, _ in chapters_by_name}) > 1 or not successive:
@@ -167,7 +185,8 @@ class JoinedSource:
             between = (after - before) / NANOSECONDS - float(lengths[index])
             if abs(between) > _ROUNDED:
                 raise UsageError(
-                    f"by its creation time it begins {abs(between):.1f} s {'after' if between > 0 else 'before'} the "
+                    f"by its creation time it begins {abs(between):.1f} s "
+                    f"{'after' if between > 0 else 'before'} the "
                     f"end of {self._paths[index].name}",
                     where=str(self._paths[index + 1]),
                     fix="name chapters that follow one another, or leave out --join",
@@ -177,7 +196,8 @@ class JoinedSource:
                 joined,
                 Finding.of(
                     "chapters-unproven",
-                    "nothing in the files states that each begins where the one before ends; it is taken as given",
+                    "nothing in the files states that each begins where the one before ends; it is "
+                    "taken as given",
                 ),
             ]
         return [joined]
@@ -189,7 +209,9 @@ class JoinedSource:
         count = sum(timing.count for timing in timings)
         variable = any(timing.variable for timing in timings)
         steps = sum(timing.count - 1 for timing in timings)
-        mean = sum((timing.period * (timing.count - 1) for timing in timings), Fraction(0)) / max(1, steps)
+        mean = sum((timing.period * (timing.count - 1) for timing in timings), Fraction(0)) / max(
+            1, steps
+        )
         timing = Timing(
             tick=first.tick,
             origin=0,
@@ -202,7 +224,10 @@ class JoinedSource:
             missing=sum(timing.missing for timing in timings),
         )
         findings = [
-            replace(finding, where=path.name if finding.where is None else f"{path.name}, {finding.where}")
+            replace(
+                finding,
+                where=path.name if finding.where is None else f"{path.name}, {finding.where}",
+            )
             for path, part in zip(self._paths, self._parts, strict=True)
             for finding in part.facts.findings
         ]
@@ -215,9 +240,13 @@ class JoinedSource:
                 yield _move_picture(picture, offset - origin)
 
     def samples(self, runs: int, count: int, stride: int) -> Iterator[list[Picture]]:
-        spans = np.array([max(1, part.facts.timing.count) for part in self._parts], dtype=np.float64)
+        spans = np.array(
+            [max(1, part.facts.timing.count) for part in self._parts], dtype=np.float64
+        )
         ends = np.rint(np.cumsum(spans) / spans.sum() * runs).astype(int).tolist()
-        for part, offset, begin, end in zip(self._parts, self._offsets, [0, *ends], ends, strict=False):
+        for part, offset, begin, end in zip(
+            self._parts, self._offsets, [0, *ends], ends, strict=False
+        ):
             if end > begin:
                 origin = part.facts.timing.origin
                 for run in part.samples(end - begin, count, stride):
@@ -225,7 +254,10 @@ class JoinedSource:
 
     def damage(self) -> list[Finding]:
         return [
-            replace(finding, where=path.name if finding.where is None else f"{path.name}, {finding.where}")
+            replace(
+                finding,
+                where=path.name if finding.where is None else f"{path.name}, {finding.where}",
+            )
             for path, part in zip(self._paths, self._parts, strict=True)
             for finding in part.damage()
         ]
@@ -244,7 +276,8 @@ def _offsets(timings: Sequence[Timing]) -> list[int]:
 
 
 def _of_one_rate(first: Timing, second: Timing) -> bool:
-    """Checks whether two files may be of one recording by their rates, of which a varying one states its median."""
+    """Checks whether two files may be of one recording by their rates, of which a varying one
+    states its median."""
     difference = abs(first.period * first.tick / (second.period * second.tick) - 1)
     return difference <= (_VARIES if first.variable or second.variable else _RATE)
 

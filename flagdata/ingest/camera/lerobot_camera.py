@@ -1,8 +1,9 @@
-"""One camera of one episode of a LeRobot data set (version 3.0), frame by frame for ingest: from its MP4, or from
-pictures in the table of frames.
+"""One camera of one episode of a LeRobot data set (version 3.0), frame by frame for ingest: from
+its MP4, or from pictures in the table of frames.
 
-If the data set has the feature `flagdata.time`, as flagdata's exports do, it gives each frame's instant in UTC.
-Otherwise times count from the episode's start (column `timestamp`), and the user gives the start.
+If the data set has the feature `flagdata.time`, as flagdata's exports do, it gives each frame's
+instant in UTC. Otherwise times count from the episode's start (column `timestamp`), and the user
+gives the start.
 
 Source: lerobot 0.6, `lerobot.datasets`.
 """
@@ -33,7 +34,14 @@ from flagdata.core.files.bounded_parquet import read_parquet
 from flagdata.core.files.regular_files import LEROBOT_INFO, LEROBOT_LABEL, LEROBOT_OWN, is_beside
 from flagdata.core.findings import Finding, Severity
 from flagdata.core.printable import printable
-from flagdata.errors import CorruptError, InputError, LimitError, NotFoundError, TimeError, UnknownNameError
+from flagdata.errors import (
+    CorruptError,
+    InputError,
+    LimitError,
+    NotFoundError,
+    TimeError,
+    UnknownNameError,
+)
 from flagdata.ingest.camera.camera_options import CameraOptions
 from flagdata.ingest.camera.damage import undecoded_findings
 from flagdata.ingest.camera.frame_stamps import survey
@@ -47,12 +55,17 @@ from flagdata.recipes.shelves import is_name
 VERSION = "v3.0"
 TIME = "flagdata.time"
 """Feature with each frame's instant [UTC ns]."""
-_TRAIN_ALONE = "its description has one split, train, which LeRobot writes for every data set: no side is taken from it"
+_TRAIN_ALONE = (
+    "its description has one split, train, which LeRobot writes for every data set: no side is "
+    "taken from it"
+)
 _EPISODES = re.compile(r"(\d{1,18}):(\d{1,18})")
 _NANOSECOND = Fraction(1, 1_000_000_000)
 _FIELD = re.compile(r"\{(\w+)(?::0?(\d?)d)?\}")
 _FARTHEST = 9.2e18  # ns; 64 bits hold a little more
-_EARLY = 0.25  # frame periods by which a decoded frame may precede the first one wanted and still count
+_EARLY = (
+    0.25  # frame periods by which a decoded frame may precede the first one wanted and still count
+)
 
 T = TypeVar("T")
 
@@ -69,7 +82,9 @@ def description_of(folder: Path) -> Mapping[str, Any]:
     version, stored = info.get("codebase_version"), info.get("storage_format", "parquet")
     if version != VERSION:
         fix = "convert it by LeRobot's own script, convert_dataset_v21_to_v30"
-        raise InputError(f"the LeRobot data set has version {version}, not {VERSION}", where=str(where), fix=fix)
+        raise InputError(
+            f"the LeRobot data set has version {version}, not {VERSION}", where=str(where), fix=fix
+        )
     if stored != "parquet":
         fix = "write it as Parquet and MP4 by LeRobot's own tools"
         raise InputError(f"the LeRobot data set is stored as {stored}", where=str(where), fix=fix)
@@ -84,17 +99,20 @@ def description_of(folder: Path) -> Mapping[str, Any]:
 def stated_of(
     folder: Path, info: Mapping[str, Any], row: Mapping[str, Any]
 ) -> tuple[dict[str, Any], tuple[Finding, ...]]:
-    """Reads what a data set states of an episode, as columns of the catalog: data set and side, seed and session.
+    """Reads what a data set states of an episode, as columns of the catalog: data set and side,
+    seed and session.
 
-    The side is the split of its description that the episode is in. One split, train, over all episodes states none:
-    LeRobot writes it for every data set. An export of flagdata says under a key of its own whether its splits are
-    sides, and has seed and session in the label of the episode.
+    The side is the split of its description that the episode is in. One split, train, over all
+    episodes states none: LeRobot writes it for every data set. An export of flagdata says under a
+    key of its own whether its splits are sides, and has seed and session in the label of the
+    episode.
 
     Args:
         row: of the table of episodes.
 
     Raises:
-        CorruptError: splits that are no ranges of episodes, an episode in two of them, or a label that is damaged.
+        CorruptError: splits that are no ranges of episodes, an episode in two of them, or a label
+            that is damaged.
     """
     own = info.get(LEROBOT_OWN)
     label = _label(row, str(folder))
@@ -104,7 +122,9 @@ def stated_of(
     if isinstance(own, Mapping):
         splits = splits if own.get("split_by") is not None else {}
     elif splits == {"train": (0, info.get("total_episodes"))}:
-        return columns, (Finding(kind="side-not-stated", severity=Severity.NOTE, what=_TRAIN_ALONE),)
+        return columns, (
+            Finding(kind="side-not-stated", severity=Severity.NOTE, what=_TRAIN_ALONE),
+        )
     sides = [side for side, (first, end) in splits.items() if first <= number < end]
     if len(sides) > 1:
         raise CorruptError(
@@ -113,7 +133,10 @@ def stated_of(
             fix="correct its splits, which are ranges of episodes: first:end",
         )
     if sides:
-        columns |= {"dataset": label.get("dataset") or printable(folder.resolve().name), "side": sides[0]}
+        columns |= {
+            "dataset": label.get("dataset") or printable(folder.resolve().name),
+            "side": sides[0],
+        }
     return columns, ()
 
 
@@ -129,7 +152,9 @@ def _splits(info: Mapping[str, Any], where: str) -> dict[str, tuple[int, int]]:
         for name, value in (stated.items() if isinstance(stated, Mapping) else [("", "")])
         if is_name(name) and isinstance(value, str)
     }
-    found = {name: (int(match[1]), int(match[2])) for name, match in matches.items() if match is not None}
+    found = {
+        name: (int(match[1]), int(match[2])) for name, match in matches.items() if match is not None
+    }
     if len(found) != len(stated):
         raise CorruptError(
             "its splits are no ranges of episodes",
@@ -154,23 +179,29 @@ def _label(row: Mapping[str, Any], where: str) -> dict[str, Any]:
         if not all(map(is_name, texts)) or type(label.get("seed")) not in (int, NoneType):
             raise ValueError("values of other types")
     except (ValueError, TypeError, AttributeError) as error:
-        raise CorruptError(f"the label of an episode is damaged: {error}", where=where, fix="export it again") from None
+        raise CorruptError(
+            f"the label of an episode is damaged: {error}", where=where, fix="export it again"
+        ) from None
     return label
 
 
 def cameras(info: Mapping[str, Any]) -> dict[str, str]:
     """Lists the features that are pictures: name → "video" or "image"."""
     kinds = {
-        name: str(feature.get("dtype")) for name, feature in info["features"].items() if isinstance(feature, Mapping)
+        name: str(feature.get("dtype"))
+        for name, feature in info["features"].items()
+        if isinstance(feature, Mapping)
     }
     return {name: kind for name, kind in kinds.items() if kind in ("video", "image")}
 
 
 class EpisodeSource:
-    """The pictures of one camera in one episode. See `flagdata.ingest.camera.picture_source.PictureSource`.
+    """The pictures of one camera in one episode. See
+    `flagdata.ingest.camera.picture_source.PictureSource`.
 
     Raises:
-        InputError: several episodes or cameras and none is named, or none of its pictures can be decoded.
+        InputError: several episodes or cameras and none is named, or none of its pictures can be
+            decoded.
         NotFoundError: no such episode, or one of its files is missing.
         UnknownNameError: no such camera.
         TimeError: a rate for frames that have stamps.
@@ -182,7 +213,9 @@ class EpisodeSource:
         info = description_of(folder)
         self._camera, self._kind = _chosen(cameras(info), options.topic, self._where)
         if options.sequence_fps is not None:
-            raise TimeError("its frames have stamps", where=self._where, fix="leave out --sequence-fps")
+            raise TimeError(
+                "its frames have stamps", where=self._where, fix="leave out --sequence-fps"
+            )
         row = _episode(folder, options.episode)
         data = folder / _path(info["data_path"], row, "data", self._where)
         columns = ["timestamp", *([TIME] if TIME in info["features"] else [])]
@@ -202,10 +235,18 @@ class EpisodeSource:
         self._film: tuple[Path, float, float] | None = None
         if self._kind == "video":
             of_film = f"videos/{self._camera}"
-            path = folder / _path(str(info.get("video_path")), row, of_film, self._where, video_key=self._camera)
-            begin, end = (_number(row, f"{of_film}/{part}_timestamp", self._where) for part in ("from", "to"))
+            path = folder / _path(
+                str(info.get("video_path")), row, of_film, self._where, video_key=self._camera
+            )
+            begin, end = (
+                _number(row, f"{of_film}/{part}_timestamp", self._where) for part in ("from", "to")
+            )
             if not 0 <= begin < end:
-                raise CorruptError(f"its film lasts from {begin} s to {end} s", where=self._where, fix="copy it again")
+                raise CorruptError(
+                    f"its film lasts from {begin} s to {end} s",
+                    where=self._where,
+                    fix="copy it again",
+                )
             self._film = (path, begin, end)
         self._broken = 0
         timing = survey(
@@ -217,7 +258,9 @@ class EpisodeSource:
         )
         first = next(self.samples(1, 1, 1), None)
         if first is None:
-            raise InputError("no picture of the episode can be decoded", where=self._where, fix="copy it again")
+            raise InputError(
+                "no picture of the episode can be decoded", where=self._where, fix="copy it again"
+            )
         luma = first[0].luma()
         data_set, side_findings = stated_of(folder, info, row)
         findings = [*([] if self._stamped else [_counted_finding()]), *side_findings]
@@ -266,7 +309,9 @@ class EpisodeSource:
         if self._film is not None:
             yield from self._of_film(start)
             return
-        pictures = self._pictures if self._pictures is not None else pa.chunked_array([], pa.binary())
+        pictures = (
+            self._pictures if self._pictures is not None else pa.chunked_array([], pa.binary())
+        )
         for stamp, cell in zip(self._stamps[start:].tolist(), pictures.slice(start), strict=True):
             value = cell.as_py()
             stored = value.get("bytes") if isinstance(value, Mapping) else value
@@ -276,7 +321,9 @@ class EpisodeSource:
                 image = Image.open(io.BytesIO(stored), formats=STILLS)
                 if image.width * image.height > self._limits.frame_pixels:
                     raise LimitError(
-                        "a picture is beyond the limit of pixels", where=self._where, fix="raise the limit"
+                        "a picture is beyond the limit of pixels",
+                        where=self._where,
+                        fix="raise the limit",
                     )
                 image.load()
             except BROKEN:
@@ -287,7 +334,9 @@ class EpisodeSource:
         """Frames of the episode's part of its film: the k-th belongs to the k-th row."""
         path, begin, end = self._film or (Path(), 0.0, 0.0)
         if not path.is_file():
-            raise NotFoundError("the film of the episode is missing", where=str(path), fix="copy the data set again")
+            raise NotFoundError(
+                "the film of the episode is missing", where=str(path), fix="copy the data set again"
+            )
         period = (end - begin) / max(len(self._stamps), 1)
         wanted = begin + start * period
         try:
@@ -308,12 +357,16 @@ class EpisodeSource:
 
 
 def _path(template: str, row: Mapping[str, Any], prefix: str, where: str, **names: str) -> str:
-    """Builds the path where the description has a file of an episode, from the data set's folder on.
+    """Builds the path where the description has a file of an episode, from the data set's folder
+    on.
 
     Raises:
         CorruptError: outside that folder, or not by the fields that LeRobot has.
     """
-    numbers = {part: round(_number(row, f"{prefix}/{part}", where)) for part in ("chunk_index", "file_index")}
+    numbers = {
+        part: round(_number(row, f"{prefix}/{part}", where))
+        for part in ("chunk_index", "file_index")
+    }
 
     def fill_field(match: re.Match[str]) -> str:
         values = {**numbers, **names}
@@ -321,7 +374,9 @@ def _path(template: str, row: Mapping[str, Any], prefix: str, where: str, **name
 
     text = _FIELD.sub(fill_field, template)
     if "{" in text:
-        raise CorruptError(f"{template!r} names no file", where=f"{where}/{LEROBOT_INFO}", fix="copy it again")
+        raise CorruptError(
+            f"{template!r} names no file", where=f"{where}/{LEROBOT_INFO}", fix="copy it again"
+        )
     return _inside(text, where)
 
 
@@ -332,7 +387,9 @@ def _inside(text: str, where: str) -> str:
         CorruptError: it leads out of it.
     """
     if text.startswith("/") or "\0" in text or ".." in Path(text).parts:
-        raise CorruptError(f"{text!r} leads out of the data set", where=where, fix="do not trust this data set")
+        raise CorruptError(
+            f"{text!r} leads out of the data set", where=where, fix="do not trust this data set"
+        )
     return text
 
 
@@ -344,21 +401,32 @@ def _number(row: Mapping[str, Any], name: str, where: str) -> float:
     """
     value = row.get(name)
     if not isinstance(value, int | float) or not math.isfinite(value):
-        raise CorruptError(f"the table of episodes does not state {name}", where=where, fix="copy it again")
+        raise CorruptError(
+            f"the table of episodes does not state {name}", where=where, fix="copy it again"
+        )
     return value
 
 
 def stamps_of(table: pa.Table, where: str) -> IntArray:
-    """Reads (n,) instants of frames [UTC ns], or nanoseconds from the episode's start where the table has no `TIME`.
+    """Reads (n,) instants of frames [UTC ns], or nanoseconds from the episode's start where the
+    table has no `TIME`.
 
     Raises:
         CorruptError: a column of another type, or with values that are no instants.
     """
-    name, kind = (TIME, pa.types.is_int64) if TIME in table.column_names else ("timestamp", pa.types.is_floating)
+    name, kind = (
+        (TIME, pa.types.is_int64)
+        if TIME in table.column_names
+        else ("timestamp", pa.types.is_floating)
+    )
     column = table[name]
-    values = column.to_numpy() if kind(column.type) and not column.null_count else np.array([np.nan])
+    values = (
+        column.to_numpy() if kind(column.type) and not column.null_count else np.array([np.nan])
+    )
     if not np.all(np.abs(values.astype(np.float64)) < _FARTHEST * (1 if name == TIME else 1e-9)):
-        raise CorruptError(f"the column {name} has values that are no instants", where=where, fix="copy it again")
+        raise CorruptError(
+            f"the column {name} has values that are no instants", where=where, fix="copy it again"
+        )
     return values if name == TIME else np.rint(values.astype(np.float64) * 1e9).astype(np.int64)
 
 
@@ -368,8 +436,16 @@ def _chosen(streams: Mapping[str, str], wanted: str | None, where: str) -> tuple
             raise UnknownNameError.of("camera", wanted, streams, where=where)
         return wanted, streams[wanted]
     if len(streams) != 1:
-        message = f"{len(streams)} cameras: {', '.join(streams)}" if streams else "a LeRobot data set without a camera"
-        raise InputError(message, where=where, fix="choose one: --topic NAME" if streams else "there is no film in it")
+        message = (
+            f"{len(streams)} cameras: {', '.join(streams)}"
+            if streams
+            else "a LeRobot data set without a camera"
+        )
+        raise InputError(
+            message,
+            where=where,
+            fix="choose one: --topic NAME" if streams else "there is no film in it",
+        )
     return next(iter(streams.items()))
 
 
@@ -377,11 +453,15 @@ def _episode(folder: Path, wanted: int | None) -> dict[str, Any]:
     files = tables(folder / "meta" / "episodes")
     if not files:
         raise CorruptError(
-            "there is no table of episodes", where=str(folder / "meta" / "episodes"), fix="copy it again"
+            "there is no table of episodes",
+            where=str(folder / "meta" / "episodes"),
+            fix="copy it again",
         )
     rows: list[dict[str, Any]] = []
     for path in files:
-        names = [name for name in _reading(path, pq.read_schema).names if not name.startswith("stats/")]
+        names = [
+            name for name in _reading(path, pq.read_schema).names if not name.startswith("stats/")
+        ]
         rows += read(path, names).to_pylist()
     if wanted is None and len(rows) != 1:
         raise InputError(
@@ -392,11 +472,14 @@ def _episode(folder: Path, wanted: int | None) -> dict[str, Any]:
     for row in rows:
         if wanted in (None, row.get("episode_index")):
             return row
-    raise NotFoundError(f"there is no episode {wanted}", where=str(folder), fix=f"there are {len(rows)}, from 0 on")
+    raise NotFoundError(
+        f"there is no episode {wanted}", where=str(folder), fix=f"there are {len(rows)}, from 0 on"
+    )
 
 
 def tables(folder: Path) -> list[Path]:
-    """Lists the tables of a part of a data set, in order; not what an operating system put beside them."""
+    """Lists the tables of a part of a data set, in order; not what an operating system put beside
+    them."""
     return sorted(path for path in folder.glob("*/*.parquet") if not is_beside(path.name))
 
 
@@ -415,22 +498,29 @@ def _reading(path: Path, how: Callable[[Path], T]) -> T:
     try:
         return how(path)
     except FileNotFoundError:
-        raise NotFoundError("a table of the data set is missing", where=str(path), fix="copy it again") from None
+        raise NotFoundError(
+            "a table of the data set is missing", where=str(path), fix="copy it again"
+        ) from None
     except (pa.ArrowException, OSError) as error:
-        raise CorruptError(f"a table cannot be read: {error}", where=str(path), fix="copy it again") from None
+        raise CorruptError(
+            f"a table cannot be read: {error}", where=str(path), fix="copy it again"
+        ) from None
 
 
 def _table(path: Path, columns: list[str], episode: int) -> pa.Table:
     table = read(path, [*columns, "episode_index", "frame_index"])
     table = table.filter(pc.field("episode_index") == episode).sort_by("frame_index")
     if not table.num_rows:
-        raise CorruptError(f"the table has no frame of episode {episode}", where=str(path), fix="copy it again")
+        raise CorruptError(
+            f"the table has no frame of episode {episode}", where=str(path), fix="copy it again"
+        )
     return table
 
 
 def _counted_finding() -> Finding:
     return Finding.of(
         "stamps-synthetic",
-        "LeRobot counts a frame's time as its number / fps: gaps and jitter of the camera are not in the data set",
+        "LeRobot counts a frame's time as its number / fps: gaps and jitter of the camera are not "
+        "in the data set",
         fix="where the original recording exists, ingest that",
     )

@@ -1,4 +1,5 @@
-"""The luma of a decoded frame, as a Pillow image over the decoder's own memory where the format allows."""
+"""The luma of a decoded frame, as a Pillow image over the decoder's own memory where the format
+allows."""
 
 from __future__ import annotations
 
@@ -14,7 +15,9 @@ from flagdata.errors import InputError
 
 _FULL = 2  # AVCOL_RANGE_JPEG
 _LIMITED = 1  # AVCOL_RANGE_MPEG
-_STILL_CODECS = frozenset({"mjpeg", "png", "apng", "gif", "bmp", "tiff", "webp", "jpeg2000", "ljpeg", "jpegls", "ffv1"})
+_STILL_CODECS = frozenset(
+    {"mjpeg", "png", "apng", "gif", "bmp", "tiff", "webp", "jpeg2000", "ljpeg", "jpegls", "ffv1"}
+)
 BROKEN = (
     OSError,
     ValueError,
@@ -48,22 +51,29 @@ class Luma:
 
 
 def luma_of_frame(frame: av.VideoFrame, *, codec: str) -> Luma:
-    """Extracts the luma of a frame: a Y'CbCr stream's own Y', whatever matrix (Rec. 601, 709, 2020) it was made with.
+    """Extracts the luma of a frame: a Y'CbCr stream's own Y', whatever matrix (Rec. 601, 709, 2020)
+    it was made with.
 
-    A stream of RGB has none: Rec. 601 weights make it (0.299, 0.587, 0.114), as JPEG (ITU-T T.871) does, so that the
-    same picture as PNG and as JPEG gives the same gray. The range is what the stream says; where it says nothing,
-    limited for Y'CbCr (the default of H.264, E.2.1) and full for still-picture codecs. Alpha is left aside.
+    A stream of RGB has none: Rec. 601 weights make it (0.299, 0.587, 0.114), as JPEG (ITU-T T.871)
+    does, so that the same picture as PNG and as JPEG gives the same gray. The range is what the
+    stream says; where it says nothing, limited for Y'CbCr (the default of H.264, E.2.1) and full
+    for still-picture codecs. Alpha is left aside.
 
     Raises:
         InputError: a pixel format that has no luma (Bayer mosaics, XYZ).
     """
     name = frame.format.name
     if name.startswith(("xyz", "bayer", "vaapi", "cuda")):
-        raise InputError(f"pixel format {name} is neither gray, YUV nor RGB", fix="convert the file to H.264 first")
+        raise InputError(
+            f"pixel format {name} is neither gray, YUV nor RGB",
+            fix="convert the file to H.264 first",
+        )
     if frame.format.is_rgb or frame.format.has_palette or name.startswith("mono"):
         rgb = _convert(frame, "rgb24")
         plane = rgb.planes[0]
-        colour = Image.frombuffer("RGB", (rgb.width, rgb.height), bytes(plane), "raw", "RGB", plane.line_size, 1)
+        colour = Image.frombuffer(
+            "RGB", (rgb.width, rgb.height), bytes(plane), "raw", "RGB", plane.line_size, 1
+        )
         return Luma(image=colour.convert("L"), black=0.0, white=255.0)
     first = frame.format.components[0]
     bits = first.bits
@@ -74,7 +84,9 @@ def luma_of_frame(frame: av.VideoFrame, *, codec: str) -> Luma:
     plane = frame.planes[0]
     if bits == 8:
         memory = cast(bytes, plane)  # Pillow takes any buffer, and keeps it alive
-        image = Image.frombuffer("L", (frame.width, frame.height), memory, "raw", "L", plane.line_size, 1)
+        image = Image.frombuffer(
+            "L", (frame.width, frame.height), memory, "raw", "L", plane.line_size, 1
+        )
     else:
         words = np.frombuffer(memoryview(plane), dtype="<u2").reshape(-1, plane.line_size // 2)[
             : frame.height, : frame.width
@@ -86,20 +98,27 @@ def luma_of_frame(frame: av.VideoFrame, *, codec: str) -> Luma:
 
 
 def luma_of_image(image: Image.Image) -> Luma:
-    """Loads the pixels. A JPEG's own Y' is taken as it is; RGB is weighted by Rec. 601, see `luma_of_frame`."""
+    """Loads the pixels. A JPEG's own Y' is taken as it is; RGB is weighted by Rec. 601, see
+    `luma_of_frame`."""
     image.draft("L", image.size)
     if image.mode.startswith(DEEP):
         words = np.asarray(image).astype(np.float32)
         return Luma(image=Image.fromarray(words), black=0.0, white=65535.0)
     if image.mode in ("I", "F"):
-        raise InputError(f"an image of mode {image.mode} states no range of gray", fix="use images of 8 or 16 bits")
-    gray = image.convert("RGB").convert("L") if image.mode not in ("L", "LA") else image.convert("L")
+        raise InputError(
+            f"an image of mode {image.mode} states no range of gray",
+            fix="use images of 8 or 16 bits",
+        )
+    gray = (
+        image.convert("RGB").convert("L") if image.mode not in ("L", "LA") else image.convert("L")
+    )
     gray.load()
     return Luma(image=gray, black=0.0, white=255.0)
 
 
 def _convert(frame: av.VideoFrame, pixel_format: str) -> av.VideoFrame:
-    """Converts a picture to another layout, by one thread: with several, swscale mixed up bands of rows."""
+    """Converts a picture to another layout, by one thread: with several, swscale mixed up bands of
+    rows."""
     return frame.reformat(format=pixel_format, threads=1)
 
 

@@ -1,12 +1,14 @@
-"""Where the motion is: a crop proposed from it, and a picture of the proposal for a person to judge.
+"""Where the motion is: a crop proposed from it, and a picture of the proposal for a person to
+judge.
 
-Short runs of frames are taken all over the recording. In each run the brightness of every frame is fitted to the run's
-median frame (gain and offset, over the pixels that hold still), so that flicker and exposure control are not motion.
-What remains is the temporal standard deviation of each pixel. Where its mean square over the runs stands out, there are
-regions; the one with the most motion in the median run is the flag's, since a passer-by is in few of the runs. A tip is
-thin, faint or out in few of the runs, and so does not stand out in that mean: the region grows into all that moves in
-any run, however faintly, and touches it, unless that would make it nearly twice as large, as a passer-by does. The
-proposal is the square around it.
+Short runs of frames are taken all over the recording. In each run the brightness of every frame is
+fitted to the run's median frame (gain and offset, over the pixels that hold still), so that flicker
+and exposure control are not motion. What remains is the temporal standard deviation of each pixel.
+Where its mean square over the runs stands out, there are regions; the one with the most motion in
+the median run is the flag's, since a passer-by is in few of the runs. A tip is thin, faint or out
+in few of the runs, and so does not stand out in that mean: the region grows into all that moves in
+any run, however faintly, and touches it, unless that would make it nearly twice as large, as a
+passer-by does. The proposal is the square around it.
 """
 
 from __future__ import annotations
@@ -27,7 +29,8 @@ from flagdata.ingest.camera.picture_source import Picture, PictureSource
 
 _RUNS = 10
 _PER_RUN = 8
-_STEP = 0.03  # s between the frames of a run: a flag's motion shows, and a run stays within a tenth of its gusts
+# s between the frames of a run: a flag's motion shows, and a run stays within a tenth of its gusts
+_STEP = 0.03
 _WORK = 192  # px, longer side of the images that are compared
 _SHOW = 960  # px, longer side of the picture
 _FAINTEST = 1.0  # gray levels; less motion than one is coding noise
@@ -44,7 +47,8 @@ class CropProposal:
     """A crop found from motion.
 
     Attributes:
-        box: of the upright image; square, unless the motion is longer than the image's shorter side.
+        box: of the upright image; square, unless the motion is longer than the image's shorter
+            side.
         moving: the part of the upright image that moves, without the padding.
         share: part of the motion's energy that lies in the region within the box, 0 to 1.
         runs: runs of frames it rests on.
@@ -82,7 +86,9 @@ def propose(source: PictureSource, *, rate: float, where: str) -> CropProposal:
             first_picture = _small(pictures[0], source, uncropped, _SHOW)
     if not maps or first_picture is None:
         raise RefusedError(
-            "too few frames to see motion in", where=where, fix="give the crop as x,y,width,height, or take it whole"
+            "too few frames to see motion in",
+            where=where,
+            fix="give the crop as x,y,width,height, or take it whole",
         )
     stack = np.stack(maps)
     motion = np.sqrt(np.mean(stack**2, axis=0))
@@ -104,11 +110,12 @@ def propose(source: PictureSource, *, rate: float, where: str) -> CropProposal:
 
 
 def cut_off(crop: CropBox, proposal: CropProposal, *, wide: int) -> dict[str, int]:
-    """Measures by how many pixels what moves reaches beyond each edge of a crop, where it is partly inside; none
-    elsewhere.
+    """Measures by how many pixels what moves reaches beyond each edge of a crop, where it is partly
+    inside; none elsewhere.
 
     Args:
-        wide: width of the upright image; the motion is known to `_EDGE` pixels of the images that were compared.
+        wide: width of the upright image; the motion is known to `_EDGE` pixels of the images that
+            were compared.
     """
     moving = proposal.moving
     beyond = {
@@ -137,12 +144,14 @@ def _small(picture: Picture, source: PictureSource, uncropped: CropBox, size: in
         size=size,
     )
     top, left, high, wide = geometry.placement
-    return geometry.render(luma.image, black=luma.black, white=luma.white)[top : top + high, left : left + wide]
+    return geometry.render(luma.image, black=luma.black, white=luma.white)[
+        top : top + high, left : left + wide
+    ]
 
 
 def _deviation(frames: UInt8Array) -> Float32Array:
-    """Computes the temporal standard deviation of each pixel, global changes of gain and offset taken out; (n, h, w) →
-    (h, w)."""
+    """Computes the temporal standard deviation of each pixel, global changes of gain and offset
+    taken out; (n, h, w) → (h, w)."""
     stack = frames.astype(np.float32)
     reference = np.median(stack, axis=0)
     spread = stack.std(axis=0)
@@ -161,7 +170,8 @@ def _deviation(frames: UInt8Array) -> Float32Array:
 
 
 def _region(maps: Float32Array, motion: Float32Array, *, where: str) -> tuple[BoolArray, float]:
-    """Finds the connected region with most of the motion's energy in the median run, and its share of it.
+    """Finds the connected region with most of the motion's energy in the median run, and its share
+    of it.
 
     Args:
         maps: (run, height, width) deviation in each run.
@@ -175,16 +185,21 @@ def _region(maps: Float32Array, motion: Float32Array, *, where: str) -> tuple[Bo
     peak = float(np.percentile(smooth, 99.5))
     if peak - middle < _FAINTEST:
         raise RefusedError(
-            f"no motion is found in the image: gray levels change by {peak - middle:.2g}, less than {_FAINTEST:g}",
+            f"no motion is found in the image: gray levels change by {peak - middle:.2g}, less "
+            f"than {_FAINTEST:g}",
             where=where,
             fix="give the crop as x,y,width,height",
         )
-    moving = smooth > middle + max(_FAINTEST / 2, min(4 * noise, 0.5 * (peak - middle)), 0.1 * (peak - middle))
+    moving = smooth > middle + max(
+        _FAINTEST / 2, min(4 * noise, 0.5 * (peak - middle)), 0.1 * (peak - middle)
+    )
     # Parts of one flag that move apart by a few pixels are one region.
     labels = np.empty(moving.shape, dtype=np.int32)
     ndimage.label(ndimage.binary_dilation(moving, iterations=_BRIDGE), output=labels)
     names = np.arange(1, labels.max() + 1)
-    sums = np.array([ndimage.sum_labels(np.where(moving, run**2, 0.0), labels, index=names) for run in maps])
+    sums = np.array(
+        [ndimage.sum_labels(np.where(moving, run**2, 0.0), labels, index=names) for run in maps]
+    )
     energy = np.median(sums, axis=0)
     if energy.sum() == 0:
         raise RefusedError(
@@ -198,7 +213,8 @@ def _region(maps: Float32Array, motion: Float32Array, *, where: str) -> tuple[Bo
 
 
 def _with_tip(region: BoolArray, maps: Float32Array) -> BoolArray:
-    """Adds to a region what moves in any run and touches it; without, where that is much larger than the region."""
+    """Adds to a region what moves in any run and touches it; without, where that is much larger
+    than the region."""
     from scipy import ndimage  # only now: ingesting a log needs none of it
 
     moving = np.zeros_like(region)
@@ -224,13 +240,16 @@ def _extent_box(region: BoolArray, *, wide: int, high: int) -> CropBox:
     rows, columns = np.flatnonzero(region.any(axis=1)), np.flatnonzero(region.any(axis=0))
     scale = wide / region.shape[1]
     x, y = round(columns[0] * scale), round(rows[0] * scale)
-    right, bottom = min(wide, round((columns[-1] + 1) * scale)), min(high, round((rows[-1] + 1) * scale))
+    right, bottom = (
+        min(wide, round((columns[-1] + 1) * scale)),
+        min(high, round((rows[-1] + 1) * scale)),
+    )
     return CropBox(x=x, y=y, width=right - x, height=bottom - y)
 
 
 def _box_around(region: BoolArray, *, wide: int, high: int) -> CropBox:
-    """Returns the padded square around `region`, in pixels of the upright image, moved inside it and cut where it is
-    larger."""
+    """Returns the padded square around `region`, in pixels of the upright image, moved inside it
+    and cut where it is larger."""
     rows, columns = np.flatnonzero(region.any(axis=1)), np.flatnonzero(region.any(axis=0))
     scale = wide / region.shape[1]
     left_edge, right = columns[0] * scale, (columns[-1] + 1) * scale
@@ -250,7 +269,9 @@ def _draw(image: UInt8Array, motion: NDArray[np.floating], box: CropBox, *, wide
     )
     strength = np.clip(np.asarray(heat) / max(float(np.percentile(motion, 99.5)), 1e-6), 0.0, 1.0)
     dim = image * 0.75
-    rgb = np.stack([dim + (255 - dim) * strength, dim * (1 - strength), dim * (1 - strength)], axis=-1)
+    rgb = np.stack(
+        [dim + (255 - dim) * strength, dim * (1 - strength), dim * (1 - strength)], axis=-1
+    )
     picture = Image.fromarray(np.rint(rgb).astype(np.uint8), mode="RGB")
     scale = image.shape[1] / wide
     corners = _scale_box(box, scale)

@@ -1,4 +1,5 @@
-"""From the stored picture to the upright square that comes out: rotation, pixel shape, crop, scale, padding."""
+"""From the stored picture to the upright square that comes out: rotation, pixel shape, crop, scale,
+padding."""
 
 from __future__ import annotations
 
@@ -17,10 +18,12 @@ from flagdata.ingest.camera.camera_options import Crop, CropBox
 
 @dataclass(frozen=True, kw_only=True)
 class Orientation:
-    """How the stored picture becomes upright: transposed first, then mirrored left-right, then top-bottom.
+    """How the stored picture becomes upright: transposed first, then mirrored left-right, then
+    top-bottom.
 
     Attributes:
-        exact: false when the file asked for an angle that is not a multiple of 90° and the nearest was taken.
+        exact: false when the file asked for an angle that is not a multiple of 90° and the nearest
+            was taken.
     """
 
     transpose: bool = False
@@ -34,7 +37,8 @@ class Orientation:
 
     @property
     def clockwise(self) -> int:
-        """Degrees clockwise that turn the stored picture upright; of a mirrored one, after mirroring left-right."""
+        """Degrees clockwise that turn the stored picture upright; of a mirrored one, after
+        mirroring left-right."""
         if self.transpose:
             return 90 if self.flip_x else 270
         return 180 if self.flip_y else 0
@@ -57,14 +61,20 @@ class Orientation:
     @property
     def _steps(self) -> tuple[Image.Transpose, ...]:
         chosen = (self.transpose, self.flip_x, self.flip_y)
-        steps = (Image.Transpose.TRANSPOSE, Image.Transpose.FLIP_LEFT_RIGHT, Image.Transpose.FLIP_TOP_BOTTOM)
+        steps = (
+            Image.Transpose.TRANSPOSE,
+            Image.Transpose.FLIP_LEFT_RIGHT,
+            Image.Transpose.FLIP_TOP_BOTTOM,
+        )
         return tuple(step for step, is_chosen in zip(steps, chosen, strict=True) if is_chosen)
 
     @classmethod
     def of_display_matrix(cls, matrix: Sequence[int]) -> Orientation:
-        """Reads the orientation from the nine numbers a, b, u, c, d, v, x, y, w of a container's display matrix.
+        """Reads the orientation from the nine numbers a, b, u, c, d, v, x, y, w of a container's
+        display matrix.
 
-        A stored pixel (p, q) is shown at (a p + c q, b p + d q), y down (ISO/IEC 14496-12, 8.3.2 and 6.2.2).
+        A stored pixel (p, q) is shown at (a p + c q, b p + d q), y down (ISO/IEC 14496-12, 8.3.2
+        and 6.2.2).
         """
         a, b, c, d = matrix[0], matrix[1], matrix[3], matrix[4]
         exact = (b == c == 0) if abs(a) > abs(b) else (a == d == 0)
@@ -74,9 +84,17 @@ class Orientation:
 
     @classmethod
     def of_exif(cls, value: int) -> Orientation:
-        """Reads the orientation from the Exif tag Orientation, 1 to 8 (CIPA DC-008, 4.6.4 A); other values are
-        upright."""
-        table = {2: (0, 1, 0), 3: (0, 1, 1), 4: (0, 0, 1), 5: (1, 0, 0), 6: (1, 1, 0), 7: (1, 1, 1), 8: (1, 0, 1)}
+        """Reads the orientation from the Exif tag Orientation, 1 to 8 (CIPA DC-008, 4.6.4 A); other
+        values are upright."""
+        table = {
+            2: (0, 1, 0),
+            3: (0, 1, 1),
+            4: (0, 0, 1),
+            5: (1, 0, 0),
+            6: (1, 1, 0),
+            7: (1, 1, 1),
+            8: (1, 0, 1),
+        }
         transpose, flip_x, flip_y = table.get(value, (0, 0, 0))
         return cls(transpose=bool(transpose), flip_x=bool(flip_x), flip_y=bool(flip_y))
 
@@ -85,8 +103,9 @@ class Orientation:
 class Geometry:
     """The way from a stored picture to a square of `size` pixels.
 
-    The upright image is the stored one with square pixels (its width multiplied by `aspect`) and turned. The crop is a
-    box of it. The crop's longer side fills the output; the rest is black, half on either side.
+    The upright image is the stored one with square pixels (its width multiplied by `aspect`) and
+    turned. The crop is a box of it. The crop's longer side fills the output; the rest is black,
+    half on either side.
 
     Attributes:
         width, height: of the stored picture [px].
@@ -123,7 +142,8 @@ class Geometry:
 
     @cached_property
     def _stored_box(self) -> tuple[float, float, float, float]:
-        """Left, top, right and bottom of the crop in the stored picture, in fractions of its pixels."""
+        """Left, top, right and bottom of the crop in the stored picture, in fractions of its
+        pixels."""
         wide, high = upright_size(self.width, self.height, self.aspect, self.orientation)
         left, right = self.crop.x / wide, (self.crop.x + self.crop.width) / wide
         top, bottom = self.crop.y / high, (self.crop.y + self.crop.height) / high
@@ -133,14 +153,20 @@ class Geometry:
             top, bottom = 1 - bottom, 1 - top
         if self.orientation.transpose:
             left, top, right, bottom = top, left, bottom, right
-        return (left * self.width, top * self.height, min(right, 1.0) * self.width, min(bottom, 1.0) * self.height)
+        return (
+            left * self.width,
+            top * self.height,
+            min(right, 1.0) * self.width,
+            min(bottom, 1.0) * self.height,
+        )
 
     def render(self, luma: Image.Image, *, black: float, white: float) -> UInt8Array:
         """Renders the output square of one stored luma picture; (size, size) uint8.
 
-        Scaling is a separable convolution with the Hamming-windowed kernel, widened when it shrinks: it averages over
-        the area an output pixel covers, so nothing aliases, and it has no negative lobes, so a flag's edge does not
-        ring. Then `black` … `white` is stretched to 0 … 255.
+        Scaling is a separable convolution with the Hamming-windowed kernel, widened when it
+        shrinks: it averages over the area an output pixel covers, so nothing aliases, and it has no
+        negative lobes, so a flag's edge does not ring. Then `black` … `white` is stretched to 0 …
+        255.
 
         Args:
             luma: mode L or F, `width` × `height`.
@@ -155,7 +181,8 @@ class Geometry:
         return square
 
     def content(self, luma: Image.Image, *, black: float, white: float) -> UInt8Array:
-        """Renders as `render`, without the padding; (height, width) uint8, the longer side `size`."""
+        """Renders as `render`, without the padding; (height, width) uint8, the longer side
+        `size`."""
         wide, high = self._content
         target, box = (high, wide) if self.orientation.transpose else (wide, high), self._stored_box
         is_whole = luma.size == target and box == (0, 0, *target)
@@ -181,15 +208,18 @@ def _turn_image(image: Image.Image, steps: Sequence[Image.Transpose]) -> Image.I
     return image
 
 
-def upright_size(width: int, height: int, aspect: Fraction, orientation: Orientation) -> tuple[int, int]:
-    """Computes width and height of the upright image with square pixels; the stored height is kept."""
+def upright_size(
+    width: int, height: int, aspect: Fraction, orientation: Orientation
+) -> tuple[int, int]:
+    """Computes width and height of the upright image with square pixels; the stored height is
+    kept."""
     wide = max(1, round(width * aspect))
     return (height, wide) if orientation.transpose else (wide, height)
 
 
 def settle_crop(crop: Crop, *, width: int, height: int) -> CropBox:
-    """Computes the box that `crop` means in an upright image of `width` × `height`; "auto" must have been resolved
-    before.
+    """Computes the box that `crop` means in an upright image of `width` × `height`; "auto" must
+    have been resolved before.
 
     Raises:
         UsageError: the box reaches beyond the image.

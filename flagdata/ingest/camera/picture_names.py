@@ -1,8 +1,11 @@
-"""The order of the pictures in a folder, and how many frames apart they are, by the numbers in their names.
+"""The order of the pictures in a folder, and how many frames apart they are, by the numbers in
+their names.
 
-A name is text and numbers in turn. The text has to be the same in all names; of the numbers, those that vary count.
-Where several do, they have to rise together, as a frame's number and its time do, or be a date and a time of day. What
-leaves the order open is refused: a picture in the wrong place is a frame at an instant at which it was not taken.
+A name is text and numbers in turn. The text has to be the same in all names; of the numbers, those
+that vary count. Where several do, they have to rise together, as a frame's number and its time do,
+or be a date and a time of day. What
+leaves the order open is refused: a picture in the wrong place is a frame at an instant at which it
+was not taken.
 
 The date and the time of day that the names of pictures state.
 """
@@ -44,7 +47,8 @@ class Clock:
 
     Attributes:
         times: of each name, from any origin [ns].
-        counts: number behind the seconds that is no fraction of one, as of a burst; 0 where there is none.
+        counts: number behind the seconds that is no fraction of one, as of a burst; 0 where there
+            is none.
         first, last: numbers of the names that make it, from `first` up to `last`.
         dated: whether the names state the day.
         resolution: of the times [ns].
@@ -63,12 +67,16 @@ class Clock:
 def clock_of(stems: Sequence[str]) -> Clock | None:
     """Reads the clock in names of one text; None where there is none, or it stands still.
 
-    Six digits without a day are taken for a time of day where none is of the first hour: smaller numbers count.
+    Six digits without a day are taken for a time of day where none is of the first hour: smaller
+    numbers count.
     """
     matches = [match for stem in stems if (match := _CLOCK.search(stem)) is not None]
     if len(matches) < len(stems):
         return None
-    places = {(len(_CLOCK_NUMBER.findall(m.string[: m.start()])), len(_CLOCK_NUMBER.findall(m[0]))) for m in matches}
+    places = {
+        (len(_CLOCK_NUMBER.findall(m.string[: m.start()])), len(_CLOCK_NUMBER.findall(m[0])))
+        for m in matches
+    }
     dated = {match["date"] is not None for match in matches}
     if len(places) > 1 or len(dated) > 1:
         return None
@@ -88,25 +96,33 @@ def clock_of(stems: Sequence[str]) -> Clock | None:
     fractions = [int(part[:9].ljust(9, "0")) if exact else 0 for part in parts]
     first, count = places.pop()
     return Clock(
-        times=tuple(second * NANOSECONDS + part for second, part in zip(seconds, fractions, strict=True)),
+        times=tuple(
+            second * NANOSECONDS + part for second, part in zip(seconds, fractions, strict=True)
+        ),
         counts=tuple(Ordinal.read("0" if exact or not part else part) for part in parts),
         first=first,
         last=first + count,
         dated=all(dated),
         resolution=10 ** max(0, 9 - min(widths)) if exact else NANOSECONDS,
-        problem=_problem(overnight=not all(dated) and {0, 23} <= hours, loose=len(widths) > 1, mark=matches[0]["mark"]),
+        problem=_problem(
+            overnight=not all(dated) and {0, 23} <= hours,
+            loose=len(widths) > 1,
+            mark=matches[0]["mark"],
+        ),
     )
 
 
 def _problem(*, overnight: bool, loose: bool, mark: str | None) -> tuple[str, str] | None:
     if overnight:
         return (
-            "the names state times of day of both sides of midnight and no day: their order is not known",
+            "the names state times of day of both sides of midnight and no day: their order is not "
+            "known",
             "put the date before the time in the names, as 20260501_235959",
         )
     if loose and mark in (".", ","):
         message = (
-            f"the numbers behind the seconds and {mark!r} are of several lengths: fractions or counts is not known"
+            f"the numbers behind the seconds and {mark!r} are of several lengths: fractions or "
+            "counts is not known"
         )
         return message, "write them with the same number of digits, as 12-00-00.520"
     return None
@@ -118,7 +134,9 @@ def _seconds(match: re.Match[str]) -> int:
     Raises:
         ValueError: no such day.
     """
-    hour, minute, second = (int(match[short] or match[long]) for short, long in (("h", "hh"), ("m", "mm"), ("s", "ss")))
+    hour, minute, second = (
+        int(match[short] or match[long]) for short, long in (("h", "hh"), ("m", "mm"), ("s", "ss"))
+    )
     if match["half"] is not None:
         hour = hour % 12 + (12 if match["half"] == "pm" else 0)
     of_day = (hour * 60 + minute) * 60 + second
@@ -135,10 +153,14 @@ _EPOCH = range(1_000_000_000, 2_200_000_000)  # seconds since 1970, of the years
 _NUMBER = re.compile(r"(\d+)")
 _COPY = re.compile(r"\s*\((\d+)\)$")
 _MINUS = re.compile(r"(?:^|[ _=(])-$")
-_RENAME = "name the pictures of one recording alike, with one number that counts the frames, and keep others elsewhere"
+_RENAME = (
+    "name the pictures of one recording alike, with one number that counts the frames, and keep "
+    "others elsewhere"
+)
 _COUNT = "number the pictures by frames, 1, 2, 3, …; a number that is left out is a missing frame"
 _LARGEST = 10**40
-"""Largest number of a name that is calculated with: a date, a time of day and a fraction have 23 digits."""
+"""Largest number of a name that is calculated with: a date, a time of day and a fraction have 23
+digits."""
 _LAST = 2**53
 """Last place of a picture: its time is a fraction's multiple of it."""
 
@@ -206,7 +228,8 @@ class _Reading:
 def order_pictures(names: Sequence[str], *, rate: Fraction, where: str) -> Ordered:
     """Pictures in the order of the numbers in their names, and the frame that each is.
 
-    A number that is missing is a missing frame. Numbers in steps, and times in about even ones, count one frame a step.
+    A number that is missing is a missing frame. Numbers in steps, and times in about even ones,
+    count one frame a step.
 
     Args:
         rate: frames a second, as the user gives it.
@@ -221,7 +244,8 @@ def order_pictures(names: Sequence[str], *, rate: Fraction, where: str) -> Order
         order = tuple(sorted(range(len(stems)), key=lambda i: stems[i]))
         note = Finding.of(
             "order-by-name",
-            "the file names have no numbers: the images are taken in the order of their names, none as missing",
+            "the file names have no numbers: the images are taken in the order of their names, "
+            "none as missing",
             fix="if it is not the order of the recording, number them in it",
         )
         return Ordered(order=order, places=tuple(range(len(order))), findings=(note,))
@@ -246,7 +270,8 @@ def _check_gaps(taken: Ordered, names: Sequence[str], where: str) -> None:
     steps = [b - a for a, b in pairwise(taken.places)]
     wide = next(k for k, step in enumerate(steps) if step > 1)
     raise InputError(
-        f"by the numbers in the names {sum(steps) - len(steps)} frames are missing, the first after "
+        f"by the numbers in the names {sum(steps) - len(steps)} frames are missing, the first "
+        "after "
         f"{names[taken.order[wide]]}: they do not count frames",
         where=where,
         fix=_COUNT,
@@ -254,7 +279,8 @@ def _check_gaps(taken: Ordered, names: Sequence[str], where: str) -> None:
 
 
 def _with_copies(stems: list[str]) -> list[str]:
-    """Returns the names with the "(1)" of a further picture of one name on all of them, where it is on some."""
+    """Returns the names with the "(1)" of a further picture of one name on all of them, where it is
+    on some."""
     copies = [_COPY.search(stem) for stem in stems]
     if all(copies) or not any(copies):
         return stems
@@ -285,7 +311,8 @@ def _columns(stems: Sequence[str], names: Sequence[str], where: str) -> list[_Co
             for kind, count in kinds.most_common(3)
         ]
         raise InputError(
-            f"the pictures' names are of {len(kinds)} kinds, such as {', '.join(examples)}: which of them are one "
+            f"the pictures' names are of {len(kinds)} kinds, such as {', '.join(examples)}: which "
+            "of them are one "
             "recording, and in which order, is not known",
             where=where,
             fix=_RENAME,
@@ -293,20 +320,31 @@ def _columns(stems: Sequence[str], names: Sequence[str], where: str) -> list[_Co
     columns = []
     for k, before in enumerate(texts[0][:-1]):
         digits = tuple(parts[2 * k + 1] for parts in split)
-        values = tuple(sign[k] * value for sign, value in zip(signs, _values(digits, names, where), strict=True))
+        values = tuple(
+            sign[k] * value
+            for sign, value in zip(signs, _values(digits, names, where), strict=True)
+        )
         column = _Column(before=before, values=values, digits=digits, tick=_epoch(values))
         unpadded = not any(len(text) > 1 and text[0] == "0" for text in digits)
-        dash = (k == 0 or before != "-") and _MINUS.search(before) is not None and column.varies and unpadded
+        dash = (
+            (k == 0 or before != "-")
+            and _MINUS.search(before) is not None
+            and column.varies
+            and unpadded
+        )
         if dash or (min(values) < 0 and 0 not in values):
             raise InputError(
-                f"whether the numbers of {names[0]} and {names[1]} are negative is not known", where=where, fix=_RENAME
+                f"whether the numbers of {names[0]} and {names[1]} are negative is not known",
+                where=where,
+                fix=_RENAME,
             )
         columns.append(column)
     return columns
 
 
 def _values(digits: Sequence[str], names: Sequence[str], where: str) -> list[int]:
-    """Numbers of a column; 0 of one that is the same in all names and longer than any count or time.
+    """Numbers of a column; 0 of one that is the same in all names and longer than any count or
+    time.
 
     Raises:
         InputError: they are longer, and vary.
@@ -316,7 +354,8 @@ def _values(digits: Sequence[str], names: Sequence[str], where: str) -> list[int
         return values
     if len(set(digits)) > 1:
         raise InputError(
-            f"the numbers in the names, as of {names[0]} and {names[1]}, are longer than any count or time",
+            f"the numbers in the names, as of {names[0]} and {names[1]}, are longer than any count "
+            "or time",
             where=where,
             fix=_COUNT,
         )
@@ -332,7 +371,8 @@ def _epoch(values: Sequence[int]) -> Fraction | None:
 
 
 def _with_fractions(columns: list[_Column]) -> list[_Column]:
-    """Joins a number and the fraction behind its point to one column: seconds as 0.04, or since 1970."""
+    """Joins a number and the fraction behind its point to one column: seconds as 0.04, or since
+    1970."""
     for k, (column, part) in enumerate(pairwise(columns)):
         zeros = any(text[0] == "0" for text in part.digits)
         point = part.before == "." and (column.varies or (zeros and not part.padded))
@@ -341,9 +381,14 @@ def _with_fractions(columns: list[_Column]) -> list[_Column]:
             continue
         width = max(map(len, part.digits))
         padded = [text.ljust(width, "0") for text in part.digits]
-        if seconds and part.before != "." and not part.padded:  # nanoseconds, written without their zeros
+        if (
+            seconds and part.before != "." and not part.padded
+        ):  # nanoseconds, written without their zeros
             width, padded = 9, [text.rjust(9, "0") for text in part.digits]
-        values = tuple(integer * 10**width + int(text) for integer, text in zip(column.values, padded, strict=True))
+        values = tuple(
+            integer * 10**width + int(text)
+            for integer, text in zip(column.values, padded, strict=True)
+        )
         tick = Fraction(1, 10**width) if seconds else None
         merged = _Column(before=column.before, values=values, digits=part.digits, tick=tick)
         even = _evenly_counted(sorted(values)) if merged.distinguishes else None
@@ -352,7 +397,9 @@ def _with_fractions(columns: list[_Column]) -> list[_Column]:
     return columns
 
 
-def _by_number(columns: Sequence[_Column], names: Sequence[str], rate: Fraction, where: str) -> Ordered:
+def _by_number(
+    columns: Sequence[_Column], names: Sequence[str], rate: Fraction, where: str
+) -> Ordered:
     varying = [column for column in columns if column.varies]
     ordering = [column for column in varying if column.distinguishes]
     if not ordering:
@@ -363,7 +410,9 @@ def _by_number(columns: Sequence[_Column], names: Sequence[str], rate: Fraction,
     for column in ordering:
         values = [column.values[i] for i in order]
         reading = _evenly_counted(values)
-        instants = None if column.tick is None else [round(v * column.tick * NANOSECONDS) for v in values]
+        instants = (
+            None if column.tick is None else [round(v * column.tick * NANOSECONDS) for v in values]
+        )
         if reading is None and instants is not None:
             reading = _at_rate(instants, rate)
         if reading is not None:
@@ -371,17 +420,24 @@ def _by_number(columns: Sequence[_Column], names: Sequence[str], rate: Fraction,
     if not readings:
         first, second = (names[i] for i in order[:2])
         raise InputError(
-            f"the numbers in the names, as of {first} and {second}, rise by steps that are neither one nor even: they "
+            f"the numbers in the names, as of {first} and {second}, rise by steps that are neither "
+            "one nor even: they "
             "do not count frames",
             where=where,
             fix=_COUNT,
         )
     reading, column, instants = min(readings, key=lambda candidate: candidate[0].places[-1])
     _check_passed_end(column, reading, names, where)
-    return Ordered(order=tuple(order), places=reading.places, findings=tuple(_findings(reading, instants, rate)))
+    return Ordered(
+        order=tuple(order),
+        places=reading.places,
+        findings=tuple(_findings(reading, instants, rate)),
+    )
 
 
-def _by_clock(clock: Clock, columns: Sequence[_Column], names: Sequence[str], rate: Fraction, where: str) -> Ordered:
+def _by_clock(
+    clock: Clock, columns: Sequence[_Column], names: Sequence[str], rate: Fraction, where: str
+) -> Ordered:
     later = [column for column in columns[clock.last :] if column.varies]
     other_columns = [column for column in columns[: clock.first] if column.varies]
     keys = [(clock.times[i], clock.counts[i]) for i in range(len(names))]
@@ -407,7 +463,9 @@ def _by_clock(clock: Clock, columns: Sequence[_Column], names: Sequence[str], ra
         if (reading := _evenly_counted([column.values[i] for i in order])) is not None
     ]
     # Numbers from 0 or 1 on that look like times are counted frames.
-    readings = [reading for reading, least in counted if least <= 1] + ([timed] if timed is not None else [])
+    readings = [reading for reading, least in counted if least <= 1] + (
+        [timed] if timed is not None else []
+    )
     readings += [reading for reading, least in counted if least > 1]
     by_rank = _Reading(places=tuple(range(len(order))), clock=True, ranked=True)
     if readings:
@@ -423,7 +481,8 @@ def _by_clock(clock: Clock, columns: Sequence[_Column], names: Sequence[str], ra
 
 
 def _evenly_counted(values: Sequence[int], *, clock: bool = False) -> _Reading | None:
-    """Places of rising numbers that count in a common step, or that rise by about one step as times do; else None."""
+    """Places of rising numbers that count in a common step, or that rise by about one step as times
+    do; else None."""
     steps = [b - a for a, b in pairwise(values)]
     common, middle = math.gcd(*steps), median(steps)
     if min(steps) == common or middle <= _COUNTS * common:
@@ -441,7 +500,8 @@ def _evenly_counted(values: Sequence[int], *, clock: bool = False) -> _Reading |
 
 
 def _at_rate(instants: Sequence[int], rate: Fraction) -> _Reading | None:
-    """Frames of the rate that are nearest to instants [ns]; None where two of these are of one frame."""
+    """Frames of the rate that are nearest to instants [ns]; None where two of these are of one
+    frame."""
     places = tuple(round((instant - instants[0]) * rate / NANOSECONDS) for instant in instants)
     return _Reading(places=places, clock=True) if len(set(places)) == len(places) else None
 
@@ -450,18 +510,22 @@ def _rises(column: _Column, order: Sequence[int]) -> bool:
     return all(column.values[a] <= column.values[b] for a, b in pairwise(order))
 
 
-def _check_rising(columns: Sequence[_Column], order: Sequence[int], names: Sequence[str], where: str) -> None:
+def _check_rising(
+    columns: Sequence[_Column], order: Sequence[int], names: Sequence[str], where: str
+) -> None:
     if not all(_rises(column, order) for column in columns):
         raise _open_order(names, where)
 
 
 def _check_passed_end(column: _Column, reading: _Reading, names: Sequence[str], where: str) -> None:
-    """Refuse a count that may have gone on at 0001 after 9999: most numbers are missing between these."""
+    """Refuse a count that may have gone on at 0001 after 9999: most numbers are missing between
+    these."""
     width = len(column.digits[0])
     ends = column.padded and max(column.values) == 10**width - 1 and min(column.values) <= 1
     if ends and reading.places[-1] > 2 * len(names):
         raise InputError(
-            f"the numbers in the names are the first and the last of {width} digits and few between: whether the "
+            f"the numbers in the names are the first and the last of {width} digits and few "
+            "between: whether the "
             "camera went on counting from the first is not known",
             where=where,
             fix="name those that came later with a larger number",
@@ -470,7 +534,8 @@ def _check_passed_end(column: _Column, reading: _Reading, names: Sequence[str], 
 
 def _open_order(names: Sequence[str], where: str) -> InputError:
     return InputError(
-        f"several numbers vary in the names, as in {names[0]} and {names[-1]}, and do not rise together: which of them "
+        f"several numbers vary in the names, as in {names[0]} and {names[-1]}, and do not rise "
+        "together: which of them "
         "counts the frames is not known",
         where=where,
         fix=_RENAME,
@@ -478,13 +543,20 @@ def _open_order(names: Sequence[str], where: str) -> InputError:
 
 
 def _undecided_error(columns: Sequence[_Column], names: Sequence[str], where: str) -> InputError:
-    """Returns the error of pictures that no number distinguishes: all numbers of two are alike, or several numbers
-    vary."""
+    """Returns the error of pictures that no number distinguishes: all numbers of two are alike, or
+    several numbers vary."""
     first: dict[tuple[int, ...], str] = {}
-    for key, name in zip(zip(*(column.values for column in columns), strict=True), names, strict=True):
+    for key, name in zip(
+        zip(*(column.values for column in columns), strict=True), names, strict=True
+    ):
         if key in first:
-            message = f"{first[key]} and {name} have the same number: which of them is the frame is not known"
-            return InputError(message, where=where, fix="keep one of them, or give each a number of its own")
+            message = (
+                f"{first[key]} and {name} have the same number: which of them is the frame is not "
+                "known"
+            )
+            return InputError(
+                message, where=where, fix="keep one of them, or give each a number of its own"
+            )
         first[key] = name
     return _open_order(names, where)
 
@@ -500,14 +572,16 @@ def _findings(
     if reading.ranked:
         yield Finding.of(
             "order-by-time",
-            "the names state times that say the order of the pictures and not how far apart they are: they are "
+            "the names state times that say the order of the pictures and not how far apart they "
+            "are: they are "
             "taken as evenly spaced, none as missing",
         )
     elif reading.steps:
         unit = " ns" if reading.clock else ""
         yield Finding.of(
             "numbered-by-steps",
-            f"the file names count in steps of {reading.steps}{unit}; one step is taken as one frame",
+            f"the file names count in steps of {reading.steps}{unit}; one step is taken as one "
+            "frame",
             value=float(reading.steps) if reading.steps.isdigit() else None,
         )
     if instants is None:
@@ -516,8 +590,10 @@ def _findings(
     if stated_span > 0 and abs(stated_span - taken) > _PACE * max(stated_span, taken) + resolution:
         yield Finding.of(
             "rate-unlike-names",
-            f"by the times in their names the pictures span {stated_span / NANOSECONDS:.6g} s, at the rate that was "
+            f"by the times in their names the pictures span {stated_span / NANOSECONDS:.6g} s, at "
+            "the rate that was "
             f"given {float(taken) / NANOSECONDS:.6g} s",
             value=stated_span / NANOSECONDS,
-            fix=f"if the times are right, the rate is {reading.places[-1] / stated_span * NANOSECONDS:.4g} Hz",
+            fix="if the times are right, the rate is "
+            f"{reading.places[-1] / stated_span * NANOSECONDS:.4g} Hz",
         )

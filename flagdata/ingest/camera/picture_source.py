@@ -1,4 +1,5 @@
-"""What a camera source is to the rest: facts read before decoding, then pictures in the order of presentation."""
+"""What a camera source is to the rest: facts read before decoding, then pictures in the order of
+presentation."""
 
 from __future__ import annotations
 
@@ -27,9 +28,11 @@ class SourceFacts:
         recorded: the camera's wall-clock time inside the video stream, if it writes one there.
         sequence: whether the stamps were made from `sequence_fps`.
         findings: what opening it found.
-        stamped: instant of the first frame [UTC ns], where stamps state the day and the time; else `None`.
+        stamped: instant of the first frame [UTC ns], where stamps state the day and the time; else
+            `None`.
         gps: times that the camera's telemetry states by GPS, if it does.
-        data_set: columns of the catalog that a data set states of its film: "dataset" and "side", "seed", "session".
+        data_set: columns of the catalog that a data set states of its film: "dataset" and "side",
+            "seed", "session".
     """
 
     container: str
@@ -73,8 +76,8 @@ class PictureSource(Protocol):
         ...
 
     def samples(self, runs: int, count: int, stride: int) -> Iterator[list[Picture]]:
-        """Yields at most `runs` runs of at most `count` pictures, every `stride`-th, spread over it; any number of
-        times."""
+        """Yields at most `runs` runs of at most `count` pictures, every `stride`-th, spread over
+        it; any number of times."""
         ...
 
     def damage(self) -> list[Finding]:

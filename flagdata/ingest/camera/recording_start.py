@@ -1,4 +1,5 @@
-"""When a recording began: from the user, or from metadata, corrected for known habits of cameras; never guessed."""
+"""When a recording began: from the user, or from metadata, corrected for known habits of cameras;
+never guessed."""
 
 from __future__ import annotations
 
@@ -20,8 +21,8 @@ class Start:
     Attributes:
         instant: [UTC ns].
         source: "option", "unknown", "telemetry: GPS", or "metadata: <key>".
-        sigma: standard uncertainty of reading it off the file [s], the camera's clock error not included; `None` for
-            the user's own figure.
+        sigma: standard uncertainty of reading it off the file [s], the camera's clock error not
+            included; `None` for the user's own figure.
     """
 
     instant: int
@@ -31,10 +32,13 @@ class Start:
 
 
 UNKNOWN = 946_684_800 * NANOSECONDS
-"""2000-01-01T00:00:00Z: the start of a recording whose start time is unknown, given by --start unknown."""
+"""2000-01-01T00:00:00Z: the start of a recording whose start time is unknown, given by --start
+unknown."""
 _RECORDED = "recording time in the video"
 _WHOLE_SECOND = 1 / 12**0.5  # σ of an instant cut to whole seconds
-_EARLIEST = 315_532_800 * NANOSECONDS  # 1980: before it a stamp is an unset clock's (epochs of 1904, 1970 and 1980)
+_EARLIEST = (
+    315_532_800 * NANOSECONDS
+)  # 1980: before it a stamp is an unset clock's (epochs of 1904, 1970 and 1980)
 
 
 def find_start(
@@ -51,19 +55,23 @@ def find_start(
 ) -> Start:
     """Finds the start of a recording.
 
-    In order: `option`; `stamped`; `gps`; `com.apple.quicktime.creationdate`, which names its zone and means the start;
-    the wall-clock time that AVCHD cameras write into the video itself, with their zone or `zone_name`; `creation_time`,
-    which should be UTC (ISO/IEC 14496-12, 8.2.2) and the start, but some cameras write local time and some phones the
-    recording's end, and cameras that split a recording into chapters stamp them all with its creation time.
-    Neither the file's name nor its modification time is used.
+    In order: `option`; `stamped`; `gps`; `com.apple.quicktime.creationdate`, which names its zone
+    and means the start; the wall-clock time that AVCHD cameras write into the video itself, with
+    their zone or `zone_name`; `creation_time`, which should be UTC (ISO/IEC 14496-12, 8.2.2) and
+    the start, but some cameras write local time and some phones the recording's end, and cameras
+    that split a recording into chapters stamp them all with its creation time. Neither the file's
+    name nor its modification time is used.
 
     Args:
         recorded: ISO 8601 wall-clock time from within the video stream, with a zone or without.
         zone_name: zone of the camera's clock, for times without one.
         duration: of the file [s].
-        stamped: instant of the first frame, where the frames' own stamps state the day and the time [UTC ns].
-        gps: instant of the first frame by the GPS in the camera's telemetry [UTC ns], and its standard uncertainty [s].
-        chapter: where the file begins within the recording whose creation time it states; None where it is the whole.
+        stamped: instant of the first frame, where the frames' own stamps state the day and the time
+            [UTC ns].
+        gps: instant of the first frame by the GPS in the camera's telemetry [UTC ns], and its
+            standard uncertainty [s].
+        chapter: where the file begins within the recording whose creation time it states; None
+            where it is the whole.
 
     Raises:
         TimeError: nothing usable was found.
@@ -72,7 +80,8 @@ def find_start(
         finding = Finding.of(
             "start-unknown",
             f"nobody knows when the recording began; it is stamped from {iso(UNKNOWN)} on",
-            fix="declare its wind (flagdata declare), or give the clock's offset (flagdata align --by given)",
+            fix="declare its wind (flagdata declare), or give the clock's offset (flagdata align "
+            "--by given)",
         )
         return Start(instant=UNKNOWN, source="unknown", sigma=None, findings=(finding,))
     if option is not None:
@@ -81,7 +90,9 @@ def find_start(
         try:
             return _check_start(stamped, "stamps of the frames", 0.0)
         except TimeError as error:
-            raise TimeError(f"the frames' stamps begin at {error.what}", where=where, fix=error.fix) from None
+            raise TimeError(
+                f"the frames' stamps begin at {error.what}", where=where, fix=error.fix
+            ) from None
     default = zone(zone_name, where="zone") if zone_name else None
     if gps is not None:
         return _from_gps(*gps, created=metadata.get("creation_time"), default=default)
@@ -95,7 +106,9 @@ def find_start(
             continue
         try:
             if key == "creation_time":
-                start = _from_creation_time(text, default=default, duration=duration, where=where, chapter=chapter)
+                start = _from_creation_time(
+                    text, default=default, duration=duration, where=where, chapter=chapter
+                )
             else:
                 start = _check_start(parse(text, default=default, where=where), key, _WHOLE_SECOND)
         except TimeError as error:
@@ -117,7 +130,9 @@ def _from_gps(instant: int, sigma: float, *, created: str | None, default: tzinf
     if created:
         with suppress(TimeError):  # it is not used
             difference = (parse(created, default=default) - instant) / NANOSECONDS
-            message += f"; the camera's own clock, creation_time {created}, is {abs(difference):.1f} s "
+            message += (
+                f"; the camera's own clock, creation_time {created}, is {abs(difference):.1f} s "
+            )
             message += "ahead" if difference > 0 else "behind"
     finding = Finding.of("start-by-gps", message, value=sigma)
     return Start(instant=instant, source="telemetry: GPS", sigma=sigma, findings=(finding,))
@@ -129,17 +144,25 @@ def _from_creation_time(
     created = _check_start(parse(text, default=default, where=where), "creation_time", None)
     before = chapter.before if chapter is not None else 0.0
     duration += before
-    # Uniform from start to end of the recording, as far as it is known, and over the second it is cut to.
+    # Uniform from start to end of the recording, as far as it is known, and over the second it is
+    # cut to.
     sigma = (1 / 12 + duration**2 / 12) ** 0.5
     finding = Finding.of(
         "start-unsure",
-        f"the start is by creation_time {text}, taken as the start of the recording in the zone it names; some "
-        f"cameras write their local time as UTC, and some write the end (then it is {duration:.1f} s late)",
+        f"the start is by creation_time {text}, taken as the start of the recording in the zone it "
+        "names; some "
+        f"cameras write their local time as UTC, and some write the end (then it is {duration:.1f} "
+        "s late)",
         value=sigma,
         fix="give --start with a zone, or align the recording by its contents",
     )
     findings = (finding,) if chapter is None else (finding, chapter.finding)
-    return replace(created, instant=created.instant + round(before * NANOSECONDS), sigma=sigma, findings=findings)
+    return replace(
+        created,
+        instant=created.instant + round(before * NANOSECONDS),
+        sigma=sigma,
+        findings=findings,
+    )
 
 
 def _check_start(instant: int, key: str, sigma: float | None) -> Start:

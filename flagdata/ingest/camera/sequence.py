@@ -1,4 +1,5 @@
-"""Image sequences: a folder of PNG, JPEG, TIFF, BMP or WebP files, in the order of the numbers in their names.
+"""Image sequences: a folder of PNG, JPEG, TIFF, BMP or WebP files, in the order of the numbers in
+their names.
 
 Single pictures in files: opened safely, and what their heads state.
 """
@@ -64,7 +65,9 @@ class Head:
     @property
     def upright(self) -> tuple[int, int]:
         """Width and height of the picture once it is upright."""
-        return (self.height, self.width) if self.orientation.transpose else (self.width, self.height)
+        return (
+            (self.height, self.width) if self.orientation.transpose else (self.width, self.height)
+        )
 
 
 def open_picture(path: Path, limits: Limits) -> Image.Image:
@@ -81,12 +84,15 @@ def open_picture(path: Path, limits: Limits) -> Image.Image:
             image = Image.open(path, formats=_FORMATS)
     except (Image.DecompressionBombWarning, Image.DecompressionBombError) as error:
         raise LimitError(
-            f"the image is absurdly large ({error})", where=str(path), fix="scale it down, or leave it out"
+            f"the image is absurdly large ({error})",
+            where=str(path),
+            fix="scale it down, or leave it out",
         ) from None
     if image.width * image.height > limits.frame_pixels:
         image.close()
         raise LimitError(
-            f"an image of {image.width} × {image.height} px is beyond the limit of {limits.frame_pixels} px",
+            f"an image of {image.width} × {image.height} px is beyond the limit of "
+            f"{limits.frame_pixels} px",
             where=str(path),
             fix="raise the limit if the file is to be trusted",
         )
@@ -111,8 +117,10 @@ def heads(paths: Sequence[Path], limits: Limits) -> list[Head | None]:
                     mode=image.mode,
                     alpha=image.has_transparency_data,
                     orientation=Orientation.of_exif(int(image.getexif().get(_ORIENTATION, 1))),
-                    # A phone's JPEG may carry a second picture that only says how to show the first.
-                    several=image.format not in ("JPEG", "MPO") and getattr(image, "n_frames", 1) > 1,
+                    # A phone's JPEG may carry a second picture that only says how to show the
+                    # first.
+                    several=image.format not in ("JPEG", "MPO")
+                    and getattr(image, "n_frames", 1) > 1,
                 )
         except BROKEN:
             heads_read.append(None)
@@ -130,12 +138,15 @@ def size_of_most(heads_read: Sequence[Head | None], *, where: str) -> tuple[int,
     counts = Counter(head.upright for head in heads_read if head is not None).most_common(2)
     if not counts:
         raise InputError(
-            f"not one of {len(heads_read)} images can be read", where=where, fix="copy them from the camera again"
+            f"not one of {len(heads_read)} images can be read",
+            where=where,
+            fix="copy them from the camera again",
         )
     if len(counts) > 1 and counts[0][1] == counts[1][1]:
         sizes = " and ".join(f"{wide} × {high}" for (wide, high), _ in sorted(counts))
         raise InputError(
-            f"as many images have one size as another, {sizes} px: which of them are the recording is not known",
+            f"as many images have one size as another, {sizes} px: which of them are the recording "
+            "is not known",
             where=where,
             fix="keep the images of one size in a folder",
         )
@@ -143,25 +154,29 @@ def size_of_most(heads_read: Sequence[Head | None], *, where: str) -> tuple[int,
 
 
 def taken(image: Image.Image) -> str | None:
-    """Reads ISO 8601 text of Exif's DateTimeOriginal, its fraction and its zone, the last two where it has them."""
+    """Reads ISO 8601 text of Exif's DateTimeOriginal, its fraction and its zone, the last two where
+    it has them."""
     exif = image.getexif().get_ifd(_EXIF)
     date, _, clock = str(exif.get(_TAKEN, "")).partition(" ")
     if not clock:
         return None
     part = str(exif.get(_TAKEN_PART, "")).strip()
     zone_text = str(exif.get(_TAKEN_ZONE, "")).strip()
-    return f"{date.replace(':', '-')}T{clock.strip()}{'.' + part if part.isdigit() else ''}{zone_text}"
+    return (
+        f"{date.replace(':', '-')}T{clock.strip()}{'.' + part if part.isdigit() else ''}{zone_text}"
+    )
 
 
 class SequenceSource:
     """A folder of images. See `Source`.
 
-    The numbers in the names say the order and which frames are missing, see `picture_names`. Images of another size
-    than most are left out. The rate is `options.sequence_fps`; file times are not looked at.
+    The numbers in the names say the order and which frames are missing, see `picture_names`. Images
+    of another size than most are left out. The rate is `options.sequence_fps`; file times are not
+    looked at.
 
     Raises:
-        InputError: no images, images of several kinds, names or sizes that do not say which are the recording, or none
-            that can be read.
+        InputError: no images, images of several kinds, names or sizes that do not say which are the
+            recording, or none that can be read.
         LimitError: larger than `options.limits`.
         TimeError: no `sequence_fps`.
     """
@@ -172,7 +187,9 @@ class SequenceSource:
         paths, findings_of_folder = self._files(folder)
         if options.sequence_fps is None:
             raise TimeError(
-                "images have no time stamps", where=self._where, fix="give the camera's frame rate: --sequence-fps HZ"
+                "images have no time stamps",
+                where=self._where,
+                fix="give the camera's frame rate: --sequence-fps HZ",
             )
         rate = exact(options.sequence_fps)
         order = order_pictures([path.name for path in paths], rate=rate, where=self._where)
@@ -181,7 +198,9 @@ class SequenceSource:
         self._broken: list[str] = []
         self._heads = heads(self._paths, self._limits)
         self._size = size_of_most(self._heads, where=self._where)
-        heads_kept = [head for head in self._heads if head is not None and head.upright == self._size]
+        heads_kept = [
+            head for head in self._heads if head is not None and head.upright == self._size
+        ]
         self._resized = sum(head is not None for head in self._heads) - len(heads_kept)
         self._orientation = Counter(head.orientation for head in heads_kept).most_common(1)[0][0]
         self._white, depths = self._depth()
@@ -199,13 +218,17 @@ class SequenceSource:
     def _files(self, folder: Path) -> tuple[list[Path], list[Finding]]:
         """Lists the folder's images by name, with a note of what else is in it."""
         try:
-            files = sorted(path for path in folder.iterdir() if not is_beside(path.name) and path.is_file())
+            files = sorted(
+                path for path in folder.iterdir() if not is_beside(path.name) and path.is_file()
+            )
         except OSError as error:
             message = f"the folder cannot be read ({error.strerror})"
             raise InputError(message, where=self._where, fix="check its rights") from error
         paths = [path for path in files if path.suffix.lower() in PICTURES]
         other_files = Counter(
-            path.suffix.lower() or "no ending" for path in files if path.suffix.lower() not in PICTURES
+            path.suffix.lower() or "no ending"
+            for path in files
+            if path.suffix.lower() not in PICTURES
         )
         listed = ", ".join(f"{count} of {ending}" for ending, count in other_files.most_common(5))
         if not paths:
@@ -337,16 +360,17 @@ class SequenceSource:
 
     def damage(self) -> list[Finding]:
         first = self._broken[0] if self._broken else None
-        return undecoded_findings(len(self._broken), total=len(self._paths), first=first) + resized_findings(
-            self._resized, than="most"
-        )
+        return undecoded_findings(
+            len(self._broken), total=len(self._paths), first=first
+        ) + resized_findings(self._resized, than="most")
 
     def close(self) -> None:
         """Closes nothing: no file stays open between images."""
 
 
 def _shown_otherwise(heads_read: Sequence[Head]) -> list[Finding]:
-    """Reports what in the images is not shown as their files say: transparency, further pages, turns that differ."""
+    """Reports what in the images is not shown as their files say: transparency, further pages,
+    turns that differ."""
     alpha, pages = sum(head.alpha for head in heads_read), sum(head.several for head in heads_read)
     turned = len(heads_read) - max(Counter(head.orientation for head in heads_read).values())
     findings = []
@@ -371,7 +395,8 @@ def _shown_otherwise(heads_read: Sequence[Head]) -> list[Finding]:
         findings.append(
             Finding.of(
                 "orientation-changed",
-                f"{turned} images are to be turned otherwise than the rest, by their Exif; they were turned so",
+                f"{turned} images are to be turned otherwise than the rest, by their Exif; they "
+                "were turned so",
                 count=turned,
                 fix="if the camera did not turn, remove the tag Orientation from all of them",
             )

@@ -34,11 +34,13 @@ _EXPOSURE_SLACK = 0.01
 
 
 class CameraStream:
-    """Resampled frames of a camera, read once, in order, in constant memory: by `open_camera`, closed by its block.
+    """Resampled frames of a camera, read once, in order, in constant memory: by `open_camera`,
+    closed by its block.
 
     Attributes:
         info: the file after its options are settled.
-        proposal: the crop found from motion, with its picture; `None` unless `options.crop` is "auto".
+        proposal: the crop found from motion, with its picture; `None` unless `options.crop` is
+            "auto".
         data_set: what a data set states of its film, see `SourceFacts`.
     """
 
@@ -54,14 +56,18 @@ class CameraStream:
         if options.true_fps is not None:
             self._scale = timing.mean_rate / exact(options.true_fps)
             self._opening.append(
-                _rescaled_finding(timing.variable, self._scale, options.true_fps, float(timing.mean_rate))
+                _rescaled_finding(
+                    timing.variable, self._scale, options.true_fps, float(timing.mean_rate)
+                )
             )
         duration = timing.duration * float(self._scale)
         if duration > options.limits.duration:
             raise LimitError(
-                f"the time stamps span {duration:.0f} s, beyond the limit of {options.limits.duration:.0f} s",
+                f"the time stamps span {duration:.0f} s, beyond the limit of "
+                f"{options.limits.duration:.0f} s",
                 where=str(path),
-                fix="give the rate at which they were taken, --sequence-fps HZ, or number them by frames"
+                fix="give the rate at which they were taken, --sequence-fps HZ, or number them by "
+                "frames"
                 if facts.sequence
                 else "the stamps are damaged; repair the container, or raise the limit",
             )
@@ -85,7 +91,9 @@ class CameraStream:
         if options.crop == "auto":
             self.proposal = propose(source, rate=float(timing.rate / self._scale), where=str(path))
             self._opening.append(_proposed_finding(self.proposal))
-        crop = settle_crop(self.proposal.box if self.proposal else options.crop, width=width, height=height)
+        crop = settle_crop(
+            self.proposal.box if self.proposal else options.crop, width=width, height=height
+        )
         self._geometry = Geometry(
             width=facts.width,
             height=facts.height,
@@ -136,9 +144,11 @@ class CameraStream:
         ]
 
     def _check_exposure(self, where: str) -> None:
-        """Refuse an exposure that no frame of this camera can have had: it ends before the next one begins.
+        """Refuse an exposure that no frame of this camera can have had: it ends before the next one
+        begins.
 
-        Where the rate varies, the longest step counts, since cameras slow down to expose for longer.
+        Where the rate varies, the longest step counts, since cameras slow down to expose for
+        longer.
         """
         if self._options.exposure is None:
             return
@@ -148,9 +158,11 @@ class CameraStream:
             interval = float(timing.longest * timing.tick * self._scale)
         if self._options.exposure > interval * (1 + _EXPOSURE_SLACK):
             raise UsageError(
-                f"an exposure of {self._options.exposure:g} s is longer than the {interval:.4g} s from frame to frame",
+                f"an exposure of {self._options.exposure:g} s is longer than the {interval:.4g} s "
+                "from frame to frame",
                 where=where,
-                fix="give it in seconds (1/500 s is 0.002), or --true-fps HZ if the file states a wrong rate",
+                fix="give it in seconds (1/500 s is 0.002), or --true-fps HZ if the file states a "
+                "wrong rate",
             )
 
     @property
@@ -161,7 +173,10 @@ class CameraStream:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         self.close()
 
@@ -172,7 +187,8 @@ class CameraStream:
         return self._once(self._geometry.render)
 
     def unpadded_frames(self) -> Iterator[Frame]:
-        """Yields the same frames, their images (height, width) the crop alone, without the padding about it."""
+        """Yields the same frames, their images (height, width) the crop alone, without the padding
+        about it."""
         return self._once(self._geometry.content)
 
     def _once(self, render: Callable[..., UInt8Array]) -> Iterator[Frame]:
@@ -197,11 +213,13 @@ class CameraStream:
 
     def _sampler(self) -> Sampler[Picture]:
         if self._options.rate == "native":
-            # Half a period of jitter is no gap; a variable rate doubles its step without losing a frame.
+            # Half a period of jitter is no gap; a variable rate doubles its step without losing a
+            # frame.
             return EveryFrame(period=self._period, slack=2.5 if self.info.variable_rate else 1.5)
         rate = exact(self._options.rate)
         grid_period = Fraction(NANOSECONDS) / rate
-        # A source slower than a quarter of the grid is a series of stills: most instants have no frame.
+        # A source slower than a quarter of the grid is a series of stills: most instants have no
+        # frame.
         period = min(Fraction(self._period), 4 * grid_period)
         tolerance_given = self._options.tolerance
         tolerance = (
@@ -217,7 +235,9 @@ class CameraStream:
         for picture in self._source.pictures():
             stamp = None
             if picture.stamp is not None:
-                stamp = nanoseconds(picture.stamp - timing.origin, tick=timing.tick, scale=self._scale)
+                stamp = nanoseconds(
+                    picture.stamp - timing.origin, tick=timing.tick, scale=self._scale
+                )
             yield from repair.push(stamp, picture)
         yield from repair.finish()
 
@@ -235,8 +255,14 @@ class CameraStream:
                 Finding(
                     kind="letterboxed",
                     severity=Severity.NOTE if chosen else Severity.WARNING,
-                    what=f"the crop of {self.info.crop[2]} × {self.info.crop[3]} px is not square and was padded with "
-                    "black" + ("" if chosen else "; no crop was chosen, so the flag may be small or off centre"),
+                    what=f"the crop of {self.info.crop[2]} × {self.info.crop[3]} px is not square "
+                    "and was padded with "
+                    "black"
+                    + (
+                        ""
+                        if chosen
+                        else "; no crop was chosen, so the flag may be small or off centre"
+                    ),
                     fix=None if chosen else "choose a crop: --crop auto proposes one",
                 )
             )
@@ -246,7 +272,8 @@ class CameraStream:
                 Finding(
                     kind="enlarged",
                     severity=Severity.WARNING if enlarged > 2 else Severity.NOTE,
-                    what=f"the crop of {self.info.crop[2]} × {self.info.crop[3]} px is smaller than the "
+                    what=f"the crop of {self.info.crop[2]} × {self.info.crop[3]} px is smaller "
+                    "than the "
                     f"{self._options.size} px that come out: it was enlarged {enlarged:.3g}-fold",
                     value=enlarged,
                 )
@@ -256,7 +283,8 @@ class CameraStream:
             findings.append(
                 Finding.of(
                     "exposure-unknown",
-                    f"the exposure time is unknown: stamps count as mid-exposure, to within {half * 1e3:.3g} ms",
+                    "the exposure time is unknown: stamps count as mid-exposure, to within "
+                    f"{half * 1e3:.3g} ms",
                     value=half,
                 )
             )
@@ -266,7 +294,8 @@ class CameraStream:
             findings.append(
                 Finding.of(
                     "variable-rate",
-                    f"the frame rate varies: {timing.shortest * tick:.3g} to {timing.longest * tick:.3g} ms from "
+                    f"the frame rate varies: {timing.shortest * tick:.3g} to "
+                    f"{timing.longest * tick:.3g} ms from "
                     "frame to frame",
                     value=float(timing.longest * timing.tick * self._scale),
                 )
@@ -277,14 +306,18 @@ class CameraStream:
 def _proposed_finding(proposal: CropProposal) -> Finding:
     return Finding.of(
         "crop-proposed",
-        f"automatic crop {proposal.box}, with {proposal.share:.0%} of the motion; check it by --crop-picture",
+        f"automatic crop {proposal.box}, with {proposal.share:.0%} of the motion; check it by "
+        "--crop-picture",
         value=proposal.share,
     )
 
 
-def _rescaled_finding(variable: bool, scale: Fraction, true_fps: float, container: float) -> Finding:
+def _rescaled_finding(
+    variable: bool, scale: Fraction, true_fps: float, container: float
+) -> Finding:
     message = (
-        f"the camera ran at {true_fps:g} Hz, the container states {container:g}: times are scaled by {float(scale):.6g}"
+        f"the camera ran at {true_fps:g} Hz, the container states {container:g}: times are scaled "
+        f"by {float(scale):.6g}"
     )
     if variable:
         return Finding.of(
@@ -299,7 +332,8 @@ def _grid_findings(report: GridReport, rate: float) -> list[Finding]:
     findings = [
         Finding.of(
             "resampled",
-            f"{report.picks} frames at {rate:g} Hz out of {report.sources}, the nearest by time stamp; worst "
+            f"{report.picks} frames at {rate:g} Hz out of {report.sources}, the nearest by time "
+            "stamp; worst "
             f"stamp error {report.worst_error / 1e6:.3f} ms",
             count=report.picks,
             value=report.worst_error / NANOSECONDS,
@@ -309,7 +343,8 @@ def _grid_findings(report: GridReport, rate: float) -> list[Finding]:
         findings.append(
             Finding.of(
                 "frames-repeated",
-                f"{report.repeats} frames show the same source frame as the one before: the camera is slower than "
+                f"{report.repeats} frames show the same source frame as the one before: the camera "
+                "is slower than "
                 f"{rate:g} Hz or its frames are uneven",
                 count=report.repeats,
             )
@@ -318,7 +353,8 @@ def _grid_findings(report: GridReport, rate: float) -> list[Finding]:
         findings.append(
             Finding.of(
                 "frames-dropped",
-                f"{report.unused} of {report.sources} source frames are left out at this rate; --rate native keeps all",
+                f"{report.unused} of {report.sources} source frames are left out at this rate; "
+                "--rate native keeps all",
                 count=report.unused,
             )
         )
@@ -357,8 +393,8 @@ def open_camera(path: Path | str, options: CameraOptions | None = None) -> Camer
 
 
 def open_source(path: Path, options: CameraOptions) -> PictureSource:
-    """Opens the reader for `path`: a LeRobot data set, a bag or an image sequence for a folder, a topic of it for an
-    MCAP file, a video file for anything else.
+    """Opens the reader for `path`: a LeRobot data set, a bag or an image sequence for a folder, a
+    topic of it for an MCAP file, a video file for anything else.
 
     Raises:
         UsageError: a topic or an episode of what has none, or what cannot be joined.
@@ -367,7 +403,9 @@ def open_source(path: Path, options: CameraOptions) -> PictureSource:
         if options.episode is not None or options.topic is not None:
             message = "an episode" if options.episode is not None else "a topic"
             raise UsageError(
-                f"{message} was given, but joined video files have none", where=str(path), fix="leave it out"
+                f"{message} was given, but joined video files have none",
+                where=str(path),
+                fix="leave it out",
             )
         check_films((path, *options.chapters))
         return JoinedSource((path, *options.chapters), options)
@@ -378,7 +416,9 @@ def open_source(path: Path, options: CameraOptions) -> PictureSource:
         return EpisodeSource(path, options)
     if options.episode is not None:
         raise UsageError(
-            "an episode was given, but this is no LeRobot data set", where=str(path), fix="leave out --episode"
+            "an episode was given, but this is no LeRobot data set",
+            where=str(path),
+            fix="leave out --episode",
         )
     if is_bag(path):
         from flagdata.ingest.mcap.mcap_pictures import TopicSource
@@ -387,7 +427,9 @@ def open_source(path: Path, options: CameraOptions) -> PictureSource:
         return TopicSource(path, options)
     if options.topic is not None:
         raise UsageError(
-            "a topic was given, but this is no MCAP file or LeRobot data set", where=str(path), fix="leave out --topic"
+            "a topic was given, but this is no MCAP file or LeRobot data set",
+            where=str(path),
+            fix="leave out --topic",
         )
     if is_folder(path):
         _no_stream(path, options)
@@ -397,11 +439,16 @@ def open_source(path: Path, options: CameraOptions) -> PictureSource:
 
 def _no_stream(path: Path, options: CameraOptions) -> None:
     if options.stream is not None:
-        raise UsageError("a stream was given, but this is no video file", where=str(path), fix="leave out --stream")
+        raise UsageError(
+            "a stream was given, but this is no video file",
+            where=str(path),
+            fix="leave out --stream",
+        )
 
 
 def propose_crop(path: Path | str, options: CameraOptions | None = None) -> CropProposal:
-    """Proposes the crop that the motion in a camera file suggests, with a picture of it; needs no start time.
+    """Proposes the crop that the motion in a camera file suggests, with a picture of it; needs no
+    start time.
 
     Raises:
         RefusedError: nothing moves, or motion is all over the image.

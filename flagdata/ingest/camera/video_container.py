@@ -1,4 +1,5 @@
-"""Opening video files safely: which containers, what their headers get refused, what the packets say of the timing.
+"""Opening video files safely: which containers, what their headers get refused, what the packets
+say of the timing.
 
 Whether a video file ends before its own header says.
 """
@@ -37,10 +38,11 @@ _EBML, _SEGMENT = b"\x1a\x45\xdf\xa3", b"\x18\x53\x80\x67"
 def truncation(
     path: Path, container: InputContainer, stream: VideoStream, timing: Timing, *, read: int
 ) -> list[Finding]:
-    """Finds what betrays a file that is cut off: a box or transport packet that is not whole, missing frames, missing
-    time.
+    """Finds what betrays a file that is cut off: a box or transport packet that is not whole,
+    missing frames, missing time.
 
-    A transport stream cut between packets, and a fragmented MP4 cut between fragments, betray nothing.
+    A transport stream cut between packets, and a fragmented MP4 cut between fragments, betray
+    nothing.
 
     Args:
         read: packets that could be read, those an edit list hides among them.
@@ -87,12 +89,19 @@ def _of_mp4(path: Path, stream: VideoStream, read: int) -> list[Finding]:
     missing = stream.frames - read
     if is_cut(path):
         counted = f"; {read} of {stream.frames} frames are there" if missing > 0 else ""
-        return [cut_off(f"the file ends inside one of its boxes: it is cut off{counted}", read, max(1, missing))]
+        return [
+            cut_off(
+                f"the file ends inside one of its boxes: it is cut off{counted}",
+                read,
+                max(1, missing),
+            )
+        ]
     if missing > 0:
         return [
             Finding.of(
                 "frames-not-shown",
-                f"the file states {stream.frames} frames; its edit list, or damage of its index, leaves {read}",
+                f"the file states {stream.frames} frames; its edit list, or damage of its index, "
+                f"leaves {read}",
                 count=missing,
             )
         ]
@@ -100,8 +109,8 @@ def _of_mp4(path: Path, stream: VideoStream, read: int) -> list[Finding]:
 
 
 def _of_matroska(path: Path, container: InputContainer, timing: Timing, read: int) -> list[Finding]:
-    """Compares with the stated duration, which is the longest stream's, where the video is alone; else with the stated
-    length."""
+    """Compares with the stated duration, which is the longest stream's, where the video is alone;
+    else with the stated length."""
     if container.duration is not None and len(container.streams) == 1:
         stated_length = Fraction(container.duration, 1_000_000)
         length = (timing.span + timing.period) * timing.tick
@@ -110,18 +119,28 @@ def _of_matroska(path: Path, container: InputContainer, timing: Timing, read: in
         if stated_length - length > Fraction(3, 4) * step * timing.tick:
             lost = max(1, round((stated_length - length) / (timing.period * timing.tick)))
             return [
-                cut_off(f"the file states {float(stated_length):.2f} s and holds {float(length):.2f} s", read, lost)
+                cut_off(
+                    f"the file states {float(stated_length):.2f} s and holds {float(length):.2f} s",
+                    read,
+                    lost,
+                )
             ]
     stated_end, end = _segment_end(path), path.stat().st_size
     if stated_end is None or stated_end <= end:
         return []
-    return [cut_off(f"the file states a length of {stated_end} B and has {end} B: it is cut off", read, 1)]
+    return [
+        cut_off(
+            f"the file states a length of {stated_end} B and has {end} B: it is cut off", read, 1
+        )
+    ]
 
 
 def _segment_end(path: Path) -> int | None:
-    """Finds where a Matroska file ends by its own statement; None where it makes none, as of a live recording.
+    """Finds where a Matroska file ends by its own statement; None where it makes none, as of a live
+    recording.
 
-    Elements are an identifier and a length, each as long as the zeros before its first one bit say (RFC 8794, 4).
+    Elements are an identifier and a length, each as long as the zeros before its first one bit say
+    (RFC 8794, 4).
     """
     with path.open("rb") as stream:
         for identifier in (_EBML, _SEGMENT):
@@ -140,7 +159,8 @@ def _segment_end(path: Path) -> int | None:
 
 
 def _of_transport_stream(path: Path) -> list[Finding]:
-    """Packets are 188 bytes, or 192 with the time code of a camcorder's M2TS before the sync byte."""
+    """Packets are 188 bytes, or 192 with the time code of a camcorder's M2TS before the sync
+    byte."""
     with path.open("rb") as stream:
         length = 192 if stream.read(5)[4:5] == b"\x47" else 188
     if path.stat().st_size % length == 0:
@@ -149,13 +169,14 @@ def _of_transport_stream(path: Path) -> list[Finding]:
         Finding(
             kind="truncated",
             severity=Severity.WARNING,
-            what=f"the file is not a whole number of transport packets of {length} B: it is cut off or damaged",
+            what=f"the file is not a whole number of transport packets of {length} B: it is cut "
+            "off or damaged",
         )
     ]
 
 
-# Containers of one file's own frames. Playlists and scripts that name other files or addresses (HLS, DASH, concat, SDP)
-# are not among them.
+# Containers of one file's own frames. Playlists and scripts that name other files or addresses
+# (HLS, DASH, concat, SDP) are not among them.
 _FORMATS = (
     "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,mpegts,avi,mpeg,mpegvideo,h264,hevc,m4v,mjpeg,mxf,flv,asf,ogg,gif,apng,dv,ivf,"
     "yuv4mpegpipe,nut,wtv"
@@ -167,7 +188,8 @@ BY_DECODE_ORDER = frozenset({"avi"})
 
 
 _UNFINISHED = (
-    "an MP4 or MOV whose index (moov) is missing was cut off or not closed by the camera: repair it with a recovery "
+    "an MP4 or MOV whose index (moov) is missing was cut off or not closed by the camera: repair "
+    "it with a recovery "
     "tool and an intact file of the same camera"
 )
 
@@ -192,11 +214,15 @@ def _advice(path: Path) -> str:
         return "check that the file is still there and readable"
     if head[4:8] in (b"ftyp", b"mdat", b"wide", b"free"):
         return _UNFINISHED
-    return "give a video that a player opens: MP4, MOV, MTS, AVI or MKV, or a folder of PNG or JPEG images"
+    return (
+        "give a video that a player opens: MP4, MOV, MTS, AVI or MKV, or a folder of PNG or JPEG "
+        "images"
+    )
 
 
 def check_file(path: Path, limits: Limits) -> None:
-    """Refuse what is not a file with something in it, and animated pictures whose first bytes state an absurd size.
+    """Refuse what is not a file with something in it, and animated pictures whose first bytes state
+    an absurd size.
 
     Raises:
         NotFoundError, InputError, LimitError
@@ -249,7 +275,8 @@ def open_container(
         context = stream.codec_context
         if context.width * context.height > limits.frame_pixels:
             raise _too_large(context.width, context.height, limits, path)
-        # The decoder itself refuses frames that turn out larger than the header said; its own count includes padding.
+        # The decoder itself refuses frames that turn out larger than the header said; its own count
+        # includes padding.
         context.options = {"max_pixels": str(2 * limits.frame_pixels)}
         context.thread_count = threads
         context.thread_type = "FRAME" if threads > 1 else "SLICE"
@@ -279,8 +306,8 @@ def _open_container(path: Path, limits: Limits, **options: str) -> InputContaine
 
 
 def _choose(container: InputContainer, path: Path, wanted: int | None) -> VideoStream:
-    """Chooses the stream of that number, or the first one, that is not a cover picture and that there is a decoder
-    for."""
+    """Chooses the stream of that number, or the first one, that is not a cover picture and that
+    there is a decoder for."""
     streams = []
     for stream in container.streams.video:
         if stream.disposition & av.stream.Disposition.attached_pic:
@@ -302,7 +329,10 @@ def _choose(container: InputContainer, path: Path, wanted: int | None) -> VideoS
     kinds = sorted({stream.type for stream in container.streams if stream.type != "video"})
     if is_cut(path) and is_mp4(path):
         fix = _UNFINISHED
-    elif any(not stream.disposition & av.stream.Disposition.attached_pic for stream in container.streams.video):
+    elif any(
+        not stream.disposition & av.stream.Disposition.attached_pic
+        for stream in container.streams.video
+    ):
         fix = "convert the video, as by ffmpeg -i FILE -c:v libx264 NEW.mp4"
     else:
         fix = "give the video file"
@@ -315,11 +345,15 @@ def _choose(container: InputContainer, path: Path, wanted: int | None) -> VideoS
     )
 
 
-def packets(container: InputContainer, stream: VideoStream, *, end: int | None = None) -> Iterator[av.Packet]:
-    """Packets of the stream, the empty one that flushes the decoder last; damage of the container ends them.
+def packets(
+    container: InputContainer, stream: VideoStream, *, end: int | None = None
+) -> Iterator[av.Packet]:
+    """Packets of the stream, the empty one that flushes the decoder last; damage of the container
+    ends them.
 
-    Their stamps run on where a counter passes its end. `survey_file` reports damage. PyAV's IndexError comes in place
-    of the flushing packet when a stream appeared in the middle of the file.
+    Their stamps run on where a counter passes its end. `survey_file` reports damage. PyAV's
+    IndexError comes in place of the flushing packet when a stream appeared in the middle of the
+    file.
 
     Args:
         end: how many of them belong to the recording; None for all.
@@ -343,7 +377,8 @@ def _counter(container: InputContainer, stream: VideoStream) -> Counter:
 
 
 def survey_file(path: Path, options: CameraOptions) -> tuple[Timing, list[Finding]]:
-    """Reads the timing of a file by its packets, without decoding, and whether it is cut off or its clock started anew.
+    """Reads the timing of a file by its packets, without decoding, and whether it is cut off or its
+    clock started anew.
 
     Raises:
         InputError: not a video.
@@ -354,23 +389,32 @@ def survey_file(path: Path, options: CameraOptions) -> tuple[Timing, list[Findin
     container, stream = open_container(path, options.limits, threads=1, wanted=options.stream)
     with container:
         tally = _tally(container, stream, path, options.limits)
-        first_part = tally if container.format.name in UNTIMED else _before_restart(tally, tick=_tick(stream))
+        first_part = (
+            tally
+            if container.format.name in UNTIMED
+            else _before_restart(tally, tick=_tick(stream))
+        )
         timing = replace(_timing(path, options, container, stream, first_part), end=first_part.end)
         passed_over = edit_list_remark(edits(path, stream.id)) if stream.id else None
         findings = [tally.problem] if tally.problem is not None else []
         if first_part.end is not None:
             after = timing.duration + 1 / float(timing.rate)
             findings.append(
-                restarted_finding(frame=first_part.frames, after=after, count=tally.frames - first_part.frames)
+                restarted_finding(
+                    frame=first_part.frames, after=after, count=tally.frames - first_part.frames
+                )
             )
-        findings = findings or truncation(path, container, stream, timing, read=tally.frames + tally.discarded)
+        findings = findings or truncation(
+            path, container, stream, timing, read=tally.frames + tally.discarded
+        )
         return timing, findings + ([_edit_list(passed_over)] if passed_over is not None else [])
 
 
 def _edit_list(shows: str) -> Finding:
     return Finding.of(
         "edit-list-passed-over",
-        f"the file's edit list shows {shows}; it was left aside, and each frame is read once, at the time at "
+        f"the file's edit list shows {shows}; it was left aside, and each frame is read once, at "
+        "the time at "
         "which it was recorded",
         fix="to measure what the edit list shows, export the film from the program that made it",
     )
@@ -401,7 +445,9 @@ class _PacketStamps:
         return len(self.stamps) + len(self.missing)
 
 
-def _tally(container: InputContainer, stream: VideoStream, path: Path, limits: Limits) -> _PacketStamps:
+def _tally(
+    container: InputContainer, stream: VideoStream, path: Path, limits: Limits
+) -> _PacketStamps:
     tally = _PacketStamps()
     pixels = max(1, stream.codec_context.width * stream.codec_context.height)
     counter = _counter(container, stream)
@@ -421,7 +467,8 @@ def _tally(container: InputContainer, stream: VideoStream, path: Path, limits: L
                 tally.places.append(position)
             if tally.frames > limits.frames or tally.frames * pixels > limits.total_pixels:
                 raise LimitError(
-                    f"{tally.frames} frames of {pixels} px and perhaps more are beyond the limit of {limits.frames} "
+                    f"{tally.frames} frames of {pixels} px and perhaps more are beyond the limit "
+                    f"of {limits.frames} "
                     f"frames and {limits.total_pixels} px in all",
                     where=str(path),
                     fix="cut the file into parts, or raise the limit",
@@ -432,7 +479,8 @@ def _tally(container: InputContainer, stream: VideoStream, path: Path, limits: L
     except IndexError:
         tally.problem = Finding.of(
             "stream-appeared",
-            "another stream appears in the middle of the file, which is damaged or was joined from several",
+            "another stream appears in the middle of the file, which is damaged or was joined from "
+            "several",
         )
     return tally
 
@@ -444,7 +492,9 @@ def _before_restart(tally: _PacketStamps, *, tick: Fraction) -> _PacketStamps:
         return tally
     end = tally.places[index]
     missing = array("q", (position for position in tally.missing if position < end))
-    return replace(tally, stamps=tally.stamps[:index], places=tally.places[:index], missing=missing, end=end)
+    return replace(
+        tally, stamps=tally.stamps[:index], places=tally.places[:index], missing=missing, end=end
+    )
 
 
 def _tick(stream: VideoStream) -> Fraction:
@@ -463,17 +513,25 @@ def _timing(
             raise TimeError(
                 "a raw stream has no time stamps",
                 where=str(path),
-                fix="give the camera's frame rate, --sequence-fps HZ, or wrap the stream in a container with stamps",
+                fix="give the camera's frame rate, --sequence-fps HZ, or wrap the stream in a "
+                "container with stamps",
             )
         rate = exact(options.sequence_fps)
         places = np.arange(tally.frames, dtype=np.int64)
         return survey(places, tick=1 / rate, missing=0, fallback_rate=rate)
     if options.sequence_fps is not None:
         raise UsageError(
-            "--sequence-fps is for image sequences and raw streams; this file has time stamps of its own",
+            "--sequence-fps is for image sequences and raw streams; this file has time stamps of "
+            "its own",
             where=str(path),
             fix="leave it out, or give --true-fps HZ if a high-speed camera stored a wrong rate",
         )
     rate = stream.average_rate or stream.guessed_rate
     stamps = np.frombuffer(tally.stamps, dtype=np.int64)
-    return survey(stamps, tick=_tick(stream), missing=len(tally.missing), fallback_rate=rate or None, where=str(path))
+    return survey(
+        stamps,
+        tick=_tick(stream),
+        missing=len(tally.missing),
+        fallback_rate=rate or None,
+        where=str(path),
+    )

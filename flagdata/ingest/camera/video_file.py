@@ -1,16 +1,20 @@
-"""Video files through PyAV: a survey of the packets, then decoding that survives damage and says what it skipped.
+"""Video files through PyAV: a survey of the packets, then decoding that survives damage and says
+what it skipped.
 
 The recording time that AVCHD camcorders (MTS files) write into the video stream itself.
 
-An H.264 message of unregistered user data (ITU-T H.264, D.1.6) with the identifier below holds "MDPM", a count, and
-entries of a tag and four bytes, after the packs of DV (IEC 61834-4): 0x18 is a zone byte, century, year, month; 0x19 is
-day, hour, minute, second, all as binary-coded decimals. The zone byte is left aside: many cameras leave it at zero
-whatever zone they are set to. So the time is wall-clock time without a zone.
+An H.264 message of unregistered user data (ITU-T H.264, D.1.6) with the identifier below holds
+"MDPM", a count, and entries of a tag and four bytes, after the packs of DV (IEC 61834-4): 0x18 is a
+zone byte, century, year, month; 0x19 is day, hour, minute, second, all as binary-coded decimals.
+The zone byte is left aside: many cameras leave it at zero whatever zone they are set to. So the
+time is wall-clock time without a zone.
 
-What the delays of a GIF say of its frames' rate: whole hundredths of a second, and nothing at all below two.
+What the delays of a GIF say of its frames' rate: whole hundredths of a second, and nothing at all
+below two.
 
-GIF89a counts delays in hundredths (section 23, Graphic Control Extension). Programs write 0 or 1 for "as fast as
-possible"; browsers play both as 10, a demuxer plays 1 as 1: a camera of unknown rate would count as one of 100 Hz.
+GIF89a counts delays in hundredths (section 23, Graphic Control Extension). Programs write 0 or 1
+for "as fast as possible"; browsers play both as 10, a demuxer plays 1 as 1: a camera of unknown
+rate would count as one of 100 Hz.
 """
 
 from __future__ import annotations
@@ -63,7 +67,8 @@ HALF = Fraction(1, 200)
 """What rounding to hundredths leaves open [s]."""
 LOOKED_AT = 16 * 1024**2
 """Bytes of the file whose delays are read."""
-# The extension's label, its size, flags, the delay, an index, the end; a picture or another extension follows.
+# The extension's label, its size, flags, the delay, an index, the end; a picture or another
+# extension follows.
 _DELAY = re.compile(rb"\x21\xf9\x04.(..).\x00[\x21\x2c]", re.DOTALL)
 
 
@@ -75,7 +80,8 @@ def delays(path: Path) -> list[int]:
 
 
 def check(path: Path, timing: Timing, *, true_fps: float | None) -> list[Finding]:
-    """Reports what is open about the rate of a GIF with `timing`; nothing where the user named the camera's.
+    """Reports what is open about the rate of a GIF with `timing`; nothing where the user named the
+    camera's.
 
     Raises:
         TimeError: its delays say nothing, and no rate was named.
@@ -86,10 +92,12 @@ def check(path: Path, timing: Timing, *, true_fps: float | None) -> list[Finding
     waits = delays(path)
     if waits and float(np.median(waits)) < SHORTEST:
         raise TimeError(
-            f'the GIF states delays of {float(np.median(waits)):g} hundredths of a second, which stands for "as fast '
+            f"the GIF states delays of {float(np.median(waits)):g} hundredths of a second, which "
+            'stands for "as fast '
             "as possible\": the camera's rate is not known",
             where=str(path),
-            fix="give the rate at which the camera ran, --true-fps HZ, or the film that the GIF was made of",
+            fix="give the rate at which the camera ran, --true-fps HZ, or the film that the GIF "
+            "was made of",
         )
     if timing.variable or period.denominator > 100:
         return []  # delays of 3, 3 and 4 hundredths keep a mean
@@ -97,7 +105,8 @@ def check(path: Path, timing: Timing, *, true_fps: float | None) -> list[Finding
     return [
         Finding.of(
             "gif-delays",
-            f"a GIF states times in hundredths of a second: delays of {float(period):g} s say that the rate is "
+            f"a GIF states times in hundredths of a second: delays of {float(period):g} s say that "
+            "the rate is "
             f"between {low:.3g} and {high:.3g} Hz, and {float(1 / period):.4g} Hz is assumed",
             value=float(1 / period),
             fix="if the camera's rate is known, give it: --true-fps HZ",
@@ -109,8 +118,8 @@ _IDENTIFIER = bytes.fromhex("17ee8c60f84d11d98cd60800200c9a66") + b"MDPM"
 
 
 def recording_time(message: bytes) -> str | None:
-    """Reads ISO 8601 wall-clock time, to the second and without a zone, of one user-data message; `None` if it has
-    none."""
+    """Reads ISO 8601 wall-clock time, to the second and without a zone, of one user-data message;
+    `None` if it has none."""
     if not message.startswith(_IDENTIFIER):
         return None
     body = message[len(_IDENTIFIER) :]
@@ -127,7 +136,8 @@ def recording_time(message: bytes) -> str | None:
 
 _CAPTURE_RATE = "com.android.capture.fps"
 _RATES_AGREE = 0.1
-"""Part by which the rate that a phone states and that of the stamps differ where neither is slow motion."""
+"""Part by which the rate that a phone states and that of the stamps differ where neither is slow
+motion."""
 _FARTHEST = 1000  # frames decoded in vain to reach a place between key frames
 
 
@@ -163,7 +173,10 @@ class VideoSource:
 
     def _frameless(self) -> InputError:
         """Returns the error of a file of which no frame came."""
-        packets_there, damaged = self._timing.count + self._timing.missing, "copy it from the camera again"
+        packets_there, damaged = (
+            self._timing.count + self._timing.missing,
+            "copy it from the camera again",
+        )
         if packets_there:
             message = f"not one frame could be decoded of {packets_there} packets"
             fix = f"the file is damaged beyond reading; {damaged}"
@@ -171,12 +184,17 @@ class VideoSource:
             message = f"the file's edit list shows none of its {self._stream.frames} frames"
             fix = "write the film without it: ffmpeg -ignore_editlist 1 -i IN -c copy OUT"
         else:
-            message, fix = "the file ends before its first frame", f"the rest of it is missing; {damaged}"
+            message, fix = (
+                "the file ends before its first frame",
+                f"the rest of it is missing; {damaged}",
+            )
         return InputError(message, where=str(self._path), fix=fix)
 
     def _open(self) -> tuple[InputContainer, VideoStream]:
         options = self._options
-        return open_container(self._path, options.limits, threads=options.threads, wanted=options.stream)
+        return open_container(
+            self._path, options.limits, threads=options.threads, wanted=options.stream
+        )
 
     def _gps_times(self) -> GpsTimes | None:
         container, _ = self._open()
@@ -207,7 +225,9 @@ class VideoSource:
 
     def _metadata(self) -> dict[str, str]:
         """Returns what the container and the stream state, keys lower-cased; the stream's win."""
-        return {k.lower(): v for k, v in {**self._container.metadata, **self._stream.metadata}.items()}
+        return {
+            k.lower(): v for k, v in {**self._container.metadata, **self._stream.metadata}.items()
+        }
 
     def _stream_findings(self, first: av.VideoFrame) -> list[Finding]:
         findings = []
@@ -217,7 +237,8 @@ class VideoSource:
             findings.append(
                 Finding.of(
                     "interlaced",
-                    "the video is interlaced: each frame mixes two instants, half a frame period apart; it was "
+                    "the video is interlaced: each frame mixes two instants, half a frame period "
+                    "apart; it was "
                     "not deinterlaced",
                 )
             )
@@ -227,33 +248,47 @@ class VideoSource:
             findings.append(
                 Finding.of(
                     "odd-rotation",
-                    "the file asks for a rotation that is not a multiple of 90°; the nearest one was taken",
+                    "the file asks for a rotation that is not a multiple of 90°; the nearest one "
+                    "was taken",
                 )
             )
         if int(first.color_trc) in (16, 18):
             findings.append(
                 Finding.of(
-                    "hdr-transfer", "the video is HDR (PQ or HLG): its grays are not those of an ordinary camera"
+                    "hdr-transfer",
+                    "the video is HDR (PQ or HLG): its grays are not those of an ordinary camera",
                 )
             )
-        if _has_alpha(first) or self._metadata().get("alpha_mode") == "1":  # VP8 and VP9 code it beside
-            findings.append(Finding.of("alpha-ignored", "transparency was left aside: the picture below it is read"))
+        if (
+            _has_alpha(first) or self._metadata().get("alpha_mode") == "1"
+        ):  # VP8 and VP9 code it beside
+            findings.append(
+                Finding.of(
+                    "alpha-ignored", "transparency was left aside: the picture below it is read"
+                )
+            )
         findings += self._capture_findings()
         further_streams = len(self._container.streams.video) - 1
         if further_streams:
             findings.append(
                 Finding.of(
                     "more-video-streams",
-                    f"stream {self._stream.index} was taken, {further_streams} other video streams were not",
+                    f"stream {self._stream.index} was taken, {further_streams} other video streams "
+                    "were not",
                     count=further_streams,
                     fix="choose another with --stream",
                 )
             )
-        if self._options.start is None and telemetry_of(self._container) is not None and self._gps is None:
+        if (
+            self._options.start is None
+            and telemetry_of(self._container) is not None
+            and self._gps is None
+        ):
             findings.append(
                 Finding.of(
                     "telemetry-without-time",
-                    "the telemetry in the file (GPMF) states no GPS time with a fix; the start is the camera's own"
+                    "the telemetry in the file (GPMF) states no GPS time with a fix; the start is "
+                    "the camera's own"
                     " clock",
                     fix="if that clock was not set, give --start",
                 )
@@ -261,7 +296,8 @@ class VideoSource:
         return findings
 
     def _capture_findings(self) -> list[Finding]:
-        """Reports a phone's statement of the rate at which it took the frames, where it is not that of the stamps."""
+        """Reports a phone's statement of the rate at which it took the frames, where it is not that
+        of the stamps."""
         if self._options.true_fps is not None:
             return []
         try:
@@ -274,7 +310,8 @@ class VideoSource:
         return [
             Finding.of(
                 "capture-rate",
-                f"the file says that the camera took {taken:g} frames a second, its time stamps say {stamp_rate:.4g}: "
+                f"the file says that the camera took {taken:g} frames a second, its time stamps "
+                f"say {stamp_rate:.4g}: "
                 f"time runs {taken / stamp_rate:.3g} times too slow in it",
                 value=taken,
                 fix=f"give the camera's rate: {command_line('--true-fps', f'{taken:g}')}",
@@ -330,11 +367,12 @@ class VideoSource:
         for packet in packets(self._container, self._stream, end=self._timing.end):
             count += 1
             stamp = packet.pts if packet.pts is not None else packet.dts
-            # Where another take begins, transport packets are not numbered on, for which FFmpeg marks one of the last
-            # two frames before it.
+            # Where another take begins, transport packets are not numbered on, for which FFmpeg
+            # marks one of the last two frames before it.
             joint = self._timing.end is not None and count >= self._timing.end - 1
             if packet.is_corrupt and not joint:
-                # It is decoded all the same, since others refer to it; the frame it makes is left out.
+                # It is decoded all the same, since others refer to it; the frame it makes is left
+                # out.
                 flagged.add(stamp)
                 damaged = True
             try:
@@ -374,13 +412,16 @@ def _run(
 ) -> Iterator[av.VideoFrame]:
     """Yields every `stride`-th of the frames after a seek, from the key frame it landed on.
 
-    Where an earlier run began with that frame, from `target` on. Adds the first frame's stamp to `keys`.
+    Where an earlier run began with that frame, from `target` on. Adds the first frame's stamp to
+    `keys`.
     """
     first = next(frames, None)
     if first is None:
         return
     if first.pts in keys:
-        first = next((frame for frame in islice(frames, _FARTHEST) if (frame.pts or 0) >= target), None)
+        first = next(
+            (frame for frame in islice(frames, _FARTHEST) if (frame.pts or 0) >= target), None
+        )
     if first is not None:
         keys.add(first.pts)
         yield first
@@ -388,7 +429,8 @@ def _run(
 
 
 class _DecodeOrderStamps:
-    """Stamps for containers that number frames in decoding order: presentation takes them in increasing order."""
+    """Stamps for containers that number frames in decoding order: presentation takes them in
+    increasing order."""
 
     def __init__(self, timing: Timing) -> None:
         self._reach = 17 * timing.period
@@ -405,9 +447,13 @@ class _DecodeOrderStamps:
             heapq.heapify(self._waiting)
 
     def shown(self, packet_stamp: int | None) -> int | None:
-        """Returns the stamp of the frame shown next, whose packet carried `packet_stamp`; drops those of lost
-        frames."""
-        while self._waiting and packet_stamp is not None and self._waiting[0] < packet_stamp - self._reach:
+        """Returns the stamp of the frame shown next, whose packet carried `packet_stamp`; drops
+        those of lost frames."""
+        while (
+            self._waiting
+            and packet_stamp is not None
+            and self._waiting[0] < packet_stamp - self._reach
+        ):
             heapq.heappop(self._waiting)
         return heapq.heappop(self._waiting) if self._waiting else packet_stamp
 
@@ -432,7 +478,9 @@ def _side_data(frame: av.VideoFrame) -> list[SideData]:
 def _orientation(frame: av.VideoFrame) -> Orientation:
     for data in _side_data(frame):
         if data.type is Type.DISPLAYMATRIX:
-            return Orientation.of_display_matrix(np.frombuffer(memoryview(data), dtype="<i4").tolist())
+            return Orientation.of_display_matrix(
+                np.frombuffer(memoryview(data), dtype="<i4").tolist()
+            )
     return Orientation()
 
 

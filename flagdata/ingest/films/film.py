@@ -1,4 +1,5 @@
-"""A film: frames at their instants, from a video file, a folder of images, or a record of a lake."""
+"""A film: frames at their instants, from a video file, a folder of images, or a record of a
+lake."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ from flagdata.timebase import NANOSECONDS
 _AT_ONCE = 64  # frames read from a record together
 _NO_START = 0  # a file's own clock begins with its first frame
 _LONGEST = 1920
-"""Longer side [px] to which frames of files are averaged down: a flag of a tenth of it fills a network's picture."""
+"""Longer side [px] to which frames of files are averaged down: a flag of a tenth of it fills a
+network's picture."""
 _OF_PADDING = frozenset({"letterboxed"})
 """Findings on the padding about an oblong picture, which is left away."""
 
@@ -49,7 +51,8 @@ class Film(Protocol):
         ...
 
     def frames(self, first: float, last: float) -> Iterator[tuple[float, UInt8Array]]:
-        """Yields (time since the first frame [s], (height, width) gray) from `first` to `last` [s], in order."""
+        """Yields (time since the first frame [s], (height, width) gray) from `first` to `last` [s],
+        in order."""
         ...
 
     def findings(self) -> tuple[Finding, ...]:
@@ -72,12 +75,18 @@ class CameraFilm:
         FlagdataError: see `flagdata.ingest.camera.open_camera`.
     """
 
-    def __init__(self, path: Path, *, true_fps: float | None = None, sequence_fps: float | None = None) -> None:
+    def __init__(
+        self, path: Path, *, true_fps: float | None = None, sequence_fps: float | None = None
+    ) -> None:
         self.path = path
-        options = CameraOptions(start=_NO_START, rate="native", true_fps=true_fps, sequence_fps=sequence_fps)
+        options = CameraOptions(
+            start=_NO_START, rate="native", true_fps=true_fps, sequence_fps=sequence_fps
+        )
         facts = probe(path, options)
         self.width, self.height = facts.width, facts.height
-        self._options = replace(options, crop="whole", size=min(_LONGEST, max(8, facts.width, facts.height)))
+        self._options = replace(
+            options, crop="whole", size=min(_LONGEST, max(8, facts.width, facts.height))
+        )
         slower = 1.0 if true_fps is None else facts.rate / true_fps
         self._rate = facts.rate / slower
         self._duration = facts.duration * slower
@@ -109,7 +118,9 @@ class CameraFilm:
                     if time >= first:
                         yield time, frame.image
             finally:
-                self._findings = tuple(finding for finding in stream.findings if finding.kind not in _OF_PADDING)
+                self._findings = tuple(
+                    finding for finding in stream.findings if finding.kind not in _OF_PADDING
+                )
 
     def findings(self) -> tuple[Finding, ...]:
         return self._findings
@@ -136,7 +147,9 @@ class RecordFilm:
         self._name, self._first = name, first
         count = self.record.frame_count - first if count is None else count
         if count < 2:
-            raise InputError(f"{count} frames", where=name, fix="name a recording or clip with frames")
+            raise InputError(
+                f"{count} frames", where=name, fix="name a recording or clip with frames"
+            )
         self.times = self.record.times(first, count)
         self._seconds = (self.times - self.times[0]) / NANOSECONDS
         self.height, self.width = self.record.frames(first, 1).shape[1:]

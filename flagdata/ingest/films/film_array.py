@@ -23,7 +23,8 @@ _SHOWN, _SIDE = 50, 240
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Frames:
-    """Frames of a film as an array. It is a film itself: `flagdata.measure` and `flagdata.motion` take it.
+    """Frames of a film as an array. It is a film itself: `flagdata.measure` and `flagdata.motion`
+    take it.
 
     Attributes:
         images: (n, height, width) uint8 gray, or (n, height, width, 3) sRGB; y down, x right.
@@ -48,7 +49,11 @@ class Frames:
                 where=self.name,
                 fix="give (n, height, width) or (n, height, width, 3) of type uint8",
             )
-        if shape[0] < 2 or np.shape(self.time) != shape[:1] or not bool((np.diff(self.time) > 0).all()):
+        if (
+            shape[0] < 2
+            or np.shape(self.time) != shape[:1]
+            or not bool((np.diff(self.time) > 0).all())
+        ):
             raise InputError(
                 f"{shape[0]} frames with times of shape {np.shape(self.time)}",
                 where=self.name,
@@ -79,7 +84,8 @@ class Frames:
         return self.images.shape[1]
 
     def frames(self, first: float, last: float) -> Iterator[tuple[float, UInt8Array]]:
-        """Yields (time since the first frame [s], (height, width) gray) from `first` to `last` [s], in order."""
+        """Yields (time since the first frame [s], (height, width) gray) from `first` to `last` [s],
+        in order."""
         seconds = self.time - self.time[0]
         for index in np.flatnonzero((seconds >= first) & (seconds <= last)).tolist():
             yield float(seconds[index]), gray(self.images[index])
@@ -104,7 +110,8 @@ class Frames:
 
 
 def gray(picture: UInt8Array) -> UInt8Array:
-    """Computes (height, width) luma by Rec. 601, as everywhere in `flagdata.ingest`, of a gray or sRGB picture."""
+    """Computes (height, width) luma by Rec. 601, as everywhere in `flagdata.ingest`, of a gray or
+    sRGB picture."""
     if picture.ndim == 2:
         return picture
     return (picture @ np.array([0.299, 0.587, 0.114]) + 0.5).astype(np.uint8)
@@ -137,4 +144,6 @@ def collect_frames(film: Film, *, first: float, last: float | None) -> Frames:
             fix=f"choose a part of its {film.duration:.2f} s",
         )
     start = None if film.start is None else film.start + round(times[0] * NANOSECONDS)
-    return Frames(images=np.stack(images), time=np.array(times) - times[0], name=film.name, start=start)
+    return Frames(
+        images=np.stack(images), time=np.array(times) - times[0], name=film.name, start=start
+    )

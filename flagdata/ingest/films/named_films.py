@@ -1,4 +1,5 @@
-"""Films by what names them: a video file, a folder of images, an example, or an artifact of a lake."""
+"""Films by what names them: a video file, a folder of images, an example, or an artifact of a
+lake."""
 
 from __future__ import annotations
 
@@ -17,7 +18,12 @@ FILMED = (Kind.RECORDING, Kind.CLIP, Kind.CAMERA)
 
 
 def film_at(
-    source: Path | str, *, lake: Lake | None, at: str | None, true_fps: float | None, sequence_fps: float | None
+    source: Path | str,
+    *,
+    lake: Lake | None,
+    at: str | None,
+    true_fps: float | None,
+    sequence_fps: float | None,
 ) -> tuple[CameraFilm, Path] | tuple[RecordFilm, Artifact]:
     """Opens the film that a source names, with its path or its artifact.
 
@@ -53,10 +59,15 @@ def frames_have_instants() -> UsageError:
 
 
 def find_artifact(
-    lake: Lake, source: str, at: str | None, *, kinds: tuple[Kind, ...] = FILMED, noun: str = "file or film of the lake"
+    lake: Lake,
+    source: str,
+    at: str | None,
+    *,
+    kinds: tuple[Kind, ...] = FILMED,
+    noun: str = "file or film of the lake",
 ) -> Artifact:
-    """Finds the artifact of a name or id; of a recording and what it was aligned from, which has its name, the
-    recording.
+    """Finds the artifact of a name or id; of a recording and what it was aligned from, which has
+    its name, the recording.
 
     Args:
         kinds: that are meant; a clip by its id alone.
@@ -85,7 +96,11 @@ def stored_film(lake: Lake, artifact: Artifact) -> RecordFilm:
         CorruptError: its object is damaged.
     """
     if artifact.object is None:
-        raise InputError(f"the {artifact.kind} has no frames of its own", where=artifact.name, fix="name its recording")
+        raise InputError(
+            f"the {artifact.kind} has no frames of its own",
+            where=artifact.name,
+            fix="name its recording",
+        )
     clip = artifact.kind is Kind.CLIP
     return RecordFilm(
         lake.record_place(artifact.object),

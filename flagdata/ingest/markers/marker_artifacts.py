@@ -76,7 +76,8 @@ def ingest_markers(
             transaction.add(artifact)
             new[name] = (artifact, report)
     return tuple(
-        present[name] if name in present else result_of(transaction, *new[name], labels_of[name]) for name in recordings
+        present[name] if name in present else result_of(transaction, *new[name], labels_of[name])
+        for name in recordings
     )
 
 
@@ -87,12 +88,17 @@ def _findings(sequence: MarkerSequence) -> tuple[Finding, ...]:
         return ()
     return (
         Finding.of(
-            "markers-not-tracked", f"{lost} of {total} positions were not tracked", count=lost, value=lost / total
+            "markers-not-tracked",
+            f"{lost} of {total} positions were not tracked",
+            count=lost,
+            value=lost / total,
         ),
     )
 
 
-def _report(sequence: MarkerSequence, findings: Sequence[Finding], reasons: Sequence[str]) -> dict[str, Any]:
+def _report(
+    sequence: MarkerSequence, findings: Sequence[Finding], reasons: Sequence[str]
+) -> dict[str, Any]:
     span = int(sequence.time[-1]) / NANOSECONDS
     return {
         "schema": REPORT_SCHEMA,

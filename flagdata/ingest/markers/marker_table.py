@@ -1,8 +1,9 @@
 """Marker tables, CSV or Parquet: one row a marker and frame.
 
-Columns: `marker` (its name), `u`, `v` (where it is on the flat cloth), `x`, `y`, `z` (where it is in space), `frame` (a
-whole number) or `time` [s] or both, and `recording` where a table holds several. A row that is missing, or whose
-position is empty, says that the marker was not tracked. Other columns are refused: a misspelt one would be missed.
+Columns: `marker` (its name), `u`, `v` (where it is on the flat cloth), `x`, `y`, `z` (where it is
+in space), `frame` (a whole number) or `time` [s] or both, and `recording` where a table holds
+several. A row that is missing, or whose position is empty, says that the marker was not tracked.
+Other columns are refused: a misspelt one would be missed.
 """
 
 from __future__ import annotations
@@ -60,11 +61,15 @@ class MarkerOptions:
     def __post_init__(self) -> None:
         if self.rate is not None and not (math.isfinite(self.rate) and 0 < self.rate <= 1e6):
             raise UsageError(
-                f"the frame rate {self.rate!r} Hz is out of range", where="--rate", fix="give frames a second"
+                f"the frame rate {self.rate!r} Hz is out of range",
+                where="--rate",
+                fix="give frames a second",
             )
         for name in (self.unit, self.rest_unit or self.unit):
             if unit(name).si != "m":
-                raise UsageError(f"{name!r} is no unit of length", where="--unit", fix="give mm, cm, m or ft")
+                raise UsageError(
+                    f"{name!r} is no unit of length", where="--unit", fix="give mm, cm, m or ft"
+                )
 
     def recipe(self) -> dict[str, Any]:
         """As JSON."""
@@ -89,8 +94,8 @@ def read_table(path: Path, options: MarkerOptions | None = None) -> Mapping[str,
     Raises:
         NotFoundError: no such file.
         LimitError: a table too large to be read.
-        InputError: columns or values that are missing or malformed, markers that occur twice in a frame or lie in
-            two places of the cloth.
+        InputError: columns or values that are missing or malformed, markers that occur twice in a
+            frame or lie in two places of the cloth.
         UnknownNameError: a column that is none of these.
         UsageError: a rate that the table needs, or has no use for.
     """
@@ -100,16 +105,22 @@ def read_table(path: Path, options: MarkerOptions | None = None) -> Mapping[str,
     _check_columns(names, options, str(path))
     table = _rows(path, names)
     if not table.num_rows:
-        raise InputError("there are no rows", where=str(path), fix="export the table with its tracks")
+        raise InputError(
+            "there are no rows", where=str(path), fix="export the table with its tracks"
+        )
     if "recording" not in names:
         return {"": _sequence(table, options, str(path))}
     column = table["recording"]
     if column.null_count:
-        raise InputError("a row names no recording", where=str(path), fix="fill the column, or leave it out")
+        raise InputError(
+            "a row names no recording", where=str(path), fix="fill the column, or leave it out"
+        )
     sequences: dict[str, MarkerSequence] = {}
     of = column.to_numpy()
     for name in column.unique().to_pylist():
-        sequences[name] = _sequence(table.filter(pa.array(of == name)), options, f"{path}, recording {name!r}")
+        sequences[name] = _sequence(
+            table.filter(pa.array(of == name)), options, f"{path}, recording {name!r}"
+        )
     return sequences
 
 
@@ -135,9 +146,17 @@ def _check_columns(names: list[str], options: MarkerOptions, where: str) -> None
             fix="add the number of the frame, or its time in s",
         )
     if "time" not in names and options.rate is None:
-        raise UsageError("the table has frame numbers only", where=where, fix="give the frames per second by --rate")
+        raise UsageError(
+            "the table has frame numbers only",
+            where=where,
+            fix="give the frames per second by --rate",
+        )
     if "time" in names and options.rate is not None:
-        raise UsageError("the table has times of its own", where=where, fix="leave the rate out, or the column time")
+        raise UsageError(
+            "the table has times of its own",
+            where=where,
+            fix="leave the rate out, or the column time",
+        )
 
 
 def _rows(path: Path, names: list[str]) -> pa.Table:
@@ -148,7 +167,9 @@ def _rows(path: Path, names: list[str]) -> pa.Table:
         if _is_parquet(path):
             with _table_errors(path):
                 file = _parquet(path)
-                table = pa.concat_tables(file.read_row_group(i, columns=names) for i in range(file.num_row_groups))
+                table = pa.concat_tables(
+                    file.read_row_group(i, columns=names) for i in range(file.num_row_groups)
+                )
                 table.validate(full=True)  # text that is not UTF-8, for one
                 return table.select(names).cast(wanted)
         head = small_table_head(path)
@@ -156,7 +177,9 @@ def _rows(path: Path, names: list[str]) -> pa.Table:
             encoding = encoding_of(stream.read(4))
         return pyarrow.csv.read_csv(
             path,
-            read_options=pyarrow.csv.ReadOptions(column_names=names, skip_rows=head.line, encoding=encoding),
+            read_options=pyarrow.csv.ReadOptions(
+                column_names=names, skip_rows=head.line, encoding=encoding
+            ),
             parse_options=pyarrow.csv.ParseOptions(delimiter=head.delimiter),
             convert_options=pyarrow.csv.ConvertOptions(
                 column_types=wanted,
@@ -177,7 +200,8 @@ def _parquet(path: Path) -> pyarrow.parquet.ParquetFile:
     """Opens a Parquet file whose pages' checksums are compared, where it has any.
 
     Raises:
-        LimitError: it says that it unpacks to more than `SIZE_LIMIT`, or has more rows than `POSITIONS_LIMIT`.
+        LimitError: it says that it unpacks to more than `SIZE_LIMIT`, or has more rows than
+            `POSITIONS_LIMIT`.
     """
     file = pyarrow.parquet.ParquetFile(
         path,
@@ -186,7 +210,10 @@ def _parquet(path: Path) -> pyarrow.parquet.ParquetFile:
         thrift_container_size_limit=_FOOTER_LIMIT,
     )
     groups = [file.metadata.row_group(index) for index in range(file.num_row_groups)]
-    rows, size = sum(group.num_rows for group in groups), sum(group.total_byte_size for group in groups)
+    rows, size = (
+        sum(group.num_rows for group in groups),
+        sum(group.total_byte_size for group in groups),
+    )
     if rows > POSITIONS_LIMIT or size > SIZE_LIMIT:
         raise LimitError(
             f"the table has {rows} rows and {size} bytes unpacked",
@@ -204,7 +231,9 @@ def _table_errors(path: Path) -> Iterator[None]:
     except (pa.ArrowException, OSError, ValueError, OverflowError, MemoryError, KeyError) as error:
         first_line = (str(error).splitlines() or [type(error).__name__])[0]
         raise InputError(
-            f"the Parquet file cannot be read: {first_line}", where=str(path), fix="export the table again"
+            f"the Parquet file cannot be read: {first_line}",
+            where=str(path),
+            fix="export the table again",
         ) from None
 
 
@@ -229,12 +258,21 @@ def _sequence(table: pa.Table, options: MarkerOptions, where: str) -> MarkerSequ
             where=f"{where}, row {row + 1}",
             fix="keep one of them; is a column recording missing?",
         )
-    length, rest_length = unit(options.unit, where=where), unit(options.rest_unit or options.unit, where=where)
+    length, rest_length = (
+        unit(options.unit, where=where),
+        unit(options.rest_unit or options.unit, where=where),
+    )
     positions = np.full((len(instants) * len(names), 3), np.nan)
     positions[seat] = np.stack([length.to_si(_numbers(table, axis)) for axis in "xyz"], axis=1)
-    rest = np.stack([rest_length.to_si(_seats(table, axis, marker, names, where)) for axis in "uv"], axis=1)
+    rest = np.stack(
+        [rest_length.to_si(_seats(table, axis, marker, names, where)) for axis in "uv"], axis=1
+    )
     if np.isinf(positions).any():
-        raise InputError("a coordinate is infinite", where=where, fix="leave positions empty that were not tracked")
+        raise InputError(
+            "a coordinate is infinite",
+            where=where,
+            fix="leave positions empty that were not tracked",
+        )
     positions[~np.isfinite(positions).all(axis=1)] = np.nan
     return MarkerSequence(
         time=instants,
@@ -251,11 +289,19 @@ def _frames(table: pa.Table, options: MarkerOptions, where: str) -> tuple[IntArr
     values = _numbers(table, column)
     if not np.isfinite(values).all():
         row = int(np.flatnonzero(~np.isfinite(values))[0])
-        raise InputError(f"a row has no {column}", where=f"{where}, row {row + 1}", fix="fill the column")
+        raise InputError(
+            f"a row has no {column}", where=f"{where}, row {row + 1}", fix="fill the column"
+        )
     if column == "frame" and (values != np.rint(values)).any():
-        raise InputError("a frame number with decimals", where=where, fix="name the column time, if it is in seconds")
+        raise InputError(
+            "a frame number with decimals",
+            where=where,
+            fix="name the column time, if it is in seconds",
+        )
     seconds = values if options.rate is None else values / options.rate
-    instants, frame = np.unique(np.rint((seconds - seconds.min()) * NANOSECONDS).astype(np.int64), return_inverse=True)
+    instants, frame = np.unique(
+        np.rint((seconds - seconds.min()) * NANOSECONDS).astype(np.int64), return_inverse=True
+    )
     return instants, frame.astype(np.int64)
 
 
@@ -269,7 +315,9 @@ def _seats(table: pa.Table, axis: str, marker: IntArray, names: AnyArray, where:
     if (low > high).any():
         lost = names[int(np.flatnonzero(low > high)[0])]
         raise InputError(
-            f"marker {lost!r} has no {axis}", where=where, fix="say where each marker is on the flat cloth"
+            f"marker {lost!r} has no {axis}",
+            where=where,
+            fix="say where each marker is on the flat cloth",
         )
     moved = high - low > _SAME * max(float(np.ptp(values[is_given])), 1e-30)
     if moved.any():
@@ -277,7 +325,8 @@ def _seats(table: pa.Table, axis: str, marker: IntArray, names: AnyArray, where:
         raise InputError(
             f"marker {names[strange]!r} has {axis} from {low[strange]:.6g} to {high[strange]:.6g}",
             where=where,
-            fix="u and v, its place on the flat cloth, are the same in all frames; several recordings need a column "
+            fix="u and v, its place on the flat cloth, are the same in all frames; several "
+            "recordings need a column "
             "recording",
         )
     return low

@@ -26,17 +26,22 @@ _HEAD = 16 << 10
 
 
 def is_bag(path: Path) -> bool:
-    """Checks whether a path is an MCAP file, a folder of such files, or any folder that `ros2 bag record` wrote."""
-    return is_mcap(path) or (is_folder(path) and (is_described(path) or any(map(is_mcap, _files(path)))))
+    """Checks whether a path is an MCAP file, a folder of such files, or any folder that `ros2 bag
+    record` wrote."""
+    return is_mcap(path) or (
+        is_folder(path) and (is_described(path) or any(map(is_mcap, _files(path))))
+    )
 
 
 def is_described(path: Path) -> bool:
-    """Checks whether a path is a folder whose description names its parts, which follow one another then."""
+    """Checks whether a path is a folder whose description names its parts, which follow one another
+    then."""
     return _description(path) is not None
 
 
 def parts_of(path: Path) -> tuple[Path, ...]:
-    """Lists the MCAP files of a recording: of a folder its parts in order, of a file the file itself.
+    """Lists the MCAP files of a recording: of a folder its parts in order, of a file the file
+    itself.
 
     Raises:
         InputError: a part that the folder's description names is not there, or is no MCAP file.
@@ -51,7 +56,8 @@ def parts_of(path: Path) -> tuple[Path, ...]:
             raise InputError(
                 f"the bag's {_DESCRIPTION} names {part.name}, which is not there",
                 where=str(path),
-                fix=f"copy it again; or read the parts that are there: {command_line('rm', path / _DESCRIPTION)}",
+                fix="copy it again; or read the parts that are there: "
+                f"{command_line('rm', path / _DESCRIPTION)}",
             )
         if not is_mcap(part):
             reason, fix = other_bag(part) or (f"{part.name} is no MCAP file", "copy it again")
@@ -62,15 +68,18 @@ def parts_of(path: Path) -> tuple[Path, ...]:
 
 
 def other_bag(path: Path) -> tuple[str, str] | None:
-    """Names what a file is, of the kinds of bags that are not read, and what to do with it; `None` for anything
-    else."""
+    """Names what a file is, of the kinds of bags that are not read, and what to do with it; `None`
+    for anything else."""
     try:
         with open_regular(path) as stream:
             head = stream.read(_HEAD)
     except (OSError, ValueError):
         return None
     bare, new = path.with_suffix(""), path.with_suffix(".mcap")
-    convert = f"convert it: {command_line('mcap', 'convert', path, new)}; then {command_line('ingest', new)}"
+    convert = (
+        f"convert it: {command_line('mcap', 'convert', path, new)}; then "
+        f"{command_line('ingest', new)}"
+    )
     if head.startswith(_SQLITE) and b"serialization_format" in head:
         return "a ROS 2 bag kept in SQLite (.db3)", convert
     if head.startswith(_ROS_1):
@@ -78,21 +87,31 @@ def other_bag(path: Path) -> tuple[str, str] | None:
     if head.startswith(_ZSTD) and _inside_zstd(head).startswith((MCAP, _SQLITE)):
         return (
             "a bag that was compressed as a whole by zstd",
-            f"unpack it: {command_line('zstd', '-d', path, '-o', bare)}; then {command_line('ingest', bare)}",
+            f"unpack it: {command_line('zstd', '-d', path, '-o', bare)}; then "
+            f"{command_line('ingest', bare)}",
         )
     if head.startswith(_GZIP) and _inside_gzip(path).startswith(MCAP):
-        unpack = f"unpack it: {command_line('gunzip', '-k', path)}; then {command_line('ingest', bare)}"
+        unpack = (
+            f"unpack it: {command_line('gunzip', '-k', path)}; then {command_line('ingest', bare)}"
+        )
         return "a bag that was compressed as a whole by gzip", unpack
     return None
 
 
 def to_join(paths: Sequence[Path]) -> str:
-    """Advises on MCAP files that are the parts of one recording: a folder of them alone is read as one."""
+    """Advises on MCAP files that are the parts of one recording: a folder of them alone is read as
+    one."""
     (folder, *other_folders) = {path.parent for path in paths}
     if not other_folders and is_described(folder):
-        return f"the folder of the parts is read as one recording: {command_line('flagdata', 'ingest', folder)}"
+        return (
+            "the folder of the parts is read as one recording: "
+            f"{command_line('flagdata', 'ingest', folder)}"
+        )
     move = command_line("mv", *paths, "whole")
-    return f"a folder of the parts alone is read as one recording: mkdir whole; {move}; flagdata ingest whole"
+    return (
+        f"a folder of the parts alone is read as one recording: mkdir whole; {move}; flagdata "
+        "ingest whole"
+    )
 
 
 def by_number(paths: Sequence[Path]) -> list[Path]:

@@ -1,8 +1,9 @@
-"""Where an MCAP file has its messages: in chunks and outside them, by one pass over the records themselves.
+"""Where an MCAP file has its messages: in chunks and outside them, by one pass over the records
+themselves.
 
-The summary at a file's end may be absent, and its index need not list all that is there: programs write messages
-without chunks, or behind the last one. So the heads of all records are read, and of a chunk what it states; what the
-summary counts is only compared with what was found.
+The summary at a file's end may be absent, and its index need not list all that is there: programs
+write messages without chunks, or behind the last one. So the heads of all records are read, and of
+a chunk what it states; what the summary counts is only compared with what was found.
 
 Source: the MCAP specification, https://mcap.dev/spec.
 """
@@ -35,8 +36,12 @@ _KEPT = 64 << 20
 _HEAD = struct.Struct("<BQ")
 _INDEX = struct.Struct("<HI")  # channel, bytes of the entries
 _INDEX_ENTRY = 16
-_MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time; the data follow
-_CHUNK = struct.Struct("<QQQII")  # first and last time, unpacked size, checksum, length of the compression's name
+_MESSAGE = struct.Struct(
+    "<BQHIQQ"
+)  # opcode, length, channel, sequence, log time, publish time; the data follow
+_CHUNK = struct.Struct(
+    "<QQQII"
+)  # first and last time, unpacked size, checksum, length of the compression's name
 _DEFINED = frozenset({Opcode.SCHEMA, Opcode.CHANNEL})
 _RECOVER = "salvage what is whole: flagdata recover FILE NEW.mcap"
 
@@ -79,14 +84,19 @@ class Layout:
 
     def missing(self, channels: Collection[int]) -> int:
         """Messages of some channels that the summary states and the file does not have."""
-        return sum(max(0, self.announced.get(channel, 0) - self.counts.get(channel, 0)) for channel in channels)
+        return sum(
+            max(0, self.announced.get(channel, 0) - self.counts.get(channel, 0))
+            for channel in channels
+        )
 
     def undefined_findings(self) -> tuple[Finding, ...]:
         """Reports messages whose channel the file does not define; empty where there are none."""
         lost = sum(count for channel, count in self.counts.items() if channel not in self.channels)
         if not lost:
             return ()
-        message = f"{lost} messages are of a channel that the file does not define, and were not read"
+        message = (
+            f"{lost} messages are of a channel that the file does not define, and were not read"
+        )
         return (
             Finding.of(
                 "messages-undefined",
@@ -115,11 +125,13 @@ class Message:
 
 
 def layout_of(path: Path) -> Layout:
-    """Reads what a file has, and where; of a file that has not changed since it was last asked for, from memory.
+    """Reads what a file has, and where; of a file that has not changed since it was last asked for,
+    from memory.
 
     Raises:
         NotFoundError, InputError: there is no such file, or it is empty.
-        CorruptError: no MCAP file, one that was cut off or is damaged, or several behind one another.
+        CorruptError: no MCAP file, one that was cut off or is damaged, or several behind one
+            another.
         LimitError: a chunk that would unpack to more than is held in memory.
     """
     check_input(path)
@@ -150,7 +162,9 @@ class _Scan:
 
     def run(self) -> Layout:
         if self.stream.read(len(MCAP)) != MCAP:
-            raise CorruptError("this is no MCAP file", where=str(self.path), fix="check that it is the right file")
+            raise CorruptError(
+                "this is no MCAP file", where=str(self.path), fix="check that it is the right file"
+            )
         at = len(MCAP)
         ended = closed = False
         while not closed:
@@ -191,7 +205,9 @@ class _Scan:
             raise self._damage_error(f"a message of {length} bytes at byte {start}")
         if length > CHUNK_LIMIT:
             raise LimitError(
-                f"a message of {length} bytes", where=str(self.path), fix=f"at most {CHUNK_LIMIT} are read"
+                f"a message of {length} bytes",
+                where=str(self.path),
+                fix=f"at most {CHUNK_LIMIT} are read",
             )
         if self.run_counts and start - self.run_at > _RUN:
             self._end_run(start)
@@ -202,7 +218,9 @@ class _Scan:
     def _end_run(self, end: int) -> None:
         if self.run_counts:
             counts, self.run_counts = dict(self.run_counts), Counter()
-            self.blocks.append(Block(at=self.run_at, length=end - self.run_at, chunk=False, counts=counts))
+            self.blocks.append(
+                Block(at=self.run_at, length=end - self.run_at, chunk=False, counts=counts)
+            )
 
     def _chunk(self, start: int, length: int) -> None:
         if length < CHUNK_HEAD - RECORD_HEAD:
@@ -212,7 +230,9 @@ class _Scan:
             check_stated(size, where=str(self.path))
         if max(length, size) > CHUNK_LIMIT:
             fix = f"at most {CHUNK_LIMIT} are read at once: write smaller chunks"
-            raise LimitError(f"a chunk has {max(length, size)} bytes", where=str(self.path), fix=fix)
+            raise LimitError(
+                f"a chunk has {max(length, size)} bytes", where=str(self.path), fix=fix
+            )
         self.blocks.append(Block(at=start, length=RECORD_HEAD + length, chunk=True, counts=None))
 
     def _index(self, length: int) -> None:
@@ -231,7 +251,9 @@ class _Scan:
         elif opcode in _DEFINED:
             self._define(opcode, self.stream.read(length))
         elif opcode == Opcode.STATISTICS:
-            self.announced = dict(parse(Statistics.read, self.stream.read(length), where=where).channel_message_counts)
+            self.announced = dict(
+                parse(Statistics.read, self.stream.read(length), where=where).channel_message_counts
+            )
 
     def _define(self, opcode: int, record: bytes | memoryview) -> None:
         """Take the definition of a schema or channel.
@@ -243,19 +265,24 @@ class _Scan:
         if opcode == Opcode.SCHEMA:
             schema = parse(Schema.read, bytes(record), where=where)
             first_schema = self.schemas.setdefault(schema.id, schema)
-            same, noun = (first_schema.name, first_schema.data) == (schema.name, schema.data), f"schema {schema.id}"
+            same, noun = (
+                (first_schema.name, first_schema.data) == (schema.name, schema.data),
+                f"schema {schema.id}",
+            )
         else:
             channel = parse(Channel.read, bytes(record), where=where)
             first_channel = self.channels.setdefault(channel.id, channel)
             same, noun = (
-                (first_channel.topic, first_channel.schema_id) == (channel.topic, channel.schema_id),
+                (first_channel.topic, first_channel.schema_id)
+                == (channel.topic, channel.schema_id),
                 f"channel {channel.id}",
             )
         if not same:
             raise CorruptError(
                 f"{noun} is defined twice, as different things",
                 where=where,
-                fix="write the files that it was made of again, each by itself, or merge them: mcap merge",
+                fix="write the files that it was made of again, each by itself, or merge them: "
+                "mcap merge",
             )
 
     def _check_end(self, end: int) -> None:
@@ -271,9 +298,14 @@ class _Scan:
             raise CorruptError(
                 f"a second MCAP file begins at byte {end}: files were written one behind another",
                 where=str(self.path),
-                fix=f"cut them apart: {cut}; {command_line('tail', '-c', rest, self.path)} > second.mcap",
+                fix=f"cut them apart: {cut}; {command_line('tail', '-c', rest, self.path)} > "
+                "second.mcap",
             )
-        raise CorruptError(f"{rest} bytes follow the end of the MCAP file", where=str(self.path), fix=f"cut it: {cut}")
+        raise CorruptError(
+            f"{rest} bytes follow the end of the MCAP file",
+            where=str(self.path),
+            fix=f"cut it: {cut}",
+        )
 
     def _layout_found(self) -> Layout:
         counts: Counter[int] = Counter()
@@ -294,22 +326,29 @@ class _Scan:
         )
 
     def _count_messages(self) -> Counter[int]:
-        """Counts the messages by channel, one by one; definitions that stand only in chunks are taken on the way."""
+        """Counts the messages by channel, one by one; definitions that stand only in chunks are
+        taken on the way."""
         total: Counter[int] = Counter()
         for number, block in enumerate(self.blocks):
             of_block: Counter[int] = Counter()
-            for opcode, _, record in split(read_block(self.stream, block, where=str(self.path)), where=str(self.path)):
+            for opcode, _, record in split(
+                read_block(self.stream, block, where=str(self.path)), where=str(self.path)
+            ):
                 if opcode in _DEFINED:
                     self._define(opcode, record)
                 elif opcode == Opcode.MESSAGE:
                     of_block[int.from_bytes(record[:2], "little")] += 1
-            self.blocks[number] = Block(at=block.at, length=block.length, chunk=block.chunk, counts=dict(of_block))
+            self.blocks[number] = Block(
+                at=block.at, length=block.length, chunk=block.chunk, counts=dict(of_block)
+            )
             total += of_block
         return total
 
     def _cut_off(self, noun: str) -> CorruptError:
         return CorruptError(
-            f"the MCAP file is damaged or cut off: it ends before the end of {noun}", where=str(self.path), fix=_RECOVER
+            f"the MCAP file is damaged or cut off: it ends before the end of {noun}",
+            where=str(self.path),
+            fix=_RECOVER,
         )
 
     def _damage_error(self, noun: str) -> CorruptError:
@@ -365,7 +404,9 @@ class Messages:
             CorruptError: a chunk or record that is damaged; messages before it have been given.
         """
         for number, block in enumerate(self._layout.blocks):
-            if block.counts is not None and not any(block.counts.get(channel) for channel in channels):
+            if block.counts is not None and not any(
+                block.counts.get(channel) for channel in channels
+            ):
                 continue
             for opcode, at, record in split(self._block(number), where=self._where):
                 if opcode == Opcode.MESSAGE and int.from_bytes(record[:2], "little") in channels:

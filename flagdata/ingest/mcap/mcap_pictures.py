@@ -1,7 +1,9 @@
-"""A topic of pictures in an MCAP file as a camera's source: compressed images, compressed video, plain pixels.
+"""A topic of pictures in an MCAP file as a camera's source: compressed images, compressed video,
+plain pixels.
 
-Sources: Foxglove's schemas CompressedImage, CompressedVideo and RawImage (https://docs.foxglove.dev/docs/sdk/schemas);
-ROS 2's sensor_msgs, whose Image states the bytes of a row as `step`.
+Sources: Foxglove's schemas CompressedImage, CompressedVideo and RawImage
+(https://docs.foxglove.dev/docs/sdk/schemas); ROS 2's sensor_msgs, whose Image states the bytes of a
+row as `step`.
 """
 
 from __future__ import annotations
@@ -59,7 +61,8 @@ _PLAIN = {  # encoding → (mode for Pillow, how the bytes of a pixel lie)
 }
 _DEPTH = re.compile(r"\b(?:16UC1|16SC1|32SC1|32FC1|64FC1|compressedDepth)\b", re.IGNORECASE)
 _LOOKED = (5, 4, 1)
-"""Runs of pictures, and pictures of each, that are looked at for their brightest gray; see `TopicSource.samples`."""
+"""Runs of pictures, and pictures of each, that are looked at for their brightest gray; see
+`TopicSource.samples`."""
 _BYTES_OF = {"L": 1, "RGB": 3, "BGR": 3, "RGBX": 4, "BGRX": 4}
 
 
@@ -72,8 +75,9 @@ class TopicSource:
     """The pictures of one topic, of a file or of the parts of a bag. See
     `flagdata.ingest.camera.picture_source.PictureSource`.
 
-    A picture's instant is the one that its message states, else the one at which it was logged. Pictures come in the
-    order of their instants; compressed video in that in which it was recorded, as its decoder needs it.
+    A picture's instant is the one that its message states, else the one at which it was logged.
+    Pictures come in the order of their instants; compressed video in that in which it was recorded,
+    as its decoder needs it.
 
     Raises:
         InputError: no topic of pictures, several and none is named, or none that can be decoded.
@@ -89,17 +93,31 @@ class TopicSource:
         present = topics(path)
         self._topic = choose(of_pictures(present), options.topic, where=where, noun="pictures")
         if options.sequence_fps is not None:
-            raise TimeError("pictures of a topic have stamps of their own", where=where, fix="leave out --sequence-fps")
+            raise TimeError(
+                "pictures of a topic have stamps of their own",
+                where=where,
+                fix="leave out --sequence-fps",
+            )
         self._kind = self._topic.pictures
         self._broken = self._resized = 0
-        messages_index = index(self._path, self._topic.name, limit=self._limits.frames, sort=self._kind != MOVING)
+        messages_index = index(
+            self._path, self._topic.name, limit=self._limits.frames, sort=self._kind != MOVING
+        )
         if not len(messages_index.stamps):
-            raise InputError(f"{self._topic.name} has no messages", where=where, fix="choose another topic")
-        findings = [*_other_topics(present, self._topic), *_joined_findings(parts_of(path)), *messages_index.findings]
+            raise InputError(
+                f"{self._topic.name} has no messages", where=where, fix="choose another topic"
+            )
+        findings = [
+            *_other_topics(present, self._topic),
+            *_joined_findings(parts_of(path)),
+            *messages_index.findings,
+        ]
         end = None if messages_index.in_time else restart(messages_index.stamps, tick=_NANOSECOND)
         if end is not None:
             after = int(messages_index.stamps[end - 1] - messages_index.stamps[0]) / NANOSECONDS
-            findings.append(restarted_finding(frame=end, after=after, count=len(messages_index.stamps) - end))
+            findings.append(
+                restarted_finding(frame=end, after=after, count=len(messages_index.stamps) - end)
+            )
         self._index = messages_index = messages_index.part(0, end)
         timing = survey(
             np.sort(messages_index.stamps) if messages_index.in_time else messages_index.stamps,
@@ -108,7 +126,9 @@ class TopicSource:
             fallback_rate=Fraction(1),
             where=where,
         )
-        decoded = self._decode_pictures(messages(self._path, self._topic.name, picked=messages_index))
+        decoded = self._decode_pictures(
+            messages(self._path, self._topic.name, picked=messages_index)
+        )
         first = next(decoded, None)
         if first is None:
             raise InputError(
@@ -150,11 +170,17 @@ class TopicSource:
         lumas = [picture.luma() for run in self.samples(*_LOOKED) for picture in run]
         brightest = max((int(np.asarray(luma.image).max()) for luma in lumas), default=0)
         which = f"the {len(lumas)} pictures looked at"
-        white, findings = depth.white(brightest, which=which, otherwise="; if they are depths, choose another topic")
+        white, findings = depth.white(
+            brightest, which=which, otherwise="; if they are depths, choose another topic"
+        )
         if findings and not pixel_format.startswith(DEEP):
-            message = f"{which} are of 16 bits, and none of their pixels is brighter than {brightest}"
+            message = (
+                f"{which} are of 16 bits, and none of their pixels is brighter than {brightest}"
+            )
             raise InputError(
-                f"{message}: they would be next to black", where=self._where, fix="write them with 8 bits a colour"
+                f"{message}: they would be next to black",
+                where=self._where,
+                fix="write them with 8 bits a colour",
             )
         self._white = white if findings else None
         return findings
@@ -182,18 +208,28 @@ class TopicSource:
             if start >= length:
                 return
             part = messages(self._path, self._topic.name, picked=self._index.part(start))
-            sound = (picture for picture in self._decode_pictures(part, tally=False) if picture[1:3] == self._size)
-            pictures = [self._picture(picture) for picture in islice(sound, 0, count * stride, stride)]
+            sound = (
+                picture
+                for picture in self._decode_pictures(part, tally=False)
+                if picture[1:3] == self._size
+            )
+            pictures = [
+                self._picture(picture) for picture in islice(sound, 0, count * stride, stride)
+            ]
             if pictures:
                 yield pictures
 
     def damage(self) -> list[Finding]:
-        return undecoded_findings(self._broken, total=len(self._index.stamps)) + resized_findings(self._resized)
+        return undecoded_findings(self._broken, total=len(self._index.stamps)) + resized_findings(
+            self._resized
+        )
 
     def close(self) -> None:
         """Closes nothing: the file is open only while pictures are read."""
 
-    def _decode_pictures(self, decoded: Iterator[Decoded], *, tally: bool = True) -> Iterator[_Shown]:
+    def _decode_pictures(
+        self, decoded: Iterator[Decoded], *, tally: bool = True
+    ) -> Iterator[_Shown]:
         decode = {STILL: self._stills, MOVING: self._moving, RAW: self._plain}[str(self._kind)]
         for frame in decode(decoded):
             if frame is None:
@@ -201,7 +237,8 @@ class TopicSource:
                 continue
             if frame[1] * frame[2] > self._limits.frame_pixels:
                 raise LimitError(
-                    f"a picture of {frame[1]} × {frame[2]} px is beyond the limit of {self._limits.frame_pixels} px",
+                    f"a picture of {frame[1]} × {frame[2]} px is beyond the limit of "
+                    f"{self._limits.frame_pixels} px",
                     where=self._where,
                     fix="raise the limit if the file is to be trusted",
                 )
@@ -227,7 +264,8 @@ class TopicSource:
             )
 
     def _check_no_depth(self, format_stated: str) -> None:
-        """Refuse pictures whose format says that their values are distances, as image_transport writes it."""
+        """Refuse pictures whose format says that their values are distances, as image_transport
+        writes it."""
         if _DEPTH.search(format_stated):
             raise InputError(
                 f"pictures of the format {format_stated!r} are depths, not grays",
@@ -252,14 +290,23 @@ class TopicSource:
                 yield None
                 continue
             step = step or width * _BYTES_OF[layout]
-            if data is None or width < 1 or height < 1 or len(data) < step * height or step < width * _BYTES_OF[layout]:
+            if (
+                data is None
+                or width < 1
+                or height < 1
+                or len(data) < step * height
+                or step < width * _BYTES_OF[layout]
+            ):
                 yield None
                 continue
-            image = Image.frombytes(mode, (width, height), data[: step * height], "raw", layout, step, 1)
+            image = Image.frombytes(
+                mode, (width, height), data[: step * height], "raw", layout, step, 1
+            )
             yield message.stamp, width, height, "raw", encoding, partial(luma_of_image, image)
 
     def _moving(self, decoded: Iterator[Decoded]) -> Iterator[_Shown | None]:
-        """Frames of a video, each by the stamp of the message that it came in; there are no B-frames."""
+        """Frames of a video, each by the stamp of the message that it came in; there are no
+        B-frames."""
         context: Any = None
         stamps: dict[int, int] = {}
         name = ""
@@ -286,7 +333,9 @@ class TopicSource:
         if context is not None:
             yield from self._frames(context, None, stamps, name)
 
-    def _frames(self, context: Any, packet: Any, stamps: Mapping[int, int], name: str) -> Iterator[_Shown | None]:
+    def _frames(
+        self, context: Any, packet: Any, stamps: Mapping[int, int], name: str
+    ) -> Iterator[_Shown | None]:
         try:
             frames = context.decode(packet)
         except av.error.FFmpegError:
@@ -313,7 +362,8 @@ _Shown = tuple[int, int, int, str, str, Callable[[], Luma]]
 
 
 def _data(values: Mapping[str, Any]) -> bytes | None:
-    """Returns the bytes of a picture's message; in JSON they are base64. None where there are none."""
+    """Returns the bytes of a picture's message; in JSON they are base64. None where there are
+    none."""
     data = values.get("data")
     try:
         if isinstance(data, str):
@@ -327,8 +377,8 @@ def _joined_findings(files: Sequence[Path]) -> Iterator[Finding]:
     if len(files) > 1:
         yield Finding.of(
             "chapters-joined",
-            f"{len(files)} parts of one recording were joined: {', '.join(part.name for part in files[:8])}"
-            + (", …" if len(files) > 8 else ""),
+            f"{len(files)} parts of one recording were joined: "
+            f"{', '.join(part.name for part in files[:8])}" + (", …" if len(files) > 8 else ""),
             count=len(files),
         )
 
@@ -338,7 +388,8 @@ def _other_topics(present: tuple[Topic, ...], chosen: Topic) -> Iterator[Finding
     if unread:
         yield Finding.of(
             "topics-not-read",
-            f"{chosen.name} was read, {len(unread)} other topics were not: {', '.join(map(str, unread[:8]))}",
+            f"{chosen.name} was read, {len(unread)} other topics were not: "
+            f"{', '.join(map(str, unread[:8]))}",
             count=len(unread),
             fix="ingest the file again with --topic NAME for another",
         )

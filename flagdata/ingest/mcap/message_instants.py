@@ -1,9 +1,11 @@
 """When the messages of a topic were measured, and in what order they are to be read.
 
-A message's instant is the one that it states. A stamp of zero means that its writer did not set it; such a message, and
-one that states none, is dated by when it was logged. Messages are put in the order of their instants, since files and
-logs may have another. Where neither the file nor the log has them in order to within `SLIP`, the clock that stamped
-them was set, or single stamps are wrong: then the order of the file stands, for the reader to judge.
+A message's instant is the one that it states. A stamp of zero means that its writer did not set it;
+such a message, and one that states none, is dated by when it was logged. Messages are put in the
+order of their instants, since files and logs may have another. Where neither the file nor the log
+has them in order to within `SLIP`, the clock that stamped
+them was set, or single stamps are wrong: then the order of the file stands, for the reader to
+judge.
 """
 
 from __future__ import annotations
@@ -44,7 +46,8 @@ class Stamp:
 
 
 def stamp_of(values: Mapping[str, Any]) -> Stamp:
-    """Reads what a message of these fields says of its instant: in `timestamp` or `stamp`, of its own or of its header.
+    """Reads what a message of these fields says of its instant: in `timestamp` or `stamp`, of its
+    own or of its header.
 
     Raises:
         CorruptError: an instant beyond those that 64 bits hold.
@@ -68,12 +71,15 @@ def check_instant(instant: int) -> int:
         CorruptError: they do not.
     """
     if not -(1 << 63) <= instant < 1 << 63:
-        raise CorruptError(f"a message states an instant of {instant} ns", fix="mend the recorder's clock")
+        raise CorruptError(
+            f"a message states an instant of {instant} ns", fix="mend the recorder's clock"
+        )
     return instant
 
 
 def _instant(stamp: object) -> int | None:
-    """Reads UTC nanoseconds of a time as protobuf, ROS, Foxglove's JSON, a number since 1970 or ISO 8601 state it."""
+    """Reads UTC nanoseconds of a time as protobuf, ROS, Foxglove's JSON, a number since 1970 or ISO
+    8601 state it."""
     if isinstance(stamp, Mapping):
         seconds = stamp.get("seconds", stamp.get("sec", stamp.get("secs")))
         part = stamp.get("nanos", stamp.get("nanosec", stamp.get("nsec", stamp.get("nsecs", 0))))
@@ -112,8 +118,8 @@ class Order:
 
 
 def few_without_date(stamps: IntArray, logged: IntArray) -> BoolArray:
-    """Finds (n,) messages that have a stamp before 1980 or after 2100, as of a clock that was not set yet, where most
-    have a date and the log has one for these."""
+    """Finds (n,) messages that have a stamp before 1980 or after 2100, as of a clock that was not
+    set yet, where most have a date and the log has one for these."""
     odd = (stamps < _FROM) | (stamps >= _TO)
     return odd & (logged >= _FROM) & (logged < _TO) & (2 * int(odd.sum()) < len(stamps))
 
@@ -123,7 +129,8 @@ def order_of(stamps: IntArray, logged: IntArray, *, sort: bool, where: str) -> O
 
     Args:
         stamps, logged: (n,) instants and times of logging [UTC ns], in the order of the file.
-        sort: whether they may be put in the order of their instants; else that of the file or the log stands.
+        sort: whether they may be put in the order of their instants; else that of the file or the
+            log stands.
         where: the topic, for findings.
     """
     rows = np.arange(len(stamps))
@@ -149,16 +156,21 @@ def _disordered_finding(stamps: IntArray, logged: IntArray, where: str) -> Findi
     steps = int((np.diff(logged) < -SLIP).sum())
     return Finding.of(
         "log-disordered",
-        f"the file goes back by up to {back:.3f} s from message to message, by the log as by the stamps: its "
-        "parts are in another order, or the computer's clock was set back; the messages were ordered by their instants",
+        f"the file goes back by up to {back:.3f} s from message to message, by the log as by the "
+        "stamps: its "
+        "parts are in another order, or the computer's clock was set back; the messages were "
+        "ordered by their instants",
         where=where,
         count=steps,
         value=back,
-        fix="if the clock was set back, ingest what was recorded before and after it as files of their own",
+        fix="if the clock was set back, ingest what was recorded before and after it as files of "
+        "their own",
     )
 
 
-def clock_findings(stamps: IntArray, logged: IntArray, *, unset: int, unstated: int, where: str) -> Iterator[Finding]:
+def clock_findings(
+    stamps: IntArray, logged: IntArray, *, unset: int, unstated: int, where: str
+) -> Iterator[Finding]:
     """Reports what is odd of the clocks of messages.
 
     Args:
@@ -168,25 +180,32 @@ def clock_findings(stamps: IntArray, logged: IntArray, *, unset: int, unstated: 
     """
     count = len(stamps)
     if unset or 0 < unstated < count:
-        message = f"{unset + unstated} of {count} messages state no instant (a stamp of 0, or none that is a date): "
+        message = (
+            f"{unset + unstated} of {count} messages state no instant (a stamp of 0, or none that "
+            "is a date): "
+        )
         yield Finding(
             kind="dated-by-log",
             severity=Severity.WARNING,
             where=where,
             count=unset + unstated,
-            what=f"{message}they are dated by when they were logged, which is later by an unknown delay",
+            what=f"{message}they are dated by when they were logged, which is later by an unknown "
+            "delay",
             fix="set the stamp where the messages are made; or align the recording by its contents",
         )
     elif unstated:
         message = "its messages have no stamp: they are dated by when they were logged"
-        yield Finding(kind="dated-by-log", severity=Severity.NOTE, where=where, count=count, what=message)
+        yield Finding(
+            kind="dated-by-log", severity=Severity.NOTE, where=where, count=count, what=message
+        )
     if not count:
         return
     most = float(np.abs(stamps.astype(float) - logged).max()) / NANOSECONDS
     if most > APART:
         yield Finding.of(
             "clocks-apart",
-            f"the stamps of its messages lie up to {most:.3f} s from when they were logged: a delay, or another clock",
+            f"the stamps of its messages lie up to {most:.3f} s from when they were logged: a "
+            "delay, or another clock",
             where=where,
             value=most,
             fix="compare it with another topic; align it after it is ingested",

@@ -1,7 +1,9 @@
-"""The topics of MCAP files and their messages, decoded: field → number, text, bytes, list or mapping.
+"""The topics of MCAP files and their messages, decoded: field → number, text, bytes, list or
+mapping.
 
-A topic may be on several channels, each with a definition of its own: every message is decoded by that of its channel.
-Messages of different types are topics of their own, whatever their topic's name, since they are no one series.
+A topic may be on several channels, each with a definition of its own: every message is decoded by
+that of its channel. Messages of different types are topics of their own, whatever their topic's
+name, since they are no one series.
 
 Source: the MCAP specification and its registry of encodings, https://mcap.dev/spec.
 """
@@ -54,7 +56,15 @@ _PICTURES = {
     "sensor_msgs/Image": RAW,
 }
 """Types of messages that are pictures, those of ROS 2 as ROS 1 names them → what kind."""
-_UNREADABLE = (McapError, EOFError, ValueError, protobuf.DecodeError, struct.error, KeyError, TypeError)
+_UNREADABLE = (
+    McapError,
+    EOFError,
+    ValueError,
+    protobuf.DecodeError,
+    struct.error,
+    KeyError,
+    TypeError,
+)
 """What libraries raise on damaged records and messages."""
 _OVERLAP = 2.5
 """s by which a part of a recording may begin before the end of the one before, by the log."""
@@ -82,7 +92,8 @@ class Topic:
 
     @property
     def type(self) -> str:
-        """Its messages' type; that of ROS 2 as ROS 1 names it: "sensor_msgs/Image" for "sensor_msgs/msg/Image"."""
+        """Its messages' type; that of ROS 2 as ROS 1 names it: "sensor_msgs/Image" for
+        "sensor_msgs/msg/Image"."""
         return self.schema.replace("/msg/", "/")
 
     @property
@@ -121,7 +132,8 @@ class Decoded:
 
     @property
     def stamp(self) -> int:
-        """Its instant [UTC ns]: that of the measurement where it states one that is not zero, else the log's.
+        """Its instant [UTC ns]: that of the measurement where it states one that is not zero, else
+        the log's.
 
         Raises:
             CorruptError: an instant beyond those that 64 bits hold.
@@ -140,7 +152,8 @@ class Index:
         rows: (n,) number of each in the order of the file.
         places: (n, 3) as `Decoded.position`.
         stamps, logged: (n,) when each was measured and when it was logged [UTC ns].
-        in_time: whether they are in the order of their instants, to within a slip where that of the file stands.
+        in_time: whether they are in the order of their instants, to within a slip where that of the
+            file stands.
         findings: what to report of their order, their clocks and of those that are missing.
     """
 
@@ -155,12 +168,17 @@ class Index:
         """Returns the messages from one place on, or up to another."""
         rows = slice(first, end)
         return replace(
-            self, rows=self.rows[rows], places=self.places[rows], stamps=self.stamps[rows], logged=self.logged[rows]
+            self,
+            rows=self.rows[rows],
+            places=self.places[rows],
+            stamps=self.stamps[rows],
+            logged=self.logged[rows],
         )
 
 
 def profile(path: Path) -> str:
-    """Reads what the header of an MCAP file, or of a folder's first, says its content is: "flagdata", "ros2", "" …
+    """Reads what the header of an MCAP file, or of a folder's first, says its content is:
+    "flagdata", "ros2", "" …
 
     Raises:
         CorruptError: it cannot be read.
@@ -190,7 +208,9 @@ def topics(path: Path) -> tuple[Topic, ...]:
     types = [plain for plain, _ in channels_by_topic]
     return tuple(
         Topic(
-            name=plain if types.count(plain) == 1 else f"{plain}:{schema or encodings[plain, schema]}",
+            name=plain
+            if types.count(plain) == 1
+            else f"{plain}:{schema or encodings[plain, schema]}",
             plain=plain,
             schema=schema,
             encoding=encodings[plain, schema],
@@ -217,14 +237,31 @@ def choose(candidates: Sequence[Topic], wanted: str | None, *, where: str, noun:
                 return topic
         typed = [topic for topic in candidates if topic.plain == wanted]
         if not typed:
-            raise UnknownNameError.of(f"topic of {noun}", wanted, [topic.name for topic in candidates], where=where)
-        message = f"messages of several types are on {wanted}, which are no one series: {', '.join(map(str, typed))}"
-        raise InputError(message, where=where, fix=f"choose one by its type: {command_line('--topic', typed[0].name)}")
+            raise UnknownNameError.of(
+                f"topic of {noun}", wanted, [topic.name for topic in candidates], where=where
+            )
+        message = (
+            f"messages of several types are on {wanted}, which are no one series: "
+            f"{', '.join(map(str, typed))}"
+        )
+        raise InputError(
+            message,
+            where=where,
+            fix=f"choose one by its type: {command_line('--topic', typed[0].name)}",
+        )
     if len(candidates) == 1:
         return candidates[0]
     listed = ", ".join(map(str, candidates))
-    message = f"{len(candidates)} topics hold {noun}: {listed}" if candidates else f"no topic holds {noun}"
-    raise InputError(message, where=where, fix="choose one: --topic NAME" if candidates else "see flagdata doctor FILE")
+    message = (
+        f"{len(candidates)} topics hold {noun}: {listed}"
+        if candidates
+        else f"no topic holds {noun}"
+    )
+    raise InputError(
+        message,
+        where=where,
+        fix="choose one: --topic NAME" if candidates else "see flagdata doctor FILE",
+    )
 
 
 def messages(path: Path, topic: str, *, picked: Index | None = None) -> Iterator[Decoded]:
@@ -239,7 +276,9 @@ def messages(path: Path, topic: str, *, picked: Index | None = None) -> Iterator
         CorruptError: a chunk or message that is damaged; those before it have been given.
     """
     layouts = _layouts(path)
-    channels = {channel for present in topics(path) if present.name == topic for channel in present.channels}
+    channels = {
+        channel for present in topics(path) if present.name == topic for channel in present.channels
+    }
     with ExitStack() as stack:
         opened = [stack.enter_context(closing(Messages(layout))) for layout in layouts]
         decoders: dict[tuple[int, int], Callable[[bytes], Mapping[str, Any]]] = {}
@@ -248,12 +287,18 @@ def messages(path: Path, topic: str, *, picked: Index | None = None) -> Iterator
             key = (part, message.channel)
             if key not in decoders:
                 channel = layouts[part].channels[message.channel]
-                decoders[key] = _decoder(layouts[part].path, layouts[part].schemas.get(channel.schema_id), channel)
+                decoders[key] = _decoder(
+                    layouts[part].path, layouts[part].schemas.get(channel.schema_id), channel
+                )
             position = (part, message.block, message.offset)
-            return Decoded(position=position, log_time=message.log_time, values=decoders[key](message.data))
+            return Decoded(
+                position=position, log_time=message.log_time, values=decoders[key](message.data)
+            )
 
         if picked is not None:
-            for (part, block, offset), dated in zip(picked.places.tolist(), picked.stamps.tolist(), strict=True):
+            for (part, block, offset), dated in zip(
+                picked.places.tolist(), picked.stamps.tolist(), strict=True
+            ):
                 with _readable(layouts[part].path):
                     read_message = decode_message(part, opened[part].at(block, offset))
                 yield replace(read_message, dated=dated)
@@ -280,7 +325,8 @@ def index(
     """Indexes the messages of a topic in the order of their instants.
 
     Args:
-        sort: whether to put messages in order that are a slip late; else they stay in that of the file or the log.
+        sort: whether to put messages in order that are a slip late; else they stay in that of the
+            file or the log.
         visit: called with every message, in the order of the file.
 
     Raises:
@@ -299,7 +345,9 @@ def index(
         stamp, logged = message.said, check_instant(message.log_time)
         states_instant.append(stamp.instant is not None)
         has_field.append(stamp.field)
-        numbers.extend((*message.position, logged if stamp.instant is None else stamp.instant, logged))
+        numbers.extend(
+            (*message.position, logged if stamp.instant is None else stamp.instant, logged)
+        )
         if visit is not None:
             visit(message)
     table = np.array(numbers, dtype=np.int64).reshape(-1, 5)
@@ -311,7 +359,11 @@ def index(
     stamps[by_log] = logged[by_log]
     order = order_of(stamps, logged, sort=sort, where=topic)
     findings = clock_findings(
-        stamps, logged, unset=int((by_log & with_field).sum()), unstated=int((~with_field).sum()), where=topic
+        stamps,
+        logged,
+        unset=int((by_log & with_field).sum()),
+        unstated=int((~with_field).sum()),
+        where=topic,
     )
     return Index(
         rows=order.rows,
@@ -324,7 +376,8 @@ def index(
 
 
 def _check_successive(path: Path, topic: str, places: IntArray, logged: IntArray) -> None:
-    """Refuse the files of a folder that were recorded at the same time: their messages are no one series.
+    """Refuse the files of a folder that were recorded at the same time: their messages are no one
+    series.
 
     Raises:
         InputError: one begins, by the log, before the end of another.
@@ -339,7 +392,8 @@ def _check_successive(path: Path, topic: str, places: IntArray, logged: IntArray
         overlap = (before[1] - after[0]) / NANOSECONDS
         if overlap > _OVERLAP:
             raise InputError(
-                f"{topic} begins there {overlap:.1f} s before its end in {parts[before[2]].name}: not successive parts "
+                f"{topic} begins there {overlap:.1f} s before its end in {parts[before[2]].name}: "
+                "not successive parts "
                 "of one recording",
                 where=str(parts[after[2]]),
                 fix=f"ingest each by itself: {command_line('flagdata', 'ingest', path)}/*.mcap",
@@ -349,13 +403,16 @@ def _check_successive(path: Path, topic: str, places: IntArray, logged: IntArray
 def _missing(path: Path, topic: str) -> Iterator[Finding]:
     """Findings of messages that are not where files say that they are."""
     layouts = _layouts(path)
-    chosen = next((present.channels for present in topics(path) if present.name == topic), frozenset())
+    chosen = next(
+        (present.channels for present in topics(path) if present.name == topic), frozenset()
+    )
     lost = sum(layouts[part].missing([number]) for part, number in chosen)
     if lost:
         count = sum(layouts[part].counts.get(number, 0) for part, number in chosen)
         yield Finding.of(
             "messages-missing",
-            f"the summary counts {count + lost} messages of {topic}, {count} are there: {lost} are lost",
+            f"the summary counts {count + lost} messages of {topic}, {count} are there: {lost} are "
+            "lost",
             where=topic,
             count=lost,
             fix="copy the file again, or record it again",
@@ -386,7 +443,9 @@ def _readable(path: Path) -> Iterator[None]:
         ) from None
 
 
-def _decoder(path: Path, schema: Schema | None, channel: Channel) -> Callable[[bytes], Mapping[str, Any]]:
+def _decoder(
+    path: Path, schema: Schema | None, channel: Channel
+) -> Callable[[bytes], Mapping[str, Any]]:
     encoding = channel.message_encoding
     if encoding == "protobuf" and schema is not None:
         decode = DecoderFactory().decoder_for(encoding, schema)
@@ -394,8 +453,13 @@ def _decoder(path: Path, schema: Schema | None, channel: Channel) -> Callable[[b
             return lambda data: _values(decode(data))
     if encoding == "json":
         return _from_json
-    if schema is not None and (encoding, schema.encoding) in (("cdr", "ros2msg"), ("ros1", "ros1msg")):
-        return cdr.decoder(schema.name, schema.data.decode(errors="replace"), ros1=encoding == "ros1")
+    if schema is not None and (encoding, schema.encoding) in (
+        ("cdr", "ros2msg"),
+        ("ros1", "ros1msg"),
+    ):
+        return cdr.decoder(
+            schema.name, schema.data.decode(errors="replace"), ros1=encoding == "ros1"
+        )
     described = f" described by {schema.encoding}" if schema is not None and schema.encoding else ""
     raise InputError(
         f"messages in the encoding {encoding or 'none'}{described} cannot be decoded",
@@ -417,7 +481,9 @@ def _values(message: protobuf.Message) -> dict[str, Any]:
         if descriptor.message_type is not None and descriptor.message_type.GetOptions().map_entry:
             continue
         if isinstance(value, Sequence) and not isinstance(value, str | bytes):
-            values[descriptor.name] = [_values(part) if isinstance(part, protobuf.Message) else part for part in value]
+            values[descriptor.name] = [
+                _values(part) if isinstance(part, protobuf.Message) else part for part in value
+            ]
         elif isinstance(value, protobuf.Message):
             if message.HasField(descriptor.name):
                 values[descriptor.name] = _values(value)

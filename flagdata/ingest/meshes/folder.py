@@ -43,23 +43,35 @@ def read_json(path: Path) -> dict[str, Any]:
     check_input(path, limit=SIZE_LIMIT)
     text = path.read_text(encoding="utf-8-sig", errors="replace")
     # A string, kept, or a comment up to the end of its line, dropped.
-    bare = re.sub(r'"(?:[^"\\]|\\.)*"|//[^\n]*', lambda m: m[0] if m[0].startswith('"') else "", text)
+    bare = re.sub(
+        r'"(?:[^"\\]|\\.)*"|//[^\n]*', lambda m: m[0] if m[0].startswith('"') else "", text
+    )
     try:
         content = from_json(bare)
     except ValueError as error:
-        raise InputError(f"the file is not JSON: {error}", where=str(path), fix="correct the file") from None
+        raise InputError(
+            f"the file is not JSON: {error}", where=str(path), fix="correct the file"
+        ) from None
     if not isinstance(content, dict):
-        raise InputError("the file holds no JSON object", where=str(path), fix="give a file of the form {…}")
+        raise InputError(
+            "the file holds no JSON object", where=str(path), fix="give a file of the form {…}"
+        )
     return content
 
 
 def read_folder(
-    path: Path, *, rate: float | None = None, metre: float = 1.0, progress: Callable[[int], object] | None = None
+    path: Path,
+    *,
+    rate: float | None = None,
+    metre: float = 1.0,
+    progress: Callable[[int], object] | None = None,
 ) -> MeshSequence | RaggedMeshSequence:
-    """Reads a sequence of one cloth; ragged if the topology changes. Frame n is at n frame times from 0.
+    """Reads a sequence of one cloth; ragged if the topology changes. Frame n is at n frame times
+    from 0.
 
-    The frames are the files `NNNN_00.obj`; in a folder without such, all `.obj` files, which must then differ in one
-    number only ("flag_001.obj"). The rest shape is their texture coordinates, in metres.
+    The frames are the files `NNNN_00.obj`; in a folder without such, all `.obj` files, which must
+    then differ in one number only ("flag_001.obj"). The rest shape is their texture coordinates, in
+    metres.
 
     Args:
         rate: frames a second [Hz]; None for 1/`frame_time` of conf.json.
@@ -68,16 +80,21 @@ def read_folder(
 
     Raises:
         NotFoundError: no folder, no frames, or neither rate nor conf.json.
-        InputError: frames missing in between, several cloths, a malformed file or frame time, no texture coordinates.
+        InputError: frames missing in between, several cloths, a malformed file or frame time, no
+            texture coordinates.
         LimitError: more than `FRAME_LIMIT` frames.
     """
     if not path.is_dir():
-        raise NotFoundError("there is no such folder", where=str(path), fix="name the folder with the .obj files")
+        raise NotFoundError(
+            "there is no such folder", where=str(path), fix="name the folder with the .obj files"
+        )
     numbered = frame_files(path)
     configured = (path / _CONFIGURATION).is_file()
     if rate is None and not configured:
         raise NotFoundError(
-            f"no {_CONFIGURATION}, so that the frame rate is not known", where=str(path), fix="give it by --rate"
+            f"no {_CONFIGURATION}, so that the frame rate is not known",
+            where=str(path),
+            fix="give it by --rate",
         )
     configuration = read_json(path / _CONFIGURATION) if configured else None
     frame_time = _frame_time(configuration or {}, path) if rate is None else 1 / rate
@@ -93,7 +110,9 @@ def read_folder(
         frames.append(frame)
         if progress is not None:
             progress(1)
-    return _sequence(frames, [n for n, _ in numbered], frame_time, metre, configuration, where=str(path))
+    return _sequence(
+        frames, [n for n, _ in numbered], frame_time, metre, configuration, where=str(path)
+    )
 
 
 def frame_files(path: Path) -> list[tuple[int, Path]]:
@@ -101,20 +120,27 @@ def frame_files(path: Path) -> list[tuple[int, Path]]:
 
     Raises:
         NotFoundError: there are none.
-        InputError: numbers missing in between or twice, several cloths, or names that are no sequence.
+        InputError: numbers missing in between or twice, several cloths, or names that are no
+            sequence.
         LimitError: more than `FRAME_LIMIT`.
     """
-    entries = sorted(entry for entry in path.iterdir() if entry.is_file() and not is_beside(entry.name))
+    entries = sorted(
+        entry for entry in path.iterdir() if entry.is_file() and not is_beside(entry.name)
+    )
     frames_of_cloths = [
         (Ordinal.read(m[1]), Ordinal.read(m[2]), entry)
         for entry in entries
         if (m := _FRAME.fullmatch(entry.name)) is not None
     ]
     if not frames_of_cloths:
-        frames_of_cloths = _number_frames([entry for entry in entries if entry.suffix.lower() == ".obj"], path)
+        frames_of_cloths = _number_frames(
+            [entry for entry in entries if entry.suffix.lower() == ".obj"], path
+        )
     if len(frames_of_cloths) > FRAME_LIMIT:
         raise LimitError(
-            f"the folder has {len(frames_of_cloths)} frames", where=str(path), fix=f"at most {FRAME_LIMIT} are read"
+            f"the folder has {len(frames_of_cloths)} frames",
+            where=str(path),
+            fix=f"at most {FRAME_LIMIT} are read",
         )
     cloths = {cloth for _, cloth, _ in frames_of_cloths}
     if cloths != {_ONLY}:
@@ -129,14 +155,19 @@ def frame_files(path: Path) -> list[tuple[int, Path]]:
         raise InputError(
             f"{missing.count} frames are missing, the first after frame {missing.after:04d}",
             where=str(path),
-            fix="copy them, or cut there; number the files 1, 2, 3, … if their numbers do not count frames",
+            fix="copy them, or cut there; number the files 1, 2, 3, … if their numbers do not "
+            "count frames",
         )
     if len(set(numbers)) < len(numbers):
         twice = next(a for a, b in pairwise(numbers) if a == b)
         raise InputError(
-            "there are two files for one frame", where=f"{path}, frame {twice:04d}", fix="keep one of them"
+            "there are two files for one frame",
+            where=f"{path}, frame {twice:04d}",
+            fix="keep one of them",
         )
-    frames = [(frame, entry) for number, entry in ordered if (frame := number.up_to(_LAST)) is not None]
+    frames = [
+        (frame, entry) for number, entry in ordered if (frame := number.up_to(_LAST)) is not None
+    ]
     if len(frames) < len(ordered):
         raise LimitError(
             f"the last frame is numbered {numbers[-1]}, beyond {_LAST}",
@@ -164,7 +195,8 @@ def _number_frames(entries: list[Path], path: Path) -> list[tuple[Ordinal, Ordin
     varying = [column for column in columns if len(set(column)) > 1] or columns[-1:]
     if len(varying) > 1:
         raise InputError(
-            f"{len(varying)} numbers vary in the names, as in {entries[0].name} and {entries[-1].name}: which of them "
+            f"{len(varying)} numbers vary in the names, as in {entries[0].name} and "
+            f"{entries[-1].name}: which of them "
             "counts the frames is not known",
             where=str(path),
             fix="name the files of one cloth alike, with one number that counts the frames",
@@ -174,9 +206,15 @@ def _number_frames(entries: list[Path], path: Path) -> list[tuple[Ordinal, Ordin
 
 def _frame_time(configuration: Mapping[str, Any], path: Path) -> float:
     frame_time = configuration.get("frame_time")
-    if isinstance(frame_time, bool) or not isinstance(frame_time, int | float) or not 0 < frame_time < 1e6:
+    if (
+        isinstance(frame_time, bool)
+        or not isinstance(frame_time, int | float)
+        or not 0 < frame_time < 1e6
+    ):
         raise InputError(
-            f"frame_time is {frame_time!r}", where=str(path / _CONFIGURATION), fix="give seconds between frames"
+            f"frame_time is {frame_time!r}",
+            where=str(path / _CONFIGURATION),
+            fix="give seconds between frames",
         )
     return float(frame_time)
 
@@ -197,10 +235,13 @@ def _sequence(
             fix="number the frames from 0 or 1 on",
         )
     time = np.array([round(n * frame_time * NANOSECONDS) for n in numbers], dtype=np.int64)
-    attributes = {"source": "obj"} if configuration is None else {"source": "arcsim", "scene": configuration}
+    attributes = (
+        {"source": "obj"} if configuration is None else {"source": "arcsim", "scene": configuration}
+    )
     first = frames[0]
     if all(
-        np.array_equal(_sorted_faces(f.faces), _sorted_faces(first.faces)) and np.array_equal(f.rest, first.rest)
+        np.array_equal(_sorted_faces(f.faces), _sorted_faces(first.faces))
+        and np.array_equal(f.rest, first.rest)
         for f in frames
     ):
         return MeshSequence(
@@ -228,7 +269,9 @@ def _sorted_faces(faces: IntArray) -> IntArray:
     return turned[np.lexsort(turned.T[::-1])]
 
 
-def write_folder(path: Path, sequence: MeshSequence | RaggedMeshSequence, *, scene: Mapping[str, Any]) -> None:
+def write_folder(
+    path: Path, sequence: MeshSequence | RaggedMeshSequence, *, scene: Mapping[str, Any]
+) -> None:
     """Write a sequence as a new ArcSim output folder, which appears with the last of its files.
 
     Args:
@@ -242,10 +285,14 @@ def write_folder(path: Path, sequence: MeshSequence | RaggedMeshSequence, *, sce
 
     check_folder(path)
     frame_time = scene.get("frame_time")
-    expected = np.array([round(i * float(frame_time or 0.0) * NANOSECONDS) for i in range(len(sequence))])
+    expected = np.array(
+        [round(i * float(frame_time or 0.0) * NANOSECONDS) for i in range(len(sequence))]
+    )
     if not frame_time or np.abs(sequence.time - sequence.time[0] - expected).max() > 1:
         raise InputError(
-            f"frames are not {frame_time!r} s apart", where="scene, frame_time", fix="give the sequence's frame time"
+            f"frames are not {frame_time!r} s apart",
+            where="scene, frame_time",
+            fix="give the sequence's frame time",
         )
     with fresh_folder(path) as folder:
         for index in range(len(sequence)):
@@ -256,4 +303,6 @@ def write_folder(path: Path, sequence: MeshSequence | RaggedMeshSequence, *, sce
                 rest=frame.rest.astype(np.float64),
             )
             (folder / f"{index:04d}_00.obj").write_text(obj_text(mesh), encoding="utf-8")
-        (folder / _CONFIGURATION).write_text(json.dumps(dict(scene), indent=1) + "\n", encoding="utf-8")
+        (folder / _CONFIGURATION).write_text(
+            json.dumps(dict(scene), indent=1) + "\n", encoding="utf-8"
+        )

@@ -1,13 +1,14 @@
-"""From a folder of meshes to an artifact of the lake: read, checked, written as one Zarr sequence, published.
+"""From a folder of meshes to an artifact of the lake: read, checked, written as one Zarr sequence,
+published.
 
 Checked are errors that the numbers of a sequence show: units, scale, faces turned over, and
 
-- T-joints: a vertex on an edge of a face that does not have it as a corner. Where one side of a line was subdivided and
-  the other was not, the cloth looks whole and is open: the two sides share no edge, so that no force crosses it and it
-  opens as soon as it is simulated.
-- whether frames are of one cloth in motion: vertices that change places, jumps, a topology that changes. Programs that
-  export each frame by itself may number vertices anew. Then one row of the positions is two points of the cloth, and
-  whatever is measured along time is of neither.
+- T-joints: a vertex on an edge of a face that does not have it as a corner. Where one side of a
+  line was subdivided and the other was not, the cloth looks whole and is open: the two sides share
+  no edge, so that no force crosses it and it opens as soon as it is simulated.
+- whether frames are of one cloth in motion: vertices that change places, jumps, a topology that
+  changes. Programs that export each frame by itself may number vertices anew. Then one row of the
+  positions is two points of the cloth, and whatever is measured along time is of neither.
 """
 
 from __future__ import annotations
@@ -58,10 +59,14 @@ class MeshIngest:
     def __post_init__(self) -> None:
         if self.rate is not None and not (math.isfinite(self.rate) and 0 < self.rate <= 1e6):
             raise UsageError(
-                f"the frame rate {self.rate!r} Hz is out of range", where="--rate", fix="give frames a second"
+                f"the frame rate {self.rate!r} Hz is out of range",
+                where="--rate",
+                fix="give frames a second",
             )
         if unit(self.unit).si != "m":
-            raise UsageError(f"{self.unit!r} is no unit of length", where="--unit", fix="give mm, cm, m or ft")
+            raise UsageError(
+                f"{self.unit!r} is no unit of length", where="--unit", fix="give mm, cm, m or ft"
+            )
 
     def recipe(self) -> dict[str, Any]:
         return {"ingest": "meshes", "rate": self.rate, "unit": self.unit}
@@ -77,9 +82,11 @@ def ingest_meshes(
     reasons: Sequence[str] = (),
     progress: Callable[[int], object] | None = None,
 ) -> IngestResult:
-    """Ingest a folder of OBJ meshes, one a frame; ArcSim's output folders with the scene that made them.
+    """Ingest a folder of OBJ meshes, one a frame; ArcSim's output folders with the scene that made
+    them.
 
-    Vertices that are the same in the texture and in every frame are merged, see `welded`; other pieces are reported.
+    Vertices that are the same in the texture and in every frame are merged, see `welded`; other
+    pieces are reported.
 
     Args:
         reasons: why the folder is taken to be meshes, for the report.
@@ -87,7 +94,8 @@ def ingest_meshes(
 
     Raises:
         FlagdataError: as `read_folder` and `check_units`; the lake is unchanged.
-        ConflictError: a file changed while the folder was read, or the folder is in the lake under other labels.
+        ConflictError: a file changed while the folder was read, or the folder is in the lake under
+            other labels.
     """
     options, labels = options or MeshIngest(), labels or Labels()
     source = Source.of(path)
@@ -127,19 +135,24 @@ def ingest_meshes(
 
 
 def scene_wind(scene: Any) -> dict[str, float] | None:
-    """Reads the wind of an ArcSim scene, where the air goes to [m/s]; None where the scene gives none that can be
-    read."""
+    """Reads the wind of an ArcSim scene, where the air goes to [m/s]; None where the scene gives
+    none that can be read."""
     wind = scene.get("wind") if isinstance(scene, Mapping) else None
     velocity = wind.get("velocity") if isinstance(wind, Mapping) else None
     if not isinstance(velocity, list) or len(velocity) != 3:
         return None
-    if not all(isinstance(v, int | float) and not isinstance(v, bool) and math.isfinite(v) for v in velocity):
+    if not all(
+        isinstance(v, int | float) and not isinstance(v, bool) and math.isfinite(v)
+        for v in velocity
+    ):
         return None
     return dict(zip(("wind_x", "wind_y", "wind_z"), map(float, velocity), strict=True))
 
 
 def _report(
-    sequence: MeshSequence | RaggedMeshSequence, all_findings: Sequence[Finding], reasons: Sequence[str]
+    sequence: MeshSequence | RaggedMeshSequence,
+    all_findings: Sequence[Finding],
+    reasons: Sequence[str],
 ) -> dict[str, Any]:
     """Counts, times since the start of the simulation, and findings."""
     if isinstance(sequence, MeshSequence):
@@ -164,8 +177,8 @@ def _report(
 
 
 _STRETCHED = 1.5
-"""Ratio of an edge's length in space to its length at rest above which it is not cloth: knits tear at 1.3 to 1.5, and
-a vertex that takes its neighbour's place doubles an edge."""
+"""Ratio of an edge's length in space to its length at rest above which it is not cloth: knits tear
+at 1.3 to 1.5, and a vertex that takes its neighbour's place doubles an edge."""
 _SUDDEN = 10.0
 """A frame has jumped if its vertices move more than this many times their usual way between frames,
 and more than `_FAR` of the cloth's size: both must hold."""
@@ -174,7 +187,8 @@ _FAR = 0.2
 
 
 def continuity(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]:
-    """Return what speaks against one cloth in motion: `edges-stretched`, `cloth-jumps`, `topology-changes`."""
+    """Return what speaks against one cloth in motion: `edges-stretched`, `cloth-jumps`,
+    `topology-changes`."""
     return (*_stretched_findings(sequence), *_jumps(sequence), *_changes(sequence))
 
 
@@ -184,11 +198,17 @@ def _stretched_findings(sequence: MeshSequence | RaggedMeshSequence) -> Iterator
     if not counts[worst]:
         return
     where = np.flatnonzero(counts)
-    frames = f"frame {where[0]}" if len(where) == 1 else f"{len(where)} frames, the first frame {where[0]}"
+    frames = (
+        f"frame {where[0]}"
+        if len(where) == 1
+        else f"{len(where)} frames, the first frame {where[0]}"
+    )
     yield Finding.of(
         "edges-stretched",
-        f"{counts[worst]} edges are more than {_STRETCHED:g} times as long as in the material ({frames}): "
-        "vertices that change places, a tear, or texture coordinates that are not the cloth's own lengths",
+        f"{counts[worst]} edges are more than {_STRETCHED:g} times as long as in the material "
+        f"({frames}): "
+        "vertices that change places, a tear, or texture coordinates that are not the cloth's own "
+        "lengths",
         count=int(counts[worst]),
         where=f"frame {worst}",
         fix="export all frames with the vertices in one order, and texture coordinates in metres",
@@ -218,8 +238,10 @@ def _jumps(sequence: MeshSequence | RaggedMeshSequence) -> Iterator[Finding]:
         first = int(sudden[0])
         yield Finding.of(
             "cloth-jumps",
-            f"half of the vertices move {ways[first]:.3g} m or more from frame {first} to frame {first + 1}, and "
-            f"{usual:.2g} m between others: vertices that are numbered anew, or frames of another run",
+            f"half of the vertices move {ways[first]:.3g} m or more from frame {first} to frame "
+            f"{first + 1}, and "
+            f"{usual:.2g} m between others: vertices that are numbered anew, or frames of another "
+            "run",
             count=len(sudden),
             where=f"frame {first + 1}",
             value=float(ways[first]),
@@ -242,7 +264,8 @@ def _changes(sequence: MeshSequence | RaggedMeshSequence) -> Iterator[Finding]:
     ]
     yield Finding.of(
         "topology-changes",
-        f"the mesh changes at {len(changed)} of {len(frames) - 1} frames: {vertices.min()} to {vertices.max()} "
+        f"the mesh changes at {len(changed)} of {len(frames) - 1} frames: {vertices.min()} to "
+        f"{vertices.max()} "
         f"vertices, {faces.min()} to {faces.max()} faces",
         count=len(changed),
         where=f"frame {changed[0]}",
@@ -250,8 +273,10 @@ def _changes(sequence: MeshSequence | RaggedMeshSequence) -> Iterator[Finding]:
     )
 
 
-_ON_THE_LINE = 1e-3  # distance from the edge in the material, in edge lengths; exporters keep four digits or more
-_NEAR = 0.1  # the same in space, along the edge too: cloth stretches, and bends away from an edge's middle
+# distance from the edge in the material, in edge lengths; exporters keep four digits or more
+_ON_THE_LINE = 1e-3
+# the same in space, along the edge too: cloth stretches, and bends away from an edge's middle
+_NEAR = 0.1
 _WITHIN = 1e-2  # from an edge's ends, in edge lengths
 
 
@@ -266,7 +291,8 @@ def t_joints(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]
     return (
         Finding.of(
             "t-joints",
-            f"{len(joints[worst])} vertices lie on an edge of a face that they are no corner of (the first is "
+            f"{len(joints[worst])} vertices lie on an edge of a face that they are no corner of "
+            "(the first is "
             f"vertex {first}): the cloth is open there",
             count=len(joints[worst]),
             where=f"frame {worst}",
@@ -276,8 +302,12 @@ def t_joints(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]
 
 
 def _joints(mesh: Mesh) -> IntArray:
-    """Numbers of the vertices on the inside of an edge that only one face has, in the material and in space."""
-    edges = np.sort(np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]), axis=1)
+    """Numbers of the vertices on the inside of an edge that only one face has, in the material and
+    in space."""
+    edges = np.sort(
+        np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]),
+        axis=1,
+    )
     edges, counts = np.unique(edges, axis=0, return_counts=True)
     border = edges[counts == 1]
     corners = np.unique(border).astype(np.int64)
@@ -288,65 +318,84 @@ def _joints(mesh: Mesh) -> IntArray:
     half = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / 2
     neighbours = KDTree(rest[corners]).query_ball_point(ends.mean(axis=1), half)
     number = np.repeat(np.arange(len(border)), [len(of_edge) for of_edge in neighbours])
-    vertex = corners[np.concatenate([np.asarray(of_edge, dtype=np.int64) for of_edge in neighbours])]
+    vertex = corners[
+        np.concatenate([np.asarray(of_edge, dtype=np.int64) for of_edge in neighbours])
+    ]
     first, last = border[number].astype(np.int64).T
     along, off = _along(rest, vertex, first, last)
     along_in_space, off_in_space = _along(space, vertex, first, last)
-    inside = (off < _ON_THE_LINE) & (off_in_space < _NEAR) & (np.abs(along_in_space - along) < _NEAR)
+    inside = (
+        (off < _ON_THE_LINE) & (off_in_space < _NEAR) & (np.abs(along_in_space - along) < _NEAR)
+    )
     for share in (along, along_in_space):
         inside &= (share > _WITHIN) & (share < 1 - _WITHIN)
     return np.unique(vertex[inside])
 
 
-def _along(positions: FloatArray, vertex: IntArray, first: IntArray, last: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Computes where vertices lie along edges, 0 at the first end and 1 at the last, and how far beside, in edge
-    lengths."""
+def _along(
+    positions: FloatArray, vertex: IntArray, first: IntArray, last: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Computes where vertices lie along edges, 0 at the first end and 1 at the last, and how far
+    beside, in edge lengths."""
     edge, arm = positions[last] - positions[first], positions[vertex] - positions[first]
     square = np.maximum((edge**2).sum(axis=1), np.finfo(np.float64).tiny)
     along = (edge * arm).sum(axis=1) / square
     return along, np.linalg.norm(arm - along[:, None] * edge, axis=1) / np.sqrt(square)
 
 
-# Median edge length in space over that in the material. Cloth stretches and crumples by some per cent; a factor of two
-# is beyond any, and below the steps between units that are mixed up (2.54, 10, 12, 100, 1000).
+# Median edge length in space over that in the material. Cloth stretches and crumples by some per
+# cent; a factor of two is beyond any, and below the steps between units that are mixed up (2.54,
+# 10, 12, 100, 1000).
 _MIXED = 2.0
 # Sizes of cloth that is filmed or simulated [m].
 _SMALLEST, _LARGEST = 0.01, 100.0
-_UNITS = {1e3: "mm and m", 1e2: "cm and m", 10.0: "mm and cm", 39.37: "inches and m", 3.281: "feet and m"}
+_UNITS = {
+    1e3: "mm and m",
+    1e2: "cm and m",
+    10.0: "mm and cm",
+    39.37: "inches and m",
+    3.281: "feet and m",
+}
 
 
 def check_units(sequence: MeshSequence | RaggedMeshSequence, *, where: str) -> None:
     """Refuse lengths that cannot be metres in space and in the material.
 
     Raises:
-        InputError: edges much longer or shorter in space than at rest, in the first frame or from some frame on; or a
-            cloth smaller than 1 cm or larger than 100 m.
+        InputError: edges much longer or shorter in space than at rest, in the first frame or from
+            some frame on; or a cloth smaller than 1 cm or larger than 100 m.
     """
     for index in range(len(sequence)):
         ratio = _edge_ratio(sequence.frame(index))
         if not 1 / _MIXED < ratio < _MIXED:
             raise InputError(
-                f"edges are {ratio:.4g} times as long in space as in the material coordinates{_likely(ratio)}",
+                f"edges are {ratio:.4g} times as long in space as in the material "
+                f"coordinates{_likely(ratio)}",
                 where=f"{where}, frame {index}",
-                fix="name the unit of the positions by --unit and let texture coordinates be metres, or export it anew",
+                fix="name the unit of the positions by --unit and let texture coordinates be "
+                "metres, or export it anew",
             )
     rest = sequence.frame(0).rest
     size = float(np.max(rest.max(axis=0) - rest.min(axis=0)))
     if not _SMALLEST <= size <= _LARGEST:
         raise InputError(
-            f"a cloth of {size:.4g} m by its texture coordinates, which are its shape at rest in metres",
+            f"a cloth of {size:.4g} m by its texture coordinates, which are its shape at rest in "
+            "metres",
             where=where,
             fix="export it with texture coordinates in metres",
         )
 
 
 def findings(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]:
-    """Reports what is odd and was kept: faces turned over or without area in the material, vertices of no face,
-    vertices that change places, pieces, slits and T-joints."""
+    """Reports what is odd and was kept: faces turned over or without area in the material, vertices
+    of no face, vertices that change places, pieces, slits and T-joints."""
     flipped = degenerate = loose = 0
     first: dict[str, int] = {}
     frames = range(1) if isinstance(sequence, MeshSequence) else range(len(sequence))
-    areas = [_doubled_areas(mesh.rest.astype(np.float64), mesh.faces) for mesh in map(sequence.frame, frames)]
+    areas = [
+        _doubled_areas(mesh.rest.astype(np.float64), mesh.faces)
+        for mesh in map(sequence.frame, frames)
+    ]
     main = np.sign(np.median([np.median(doubled) for doubled in areas])) or 1.0
     for index, doubled in zip(frames, areas, strict=True):
         mesh = sequence.frame(index)
@@ -379,7 +428,13 @@ def findings(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]
         for kind, count, message in kinds
         if count
     )
-    return (*odd, *continuity(sequence), *in_pieces(sequence), *slits(sequence), *t_joints(sequence))
+    return (
+        *odd,
+        *continuity(sequence),
+        *in_pieces(sequence),
+        *slits(sequence),
+        *t_joints(sequence),
+    )
 
 
 def _edge_ratio(mesh: Mesh) -> float:
@@ -387,7 +442,9 @@ def _edge_ratio(mesh: Mesh) -> float:
     space = np.linalg.norm(np.diff(mesh.positions[edges].astype(np.float64), axis=1)[:, 0], axis=1)
     rest = np.linalg.norm(np.diff(mesh.rest[edges].astype(np.float64), axis=1)[:, 0], axis=1)
     has_length = rest > 0
-    return float(np.median(space[has_length] / rest[has_length])) if has_length.any() else float("inf")
+    return (
+        float(np.median(space[has_length] / rest[has_length])) if has_length.any() else float("inf")
+    )
 
 
 def _likely(ratio: float) -> str:

@@ -1,10 +1,12 @@
-"""Wavefront OBJ as cloth simulators write it: positions, material coordinates, triangles, velocities.
+"""Wavefront OBJ as cloth simulators write it: positions, material coordinates, triangles,
+velocities.
 
-Beside `v`, `vt` and `f`, ArcSim writes `nv` (velocity of the vertex before it) and `ny` (its plastic rest position).
-Quads and polygons are split into triangles. Normals, groups, materials and comments are passed over, as
-in any OBJ reader; lines of an unknown keyword are refused.
+Beside `v`, `vt` and `f`, ArcSim writes `nv` (velocity of the vertex before it) and `ny` (its
+plastic rest position). Quads and polygons are split into triangles. Normals, groups, materials and
+comments are passed over, as in any OBJ reader; lines of an unknown keyword are refused.
 
-Polygons split into triangles: convex ones as fans, others by clipping ears (Meisters, 1975), in their own plane.
+Polygons split into triangles: convex ones as fans, others by clipping ears (Meisters, 1975), in
+their own plane.
 """
 
 from __future__ import annotations
@@ -31,7 +33,8 @@ Triples = IntArray
 
 
 def fans(sizes: IntArray) -> tuple[Triples, IntArray]:
-    """Polygons of so many corners, whose corners lie one polygon after another, as fans around their first corners.
+    """Polygons of so many corners, whose corners lie one polygon after another, as fans around
+    their first corners.
 
     Returns:
         (triangle, 3) places of corners, and (triangle,) the polygon of each.
@@ -45,7 +48,8 @@ def fans(sizes: IntArray) -> tuple[Triples, IntArray]:
 
 
 def convex(points: Points) -> BoolArray:
-    """Checks (polygon,) which of some polygons of equally many corners, (polygon, corner, 2), are strictly convex."""
+    """Checks (polygon,) which of some polygons of equally many corners, (polygon, corner, 2), are
+    strictly convex."""
     ahead = np.roll(points, -1, axis=1) - points
     after = np.roll(ahead, -1, axis=1)
     turn = _cross(ahead, after)
@@ -56,7 +60,8 @@ def convex(points: Points) -> BoolArray:
 
 
 def in_plane(points: Points) -> Points:
-    """Projects the corners of a polygon in space, (corner, 3), on the plane of its vector area, (corner, 2)."""
+    """Projects the corners of a polygon in space, (corner, 3), on the plane of its vector area,
+    (corner, 2)."""
     spokes = points - points.mean(axis=0)
     normal = np.cross(spokes, np.roll(spokes, -1, axis=0)).sum(axis=0)
     length = float(np.linalg.norm(normal))
@@ -69,10 +74,12 @@ def in_plane(points: Points) -> Points:
 
 
 def ears(points: Points) -> Triples:
-    """Cuts a simple polygon, (corner, 2), into (corner − 2, 3) triangles with its orientation, of all its corners.
+    """Cuts a simple polygon, (corner, 2), into (corner − 2, 3) triangles with its orientation, of
+    all its corners.
 
     Raises:
-        ValueError: more corners than `CORNERS`, no area, or edges that cross or touch each other; the text says which.
+        ValueError: more corners than `CORNERS`, no area, or edges that cross or touch each other;
+            the text says which.
     """
     count = len(points)
     if count > CORNERS:
@@ -99,17 +106,22 @@ def ears(points: Points) -> Triples:
     return np.array([*triangles, rest], dtype=np.int64)
 
 
-def _is_ear(points: Points, corners: list[int], rest: list[int], *, sign: float, flat: float) -> bool:
+def _is_ear(
+    points: Points, corners: list[int], rest: list[int], *, sign: float, flat: float
+) -> bool:
     a, b, c = points[corners]
     if sign * float(_cross(b - a, c - a)) <= flat:
         return False
     other_points = points[[corner for corner in rest if corner not in corners]]
-    sides = [sign * _cross(end - start, other_points - start) for start, end in ((a, b), (b, c), (c, a))]
+    sides = [
+        sign * _cross(end - start, other_points - start) for start, end in ((a, b), (b, c), (c, a))
+    ]
     return not (np.stack(sides) >= -flat).all(axis=0).any()
 
 
 def _crosses(points: Points) -> bool:
-    """Checks whether two edges of a polygon have a point in common, beside the corner that neighbours share."""
+    """Checks whether two edges of a polygon have a point in common, beside the corner that
+    neighbours share."""
     count = len(points)
     start, end = points, np.roll(points, -1, axis=0)
     along = end - start
@@ -151,7 +163,9 @@ _NOWHERE = 1 << 40
 """An index beyond those of any file that is read."""
 
 # Keywords of the format (and of ArcSim's dialect) that carry nothing this reader keeps.
-_PASSED_OVER = frozenset({"vn", "vp", "g", "o", "s", "l", "e", "usemtl", "mtllib", "ny", "ms", "tm", "tl", "te", "tf"})
+_PASSED_OVER = frozenset(
+    {"vn", "vp", "g", "o", "s", "l", "e", "usemtl", "mtllib", "ny", "ms", "tm", "tl", "te", "tf"}
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -174,16 +188,21 @@ class Obj:
 
 
 def read_obj(path: Path) -> Obj:
-    """Read a mesh. Without `vt`, x and y of the positions are the material coordinates, as in ArcSim.
+    """Read a mesh. Without `vt`, x and y of the positions are the material coordinates, as in
+    ArcSim.
 
     Raises:
         NotFoundError: no such file.
         LimitError: larger than `SIZE_LIMIT`.
-        InputError: a malformed line, indices that do not exist, no faces, a vertex with two material coordinates (a
-            seam), or a polygon without area or with edges that cross in the material, each with its line.
+        InputError: a malformed line, indices that do not exist, no faces, a vertex with two
+            material coordinates (a seam), or a polygon without area or with edges that cross in the
+            material, each with its line.
     """
     check_input(path, noun="mesh file", limit=SIZE_LIMIT)
-    positions, texture = array("d"), array("d")  # a list of lists takes ten times the memory of the file
+    positions, texture = (
+        array("d"),
+        array("d"),
+    )  # a list of lists takes ten times the memory of the file
     velocities: dict[int, list[float]] = {}
     corners, sizes, face_lines = array("q"), array("q"), array("q")
     with path.open(encoding="utf-8-sig", errors="replace") as lines:
@@ -199,14 +218,23 @@ def read_obj(path: Path) -> Obj:
                 texture.extend(_numbers(values, 2, where))
             elif keyword == "nv":
                 if not positions:
-                    raise InputError("a velocity comes before any vertex", where=where, fix="write nv after its v")
+                    raise InputError(
+                        "a velocity comes before any vertex",
+                        where=where,
+                        fix="write nv after its v",
+                    )
                 velocities[len(positions) // 3 - 1] = _numbers(values, 3, where)
             elif keyword == "f":
                 if len(values) < 3:
-                    raise InputError("a face has fewer than three corners", where=where, fix="give at least three")
+                    raise InputError(
+                        "a face has fewer than three corners",
+                        where=where,
+                        fix="give at least three",
+                    )
                 if len(values) > FACE_CORNERS:
                     raise InputError(
-                        f"a face has {len(values):,} corners, more than the {FACE_CORNERS:,} that are read",
+                        f"a face has {len(values):,} corners, more than the {FACE_CORNERS:,} that "
+                        "are read",
                         where=where,
                         fix="triangulate the mesh in the program that made it",
                     )
@@ -216,7 +244,9 @@ def read_obj(path: Path) -> Obj:
                 face_lines.append(number)
             elif keyword not in _PASSED_OVER:
                 raise InputError(
-                    f"the keyword {keyword!r} is unknown", where=where, fix="is this a Wavefront OBJ file?"
+                    f"the keyword {keyword!r} is unknown",
+                    where=where,
+                    fix="is this a Wavefront OBJ file?",
                 )
     if not corners:
         raise InputError("the mesh has no faces", where=str(path), fix="export triangles")
@@ -226,7 +256,9 @@ def read_obj(path: Path) -> Obj:
         sizes=np.frombuffer(sizes, dtype=np.int64),
         lines=np.frombuffer(face_lines, dtype=np.int64),
     )
-    return _assemble_mesh(faces, np.array(positions).reshape(-1, 3), np.array(texture).reshape(-1, 2), velocities)
+    return _assemble_mesh(
+        faces, np.array(positions).reshape(-1, 3), np.array(texture).reshape(-1, 2), velocities
+    )
 
 
 def _numbers(values: list[str], count: int, where: str) -> list[float]:
@@ -235,21 +267,28 @@ def _numbers(values: list[str], count: int, where: str) -> list[float]:
     except ValueError:
         numbers = []
     if len(numbers) != count or not np.isfinite(numbers).all():
-        raise InputError(f"{' '.join(values)!r} is not {count} finite numbers", where=where, fix="correct the line")
+        raise InputError(
+            f"{' '.join(values)!r} is not {count} finite numbers",
+            where=where,
+            fix="correct the line",
+        )
     return numbers
 
 
 def _corner(word: str, vertices: int, textures: int, where: str) -> tuple[int, int]:
     """Reads vertex and texture index of a face's corner, from 1; 0 where there is no texture index.
 
-    Indices below zero count back from the last vertex before the line; those that lead nowhere are returned as -1.
+    Indices below zero count back from the last vertex before the line; those that lead nowhere are
+    returned as -1.
     """
     parts = word.split("/")
     try:
         vertex = int(parts[0])
         texture = int(parts[1]) if len(parts) > 1 and parts[1] else 0
     except ValueError:
-        raise InputError(f"{word!r} is not a corner", where=where, fix="write v, v/vt or v/vt/vn") from None
+        raise InputError(
+            f"{word!r} is not a corner", where=where, fix="write v, v/vt or v/vt/vn"
+        ) from None
     if vertex < 0:
         vertex = max(vertices + 1 + vertex, 0) or -1
     if texture < 0:
@@ -283,8 +322,8 @@ class _Faces:
             raise InputError(text, where=f"{self.path}, line {self.lines[face]}", fix=fix)
 
     def triangles(self, points: FloatArray) -> IntArray:
-        """Splits each face in the plane of its corners, (corner, 2) or (corner, 3), into triangles: (triangle, 3)
-        places of corners.
+        """Splits each face in the plane of its corners, (corner, 2) or (corner, 3), into triangles:
+        (triangle, 3) places of corners.
 
         Raises:
             InputError: a face of four corners or more has no area there, or edges that cross.
@@ -295,7 +334,11 @@ class _Faces:
         for size in np.unique(self.sizes[self.sizes > 3]):
             faces = np.flatnonzero(self.sizes == size)
             polygons = points[(ends[faces] - size)[:, None] + np.arange(size)]
-            flat = polygons if points.shape[1] == 2 else np.stack([in_plane(polygon) for polygon in polygons])
+            flat = (
+                polygons
+                if points.shape[1] == 2
+                else np.stack([in_plane(polygon) for polygon in polygons])
+            )
             for index in np.flatnonzero(~convex(flat)):
                 face = faces[index]
                 try:
@@ -314,13 +357,17 @@ def _assemble_mesh(
     faces: _Faces, positions: FloatArray, texture: FloatArray, velocities: dict[int, list[float]]
 ) -> Obj:
     counts = np.array([len(positions), len(texture)])
-    wrong = (faces.corners[:, 0] < 1) | (faces.corners > counts).any(axis=1) | (faces.corners[:, 1] < 0)
+    wrong = (
+        (faces.corners[:, 0] < 1) | (faces.corners > counts).any(axis=1) | (faces.corners[:, 1] < 0)
+    )
     faces.refuse(wrong, "a corner names what is not there", fix="correct the face")
     vertex, uv = faces.corners[:, 0] - 1, faces.corners[:, 1] - 1
     textured = bool((uv >= 0).all())
     if textured:
         rest = np.full((len(positions), 2), np.nan)
-        rest[vertex[::-1]] = texture[uv[::-1]]  # the first mention counts, so that a seam keeps its place
+        rest[vertex[::-1]] = texture[
+            uv[::-1]
+        ]  # the first mention counts, so that a seam keeps its place
         faces.refuse(
             (texture[uv] != rest[vertex]).any(axis=1),
             "a vertex has two material coordinates: a seam, which is not supported",
@@ -333,24 +380,30 @@ def _assemble_mesh(
         triangles = faces.triangles(positions[vertex])
     else:
         raise InputError(
-            "some corners have material coordinates, others not", where=str(faces.path), fix="give all or none"
+            "some corners have material coordinates, others not",
+            where=str(faces.path),
+            fix="give all or none",
         )
     speed = None
     if velocities:
         speed = np.zeros((len(positions), 3))
         speed[list(velocities)] = list(velocities.values())
-    return Obj(positions=positions, faces=vertex[triangles], rest=rest, velocities=speed, textured=textured)
+    return Obj(
+        positions=positions, faces=vertex[triangles], rest=rest, velocities=speed, textured=textured
+    )
 
 
 def write_obj(path: Path, mesh: Obj) -> None:
-    """Write a mesh into a new file, see `obj_text`; raises as `flagdata.core.files.outputs.write_file`."""
+    """Write a mesh into a new file, see `obj_text`; raises as
+    `flagdata.core.files.outputs.write_file`."""
     from flagdata.core.files.outputs import write_file
 
     write_file(path, obj_text(mesh))
 
 
 def obj_text(mesh: Obj) -> str:
-    """Writes a mesh as ArcSim does: all `vt`, each `v` with its `nv` where there are velocities, `f` as v/vt.
+    """Writes a mesh as ArcSim does: all `vt`, each `v` with its `nv` where there are velocities,
+    `f` as v/vt.
 
     Nine significant digits: float32 values come back exactly.
     """

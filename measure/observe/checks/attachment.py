@@ -13,11 +13,13 @@ from measure.observe import cloth_mesh
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import Experiment, Specimen, Trajectory
 
-# A pin's root-mean-square motion over that of the median marker. Held by springs of 1 kN/m in 8 m/s: below 0.01.
+# A pin's root-mean-square motion over that of the median marker. Held by springs of 1 kN/m in 8
+# m/s: below 0.01.
 _LOOSE, _FREE = 0.05, 0.3
 _STILL = 1e-3  # of the cloth's size: what moves less is still, whatever the rest does
 _SEEN = 0.02  # of the cloth's size: a pin that far beyond the outermost markers is not observed
-_ALONG = 3  # markers of a hoist between its pins, below which nothing is concluded from their standing still
+# markers of a hoist between its pins, below which nothing is concluded from their standing still
+_ALONG = 3
 _ELSEWHERE = 0.02  # of the cloth's size: pins of two recordings further apart are not in one place
 
 
@@ -25,29 +27,38 @@ def check_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]
     """Refuses pins that move with the cloth, and reports those that move a little.
 
     Raises:
-        InputError: a pin among the markers moves by more than three tenths of what the median marker does, or one
-            beyond them by more than all of it.
+        InputError: a pin among the markers moves by more than three tenths of what the median
+            marker does, or one beyond them by more than all of it.
     """
     where = f"recording {recording.name!r}"
     seats = specimen.mesh.rest[list(specimen.held)]
     tracks = _tracks(recording, seats)
-    moved = _motion(tracks, recording.noise * np.linalg.norm(onto(recording.markers, seats), axis=1))
+    moved = _motion(
+        tracks, recording.noise * np.linalg.norm(onto(recording.markers, seats), axis=1)
+    )
     usual = float(np.median(_motion(recording.positions, recording.noise)))
     size = float(np.ptp(specimen.mesh.rest, axis=0).max())
     worst = int(moved.argmax())
     if moved[worst] <= max(_LOOSE * usual, _STILL * size, 3 * recording.noise):
         return ()
     u, v = seats[worst]
-    motion = f"the cloth moves by {1e3 * moved[worst]:.3g} mm at the pin (u, v) = ({u:.3g}, {v:.3g}) m"
+    motion = (
+        f"the cloth moves by {1e3 * moved[worst]:.3g} mm at the pin (u, v) = ({u:.3g}, {v:.3g}) m"
+    )
     still = _still_points(recording)
     reach = cloth_mesh.hull(recording.markers, where=where)
-    away = 0.0 if cloth_mesh.inside(reach, seats[worst][None])[0] else cloth_mesh.distance_to(reach, seats[worst])
+    away = (
+        0.0
+        if cloth_mesh.inside(reach, seats[worst][None])[0]
+        else cloth_mesh.distance_to(reach, seats[worst])
+    )
     covered = away <= _SEEN * size
     if not covered and moved[worst] <= usual:
         return (
             Finding.of(
                 "pins-not-observed",
-                f"the pin (u, v) = ({u:.3g}, {v:.3g}) m is {away:.3g} m beyond the outermost markers; its "
+                f"the pin (u, v) = ({u:.3g}, {v:.3g}) m is {away:.3g} m beyond the outermost "
+                "markers; its "
                 f"place is guessed from them and moves by {1e3 * moved[worst]:.3g} mm",
                 where=where,
                 value=away,
@@ -73,7 +84,8 @@ def check_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]
 
 
 def beside_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
-    """Reports markers away from the pins that stand as still as these: the cloth may be held there too."""
+    """Reports markers away from the pins that stand as still as these: the cloth may be held there
+    too."""
     still, away = _still(recording, specimen)
     still_markers = np.flatnonzero(still & (away > 0))
     if not len(still_markers) or still.mean() > 0.5:
@@ -82,7 +94,8 @@ def beside_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...
     return (
         Finding.of(
             "still-away-from-pins",
-            f"{len(still_markers)} markers away from the pins stand as still as these, one at (u, v) = ({u:.3g}, "
+            f"{len(still_markers)} markers away from the pins stand as still as these, one at (u, "
+            f"v) = ({u:.3g}, "
             f"{v:.3g}) m",
             where=f"recording {recording.name!r}",
             count=len(still_markers),
@@ -92,7 +105,8 @@ def beside_pins(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...
 
 
 def hoist_stands_still(experiment: Experiment) -> bool:
-    """Returns whether in every recording the markers of the hoist away from the pins stand as still as these, three of
+    """Returns whether in every recording the markers of the hoist away from the pins stand as still
+    as these, three of
     them or more, and no others do: the cloth is attached along its hoist."""
     specimen = experiment.specimen
     size = float(np.ptp(specimen.mesh.rest, axis=0).max())
@@ -106,8 +120,8 @@ def hoist_stands_still(experiment: Experiment) -> bool:
 
 
 def _still(recording: Trajectory, specimen: Specimen) -> tuple[BoolArray, FloatArray]:
-    """Masks the markers that stand still, (marker,), and measures how far each is from the nearest pin [m], 0 of one
-    that is beside it."""
+    """Masks the markers that stand still, (marker,), and measures how far each is from the nearest
+    pin [m], 0 of one that is beside it."""
     size = float(np.ptp(specimen.mesh.rest, axis=0).max())
     still = _motion(recording.positions, recording.noise) <= max(_STILL * size, recording.noise)
     seats = specimen.mesh.rest[list(specimen.held)]
@@ -130,7 +144,8 @@ def check_places(recordings: Sequence[Trajectory], specimen: Specimen) -> None:
         if away.max() > _ELSEWHERE * size:
             x, y, z = (places - first).mean(axis=0)
             raise InputError(
-                f"its pins are up to {away.max():.3g} m from those of {recordings[0].name!r}; on the average "
+                f"its pins are up to {away.max():.3g} m from those of {recordings[0].name!r}; on "
+                "the average "
                 f"({x:.3g}, {y:.3g}, {z:.3g}) m",
                 where=f"recording {recording.name!r}",
                 fix="bring the recordings to one frame of coordinates, the wind along with them",
@@ -148,7 +163,8 @@ def _tracks(recording: Trajectory, seats: FloatArray) -> FloatArray:
 
 
 def _motion(positions: FloatArray, sigma: float | FloatArray) -> FloatArray:
-    """Computes the root-mean-square distance of each point from its mean, without the noise's part, (point,) [m]."""
+    """Computes the root-mean-square distance of each point from its mean, without the noise's part,
+    (point,) [m]."""
     return np.sqrt(np.maximum(positions.var(axis=0).sum(axis=1) - 3 * sigma**2, 0.0))
 
 

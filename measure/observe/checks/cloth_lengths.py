@@ -1,5 +1,5 @@
-"""The cloth's own lengths: cloth hardly stretches, so neighbouring markers are never further apart than at rest, and
-when the cloth is taut they are as far."""
+"""The cloth's own lengths: cloth hardly stretches, so neighbouring markers are never further apart
+than at rest, and when the cloth is taut they are as far."""
 
 from __future__ import annotations
 
@@ -19,10 +19,12 @@ FEWEST = 30
 """Markers that a recording must have."""
 _TAUT = 0.9  # quantile over the frames of a length: as long as it gets, fluttering apart
 _NORMAL = 1.2816  # that quantile of a normal distribution
-# Median of these lengths over those at rest. In the reference runs, 0 to 8 m/s and 30 to 651 markers: 1.00 to 1.03.
+# Median of these lengths over those at rest. In the reference runs, 0 to 8 m/s and 30 to 651
+# markers: 1.00 to 1.03.
 _SHORT, _LONG, _TOO_LONG = 0.95, 1.05, 1.08
 _UNEVEN = 0.08  # the same along u and along v differ by less than 0.05 there
-_TORN = 1.5  # a marker that is further than that from most of its neighbours is not where the file places it
+# a marker that is further than that from most of its neighbours is not where the file places it
+_TORN = 1.5
 _HOLE = 0.35  # of the cloth's size: a part that is further from any marker is not observed
 _UNITS = {
     "mm for m": 1000.0,
@@ -43,7 +45,8 @@ class Edges:
 
     @classmethod
     def between(cls, markers: FloatArray, *, where: str) -> Edges:
-        """Finds the edges of the Delaunay triangulation of the flat cloth, those along its hollows left out.
+        """Finds the edges of the Delaunay triangulation of the flat cloth, those along its hollows
+        left out.
 
         Raises:
             InputError: fewer than `FEWEST` markers, two in one place, or all on a line.
@@ -52,10 +55,13 @@ class Edges:
             raise InputError(
                 f"the recording has {len(markers)} markers",
                 where=where,
-                fix=f"track at least {FEWEST}, spread over the cloth: fewer do not show how it bends",
+                fix=f"track at least {FEWEST}, spread over the cloth: fewer do not show how it "
+                "bends",
             )
         if not np.isfinite(markers).all():
-            raise InputError("a rest coordinate is not finite", where=where, fix="give u and v of every marker")
+            raise InputError(
+                "a rest coordinate is not finite", where=where, fix="give u and v of every marker"
+            )
         query = KDTree(markers).query(markers, k=2)
         distances, neighbours = np.asarray(query[0]), np.asarray(query[1])
         size = float(np.ptp(markers, axis=0).max())
@@ -70,7 +76,9 @@ class Edges:
             faces = Delaunay(markers).simplices
         except QhullError:
             raise InputError(
-                "all markers are on one line of the cloth", where=where, fix="track markers that span it"
+                "all markers are on one line of the cloth",
+                where=where,
+                fix="track markers that span it",
             ) from None
         sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
         pairs = np.unique(np.sort(sides, axis=1), axis=0)
@@ -87,36 +95,46 @@ def check_scale(observation: Observation, edges: Edges, sigma: float) -> tuple[F
     """Refuses positions that are not of this rest shape in metres.
 
     Raises:
-        InputError: lengths that are off by a factor, or differently along u and v; or nothing to measure them by.
+        InputError: lengths that are off by a factor, or differently along u and v; or nothing to
+            measure them by.
     """
     where = f"recording {observation.name!r}"
     taut, measured = _taut(edges.lengths(observation.positions), sigma)
     if not measured.any():
         raise InputError(
-            "no two neighbouring markers are tracked together", where=where, fix="check the columns of the positions"
+            "no two neighbouring markers are tracked together",
+            where=where,
+            fix="check the columns of the positions",
         )
     ratio = taut[measured] / edges.rest[measured]
     scale = float(np.median(ratio))
     if not _SHORT <= scale <= _TOO_LONG:
         raise InputError(
-            f"taut, neighbouring markers are {scale:.4g} times as far apart as at rest", where=where, fix=_advice(scale)
+            f"taut, neighbouring markers are {scale:.4g} times as far apart as at rest",
+            where=where,
+            fix=_advice(scale),
         )
-    arms = np.abs(observation.markers[edges.ends[measured, 0]] - observation.markers[edges.ends[measured, 1]])
+    arms = np.abs(
+        observation.markers[edges.ends[measured, 0]] - observation.markers[edges.ends[measured, 1]]
+    )
     along = [ratio[arms[:, axis] > 2 * arms[:, 1 - axis]] for axis in (0, 1)]
     if min(map(len, along)) >= 5:
         u, v = (float(np.median(part)) for part in along)
         if abs(u - v) > _UNEVEN:
             raise InputError(
-                f"pulled tight, the cloth is {u:.4g} times its length at rest along u, but {v:.4g} times along v",
+                f"pulled tight, the cloth is {u:.4g} times its length at rest along u, but {v:.4g} "
+                "times along v",
                 where=where,
-                fix="check the width and height that were given, and that the columns u and v are not exchanged",
+                fix="check the width and height that were given, and that the columns u and v are "
+                "not exchanged",
             )
     if scale <= _LONG:
         return ()
     return (
         Finding.of(
             "cloth-longer-than-rest",
-            f"taut, the cloth is {100 * (scale - 1):.1f} % longer than at rest, more than wind stretches it",
+            f"taut, the cloth is {100 * (scale - 1):.1f} % longer than at rest, more than wind "
+            "stretches it",
             where=where,
             value=scale,
             fix="measure its width and height again",
@@ -125,8 +143,8 @@ def check_scale(observation: Observation, edges: Edges, sigma: float) -> tuple[F
 
 
 def without_strays(observation: Observation, edges: Edges, sigma: float) -> Observation:
-    """Sets positions to NaN where a marker is much further from most of its neighbours than the cloth allows: lost and
-    found elsewhere, or exchanged with another."""
+    """Sets positions to NaN where a marker is much further from most of its neighbours than the
+    cloth allows: lost and found elsewhere, or exchanged with another."""
     reach = _TORN * edges.rest + 6 * sigma
     stretched = edges.lengths(observation.positions) > reach  # false where NaN
     torn = np.zeros(observation.positions.shape[:2])
@@ -134,7 +152,8 @@ def without_strays(observation: Observation, edges: Edges, sigma: float) -> Obse
     for end in (0, 1):
         np.add.at(torn.T, edges.ends[:, end], stretched.T)
     stray = torn > 0.5 * degree
-    # The neighbours of a stray have one bad edge each; strays that are neighbours of strays are found as well.
+    # The neighbours of a stray have one bad edge each; strays that are neighbours of strays are
+    # found as well.
     count = int(stray.sum())
     if not count:
         return observation
@@ -143,9 +162,11 @@ def without_strays(observation: Observation, edges: Edges, sigma: float) -> Obse
     frame, marker = np.argwhere(stray)[0]
     finding = Finding.of(
         "markers-astray",
-        f"{count} positions are further from the markers around than cloth can stretch; they are left out",
+        f"{count} positions are further from the markers around than cloth can stretch; they are "
+        "left out",
         count=count,
-        where=f"recording {observation.name!r}, frame {int(frame)}, {marker_at(observation.markers[marker])}",
+        where=f"recording {observation.name!r}, frame {int(frame)}, "
+        f"{marker_at(observation.markers[marker])}",
         fix="look at the track there: was the marker exchanged with another?",
     )
     return replace(observation, positions=positions, findings=(*observation.findings, finding))
@@ -178,11 +199,11 @@ def check_cover(markers: FloatArray, corners: FloatArray, *, where: str) -> tupl
 
 
 def _taut(lengths: FloatArray, sigma: float) -> tuple[FloatArray, BoolArray]:
-    """Computes the upper decile of each length over its frames without the noise's part, (edge,), and masks the edges
-    that have one.
+    """Computes the upper decile of each length over its frames without the noise's part, (edge,),
+    and masks the edges that have one.
 
-    Noise of σ a coordinate lies along the edge with variance 2 σ², which widens the upper half of a distribution as of
-    a normal one, and across it with 4 σ², which adds as much to the mean square.
+    Noise of σ a coordinate lies along the edge with variance 2 σ², which widens the upper half of a
+    distribution as of a normal one, and across it with 4 σ², which adds as much to the mean square.
     """
     tracked = np.isfinite(lengths)
     measured = tracked.sum(axis=0) >= 10
@@ -196,7 +217,13 @@ def _taut(lengths: FloatArray, sigma: float) -> tuple[FloatArray, BoolArray]:
 
 def _advice(ratio: float) -> str:
     for units, factor in _UNITS.items():
-        for value, conversion in ((factor, units), (1 / factor, " for ".join(reversed(units.split(" for "))))):
+        for value, conversion in (
+            (factor, units),
+            (1 / factor, " for ".join(reversed(units.split(" for ")))),
+        ):
             if abs(ratio / value - 1) < 0.06:
                 return f"the positions seem to be {conversion}: name their unit"
-    return "the rest shape does not fit: check width and height, the unit, and that both are of this cloth"
+    return (
+        "the rest shape does not fit: check width and height, the unit, and that both are of this "
+        "cloth"
+    )

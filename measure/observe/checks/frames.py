@@ -22,14 +22,21 @@ _SLOWEST, _FASTEST = 9.0, 550.0  # Hz: 10 to 500, and what cameras and trackers 
 _JITTER = 0.1  # of a frame: times that are further off an even grid are not of a constant rate
 _REPEATED = 0.02  # of the usual squared step: a frame that moved less repeats the one before
 _MANY = 0.2  # of the frames: repeats that are so many mean a lower rate
-_FROZEN = 0.95  # of the frames: repeats that are so many are no repeats but a cloth that stands still
+_FROZEN = (
+    0.95  # of the frames: repeats that are so many are no repeats but a cloth that stands still
+)
 _AROUND = 5  # frames on either side that give the usual step
 _NEIGHBOURS = 4
-_MOVED_ON = 20.0  # times the smallest steps there are: the neighbours of a stuck marker move as much
+_MOVED_ON = (
+    20.0  # times the smallest steps there are: the neighbours of a stuck marker move as much
+)
 _PINNED = 0.5  # of the frames: a marker that stands still in so many is held
-_FAR = 0.05  # of the cloth's size: (0, 0, 0) is no position of a marker that never comes as near to it
+_FAR = (
+    0.05  # of the cloth's size: (0, 0, 0) is no position of a marker that never comes as near to it
+)
 _JUMP = 1.7  # of the mean of the steps on either side: a frame is missing in between
-_STILL = 1e-3  # of the cloth's size, and three times the noise: what moves less on the average stands still
+# of the cloth's size, and three times the noise: what moves less on the average stands still
+_STILL = 1e-3
 
 
 def even(observation: Observation) -> Observation:
@@ -45,7 +52,8 @@ def even(observation: Observation) -> Observation:
         raise InputError(
             f"the recording has {count} frames over {span:.3g} s",
             where=where,
-            fix=f"record at least {SHORTEST:g} s and {FEWEST} frames: with less, effects cannot be distinguished",
+            fix=f"record at least {SHORTEST:g} s and {FEWEST} frames: with less, effects cannot be "
+            "distinguished",
         )
     step = float(np.median(np.diff(observation.times)))
     if not _SLOWEST <= 1 / step <= _FASTEST:
@@ -54,15 +62,21 @@ def even(observation: Observation) -> Observation:
             where=where,
             fix=f"give {_SLOWEST:g} to {_FASTEST:g} Hz: cloth moves on too far between rarer frames",
         )
-    index = np.concatenate([[0], np.cumsum(np.rint(np.diff(observation.times) / step).astype(np.int64))])
-    step, first = np.polyfit(index, observation.times, 1).tolist()  # the median of rounded times is a rounded step
+    index = np.concatenate(
+        [[0], np.cumsum(np.rint(np.diff(observation.times) / step).astype(np.int64))]
+    )
+    step, first = np.polyfit(
+        index, observation.times, 1
+    ).tolist()  # the median of rounded times is a rounded step
     off = np.abs(observation.times - first - index * step)
     if off.max() > _JITTER * step or (np.diff(index) < 1).any():
         frame = int(off.argmax())
         raise InputError(
-            f"frames are not evenly spaced: one is {1e3 * off[frame]:.3g} ms off, at {1e3 * step:.4g} ms a frame",
+            f"frames are not evenly spaced: one is {1e3 * off[frame]:.3g} ms off, at "
+            f"{1e3 * step:.4g} ms a frame",
             where=f"{where}, frame {frame}",
-            fix="interpolate the positions to a constant rate, or track a video of constant frame rate",
+            fix="interpolate the positions to a constant rate, or track a video of constant frame "
+            "rate",
         )
     times = np.arange(index[-1] + 1) * step
     lost = len(times) - count
@@ -84,7 +98,9 @@ def even(observation: Observation) -> Observation:
         where=f"{where}, frame {gap}",
         count=lost,
     )
-    return replace(observation, times=times, positions=positions, findings=(*observation.findings, finding))
+    return replace(
+        observation, times=times, positions=positions, findings=(*observation.findings, finding)
+    )
 
 
 def without_repeats(observation: Observation, sigma: float) -> Observation:
@@ -100,7 +116,9 @@ def without_repeats(observation: Observation, sigma: float) -> Observation:
     steps = _steps(observation.positions)
     if (steps == 0).mean() > _FROZEN:
         raise InputError(
-            "no motion is found: nearly all frames are the same", where=where, fix="record the cloth in a wind"
+            "no motion is found: nearly all frames are the same",
+            where=where,
+            fix="record the cloth in a wind",
         )
     square = steps - 6 * sigma**2
     usual = _neighbourhood(square)
@@ -110,11 +128,16 @@ def without_repeats(observation: Observation, sigma: float) -> Observation:
     if not count:
         return observation
     if count >= _MANY * len(repeat):
-        rate = (len(repeat) - count) / (len(repeat) - 1) / float(observation.times[1] - observation.times[0])
+        rate = (
+            (len(repeat) - count)
+            / (len(repeat) - 1)
+            / float(observation.times[1] - observation.times[0])
+        )
         raise InputError(
             f"{count} of {len(repeat)} frames repeat the one before",
             where=f"{where}, frame {int(repeat.argmax())}",
-            fix=f"it may have been tracked at about {rate:.4g} Hz: drop the repeats and give that rate",
+            fix=f"it may have been tracked at about {rate:.4g} Hz: drop the repeats and give that "
+            "rate",
         )
     positions = np.array(observation.positions)
     positions[repeat] = np.nan
@@ -131,14 +154,16 @@ def without_repeats(observation: Observation, sigma: float) -> Observation:
 def without_stuck_markers(observation: Observation) -> Observation:
     """Sets positions to NaN where trackers write something else for a marker they lost.
 
-    That is its last position while its neighbours move on, or exactly (0, 0, 0) where it never is otherwise. A marker
-    that mostly stands still is a pin, and left alone.
+    That is its last position while its neighbours move on, or exactly (0, 0, 0) where it never is
+    otherwise. A marker that mostly stands still is a pin, and left alone.
     """
     step = np.abs(np.diff(observation.positions, axis=0)).max(axis=2)
     neighbours = KDTree(observation.markers).query(
         observation.markers, k=min(_NEIGHBOURS + 1, len(observation.markers))
     )[1]
-    around = np.median(step[:, np.asarray(neighbours)[:, 1:]], axis=2)  # NaN where a neighbour was not tracked
+    around = np.median(
+        step[:, np.asarray(neighbours)[:, 1:]], axis=2
+    )  # NaN where a neighbour was not tracked
     units = step[step > 0]
     resolution = float(np.quantile(units, 0.01)) if len(units) else 0.0
     stuck = np.zeros(observation.positions.shape[:2], dtype=bool)
@@ -147,10 +172,18 @@ def without_stuck_markers(observation: Observation) -> Observation:
     tracked = np.isfinite(observation.positions).all(axis=2)
     zero = (observation.positions == 0).all(axis=2)
     distances = np.where(
-        (tracked & ~zero)[:, :, None], np.linalg.norm(observation.positions, axis=2, keepdims=True), np.inf
+        (tracked & ~zero)[:, :, None],
+        np.linalg.norm(observation.positions, axis=2, keepdims=True),
+        np.inf,
     )
-    nearest = distances[:, :, 0].min(axis=0)  # to the origin, when not at it; infinite for one that always is
-    stuck |= zero & np.isfinite(nearest) & (nearest > _FAR * float(np.ptp(observation.markers, axis=0).max()))
+    nearest = distances[:, :, 0].min(
+        axis=0
+    )  # to the origin, when not at it; infinite for one that always is
+    stuck |= (
+        zero
+        & np.isfinite(nearest)
+        & (nearest > _FAR * float(np.ptp(observation.markers, axis=0).max()))
+    )
     count = int(stuck.sum())
     if not count:
         return observation
@@ -159,10 +192,12 @@ def without_stuck_markers(observation: Observation) -> Observation:
     frame, marker = np.argwhere(stuck)[0]
     finding = Finding.of(
         "positions-stuck",
-        f"{count} positions are exactly those of the frame before while the markers around move on, or are "
+        f"{count} positions are exactly those of the frame before while the markers around move "
+        "on, or are "
         "(0, 0, 0): not tracked",
         count=count,
-        where=f"recording {observation.name!r}, frame {int(frame)}, {marker_at(observation.markers[marker])}",
+        where=f"recording {observation.name!r}, frame {int(frame)}, "
+        f"{marker_at(observation.markers[marker])}",
     )
     return replace(observation, positions=positions, findings=(*observation.findings, finding))
 
@@ -182,14 +217,17 @@ def check_motion(positions: FloatArray, sigma: float, size: float, *, where: str
     least = max(3 * np.sqrt(3) * sigma, _STILL * size)
     if motion < least:
         raise InputError(
-            f"no motion is found: {1e3 * motion:.3g} mm on the average, with {1e3 * sigma:.3g} mm of noise",
+            f"no motion is found: {1e3 * motion:.3g} mm on the average, with {1e3 * sigma:.3g} mm "
+            "of noise",
             where=where,
-            fix="record the cloth in a wind; a still cloth says nothing of damping, inertia or gusts",
+            fix="record the cloth in a wind; a still cloth says nothing of damping, inertia or "
+            "gusts",
         )
 
 
 def lost_frames(positions: FloatArray, *, where: str) -> tuple[Finding, ...]:
-    """Steps nearly twice as long as those on either side: a frame was lost there, and nothing says so.
+    """Steps nearly twice as long as those on either side: a frame was lost there, and nothing says
+    so.
 
     Found only where the motion is well sampled: where the ratio of steps hardly varies otherwise.
 
@@ -208,7 +246,8 @@ def lost_frames(positions: FloatArray, *, where: str) -> tuple[Finding, ...]:
     return (
         Finding.of(
             "frames-lost",
-            f"{len(jumps)} steps are about twice as long as those before and after: frames seem to be missing",
+            f"{len(jumps)} steps are about twice as long as those before and after: frames seem to "
+            "be missing",
             where=f"{where}, frame {int(jumps[0]) + 1}",
             count=len(jumps),
             fix="give the frames' times or numbers, so that the gap is known",
@@ -217,8 +256,8 @@ def lost_frames(positions: FloatArray, *, where: str) -> tuple[Finding, ...]:
 
 
 def _steps(positions: FloatArray) -> FloatArray:
-    """Computes the mean squared step of the tracked markers (frame − 1,) [m²]; NaN where none is tracked on both
-    sides."""
+    """Computes the mean squared step of the tracked markers (frame − 1,) [m²]; NaN where none is
+    tracked on both sides."""
     square = (np.diff(positions, axis=0) ** 2).sum(axis=2)
     tracked = np.isfinite(square)
     count = tracked.sum(axis=1)

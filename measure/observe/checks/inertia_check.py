@@ -1,12 +1,15 @@
-"""Inertia against wind and gravity: whether frame rate, wind, unit and area weight are those of one and the same cloth.
+"""Inertia against wind and gravity: whether frame rate, wind, unit and area weight are those of one
+and the same cloth.
 
-Reactions at pins on a line have no moment about it, nor have internal forces at all, so that the cloth's moment of
-momentum changes by what the air and gravity give. All but the wind's speed is observed or nominal: the speed at which
-the balance holds is the wind that the motion shows. A rate that is twice the true one doubles it, a wind of 3.6 times
-the true one divides it by 3.6 in terms of the wind that is given.
+Reactions at pins on a line have no moment about it, nor have internal forces at all, so that the
+cloth's moment of momentum changes by what the air and gravity give. All but the wind's speed is
+observed or nominal: the speed at which the balance holds is the wind that the motion shows. A rate
+that is twice the true one doubles it, a wind of 3.6 times the true one divides it by 3.6 in terms
+of the wind that is given.
 
-In calm air the balance does not constrain the clock: the air's force and the inertia both go by the inverse square of
-the time. There a swinging cloth constrains it: its kinetic energy comes from its height.
+In calm air the balance does not constrain the clock: the air's force and the inertia both go by the
+inverse square of the time. There a swinging cloth constrains it: its kinetic energy comes from its
+height.
 """
 
 from __future__ import annotations
@@ -20,23 +23,29 @@ from flagdata.core.findings import Finding
 from measure.observe.interpolation import onto
 from measure.observe.trajectory import Specimen, Trajectory
 
-_PERIOD = 0.03  # s: frames closer than this are left out, since differences of noise grow with the square of the rate
-_LINE = 0.02  # of the cloth's size: pins that are further from a line have reactions with a moment about it
+# s: frames closer than this are left out, since differences of noise grow with the square of the
+# rate
+_PERIOD = 0.03
+# of the cloth's size: pins that are further from a line have reactions with a moment about it
+_LINE = 0.02
 _FACTORS = np.geomspace(1 / 12, 12, 241)  # of the wind, in steps of 2 %
 _EXPLAINED = 0.4  # of the moment's variance: a balance that explains less says nothing of the wind
-# The wind that the motion shows over the one given. In 72 recordings with and without strong effects (3 to 8 m/s, 25
-# and 60 Hz, 0 to 4 mm of noise) it is 0.81 to 1.09, once 1.36, once nothing: no false alarm, at most 4.1 % (95 %). With
-# the rate twice or half the true one, km/h for m/s or the reverse, 25 of them give 1.68 or more, 0.54 or less:
-# reported.
+# The wind that the motion shows over the one given. In 72 recordings with and without strong
+# effects (3 to 8 m/s, 25 and 60 Hz, 0 to 4 mm of noise) it is 0.81 to 1.09, once 1.36, once
+# nothing: no false alarm, at most 4.1 % (95 %). With the rate twice or half the true one, km/h for
+# m/s or the reverse, 25 of them give 1.68 or more, 0.54 or less: reported.
 _SHOWN = (0.65, 1.5)
-_SWING = (0.4, 2.0)  # kinetic energy over that from height; released reference runs give 0.77 to 0.87
+_SWING = (
+    0.4,
+    2.0,
+)  # kinetic energy over that from height; released reference runs give 0.77 to 0.87
 _CALM = 0.5  # m/s
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MarkerMotion:
-    """Position, velocity and acceleration of the mesh's vertices, interpolated from the markers, by central
-    differences.
+    """Position, velocity and acceleration of the mesh's vertices, interpolated from the markers, by
+    central differences.
 
     Attributes:
         times: (frame,) [s].
@@ -76,22 +85,24 @@ def check_inertia(recording: Trajectory, specimen: Specimen) -> tuple[Finding, .
     return (
         Finding.of(
             "inertia-does-not-fit",
-            f"by its accelerations the cloth moves as in {factor * speed:.2g} m/s, {factor:.2g} times the wind "
+            f"by its accelerations the cloth moves as in {factor * speed:.2g} m/s, {factor:.2g} "
+            "times the wind "
             f"given, {speed:.3g} m/s",
             where=f"recording {recording.name!r}",
             value=factor,
-            fix=f"check the unit of the wind (km/h are {1 / 3.6:.2g} m/s), the frame rate ({recording.rate:.4g} Hz; "
+            fix=f"check the unit of the wind (km/h are {1 / 3.6:.2g} m/s), the frame rate "
+            f"({recording.rate:.4g} Hz; "
             f"{recording.rate / factor:.3g} Hz would fit) and the cloth's area weight",
         ),
     )
 
 
 def wind_shown(recording: Trajectory, specimen: Specimen) -> float | None:
-    """Estimates the ratio of the wind speed that balances the moments about the pins to the wind speed given; None if
-    the moments do not determine it.
+    """Estimates the ratio of the wind speed that balances the moments about the pins to the wind
+    speed given; None if the moments do not determine it.
 
-    That is, the factor q of least ‖M_a − M_g − M_w(q U)‖² over all frames, each less its mean, where M are the moments
-    of the accelerations, of gravity and of the base model's wind force.
+    That is, the factor q of least ‖M_a − M_g − M_w(q U)‖² over all frames, each less its mean,
+    where M are the moments of the accelerations, of gravity and of the base model's wind force.
     """
     axis = _axis(recording, specimen)
     if axis is None:
@@ -114,7 +125,9 @@ def wind_shown(recording: Trajectory, specimen: Specimen) -> float | None:
                 (
                     moment
                     - _centre_values(
-                        (weight * np.abs(q * blown - along_normal) * (q * blown - along_normal)).sum(axis=1)
+                        (
+                            weight * np.abs(q * blown - along_normal) * (q * blown - along_normal)
+                        ).sum(axis=1)
                     )
                 )
                 ** 2
@@ -130,8 +143,8 @@ def wind_shown(recording: Trajectory, specimen: Specimen) -> float | None:
 
 
 def swing(recording: Trajectory, specimen: Specimen) -> float | None:
-    """Estimates the ratio of the kinetic energy gained to the potential energy lost, by least squares in time;
-    None where neither determines the other.
+    """Estimates the ratio of the kinetic energy gained to the potential energy lost, by least
+    squares in time; None where neither determines the other.
 
     It is 1 less what friction takes, and goes with the square of the frame rate.
     """
@@ -146,7 +159,8 @@ def swing(recording: Trajectory, specimen: Specimen) -> float | None:
     return float(gained @ lost) / power
 
 
-_CLEAR = 0.7  # of the squared correlation of the two: energies that go together less are exchanged with others
+# of the squared correlation of the two: energies that go together less are exchanged with others
+_CLEAR = 0.7
 
 
 def _check_swing(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
@@ -156,17 +170,19 @@ def _check_swing(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ..
     return (
         Finding.of(
             "inertia-does-not-fit",
-            f"in calm air the swinging cloth gains {ratio:.2g} times the energy that its height loses",
+            f"in calm air the swinging cloth gains {ratio:.2g} times the energy that its height "
+            "loses",
             where=f"recording {recording.name!r}",
             value=ratio,
-            fix=f"check the frame rate ({recording.rate:.4g} Hz; {recording.rate / ratio**0.5:.3g} Hz would fit)",
+            fix=f"check the frame rate ({recording.rate:.4g} Hz; {recording.rate / ratio**0.5:.3g} "
+            "Hz would fit)",
         ),
     )
 
 
 def _axis(recording: Trajectory, specimen: Specimen) -> tuple[FloatArray, FloatArray] | None:
-    """Fits the line through the pins, a point of it and its direction; the vertical through a single one; None if no
-    line."""
+    """Fits the line through the pins, a point of it and its direction; the vertical through a
+    single one; None if no line."""
     seats = onto(recording.markers, specimen.mesh.rest[list(specimen.held)])
     pins = seats @ recording.positions.mean(axis=0)
     origin = pins.mean(axis=0)

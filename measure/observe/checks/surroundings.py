@@ -1,4 +1,5 @@
-"""Wind, gravity and clock against what the cloth shows: it flies downwind, sags downward, and is not flung about."""
+"""Wind, gravity and clock against what the cloth shows: it flies downwind, sags downward, and is
+not flung about."""
 
 from __future__ import annotations
 
@@ -12,13 +13,19 @@ from flagdata.errors import InputError
 from measure.observe.checks.attachment import centre_of_pins
 from measure.observe.trajectory import Specimen, Trajectory, WindTrack
 
-_FLIES = 0.15  # of the cloth's size: a mean offset from the pins that is less says nothing of the wind's direction
+# of the cloth's size: a mean offset from the pins that is less says nothing of the wind's direction
+_FLIES = 0.15
 _BLOWS = 1.0  # of the ratio ρU²/(m g): wind that is weaker does not set the direction
 _UPWIND, _ASIDE = math.radians(100), math.radians(45)
 _RISES, _SAGS = 0.02, 0.05  # of the cloth's size
-_DOWNWARD = 0.3  # of a length along v: the mean cloth falls by so much at least where v runs downward
+_DOWNWARD = (
+    0.3  # of a length along v: the mean cloth falls by so much at least where v runs downward
+)
 _COVERED = 0.98  # of the recording: a log must cover so much
-_WILD, _SLOW = 30.0, 0.01  # of g + ρU²/m: root-mean-square accelerations beyond are of another clock or unit
+_WILD, _SLOW = (
+    30.0,
+    0.01,
+)  # of g + ρU²/m: root-mean-square accelerations beyond are of another clock or unit
 _QUASI_STATIC = 0.02  # of g x/L, a pendulum's at that motion: slower is no swinging cloth
 _CALM, _FLAT, _STRONG, _LIMP = 0.1, 0.5, 10.0, 0.25
 """ρU²/(m g), and the cloth's mean horizontal offset over what it is at most."""
@@ -38,7 +45,8 @@ def check_overlap(recording: Trajectory) -> None:
     covered = min(end, float(times[-1])) - max(begin, 0.0)
     if covered < _COVERED * float(times[-1]):
         raise InputError(
-            f"the wind log spans {wind[0]:.4g} s to {wind[-1]:.4g} s after the first frame, the recording lasts "
+            f"the wind log spans {wind[0]:.4g} s to {wind[-1]:.4g} s after the first frame, the "
+            "recording lasts "
             f"{times[-1]:.4g} s",
             where=f"recording {recording.name!r}",
             fix="give the instant of the first frame on the log's clock, or another log",
@@ -71,7 +79,8 @@ def check_up(recording: Trajectory, specimen: Specimen) -> None:
         raise InputError(
             f"the cloth does not sag along −z but is {abs(sideways):.3g} m off sideways",
             where=where,
-            fix=f"z must point up, and the wind be in the same axes: {_sagging(offset, size, recording.wind)}",
+            fix="z must point up, and the wind be in the same axes: "
+            f"{_sagging(offset, size, recording.wind)}",
         )
 
 
@@ -91,13 +100,15 @@ def check_direction(recording: Trajectory, specimen: Specimen) -> tuple[Finding,
     angle = math.acos(float(np.clip(offset @ wind / (distance * speed), -1, 1)))
     heading, blown = (math.degrees(math.atan2(y, x)) for x, y in (offset, wind))
     directions = (
-        f"the cloth streams towards {heading:.0f}°, the wind as given blows towards {blown:.0f}° (from +x towards +y)"
+        f"the cloth streams towards {heading:.0f}°, the wind as given blows towards {blown:.0f}° "
+        "(from +x towards +y)"
     )
     if angle > _UPWIND:
         raise InputError(
             f"the cloth streams upwind: {directions}",
             where=where,
-            fix="wind velocities say where the air goes to; turn a direction it comes from, and check the axes",
+            fix="wind velocities say where the air goes to; turn a direction it comes from, and "
+            "check the axes",
         )
     if angle <= _ASIDE:
         return ()
@@ -113,7 +124,8 @@ def check_direction(recording: Trajectory, specimen: Specimen) -> tuple[Finding,
 
 
 def check_strength(recording: Trajectory, specimen: Specimen) -> tuple[Finding, ...]:
-    """Reports a cloth that hangs in a strong wind or flies in none: wrong units, or not the wind at the flag."""
+    """Reports a cloth that hangs in a strong wind or flies in none: wrong units, or not the wind at
+    the flag."""
     ratio = _ratio(specimen, recording.wind)
     pins = centre_of_pins(recording, specimen)
     seats = specimen.mesh.rest[list(specimen.held)].mean(axis=0)
@@ -128,7 +140,8 @@ def check_strength(recording: Trajectory, specimen: Specimen) -> tuple[Finding, 
     return (
         Finding.of(
             "wind-does-not-fit",
-            f"the cloth {motion} of {recording.wind.speed:.3g} m/s has {ratio:.2g} times the force of its weight",
+            f"the cloth {motion} of {recording.wind.speed:.3g} m/s has {ratio:.2g} times the force "
+            "of its weight",
             where=f"recording {recording.name!r}",
             value=ratio,
             fix="check the unit of the wind, and the clock of its log",
@@ -137,7 +150,8 @@ def check_strength(recording: Trajectory, specimen: Specimen) -> tuple[Finding, 
 
 
 def check_sides(recording: Trajectory) -> tuple[Finding, ...]:
-    """Reports rest coordinates whose v runs downward: top and bottom, and the two faces, are exchanged."""
+    """Reports rest coordinates whose v runs downward: top and bottom, and the two faces, are
+    exchanged."""
     design = np.concatenate([recording.markers, np.ones((len(recording.markers), 1))], axis=1)
     slope = np.linalg.lstsq(design, recording.positions.mean(axis=0), rcond=None)[0]
     if slope[1, 2] > -_DOWNWARD:
@@ -145,7 +159,8 @@ def check_sides(recording: Trajectory) -> tuple[Finding, ...]:
     return (
         Finding.of(
             "rest-upside-down",
-            "the markers' v runs downward as the cloth hangs: what the answer calls the top is the bottom",
+            "the markers' v runs downward as the cloth hangs: what the answer calls the top is the "
+            "bottom",
             where=f"recording {recording.name!r}",
             value=float(slope[1, 2]),
             fix="let v run from the bottom to the top, and u from the hoist to the fly",
@@ -154,11 +169,12 @@ def check_sides(recording: Trajectory) -> tuple[Finding, ...]:
 
 
 def check_accelerations(recording: Trajectory, specimen: Specimen) -> None:
-    """Refuses accelerations far from what gravity and the wind's force give: another frame rate, or another unit.
+    """Refuses accelerations far from what gravity and the wind's force give: another frame rate, or
+    another unit.
 
     Raises:
-        InputError: their root mean square is beyond 0.01 to 30 times g + ρU²/m, or below a fiftieth of what a
-            pendulum of the cloth's length has at such a motion.
+        InputError: their root mean square is beyond 0.01 to 30 times g + ρU²/m, or below a fiftieth
+            of what a pendulum of the cloth's length has at such a motion.
     """
     positions, rate = recording.positions, recording.rate
     second = np.diff(positions, n=2, axis=0)
@@ -171,7 +187,8 @@ def check_accelerations(recording: Trajectory, specimen: Specimen) -> None:
         raise InputError(
             f"accelerations of {typical:.3g} m/s², where gravity and wind give about {expected:.3g}",
             where=where,
-            fix=f"is the rate of {rate:.4g} Hz too high, or the wind or the unit of the positions wrong?",
+            fix=f"is the rate of {rate:.4g} Hz too high, or the wind or the unit of the positions "
+            "wrong?",
         )
     motion = float(np.sqrt(np.median(positions.var(axis=0).sum(axis=1))))
     swing = weight * motion / float(np.ptp(specimen.mesh.rest, axis=0).max())
@@ -180,7 +197,8 @@ def check_accelerations(recording: Trajectory, specimen: Specimen) -> None:
         raise InputError(
             f"accelerations of {typical:.3g} m/s², where gravity and wind give about {expected:.3g}",
             where=where,
-            fix=f"is the rate of {rate:.4g} Hz that of slow motion, or the unit of the wind another? Give the rate at "
+            fix=f"is the rate of {rate:.4g} Hz that of slow motion, or the unit of the wind "
+            "another? Give the rate at "
             "which the camera ran, and the wind in m/s",
         )
 
@@ -202,7 +220,8 @@ def _ratio(specimen: Specimen, wind: WindTrack) -> float:
 
 
 def _sagging(offset: FloatArray, size: float, wind: WindTrack) -> str:
-    """Advises on the vertical: the axis against which the cloth is off its pins, the wind's left aside."""
+    """Advises on the vertical: the axis against which the cloth is off its pins, the wind's left
+    aside."""
     blown = np.abs(wind.velocity.mean(axis=0))
     candidates = np.abs(offset) / size - 2.0 * (blown > 0.5 * blown.max()) * (blown.max() > 0)
     axis = int(candidates.argmax())

@@ -1,4 +1,5 @@
-"""Which disturbances a training draws, how strong they are, and the named streams that they are drawn from."""
+"""Which disturbances a training draws, how strong they are, and the named streams that they are
+drawn from."""
 
 from __future__ import annotations
 
@@ -68,7 +69,8 @@ class Drawn:
         strength: in the disturbance's unit.
         rng: of all else that it draws.
         other: gives another film of the training side, (n', height', width'), at its own rate.
-        weight: (height, width) float32 1 on the cloth of a conditioned clip, 0 where it is frozen; 1 everywhere before.
+        weight: (height, width) float32 1 on the cloth of a conditioned clip, 0 where it is frozen;
+            1 everywhere before.
     """
 
     film: Film
@@ -101,7 +103,8 @@ class Augment:
 
     Raises:
         UnknownNameError: a name that is none.
-        InputError: a share outside of 0 to 1, or strengths that are not in order or beyond what makes sense.
+        InputError: a share outside of 0 to 1, or strengths that are not in order or beyond what
+            makes sense.
     """
 
     strengths: Mapping[str, Strength] = field(default_factory=dict)
@@ -112,10 +115,12 @@ class Augment:
             ordered = limits.least <= strength.low <= strength.high <= limits.most
             if not (0 <= strength.share <= 1 and ordered):
                 raise InputError(
-                    f"{name} of a share of {strength.share:g} of the films, {strength.low:g} to {strength.high:g} "
+                    f"{name} of a share of {strength.share:g} of the films, {strength.low:g} to "
+                    f"{strength.high:g} "
                     f"{limits.unit}",
                     where="[input] [augment]",
-                    fix=f"give a share of 0 to 1, and low ≤ high from {limits.least:g} to {limits.most:g}",
+                    fix=f"give a share of 0 to 1, and low ≤ high from {limits.least:g} to "
+                    f"{limits.most:g}",
                 )
 
     def identity(self) -> dict[str, Any]:
@@ -127,7 +132,9 @@ class Augment:
         strength = self.strengths.get(name)
         return strength is not None and self._stream(name, source).random() < strength.share
 
-    def before(self, film: Film, times: FloatArray, *, source: str, other_film: Callable[[], Film]) -> Film:
+    def before(
+        self, film: Film, times: FloatArray, *, source: str, other_film: Callable[[], Film]
+    ) -> Film:
         """Disturbs a film as it was taken.
 
         Args:
@@ -137,7 +144,9 @@ class Augment:
         everywhere = np.ones(film.shape[1:], dtype=np.float32)
         return self._apply_disturbances(BEFORE, film, times, (source,), other_film, everywhere)
 
-    def after(self, clip: Film, times: FloatArray, *, source: str, variant: int, weight: Float32Array) -> Film:
+    def after(
+        self, clip: Film, times: FloatArray, *, source: str, variant: int, weight: Float32Array
+    ) -> Film:
         """Disturbs a conditioned clip by what conditioning leaves."""
 
         def none() -> Film:

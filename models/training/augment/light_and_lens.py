@@ -30,7 +30,9 @@ def _dusk(drawn: Drawn) -> Film:
 def _noise(drawn: Drawn) -> Film:
     """Adds a sensor's noise; the strength is its standard deviation [gray levels]."""
     noise: Float32Array = drawn.rng.standard_normal(drawn.film.shape, dtype=np.float32)
-    return np.clip(np.rint(drawn.film + np.float32(drawn.strength) * noise), 0, 255).astype(np.uint8)
+    return np.clip(np.rint(drawn.film + np.float32(drawn.strength) * noise), 0, 255).astype(
+        np.uint8
+    )
 
 
 BLUR = Disturbance(apply=_blur, unit="px", most=10.0)

@@ -19,8 +19,11 @@ _TURN = 0.002
 
 
 def course(rng: np.random.Generator, times: FloatArray, axes: int) -> FloatArray:
-    """Draws paths (n, axes) of mean 0 and root mean square 1: waves of random frequencies, the slower the larger."""
-    frequency = np.geomspace(_SLOWEST_TURN, _FASTEST_TURN, _WAVES) * rng.uniform(0.8, 1.25, (axes, _WAVES))
+    """Draws paths (n, axes) of mean 0 and root mean square 1: waves of random frequencies, the
+    slower the larger."""
+    frequency = np.geomspace(_SLOWEST_TURN, _FASTEST_TURN, _WAVES) * rng.uniform(
+        0.8, 1.25, (axes, _WAVES)
+    )
     phase = rng.uniform(0, 2 * np.pi, (axes, _WAVES))
     waves = np.sin(2 * np.pi * frequency * times[:, None, None] + phase) / np.sqrt(frequency)
     path = waves.sum(axis=2)
@@ -37,7 +40,13 @@ def _shake(drawn: Drawn) -> Film:
         matrix = cv2.getRotationMatrix2D((width / 2, height / 2), np.degrees(_TURN * turn), 1.0)
         matrix[:, 2] += (x, y)
         shaken.append(
-            cv2.warpAffine(frame, matrix, (width, height), flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+            cv2.warpAffine(
+                frame,
+                matrix,
+                (width, height),
+                flags=cv2.INTER_CUBIC,
+                borderMode=cv2.BORDER_REPLICATE,
+            )
         )
     return np.stack(shaken)
 
@@ -50,18 +59,20 @@ _SLOWEST, _FASTEST = 0.4, 3.0
 
 
 def _left_over_shake(drawn: Drawn) -> Film:
-    """Moves the film by a camera's motion that was not removed; the strength is its root mean square along each axis
-    [px]."""
+    """Moves the film by a camera's motion that was not removed; the strength is its root mean
+    square along each axis [px]."""
     path = drawn.strength * course(drawn.rng, drawn.times, 2)
     return _move_frames(drawn, path, np.ones(drawn.film.shape[1:], dtype=np.float32))
 
 
 def _pole_sway(drawn: Drawn) -> Film:
-    """Sways the pole, and the cloth with it: to the sides, the more the higher; the strength is the amplitude at the
-    top of the picture [px]."""
+    """Sways the pole, and the cloth with it: to the sides, the more the higher; the strength is the
+    amplitude at the top of the picture [px]."""
     height, width = drawn.film.shape[1:]
     frequency = np.exp(drawn.rng.uniform(np.log(_SLOWEST), np.log(_FASTEST)))
-    sway = drawn.strength * np.sin(2 * np.pi * frequency * drawn.times + drawn.rng.uniform(0, 2 * np.pi))
+    sway = drawn.strength * np.sin(
+        2 * np.pi * frequency * drawn.times + drawn.rng.uniform(0, 2 * np.pi)
+    )
     up = np.linspace(1.0, 0.5, height, dtype=np.float32)[:, None]
     return _move_frames(drawn, np.stack([sway, 0 * sway], axis=1), np.repeat(up, width, axis=1))
 
@@ -73,7 +84,11 @@ def _move_frames(drawn: Drawn, path: FloatArray, share: Float32Array) -> Film:
     moved = np.empty_like(drawn.film)
     for index, (x, y) in enumerate(path.astype(np.float32)):
         moved[index] = cv2.remap(
-            drawn.film[index], columns - share * x, rows - share * y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
+            drawn.film[index],
+            columns - share * x,
+            rows - share * y,
+            cv2.INTER_CUBIC,
+            borderMode=cv2.BORDER_REPLICATE,
         )
     return moved
 

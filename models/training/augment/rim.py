@@ -18,7 +18,8 @@ _FEATHER = 0.02
 
 
 def _tree(drawn: Drawn) -> Film:
-    """Leaves along one side of the picture, drawn anew; the strength is the amplitude of their motion [px]."""
+    """Leaves along one side of the picture, drawn anew; the strength is the amplitude of their
+    motion [px]."""
     rng, film = drawn.rng, drawn.film
     quarters = int(rng.integers(4))
     turned = np.rot90(film, k=quarters, axes=(1, 2)).copy()
@@ -28,7 +29,9 @@ def _tree(drawn: Drawn) -> Film:
     texture = _fields(rng, (1, height, wide), leaf)[0]
     level, contrast = rng.uniform(30, 160), rng.uniform(10, 45)
     leaves = np.clip(level + contrast * texture, 0, 255).astype(np.float32)
-    edge = _fields(rng, (1, height, wide), 3 * leaf)[0] - np.linspace(-2.5, 2.5, wide, dtype=np.float32)
+    edge = _fields(rng, (1, height, wide), 3 * leaf)[0] - np.linspace(
+        -2.5, 2.5, wide, dtype=np.float32
+    )
     cover = np.clip(2 * edge + 0.5, 0, 1).astype(np.float32)
     patterns = _fields(rng, (2 * _WAVES, height, wide), 4 * leaf).reshape(2, _WAVES, height, wide)
     phases = 2 * np.pi * _fields(rng, (1, height, wide), 12 * leaf)[0]
@@ -38,7 +41,13 @@ def _tree(drawn: Drawn) -> Film:
         waves = np.sin(turn[:, None, None] * time + phases) * (drawn.strength / _WAVES**0.5)
         across, down = (patterns * waves).sum(axis=1).astype(np.float32)
         moved, covering = (
-            cv2.remap(field, columns + across, rows + down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)
+            cv2.remap(
+                field,
+                columns + across,
+                rows + down,
+                cv2.INTER_LINEAR,
+                borderMode=cv2.BORDER_REFLECT,
+            )
             for field in (leaves, cover)
         )
         part = frame[:, :wide]
@@ -47,11 +56,14 @@ def _tree(drawn: Drawn) -> Film:
 
 
 def _second_flag(drawn: Drawn) -> Film:
-    """Pastes another film's picture, small, at a corner; the strength is its side, in sides of the picture."""
+    """Pastes another film's picture, small, at a corner; the strength is its side, in sides of the
+    picture."""
     rng, film, other_film = drawn.rng, drawn.film.copy(), drawn.other()
     height, width = film.shape[1:]
     side = max(8, round(drawn.strength * min(height, width)))
-    there_and_back = np.concatenate([np.arange(len(other_film)), np.arange(len(other_film))[-2:0:-1]])
+    there_and_back = np.concatenate(
+        [np.arange(len(other_film)), np.arange(len(other_film))[-2:0:-1]]
+    )
     first = int(rng.integers(len(there_and_back)))
     feather = max(1, round(_FEATHER * width))
     ramp = np.minimum(np.arange(1, side + 1), np.arange(side, 0, -1)) / feather

@@ -1,4 +1,5 @@
-"""Gusts, an anemometer and a flag, made from published spectra and independent of the estimators under test."""
+"""Gusts, an anemometer and a flag, made from published spectra and independent of the estimators
+under test."""
 
 from __future__ import annotations
 
@@ -23,9 +24,11 @@ FINE = 20  # samples of the true wind a second
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """A ten-minute film beside an anemometer whose clock differs by `offset`; all that varies between cases.
+    """A ten-minute film beside an anemometer whose clock differs by `offset`; all that varies
+    between cases.
 
-    The true wind has von Kármán's spectrum n S(n)/σ² = 4 f / (1 + 70.8 f²)^(5/6), f = n L / U (IEC 61400-1, B.13).
+    The true wind has von Kármán's spectrum n S(n)/σ² = 4 f / (1 + 70.8 f²)^(5/6), f = n L / U (IEC
+    61400-1, B.13).
     """
 
     seed: int
@@ -46,7 +49,8 @@ class Scene:
 
 
 def gusts(scene: Scene, generator: np.random.Generator, seconds: float) -> np.ndarray:
-    """Zero-mean gusts of unit variance at FINE samples a second, by random phases and von Kármán amplitudes."""
+    """Zero-mean gusts of unit variance at FINE samples a second, by random phases and von Kármán
+    amplitudes."""
     count = round(seconds * FINE)
     frequency = np.fft.rfftfreq(count, 1 / FINE)[1:]
     reduced = frequency * scene.length / scene.mean
@@ -69,7 +73,9 @@ def red_noise(generator: np.random.Generator, count: int, steps: float) -> np.nd
     """Gauss–Markov noise of unit variance with a correlation length in samples."""
     keep = np.exp(-1 / steps)
     start = generator.standard_normal()
-    out, _ = lfilter([np.sqrt(1 - keep**2)], [1, -keep], generator.standard_normal(count), zi=[keep * start])
+    out, _ = lfilter(
+        [np.sqrt(1 - keep**2)], [1, -keep], generator.standard_normal(count), zi=[keep * start]
+    )
     return out
 
 
@@ -85,12 +91,15 @@ def make(
     generator = stream(scene.seed, "scene")
     seconds = scene.duration + 2 * scene.margin
     here = gusts(scene, generator, seconds) if gust is None else gust
-    # Taylor's frozen gusts between the two places, less what decays on the way: coherence exp(−8 n d / U) (Davenport).
+    # Taylor's frozen gusts between the two places, less what decays on the way: coherence exp(−8 n
+    # d / U) (Davenport).
     spectrum = np.fft.rfft(here)
     frequency = np.fft.rfftfreq(len(here), 1 / FINE)
     coherence = np.exp(-8 * frequency * scene.apart / scene.mean)
     fresh = np.fft.rfft(gusts(scene, stream(scene.seed, "fresh"), seconds))
-    there = np.fft.irfft(spectrum * np.sqrt(coherence) + fresh * np.sqrt(1 - coherence), n=len(here))
+    there = np.fft.irfft(
+        spectrum * np.sqrt(coherence) + fresh * np.sqrt(1 - coherence), n=len(here)
+    )
     if other is not None:
         there = other
     speed_here = np.maximum(scene.mean * (1 + scene.turbulence * here), 0.1)
@@ -140,7 +149,8 @@ class Tunnel:
     """The camera-tracked card flag and the tunnel's anemometer, both stamped by one laptop.
 
     Attributes:
-        device, host: (n,) stamps of the tracked flag by the camera's computer and by the laptop [UTC ns].
+        device, host: (n,) stamps of the tracked flag by the camera's computer and by the laptop
+            [UTC ns].
         motion: (n,) RMS displacement of the tracked points [px].
         wind: the anemometer on the laptop's clock, its zero of -0.35 m/s put right.
     """
@@ -159,7 +169,10 @@ def tunnel(reference_data: Path) -> Tunnel:
     def lines(name: str) -> list[tuple[int, str]]:
         with (folder / name).open(newline="") as file:
             rows = list(csv.reader(file))[1:]
-        return [(from_datetime(datetime.fromisoformat(stamp).replace(tzinfo=UTC)), raw) for stamp, raw in rows]
+        return [
+            (from_datetime(datetime.fromisoformat(stamp).replace(tzinfo=UTC)), raw)
+            for stamp, raw in rows
+        ]
 
     device, host, motion = [], [], []
     for stamp, raw in lines("pi_log.csv"):
@@ -169,7 +182,9 @@ def tunnel(reference_data: Path) -> Tunnel:
             device.append(int(seconds) * SECOND + int(milliseconds) * 1_000_000)
             host.append(stamp)
             motion.append(float(fields[1]))
-    stamps, speeds = zip(*((stamp, float(raw) + 0.35) for stamp, raw in lines("gt_log.csv")), strict=True)
+    stamps, speeds = zip(
+        *((stamp, float(raw) + 0.35) for stamp, raw in lines("gt_log.csv")), strict=True
+    )
     wind = WindSeries(
         time=np.array(stamps),
         channels={"wind_speed": np.array(speeds)},

@@ -1,4 +1,5 @@
-"""A bit that was flipped in a stored record is never copied into a new artifact, whose own hash would call it sound."""
+"""A bit that was flipped in a stored record is never copied into a new artifact, whose own hash
+would call it sound."""
 
 from __future__ import annotations
 
@@ -61,33 +62,47 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Kept:
     pictures = stream(3, "pictures").integers(0, 256, (FRAMES, 24, 32), dtype=np.uint8)
     with lake.transaction("scene") as transaction:
         path = transaction.staging(".mcap")
-        with RecordWriter(path, metadata={"camera": {"codec": "made", "exposure": "0.01"}}) as record:
+        with RecordWriter(
+            path, metadata={"camera": {"codec": "made", "exposure": "0.01"}}
+        ) as record:
             for k, image in enumerate(pictures):
                 time = START + k * SECOND // 10
-                record.frame(log_time=time, publish_time=time, timestamp=time + 5_000_000, image=image)
-        camera = Artifact(kind=Kind.CAMERA, name="cam", object=transaction.put(path), source_hash="a" * 64)
+                record.frame(
+                    log_time=time, publish_time=time, timestamp=time + 5_000_000, image=image
+                )
+        camera = Artifact(
+            kind=Kind.CAMERA, name="cam", object=transaction.put(path), source_hash="a" * 64
+        )
         transaction.add(camera)
         path = transaction.staging(".mcap")
         count = 300
         series = WindSeries(
             time=START + (np.arange(count, dtype=np.int64) - 100) * SECOND // 10,
-            channels={"wind_speed": 5 + np.sin(np.arange(count) / 7), "wind_direction": np.full(count, 1.5)},
+            channels={
+                "wind_speed": 5 + np.sin(np.arange(count) / 7),
+                "wind_direction": np.full(count, 1.5),
+            },
             flags=np.zeros(count, dtype=np.uint16),
             sensor=Sensor(name="sonic", height=2.0, accuracy=0.1),
         )
         with RecordWriter(path, metadata={}) as record:
             record.wind(series)
             record.attach("log.csv", b"speed\n5.0\n", media_type="text/csv", log_time=START)
-        wind = Artifact(kind=Kind.WIND, name="mast", object=transaction.put(path), source_hash="b" * 64)
+        wind = Artifact(
+            kind=Kind.WIND, name="mast", object=transaction.put(path), source_hash="b" * 64
+        )
         transaction.add(wind)
     sound = folder.with_name("sound")
     shutil.copytree(folder, sound)
-    return Kept(folder=folder, camera=camera.id, wind=wind.id, expected=align(sound, camera.id, wind.id))
+    return Kept(
+        folder=folder, camera=camera.id, wind=wind.id, expected=align(sound, camera.id, wind.id)
+    )
 
 
 @pytest.fixture
 def flipped(kept: Kept, tmp_path: Path) -> Callable[[str, int, int], tuple[Path, Path]]:
-    """Copies of the lake in which one bit of an artifact's object differs; the lake and the object."""
+    """Copies of the lake in which one bit of an artifact's object differs; the lake and the
+    object."""
     trials: Iterator[int] = iter(range(10_000))
 
     def make(artifact: str, byte: int, bit: int) -> tuple[Path, Path]:
@@ -113,7 +128,10 @@ def payload_bytes(path: Path, topic: str) -> np.ndarray:
     file = open_bytes(path)
     table = read_messages(file, read_summary(file, where=""), topic, where="")
     return np.concatenate(
-        [np.arange(start - 16, start + length) for start, length in zip(table.offset, table.length, strict=True)]
+        [
+            np.arange(start - 16, start + length)
+            for start, length in zip(table.offset, table.length, strict=True)
+        ]
     )
 
 
@@ -124,7 +142,9 @@ def test_align_refuses_every_flipped_bit_of_a_frame_or_sample_and_names_the_obje
     artifact = getattr(kept, which)
     places = payload_bytes(object_of(kept.folder, artifact), topic)
     rng = stream(7, "flips", which)
-    for byte, bit in zip(rng.choice(places, FLIPS, replace=False), rng.integers(0, 8, FLIPS), strict=True):
+    for byte, bit in zip(
+        rng.choice(places, FLIPS, replace=False), rng.integers(0, 8, FLIPS), strict=True
+    ):
         folder, path = flipped(artifact, int(byte), int(bit))
         head = Lake.open(folder).resolve(None)
         with pytest.raises(CorruptError) as refused:
@@ -149,8 +169,11 @@ def test_a_bit_flipped_anywhere_is_refused_or_leaves_the_recording_as_it_is(
     assert refused > FLIPS / 2
 
 
-def test_a_record_without_checksums_is_hashed_before_it_becomes_a_parent(kept: Kept, tmp_path: Path) -> None:
-    """The record of format 1 was written before there were checksums; the bit lies in its metadata, which had none."""
+def test_a_record_without_checksums_is_hashed_before_it_becomes_a_parent(
+    kept: Kept, tmp_path: Path
+) -> None:
+    """The record of format 1 was written before there were checksums; the bit lies in its metadata,
+    which had none."""
     folder = tmp_path / "lake"
     shutil.copytree(kept.folder, folder)
     lake = Lake.open(folder)

@@ -40,7 +40,12 @@ def test_stamps_leave_instants_as_they_are() -> None:
 def test_nobody_can_vouch_for_an_offset_without_an_uncertainty() -> None:
     cases = [0.0, -1.0, math.inf, math.nan]
     assert (
-        unrefused(lambda sigma: by_stamps("cam", "mast", sigma=sigma, **SPAN), zip(cases), UsageError, "uncertainty")
+        unrefused(
+            lambda sigma: by_stamps("cam", "mast", sigma=sigma, **SPAN),
+            zip(cases),
+            UsageError,
+            "uncertainty",
+        )
         == []
     )
 
@@ -60,7 +65,9 @@ def test_an_offset_that_is_no_number_is_refused() -> None:
         ([0, 0.000_5], 0.0),
     ],
 )
-def test_the_step_of_stamps_is_the_coarsest_that_divides_them(stamps: list[float], step: float) -> None:
+def test_the_step_of_stamps_is_the_coarsest_that_divides_them(
+    stamps: list[float], step: float
+) -> None:
     time = np.array([round(s * SECOND) for s in stamps], dtype=np.int64)
     assert stamp_step(time) == step
     assert stamp_sigma(time) == pytest.approx(step / math.sqrt(12))
@@ -78,7 +85,15 @@ def test_a_model_reads_back_as_it_was_written() -> None:
         method="estimated",
         confidence=0.97,
         segments=(
-            Segment(start=0, end=10, origin=5, offset=1.5, drift=1e-5, sigma_offset=0.1, sigma_drift=1e-6),
+            Segment(
+                start=0,
+                end=10,
+                origin=5,
+                offset=1.5,
+                drift=1e-5,
+                sigma_offset=0.1,
+                sigma_drift=1e-6,
+            ),
             Segment(start=10, end=20, origin=15, offset=-2.0),
         ),
     )
@@ -98,14 +113,24 @@ def test_segments_apply_from_their_start_and_the_nearest_beyond_all() -> None:
     )
     times = np.array([0, 15, 20, 40], dtype=np.int64) * SECOND
     # By hand: 0 + 1 - 0.15; 15 + 1; 20 + 5; 40 + 5.
-    np.testing.assert_array_equal(model.to_common(times), np.array([850, 16_000, 25_000, 45_000]) * 1_000_000)
+    np.testing.assert_array_equal(
+        model.to_common(times), np.array([850, 16_000, 25_000, 45_000]) * 1_000_000
+    )
 
 
 def test_models_without_order_are_refused() -> None:
-    cases = [(), (Segment(start=0, end=10, origin=0, offset=0.0), Segment(start=5, end=20, origin=0, offset=0.0))]
+    cases = [
+        (),
+        (
+            Segment(start=0, end=10, origin=0, offset=0.0),
+            Segment(start=5, end=20, origin=0, offset=0.0),
+        ),
+    ]
     assert (
         unrefused(
-            lambda segments: ClockModel(device="a", reference="b", method="given", confidence=1.0, segments=segments),
+            lambda segments: ClockModel(
+                device="a", reference="b", method="given", confidence=1.0, segments=segments
+            ),
             zip(cases),
             InputError,
         )
@@ -123,7 +148,9 @@ def test_segments_that_are_no_clock_are_refused(wrong: dict[str, float]) -> None
 
 
 def model(*segments: Segment) -> ClockModel:
-    return ClockModel(device="camera", reference="wind", method="given", confidence=1.0, segments=segments)
+    return ClockModel(
+        device="camera", reference="wind", method="given", confidence=1.0, segments=segments
+    )
 
 
 def test_offset_and_drift_add_up() -> None:
@@ -134,13 +161,18 @@ def test_offset_and_drift_add_up() -> None:
 
 def test_uncertainty_grows_away_from_the_origin() -> None:
     """hypot(0.3, 1e-3 · 400) = 0.5."""
-    clock = model(Segment(start=0, end=1000 * S, origin=500 * S, offset=0.0, sigma_offset=0.3, sigma_drift=1e-3))
+    clock = model(
+        Segment(
+            start=0, end=1000 * S, origin=500 * S, offset=0.0, sigma_offset=0.3, sigma_drift=1e-3
+        )
+    )
     assert clock.sigma(np.array([500 * S, 900 * S, 100 * S])) == pytest.approx([0.3, 0.5, 0.5])
 
 
 def test_each_time_uses_its_own_segment() -> None:
     clock = model(
-        Segment(start=0, end=100 * S, origin=0, offset=1.0), Segment(start=100 * S, end=200 * S, origin=0, offset=-1.0)
+        Segment(start=0, end=100 * S, origin=0, offset=1.0),
+        Segment(start=100 * S, end=200 * S, origin=0, offset=-1.0),
     )
     times = np.array([50, 100, 150]) * S
     assert clock.to_common(times).tolist() == [51 * S, 99 * S, 149 * S]

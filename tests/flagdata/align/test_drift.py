@@ -26,11 +26,15 @@ def both(motion: MotionSeries, wind: WindAverage) -> tuple[LagEstimate, ClockLin
 
 @pytest.mark.parametrize("drift", [-2e-4, 0.0, 2e-4])
 def test_two_hours_show_a_drift_of_two_parts_in_ten_thousand(drift: float) -> None:
-    motion, wind = scene(seed=11, offset=20.0, duration=7200.0, drift=drift, apart=1.5, flag_noise=0.3)
+    motion, wind = scene(
+        seed=11, offset=20.0, duration=7200.0, drift=drift, apart=1.5, flag_noise=0.3
+    )
     _, line = both(motion, wind)
     assert len(line.parts) >= 6
     assert not line.findings
-    assert abs(line.drift - drift) < 2.5 * line.sigma_drift  # one of three tests in eighty would fail by chance
+    assert (
+        abs(line.drift - drift) < 2.5 * line.sigma_drift
+    )  # one of three tests in eighty would fail by chance
     assert line.sigma_drift < 1e-4
     middle = (line.origin - (motion.time[0] + motion.time[-1]) / 2) / SECOND
     assert line.offset + line.drift * -middle == pytest.approx(20.0, abs=0.5)

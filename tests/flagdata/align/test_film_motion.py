@@ -30,12 +30,15 @@ def film(
     noise: float = 1.0,
     area: int = 40,
 ) -> list[tuple[int, np.ndarray]]:
-    """A striped square of `area` pixels a side whose stripes move `speed` pixels a frame, before a wall."""
+    """A striped square of `area` pixels a side whose stripes move `speed` pixels a frame, before a
+    wall."""
     grain = stream(3, "grain")
     frames = []
     for index in range(count):
         image = wall((0.0, 0.0) if shake is None else tuple(shake[index]))
-        image[30 : 30 + area, 50 : 50 + area] = 120 + 70 * np.sin((COLUMNS[:area, :area] - speed * index) / 6)
+        image[30 : 30 + area, 50 : 50 + area] = 120 + 70 * np.sin(
+            (COLUMNS[:area, :area] - speed * index) / 6
+        )
         image = image * (1.0 if gain is None else gain[index]) + grain.normal(0, noise, image.shape)
         frames.append((index * PERIOD, np.clip(np.round(image), 0, 255).astype(np.uint8)))
     return frames
@@ -52,7 +55,8 @@ def test_energy_rises_with_the_speed_of_the_cloth() -> None:
 
 
 def test_energy_is_the_mean_change_over_the_picture_for_a_known_motion() -> None:
-    """Stripes 70 sin(x/6) moving 2 pixels a frame change by 140 sin(1/6) |cos|: 2/π of that on average, on 1/9."""
+    """Stripes 70 sin(x/6) moving 2 pixels a frame change by 140 sin(1/6) |cos|: 2/π of that on
+    average, on 1/9."""
     expected = 140 * np.sin(1 / 6) * (2 / np.pi) * (40 / SIZE) ** 2 / 0.04
     # Averaging over 2-pixel blocks and the 3 σ taken off each change take a few per cent.
     assert mean_energy(film(12, speed=2.0, noise=0.3)) == pytest.approx(expected, rel=0.15)
@@ -63,7 +67,9 @@ def test_flicker_and_exposure_are_no_motion() -> None:
     still, moving = mean_energy(film(12, gain=gain)), mean_energy(film(12, gain=gain, speed=2.0))
     assert still < 0.02 * moving
     assert moving == pytest.approx(mean_energy(film(12, speed=2.0)), rel=0.1)
-    assert "brightness-flicker" in {finding.kind for finding in motion_energy(film(12, gain=gain)).findings}
+    assert "brightness-flicker" in {
+        finding.kind for finding in motion_energy(film(12, gain=gain)).findings
+    }
 
 
 def test_a_shaking_camera_is_noted_and_mostly_taken_out() -> None:
@@ -90,7 +96,10 @@ def test_a_constant_picture_says_that_nothing_moves() -> None:
 
 def test_energies_stand_midway_between_their_frames_and_gaps_are_not_compared() -> None:
     frames = film(6, speed=1.0)
-    late = [(time if index < 3 else time + 2_000_000_000, image) for index, (time, image) in enumerate(frames)]
+    late = [
+        (time if index < 3 else time + 2_000_000_000, image)
+        for index, (time, image) in enumerate(frames)
+    ]
     series = motion_energy(late)
     assert series.time[0] == PERIOD // 2
     assert np.isnan(series.energy).tolist() == [False, False, True, False, False]
@@ -114,7 +123,9 @@ def test_series_that_make_no_sense_are_refused() -> None:
     ]
     assert (
         unrefused(
-            lambda time, energy: MotionSeries(time=np.array(time, dtype=np.int64), energy=np.array(energy)),
+            lambda time, energy: MotionSeries(
+                time=np.array(time, dtype=np.int64), energy=np.array(energy)
+            ),
             cases,
             InputError,
         )

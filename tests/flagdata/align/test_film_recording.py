@@ -1,4 +1,5 @@
-"""A camera and a wind artifact become a recording: frames unchanged, on the wind's clock, with clips, in one commit."""
+"""A camera and a wind artifact become a recording: frames unchanged, on the wind's clock, with
+clips, in one commit."""
 
 from __future__ import annotations
 
@@ -35,17 +36,22 @@ def gust(seconds: np.ndarray) -> np.ndarray:
 
 
 def film(seconds: np.ndarray) -> np.ndarray:
-    """Frames of a striped cloth before a still wall, whose stripes move faster the stronger the wind was 0.4 s ago."""
+    """Frames of a striped cloth before a still wall, whose stripes move faster the stronger the
+    wind was 0.4 s ago."""
     rows, columns = np.mgrid[:SIZE, :SIZE]
     phase = np.cumsum((gust(seconds - 0.4) / 6) ** 1.5) * 0.5
     wall = 100 + 30 * np.sin(rows / 3.0) + 20 * np.cos(columns / 4.0)
     frames = np.repeat(wall[None], len(seconds), axis=0)
     cloth = (slice(16, 34), slice(10, 30))
     frames[:, *cloth] = 120 + 60 * np.sin(columns[cloth][None] / 3.0 - phase[:, None, None])
-    return np.clip(frames + stream(1, "grain").normal(0, 1.0, frames.shape), 0, 255).astype(np.uint8)
+    return np.clip(frames + stream(1, "grain").normal(0, 1.0, frames.shape), 0, 255).astype(
+        np.uint8
+    )
 
 
-def fill(lake: Lake, *, steady: bool, seconds: int = 240, camera_session: str | None = "mast") -> tuple[str, str]:
+def fill(
+    lake: Lake, *, steady: bool, seconds: int = 240, camera_session: str | None = "mast"
+) -> tuple[str, str]:
     """A camera and a wind artifact of one scene; their ids."""
     with lake.transaction("scene") as transaction:
         true = np.arange(seconds * RATE) / RATE
@@ -53,7 +59,9 @@ def fill(lake: Lake, *, steady: bool, seconds: int = 240, camera_session: str | 
         path = transaction.staging(".mcap")
         with RecordWriter(path, metadata={"camera": {"container": "made"}}) as record:
             for time, image in zip(device.tolist(), film(true), strict=True):
-                record.frame(log_time=time, publish_time=time, timestamp=time + 5_000_000, image=image)
+                record.frame(
+                    log_time=time, publish_time=time, timestamp=time + 5_000_000, image=image
+                )
         camera = Artifact(
             kind=Kind.CAMERA,
             name="cam",
@@ -67,7 +75,9 @@ def fill(lake: Lake, *, steady: bool, seconds: int = 240, camera_session: str | 
         transaction.add(camera)
         stamps = np.arange(-100, seconds + 100)
         fine = np.arange(20)[None, :] / 20
-        speed = gust(stamps[:, None] - fine).mean(axis=1)  # the mean of the second before each stamp
+        speed = gust(stamps[:, None] - fine).mean(
+            axis=1
+        )  # the mean of the second before each stamp
         if steady:
             speed = 6 + 0.02 * stream(2, "sensor").standard_normal(len(stamps))
         path = transaction.staging(".mcap")
@@ -101,7 +111,9 @@ def gusty(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, str]:
 
 
 def run(*arguments: str) -> dict[str, object]:
-    result = CliRunner().invoke(root, [*arguments, "--json"], catch_exceptions=False, standalone_mode=False)
+    result = CliRunner().invoke(
+        root, [*arguments, "--json"], catch_exceptions=False, standalone_mode=False
+    )
     return json.loads(result.stdout)
 
 
@@ -112,7 +124,17 @@ def test_an_estimate_makes_a_recording_on_the_winds_clock_with_clips_in_one_comm
     lake = Lake.open(folder)
     before = lake.resolve(None)
     plot = tmp_path / "lag.png"
-    said = run("align", camera[:12], wind[:12], "--lake", str(folder), "--search", "40", "--plot", str(plot))
+    said = run(
+        "align",
+        camera[:12],
+        wind[:12],
+        "--lake",
+        str(folder),
+        "--search",
+        "40",
+        "--plot",
+        str(plot),
+    )
     assert plot.read_bytes().startswith(b"\x89PNG")
     assert lake.resolve(None) == before + 1  # one commit
     recording = lake.artifact(str(said["recording"]))
@@ -134,9 +156,20 @@ def test_an_estimate_makes_a_recording_on_the_winds_clock_with_clips_in_one_comm
     assert set(clips["artifact"].to_pylist()) == set(said["clips"])  # type: ignore[call-overload]
 
 
-def test_aligning_again_finds_the_recording_and_writes_nothing(gusty: tuple[Path, str, str]) -> None:
+def test_aligning_again_finds_the_recording_and_writes_nothing(
+    gusty: tuple[Path, str, str],
+) -> None:
     folder, camera, wind = gusty
-    options = ("--by", "given", "--clock-offset", "7.25", "--offset-sigma", "0.1", "--lake", str(folder))
+    options = (
+        "--by",
+        "given",
+        "--clock-offset",
+        "7.25",
+        "--offset-sigma",
+        "0.1",
+        "--lake",
+        str(folder),
+    )
     first = run("align", camera, wind, *options)
     head = Lake.open(folder).resolve(None)
     again = run("align", camera, wind, *options)
@@ -146,9 +179,20 @@ def test_aligning_again_finds_the_recording_and_writes_nothing(gusty: tuple[Path
     assert Lake.open(folder).resolve(None) == head
 
 
-def test_another_session_for_a_recording_that_is_there_is_a_conflict(gusty: tuple[Path, str, str]) -> None:
+def test_another_session_for_a_recording_that_is_there_is_a_conflict(
+    gusty: tuple[Path, str, str],
+) -> None:
     folder, camera, wind = gusty
-    options = ("--by", "given", "--clock-offset", "6.5", "--offset-sigma", "0.1", "--lake", str(folder))
+    options = (
+        "--by",
+        "given",
+        "--clock-offset",
+        "6.5",
+        "--offset-sigma",
+        "0.1",
+        "--lake",
+        str(folder),
+    )
     run("align", camera, wind, *options, "--session", "one")
     with pytest.raises(ConflictError, match="session 'one'"):
         run("align", camera, wind, *options, "--session", "two")
@@ -157,7 +201,17 @@ def test_another_session_for_a_recording_that_is_there_is_a_conflict(gusty: tupl
 def test_an_offset_claimed_better_than_a_frame_is_flagged(gusty: tuple[Path, str, str]) -> None:
     folder, camera, wind = gusty
     said = run(
-        "align", camera, wind, "--by", "given", "--clock-offset", "7", "--offset-sigma", "0.001", "--lake", str(folder)
+        "align",
+        camera,
+        wind,
+        "--by",
+        "given",
+        "--clock-offset",
+        "7",
+        "--offset-sigma",
+        "0.001",
+        "--lake",
+        str(folder),
     )
     assert "sigma-below-frame" in Lake.open(folder).artifact(str(said["recording"])).quality
 
@@ -186,11 +240,28 @@ def test_people_read_the_offset_with_its_interval(gusty: tuple[Path, str, str]) 
     assert result.stdout.strip() == "offset -3.20 s [-3.61, -2.79] 90 %, given"
 
 
-def test_realign_writes_a_new_object_and_names_what_it_supersedes(gusty: tuple[Path, str, str]) -> None:
+def test_realign_writes_a_new_object_and_names_what_it_supersedes(
+    gusty: tuple[Path, str, str],
+) -> None:
     folder, camera, wind = gusty
     lake = Lake.open(folder)
-    old = str(run("align", camera, wind, "--by", "stamps", "--offset-sigma", "2", "--lake", str(folder))["recording"])
-    said = run("realign", old, "--by", "given", "--clock-offset", "7", "--offset-sigma", "0.2", "--lake", str(folder))
+    old = str(
+        run("align", camera, wind, "--by", "stamps", "--offset-sigma", "2", "--lake", str(folder))[
+            "recording"
+        ]
+    )
+    said = run(
+        "realign",
+        old,
+        "--by",
+        "given",
+        "--clock-offset",
+        "7",
+        "--offset-sigma",
+        "0.2",
+        "--lake",
+        str(folder),
+    )
     new = lake.artifact(str(said["recording"]))
     assert new.object != lake.artifact(old).object
     assert new.parents == (camera, wind)
@@ -202,7 +273,18 @@ def test_realign_writes_a_new_object_and_names_what_it_supersedes(gusty: tuple[P
 
 def test_stamps_of_whole_seconds_add_their_own_uncertainty(gusty: tuple[Path, str, str]) -> None:
     folder, camera, wind = gusty
-    said = run("align", camera, wind, "--by", "stamps", "--offset-sigma", "0.4", "--dry-run", "--lake", str(folder))
+    said = run(
+        "align",
+        camera,
+        wind,
+        "--by",
+        "stamps",
+        "--offset-sigma",
+        "0.4",
+        "--dry-run",
+        "--lake",
+        str(folder),
+    )
     assert said["recording"] is None
     assert said["clock"]["sigma"] == pytest.approx(np.hypot(0.4, 1 / np.sqrt(12)))  # type: ignore[index]
 
@@ -237,8 +319,14 @@ def test_a_steady_wind_is_refused_and_nothing_is_committed(tmp_path: Path) -> No
         (["--by", "given", "--clock-offset", "3"], "needs the uncertainty"),
         (["--by", "stamps"], "needs the uncertainty"),
         (["--offset-sigma", "1"], "is estimated"),
-        (["--by", "given", "--clock-offset", "3", "--offset-sigma", "1", "--search", "5"], "searches nothing"),
-        (["--by", "given", "--clock-offset", "nan", "--offset-sigma", "1"], "offset nan s is not finite"),
+        (
+            ["--by", "given", "--clock-offset", "3", "--offset-sigma", "1", "--search", "5"],
+            "searches nothing",
+        ),
+        (
+            ["--by", "given", "--clock-offset", "nan", "--offset-sigma", "1"],
+            "offset nan s is not finite",
+        ),
         (["--by", "given", "--clock-offset", "1", "--offset-sigma", "0"], "uncertainty 0"),
         (["--by", "stamps", "--offset-sigma", "1", "--plot", "x.png"], "no search to draw"),
     ],
@@ -260,7 +348,16 @@ def test_arguments_in_the_wrong_order_are_refused(gusty: tuple[Path, str, str]) 
 def test_sessions_that_disagree_must_be_settled(tmp_path: Path) -> None:
     lake = Lake.create(tmp_path / "lake")
     camera, wind = fill(lake, steady=False, seconds=15, camera_session="beach")
-    options = ("--by", "given", "--clock-offset", "7", "--offset-sigma", "0.2", "--lake", str(lake.path))
+    options = (
+        "--by",
+        "given",
+        "--clock-offset",
+        "7",
+        "--offset-sigma",
+        "0.2",
+        "--lake",
+        str(lake.path),
+    )
     with pytest.raises(UsageError, match="'beach' and 'mast'"):
         run("align", camera, wind, *options)
     said = run("align", camera, wind, *options, "--session", "beach-mast")

@@ -1,4 +1,5 @@
-"""The offset estimated from motion and wind: recovered, covered by its interval, refused where it is unknowable."""
+"""The offset estimated from motion and wind: recovered, covered by its interval, refused where it
+is unknowable."""
 
 from __future__ import annotations
 
@@ -39,10 +40,11 @@ def test_offset_of_a_gusty_ten_minutes_is_recovered_within_half_a_second(offset:
 
 
 def test_intervals_of_field_recordings_cover_the_offset_at_their_level() -> None:
-    """Fields drawn at random: turbulence 10 to 25 %, length scales 50 to 100 m, flag 1 to 3 m from the sensor.
+    """Fields drawn at random: turbulence 10 to 25 %, length scales 50 to 100 m, flag 1 to 3 m from
+    the sensor.
 
-    The flag's response is drawn with the mean and spread that the search assumes. Coverage is that of accepted
-    estimates, which is what a user gets.
+    The flag's response is drawn with the mean and spread that the search assumes. Coverage is that
+    of accepted estimates, which is what a user gets.
     """
     errors, sigmas, covered = [], [], 0
     for seed in range(FIELDS):
@@ -70,10 +72,12 @@ def test_intervals_of_field_recordings_cover_the_offset_at_their_level() -> None
             covered += bool(found.interval[0] <= offset <= found.interval[1])
     accepted = len(errors)
     assert accepted >= 2 * FIELDS / 3  # the rest is too noisy and reported so
-    # 90 % of n by the binomial distribution, at the 1 % and 99.9 % points: chance alone fails this once in a hundred.
+    # 90 % of n by the binomial distribution, at the 1 % and 99.9 % points: chance alone fails this
+    # once in a hundred.
     assert binom.ppf(0.01, accepted, 0.9) <= covered
     scores = np.array(errors) / np.array(sigmas)
-    # The σ are neither boasts nor excuses: their scores' standard deviation is 1 ± 0.1 by theory, heavy tails apart.
+    # The σ are neither boasts nor excuses: their scores' standard deviation is 1 ± 0.1 by theory,
+    # heavy tails apart.
     assert 0.75 < np.std(scores) < 1.2
     assert np.median(np.abs(errors)) < 0.3
     assert np.mean(np.abs(errors) < 0.5) > 0.85
@@ -82,7 +86,8 @@ def test_intervals_of_field_recordings_cover_the_offset_at_their_level() -> None
 def test_the_offset_does_not_depend_on_the_generator() -> None:
     pair = scene(seed=3, offset=5.0, apart=1.5)
     found = [
-        estimate_offset(*pair, search=LagSearch(surrogates=60), generator=stream(seed, "chance")) for seed in (0, 1)
+        estimate_offset(*pair, search=LagSearch(surrogates=60), generator=stream(seed, "chance"))
+        for seed in (0, 1)
     ]
     assert found[0].offset == found[1].offset
     assert found[0].sigma == found[1].sigma
@@ -100,7 +105,8 @@ def test_shifting_the_cameras_clock_shifts_the_offset_by_as_much() -> None:
     motion, wind = scene(seed=3, offset=5.0, apart=1.5)
     plain = estimate((motion, wind), surrogates=60)
     moved = estimate((replace(motion, time=motion.time - 20 * SECOND), wind), surrogates=60)
-    # A whole number of steps of the search: the same samples meet, but the ranks run over a few others at the ends.
+    # A whole number of steps of the search: the same samples meet, but the ranks run over a few
+    # others at the ends.
     assert moved.offset == pytest.approx(plain.offset + 20, abs=0.005)
 
 
@@ -135,7 +141,9 @@ def test_steady_wind_is_refused() -> None:
 @pytest.mark.parametrize("period", [7.0, 20.0, 60.0])
 def test_periodic_wind_is_refused_as_ambiguous(period: float) -> None:
     time = np.arange(900 * 20) / 20
-    found = estimate(scene(seed=5, offset=20.0, apart=0.0, gust=np.sqrt(2) * np.sin(2 * np.pi * time / period)))
+    found = estimate(
+        scene(seed=5, offset=20.0, apart=0.0, gust=np.sqrt(2) * np.sin(2 * np.pi * time / period))
+    )
     assert "ambiguous-offset" in refusals(found)
 
 
@@ -143,7 +151,9 @@ def test_unrelated_wind_is_accepted_no_more_often_than_stated() -> None:
     """Films of one gusty day against the wind of another; the stated chance is 1 %."""
     accepted = 0
     for seed in range(FIELDS):
-        found = estimate(scene(seed=seed, other=gusts_alone(seed + 10_000, 900.0)), surrogates=60, sigma=10.0)
+        found = estimate(
+            scene(seed=seed, other=gusts_alone(seed + 10_000, 900.0)), surrogates=60, sigma=10.0
+        )
         accepted += found.is_accepted
     assert accepted <= binom.ppf(0.999, FIELDS, 0.01)
 
@@ -160,12 +170,16 @@ def test_a_film_of_two_minutes_is_too_short_and_not_unmoved() -> None:
 
 
 def test_a_peak_at_the_edge_of_the_search_is_refused() -> None:
-    found = estimate(scene(seed=3, offset=30.0, apart=1.5, flag_noise=0.2), window=30.0, surrogates=60)
+    found = estimate(
+        scene(seed=3, offset=30.0, apart=1.5, flag_noise=0.2), window=30.0, surrogates=60
+    )
     assert "offset-at-edge" in refusals(found)
 
 
 def test_an_offset_beyond_the_search_is_refused() -> None:
-    found = estimate(scene(seed=3, offset=60.0, apart=1.5, flag_noise=0.2), window=30.0, surrogates=60)
+    found = estimate(
+        scene(seed=3, offset=60.0, apart=1.5, flag_noise=0.2), window=30.0, surrogates=60
+    )
     assert not found.is_accepted
 
 
@@ -224,7 +238,8 @@ def test_searches_that_make_no_sense_are_refused(wrong: dict[str, float]) -> Non
 
 @pytest.mark.reference
 def test_a_real_sonics_gusts_tie_a_flag_to_its_clock(reference_data: Path) -> None:
-    """Fifteen minutes of a CSAT3 in a field at 20 Hz: 1.8 m/s, intensity 56 %, gusts that no spectrum here made."""
+    """Fifteen minutes of a CSAT3 in a field at 20 Hz: 1.8 m/s, intensity 56 %, gusts that no
+    spectrum here made."""
     log = read_log(reference_data / "wind" / "toa5_csat3_20hz.dat", WindOptions(zone="UTC"))
     speed = log.series.channels["wind_speed"]
     mean, spread = float(np.mean(speed)), float(np.std(speed))
@@ -249,7 +264,9 @@ def test_a_real_sonics_gusts_tie_a_flag_to_its_clock(reference_data: Path) -> No
 
 @pytest.mark.reference
 @pytest.mark.parametrize(("period", "why"), [(0.25, "accidental-peak"), (1.0, "short-overlap")])
-def test_the_tunnels_one_rise_of_the_wind_in_22_seconds_is_refused(tunnel: Any, period: float, why: str) -> None:
+def test_the_tunnels_one_rise_of_the_wind_in_22_seconds_is_refused(
+    tunnel: Any, period: float, why: str
+) -> None:
     """A single ramp ties the clocks to a second at best, and 22 bins to nothing."""
     motion = MotionSeries(time=tunnel.device, energy=tunnel.motion)
     found = estimate((motion, average(tunnel.wind, period)), window=8.0, overlap=14.0, response=0.0)

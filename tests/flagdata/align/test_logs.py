@@ -1,4 +1,5 @@
-"""Two logs of one wind: offset, drift and gain come back, and logs of different winds are refused."""
+"""Two logs of one wind: offset, drift and gain come back, and logs of different winds are
+refused."""
 
 from __future__ import annotations
 
@@ -30,8 +31,9 @@ RATE = 10
 class Two:
     """A sonic at 10 Hz and a cup at 1 Hz in von Kármán turbulence whose mean wanders over the day.
 
-    The cup's clock c is on the sonic's c + `offset` + `drift` (c − `middle`); it reads `zero` + `gain` × the wind that
-    has passed a rotor of distance constant `distance` [m], with noise, in steps of 0.1 m/s; both logs have a gap.
+    The cup's clock c is on the sonic's c + `offset` + `drift` (c − `middle`); it reads `zero` +
+    `gain` × the wind that has passed a rotor of distance constant `distance` [m], with noise, in
+    steps of 0.1 m/s; both logs have a gap.
     """
 
     seed: int
@@ -51,7 +53,9 @@ class Two:
         """Zero mean, unit variance; von Kármán's spectrum (IEC 61400-1, B.13) by random phases."""
         reduced = np.fft.rfftfreq(count, 1 / RATE)[1:] * 70.0 / 6.0
         amplitude = np.sqrt(1 / (1 + 70.8 * reduced**2) ** (5 / 6))
-        phases = generator.standard_normal(len(reduced)) + 1j * generator.standard_normal(len(reduced))
+        phases = generator.standard_normal(len(reduced)) + 1j * generator.standard_normal(
+            len(reduced)
+        )
         series = np.fft.irfft(np.concatenate([[0], amplitude * phases]), n=count)
         return series / np.std(series)
 
@@ -61,23 +65,37 @@ class Two:
         time = np.arange(count) / RATE
         mean = 6.0 * (1 + 0.4 * np.sin(2 * np.pi * time / 86_400 - 1))
         wind = np.maximum(mean * (1 + 0.18 * self.gusts(generator, count)), 0.2)
-        other = wind if self.related else np.maximum(mean * (1 + 0.18 * self.gusts(generator, count)), 0.2)
+        other = (
+            wind
+            if self.related
+            else np.maximum(mean * (1 + 0.18 * self.gusts(generator, count)), 0.2)
+        )
         sonic = np.round((wind + generator.normal(0, 0.05, count)) / 0.01) * 0.01
         turned = np.empty(count)
         level = float(other[0])
         for index, value in enumerate(other.tolist()):
-            level += (1 - np.exp(-value / (RATE * self.distance))) * (value - level) if self.distance else value - level
+            level += (
+                (1 - np.exp(-value / (RATE * self.distance))) * (value - level)
+                if self.distance
+                else value - level
+            )
             turned[index] = level
         stamps = START + np.arange(count // RATE, dtype=np.int64) * SECOND
-        true = stamps + np.round(self.offset * SECOND + self.drift * (stamps - self.middle)).astype(np.int64)
+        true = stamps + np.round(self.offset * SECOND + self.drift * (stamps - self.middle)).astype(
+            np.int64
+        )
         cup = np.interp((true - START) / SECOND, time, turned)
         cup = self.zero + self.gain * cup + generator.normal(0, 0.1, len(cup))
         cup = np.round(np.maximum(cup, 0) / 0.1) * 0.1
-        ours = series(START + np.arange(count, dtype=np.int64) * (SECOND // RATE), sonic, 0.33, distance=0.0)
+        ours = series(
+            START + np.arange(count, dtype=np.int64) * (SECOND // RATE), sonic, 0.33, distance=0.0
+        )
         return ours, series(stamps, cup, 0.5, distance=self.distance)
 
 
-def series(time: np.ndarray, speed: np.ndarray, gap: float, *, distance: float | None) -> WindSeries:
+def series(
+    time: np.ndarray, speed: np.ndarray, gap: float, *, distance: float | None
+) -> WindSeries:
     """A log with a silence of a hundredth of its length, `gap` of the way through."""
     keep = np.ones(len(time), dtype=bool)
     keep[round(gap * len(time)) : round((gap + 0.01) * len(time))] = False
@@ -91,7 +109,9 @@ def series(time: np.ndarray, speed: np.ndarray, gap: float, *, distance: float |
 
 def found(reference: WindSeries, sensor: WindSeries) -> LogClock:
     search = LagSearch(window=60.0)
-    return log_clock(reference, sensor, names=("sonic", "cup"), search=search, generator=stream(1, "found"))
+    return log_clock(
+        reference, sensor, names=("sonic", "cup"), search=search, generator=stream(1, "found")
+    )
 
 
 def at_middle(two: Two, model: ClockModel) -> float:
@@ -105,7 +125,8 @@ def test_over_a_day_drift_is_found_to_2_ppm_and_offset_to_a_tenth_of_a_second() 
     assert at_middle(two, clock.model) == pytest.approx(two.offset, abs=0.1)
     assert segment.drift == pytest.approx(two.drift, abs=2e-6)
     assert 0 < segment.sigma_drift < 1e-6
-    # Noise of the sonic's minutes, 0.05/√600 m/s, and readings held at 0 take less than a hundredth off the slope.
+    # Noise of the sonic's minutes, 0.05/√600 m/s, and readings held at 0 take less than a hundredth
+    # off the slope.
     assert clock.gain.gain == pytest.approx(two.gain, abs=0.01)
     assert clock.gain.zero == pytest.approx(two.zero, abs=0.06)
 
@@ -161,7 +182,9 @@ def test_gain_is_the_slope_of_minute_means() -> None:
     sensor = Sensor(name="made")
     flags = np.zeros(3600, dtype=np.uint16)
     one = WindSeries(time=time, channels={"wind_speed": speed}, flags=flags, sensor=sensor)
-    two = WindSeries(time=time, channels={"wind_speed": 0.2 + 1.1 * speed}, flags=flags, sensor=sensor)
+    two = WindSeries(
+        time=time, channels={"wind_speed": 0.2 + 1.1 * speed}, flags=flags, sensor=sensor
+    )
     gain = gain_of(one, two, model)
     assert (gain.gain, gain.zero) == (pytest.approx(1.1), pytest.approx(0.2))
     assert gain.sigma < 1e-6
@@ -190,11 +213,15 @@ def lake_of(folder: Path, two: Two) -> tuple[Lake, list[str]]:
 
 
 def run(*arguments: str) -> dict[str, object]:
-    result = CliRunner().invoke(root, [*arguments, "--json"], catch_exceptions=False, standalone_mode=False)
+    result = CliRunner().invoke(
+        root, [*arguments, "--json"], catch_exceptions=False, standalone_mode=False
+    )
     return json.loads(result.stdout)
 
 
-def test_the_command_writes_the_sensors_log_on_the_references_clock_in_one_commit(tmp_path: Path) -> None:
+def test_the_command_writes_the_sensors_log_on_the_references_clock_in_one_commit(
+    tmp_path: Path,
+) -> None:
     two = Two(seed=2, hours=0.6, drift=0.0)
     lake, (sonic, cup) = lake_of(tmp_path / "lake", two)
     before = lake.resolve(None)
@@ -205,7 +232,10 @@ def test_the_command_writes_the_sensors_log_on_the_references_clock_in_one_commi
     assert (artifact.kind, artifact.parents, artifact.session) == (Kind.WIND, (sonic, cup), "mast")
     assert artifact.clock_offset == pytest.approx(two.offset, abs=0.15)
     record = Record.open(lake.object_path(str(artifact.object)))
-    written, own = record.wind(), Record.open(lake.object_path(str(lake.artifact(cup).object))).wind()
+    written, own = (
+        record.wind(),
+        Record.open(lake.object_path(str(lake.artifact(cup).object))).wind(),
+    )
     assert written is not None
     assert own is not None
     np.testing.assert_array_equal(record.device_wind_times, own.time)

@@ -26,10 +26,13 @@ def clocks(
     rate: float = 20.0,
     steps: tuple[tuple[float, float], ...] = (),
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Device and host stamps with delays in bursts: exponential of 4 ms, and for two seconds in twenty, 80 ms more."""
+    """Device and host stamps with delays in bursts: exponential of 4 ms, and for two seconds in
+    twenty, 80 ms more."""
     rng = stream(seed, "clocks")
     time = np.arange(round(seconds * rate)) / rate
-    delay = rng.exponential(0.004, len(time)) + np.where(time % 20 < 2, rng.exponential(0.08, len(time)), 0.0)
+    delay = rng.exponential(0.004, len(time)) + np.where(
+        time % 20 < 2, rng.exponential(0.08, len(time)), 0.0
+    )
     late = offset + drift * (time - seconds / 2) + delay
     for at, size in steps:
         late = late + np.where(time >= at, size, 0.0)
@@ -38,14 +41,17 @@ def clocks(
 
 
 def nominal_times(host_time: np.ndarray) -> np.ndarray:
-    """Instants that a device of steady rate without a clock would have stamped: its samples counted, (n,) [UTC ns].
+    """Instants that a device of steady rate without a clock would have stamped: its samples
+    counted, (n,) [UTC ns].
 
-    The period is the line through host stamps against the count of samples, robustly. Given to `pair_clocks` with the
-    host's stamps, every lost sample or gap of the device shows as a step, so that segments hold runs without loss.
+    The period is the line through host stamps against the count of samples, robustly. Given to
+    `pair_clocks` with the host's stamps, every lost sample or gap of the device shows as a step, so
+    that segments hold runs without loss.
     """
     count = np.arange(len(host_time), dtype=np.float64)
     seconds = (host_time - host_time[0]) / SECOND
-    # Slopes over a tenth of the log, so that jitter averages out; their median, so that gaps do not count.
+    # Slopes over a tenth of the log, so that jitter averages out; their median, so that gaps do not
+    # count.
     reach = max(1, len(host_time) // 10)
     period = float(np.median(seconds[reach:] - seconds[:-reach])) / reach
     return host_time[0] + np.round(count * period * SECOND).astype(np.int64)
@@ -71,7 +77,9 @@ def test_two_sigma_hold_offset_and_drift_in_nineteen_of_twenty_logs() -> None:
         at = np.array([device[0] + 60 * SECOND])
         good += bool(abs((model.to_common(at) - at)[0] / SECOND - 12.5) < 2 * model.sigma(at)[0])
         good += bool(abs(model.segments[0].drift - 4e-5) < 2 * model.segments[0].sigma_drift)
-    assert good >= 0.9 * 120  # the median delay, a systematic allowance, makes the offsets' σ generous
+    assert (
+        good >= 0.9 * 120
+    )  # the median delay, a systematic allowance, makes the offsets' σ generous
 
 
 @pytest.mark.parametrize("size", [-0.7, 0.25, 3600.0])
@@ -144,7 +152,9 @@ def test_stamps_that_make_no_clock_are_refused() -> None:
     ]
     assert (
         unrefused(
-            lambda device, host: pair_clocks(np.array(device, dtype=np.int64), np.array(host, dtype=np.int64)),
+            lambda device, host: pair_clocks(
+                np.array(device, dtype=np.int64), np.array(host, dtype=np.int64)
+            ),
             cases,
             InputError,
         )
@@ -164,10 +174,13 @@ def test_a_log_with_one_kind_of_stamp_has_no_host_clock() -> None:
 
 @pytest.mark.reference
 def test_the_tunnels_camera_clock_runs_sixty_milliseconds_ahead_of_the_laptop(tunnel: Any) -> None:
-    """The least of laptop − device in the file is near −64 ms; the device writes whole milliseconds."""
+    """The least of laptop − device in the file is near −64 ms; the device writes whole
+    milliseconds."""
     paired = pair_clocks(tunnel.device, tunnel.host)
     (segment,) = paired.model.segments
-    assert segment.offset == pytest.approx(float(np.min(tunnel.host - tunnel.device)) / SECOND, abs=0.002)
+    assert segment.offset == pytest.approx(
+        float(np.min(tunnel.host - tunnel.device)) / SECOND, abs=0.002
+    )
     assert 0.0003 < segment.sigma_offset < 0.01
     assert abs(segment.drift) < 1e-4
     assert paired.worst_delay < 0.05
@@ -175,7 +188,8 @@ def test_the_tunnels_camera_clock_runs_sixty_milliseconds_ahead_of_the_laptop(tu
 
 @pytest.mark.reference
 def test_the_tunnels_anemometer_keeps_a_steady_203_hertz_without_loss(tunnel: Any) -> None:
-    """12,596 readings in 62 s, by the file's own stamps; bursts of up to 20 ms are delays, not steps."""
+    """12,596 readings in 62 s, by the file's own stamps; bursts of up to 20 ms are delays, not
+    steps."""
     device = nominal_times(tunnel.wind.time)
     paired = pair_clocks(device, tunnel.wind.time)
     assert SECOND / np.median(np.diff(device)) == pytest.approx(203.2, abs=0.2)

@@ -21,8 +21,14 @@ def evidence(pair: tuple[MotionSeries, WindAverage]) -> Evidence:
     search, generator = LagSearch(surrogates=60), stream(0, "chance")
     motion, wind = pair
     estimate = estimate_offset(motion, wind, search=search, generator=generator)
-    line = clock_line(motion, wind, estimate, search=search, generator=generator) if estimate.is_accepted else None
-    return Evidence(motion=motion, wind=wind, estimate=estimate, line=line, response=search.response)
+    line = (
+        clock_line(motion, wind, estimate, search=search, generator=generator)
+        if estimate.is_accepted
+        else None
+    )
+    return Evidence(
+        motion=motion, wind=wind, estimate=estimate, line=line, response=search.response
+    )
 
 
 def size(path: Path) -> tuple[int, int]:
@@ -33,14 +39,27 @@ def size(path: Path) -> tuple[int, int]:
 
 
 def test_an_accepted_and_a_refused_estimate_are_drawn(tmp_path: Path) -> None:
-    draw(evidence(scene(seed=3, offset=9.0, apart=1.5, flag_noise=0.3)), tmp_path / "good.png", title="cam and mast")
+    draw(
+        evidence(scene(seed=3, offset=9.0, apart=1.5, flag_noise=0.3)),
+        tmp_path / "good.png",
+        title="cam and mast",
+    )
     draw(evidence(scene(seed=3, turbulence=0.005)), tmp_path / "steady.png", title="cam and mast")
     draw(evidence(scene(seed=3, duration=90.0)), tmp_path / "short.png", title="cam and mast")
-    assert size(tmp_path / "good.png") == size(tmp_path / "steady.png") == size(tmp_path / "short.png") == (1200, 768)
+    assert (
+        size(tmp_path / "good.png")
+        == size(tmp_path / "steady.png")
+        == size(tmp_path / "short.png")
+        == (1200, 768)
+    )
 
 
 def test_a_measured_drift_adds_its_own_panel(tmp_path: Path) -> None:
-    draw(evidence(scene(seed=11, duration=5400.0, apart=1.5, flag_noise=0.3)), tmp_path / "long.png", title="long")
+    draw(
+        evidence(scene(seed=11, duration=5400.0, apart=1.5, flag_noise=0.3)),
+        tmp_path / "long.png",
+        title="long",
+    )
     assert size(tmp_path / "long.png") == (1200, 1056)
 
 
@@ -50,7 +69,9 @@ def test_files_that_cannot_be_drawn_say_so_before_anything_is_searched(tmp_path:
 
 
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
-def test_an_earlier_picture_is_replaced_and_another_file_is_not(suffix: str, tmp_path: Path) -> None:
+def test_an_earlier_picture_is_replaced_and_another_file_is_not(
+    suffix: str, tmp_path: Path
+) -> None:
     path, found = tmp_path / f"lag{suffix}", evidence(scene(seed=3, turbulence=0.005))
     draw(found, path, title="steady")
     draw(found, path, title="still steady")

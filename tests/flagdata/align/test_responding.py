@@ -18,12 +18,16 @@ from flagdata.timebase import NANOSECONDS
     ("wind", "response", "sigma"),
     [(0.0, 1.0, 0.3), (3.0, 1.0, 0.3), (6.0, 0.5, 0.25), (10.0, 0.3, 0.15), (20.0, 0.3, 0.15)],
 )
-def test_a_flag_follows_the_later_the_lighter_the_wind(wind: float, response: float, sigma: float) -> None:
+def test_a_flag_follows_the_later_the_lighter_the_wind(
+    wind: float, response: float, sigma: float
+) -> None:
     assert responding(wind) == pytest.approx((response, sigma))
 
 
 @pytest.mark.parametrize("lag", [1.0, 1.6])
-def test_the_lag_of_simulated_flags_in_light_wind_lies_within_two_standard_errors(lag: float) -> None:
+def test_the_lag_of_simulated_flags_in_light_wind_lies_within_two_standard_errors(
+    lag: float,
+) -> None:
     response, sigma = responding(3.0)
     assert abs(lag - response) <= 2 * sigma + 1e-9
 
@@ -48,11 +52,17 @@ def test_what_the_user_states_counts(
 
     times = np.array([0, 150]) * NANOSECONDS
     average = SimpleNamespace(speed=np.array([2.0, 4.0]), time=times, period=1.0)
-    monkeypatch.setattr(methods, "wind_bins", lambda series: SimpleNamespace(average=average, sigma=0.1))
+    monkeypatch.setattr(
+        methods, "wind_bins", lambda series: SimpleNamespace(average=average, sigma=0.1)
+    )
     monkeypatch.setattr(methods, "estimate_offset", estimate)
     named = SimpleNamespace(id="a")
     pair = SimpleNamespace(
-        series=lambda: None, motion=lambda progress: None, camera=named, wind=named, span=times.tolist()
+        series=lambda: None,
+        motion=lambda progress: None,
+        camera=named,
+        wind=named,
+        span=times.tolist(),
     )
     found = evidence(cast(Any, pair), ClockOptions(**cast(Any, stated)))
     assert (searched[0].response, searched[0].response_sigma) == pytest.approx(expected)

@@ -1,4 +1,5 @@
-"""The ground truth's window that the user sets, a declared wind, and clocks that are hours apart."""
+"""The ground truth's window that the user sets, a declared wind, and clocks that are hours
+apart."""
 
 from __future__ import annotations
 
@@ -28,7 +29,8 @@ RATE = 10
 
 
 def scene(folder: Path, *, log_shift: float = 0.0) -> tuple[Lake, str, str]:
-    """Six seconds of film in a log whose speed is the second's number: its mean over a window identifies the window."""
+    """Six seconds of film in a log whose speed is the second's number: its mean over a window
+    identifies the window."""
     lake = Lake.create(folder)
     with lake.transaction("scene") as transaction:
         times = START + np.arange(FRAMES, dtype=np.int64) * (SECOND // RATE)
@@ -72,15 +74,21 @@ def scene(folder: Path, *, log_shift: float = 0.0) -> tuple[Lake, str, str]:
 
 
 def invoke(*arguments: str) -> tuple[dict[str, object], str]:
-    result = CliRunner().invoke(root, [*arguments, "--json"], catch_exceptions=False, standalone_mode=False)
+    result = CliRunner().invoke(
+        root, [*arguments, "--json"], catch_exceptions=False, standalone_mode=False
+    )
     return json.loads(result.stdout), result.stderr
 
 
 STAMPS = ("--by", "stamps", "--offset-sigma", "0.01")
 
 
-@pytest.mark.parametrize(("given", "window"), [("10s", 10.0), ("2min", 120.0), ("800000ms", 800.0), (None, 60.0)])
-def test_the_window_reaches_the_clips_and_their_recipe(tmp_path: Path, given: str | None, window: float) -> None:
+@pytest.mark.parametrize(
+    ("given", "window"), [("10s", 10.0), ("2min", 120.0), ("800000ms", 800.0), (None, 60.0)]
+)
+def test_the_window_reaches_the_clips_and_their_recipe(
+    tmp_path: Path, given: str | None, window: float
+) -> None:
     lake, camera, wind = scene(tmp_path / "lake")
     option = ("--window", given) if given else ()
     said, _ = invoke("align", camera, wind, *STAMPS, *option, "--lake", str(lake.path))
@@ -101,7 +109,14 @@ def test_another_window_is_another_recording_and_realign_keeps_it(tmp_path: Path
     short, _ = invoke("align", camera, wind, *STAMPS, "--window", "10s", "--lake", str(lake.path))
     assert usual["recording"] != short["recording"]
     again, _ = invoke(
-        "realign", str(short["recording"]), "--by", "stamps", "--offset-sigma", "0.02", "--lake", str(lake.path)
+        "realign",
+        str(short["recording"]),
+        "--by",
+        "stamps",
+        "--offset-sigma",
+        "0.02",
+        "--lake",
+        str(lake.path),
     )
     assert lake.artifact(str(again["recording"])).recipe["truth"] == {"window": 10.0}
 
@@ -128,7 +143,12 @@ def test_a_window_that_is_no_length_of_time_is_refused(tmp_path: Path, text: str
 
 
 def test_a_length_of_time_has_a_unit() -> None:
-    assert [DURATION.convert(text, None, None) for text in ("10s", "1.5 min", "500ms", "1h")] == [10, 90, 0.5, 3600]
+    assert [DURATION.convert(text, None, None) for text in ("10s", "1.5 min", "500ms", "1h")] == [
+        10,
+        90,
+        0.5,
+        3600,
+    ]
 
 
 def test_a_declared_wind_is_the_truth_of_every_clip_with_its_sigma(tmp_path: Path) -> None:
@@ -144,10 +164,16 @@ def test_a_declared_wind_is_the_truth_of_every_clip_with_its_sigma(tmp_path: Pat
     assert len(Source(lake).pairs()) == len(clips)
     head = lake.resolve(None)
     again, _ = invoke(*arguments)
-    assert (again["recording"], again["created"], lake.resolve(None)) == (said["recording"], False, head)
+    assert (again["recording"], again["created"], lake.resolve(None)) == (
+        said["recording"],
+        False,
+        head,
+    )
 
 
-@pytest.mark.parametrize(("speed", "sigma"), [("-1", "0.1"), ("5", "0"), ("nan", "0.1"), ("5", "inf")])
+@pytest.mark.parametrize(
+    ("speed", "sigma"), [("-1", "0.1"), ("5", "0"), ("nan", "0.1"), ("5", "inf")]
+)
 def test_a_declared_wind_without_sense_is_refused(tmp_path: Path, speed: str, sigma: str) -> None:
     lake, camera, wind = scene(tmp_path / "lake")
     with pytest.raises(UsageError):

@@ -23,9 +23,11 @@ def ramp_log(
     jitter: float = 0.0,
     count: int = 400,
 ) -> WindSeries:
-    """A wind of 1 m/s + 1 m/s a second since START, by an instrument that gives the mean of the time before a stamp.
+    """A wind of 1 m/s + 1 m/s a second since START, by an instrument that gives the mean of the
+    time before a stamp.
 
-    The mean of a ramp over a second is its value in the middle of it, so each speed identifies its instant.
+    The mean of a ramp over a second is its value in the middle of it, so each speed identifies its
+    instant.
     """
     at = (np.arange(count) + 1) * spacing + phase
     stamp = at + jitter * stream(1, "jitter").uniform(-0.5, 0.5, count)
@@ -46,7 +48,9 @@ def error_of_instants(series: WindSeries) -> np.ndarray:
 
 
 @pytest.mark.parametrize("phase", [0.0, 0.2, 0.5, 0.77])
-def test_one_reading_a_second_stands_for_the_second_before_its_stamp_at_any_phase(phase: float) -> None:
+def test_one_reading_a_second_stands_for_the_second_before_its_stamp_at_any_phase(
+    phase: float,
+) -> None:
     series = ramp_log(spacing=1.0, phase=phase, averaging=1.0, stated=1.0)
     np.testing.assert_allclose(error_of_instants(series), 0.0, atol=1e-6)
     assert wind_bins(series).sigma == 0.0
@@ -62,10 +66,17 @@ def test_jitter_of_a_slow_logger_neither_loses_nor_doubles_bins(phase: float) ->
     assert abs(np.median(error_of_instants(series))) < 0.02
 
 
-@pytest.mark.parametrize(("spacing", "phase"), [(0.05, 0.0), (0.05, 0.013), (0.25, 0.1), (0.005, 0.0)])
-def test_fast_sensors_are_averaged_over_the_second_their_samples_are_of(spacing: float, phase: float) -> None:
-    series = ramp_log(spacing=spacing, phase=phase, averaging=spacing, stated=spacing, count=round(100 / spacing))
-    # First and last bins are not full; the median bin's instant is right to a fraction of the spacing.
+@pytest.mark.parametrize(
+    ("spacing", "phase"), [(0.05, 0.0), (0.05, 0.013), (0.25, 0.1), (0.005, 0.0)]
+)
+def test_fast_sensors_are_averaged_over_the_second_their_samples_are_of(
+    spacing: float, phase: float
+) -> None:
+    series = ramp_log(
+        spacing=spacing, phase=phase, averaging=spacing, stated=spacing, count=round(100 / spacing)
+    )
+    # First and last bins are not full; the median bin's instant is right to a fraction of the
+    # spacing.
     errors = error_of_instants(series)[1:-1]
     assert np.max(np.abs(errors)) < spacing / 2 + 1e-6
     assert abs(np.median(errors)) < 0.02 * spacing + 1e-6
@@ -75,20 +86,27 @@ def test_fast_sensors_are_averaged_over_the_second_their_samples_are_of(spacing:
 def test_unknown_averaging_is_within_the_stated_uncertainty(averaging: float | None) -> None:
     series = ramp_log(spacing=1.0, phase=0.0, averaging=averaging, stated=None)
     bins = wind_bins(series)
-    # Both extremes, a reading of the instant and the mean since the one before, are √3 σ off: the ends of a rectangle.
+    # Both extremes, a reading of the instant and the mean since the one before, are √3 σ off: the
+    # ends of a rectangle.
     assert bins.sigma == pytest.approx(1 / (4 * np.sqrt(3)))
-    np.testing.assert_allclose(np.abs(error_of_instants(series)), np.sqrt(3) * bins.sigma, atol=1e-6)
+    np.testing.assert_allclose(
+        np.abs(error_of_instants(series)), np.sqrt(3) * bins.sigma, atol=1e-6
+    )
 
 
 def test_readings_every_five_seconds_make_bins_of_five_seconds() -> None:
-    assert wind_bins(ramp_log(spacing=5.0, phase=2.0, averaging=5.0, stated=5.0)).average.period == 5.0
+    assert (
+        wind_bins(ramp_log(spacing=5.0, phase=2.0, averaging=5.0, stated=5.0)).average.period == 5.0
+    )
 
 
 def test_a_gap_stays_a_gap() -> None:
     series = ramp_log(spacing=1.0, phase=0.0, averaging=1.0, stated=1.0)
     speed = series.channels["wind_speed"].copy()
     speed[100:130] = np.nan
-    holed = WindSeries(time=series.time, channels={"wind_speed": speed}, flags=series.flags, sensor=series.sensor)
+    holed = WindSeries(
+        time=series.time, channels={"wind_speed": speed}, flags=series.flags, sensor=series.sensor
+    )
     assert len(wind_bins(holed).average.time) == 370
 
 
@@ -98,7 +116,9 @@ def test_logs_that_cannot_show_gusts_say_so() -> None:
     one = ramp_log(spacing=1.0, phase=0.0, averaging=None, stated=None, count=1)
     with pytest.raises(InputError, match="1 usable"):
         wind_bins(one)
-    other = WindSeries(time=one.time, channels={"air_temperature": np.ones(1)}, flags=one.flags, sensor=one.sensor)
+    other = WindSeries(
+        time=one.time, channels={"air_temperature": np.ones(1)}, flags=one.flags, sensor=one.sensor
+    )
     with pytest.raises(InputError, match="no channel wind_speed"):
         wind_bins(other)
 
@@ -113,7 +133,9 @@ def slow_sensor(distance_constant: float | None) -> WindSeries:
     )
 
 
-def test_a_rotating_sensor_reports_air_that_passed_its_distance_constant_over_the_speed_ago() -> None:
+def test_a_rotating_sensor_reports_air_that_passed_its_distance_constant_over_the_speed_ago() -> (
+    None
+):
     quick, slow = wind_bins(slow_sensor(0.0)), wind_bins(slow_sensor(2.5))
     # 2.5 m at 5 m/s: half a second, trusted to 20 %.
     assert (quick.average.time - slow.average.time == SECOND // 2).all()

@@ -1,4 +1,5 @@
-"""A wind from elsewhere: the difference's interval against its closed form, and the logarithmic law against tables."""
+"""A wind from elsewhere: the difference's interval against its closed form, and the logarithmic law
+against tables."""
 
 from __future__ import annotations
 
@@ -42,7 +43,8 @@ def test_a_film_that_only_bounds_the_wind_is_not_compared() -> None:
 
 
 def test_the_share_of_a_stations_wind_follows_the_logarithmic_law() -> None:
-    """ln(z / z₀) / ln(10 / z₀) in open land, whatever the blending height; 1 at the station itself."""
+    """ln(z / z₀) / ln(10 / z₀) in open land, whatever the blending height; 1 at the station
+    itself."""
     assert share_of_station(10.0, OPEN_LAND) == pytest.approx(1.0)
     assert share_of_station(3.0, OPEN_LAND) == pytest.approx(math.log(100) / math.log(1000 / 3))
     assert share_of_station(3.0, SUBURB) == pytest.approx(

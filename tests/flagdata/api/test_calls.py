@@ -1,4 +1,5 @@
-"""The calls of `flagdata` on made data: their arrays are those of the files, artifacts and models they come from."""
+"""The calls of `flagdata` on made data: their arrays are those of the files, artifacts and models
+they come from."""
 
 from __future__ import annotations
 
@@ -21,10 +22,15 @@ SHORT = {"settle": 0.2, "frames": 6}
 
 def test_every_public_name_is_there_and_no_module_hides_it() -> None:
     folder = Path(flagdata.__file__).parent
-    modules = {path.stem for path in folder.glob("*.py")} | {path.name for path in folder.iterdir() if path.is_dir()}
+    modules = {path.stem for path in folder.glob("*.py")} | {
+        path.name for path in folder.iterdir() if path.is_dir()
+    }
     both = modules & set(flagdata.__all__)
     assert all(isinstance(getattr(flagdata, name), VerbPackage) for name in both), both
-    assert all(callable(getattr(flagdata, name)) and getattr(flagdata, name).__doc__ for name in flagdata.__all__)
+    assert all(
+        callable(getattr(flagdata, name)) and getattr(flagdata, name).__doc__
+        for name in flagdata.__all__
+    )
     assert dir(flagdata) == sorted(flagdata.__all__)
     with pytest.raises(AttributeError, match="no_such_name"):
         flagdata.no_such_name  # noqa: B018
@@ -40,7 +46,9 @@ def test_a_log_and_a_film_are_read_from_their_files(video: Path, wind_log: Path)
     assert (film.height, film.width) == film.images.shape[1:]
 
 
-def test_more_frames_than_an_array_may_hold_are_refused(video: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_more_frames_than_an_array_may_hold_are_refused(
+    video: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("flagdata.ingest.films.film_array.LARGEST", 10_000)
     with pytest.raises(LimitError, match="give an end of"):
         flagdata.frames(video)
@@ -101,7 +109,9 @@ def test_members_are_those_that_a_lake_keeps(flags, tmp_path: Path) -> None:
     )
     simulate(lake, recipe)
     for index, member in enumerate(flags):
-        np.testing.assert_array_equal(flagdata.meshes(f"simulation-{index:05d}", lake=lake).positions, member.positions)
+        np.testing.assert_array_equal(
+            flagdata.meshes(f"simulation-{index:05d}", lake=lake).positions, member.positions
+        )
 
 
 def test_a_key_that_no_recipe_has_is_named() -> None:

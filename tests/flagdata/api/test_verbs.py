@@ -29,28 +29,56 @@ def test_a_recording_is_brought_in_aligned_tagged_and_exported(
     (again,) = flagdata.ingest(str(video), lake=str(lake.path), session="field")
     assert not again.created
     names = (film.artifact.id, wind.artifact.id)
-    found = flagdata.align(*names, lake=lake, by="given", clock_offset=0, offset_sigma=0.1, window=1.0)
+    found = flagdata.align(
+        *names, lake=lake, by="given", clock_offset=0, offset_sigma=0.1, window=1.0
+    )
     same = run(
-        "align", *names, *["--by", "given", "--clock-offset", "0", "--offset-sigma", "0.1", "--window", "1s", "--json"]
+        "align",
+        *names,
+        *[
+            "--by",
+            "given",
+            "--clock-offset",
+            "0",
+            "--offset-sigma",
+            "0.1",
+            "--window",
+            "1s",
+            "--json",
+        ],
     ).document
-    assert (found["recording"], found["created"], same["created"]) == (same["recording"], True, False)
+    assert (found["recording"], found["created"], same["created"]) == (
+        same["recording"],
+        True,
+        False,
+    )
     (v1,) = flagdata.tag("v1", lake=lake)
     assert [one.name for one in flagdata.tag(lake=lake)] == [v1.name] == ["v1"]
     with pytest.raises(ConflictError):
         flagdata.tag("v1", lake=lake)
-    manifest = flagdata.export("csv", lake=lake, to=tmp_path / "winds", where="kind = 'wind'", at="v1")
+    manifest = flagdata.export(
+        "csv", lake=lake, to=tmp_path / "winds", where="kind = 'wind'", at="v1"
+    )
     assert manifest["artifacts"] == 1
     assert (tmp_path / "winds" / "manifest.json").is_file()
     assert flagdata.tag("v1", lake=lake, delete=True, message="no more") == ()
     assert flagdata.tag(lake=lake) == ()
 
 
-def test_a_verb_of_a_lake_returns_what_its_command_prints_as_json(lake: Lake, video: Path, run: Run) -> None:
+def test_a_verb_of_a_lake_returns_what_its_command_prints_as_json(
+    lake: Lake, video: Path, run: Run
+) -> None:
     flagdata.ingest(video, lake=lake, name="film", start="2026-05-01T12:00:00Z")
     made = flagdata.declare("film", speed=4, sigma=0.2, name="tunnel", lake=lake)
-    assert run("ls", "--kind", "recording", "--json").document["artifacts"][0]["artifact"] == made["recording"]
+    assert (
+        run("ls", "--kind", "recording", "--json").document["artifacts"][0]["artifact"]
+        == made["recording"]
+    )
     labelled = flagdata.label(["tunnel", "usable=true"], lake=lake)
-    assert (made["recording"] in labelled["artifacts"], labelled["labels"]) == (True, {"usable": True})
+    assert (made["recording"] in labelled["artifacts"], labelled["labels"]) == (
+        True,
+        {"usable": True},
+    )
     for found, words in (
         (flagdata.ls(lake=lake, kind="clip"), ("ls", "--kind", "clip")),
         (flagdata.show("film", lake=lake), ("show", "film")),
@@ -62,11 +90,15 @@ def test_a_verb_of_a_lake_returns_what_its_command_prints_as_json(lake: Lake, vi
         (flagdata.expire(lake=lake, keep=1, dry_run=True), ("expire", "--keep", 1, "--dry-run")),
     ):
         printed = run(*words, "--json").document
-        assert {key: value for key, value in printed.items() if key != "schema"} == json.loads(json.dumps(found))
+        assert {key: value for key, value in printed.items() if key != "schema"} == json.loads(
+            json.dumps(found)
+        )
         assert found
 
 
-def test_options_that_contradict_each_other_are_refused_in_calls_as_in_commands(lake: Lake, wind_log: Path) -> None:
+def test_options_that_contradict_each_other_are_refused_in_calls_as_in_commands(
+    lake: Lake, wind_log: Path
+) -> None:
     with pytest.raises(UsageError, match="without a NAME"):
         flagdata.tag(lake=lake, at="main")
     with pytest.raises(UsageError, match="--salt needs --split"):
@@ -82,15 +114,26 @@ def test_options_that_contradict_each_other_are_refused_in_calls_as_in_commands(
 
 def test_a_table_that_nobody_confirmed_is_refused_in_a_call(lake: Lake, tmp_path: Path) -> None:
     path = tmp_path / "wind.csv"
-    path.write_text("time,wind\n" + "".join(f"2026-05-13T12:00:{k:02d}Z,{4 + k % 7 / 10:.1f}\n" for k in range(30)))
+    path.write_text(
+        "time,wind\n"
+        + "".join(f"2026-05-13T12:00:{k:02d}Z,{4 + k % 7 / 10:.1f}\n" for k in range(30))
+    )
     with pytest.raises(RefusedError):
         flagdata.ingest(path, lake=lake)
 
 
 def test_a_kind_that_is_named_takes_its_own_sources_and_options_alone(
-    run: Run, lake: Lake, video: Path, wind_log: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    run: Run,
+    lake: Lake,
+    video: Path,
+    wind_log: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
 ) -> None:
-    assert run("ingest", "wind", video, "--json").document["what"] == "this is a camera file, not an anemometer log"
+    assert (
+        run("ingest", "wind", video, "--json").document["what"]
+        == "this is a camera file, not an anemometer log"
+    )
     assert run("ingest", "film", video, "--unit", "km/h").code == 2
     assert run("ingest", "film", wind_log).code == 1
     assert run("ingest", "meshes").code == 2

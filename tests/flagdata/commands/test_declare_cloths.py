@@ -1,4 +1,5 @@
-"""`flagdata declare-cloths`: films of measured cloths become recordings whose clips know the cloth."""
+"""`flagdata declare-cloths`: films of measured cloths become recordings whose clips know the
+cloth."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ from tests.program import Run, invoke
 
 @dataclass(frozen=True, kw_only=True)
 class Declared:
-    """A table of a film in a wind that nobody knows and one in a steady wind, two fabrics; a lake after the command."""
+    """A table of a film in a wind that nobody knows and one in a steady wind, two fabrics; a lake
+    after the command."""
 
     table: Path
     lake: Lake
@@ -40,7 +42,9 @@ def declared(tmp_path_factory: pytest.TempPathFactory) -> Declared:
         "felt.mp4,felt,0.24,3e-5,W2,,\nsilk.mp4,silk,0.06,,,2.4,0.3\n"
     )
     lake = Lake.create(folder / "lake")
-    done = CliRunner().invoke(root, ["declare-cloths", str(table), "--lake", str(lake.path), "--json"])
+    done = CliRunner().invoke(
+        root, ["declare-cloths", str(table), "--lake", str(lake.path), "--json"]
+    )
     assert done.exit_code == 0, done.output
     return Declared(table=table, lake=lake, said=json.loads(done.stdout))
 
@@ -78,7 +82,9 @@ def test_clips_know_their_cloth_and_the_wind_where_it_is_stated(declared: Declar
     assert (felt["session"], silk["session"]) == ("felt", "silk")
 
 
-def test_pairs_have_the_measured_area_weight_as_simulated_ones_have_theirs(declared: Declared) -> None:
+def test_pairs_have_the_measured_area_weight_as_simulated_ones_have_theirs(
+    declared: Declared,
+) -> None:
     pairs = flagdata.open(declared.lake.path).pairs(where="wind > 0")
     assert pairs.table.parameters_of(0) == {"area_weight": 0.06}
 
@@ -89,7 +95,9 @@ def test_the_recording_without_wind_has_the_cameras_frames(declared: Declared) -
     (recording,) = lake.rows("kind = 'recording' and name = 'felt'").to_pylist()
     source, copied = (Record.open(lake.object_path(row["object"])) for row in (camera, recording))
     assert recording["parents"] == [camera["artifact"]]
-    assert copied.frame_count == source.frame_count == 40  # 80 frames at 50 Hz are 1.6 s, at 25 Hz 40
+    assert (
+        copied.frame_count == source.frame_count == 40
+    )  # 80 frames at 50 Hz are 1.6 s, at 25 Hz 40
     np.testing.assert_array_equal(copied.frames(0, 40), source.frames(0, 40))
     np.testing.assert_array_equal(copied.frame_times, source.frame_times)
 
@@ -112,7 +120,9 @@ def test_the_same_table_again_adds_nothing_and_another_area_weight_is_another_re
 def test_a_wrong_row_leaves_the_lake_as_it_was(run: Run, lake: Lake, declared: Declared) -> None:
     before = lake.rows(columns=["artifact"]).num_rows
     wrong = declared.table.with_name("wrong.csv")
-    wrong.write_text(declared.table.read_text().replace("0.24", "0.23") + "gone.mp4,linen,0.2,,,,\n")
+    wrong.write_text(
+        declared.table.read_text().replace("0.24", "0.23") + "gone.mp4,linen,0.2,,,,\n"
+    )
     code, _, err = run(wrong)
     assert code == 1
     assert "gone.mp4" in err
@@ -123,24 +133,33 @@ def test_a_wrong_row_leaves_the_lake_as_it_was(run: Run, lake: Lake, declared: D
 def table(declared: Declared, tmp_path: Path) -> Path:
     """A copy of the table beside copies of its films, in a lake without any of them."""
     Lake.create(tmp_path / "fresh")
-    copied = shutil.copytree(declared.table.parent, tmp_path / "cloths", ignore=shutil.ignore_patterns("lake"))
+    copied = shutil.copytree(
+        declared.table.parent, tmp_path / "cloths", ignore=shutil.ignore_patterns("lake")
+    )
     return Path(copied) / "cloths.csv"
 
 
-def test_an_error_midway_says_what_stays_published_and_a_repeat_makes_the_rest(table: Path, tmp_path: Path) -> None:
+def test_an_error_midway_says_what_stays_published_and_a_repeat_makes_the_rest(
+    table: Path, tmp_path: Path
+) -> None:
     lake, silk = Lake.open(tmp_path / "fresh"), table.with_name("silk.mp4")
     whole = silk.read_bytes()
     silk.write_bytes(whole[:100])
     code, _, err = invoke("declare-cloths", table, "--lake", lake.path)
     assert code == 1
-    assert "on branch main: camera 1, clip 1, recording 1; give the same command again for the rest" in err
+    assert (
+        "on branch main: camera 1, clip 1, recording 1; give the same command again for the rest"
+        in err
+    )
     silk.write_bytes(whole)
     code, _, err = invoke("declare-cloths", table, "--lake", lake.path)
     assert code == 0, err
     assert [row["name"] for row in lake.rows("kind = 'recording'").to_pylist()] == ["felt", "silk"]
 
 
-def test_an_error_before_anything_is_published_promises_nothing(table: Path, tmp_path: Path) -> None:
+def test_an_error_before_anything_is_published_promises_nothing(
+    table: Path, tmp_path: Path
+) -> None:
     table.with_name("felt.mp4").write_bytes(b"no film")
     code, _, err = invoke("declare-cloths", table, "--lake", tmp_path / "fresh")
     assert code == 1

@@ -60,7 +60,9 @@ MISTAKES: list[tuple[list[str], int, str]] = [
 def test_mistakes_end_in_a_sentence_and_write_nothing(run: Run, lake: Lake, tmp_path: Path) -> None:
     offenders = []
     for arguments, code, said in MISTAKES:
-        ended = run(*(argument.format(out=tmp_path / "out", lake=lake.path) for argument in arguments))
+        ended = run(
+            *(argument.format(out=tmp_path / "out", lake=lake.path) for argument in arguments)
+        )
         there = sorted(path.name for path in tmp_path.iterdir())
         if ended.code != code or said not in ended.err or there != ["lake"]:
             offenders.append((arguments, ended, there))

@@ -21,18 +21,25 @@ def run(lake: Lake) -> Run:
     return lambda *arguments: invoke("ingest", *arguments, "--lake", lake.path)
 
 
-def test_kind_is_inferred_from_content_not_name(run, lake: Lake, video: Path, wind_log: Path, tmp_path: Path) -> None:
+def test_kind_is_inferred_from_content_not_name(
+    run, lake: Lake, video: Path, wind_log: Path, tmp_path: Path
+) -> None:
     (tmp_path / "a.csv").write_bytes(video.read_bytes())
     (tmp_path / "b.mp4").write_bytes(wind_log.read_bytes())
     code, out, _ = run(tmp_path / "a.csv", tmp_path / "b.mp4", "--json")
     assert code == 0
     found = json.loads(out)
     assert found["schema"] == "flagdata.ingest/1"
-    assert [(r["kind"], r["created"]) for r in found["results"]] == [("camera", True), ("wind", True)]
+    assert [(r["kind"], r["created"]) for r in found["results"]] == [
+        ("camera", True),
+        ("wind", True),
+    ]
     assert lake.rows().num_rows == 2
 
 
-def test_the_report_for_people_says_format_time_rate_error_and_findings(run, video: Path, wind_log: Path) -> None:
+def test_the_report_for_people_says_format_time_rate_error_and_findings(
+    run, video: Path, wind_log: Path
+) -> None:
     code, out, _ = run(video, wind_log, "--session", "field-1")
     assert code == 0
     for expected in (
@@ -58,7 +65,9 @@ def test_the_second_time_says_already_in_the_lake_and_exits_0(run, lake: Lake, v
     assert lake.rows().num_rows == 1
 
 
-def test_sniff_says_what_and_why_and_touches_no_lake(run, lake: Lake, video: Path, wind_log: Path) -> None:
+def test_sniff_says_what_and_why_and_touches_no_lake(
+    run, lake: Lake, video: Path, wind_log: Path
+) -> None:
     code, out, _ = run("--sniff", video, wind_log)
     assert code == 0
     assert "camera: video" in out
@@ -83,7 +92,9 @@ def test_sniff_goes_on_after_a_source_it_cannot_read_and_says_what_is_missing(
 ) -> None:
     (tmp_path / "frames").mkdir()
     for k in range(3):
-        Image.fromarray(np.full((48, 64), 60 * k, dtype=np.uint8)).save(tmp_path / "frames" / f"{k}.png")
+        Image.fromarray(np.full((48, 64), 60 * k, dtype=np.uint8)).save(
+            tmp_path / "frames" / f"{k}.png"
+        )
     code, out, err = run("--sniff", tmp_path / "frames", tmp_path / "nothing", video)
     assert code == 1
     assert "image sequence" in out
@@ -95,7 +106,9 @@ def test_sniff_goes_on_after_a_source_it_cannot_read_and_says_what_is_missing(
     assert "--crop means nothing for an anemometer log" in err
 
 
-def test_a_folder_of_pictures_is_one_camera_whatever_hidden_files_lie_in_it(run, lake: Lake, tmp_path: Path) -> None:
+def test_a_folder_of_pictures_is_one_camera_whatever_hidden_files_lie_in_it(
+    run, lake: Lake, tmp_path: Path
+) -> None:
     folder = tmp_path / "frames"
     folder.mkdir()
     for k in range(10):
@@ -156,7 +169,10 @@ MISUSED = [
     (["{video}", "--azimuth", "12"], "--azimuth means nothing"),
     (["{video}", "{log}", "--unit", "mm"], "'mm' is no unit of speed"),
     (["{video}", "--sensor", "generic-csv"], "--sensor means nothing for a camera file"),
-    (["{video}", "--start", "2026-05-01T10:00:00Z", "--zone", "UTC"], "--zone means nothing for a camera file wh"),
+    (
+        ["{video}", "--start", "2026-05-01T10:00:00Z", "--zone", "UTC"],
+        "--zone means nothing for a camera file wh",
+    ),
     (["{video}", "--start", "2026-02-30T10:00:00Z"], "no day or time of the calendar"),
     (["{video}", "--start", "x"], "not an ISO 8601 time"),
     (["{video}", "--zone", "+99:00"], "beyond"),
@@ -166,7 +182,10 @@ MISUSED = [
     (["{video}", "--crop-picture", "{video}.png"], "--crop-picture needs --crop auto"),
     (["{video}", "--crop", "1,2,3"], "not a crop"),
     (["{video}", "--rate", "fast"], "not a number"),
-    (["{video}", "--exposure", "5"], "an exposure of 5 s is longer than the 0.02 s from frame to frame"),
+    (
+        ["{video}", "--exposure", "5"],
+        "an exposure of 5 s is longer than the 0.02 s from frame to frame",
+    ),
     (["{video}", "--exposure", "0.0021", "--true-fps", "500"], "longer than the 0.002 s"),
     (["{video}", "--as", "vidoe"], "unknown format"),
     (["{log}", "--sensor", "generic-cvs"], "did you mean 'generic-csv'"),
@@ -188,23 +207,31 @@ def test_options_that_do_not_apply_are_usage_errors_and_change_nothing(
     assert lake.rows().num_rows == 0
 
 
-def test_a_branch_that_is_not_there_is_not_found_and_nothing_is_ingested(run, lake: Lake, video: Path) -> None:
+def test_a_branch_that_is_not_there_is_not_found_and_nothing_is_ingested(
+    run, lake: Lake, video: Path
+) -> None:
     code, _, err = run(video, "--branch", "nowhere")
     assert code == 1
     assert "branch or commit 'nowhere'" in err
     assert lake.rows().num_rows == 0
 
 
-def test_a_start_without_a_zone_is_refused_and_the_zone_option_settles_it(run, lake: Lake, video: Path) -> None:
+def test_a_start_without_a_zone_is_refused_and_the_zone_option_settles_it(
+    run, lake: Lake, video: Path
+) -> None:
     code, _, err = run(video, "--start", "2026-05-01T12:00:00")
     assert code == 2
     assert "no zone" in err
     code, _, _ = run(video, "--start", "2026-05-01T12:00:00", "--zone", "Europe/Amsterdam")
     assert code == 0
-    assert lake.rows().to_pylist()[0]["start"] == 1_777_629_600_000_000_000  # 10:00 UTC, summer time
+    assert (
+        lake.rows().to_pylist()[0]["start"] == 1_777_629_600_000_000_000
+    )  # 10:00 UTC, summer time
 
 
-def test_a_film_whose_start_nobody_knows_is_ingested_with_that_stated(run, lake: Lake, video: Path) -> None:
+def test_a_film_whose_start_nobody_knows_is_ingested_with_that_stated(
+    run, lake: Lake, video: Path
+) -> None:
     code, out, _ = run(video, "--start", "unknown", "--json")
     assert code == 0
     assert "start-unknown" in json.loads(out)["results"][0]["quality"]
@@ -219,7 +246,12 @@ def test_a_film_whose_start_nobody_knows_is_ingested_with_that_stated(run, lake:
     ],
 )
 def test_the_help_of_a_kind_speaks_of_that_kind_alone(
-    run: Run, kind: str, own: str, others: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run: Run,
+    kind: str,
+    own: str,
+    others: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)  # where no file is named like a kind
     said = " ".join(run(kind, "--help").out.split())
@@ -287,11 +319,15 @@ def test_a_crop_picture_that_cannot_be_written_leaves_the_lake_unchanged(
     picture.parent.mkdir()
     assert run(video, "--crop", "auto", "--crop-picture", picture)[0] == 0
     again = tmp_path / "again.png"
-    assert run(video, "--crop", "auto", "--crop-picture", again)[1].startswith("already in the lake")
+    assert run(video, "--crop", "auto", "--crop-picture", again)[1].startswith(
+        "already in the lake"
+    )
     assert again.read_bytes() == picture.read_bytes()
 
 
-def test_no_crop_picture_is_left_by_an_ingest_that_failed(run, lake: Lake, video: Path, tmp_path: Path) -> None:
+def test_no_crop_picture_is_left_by_an_ingest_that_failed(
+    run, lake: Lake, video: Path, tmp_path: Path
+) -> None:
     picture = tmp_path / "crop.png"
     with small_files():
         code, _, err = run(video, "--crop", "auto", "--crop-picture", picture)

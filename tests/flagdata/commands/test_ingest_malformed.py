@@ -1,4 +1,5 @@
-"""Malformed sources: refused with what and fix, and the lake as it was; or read, as far as they can be."""
+"""Malformed sources: refused with what and fix, and the lake as it was; or read, as far as they can
+be."""
 
 from __future__ import annotations
 
@@ -31,7 +32,11 @@ def _ingest(lake: Lake, path: Path) -> bool:
     refusal: FlagdataError | None = None
     try:
         kind = classify(path)
-        result = ingest_camera(lake, path) if kind.kind == "camera" else ingest_wind(lake, path, confirm=CONFIRMED)
+        result = (
+            ingest_camera(lake, path)
+            if kind.kind == "camera"
+            else ingest_wind(lake, path, confirm=CONFIRMED)
+        )
     except FlagdataError as error:
         refusal = error
     else:
@@ -49,7 +54,9 @@ def _png(width: int, height: int) -> bytes:
     """A PNG that claims a size it has no data for."""
 
     def chunk(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        return (
+            struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        )
 
     header = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
     return (
@@ -102,7 +109,9 @@ def hopeless(video: bytes) -> Iterator[tuple[str, bytes]]:
         yield f"video-without-index-{share}", video[: len(video) * share // 20]
 
 
-def test_hopeless_sources_are_refused_and_the_lake_is_unchanged(tmp_path: Path, video: Path) -> None:
+def test_hopeless_sources_are_refused_and_the_lake_is_unchanged(
+    tmp_path: Path, video: Path
+) -> None:
     lake = Lake.create(tmp_path / "lake")
     for name, data in hopeless(video.read_bytes()):
         path = tmp_path / name

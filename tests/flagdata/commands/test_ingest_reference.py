@@ -36,12 +36,16 @@ def ingest(tmp_path: Path) -> Callable[..., tuple[dict[str, Any], Record]]:
     return ingest
 
 
-def test_a_tunnel_clip_at_its_native_rate_has_a_frame_every_millisecond(ingest, reference_data: Path) -> None:
+def test_a_tunnel_clip_at_its_native_rate_has_a_frame_every_millisecond(
+    ingest, reference_data: Path
+) -> None:
     source = reference_data / "video" / "dadamo-2024" / "rectVeloc_10.80_60fps_rv.mp4"
     report, record = ingest(source, "--start", START, "--true-fps", 1000, "--rate", "native")
     assert (report["frames"], report["rate"]) == (302, 1000.0)
     assert report["worst_stamp_error"] == 0.0
-    assert [f["value"] for f in report["findings"] if f["kind"] == "true-rate"] == [pytest.approx(0.06)]
+    assert [f["value"] for f in report["findings"] if f["kind"] == "true-rate"] == [
+        pytest.approx(0.06)
+    ]
     assert set(np.diff(record.frame_times).tolist()) == {1_000_000}
 
 
@@ -54,7 +58,9 @@ def test_phone_clip_keeps_its_own_stamps_at_the_native_rate(ingest, reference_da
 
 
 def test_crop_auto_finds_the_flag_and_shows_it(ingest, reference_data: Path) -> None:
-    report, record = ingest(reference_data / "video" / "dyntex_flag_571c110.avi", "--start", START, "--crop", "auto")
+    report, record = ingest(
+        reference_data / "video" / "dyntex_flag_571c110.avi", "--start", START, "--crop", "auto"
+    )
     assert report["frames"] == record.frame_count == 250
     assert record.attachment(CROP_PICTURE).startswith(b"\x89PNG")
 

@@ -19,12 +19,17 @@ def run(lake: Lake) -> Run:
     return lambda *arguments: invoke("ingest", *arguments, "--lake", lake.path)
 
 
-def test_each_anemometer_of_a_table_becomes_an_artifact(run: Run, lake: Lake, tmp_path: Path) -> None:
+def test_each_anemometer_of_a_table_becomes_an_artifact(
+    run: Run, lake: Lake, tmp_path: Path
+) -> None:
     path = tmp_path / "mast.csv"
     path.write_text("\n".join(["time,Spd80m (m/s),Spd40m (m/s)", *ROWS]) + "\n")
     code, out, err = run(path)
     assert code == 0, err
-    assert sorted(row["name"] for row in lake.rows().to_pylist()) == ["mast:Spd40m (m/s)", "mast:Spd80m (m/s)"]
+    assert sorted(row["name"] for row in lake.rows().to_pylist()) == [
+        "mast:Spd40m (m/s)",
+        "mast:Spd80m (m/s)",
+    ]
     code, out, _ = run(path)
     assert code == 0
     assert out.count("already in the lake") == 2
@@ -35,10 +40,15 @@ def test_one_anemometer_of_several_keeps_its_label(run: Run, lake: Lake, tmp_pat
     path.write_text("\n".join(["time,Spd80m (m/s),Spd40m (m/s)", *ROWS]) + "\n")
     for wind in ("Spd80m (m/s)", "Spd40m (m/s)"):
         assert run(path, "--wind", wind)[0] == 0
-    assert sorted(row["name"] for row in lake.rows().to_pylist()) == ["mast:Spd40m (m/s)", "mast:Spd80m (m/s)"]
+    assert sorted(row["name"] for row in lake.rows().to_pylist()) == [
+        "mast:Spd40m (m/s)",
+        "mast:Spd80m (m/s)",
+    ]
 
 
-def test_a_unit_that_is_missing_is_asked_for_and_taken(run: Run, lake: Lake, tmp_path: Path) -> None:
+def test_a_unit_that_is_missing_is_asked_for_and_taken(
+    run: Run, lake: Lake, tmp_path: Path
+) -> None:
     path = tmp_path / "wind.csv"
     path.write_text("\n".join(["time,wind,temp", *ROWS]) + "\n")
     code, _, err = run(path)
@@ -58,7 +68,9 @@ STORM = [f"--expect={key}" for key in ("fast", "strong", "constant")]
 """Answers to the doubts about a column that holds 400 m/s in every row."""
 
 
-def test_an_anemometer_without_one_usable_value_is_left_out_and_named(run: Run, lake: Lake, tmp_path: Path) -> None:
+def test_an_anemometer_without_one_usable_value_is_left_out_and_named(
+    run: Run, lake: Lake, tmp_path: Path
+) -> None:
     path = tmp_path / "mast.csv"
     rows = [row.rpartition(",")[0] + ",400" for row in ROWS]
     path.write_text("\n".join(["time,Spd80m (m/s),Spd40m (m/s)", *rows]) + "\n")
@@ -66,12 +78,16 @@ def test_an_anemometer_without_one_usable_value_is_left_out_and_named(run: Run, 
     assert code == 0, err
     results = json.loads(out)["results"]
     assert [result["name"] for result in results] == ["mast:Spd80m (m/s)"]
-    left_out = [one for one in results[0]["report"]["findings"] if one["kind"] == "anemometer-left-out"]
+    left_out = [
+        one for one in results[0]["report"]["findings"] if one["kind"] == "anemometer-left-out"
+    ]
     assert [one["severity"] for one in left_out] == ["warning"]
     assert "'Spd40m (m/s)'" in left_out[0]["what"]
 
 
-def test_a_table_none_of_whose_anemometers_measured_is_refused(run: Run, lake: Lake, tmp_path: Path) -> None:
+def test_a_table_none_of_whose_anemometers_measured_is_refused(
+    run: Run, lake: Lake, tmp_path: Path
+) -> None:
     path = tmp_path / "mast.csv"
     rows = [f"{row.partition(',')[0]},500,600" for row in ROWS]
     path.write_text("\n".join(["time,Spd80m (m/s),Spd40m (m/s)", *rows]) + "\n")
@@ -81,7 +97,9 @@ def test_a_table_none_of_whose_anemometers_measured_is_refused(run: Run, lake: L
     assert lake.rows().num_rows == 0
 
 
-def test_the_anemometers_of_a_table_come_in_whole_or_not_at_all(run: Run, lake: Lake, tmp_path: Path) -> None:
+def test_the_anemometers_of_a_table_come_in_whole_or_not_at_all(
+    run: Run, lake: Lake, tmp_path: Path
+) -> None:
     path = tmp_path / "mast.csv"
     rows = [row.rpartition(",")[0] + ",400" for row in ROWS]
     path.write_text("\n".join(["time,Spd80m (m/s),Spd40m (m/s)", *rows]) + "\n")

@@ -1,4 +1,5 @@
-"""`flagdata query` as people and programs run it, on a lake with three clips whose rows are written here."""
+"""`flagdata query` as people and programs run it, on a lake with three clips whose rows are written
+here."""
 
 from __future__ import annotations
 
@@ -22,7 +23,9 @@ SECOND = 1_000_000_000
 def lake(tmp_path_factory: pytest.TempPathFactory) -> Lake:
     made = Lake.create(tmp_path_factory.mktemp("query") / "lake")
     with made.transaction("a recording with two clips") as tx:
-        recording = Artifact(kind=Kind.RECORDING, name="pier", start=NOON, end=NOON + 60 * SECOND, frame_count=1500)
+        recording = Artifact(
+            kind=Kind.RECORDING, name="pier", start=NOON, end=NOON + 60 * SECOND, frame_count=1500
+        )
         tx.add(recording)
         for number in range(2):
             tx.add(clip(recording.id, number, wind=4.25 + number))
@@ -74,7 +77,9 @@ def test_a_cut_table_says_how_much_there_is(run: Run) -> None:
 
 
 def test_json_is_one_strict_document_with_units_and_the_version(run: Run, lake: Lake) -> None:
-    code, out, _ = run("--where", "kind = 'clip'", "--columns", "name,wind,start,start_time,quality", "--json")
+    code, out, _ = run(
+        "--where", "kind = 'clip'", "--columns", "name,wind,start,start_time,quality", "--json"
+    )
     found = json.loads(out, parse_constant=pytest.fail)
     assert code == 0
     assert found["schema"] == "flagdata.query/1"
@@ -91,7 +96,9 @@ def test_json_is_one_strict_document_with_units_and_the_version(run: Run, lake: 
 
 
 def test_numbers_that_json_cannot_hold_are_null_and_counted(run: Run) -> None:
-    _, out, _ = run("--sql", "select 'nan'::double as a, 'inf'::double as b, 1.5::double as c", "--json")
+    _, out, _ = run(
+        "--sql", "select 'nan'::double as a, 'inf'::double as b, 1.5::double as c", "--json"
+    )
     found = json.loads(out, parse_constant=pytest.fail)
     assert found["rows"] == [{"a": None, "b": None, "c": 1.5}]
     assert found["not_finite"] == {"a": 1, "b": 1}
@@ -99,12 +106,19 @@ def test_numbers_that_json_cannot_hold_are_null_and_counted(run: Run) -> None:
 
 def test_every_kind_of_value_has_its_form_in_json(run: Run) -> None:
     sql = (
-        "select date '2026-05-01' as d, time '12:30:00' as t, 1.5::decimal(4,2) as x, sum(n) as big,"
+        "select date '2026-05-01' as d, time '12:30:00' as t, 1.5::decimal(4,2) as x, sum(n) as "
+        "big,"
         " {'a': 1, 'b': [true, null]} as s from (values (9223372036854775807), (1)) as v(n)"
     )
     _, out, _ = run("--sql", sql, "--json")
     assert json.loads(out)["rows"] == [
-        {"d": "2026-05-01", "t": "12:30:00", "x": 1.5, "big": 2**63, "s": {"a": 1, "b": [True, None]}}
+        {
+            "d": "2026-05-01",
+            "t": "12:30:00",
+            "x": 1.5,
+            "big": 2**63,
+            "s": {"a": 1, "b": [True, None]},
+        }
     ]
     code, _, err = run("--sql", "select 'ab'::blob as b", "--json")
     assert code == 2
@@ -149,7 +163,9 @@ def test_an_arrow_file_that_is_there_is_not_overwritten(run: Run, tmp_path: Path
 
 
 def test_a_query_that_fails_leaves_no_arrow_file(run: Run, tmp_path: Path) -> None:
-    code, _, _ = run("--sql", "select error('late') from catalog", "--arrow", str(tmp_path / "out.arrow"))
+    code, _, _ = run(
+        "--sql", "select error('late') from catalog", "--arrow", str(tmp_path / "out.arrow")
+    )
     assert code == 2
     assert list(tmp_path.iterdir()) == []
 
@@ -161,7 +177,9 @@ def test_an_empty_result_is_reported_and_is_no_failure(run: Run) -> None:
 
 
 def test_free_sql_is_shown_as_it_is(run: Run) -> None:
-    _, out, _ = run("--sql", "select count(*) as n, max(wind) as top from catalog where kind = 'clip'")
+    _, out, _ = run(
+        "--sql", "select count(*) as n, max(wind) as top from catalog where kind = 'clip'"
+    )
     assert [line.split() for line in out.splitlines()] == [["n", "top"], ["3", "5.25"]]
 
 

@@ -22,9 +22,11 @@ from tests.refusals import unrefused
 
 EMPTY = catalog_schema().empty_table()
 ENDLESS = {
-    "recursive": "with recursive t(n) as (select 1 union all select n + 1 from t) select count(*) from t",
+    "recursive": "with recursive t(n) as (select 1 union all select n + 1 from t) select count(*) "
+    "from t",
     "cross join": "select count(*) from range(1000000000000) a, range(1000000000000) b",
-    "stream": "select * from range(1000000000000) a, range(1000000000000) b where a.range = b.range + 1",
+    "stream": "select * from range(1000000000000) a, range(1000000000000) b where a.range = "
+    "b.range + 1",
 }
 LATE = 10.0  # s: far more than a block of 2,048 rows takes, far less than any of these
 
@@ -39,7 +41,8 @@ def test_sql_without_an_end_is_stopped(sql: str) -> None:
 
 UNINTERRUPTED = {
     "comparison": "select levenshtein(repeat('a', 300000), repeat('b', 300000))",
-    "comparisons": "select max(levenshtein(repeat('a', 30000 + range), repeat('b', 30000))) from range(2048)",
+    "comparisons": "select max(levenshtein(repeat('a', 30000 + range), repeat('b', 30000))) from "
+    "range(2048)",
 }
 """One step of each takes minutes, and heeds no interrupt."""
 
@@ -61,7 +64,8 @@ LARGE = {
     "structure": "select {'a': list(range), 'b': list(range)} from range(100000000)",
     "array": "select array_agg(r) from (select range(100) r from range(10000000))",
     "window": "select list(range) over () from range(100000)",
-    "recursive": "with recursive t(n) as (select 'x' union all select n || n from t) select max(n) from t",
+    "recursive": "with recursive t(n) as (select 'x' union all select n || n from t) select max(n) "
+    "from t",
 }
 """SQL whose result, or a step towards it, has many times the memory that a query may take."""
 MOST = 400_000_000
@@ -94,19 +98,29 @@ for name, sql in json.load(sys.stdin).items():
 
 @pytest.fixture(scope="module")
 def large() -> dict[str, tuple[str, int, int]]:
-    """Name → what came of the SQL, its largest batch [B], and most memory of a process until then [B]: all in one
-    process, each query in a child of its own."""
+    """Name → what came of the SQL, its largest batch [B], and most memory of a process until then
+    [B]: all in one process, each query in a child of its own."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     command = [sys.executable, "-c", READ_LARGE, str(MOST)]
     done = subprocess.run(
-        command, input=json.dumps(LARGE), capture_output=True, text=True, check=False, env=environment
+        command,
+        input=json.dumps(LARGE),
+        capture_output=True,
+        text=True,
+        check=False,
+        env=environment,
     )
     assert done.returncode == 0, done.stderr
-    return {name: (outcome, *sizes) for name, outcome, *sizes in map(json.loads, done.stdout.splitlines())}
+    return {
+        name: (outcome, *sizes)
+        for name, outcome, *sizes in map(json.loads, done.stdout.splitlines())
+    }
 
 
 @pytest.mark.parametrize("name", LARGE)
-def test_sql_takes_no_more_memory_than_it_may(name: str, large: dict[str, tuple[str, int, int]]) -> None:
+def test_sql_takes_no_more_memory_than_it_may(
+    name: str, large: dict[str, tuple[str, int, int]]
+) -> None:
     outcome, largest, peak = large[name]
     assert outcome in ("read", "usage", "limit")
     assert largest <= 300 << 20
@@ -116,7 +130,9 @@ def test_sql_takes_no_more_memory_than_it_may(name: str, large: dict[str, tuple[
 def test_a_row_of_more_values_than_can_be_held_is_refused_and_parts_are_small() -> None:
     with pytest.raises(LimitError, match="one row of the result has more than"):
         list(Selection(EMPTY, Request(sql="select list(range(5000001))")).batches())
-    many = Selection(EMPTY, Request(sql="select range(10000) r, range i from range(4000)")).batches()
+    many = Selection(
+        EMPTY, Request(sql="select range(10000) r, range i from range(4000)")
+    ).batches()
     parts = list(many)
     assert [row for part in parts for row in part["i"].to_pylist()] == list(range(4000))
     assert len(parts) > 1
@@ -138,7 +154,10 @@ ENDS: dict[str, tuple[Exception, str]] = {
     "memory": (EndedError(End.MEMORY), "needs more memory.*narrow it down"),
     "killed": (EndedError(End.SIGNAL, "SIGKILL"), r"was killed \(SIGKILL\).*do it again"),
     "crashed": (EndedError(End.SIGNAL, "SIGSEGV"), r"crashed \(SIGSEGV\).*another way"),
-    "left": (EndedError(End.EXIT, "exit code 1: no module"), "has ended: exit code 1: no module.*do it again"),
+    "left": (
+        EndedError(End.EXIT, "exit code 1: no module"),
+        "has ended: exit code 1: no module.*do it again",
+    ),
     "closed": (EndedError(End.CLOSED), "it was closed.*do it again"),
     "late": (EndedError(End.LATE), "longer than .*--time-limit"),
     "raised": (RuntimeError("its process raised KeyError: 'x'"), "KeyError.*another way"),
@@ -147,7 +166,9 @@ ENDS: dict[str, tuple[Exception, str]] = {
 
 
 @pytest.mark.parametrize("end", ENDS)
-def test_each_end_of_the_process_has_its_own_sentence(end: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_end_of_the_process_has_its_own_sentence(
+    end: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     raised, reported = ENDS[end]
     asked = Selection(EMPTY, Request(sql="select 1 a"))
 
@@ -168,7 +189,9 @@ def test_a_filter_without_an_end_is_stopped() -> None:
 
 
 def test_the_time_is_that_of_all_that_is_asked_of_a_selection() -> None:
-    selection = Selection(EMPTY, Request(sql="select range a from range(1000000000000)", limit=1, time_limit=1.5))
+    selection = Selection(
+        EMPTY, Request(sql="select range a from range(1000000000000)", limit=1, time_limit=1.5)
+    )
     assert selection.table().num_rows == 1
     for _ in range(2):  # the second has no time left at all
         with pytest.raises(LimitError, match=r"longer than 1\.5 s"):
@@ -201,13 +224,20 @@ def test_what_fails_while_rows_are_read_is_the_users_error() -> None:
 def test_a_time_limit_is_a_length_of_time() -> None:
     cases = [0.0, -1.0, float("nan"), float("inf")]
     assert (
-        unrefused(lambda seconds: Request(sql="select 1", time_limit=seconds), zip(cases), UsageError, "time limit")
+        unrefused(
+            lambda seconds: Request(sql="select 1", time_limit=seconds),
+            zip(cases),
+            UsageError,
+            "time limit",
+        )
         == []
     )
 
 
 def test_no_length_of_time_is_too_long() -> None:
-    assert Selection(EMPTY, Request(sql="select 1 a", time_limit=1e300)).table()["a"].to_pylist() == [1]
+    assert Selection(EMPTY, Request(sql="select 1 a", time_limit=1e300)).table()[
+        "a"
+    ].to_pylist() == [1]
 
 
 def test_the_commands_default_is_the_librarys() -> None:

@@ -1,4 +1,5 @@
-"""`flagdata.lake.selection` over a hand-written catalog: every expected value is worked out from the rows below."""
+"""`flagdata.lake.selection` over a hand-written catalog: every expected value is worked out from
+the rows below."""
 
 from __future__ import annotations
 
@@ -44,8 +45,22 @@ def row(number: int, **values: object) -> dict[str, object]:
 CATALOG_ROWS = [
     row(1, kind="camera", start=NOON, end=NOON + 600 * SECOND),
     row(2, wind=2.0, start=NOON, end=NOON + SECOND, session="pier"),
-    row(3, wind=4.5, start=NOON + 60 * SECOND + 123_456_789, end=NOON + 61 * SECOND, session="pier", quality=["stale"]),
-    row(4, wind=6.0, start=NOON + 120 * SECOND, end=NOON + 121 * SECOND, session="dune", parameters='{"density":0.2}'),
+    row(
+        3,
+        wind=4.5,
+        start=NOON + 60 * SECOND + 123_456_789,
+        end=NOON + 61 * SECOND,
+        session="pier",
+        quality=["stale"],
+    ),
+    row(
+        4,
+        wind=6.0,
+        start=NOON + 120 * SECOND,
+        end=NOON + 121 * SECOND,
+        session="dune",
+        parameters='{"density":0.2}',
+    ),
     row(5, wind=None, start=None, end=None),
 ]
 
@@ -77,10 +92,17 @@ def test_a_filter_keeps_exactly_the_rows_it_holds_for() -> None:
     width=st.floats(0, 20),
 )
 @settings(max_examples=40, deadline=None)
-def test_a_range_holds_for_exactly_the_known_numbers_in_it(winds: list[float | None], low: float, width: float) -> None:
-    catalog = pa.Table.from_pylist([row(n, wind=wind) for n, wind in enumerate(winds)], schema=catalog_schema())
+def test_a_range_holds_for_exactly_the_known_numbers_in_it(
+    winds: list[float | None], low: float, width: float
+) -> None:
+    catalog = pa.Table.from_pylist(
+        [row(n, wind=wind) for n, wind in enumerate(winds)], schema=catalog_schema()
+    )
     high = low + width
-    found = Selection(catalog, Request(where=f"wind between {low!r}::double and {high!r}::double", order="artifact"))
+    found = Selection(
+        catalog,
+        Request(where=f"wind between {low!r}::double and {high!r}::double", order="artifact"),
+    )
     wanted = [n for n, wind in enumerate(winds) if wind is not None and low <= wind <= high]
     assert numbers(found.table()) == wanted
 
@@ -99,7 +121,10 @@ def test_an_unknown_number_is_not_above_any_threshold() -> None:
     nameless = row(6, wind=float("nan"), start=NOON, end=NOON)
     catalog = pa.Table.from_pylist([*CATALOG_ROWS, nameless], schema=catalog_schema())
     assert numbers(Selection(catalog, Request(where="wind > 5")).table()) == [4]
-    assert numbers(Selection(catalog, Request(where="kind = 'clip' and wind is null")).table()) == [6, 5]
+    assert numbers(Selection(catalog, Request(where="kind = 'clip' and wind is null")).table()) == [
+        6,
+        5,
+    ]
 
 
 def test_without_an_order_rows_come_by_kind_start_and_identity_with_unknown_starts_last() -> None:
@@ -113,24 +138,35 @@ def test_order_may_use_a_column_that_is_not_shown() -> None:
 
 
 def test_nanoseconds_stay_exact_and_times_are_cut_to_microseconds() -> None:
-    table = select(HandWritten(), "wind = 4.5", columns=["start", "start_time", "end_time", "duration"])
+    table = select(
+        HandWritten(), "wind = 4.5", columns=["start", "start_time", "end_time", "duration"]
+    )
     start, start_time, end_time, duration = table.to_pylist()[0].values()
     assert start == NOON + 60 * SECOND + 123_456_789
     assert start_time == datetime(2026, 5, 1, 12, 1, 0, 123_456, tzinfo=UTC)
     assert end_time == datetime(2026, 5, 1, 12, 1, 1, tzinfo=UTC)
-    assert duration == pytest.approx(0.876_543_211, abs=1e-12)  # 1 s - 123,456,789 ns; float64 of a second
+    assert duration == pytest.approx(
+        0.876_543_211, abs=1e-12
+    )  # 1 s - 123,456,789 ns; float64 of a second
 
 
 def test_times_in_text_are_utc_unless_they_name_a_zone() -> None:
     cases = ["2026-05-01 12:01:30", "2026-05-01 14:01:30+02:00", "2026-05-01T12:01:30Z"]
-    assert [numbers(select(HandWritten(), f"start_time > '{moment}'")) for moment in cases] == [[4] for moment in cases]
+    assert [numbers(select(HandWritten(), f"start_time > '{moment}'")) for moment in cases] == [
+        [4] for moment in cases
+    ]
 
 
 def test_columns_of_the_catalog_carry_their_unit_and_free_sql_does_not() -> None:
     schema = select(HandWritten(), columns=["wind", "duration"]).schema
     assert (schema.field("wind").metadata or {})[b"unit"] == b"m/s"
     assert (schema.field("duration").metadata or {})[b"unit"] == b"s"
-    assert select(HandWritten(), sql="select wind * 3.6 as wind from catalog").schema.field("wind").metadata is None
+    assert (
+        select(HandWritten(), sql="select wind * 3.6 as wind from catalog")
+        .schema.field("wind")
+        .metadata
+        is None
+    )
 
 
 def test_a_result_with_all_columns_has_the_catalog_s_own_schema() -> None:
@@ -140,7 +176,8 @@ def test_a_result_with_all_columns_has_the_catalog_s_own_schema() -> None:
 def test_sql_groups_and_counts() -> None:
     table = select(
         HandWritten(),
-        sql="select session, count(*) n, avg(wind) mean from catalog where session is not null group by 1 order by 1",
+        sql="select session, count(*) n, avg(wind) mean from catalog where session is not null "
+        "group by 1 order by 1",
     )
     assert table.to_pylist() == [
         {"session": "dune", "n": 1, "mean": 6.0},

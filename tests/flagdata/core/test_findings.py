@@ -1,4 +1,5 @@
-"""Kinds of findings: one table of their severities, which names every kind that is made by it and no other."""
+"""Kinds of findings: one table of their severities, which names every kind that is made by it and
+no other."""
 
 from __future__ import annotations
 

@@ -9,19 +9,25 @@ from flagdata.core.numbered import Ordinal, by_numbers, gap, read_bounded
 
 
 def test_a_bounded_number_is_at_most_its_bound() -> None:
-    assert [read_bounded(digits, most=120) for digits in ("0", "007", "120", "121", "9" * 5000)] == [
+    assert [
+        read_bounded(digits, most=120) for digits in ("0", "007", "120", "121", "9" * 5000)
+    ] == [
         0,
         7,
         120,
         None,
         None,
     ]
-    assert [read_bounded(text, most=120) for text in ("", "-1", "1.5", "1e3", "²", " 1")] == [None] * 6
+    assert [read_bounded(text, most=120) for text in ("", "-1", "1.5", "1e3", "²", " 1")] == [
+        None
+    ] * 6
     assert read_bounded("٣", most=120) == 3
 
 
 @pytest.mark.parametrize(
-    "of_length", [range, np.arange, np.zeros, lambda n: [0] * n], ids=["range", "arange", "zeros", "list"]
+    "of_length",
+    [range, np.arange, np.zeros, lambda n: [0] * n],
+    ids=["range", "arange", "zeros", "list"],
 )
 def test_an_ordinal_is_no_length(of_length) -> None:
     with pytest.raises((TypeError, ValueError)):
@@ -46,4 +52,14 @@ def test_an_ordinal_is_read_within_a_bound_or_not_at_all() -> None:
 
 def test_names_sort_by_their_numbers() -> None:
     names = ["b1", "a10", "a²3", "a9", f"a{10**300}", "a09", "A2", "9", "10"]
-    assert sorted(names, key=by_numbers) == ["9", "10", "A2", "a09", "a9", "a10", f"a{10**300}", "a²3", "b1"]
+    assert sorted(names, key=by_numbers) == [
+        "9",
+        "10",
+        "A2",
+        "a09",
+        "a9",
+        "a10",
+        f"a{10**300}",
+        "a²3",
+        "b1",
+    ]

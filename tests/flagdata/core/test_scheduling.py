@@ -11,11 +11,16 @@ from flagdata.core.scheduling import kept_scheduling
 
 
 def policies(*threads: threading.Thread) -> set[int]:
-    """Return the policies of the calling thread and of ``threads``; those of other tests may have ended."""
-    return {os.sched_getscheduler(0)} | {os.sched_getscheduler(thread.native_id or 0) for thread in threads}
+    """Return the policies of the calling thread and of ``threads``; those of other tests may have
+    ended."""
+    return {os.sched_getscheduler(0)} | {
+        os.sched_getscheduler(thread.native_id or 0) for thread in threads
+    }
 
 
-def test_threads_that_were_begun_with_real_time_priority_and_the_one_that_began_them_lose_it() -> None:
+def test_threads_that_were_begun_with_real_time_priority_and_the_one_that_began_them_lose_it() -> (
+    None
+):
     before, done = policies(), threading.Event()
     assert before == {os.SCHED_OTHER}
     thread = threading.Thread(target=done.wait)

@@ -34,7 +34,10 @@ def test_a_shell_reads_the_word_that_was_written(word: str) -> None:
 
 
 def test_words_that_a_shell_takes_as_they_are_are_not_quoted() -> None:
-    assert command_line("flagdata", "ingest", Path("a/b.mp4"), "--rate", 25) == "flagdata ingest a/b.mp4 --rate 25"
+    assert (
+        command_line("flagdata", "ingest", Path("a/b.mp4"), "--rate", 25)
+        == "flagdata ingest a/b.mp4 --rate 25"
+    )
 
 
 def test_a_path_is_never_an_option() -> None:

@@ -20,7 +20,9 @@ def test_a_value_a_value_with_its_deviation_and_a_range_are_read_and_written_as_
     }  # fmt: skip
     for text, (low, high, sigma, recipe) in cases.items():
         found = parse(text)
-        assert (found.low, found.high, found.sigma, found.recipe()) == (low, high, sigma, recipe), text
+        assert (found.low, found.high, found.sigma, found.recipe()) == (low, high, sigma, recipe), (
+            text
+        )
         assert parse(found.text) == found
         assert Stated.of(text) == STATED.convert(text, None, None) == found
     assert parse("0.284").exact

@@ -27,7 +27,9 @@ def test_the_length_is_shared_by_the_workers(seconds: float, workers: int, said:
 
 
 def test_what_is_kept_follows() -> None:
-    assert announce_work("simulating", 0.0, kept="all is kept").endswith("on one idle core; all is kept")
+    assert announce_work("simulating", 0.0, kept="all is kept").endswith(
+        "on one idle core; all is kept"
+    )
 
 
 GROUPS: dict[str, tuple[str, dict[str, str], int]] = {
@@ -35,11 +37,18 @@ GROUPS: dict[str, tuple[str, dict[str, str], int]] = {
     "no quota": ("0::/\n", {"cpu.max": "max 100000\n"}, 64),
     "a quota": ("0::/\n", {"cpu.max": "250000 100000\n"}, 2),
     "less than one": ("0::/\n", {"cpu.max": "50000 100000\n"}, 1),
-    "of a service": ("0::/a/b\n", {"a/b/cpu.max": "max 100000\n", "a/cpu.max": "300000 100000\n"}, 3),
+    "of a service": (
+        "0::/a/b\n",
+        {"a/b/cpu.max": "max 100000\n", "a/cpu.max": "300000 100000\n"},
+        3,
+    ),
     "more than there are": ("0::/\n", {"cpu.max": "9900000 100000\n"}, 64),
     "of the first kind": (
         "4:memory:/x\n3:cpu,cpuacct:/x\n0::/\n",
-        {"cpu,cpuacct/x/cpu.cfs_quota_us": "400000\n", "cpu,cpuacct/x/cpu.cfs_period_us": "100000\n"},
+        {
+            "cpu,cpuacct/x/cpu.cfs_quota_us": "400000\n",
+            "cpu,cpuacct/x/cpu.cfs_period_us": "100000\n",
+        },
         4,
     ),
     "none, of the first kind": (
@@ -49,7 +58,8 @@ GROUPS: dict[str, tuple[str, dict[str, str], int]] = {
     ),
     "damaged": ("0::/\n", {"cpu.max": "\n"}, 64),
 }
-"""What the kernel states of a process on 64 processors (Linux, admin-guide/cgroup-v2, cgroup-v1) → cores."""
+"""What the kernel states of a process on 64 processors (Linux, admin-guide/cgroup-v2, cgroup-v1) →
+cores."""
 
 
 @pytest.mark.parametrize("name", GROUPS)

@@ -21,14 +21,20 @@ DAY = 86_400 * NS
 
 
 def picture(seed: int, index: int, size: int) -> np.ndarray:
-    """A smooth gray picture that differs by recording and frame, so that JPEG keeps it nearly exactly."""
+    """A smooth gray picture that differs by recording and frame, so that JPEG keeps it nearly
+    exactly."""
     y, x = np.mgrid[0:size, 0:size] / size
     return (128 + 60 * np.sin(2 * x + seed) + 60 * np.cos(2 * y + index / 7)).astype(np.uint8)
 
 
-def wind_series(start: int, seconds: int, *, mean: float = 5.0, missing: tuple[int, int] = (0, 0)) -> WindSeries:
-    """1 Hz wind from `start`, a gust of 12 s about `mean`; rows of the range `missing` are left out."""
-    index = np.array([k for k in range(seconds) if not missing[0] <= k < missing[1]], dtype=np.int64)
+def wind_series(
+    start: int, seconds: int, *, mean: float = 5.0, missing: tuple[int, int] = (0, 0)
+) -> WindSeries:
+    """1 Hz wind from `start`, a gust of 12 s about `mean`; rows of the range `missing` are left
+    out."""
+    index = np.array(
+        [k for k in range(seconds) if not missing[0] <= k < missing[1]], dtype=np.int64
+    )
     return WindSeries(
         time=start + index * NS,
         channels={"wind_speed": mean + 0.5 * np.sin(2 * np.pi * index / 12)},
@@ -62,7 +68,9 @@ def write_record(path, made: Made) -> Record:
     with RecordWriter(path, metadata={"camera": {"name": f"camera {made.number}"}}) as writer:
         if made.truth is None:
             seconds = 90 + int((times[-1] - made.start) // NS) + 1
-            writer.wind(wind_series(made.start - 90 * NS, seconds, mean=made.mean, missing=made.missing))
+            writer.wind(
+                wind_series(made.start - 90 * NS, seconds, mean=made.mean, missing=made.missing)
+            )
         else:
             writer.truth(made.truth, log_time=int(times[0]))
         for index, time in enumerate(times.tolist()):
@@ -79,11 +87,17 @@ def add_recording(lake: Lake, made: Made) -> str:
         clock = None
         if made.seed is None:
             clock = ClockModel.identity(
-                "camera", "wind", start=made.start - 10 * NS, end=made.start + 600 * NS, sigma=made.clock_sigma
+                "camera",
+                "wind",
+                start=made.start - 10 * NS,
+                end=made.start + 600 * NS,
+                sigma=made.clock_sigma,
             )
         source = None
         if made.seed is None:
-            source = Artifact(kind=Kind.CAMERA, name=f"camera {made.number}", source_hash=f"{made.number:064x}")
+            source = Artifact(
+                kind=Kind.CAMERA, name=f"camera {made.number}", source_hash=f"{made.number:064x}"
+            )
             transaction.add(source)
         recording = Artifact(
             kind=Kind.RECORDING,
@@ -106,10 +120,13 @@ def add_recording(lake: Lake, made: Made) -> str:
 
 @pytest.fixture(scope="session")
 def field_lake(tmp_path_factory) -> Lake:
-    """Eight real-like recordings of 3 clips on eight days at four sites, and eight simulated ones of 3 clips."""
+    """Eight real-like recordings of 3 clips on eight days at four sites, and eight simulated ones
+    of 3 clips."""
     lake = Lake.create(tmp_path_factory.mktemp("lake") / "lake")
     for k in range(8):
-        add_recording(lake, Made(number=k, session=f"site{k // 2}", start=NOON + k * DAY, mean=3.0 + k))
+        add_recording(
+            lake, Made(number=k, session=f"site{k // 2}", start=NOON + k * DAY, mean=3.0 + k)
+        )
     for k in range(8):
         truth = {"wind_speed": 2.0 + k, "bending": 1e-5 * (k + 1)}
         add_recording(lake, Made(number=100 + k, seed=k, truth=truth))

@@ -1,4 +1,5 @@
-"""The decoded cache gives back what was decoded, within its size, even if other programs use or damage it."""
+"""The decoded cache gives back what was decoded, within its size, even if other programs use or
+damage it."""
 
 from __future__ import annotations
 
@@ -125,7 +126,9 @@ def test_several_processes_share_a_cache_that_is_too_small_for_all(tmp_path):
     limit = 8 * (FRAMES + 300)
     context = multiprocessing.get_context("fork")
     failures = context.Queue()
-    processes = [context.Process(target=work, args=(tmp_path, limit, seed, failures)) for seed in range(4)]
+    processes = [
+        context.Process(target=work, args=(tmp_path, limit, seed, failures)) for seed in range(4)
+    ]
     for process in processes:
         process.start()
     for process in processes:
@@ -137,7 +140,8 @@ def test_several_processes_share_a_cache_that_is_too_small_for_all(tmp_path):
 
 @pytest.mark.parametrize("theirs", ["notes.txt", "film.clip"])
 def test_a_cache_has_a_folder_of_its_own(theirs, tmp_path):
-    """Clips are evicted, and two files besides them are written over: none of them may be a user's."""
+    """Clips are evicted, and two files besides them are written over: none of them may be a
+    user's."""
     DecodedCache(tmp_path, limit=10**6)
     (tmp_path / theirs).write_text("mine")
     with pytest.raises(UsageError, match="among other files"):

@@ -15,11 +15,15 @@ NS = 1_000_000_000
 
 
 def test_rows_of_a_query_are_arrays_with_their_gaps(field_lake: Lake) -> None:
-    rows = flagdata.query(field_lake, "session = 'site0'", columns=["kind", "wind"], order="kind, start, artifact")
+    rows = flagdata.query(
+        field_lake, "session = 'site0'", columns=["kind", "wind"], order="kind, start, artifact"
+    )
     assert rows.columns == ("kind", "wind")
     assert Counter(rows["kind"].tolist()) == {"clip": 6, "recording": 2}
     clips = rows["kind"] == "clip"
-    np.testing.assert_allclose(rows["wind"][clips], [3.0] * 3 + [4.0] * 3, atol=0.5)  # gusts of 0.5 m/s about the mean
+    np.testing.assert_allclose(
+        rows["wind"][clips], [3.0] * 3 + [4.0] * 3, atol=0.5
+    )  # gusts of 0.5 m/s about the mean
     assert np.isnan(rows["wind"][~clips]).all()
     assert next(iter(rows)) == {"kind": "clip", "wind": rows["wind"][0]}
     assert repr(rows).splitlines()[:2] == ["Rows(8 of 2 columns)", "kind       wind"]
@@ -29,14 +33,18 @@ def test_rows_of_a_query_are_arrays_with_their_gaps(field_lake: Lake) -> None:
 def test_a_lake_says_what_it_holds_and_gives_pairs(field_lake: Lake) -> None:
     lake = flagdata.open(field_lake.path)
     assert repr(lake).endswith(": 8 camera, 48 clip, 16 recording)")
-    assert flagdata.pairs(lake, "wind > 5", at="v1").fingerprint == lake.pairs("wind > 5", at="v1").fingerprint
+    assert (
+        flagdata.pairs(lake, "wind > 5", at="v1").fingerprint
+        == lake.pairs("wind > 5", at="v1").fingerprint
+    )
     assert "<th" in lake.pairs(at="v1")._repr_html_()
 
 
 def test_wind_and_frames_of_a_recording_are_those_of_its_record(field_lake: Lake) -> None:
-    (name,) = {row["name"] for row in flagdata.query(field_lake, "kind = 'recording' and session = 'site0'")} & {
-        "recording 0"
-    }
+    (name,) = {
+        row["name"]
+        for row in flagdata.query(field_lake, "kind = 'recording' and session = 'site0'")
+    } & {"recording 0"}
     wind = flagdata.wind(name, lake=field_lake)
     seconds = np.arange(len(wind.time))
     np.testing.assert_allclose(wind.time, seconds)

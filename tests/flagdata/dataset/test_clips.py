@@ -25,7 +25,9 @@ NOON = 1_777_636_800 * NS
 
 
 def recording(**changes):
-    return Artifact(kind=Kind.RECORDING, name="flag", object="mcap/" + "0" * 64, session="field", **changes)
+    return Artifact(
+        kind=Kind.RECORDING, name="flag", object="mcap/" + "0" * 64, session="field", **changes
+    )
 
 
 def times(*steps):
@@ -40,7 +42,9 @@ def test_clips_follow_each_other_and_the_rest_is_left_out():
 
 
 def test_a_clip_begins_anew_after_a_gap():
-    steps = [PERIOD] * 40 + [2 * PERIOD] + [PERIOD] * 40  # a frame is missing between frames 40 and 41
+    steps = (
+        [PERIOD] * 40 + [2 * PERIOD] + [PERIOD] * 40
+    )  # a frame is missing between frames 40 and 41
     assert list(runs(times(*steps), 30)) == [0, 41]
 
 
@@ -56,7 +60,10 @@ def test_time_that_does_not_increase_is_refused():
         list(runs(times(PERIOD), 0))
 
 
-@given(st.lists(st.sampled_from([PERIOD, PERIOD + 1000, 2 * PERIOD, 50 * PERIOD]), max_size=200), st.integers(1, 12))
+@given(
+    st.lists(st.sampled_from([PERIOD, PERIOD + 1000, 2 * PERIOD, 50 * PERIOD]), max_size=200),
+    st.integers(1, 12),
+)
 def test_clips_never_overlap_nor_span_a_gap(steps, frames):
     instants = times(*steps)
     gap = 1.5 * np.median(steps) if steps else 0
@@ -70,13 +77,16 @@ def test_clips_never_overlap_nor_span_a_gap(steps, frames):
 
 def test_ground_truth_of_a_clip_is_the_mean_of_the_minute_before_its_end(tmp_path, made):
     record = write_record(tmp_path / "a.mcap", made(number=1, mean=6.0))
-    clock = ClockModel.identity("camera", "wind", start=NOON - 10 * NS, end=NOON + 10 * NS, sigma=0.1)
+    clock = ClockModel.identity(
+        "camera", "wind", start=NOON - 10 * NS, end=NOON + 10 * NS, sigma=0.1
+    )
     rows = clip_rows(record, recording(clock_model=clock.to_json()))
     assert [(r.frame_first, r.frame_count) for r in rows] == [(0, 30), (30, 30), (60, 30)]
     assert [r.start for r in rows] == [NOON + k * 30 * PERIOD for k in range(3)]
     assert [r.end for r in rows] == [NOON + (k * 30 + 29) * PERIOD for k in range(3)]
     for row in rows:
-        # The wind is sampled on whole seconds from 90 s before: 6 + 0.5 sin(2π k / 12), whose sum over 60 is zero.
+        # The wind is sampled on whole seconds from 90 s before: 6 + 0.5 sin(2π k / 12), whose sum
+        # over 60 is zero.
         assert row.wind == pytest.approx(6.0, abs=1e-12)
         assert row.wind_sigma >= 0.2  # the sensor's accuracy is its floor
         assert row.wind_coverage == pytest.approx(1 - row.wind_staleness / 60, abs=1e-12)
@@ -99,7 +109,12 @@ def test_a_clip_with_a_thin_minute_stays_as_a_row_that_says_so(tmp_path, made):
 def test_a_record_without_wind_gives_clips_without_ground_truth(tmp_path, made):
     record = write_record(tmp_path / "a.mcap", made(number=1, truth={"bending": 1e-5}))
     row = clip_rows(record, recording(clock_sigma=0.1))[0]
-    assert (row.wind, row.wind_sigma, row.wind_coverage, row.wind_staleness) == (None, None, 0.0, None)
+    assert (row.wind, row.wind_sigma, row.wind_coverage, row.wind_staleness) == (
+        None,
+        None,
+        0.0,
+        None,
+    )
     assert "wind-missing" in row.quality
 
 
@@ -116,7 +131,10 @@ def test_a_simulated_record_states_its_wind_exactly_and_has_no_day(tmp_path, mad
     record = write_record(tmp_path / "a.mcap", made(number=1, frames=60, truth=truth))
     rows = clip_rows(record, recording(seed=7, clock_sigma=0.0))
     assert len(rows) == 2
-    assert all((r.wind, r.wind_sigma, r.wind_coverage, r.wind_staleness) == (4.5, 0.0, 1.0, 0.0) for r in rows)
+    assert all(
+        (r.wind, r.wind_sigma, r.wind_coverage, r.wind_staleness) == (4.5, 0.0, 1.0, 0.0)
+        for r in rows
+    )
     assert all((r.seed, r.day) == (7, None) for r in rows)
     assert json.loads(rows[0].parameters) == truth
 
@@ -126,7 +144,12 @@ def test_the_wind_of_a_moving_platform_is_no_ground_truth(tmp_path):
     with RecordWriter(path, metadata={}) as writer:
         for index in range(30):
             time = NOON + index * PERIOD
-            writer.frame(log_time=time, publish_time=time, timestamp=time, image=np.zeros((8, 8), dtype=np.uint8))
+            writer.frame(
+                log_time=time,
+                publish_time=time,
+                timestamp=time,
+                image=np.zeros((8, 8), dtype=np.uint8),
+            )
         writer.wind(
             WindSeries(
                 time=NOON - 60 * NS + np.arange(62) * NS,

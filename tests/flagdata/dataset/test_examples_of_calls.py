@@ -1,4 +1,5 @@
-"""The examples in the docstrings of the calls run, those that need minutes left out: these have tests of their own."""
+"""The examples in the docstrings of the calls run, those that need minutes left out: these have
+tests of their own."""
 
 from __future__ import annotations
 
@@ -14,7 +15,8 @@ from tests.docs.calls import example
 from tests.flagdata.conftest import write_video
 
 ELSEWHERE = {
-    "measure", "example", "calibrate", "close_loop", "propose", "build", "train", "evaluate",  # minutes
+    # minutes
+    "measure", "example", "calibrate", "close_loop", "propose", "build", "train", "evaluate",
     "clone", "push", "pull",  # a bucket
     "declare_cloths",  # films of many cloths
 }  # fmt: skip
@@ -28,7 +30,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory, field_lake: Lake) -> Path:
     shutil.copy(flag.film, made)
     shutil.copy(flag.log, made)
     shutil.copytree(field_lake.path, made / "field.lake")
-    flagdata.ingest([made / flag.film.name, made / flag.log.name], lake=made / "field.lake", session="monday")
+    flagdata.ingest(
+        [made / flag.film.name, made / flag.log.name], lake=made / "field.lake", session="monday"
+    )
     write_video(made / "tunnel.mp4", frames=130, creation_time="2026-05-01T10:01:10Z")
     flagdata.ingest(made / "tunnel.mp4", lake=made / "field.lake", session="tunnel")
     flagdata.branch("trial", lake=made / "field.lake")
@@ -36,13 +40,17 @@ def folder(tmp_path_factory: pytest.TempPathFactory, field_lake: Lake) -> Path:
     shutil.copytree(made / "field.lake", made / "backup.lake")
     record = next((made / "field.lake" / "mcap").glob("*.mcap")).read_bytes()
     (made / "cut.mcap").write_bytes(record[: 3 * len(record) // 4])
-    (made / "flag.toml").write_text("[scene]\ncolumns = 4\n[wind]\nspeed = 3\n[time]\nsettle = 0\nframes = 2\n")
+    (made / "flag.toml").write_text(
+        "[scene]\ncolumns = 4\n[wind]\nspeed = 3\n[time]\nsettle = 0\nframes = 2\n"
+    )
     recipe = recipe_of(str(made / "flag.toml"), {"material": {"name": "camel-ponte-roma"}})
     simulate(Lake.create(made / "sim.lake"), recipe)
     return made
 
 
 @pytest.mark.parametrize("name", sorted(set(flagdata.__all__) - ELSEWHERE))
-def test_the_example_of_a_call_runs(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_example_of_a_call_runs(
+    name: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(folder)
     exec(compile(example(name), name, "exec"), {"flagdata": flagdata})

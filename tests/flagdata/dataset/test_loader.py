@@ -1,4 +1,5 @@
-"""The same (tag, seed) gives the same batches, whatever the workers, and a saved cursor takes them up bit for bit."""
+"""The same (tag, seed) gives the same batches, whatever the workers, and a saved cursor takes them
+up bit for bit."""
 
 from __future__ import annotations
 
@@ -153,7 +154,9 @@ _WAYS = [(0, "threads"), (1, "fork"), (4, "fork"), (2, "spawn"), (1, "forkserver
 
 @pytest.mark.filterwarnings("ignore:This DataLoader will create")
 @pytest.mark.parametrize("shares", [(1, 2), (2, 1), (2, 3)])
-def test_another_number_of_shares_and_workers_takes_up_exactly_what_an_epoch_has_left(pairs, expected, shares):
+def test_another_number_of_shares_and_workers_takes_up_exactly_what_an_epoch_has_left(
+    pairs, expected, shares
+):
     before, after = shares
     handed, states = [], []
     for index in range(before):
@@ -171,7 +174,9 @@ def test_another_number_of_shares_and_workers_takes_up_exactly_what_an_epoch_has
         assert (loader.epoch, loader.cursor) == (1, 0)
         assert loader.order_hash(0) == pairs.loader(7).order_hash(0)
     left = (len(expected[0]) - 2 * before) // after * after
-    assert [batch for turn in zip(*later, strict=True) for batch in turn] == expected[0][2 * before :][:left]
+    assert [batch for turn in zip(*later, strict=True) for batch in turn] == expected[0][
+        2 * before :
+    ][:left]
 
 
 @pytest.mark.filterwarnings("ignore:This DataLoader will create")
@@ -200,8 +205,16 @@ def test_a_state_in_the_middle_of_shares_taken_up_anew_goes_on_with_as_many(pair
 
 
 def test_the_hash_of_an_order_is_of_the_data_the_seed_and_the_epoch(field_lake, pairs):
-    loader, other = pairs.loader(7), flagdata.open(field_lake.path).pairs(at="v1", seed=12).loader(7)
-    hashes = {loader.order_hash(0), loader.order_hash(1), other.order_hash(0), pairs.loader(8).order_hash(0)}
+    loader, other = (
+        pairs.loader(7),
+        flagdata.open(field_lake.path).pairs(at="v1", seed=12).loader(7),
+    )
+    hashes = {
+        loader.order_hash(0),
+        loader.order_hash(1),
+        other.order_hash(0),
+        pairs.loader(8).order_hash(0),
+    }
     assert len(hashes) == 4
     assert pairs.loader(7, share=(1, 2), workers=3).order_hash(1) == loader.order_hash(1)
 
@@ -359,6 +372,8 @@ def test_the_loader_refuses_every_flipped_bit_of_a_frame_and_names_object_and_pl
         path.write_bytes(damaged)
         with pytest.raises(CorruptError) as refused:
             list(source.pairs(cache=cache).loader(1))
-        assert refused.value.where == f"{path}, byte {table.offset[frame]}", f"trial {trial}, byte {place}"
+        assert refused.value.where == f"{path}, byte {table.offset[frame]}", (
+            f"trial {trial}, byte {place}"
+        )
     path.write_bytes(sound)
     assert len(list(source.pairs(cache=cache).loader(1))) == 1

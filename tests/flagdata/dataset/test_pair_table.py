@@ -35,7 +35,9 @@ def rows(*changes):
         "recipe": "{}",
     }
     schema = pa.schema([(name, CATALOG[name].type) for name in COLUMNS])
-    return pa.Table.from_pylist([{**base, "artifact": f"a{k}", **change} for k, change in enumerate(changes)], schema)
+    return pa.Table.from_pylist(
+        [{**base, "artifact": f"a{k}", **change} for k, change in enumerate(changes)], schema
+    )
 
 
 def test_null_becomes_what_no_tolerance_lets_through():
@@ -56,8 +58,17 @@ def test_a_seed_of_zero_is_a_seed():
 
 
 def test_numbers_among_the_parameters_are_columns_and_the_rest_stays_in_the_catalog():
-    first = {"wind_speed": 3, "cloth": {"bending": 1e-5, "name": "silk"}, "folded": True, "tags": [1, 2]}
-    table = PairTable.of(rows({"parameters": json.dumps(first)}, {"parameters": None}, {"parameters": '{"pole": 2.5}'}))
+    first = {
+        "wind_speed": 3,
+        "cloth": {"bending": 1e-5, "name": "silk"},
+        "folded": True,
+        "tags": [1, 2],
+    }
+    table = PairTable.of(
+        rows(
+            {"parameters": json.dumps(first)}, {"parameters": None}, {"parameters": '{"pole": 2.5}'}
+        )
+    )
     assert table.names.tolist() == ["cloth.bending", "folded", "pole", "wind_speed"]
     assert table.parameters_of(0) == {"wind_speed": 3.0, "cloth.bending": 1e-5, "folded": 1.0}
     assert table.parameters_of(1) == {}
@@ -66,7 +77,11 @@ def test_numbers_among_the_parameters_are_columns_and_the_rest_stays_in_the_cata
 
 def test_pairs_are_in_the_order_of_recording_and_frame():
     table = PairTable.of(
-        rows({"recording": "s", "frame_first": 0}, {"recording": "r", "frame_first": 30}, {"recording": "r"})
+        rows(
+            {"recording": "s", "frame_first": 0},
+            {"recording": "r", "frame_first": 30},
+            {"recording": "r"},
+        )
     )
     pairs = list(zip(table.recording.tolist(), table.frame_first.tolist(), strict=True))
     assert pairs == [("r", 0), ("r", 30), ("s", 0)]
@@ -83,7 +98,9 @@ def test_taking_pairs_keeps_each_with_its_object_and_parameters():
 
 
 def test_the_fingerprint_depends_on_every_value():
-    table = PairTable.of(rows({"parameters": '{"p": 1}'}, {"parameters": '{"p": 2}', "object": "mcap/" + "1" * 64}))
+    table = PairTable.of(
+        rows({"parameters": '{"p": 1}'}, {"parameters": '{"p": 2}', "object": "mcap/" + "1" * 64})
+    )
     overlooked = []
     for field in (f.name for f in fields(PairTable) if f.name != "names"):
         values = getattr(table, field).copy()
@@ -94,7 +111,9 @@ def test_the_fingerprint_depends_on_every_value():
             values[at] = np.nextafter(values[at], np.inf)
         else:
             values[at] = not values[at]
-        overlooked += [field] * (replace(table, **{field: values}).fingerprint() == table.fingerprint())
+        overlooked += [field] * (
+            replace(table, **{field: values}).fingerprint() == table.fingerprint()
+        )
     assert overlooked == []
 
 

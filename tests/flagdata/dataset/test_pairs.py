@@ -1,4 +1,5 @@
-"""A query at a version gives typed pairs; what is outside the tolerance is refused with the reason."""
+"""A query at a version gives typed pairs; what is outside the tolerance is refused with the
+reason."""
 
 from __future__ import annotations
 
@@ -43,10 +44,17 @@ def test_real_and_simulated_clips_are_samples_of_one_type(source):
     assert real.day.startswith("2026-05-")
     assert real.wind_sigma >= 0.2
     assert simulated.parameters == {"wind_speed": 5.0, "bending": 4e-5}
-    assert (simulated.wind, simulated.wind_sigma, simulated.clock_sigma, simulated.day) == (5.0, 0.0, 0.0, "")
+    assert (simulated.wind, simulated.wind_sigma, simulated.clock_sigma, simulated.day) == (
+        5.0,
+        0.0,
+        0.0,
+        "",
+    )
 
 
-def test_the_clip_holds_the_frames_of_its_place_in_the_recording(source, field_lake, tmp_path, made):
+def test_the_clip_holds_the_frames_of_its_place_in_the_recording(
+    source, field_lake, tmp_path, made
+):
     pairs = source.pairs("seed is null and wind < 3.5", at="v1")  # the first recording: mean 3 m/s
     reference = write_record(tmp_path / "a.mcap", made(number=0, session="site0", mean=3.0))
     assert len(pairs) == 3
@@ -88,8 +96,9 @@ def test_order_does_not_depend_on_the_order_of_commits(tmp_path, made):
 
 def test_pairs_outside_the_tolerance_are_refused_with_every_reason(lake, made):
     add_recording(lake, made(number=1, start=NOON))
-    # The log pauses from 40 s to 89 s after its start. The first clip ends at 91.16 s, so its minute holds the samples
-    # 32 to 39 and 89 to 91, of which the first speaks for 0.84 s: 10.84 s of 60.
+    # The log pauses from 40 s to 89 s after its start. The first clip ends at 91.16 s, so its
+    # minute holds the samples 32 to 39 and 89 to 91, of which the first speaks for 0.84 s: 10.84 s
+    # of 60.
     add_recording(lake, made(number=2, start=NOON + DAY, missing=(40, 89), clock_sigma=3.0))
     pairs = flagdata.open(lake.path).pairs()
     assert len(pairs) == 3
@@ -155,7 +164,9 @@ def test_a_filter_does_not_move_a_clip_to_another_side(source):
 
 def test_an_explicit_split_is_used_as_given(source):
     split_by = ExplicitSplit(where={"train": "day < '2026-05-05'", "test": "day >= '2026-05-05'"})
-    train, test = (source.pairs(at="v1", split=side, split_by=split_by) for side in ("train", "test"))
+    train, test = (
+        source.pairs(at="v1", split=side, split_by=split_by) for side in ("train", "test")
+    )
     assert (len(train), len(test)) == (12, 12)
     assert max(train.table.day) < min(test.table.day)
 
@@ -185,7 +196,9 @@ def test_a_recording_that_was_aligned_anew_gives_its_clips_once(lake, made):
         (old, (f"recording {new} aligned the same camera and wind later",))
     ] * 3
     assert set(flagdata.open(lake.path).pairs(at="before").table.recording.tolist()) == {old}
-    assert set(flagdata.open(lake.path).pairs(f"recording = '{old}'").table.recording.tolist()) == {old}
+    assert set(flagdata.open(lake.path).pairs(f"recording = '{old}'").table.recording.tolist()) == {
+        old
+    }
 
 
 def test_a_single_session_says_that_it_is_on_one_side(lake, made, caplog):
@@ -195,9 +208,13 @@ def test_a_single_session_says_that_it_is_on_one_side(lake, made, caplog):
     full = max(source.sides().items(), key=lambda entry: entry[1].clips)[0]
     said = f"all 6 clips belong together (session pier), and are on the side '{full}'"
     assert len(source.pairs(split=full)) == 6
-    assert [record.getMessage() for record in caplog.records] == [f"warning: {said}: the others are empty"]
+    assert [record.getMessage() for record in caplog.records] == [
+        f"warning: {said}: the others are empty"
+    ]
     empty = next(side for side, size in source.sides().items() if not size.clips)
-    with pytest.raises(RefusedError, match=re.escape(f"split '{empty}' holds none of the clips; {said}")):
+    with pytest.raises(
+        RefusedError, match=re.escape(f"split '{empty}' holds none of the clips; {said}")
+    ):
         source.pairs(split=empty)
 
 
@@ -205,9 +222,12 @@ def test_what_is_missing_is_an_error(source):
     with pytest.raises(NotFoundError, match="no clips match"):
         source.pairs("wind > 100")
     with pytest.raises(
-        RefusedError, match="split 'none' holds none of the clips; the catalog has 12 independent groups"
+        RefusedError,
+        match="split 'none' holds none of the clips; the catalog has 12 independent groups",
     ):
-        source.pairs(at="v1", split="none", split_by=HashedSplit(fractions={"all": 1.0, "none": 0.0}))
+        source.pairs(
+            at="v1", split="none", split_by=HashedSplit(fractions={"all": 1.0, "none": 0.0})
+        )
     with pytest.raises(UnknownNameError):
         source.pairs(split="trian")
     with pytest.raises(NotFoundError):

@@ -1,4 +1,5 @@
-"""The main job on real input: a film of a flag and a sonic's log become pairs with the sonic's own mean wind."""
+"""The main job on real input: a film of a flag and a sonic's log become pairs with the sonic's own
+mean wind."""
 
 from __future__ import annotations
 
@@ -12,7 +13,15 @@ from flagdata.align import ClockOptions, Method, Pair, make_recording
 from flagdata.align.methods import declared_clock
 from flagdata.dataset import Tolerance
 from flagdata.errors import RefusedError
-from flagdata.ingest import CameraIngest, CameraOptions, Labels, WindIngest, WindOptions, ingest_camera, ingest_wind
+from flagdata.ingest import (
+    CameraIngest,
+    CameraOptions,
+    Labels,
+    WindIngest,
+    WindOptions,
+    ingest_camera,
+    ingest_wind,
+)
 from flagdata.lake import Lake
 from flagdata.timebase import parse
 
@@ -21,7 +30,8 @@ PERIOD = NS // 25
 
 
 def raw_means(path, ends, window):
-    """Mean horizontal speed over (end - window, end] and its naive scatter, from the text of the file alone."""
+    """Mean horizontal speed over (end - window, end] and its naive scatter, from the text of the
+    file alone."""
     time, speed = [], []
     for line in path.read_text().splitlines()[4:]:
         stamp, _, x, y = line.split(",")[:4]
@@ -41,7 +51,9 @@ def test_a_real_film_and_a_real_sonic_become_pairs_with_the_sonics_mean(referenc
     start = parse("2012-06-07T12:50:00.02Z")  # the two were never together: the start is made up
     lake = Lake.create(tmp_path / "lake")
     labels = Labels(session="field")
-    camera = ingest_camera(lake, film, CameraIngest(camera=CameraOptions(start=start)), labels=labels)
+    camera = ingest_camera(
+        lake, film, CameraIngest(camera=CameraOptions(start=start)), labels=labels
+    )
     wind = ingest_wind(lake, log, WindIngest(wind=WindOptions(zone="UTC")), labels=labels)
     options = ClockOptions(by=Method.GIVEN, offset=2.5, offset_sigma=0.4)
     pair = Pair.of(lake, camera.artifact.id, wind.artifact.id)
@@ -64,7 +76,10 @@ def test_a_real_film_and_a_real_sonic_become_pairs_with_the_sonics_mean(referenc
         assert all(1 - 0.0501 / window <= sample.coverage <= 1 for sample in samples)
         assert all(sample.clip.shape == (1, 30, 300, 300) for sample in samples)
         # The cloth moves: consecutive frames of a clip differ.
-        assert all(float((sample.clip[0, 1:] != sample.clip[0, :-1]).float().mean()) > 0.01 for sample in samples)
+        assert all(
+            float((sample.clip[0, 1:] != sample.clip[0, :-1]).float().mean()) > 0.01
+            for sample in samples
+        )
 
     source = flagdata.open(lake.path)
     with pytest.raises(RefusedError, match=r"known to ±0\.4 s, above 0\.1 s"):

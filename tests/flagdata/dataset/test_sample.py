@@ -51,7 +51,10 @@ def test_real_and_simulated_clips_share_a_batch_and_only_unknown_parameters_are_
     batch = collate([sample(0), simulated, other])
     assert batch.seed == (None, 7, 8)
     assert sorted(batch.parameters) == ["area_weight", "bending"]
-    bending, area_weight = batch.parameters["bending"].tolist(), batch.parameters["area_weight"].tolist()
+    bending, area_weight = (
+        batch.parameters["bending"].tolist(),
+        batch.parameters["area_weight"].tolist(),
+    )
     assert [math.isnan(value) for value in bending] == [True, False, False]
     assert [math.isnan(value) for value in area_weight] == [True, False, True]
     assert area_weight[1] == pytest.approx(0.2, rel=1e-7)  # float32
@@ -67,7 +70,14 @@ def test_samples_and_batches_are_frozen():
 def test_moving_a_batch_moves_all_tensors_and_keeps_identities():
     batch = collate([sample(0, parameters={"area_weight": 0.2})])
     moved = batch.to("meta")
-    tensors = [moved.clip, moved.wind, moved.wind_sigma, moved.staleness, moved.coverage, moved.clock_sigma]
+    tensors = [
+        moved.clip,
+        moved.wind,
+        moved.wind_sigma,
+        moved.staleness,
+        moved.coverage,
+        moved.clock_sigma,
+    ]
     tensors += [moved.start, moved.end, moved.parameters["area_weight"]]
     assert {tensor.device.type for tensor in tensors} == {"meta"}
     assert moved.artifact == batch.artifact

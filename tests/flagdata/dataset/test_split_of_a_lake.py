@@ -1,4 +1,5 @@
-"""Whatever a lake holds, what `pairs` gives for two sides shares no clip, recording, session, day, seed or camera."""
+"""Whatever a lake holds, what `pairs` gives for two sides shares no clip, recording, session, day,
+seed or camera."""
 
 from __future__ import annotations
 
@@ -21,8 +22,9 @@ SIDES = ("train", "validation", "test")
 
 @pytest.fixture(scope="module")
 def tangled(tmp_path_factory, made):
-    """A lake of 80 recordings, and each one's film. They are tangled by sessions over several days, days over several
-    sessions, films that were ingested twice, and seeds rendered twice; each has a record of two frames."""
+    """A lake of 80 recordings, and each one's film. They are tangled by sessions over several days,
+    days over several sessions, films that were ingested twice, and seeds rendered twice; each has a
+    record of two frames."""
     lake = Lake.create(tmp_path_factory.mktemp("tangled") / "lake")
     generator = np.random.default_rng(7)
     films = {}
@@ -34,7 +36,10 @@ def tangled(tmp_path_factory, made):
             simulated = number % 3 == 0
             film, day = int(generator.integers(0, 45)), int(generator.integers(0, 40))
             camera = Artifact(
-                kind=Kind.CAMERA, name=f"film {film}", source_hash=f"{film:064x}", recipe={"crop": number % 2}
+                kind=Kind.CAMERA,
+                name=f"film {film}",
+                source_hash=f"{film:064x}",
+                recipe={"crop": number % 2},
             )
             if not simulated:
                 transaction.add(camera)
@@ -44,7 +49,9 @@ def tangled(tmp_path_factory, made):
                 object=stored,
                 parents=() if simulated else (camera.id,),
                 recipe={"number": number},
-                session=None if simulated or number % 5 == 0 else f"site {int(generator.integers(0, 25))}",
+                session=None
+                if simulated or number % 5 == 0
+                else f"site {int(generator.integers(0, 25))}",
                 seed=int(generator.integers(0, 18)) if simulated else None,
             )
             transaction.add(recording)
@@ -106,7 +113,9 @@ def test_every_clip_is_on_exactly_one_side(tangled):
     everything = source.pairs()
     assert len(everything) + len(everything.refused) == 240
     sides = [source.pairs(split=side, split_by=split_by).table.artifact.tolist() for side in SIDES]
-    refused = {r.artifact for side in SIDES for r in source.pairs(split=side, split_by=split_by).refused}
+    refused = {
+        r.artifact for side in SIDES for r in source.pairs(split=side, split_by=split_by).refused
+    }
     together = list(itertools.chain(*sides))
     assert len(together) == len(set(together))
     assert len(set(together) | refused) == 240
@@ -127,4 +136,6 @@ def test_sizes_of_the_sides_are_those_of_their_pairs(tangled):
             assert size.groups <= size.recordings <= size.clips
     # A seed is rendered by several recordings, and those are one group: as many groups as seeds.
     seeds = set(source.pairs("seed is not null").table.seed.tolist())
-    assert sum(size.groups for size in source.sides("seed is not null", split_by=split_by).values()) == len(seeds)
+    assert sum(
+        size.groups for size in source.sides("seed is not null", split_by=split_by).values()
+    ) == len(seeds)

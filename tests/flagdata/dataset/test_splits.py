@@ -16,8 +16,12 @@ real = st.builds(
     Origin,
     recording=st.integers(0, 10**6).map(lambda n: f"real{n}"),
     session=st.one_of(st.none(), st.sampled_from([f"site{k}" for k in range(12)])),
-    days=st.lists(st.integers(1, 28).map(lambda d: f"2026-05-{d:02d}"), min_size=1, max_size=2, unique=True).map(tuple),
-    sources=st.lists(st.integers(0, 40).map(lambda n: f"camera {n}"), max_size=2, unique=True).map(tuple),
+    days=st.lists(
+        st.integers(1, 28).map(lambda d: f"2026-05-{d:02d}"), min_size=1, max_size=2, unique=True
+    ).map(tuple),
+    sources=st.lists(st.integers(0, 40).map(lambda n: f"camera {n}"), max_size=2, unique=True).map(
+        tuple
+    ),
 )
 simulated = st.builds(
     Origin,
@@ -26,7 +30,9 @@ simulated = st.builds(
     days=st.just(("1970-01-01",)),
     seed=st.integers(0, 30),
 )
-origins = st.lists(st.one_of(real, simulated), min_size=1, max_size=40, unique_by=lambda origin: origin.recording)
+origins = st.lists(
+    st.one_of(real, simulated), min_size=1, max_size=40, unique_by=lambda origin: origin.recording
+)
 
 
 @given(origins, st.text(max_size=5))
@@ -38,7 +44,10 @@ def test_nothing_that_connects_recordings_is_on_two_sides(recordings, salt):
             assert not set(a.sources) & set(b.sources)
             assert a.seed is None or a.seed != b.seed
             assert a.seed is not None or b.seed is not None or not set(a.days) & set(b.days)
-    by_side = {side: [o for o, s in zip(recordings, sides, strict=True) if s == side] for side in set(sides)}
+    by_side = {
+        side: [o for o, s in zip(recordings, sides, strict=True) if s == side]
+        for side in set(sides)
+    }
     refuse_leaks(by_side)
 
 
@@ -54,7 +63,10 @@ def test_a_split_does_not_depend_on_the_order_of_recordings(recordings, random):
 
 @given(st.lists(real, min_size=1, max_size=20, unique_by=lambda o: o.recording), st.integers(1, 20))
 def test_recordings_of_new_days_and_sessions_move_nothing(recordings, count):
-    added = [Origin(recording=f"new{k}", session=f"new site {k}", days=(f"2027-01-{k + 1:02d}",)) for k in range(count)]
+    added = [
+        Origin(recording=f"new{k}", session=f"new site {k}", days=(f"2027-01-{k + 1:02d}",))
+        for k in range(count)
+    ]
     split = HashedSplit()
     assert split.assign([*recordings, *added])[: len(recordings)] == split.assign(recordings)
 
@@ -62,7 +74,9 @@ def test_recordings_of_new_days_and_sessions_move_nothing(recordings, count):
 def test_a_later_recording_of_a_known_session_joins_its_side_and_moves_nothing():
     split = HashedSplit()
     for site in range(30):
-        first = Origin(recording=f"a{site}", session=f"site{site}", days=(f"2026-05-{site + 1:02d}",))
+        first = Origin(
+            recording=f"a{site}", session=f"site{site}", days=(f"2026-05-{site + 1:02d}",)
+        )
         later = Origin(recording=f"b{site}", session=f"site{site}", days=("2026-07-01",))
         assert split.assign([first, later]) == split.assign([first]) * 2
 
@@ -81,7 +95,10 @@ def test_a_chain_of_shared_sessions_and_days_is_one_group():
 
 def test_a_recording_across_midnight_joins_both_days():
     night = Origin(recording="n", days=("2026-05-01", "2026-05-02"))
-    days = [Origin(recording="a", days=("2026-05-01",)), Origin(recording="b", days=("2026-05-02",))]
+    days = [
+        Origin(recording="a", days=("2026-05-01",)),
+        Origin(recording="b", days=("2026-05-02",)),
+    ]
     assert len(set(groups([*days, night]).tolist())) == 1
     assert len(set(groups(days).tolist())) == 2
 
@@ -103,7 +120,10 @@ def test_another_salt_is_another_split():
 
 def test_a_side_without_a_share_gets_nothing():
     split = HashedSplit(fractions={"train": 0.5, "test": 0.5, "never": 0.0})
-    assert set(split.assign([Origin(recording=f"s{k}", seed=k) for k in range(200)])) == {"train", "test"}
+    assert set(split.assign([Origin(recording=f"s{k}", seed=k) for k in range(200)])) == {
+        "train",
+        "test",
+    }
 
 
 def test_an_explicit_split_that_leaks_is_refused_and_the_leak_is_named():
@@ -114,16 +134,29 @@ def test_an_explicit_split_that_leaks_is_refused_and_the_leak_is_named():
         ({"sources": ("camera abc",)}, "camera abc"),
     ):
         with pytest.raises(RefusedError, match=f"{named} is in train and in test"):
-            refuse_leaks({"train": [Origin(recording="a", **shared)], "test": [Origin(recording="b", **shared)]})
-    with pytest.raises(RefusedError, match="recording a is in train and in test"):  # whatever else is unknown
+            refuse_leaks(
+                {
+                    "train": [Origin(recording="a", **shared)],
+                    "test": [Origin(recording="b", **shared)],
+                }
+            )
+    with pytest.raises(
+        RefusedError, match="recording a is in train and in test"
+    ):  # whatever else is unknown
         refuse_leaks({"train": [Origin(recording="a")], "test": [Origin(recording="a")]})
 
 
 def test_sides_that_share_nothing_are_let_through():
     refuse_leaks(
         {
-            "train": [Origin(recording="a", session="north", days=("2026-05-01",)), Origin(recording="s", seed=1)],
-            "test": [Origin(recording="b", session="south", days=("2026-05-02",)), Origin(recording="t", seed=2)],
+            "train": [
+                Origin(recording="a", session="north", days=("2026-05-01",)),
+                Origin(recording="s", seed=1),
+            ],
+            "test": [
+                Origin(recording="b", session="south", days=("2026-05-02",)),
+                Origin(recording="t", seed=2),
+            ],
         }
     )
 

@@ -20,9 +20,17 @@ COUNTS = {"train": 3, "validation": 2, "test": 2}
 def film(number: int, **columns: Any) -> list[Artifact]:
     """A recording of a day of its own, and its two clips."""
     day = {"day": f"2026-05-{number + 1:02d}"} if "seed" not in columns else {}
-    recording = Artifact(kind=Kind.RECORDING, name=f"film {number}", recipe={"number": number}, **{**day, **columns})
+    recording = Artifact(
+        kind=Kind.RECORDING, name=f"film {number}", recipe={"number": number}, **{**day, **columns}
+    )
     clips = [
-        replace(recording, kind=Kind.CLIP, parents=(recording.id,), recording=recording.id, frame_first=30 * k)
+        replace(
+            recording,
+            kind=Kind.CLIP,
+            parents=(recording.id,),
+            recording=recording.id,
+            frame_first=30 * k,
+        )
         for k in range(2)
     ]
     return [recording, *clips]
@@ -57,7 +65,9 @@ def test_each_clip_is_on_the_side_that_it_states() -> None:
     assert found.as_dict() == {
         "rule": "stated",
         "datasets": ["made"],
-        "sides": {side: {"clips": 2 * n, "recordings": n, "groups": n} for side, n in COUNTS.items()},
+        "sides": {
+            side: {"clips": 2 * n, "recordings": n, "groups": n} for side, n in COUNTS.items()
+        },
     }
 
 
@@ -73,7 +83,10 @@ def test_a_narrower_filter_moves_nothing_and_still_names_every_side() -> None:
 def test_a_recording_is_on_its_own_side_with_or_without_clips() -> None:
     rows = [row for row in data_set() if row.kind is Kind.RECORDING]
     table = catalog(*rows)
-    assert len(divide(table, select_columns(table), hashed=HashedSplit()).on("train")) == COUNTS["train"]
+    assert (
+        len(divide(table, select_columns(table), hashed=HashedSplit()).on("train"))
+        == COUNTS["train"]
+    )
 
 
 def test_a_side_that_no_data_set_states_is_unknown() -> None:
@@ -84,16 +97,23 @@ def test_a_side_that_no_data_set_states_is_unknown() -> None:
 
 def test_rows_that_state_a_side_and_rows_that_state_none_are_not_divided_together() -> None:
     rows = [*data_set(), *film(20), *film(21)]
-    with pytest.raises(RefusedError, match=r"14 of 18 rows state a side, of 'made', and the others none") as refused:
+    with pytest.raises(
+        RefusedError, match=r"14 of 18 rows state a side, of 'made', and the others none"
+    ) as refused:
         of(rows)
     assert "side is not null" in refused.value.fix
     assert of(rows, "side is not null").rule == "stated"
     assert of(rows, "side is null").rule == "hashed"
 
 
-@pytest.mark.parametrize("split_by", [HashedSplit(), HashedSplit(salt="x"), HashedSplit(fractions={"train": 1.0})])
+@pytest.mark.parametrize(
+    "split_by", [HashedSplit(), HashedSplit(salt="x"), HashedSplit(fractions={"train": 1.0})]
+)
 def test_a_hashed_split_beside_stated_sides_is_refused_not_ignored(split_by: HashedSplit) -> None:
-    with pytest.raises(RefusedError, match="'made' states the side of each row, and a hashed split is given beside it"):
+    with pytest.raises(
+        RefusedError,
+        match="'made' states the side of each row, and a hashed split is given beside it",
+    ):
         of(data_set(), None, split_by)
 
 
@@ -111,7 +131,9 @@ def test_filters_that_take_a_clip_to_another_side_than_it_states_are_refused(whe
 
 
 def test_filters_may_name_the_stated_sides_and_divide_what_states_none() -> None:
-    split = ExplicitSplit(where={"train": "side = 'train' or day = '2026-05-21'", "test": {"side": "test"}})
+    split = ExplicitSplit(
+        where={"train": "side = 'train' or day = '2026-05-21'", "test": {"side": "test"}}
+    )
     found = of([*data_set(), *film(20)], None, split)
     assert {side: len(on) for side, on in found.artifacts.items()} == {"train": 8, "test": 4}
 

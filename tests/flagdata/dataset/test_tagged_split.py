@@ -42,13 +42,18 @@ def test_a_tag_states_what_data_sets_state_and_what_a_hash_gives_the_others(lake
     kept = note(lake, "v1")
     assert kept["stated"]["datasets"] == ["made"]
     assert {side: of["recordings"] for side, of in kept["stated"]["sides"].items()} == COUNTS
-    assert (kept["hashed"]["salt"], kept["hashed"]["fractions"]) == ("", dict(HashedSplit().fractions))
+    assert (kept["hashed"]["salt"], kept["hashed"]["fractions"]) == (
+        "",
+        dict(HashedSplit().fractions),
+    )
     assert sum(of["clips"] for of in kept["hashed"]["sides"].values()) == 4
     (listed,) = invoke("tag", "--json", "--lake", str(lake.path)).document["tags"]
     assert json.loads(listed["notes"]["split"]) == kept
 
 
-def test_a_tag_of_a_call_and_of_a_branch_keeps_it_too_and_one_without_clips_keeps_nothing(lake: Lake) -> None:
+def test_a_tag_of_a_call_and_of_a_branch_keeps_it_too_and_one_without_clips_keeps_nothing(
+    lake: Lake,
+) -> None:
     (empty,) = flagdata.tag("v0", lake=str(lake.path))
     assert empty.notes == {}
     lake.branch("trial")
@@ -68,12 +73,15 @@ def test_a_side_of_a_tag_is_decided_by_the_split_that_it_keeps(lake: Lake) -> No
     source = flagdata.open(lake.path)
     sizes = source.sides(at="old")
     assert list(sizes) == ["test", "train"]
-    assert sizes == source.sides(split_by=HashedSplit(salt="older", fractions={"test": 0.5, "train": 0.5}))
+    assert sizes == source.sides(
+        split_by=HashedSplit(salt="older", fractions={"test": 0.5, "train": 0.5})
+    )
     assert source.sides(at="bare") == source.sides() == source.sides(split_by=HashedSplit())
 
 
 @pytest.mark.parametrize(
-    "text", ["[]", "{", '{"hashed": {"salt": ""}}', '{"hashed": {"salt": "", "fractions": {"a": 2}}}']
+    "text",
+    ["[]", "{", '{"hashed": {"salt": ""}}', '{"hashed": {"salt": "", "fractions": {"a": 2}}}'],
 )
 def test_a_note_that_is_no_split_is_damage_and_named(lake: Lake, text: str) -> None:
     filled(lake, film(1))

@@ -23,8 +23,14 @@ def series(seconds, speed, *, flags=None, sensor=None, channel="wind_speed"):
     """A wind series with samples at `seconds` after START."""
     time = START + np.round(np.asarray(seconds, dtype=float) * NS).astype(np.int64)
     values = np.broadcast_to(np.asarray(speed, dtype=float), time.shape).copy()
-    bits = np.zeros(len(time), dtype=np.uint16) if flags is None else np.asarray(flags, dtype=np.uint16)
-    return WindSeries(time=time, channels={channel: values}, flags=bits, sensor=sensor or Sensor(name="exact"))
+    bits = (
+        np.zeros(len(time), dtype=np.uint16)
+        if flags is None
+        else np.asarray(flags, dtype=np.uint16)
+    )
+    return WindSeries(
+        time=time, channels={channel: values}, flags=bits, sensor=sensor or Sensor(name="exact")
+    )
 
 
 def truth(wind, end, **options):
@@ -55,7 +61,8 @@ def test_window_is_open_at_its_start_and_closed_at_its_end():
     seconds = np.arange(0, 121)
     speed = np.where(seconds == 40, 1000.0, 4.0) + np.where(seconds == 101, 1000.0, 0.0)
     speed = speed + np.where(seconds == 100, 60.0, 0.0)
-    # 40 s (exactly a window early) and 101 s (after the end) are out; 100 s (exactly the end) is one of 60 samples.
+    # 40 s (exactly a window early) and 101 s (after the end) are out; 100 s (exactly the end) is
+    # one of 60 samples.
     assert truth(series(seconds, speed), 100).wind == pytest.approx(4.0 + 60.0 / 60, rel=1e-12)
 
 
@@ -68,7 +75,9 @@ def test_nothing_after_the_end_is_used():
 
 
 def test_gap_lowers_coverage_by_its_share_and_is_not_filled_in():
-    seconds = np.concatenate([np.arange(0, 71), np.arange(86, 121)])  # rows 71..85 are missing: 15 s
+    seconds = np.concatenate(
+        [np.arange(0, 71), np.arange(86, 121)]
+    )  # rows 71..85 are missing: 15 s
     speed = np.where(seconds < 80, 2.0, 6.0)
     result = truth(series(seconds, speed), 100)
     assert result.coverage == pytest.approx(45 / 60, rel=1e-12)
@@ -149,28 +158,38 @@ def test_clock_uncertainty_is_the_scatter_that_a_wrong_clock_causes():
         right = wind.before(instant, clock_sigma=sigma)
         stated.append(right.sigma_clock)
         shifts.append(wind.before(instant + round(error * NS)).wind - right.wind)
-    # Root mean squares of 590 windows (3 % sampling error each); the edges' means over ±2 s smooth the gusts a little.
+    # Root mean squares of 590 windows (3 % sampling error each); the edges' means over ±2 s smooth
+    # the gusts a little.
     assert np.sqrt(np.mean(np.square(stated))) == pytest.approx(np.std(shifts), rel=0.2)
 
 
 def test_clock_uncertainty_is_bounded_by_the_scatter_where_the_log_has_no_edge():
     seconds = np.concatenate([np.arange(45, 90), np.arange(110, 200)])
     wind = series(seconds, np.where(seconds % 2 == 0, 3.0, 5.0))
-    # Nothing near the edge at 40 s: √2 × scatter (1 m/s, nearly: 45 samples) over the window of 60 s, per second.
-    assert truth(wind, 100, clock_sigma=1.0).sigma_clock == pytest.approx(math.sqrt(2) / 60, rel=1e-3)
+    # Nothing near the edge at 40 s: √2 × scatter (1 m/s, nearly: 45 samples) over the window of 60
+    # s, per second.
+    assert truth(wind, 100, clock_sigma=1.0).sigma_clock == pytest.approx(
+        math.sqrt(2) / 60, rel=1e-3
+    )
 
 
 def test_sensor_accuracy_does_not_shrink_by_averaging():
     sensor = Sensor(name="cup", accuracy=0.3, accuracy_relative=0.02, resolution=0.1)
     step = 0.1 / math.sqrt(12)
     seconds = np.arange(0, 121)
-    assert truth(series(seconds, 5.0, sensor=sensor), 100).sigma == pytest.approx(math.hypot(0.3, step), rel=1e-12)
-    assert truth(series(seconds, 20.0, sensor=sensor), 100).sigma == pytest.approx(math.hypot(0.4, step), rel=1e-12)
+    assert truth(series(seconds, 5.0, sensor=sensor), 100).sigma == pytest.approx(
+        math.hypot(0.3, step), rel=1e-12
+    )
+    assert truth(series(seconds, 20.0, sensor=sensor), 100).sigma == pytest.approx(
+        math.hypot(0.4, step), rel=1e-12
+    )
 
 
 def test_dead_zone_widens_the_interval_by_what_it_may_hide():
     sensor = Sensor(name="cup", accuracy=0.0, threshold=0.6)
-    wind = series(np.arange(0, 121), 0.0, flags=np.full(121, int(SampleFlag.DEAD_ZONE)), sensor=sensor)
+    wind = series(
+        np.arange(0, 121), 0.0, flags=np.full(121, int(SampleFlag.DEAD_ZONE)), sensor=sensor
+    )
     result = truth(wind, 100)
     # A true speed anywhere in [0, 0.6] read as 0: root mean square 0.6 / √3.
     assert result.sigma == pytest.approx(0.6 / math.sqrt(3), rel=1e-12)
@@ -196,7 +215,9 @@ def test_the_step_comes_on_top_of_the_scatter_of_the_mean():
     seconds = np.arange(0, 121)
     result = truth(series(seconds, 4 + 0.1 * (seconds % 2)), 100)
     assert result.sigma_sensor == pytest.approx(0.1 / math.sqrt(12), rel=1e-9)
-    assert result.sigma == pytest.approx(math.hypot(result.sigma_mean, result.sigma_sensor), rel=1e-12)
+    assert result.sigma == pytest.approx(
+        math.hypot(result.sigma_mean, result.sigma_sensor), rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("speed", [0.0, 4.0])
@@ -246,8 +267,8 @@ def test_standard_error_covers_the_true_mean_of_correlated_wind(phi):
     results = [wind.before(START + 60 * k * NS) for k in range(10, windows + 1)]
     inside = np.mean([abs(r.wind - 10) <= 2 * r.sigma_mean for r in results])
     naive = np.mean([abs(r.wind - 10) <= 2 / math.sqrt(60) for r in results])
-    # Nominal 95.4 %, sampling error 0.6 %; a minute holds 20, 10 and 3 independent winds, and what it says of their
-    # scatter is uncertain too, for which 3 % are allowed.
+    # Nominal 95.4 %, sampling error 0.6 %; a minute holds 20, 10 and 3 independent winds, and what
+    # it says of their scatter is uncertain too, for which 3 % are allowed.
     assert 0.92 < inside < 0.99
     assert naive < 0.8  # the error of uncorrelated samples falls badly short
 
@@ -263,7 +284,9 @@ def test_standard_error_does_not_depend_on_the_logging_rate(rate):
 
 def test_sonic_components_give_the_horizontal_speed():
     wind = series(np.arange(0, 121), 3.0, channel="wind_x")
-    both = replace(wind, channels={**wind.channels, "wind_y": np.full(121, -4.0), "wind_z": np.full(121, 9.0)})
+    both = replace(
+        wind, channels={**wind.channels, "wind_y": np.full(121, -4.0), "wind_z": np.full(121, 9.0)}
+    )
     assert truth(both, 100).wind == pytest.approx(5.0, rel=1e-12)
 
 
@@ -272,7 +295,9 @@ def test_rows_of_other_channels_take_nothing_from_the_coverage():
     seconds = np.sort(np.concatenate([np.arange(0, 121), np.arange(0, 121) + 0.1]))
     ground = np.arange(len(seconds)) % 2 == 0
     wind = series(seconds, np.where(ground, 4.0, np.nan))
-    both = replace(wind, channels={**wind.channels, "apparent_wind_speed": np.where(ground, np.nan, 9.0)})
+    both = replace(
+        wind, channels={**wind.channels, "apparent_wind_speed": np.where(ground, np.nan, 9.0)}
+    )
     result = truth(both, 100)
     assert (result.wind, result.coverage, result.count) == (4.0, 1.0, 60)
 
@@ -283,7 +308,12 @@ def test_apparent_wind_is_refused_as_ground_truth():
 
 
 def test_impossible_window_or_clock_is_a_usage_error():
-    for options in ({"window": 0.0}, {"window": math.inf}, {"clock_sigma": -1.0}, {"clock_sigma": math.nan}):
+    for options in (
+        {"window": 0.0},
+        {"window": math.inf},
+        {"clock_sigma": -1.0},
+        {"clock_sigma": math.nan},
+    ):
         with pytest.raises(UsageError):
             truth(series(np.arange(0, 121), 3.0), 100, **options)
 
@@ -294,7 +324,9 @@ def test_impossible_window_or_clock_is_a_usage_error():
     window=st.floats(1.0, 120.0),
     speed=st.floats(0.0, 60.0),
 )
-def test_any_spacing_keeps_the_mean_within_the_samples_and_coverage_within_one(gaps, end, window, speed):
+def test_any_spacing_keeps_the_mean_within_the_samples_and_coverage_within_one(
+    gaps, end, window, speed
+):
     result = truth(series(np.cumsum(gaps), speed), end, window=window)
     assert 0.0 <= result.coverage <= 1.0
     assert result.staleness >= 0.0

@@ -1,4 +1,5 @@
-"""A small lake whose every frame, instant and wind value is known, made without the code that exports it."""
+"""A small lake whose every frame, instant and wind value is known, made without the code that
+exports it."""
 
 from __future__ import annotations
 
@@ -34,7 +35,8 @@ class Known:
         times: (90,) instants of the frames, common clock.
         images: (90, 48, 64) the frames before JPEG.
         jpegs: the frames' bytes, 90.
-        wind_time, wind_speed: (140,) anemometer samples, one a second from noon; speed grows by 0.05 m/s a second.
+        wind_time, wind_speed: (140,) anemometer samples, one a second from noon; speed grows by
+            0.05 m/s a second.
     """
 
     lake: Lake
@@ -48,8 +50,11 @@ class Known:
 
 
 def picture(index: int) -> UInt8Array:
-    """A gray picture (48, 64) that says its index: a smooth slope from 40, brighter by 1 level a frame."""
-    return (40 + index + np.arange(HEIGHT)[:, None] + np.arange(WIDTH)[None, :] // 2).astype(np.uint8)
+    """A gray picture (48, 64) that says its index: a smooth slope from 40, brighter by 1 level a
+    frame."""
+    return (40 + index + np.arange(HEIGHT)[:, None] + np.arange(WIDTH)[None, :] // 2).astype(
+        np.uint8
+    )
 
 
 def jpeg(image: UInt8Array) -> bytes:
@@ -62,7 +67,8 @@ def jpeg(image: UInt8Array) -> bytes:
 def known(tmp_path_factory: pytest.TempPathFactory) -> Known:
     folder = tmp_path_factory.mktemp("export")
     lake = Lake.create(folder / "lake")
-    # Steps of 40 ms and 33.366700 ms in turn, from 80 s after noon: a truly variable rate, exact in nanoseconds.
+    # Steps of 40 ms and 33.366700 ms in turn, from 80 s after noon: a truly variable rate, exact in
+    # nanoseconds.
     steps = np.where(np.arange(89) % 2 == 0, 40_000_000, 33_366_700)
     times = NOON + 80 * SECOND + np.concatenate([[0], np.cumsum(steps)])
     wind_time = NOON + SECOND * np.arange(140)
@@ -123,7 +129,9 @@ def write_record(
         )
         writer.attach("log.csv", b"time,speed\n", media_type="text/csv", log_time=int(wind_time[0]))
         for time, data in zip(times.tolist(), jpegs, strict=True):
-            writer.frame(log_time=time, publish_time=time - CAMERA_BEHIND, timestamp=time, image=data)
+            writer.frame(
+                log_time=time, publish_time=time - CAMERA_BEHIND, timestamp=time, image=data
+            )
 
 
 def clip(recording: Artifact, name: str, number: int, times: IntArray) -> Artifact:

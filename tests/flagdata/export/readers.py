@@ -1,4 +1,5 @@
-"""Other programs' readers, each in an environment of its own (`tests.studies.validation.environments`)."""
+"""Other programs' readers, each in an environment of its own
+(`tests.studies.validation.environments`)."""
 
 from __future__ import annotations
 
@@ -11,11 +12,17 @@ import pytest
 from flagdata.errors import NotFoundError
 from tests.studies.validation.environments import Environment
 
-_OFFLINE = {"HF_HUB_OFFLINE": "1", "HF_DATASETS_OFFLINE": "1", "CUDA_VISIBLE_DEVICES": "", "PATH": "/usr/bin:/bin"}
+_OFFLINE = {
+    "HF_HUB_OFFLINE": "1",
+    "HF_DATASETS_OFFLINE": "1",
+    "CUDA_VISIBLE_DEVICES": "",
+    "PATH": "/usr/bin:/bin",
+}
 
 
 def read_by(environment: Environment, script: str, *arguments: object, home: object) -> Any:
-    """What a script prints as JSON in its last line, run by an environment's Python; skips where that is absent.
+    """What a script prints as JSON in its last line, run by an environment's Python; skips where
+    that is absent.
 
     Args:
         home: a folder for what the program keeps.

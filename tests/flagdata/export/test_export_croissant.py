@@ -1,4 +1,5 @@
-"""croissant.json of every export: valid by the specification's own library, true of its files, and its tables read."""
+"""croissant.json of every export: valid by the specification's own library, true of its files, and
+its tables read."""
 
 from __future__ import annotations
 
@@ -27,8 +28,11 @@ def exported(known: Any, folder: Path, name: str, **options: Any) -> mlcroissant
 
 
 @pytest.mark.parametrize("name", OF_FILMS)
-def test_each_format_is_valid_and_names_its_files_with_size_and_hash(name: str, known: Any, tmp_path: Path) -> None:
-    """Raises ValidationError where the specification is broken; licence, address and creator are the publisher's."""
+def test_each_format_is_valid_and_names_its_files_with_size_and_hash(
+    name: str, known: Any, tmp_path: Path
+) -> None:
+    """Raises ValidationError where the specification is broken; licence, address and creator are
+    the publisher's."""
     dataset = exported(known, tmp_path / "out", name)
     assert not dataset.metadata.ctx.issues.errors
     stated = {
@@ -64,8 +68,12 @@ def test_samples_of_a_csv_are_read_with_their_wind(known: Any, tmp_path: Path) -
     assert speeds == pytest.approx(known.wind_speed.tolist(), abs=1e-12)
 
 
-def test_samples_of_webdataset_are_a_set_of_files_within_their_shard(known: Any, tmp_path: Path) -> None:
+def test_samples_of_webdataset_are_a_set_of_files_within_their_shard(
+    known: Any, tmp_path: Path
+) -> None:
     dataset = exported(known, tmp_path / "out", "webdataset")
     (shard, samples) = dataset.metadata.distribution
     assert (shard.encoding_formats, samples.includes) == (["application/x-tar"], ["*.json"])
-    assert [source.uuid if hasattr(source, "uuid") else source for source in samples.contained_in] == [shard.uuid]
+    assert [
+        source.uuid if hasattr(source, "uuid") else source for source in samples.contained_in
+    ] == [shard.uuid]

@@ -1,4 +1,5 @@
-"""What holds for every export format: a folder that is whole or absent, a manifest that is true, refusals."""
+"""What holds for every export format: a folder that is whole or absent, a manifest that is true,
+refusals."""
 
 from __future__ import annotations
 
@@ -54,7 +55,9 @@ def test_exporting_the_same_version_again_gives_the_same_bytes_and_progress_coun
     name: str, known: Any, tmp_path: Path
 ) -> None:
     """The manifest states the hash of each file."""
-    request = Export(format=name, where=CLIPS, options={"frames": "jpg"} if name == "parquet" else {})
+    request = Export(
+        format=name, where=CLIPS, options={"frames": "jpg"} if name == "parquet" else {}
+    )
     manifests = []
     for folder in ("a", "b"):
         done: list[int] = []
@@ -83,7 +86,9 @@ def test_a_failed_export_leaves_nothing_behind(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_killed_export_leaves_no_target_and_does_not_hinder_the_next(known: Any, tmp_path: Path) -> None:
+def test_a_killed_export_leaves_no_target_and_does_not_hinder_the_next(
+    known: Any, tmp_path: Path
+) -> None:
     code = """
 import os, signal, sys
 from pathlib import Path
@@ -98,7 +103,9 @@ def advance(count):
 
 export(Lake.open(sys.argv[1]), Export(format="mcap", where="kind = 'clip'"), Path(sys.argv[2]), advance=advance)
 """
-    killed = subprocess.run([sys.executable, "-c", code, str(known.lake.path), str(tmp_path / "out")], check=False)
+    killed = subprocess.run(
+        [sys.executable, "-c", code, str(known.lake.path), str(tmp_path / "out")], check=False
+    )
     assert killed.returncode == -signal.SIGKILL
     assert not (tmp_path / "out").exists()
     export(known.lake, Export(format="mcap", where=CLIPS), tmp_path / "out")
@@ -118,7 +125,8 @@ def test_a_target_made_meanwhile_is_not_replaced(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "options"), [("webdataset", {}), ("mp4", {}), ("mcap", {}), ("parquet", {"frames": "jpg"})]
+    ("name", "options"),
+    [("webdataset", {}), ("mp4", {}), ("mcap", {}), ("parquet", {"frames": "jpg"})],
 )
 def test_rows_that_a_format_cannot_hold_are_refused_with_the_filter_to_write(
     name: str, options: dict[str, str], tmp_path: Path
@@ -132,7 +140,9 @@ def test_rows_that_a_format_cannot_hold_are_refused_with_the_filter_to_write(
 
 
 @pytest.mark.parametrize("name", ["webdataset", "mp4", "mcap"])
-def test_bytes_that_have_changed_in_the_lake_do_not_leave_it(name: str, known: Any, tmp_path: Path) -> None:
+def test_bytes_that_have_changed_in_the_lake_do_not_leave_it(
+    name: str, known: Any, tmp_path: Path
+) -> None:
     shutil.copytree(known.lake.path, tmp_path / "lake")
     lake = Lake.open(tmp_path / "lake")
     stored = lake.object_path(lake.artifact(known.recording).object or "")
@@ -145,24 +155,47 @@ def test_bytes_that_have_changed_in_the_lake_do_not_leave_it(name: str, known: A
     assert [path.name for path in tmp_path.iterdir()] == ["lake"]
 
 
-NO_IDS = ("../elsewhere", "/elsewhere", "a/b", "..", ".hidden", "-x", "", "index", "a\nb", "A" * 32, "a" * 300, None)
+NO_IDS = (
+    "../elsewhere",
+    "/elsewhere",
+    "a/b",
+    "..",
+    ".hidden",
+    "-x",
+    "",
+    "index",
+    "a\nb",
+    "A" * 32,
+    "a" * 300,
+    None,
+)
 """What a catalog of somebody else may state in place of an id; files would be called by it."""
 
 
 @pytest.mark.parametrize("name", FORMATS)
-def test_an_id_that_could_name_a_file_elsewhere_leaves_no_lake(name: str, known: Any, tmp_path: Path) -> None:
-    row = known.lake.artifact(known.recording).row() | {"kind": min(Export(format=name).exporter().kinds).value}
+def test_an_id_that_could_name_a_file_elsewhere_leaves_no_lake(
+    name: str, known: Any, tmp_path: Path
+) -> None:
+    row = known.lake.artifact(known.recording).row() | {
+        "kind": min(Export(format=name).exporter().kinds).value
+    }
     table = known.lake.rows()
     for identity in NO_IDS:
-        rows = pa.concat_tables([table, pa.Table.from_pylist([row | {"artifact": identity}], schema=table.schema)])
+        rows = pa.concat_tables(
+            [table, pa.Table.from_pylist([row | {"artifact": identity}], schema=table.schema)]
+        )
         with pytest.raises(CorruptError, match="is not the id of an artifact") as error:
             ExportRows(lake=known.lake, rows=rows)
         assert repr(identity) in error.value.what
 
     shutil.copytree(known.lake.path, tmp_path / "lake")
     lake = Lake.open(tmp_path / "lake")
-    odd = pa.Table.from_pylist([row | {"artifact": "../elsewhere", "name": "odd"}], schema=catalog_schema())
-    lake.catalog.append(odd, base=lake.catalog.head(), info={"commit": "c" * 17, "branch": "main", "rows": "1"})
+    odd = pa.Table.from_pylist(
+        [row | {"artifact": "../elsewhere", "name": "odd"}], schema=catalog_schema()
+    )
+    lake.catalog.append(
+        odd, base=lake.catalog.head(), info={"commit": "c" * 17, "branch": "main", "rows": "1"}
+    )
     with pytest.raises(CorruptError, match="is not the id of an artifact"):
         export(lake, Export(format=name, where="name = 'odd'"), tmp_path / "out" / "of it")
     assert [path.name for path in tmp_path.iterdir()] == ["lake"]
@@ -170,13 +203,19 @@ def test_an_id_that_could_name_a_file_elsewhere_leaves_no_lake(name: str, known:
 
 
 @pytest.mark.parametrize("name", FORMATS)
-def test_an_artifact_that_a_catalog_has_twice_leaves_no_lake(name: str, known: Any, tmp_path: Path) -> None:
+def test_an_artifact_that_a_catalog_has_twice_leaves_no_lake(
+    name: str, known: Any, tmp_path: Path
+) -> None:
     shutil.copytree(known.lake.path, tmp_path / "lake")
     lake = Lake.open(tmp_path / "lake")
-    row = known.lake.artifact(known.recording).row() | {"kind": min(Export(format=name).exporter().kinds).value}
+    row = known.lake.artifact(known.recording).row() | {
+        "kind": min(Export(format=name).exporter().kinds).value
+    }
     twice = row | {"artifact": "0" * 32, "name": "twice"}
     rows = pa.Table.from_pylist([twice, twice | {"object_bytes": 1}], schema=catalog_schema())
-    lake.catalog.append(rows, base=lake.catalog.head(), info={"commit": "c" * 17, "branch": "main", "rows": "2"})
+    lake.catalog.append(
+        rows, base=lake.catalog.head(), info={"commit": "c" * 17, "branch": "main", "rows": "2"}
+    )
     with pytest.raises(CorruptError, match=f"two rows have the identity {'0' * 32} in the catalog"):
         export(lake, Export(format=name, where="name = 'twice'"), tmp_path / "out")
     assert [path.name for path in tmp_path.iterdir()] == ["lake"]

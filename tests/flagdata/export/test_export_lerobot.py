@@ -1,4 +1,5 @@
-"""LeRobot data sets, read back by LeRobot itself: each frame, instant and number is the one that was recorded."""
+"""LeRobot data sets, read back by LeRobot itself: each frame, instant and number is the one that
+was recorded."""
 
 from __future__ import annotations
 
@@ -47,14 +48,19 @@ print(json.dumps({
 
 @pytest.mark.parametrize("frames", ["png", "av1"])
 def test_lerobot_reads_back_every_frame_and_number(known: Any, tmp_path: Path, frames: str) -> None:
-    export(known.lake, Export(format="lerobot", where=CLIPS, options={"frames": frames}), tmp_path / "out")
+    export(
+        known.lake,
+        Export(format="lerobot", where=CLIPS, options={"frames": frames}),
+        tmp_path / "out",
+    )
     found = read_by(LEROBOT, READ, tmp_path / "out", home=tmp_path)
     assert (found["length"], found["episodes"], found["shape"]) == (90, 3, [3, 48, 64])
     assert found["time"] == known.times.tolist()
     assert found["episode"] == [0] * 30 + [1] * 30 + [2] * 30
     np.testing.assert_allclose(found["timestamp"], np.arange(90) % 30 / found["fps"], atol=1e-6)
-    # Means over the second that ended last: sample k of the log, at noon + k seconds, lies in the second that ends
-    # then or one later, so the mean is one sample's value, 3.0 m/s and 0.05 more each second.
+    # Means over the second that ended last: sample k of the log, at noon + k seconds, lies in the
+    # second that ends then or one later, so the mean is one sample's value, 3.0 m/s and 0.05 more
+    # each second.
     seconds = (known.times - known.wind_time[0]) / 1e9
     assert all(0 <= age < 1 for age in found["age"])
     steps = (np.array(found["wind"]) - 3.0) / 0.05
@@ -73,8 +79,14 @@ def test_lerobot_reads_back_every_frame_and_number(known: Any, tmp_path: Path, f
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only as root SVT-AV1 takes real-time priority")
-def test_an_export_of_films_leaves_the_process_the_priority_that_it_had(known: Any, tmp_path: Path) -> None:
-    export(known.lake, Export(format="lerobot", where=CLIPS, options={"frames": "av1"}), tmp_path / "out")
+def test_an_export_of_films_leaves_the_process_the_priority_that_it_had(
+    known: Any, tmp_path: Path
+) -> None:
+    export(
+        known.lake,
+        Export(format="lerobot", where=CLIPS, options={"frames": "av1"}),
+        tmp_path / "out",
+    )
     policies = set()
     for thread in Path("/proc/self/task").iterdir():
         with suppress(ProcessLookupError):  # it has ended since
@@ -82,17 +94,32 @@ def test_an_export_of_films_leaves_the_process_the_priority_that_it_had(known: A
     assert policies == {os.SCHED_OTHER}
 
 
-def test_identity_truth_and_clock_stand_in_the_table_of_episodes(known: Any, tmp_path: Path) -> None:
-    export(known.lake, Export(format="lerobot", where=CLIPS, options={"frames": "png"}), tmp_path / "out")
+def test_identity_truth_and_clock_stand_in_the_table_of_episodes(
+    known: Any, tmp_path: Path
+) -> None:
+    export(
+        known.lake,
+        Export(format="lerobot", where=CLIPS, options={"frames": "png"}),
+        tmp_path / "out",
+    )
     rows = pq.read_table(tmp_path / "out" / "meta" / "episodes").to_pylist()
     assert [row["flagdata/artifact"] for row in rows] == list(known.clips)
     assert [row["flagdata/wind"] for row in rows] == [3.5, 4.5, 5.5]
     assert [json.loads(row["flagdata/label"])["clock_offset"] for row in rows] == [7.0] * 3
-    assert [(row["dataset_from_index"], row["dataset_to_index"]) for row in rows] == [(0, 30), (30, 60), (60, 90)]
-    assert pq.ParquetFile(tmp_path / "out" / "data" / "chunk-000" / "file-000.parquet").num_row_groups == 3
+    assert [(row["dataset_from_index"], row["dataset_to_index"]) for row in rows] == [
+        (0, 30),
+        (30, 60),
+        (60, 90),
+    ]
+    assert (
+        pq.ParquetFile(tmp_path / "out" / "data" / "chunk-000" / "file-000.parquet").num_row_groups
+        == 3
+    )
 
 
-def test_a_film_with_a_gap_is_refused_since_lerobot_has_no_place_for_it(known: Any, tmp_path: Path) -> None:
+def test_a_film_with_a_gap_is_refused_since_lerobot_has_no_place_for_it(
+    known: Any, tmp_path: Path
+) -> None:
     # Frames 40 and 33.4 ms apart by turns keep to their mean rate; a rate of 25 Hz they leave.
     assert float(common_rate([27.3])) == pytest.approx(27.3, abs=1e-6)
     assert common_rate([24.9999, 25.0, 25.00001]) == 25

@@ -29,14 +29,18 @@ def folder(known: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def decoded(path: Path, topic: str) -> list[tuple[Any, Any]]:
     with path.open("rb") as stream:
         reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
-        return [(message, data) for _, _, message, data in reader.iter_decoded_messages(topics=[topic])]
+        return [
+            (message, data) for _, _, message, data in reader.iter_decoded_messages(topics=[topic])
+        ]
 
 
 def test_a_clip_holds_its_own_frames_and_no_other(known: Any, folder: Path) -> None:
     messages = decoded(folder / f"{known.clips[1]}.mcap", "/camera/image")
     assert [data.data for _, data in messages] == list(known.jpegs[30:60])
     assert [message.log_time for message, _ in messages] == known.times[30:60].tolist()
-    assert [message.publish_time for message, _ in messages] == (known.times[30:60] - 7_000_000_000).tolist()
+    assert [message.publish_time for message, _ in messages] == (
+        known.times[30:60] - 7_000_000_000
+    ).tolist()
     assert {data.format for _, data in messages} == {"jpeg"}
 
 
@@ -44,7 +48,8 @@ def test_a_clip_holds_its_own_frames_and_no_other(known: Any, folder: Path) -> N
 def test_a_clip_holds_the_wind_that_its_ground_truth_was_worked_out_from(
     known: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, history: float, before: int
 ) -> None:
-    # Ten minutes reach back beyond the log's start; half a minute is less than the truth window before the first frame.
+    # Ten minutes reach back beyond the log's start; half a minute is less than the truth window
+    # before the first frame.
     monkeypatch.setattr("flagdata.export.mcap.HISTORY", history)
     export(known.lake, Export(format="mcap"), tmp_path / "mcap")
     messages = decoded(tmp_path / "mcap" / f"{known.clips[1]}.mcap", "/wind/samples")
@@ -54,13 +59,17 @@ def test_a_clip_holds_the_wind_that_its_ground_truth_was_worked_out_from(
     assert [data.speed for _, data in messages] == known.wind_speed[wanted].tolist()
 
 
-def test_the_ground_truth_can_be_worked_out_again_from_the_clip_alone(known: Any, folder: Path) -> None:
+def test_the_ground_truth_can_be_worked_out_again_from_the_clip_alone(
+    known: Any, folder: Path
+) -> None:
     wind = Record.open(folder / f"{known.clips[1]}.mcap").wind()
     assert wind is not None
     end = int(known.times[59])
     inside = (known.wind_time > end - 60 * 10**9) & (known.wind_time <= end)
     # Equal spacing: the mean over the window is the plain mean of the samples in it.
-    assert TruthSeries.of(wind).before(end).wind == pytest.approx(float(np.mean(known.wind_speed[inside])), abs=1e-9)
+    assert TruthSeries.of(wind).before(end).wind == pytest.approx(
+        float(np.mean(known.wind_speed[inside])), abs=1e-9
+    )
 
 
 def test_lineage_and_metadata_are_kept(known: Any, folder: Path) -> None:
@@ -87,10 +96,14 @@ def test_the_project_s_own_reader_takes_a_subset_for_a_record(known: Any, folder
 
 
 def test_a_subset_is_smaller_than_the_record_it_was_cut_from(known: Any, folder: Path) -> None:
-    assert (folder / f"{known.clips[0]}.mcap").stat().st_size < (folder / f"{known.recording}.mcap").stat().st_size
+    assert (folder / f"{known.clips[0]}.mcap").stat().st_size < (
+        folder / f"{known.recording}.mcap"
+    ).stat().st_size
 
 
-def test_a_clip_of_h264_starts_at_a_key_frame_and_says_how_many_frames_lead_in(known: Any, tmp_path: Path) -> None:
+def test_a_clip_of_h264_starts_at_a_key_frame_and_says_how_many_frames_lead_in(
+    known: Any, tmp_path: Path
+) -> None:
     lake = Lake.create(tmp_path / "lake")
     with lake.transaction("an archived recording") as tx:
         path = tx.staging(".mcap")
@@ -100,7 +113,12 @@ def test_a_clip_of_h264_starts_at_a_key_frame_and_says_how_many_frames_lead_in(k
         name = tx.put(path)
         recording = Artifact(kind=Kind.RECORDING, name="archive", object=name)
         clip = Artifact(
-            kind=Kind.CLIP, name="clip", object=name, recording=recording.id, frame_first=40, frame_count=30
+            kind=Kind.CLIP,
+            name="clip",
+            object=name,
+            recording=recording.id,
+            frame_first=40,
+            frame_count=30,
         )
         tx.add(recording)
         tx.add(clip)

@@ -16,7 +16,9 @@ from flagdata.export import Export, export
 CLIPS = "kind = 'clip'"
 
 
-def test_the_catalog_reads_back_in_pandas_and_polars_with_its_values(known: Any, tmp_path: Path) -> None:
+def test_the_catalog_reads_back_in_pandas_and_polars_with_its_values(
+    known: Any, tmp_path: Path
+) -> None:
     export(known.lake, Export(format="parquet"), tmp_path / "out")
     frames = {
         "pandas": pd.read_parquet(tmp_path / "out" / "rows").sort_values("start"),
@@ -37,15 +39,26 @@ def test_the_catalog_reads_back_in_pandas_and_polars_with_its_values(known: Any,
 
 
 def test_units_are_in_the_fields_metadata(known: Any, tmp_path: Path) -> None:
-    export(known.lake, Export(format="parquet", where=CLIPS, options={"frames": "jpg"}), tmp_path / "out")
+    export(
+        known.lake,
+        Export(format="parquet", where=CLIPS, options={"frames": "jpg"}),
+        tmp_path / "out",
+    )
     schema = pq.read_schema(tmp_path / "out" / "rows" / "part-00000.parquet")
-    units = {name: (schema.field(name).metadata or {})[b"unit"] for name in ("wind", "start", "rate", "frame_times")}
+    units = {
+        name: (schema.field(name).metadata or {})[b"unit"]
+        for name in ("wind", "start", "rate", "frame_times")
+    }
     assert units == {"wind": b"m/s", "start": b"ns", "rate": b"Hz", "frame_times": b"ns"}
     assert (schema.field("wind").metadata or {})[b"about"]
 
 
 def test_frames_are_the_stored_bytes_with_their_instants(known: Any, tmp_path: Path) -> None:
-    export(known.lake, Export(format="parquet", where=CLIPS, options={"frames": "jpg"}), tmp_path / "out")
+    export(
+        known.lake,
+        Export(format="parquet", where=CLIPS, options={"frames": "jpg"}),
+        tmp_path / "out",
+    )
     table = pl.read_parquet(tmp_path / "out" / "rows" / "*.parquet").sort("start")
     assert table["frames"].to_list() == [list(known.jpegs[i : i + 30]) for i in (0, 30, 60)]
     assert table["frame_times"].to_list() == [known.times[i : i + 30].tolist() for i in (0, 30, 60)]

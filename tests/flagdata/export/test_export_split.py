@@ -21,7 +21,8 @@ SIDES = ("train", "validation", "test")
 
 @pytest.fixture(scope="module")
 def lake(tmp_path_factory: pytest.TempPathFactory) -> Lake:
-    """Twenty days with two recordings each, of two sessions; a session of its own spans days 3 and 4."""
+    """Twenty days with two recordings each, of two sessions; a session of its own spans days 3 and
+    4."""
     made = Lake.create(tmp_path_factory.mktemp("split") / "lake")
     with made.transaction("forty recordings") as tx:
         for number in range(40):
@@ -29,7 +30,10 @@ def lake(tmp_path_factory: pytest.TempPathFactory) -> Lake:
             session = "storm" if day in (3, 4) else f"session {number}"
             values = {"session": session, "day": f"2026-05-{day + 1:02d}"}
             recording = Artifact(
-                kind=Kind.RECORDING, name=f"recording {number}", source_hash=f"{number:064x}", **values
+                kind=Kind.RECORDING,
+                name=f"recording {number}",
+                source_hash=f"{number:064x}",
+                **values,
             )
             tx.add(recording)
             for first in (0, 30):
@@ -51,12 +55,16 @@ def lake(tmp_path_factory: pytest.TempPathFactory) -> Lake:
     return made
 
 
-def read(lake: Lake, folder: Path, side: str, *, where: str = "kind = 'clip'", salt: str = "") -> pl.DataFrame:
+def read(
+    lake: Lake, folder: Path, side: str, *, where: str = "kind = 'clip'", salt: str = ""
+) -> pl.DataFrame:
     export(lake, Export(format="parquet", where=where, split=side, salt=salt), folder)
     return pl.read_parquet(folder / "rows" / "*.parquet")
 
 
-def test_sides_share_no_recording_session_or_day_and_lose_no_clip(lake: Lake, tmp_path: Path) -> None:
+def test_sides_share_no_recording_session_or_day_and_lose_no_clip(
+    lake: Lake, tmp_path: Path
+) -> None:
     sides = {side: read(lake, tmp_path / side, side) for side in SIDES}
     for column in ("artifact", "recording", "session", "day"):
         held = [set(table[column]) for table in sides.values()]
@@ -67,7 +75,10 @@ def test_sides_share_no_recording_session_or_day_and_lose_no_clip(lake: Lake, tm
 def test_two_days_of_one_session_stay_together(lake: Lake, tmp_path: Path) -> None:
     storm = [side for side in SIDES if "storm" in set(read(lake, tmp_path / side, side)["session"])]
     assert len(storm) == 1
-    assert read(lake, tmp_path / "again", storm[0], where="kind = 'clip' and session = 'storm'").height == 8
+    assert (
+        read(lake, tmp_path / "again", storm[0], where="kind = 'clip' and session = 'storm'").height
+        == 8
+    )
 
 
 def test_recordings_go_where_their_clips_go(lake: Lake, tmp_path: Path) -> None:
@@ -79,7 +90,11 @@ def test_recordings_go_where_their_clips_go(lake: Lake, tmp_path: Path) -> None:
 
 def test_a_narrower_filter_moves_no_clip_to_another_side(lake: Lake, tmp_path: Path) -> None:
     whole = set(read(lake, tmp_path / "whole", "train")["artifact"])
-    half = set(read(lake, tmp_path / "half", "train", where="kind = 'clip' and day < '2026-05-11'")["artifact"])
+    half = set(
+        read(lake, tmp_path / "half", "train", where="kind = 'clip' and day < '2026-05-11'")[
+            "artifact"
+        ]
+    )
     assert half < whole
 
 
@@ -99,24 +114,40 @@ def test_a_split_of_rows_that_are_on_no_side_is_refused(tmp_path: Path) -> None:
 
 def test_an_unknown_side_is_answered_with_the_nearest(lake: Lake, tmp_path: Path) -> None:
     with pytest.raises(UnknownNameError, match="did you mean 'train'"):
-        export(lake, Export(format="parquet", where="kind = 'clip'", split="trian"), tmp_path / "out")
+        export(
+            lake, Export(format="parquet", where="kind = 'clip'", split="trian"), tmp_path / "out"
+        )
 
 
 def test_an_empty_side_is_an_error_that_names_it(tmp_path: Path) -> None:
     lake = Lake.create(tmp_path / "lake")
     with lake.transaction("one recording") as tx:
-        recording = Artifact(kind=Kind.RECORDING, name="only", source_hash="0" * 64, day="2026-05-01")
+        recording = Artifact(
+            kind=Kind.RECORDING, name="only", source_hash="0" * 64, day="2026-05-01"
+        )
         tx.add(recording)
-        only = Artifact(kind=Kind.CLIP, name="only", parents=(recording.id,), recording=recording.id, day="2026-05-01")
+        only = Artifact(
+            kind=Kind.CLIP,
+            name="only",
+            parents=(recording.id,),
+            recording=recording.id,
+            day="2026-05-01",
+        )
         tx.add(only)
     catalog = lake.table(lake.view(None))
     filled = [
-        side for side, on in divide(catalog, clips_of(catalog, None), hashed=HashedSplit()).artifacts.items() if on
+        side
+        for side, on in divide(
+            catalog, clips_of(catalog, None), hashed=HashedSplit()
+        ).artifacts.items()
+        if on
     ]
     assert len(filled) == 1
     for side in set(SIDES) - set(filled):
         with pytest.raises(NotFoundError, match=side):
-            export(lake, Export(format="parquet", where="kind = 'clip'", split=side), tmp_path / "out")
+            export(
+                lake, Export(format="parquet", where="kind = 'clip'", split=side), tmp_path / "out"
+            )
 
 
 def test_of_two_alignments_of_one_camera_and_wind_log_the_later_is_exported(tmp_path: Path) -> None:
@@ -129,15 +160,26 @@ def test_of_two_alignments_of_one_camera_and_wind_log_the_later_is_exported(tmp_
             tx.add(camera)
             tx.add(wind)
             recording = Artifact(
-                kind=Kind.RECORDING, name="pier", parents=(camera.id, wind.id), recipe={"offset": offset}
+                kind=Kind.RECORDING,
+                name="pier",
+                parents=(camera.id, wind.id),
+                recipe={"offset": offset},
             )
-            clip = Artifact(kind=Kind.CLIP, name="pier 0", parents=(recording.id,), recording=recording.id)
+            clip = Artifact(
+                kind=Kind.CLIP, name="pier 0", parents=(recording.id,), recording=recording.id
+            )
             tx.add(recording)
             tx.add(clip)
             aligned.append(clip)
     both = export(lake, Export(format="parquet", where="kind = 'clip'"), tmp_path / "both")
-    assert pl.read_parquet(tmp_path / "both" / "rows" / "*.parquet")["artifact"].to_list() == [aligned[1].id]
+    assert pl.read_parquet(tmp_path / "both" / "rows" / "*.parquet")["artifact"].to_list() == [
+        aligned[1].id
+    ]
     assert both.manifest["superseded"] == {aligned[0].recording: aligned[1].recording}
-    named = Export(format="parquet", where=f"kind = 'clip' and recording = '{aligned[0].recording}'")
+    named = Export(
+        format="parquet", where=f"kind = 'clip' and recording = '{aligned[0].recording}'"
+    )
     export(lake, named, tmp_path / "old")
-    assert pl.read_parquet(tmp_path / "old" / "rows" / "*.parquet")["artifact"].to_list() == [aligned[0].id]
+    assert pl.read_parquet(tmp_path / "old" / "rows" / "*.parquet")["artifact"].to_list() == [
+        aligned[0].id
+    ]

@@ -26,15 +26,25 @@ def read(folder: Path) -> list[dict[str, Any]]:
         return list(webdataset.WebDataset(shards, shardshuffle=False).decode("l8"))
 
 
-def test_webdataset_gives_back_ground_truth_identity_and_instants(known: Any, tmp_path: Path) -> None:
+def test_webdataset_gives_back_ground_truth_identity_and_instants(
+    known: Any, tmp_path: Path
+) -> None:
     export(known.lake, Export(format="webdataset", where=CLIPS), tmp_path / "out")
     samples = read(tmp_path / "out")
     assert [sample["__key__"] for sample in samples] == list(known.clips)
     for number, sample in enumerate(samples):
         label = sample["json"]
-        assert (label["wind"], label["wind_sigma"], label["clock_sigma"]) == (3.5 + number, 0.125, 0.02)
+        assert (label["wind"], label["wind_sigma"], label["clock_sigma"]) == (
+            3.5 + number,
+            0.125,
+            0.02,
+        )
         assert label["artifact"] == known.clips[number]
-        assert (label["recording"], label["session"], label["day"]) == (known.recording, "pier", "2026-05-01")
+        assert (label["recording"], label["session"], label["day"]) == (
+            known.recording,
+            "pier",
+            "2026-05-01",
+        )
         assert label["frame_times"] == known.times[30 * number : 30 * number + 30].tolist()
     assert samples[0]["json"]["parameters"] == {"area_weight": 0.2}
     assert samples[1]["json"]["parameters"] is None
@@ -46,14 +56,22 @@ def test_webdataset_gives_back_ground_truth_identity_and_instants(known: Any, tm
 def test_jpg_members_are_the_stored_bytes_in_order(known: Any, tmp_path: Path) -> None:
     export(known.lake, Export(format="webdataset", where=CLIPS), tmp_path / "out")
     with tarfile.open(tmp_path / "out" / "clip-000000.tar") as tar:
-        names = [name for name in tar.getnames() if name.startswith(known.clips[1]) and name.endswith(".jpg")]
+        names = [
+            name
+            for name in tar.getnames()
+            if name.startswith(known.clips[1]) and name.endswith(".jpg")
+        ]
         stored = [tar.extractfile(name).read() for name in names]  # type: ignore[union-attr]
     assert names == sorted(names)
     assert stored == list(known.jpegs[30:60])
 
 
 def test_decoded_frames_are_the_pictures_that_were_recorded(known: Any, tmp_path: Path) -> None:
-    export(known.lake, Export(format="webdataset", where=CLIPS, options={"frames": "npy"}), tmp_path / "npy")
+    export(
+        known.lake,
+        Export(format="webdataset", where=CLIPS, options={"frames": "npy"}),
+        tmp_path / "npy",
+    )
     export(known.lake, Export(format="webdataset", where=CLIPS), tmp_path / "jpg")
     arrays = np.stack([sample["npy"] for sample in read(tmp_path / "npy")])
     assert arrays.shape == (3, 30, 48, 64)
@@ -78,7 +96,9 @@ def test_shards_are_bounded_and_together_hold_every_sample_once(known: Any, tmp_
     assert sum(shard["samples"] for shard in manifest["shards"]) == 3
 
 
-def test_a_sample_that_fits_no_shard_is_refused_and_leaves_nothing(known: Any, tmp_path: Path) -> None:
+def test_a_sample_that_fits_no_shard_is_refused_and_leaves_nothing(
+    known: Any, tmp_path: Path
+) -> None:
     request = Export(format="webdataset", where=CLIPS, options={"shard_bytes": 20_480})
     with pytest.raises(LimitError, match="larger than a shard"):
         export(known.lake, request, tmp_path / "out")
@@ -89,9 +109,17 @@ def test_shuffling_is_by_seed_and_loses_no_sample(known: Any, tmp_path: Path) ->
     orders = []
     for seed in range(8):
         folder = tmp_path / str(seed)
-        export(known.lake, Export(format="webdataset", where=CLIPS, options={"shuffle": seed}), folder)
+        export(
+            known.lake, Export(format="webdataset", where=CLIPS, options={"shuffle": seed}), folder
+        )
         orders.append(tuple(sample["__key__"] for sample in read(folder)))
     assert all(sorted(order) == sorted(known.clips) for order in orders)
     assert len(set(orders)) > 1
-    export(known.lake, Export(format="webdataset", where=CLIPS, options={"shuffle": 3}), tmp_path / "again")
-    assert (tmp_path / "again" / "clip-000000.tar").read_bytes() == (tmp_path / "3" / "clip-000000.tar").read_bytes()
+    export(
+        known.lake,
+        Export(format="webdataset", where=CLIPS, options={"shuffle": 3}),
+        tmp_path / "again",
+    )
+    assert (tmp_path / "again" / "clip-000000.tar").read_bytes() == (
+        tmp_path / "3" / "clip-000000.tar"
+    ).read_bytes()

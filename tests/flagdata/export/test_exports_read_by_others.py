@@ -54,7 +54,11 @@ print(json.dumps({"time": found["/camera/image"]["time"], "device": found["/came
 
 
 def test_hugging_face_loads_the_parquet_export_with_its_frames(known: Any, tmp_path: Path) -> None:
-    export(known.lake, Export(format="parquet", where=CLIPS, options={"frames": "jpg"}), tmp_path / "out")
+    export(
+        known.lake,
+        Export(format="parquet", where=CLIPS, options={"frames": "jpg"}),
+        tmp_path / "out",
+    )
     rows = read_by(DATASETS, PARQUET, tmp_path / "out", tmp_path / "cache", home=tmp_path)
     assert rows == [
         [
@@ -71,15 +75,21 @@ def test_hugging_face_loads_the_parquet_export_with_its_frames(known: Any, tmp_p
 def test_hugging_face_streams_the_webdataset_export(known: Any, tmp_path: Path) -> None:
     export(known.lake, Export(format="webdataset", where=CLIPS), tmp_path / "out")
     rows = read_by(DATASETS, SHARDS, tmp_path / "out", home=tmp_path)
-    assert [(key, wind) for key, wind, _, _ in rows] == [(known.clips[n], 3.5 + n) for n in range(3)]
-    assert [times for _, _, times, _ in rows] == [known.times[30 * n : 30 * n + 30].tolist() for n in range(3)]
+    assert [(key, wind) for key, wind, _, _ in rows] == [
+        (known.clips[n], 3.5 + n) for n in range(3)
+    ]
+    assert [times for _, _, times, _ in rows] == [
+        known.times[30 * n : 30 * n + 30].tolist() for n in range(3)
+    ]
     for n, (_, _, _, pictures) in enumerate(rows):
         for k, (size, gray) in enumerate(pictures):
             assert size == [64, 48]
             assert abs(gray - int(known.images[30 * n + k, 0, 0])) <= 3  # JPEG at quality 95
 
 
-def test_rerun_shows_frames_on_both_clocks_and_the_samples_of_the_wind(known: Any, tmp_path: Path) -> None:
+def test_rerun_shows_frames_on_both_clocks_and_the_samples_of_the_wind(
+    known: Any, tmp_path: Path
+) -> None:
     export(known.lake, Export(format="mcap", where="kind = 'recording'"), tmp_path / "out")
     found = read_by(DATASETS, RERUN, tmp_path / "out" / f"{known.recording}.mcap", home=tmp_path)
     assert found["time"] == known.times.tolist()

@@ -1,4 +1,5 @@
-"""Drafted readings of logs enter only when somebody confirmed them, and what was understood is part of the identity."""
+"""Drafted readings of logs enter only when somebody confirmed them, and what was understood is part
+of the identity."""
 
 from __future__ import annotations
 
@@ -34,7 +35,9 @@ from tests.program import Run, invoke
 
 ROWS = [f"14.05.2026;11:30:{k:02d};{18 + k % 7},4;{200 + k}" for k in range(30)]
 TABLE = "\n".join(["Date;Time;Speed [km/h];Dir [deg]", *ROWS]) + "\n"
-STATED = "time,wind_speed (m/s)\n" + "".join(f"2026-05-01T12:00:{k:02d}Z,{5 + k % 3}.5\n" for k in range(30))
+STATED = "time,wind_speed (m/s)\n" + "".join(
+    f"2026-05-01T12:00:{k:02d}Z,{5 + k % 3}.5\n" for k in range(30)
+)
 ZONED = WindIngest(wind=WindOptions(zone="+02:00"))
 
 
@@ -73,7 +76,9 @@ def test_without_a_terminal_a_draft_ends_with_3_and_both_ways_out_and_nothing_is
     assert "14.05.2026;11:30:00;18,4;200  →  2026-05-14T09:30:00Z  5.11 m/s from 200°" in err
 
 
-def test_the_hash_that_the_refusal_shows_confirms_the_draft_and_no_other(run: Run, lake: Lake, table: Path) -> None:
+def test_the_hash_that_the_refusal_shows_confirms_the_draft_and_no_other(
+    run: Run, lake: Lake, table: Path
+) -> None:
     refused = json.loads(run("ingest", table, "--zone", "+02:00", "--json")[1])
     assert (refused["kind"], "5.11 m/s" in refused["preview"]) == ("unconfirmed", True)
     accept = ("--accept", refused["accept"])
@@ -84,16 +89,22 @@ def test_the_hash_that_the_refusal_shows_confirms_the_draft_and_no_other(run: Ru
     table.write_text(TABLE)
     code, out, err = run("ingest", table, "--zone", "+02:00", *accept, "--json")
     assert code == 0, err
-    assert json.loads(out)["results"][0]["report"]["confirmed"] == f"accepted as {refused['accept']}"
+    assert (
+        json.loads(out)["results"][0]["report"]["confirmed"] == f"accepted as {refused['accept']}"
+    )
 
 
-def test_a_draft_that_was_confirmed_is_found_again_without_a_question(lake: Lake, table: Path) -> None:
+def test_a_draft_that_was_confirmed_is_found_again_without_a_question(
+    lake: Lake, table: Path
+) -> None:
     first = ingest_wind(lake, table, ZONED, confirm=CONFIRMED)
     again = ingest_wind(lake, table, ZONED)
     assert (again.created, again.artifact.id) == (False, first.artifact.id)
 
 
-def test_at_a_terminal_the_zone_is_typed_and_a_row_confirmed(run: Run, lake: Lake, table: Path, types) -> None:
+def test_at_a_terminal_the_zone_is_typed_and_a_row_confirmed(
+    run: Run, lake: Lake, table: Path, types
+) -> None:
     types("Mars\n+02:00\ny\nyes\n")
     code, _, err = run("ingest", table)
     assert code == 0, err
@@ -130,9 +141,13 @@ def test_a_table_that_states_all_of_itself_needs_no_question(lake: Lake, tmp_pat
 )
 def test_what_one_thing_of_is_inferred_is_a_draft(tmp_path: Path, heading: str, rows: str) -> None:
     path = tmp_path / "mast.csv"
-    path.write_text(heading + "\n" + "".join(rows.format(k=k, v=4 + k % 3) + "\n" for k in range(30)))
+    path.write_text(
+        heading + "\n" + "".join(rows.format(k=k, v=4 + k % 3) + "\n" for k in range(30))
+    )
     zone = None if "Z" in rows else "UTC"
-    log = read_log(path, WindOptions(zone=zone, unit="m/s" if heading == "time,wind_speed" else None))
+    log = read_log(
+        path, WindOptions(zone=zone, unit="m/s" if heading == "time,wind_speed" else None)
+    )
     known = {"time,wind_speed", "time,wind_speed (m/s),gust (m/s)", "time,wind_speed (m/s)"}
     assert log.stated == (heading in known and "/2026" not in rows)
 
@@ -160,12 +175,18 @@ def test_close_loop_asks_at_a_terminal_what_a_log_leaves_open_as_ingest_does(
     types("+02:00\nyes\n")
     wind, found = from_log(table, placement, confirm=commands.on_command_line(None, as_json=False))
     np.testing.assert_allclose(wind.velocity[0], [18.4 / 3.6, 0, 0])
-    assert [one.what for one in found if one.kind == "answers-given"] == ["given at the terminal: zone +02:00"]
+    assert [one.what for one in found if one.kind == "answers-given"] == [
+        "given at the terminal: zone +02:00"
+    ]
 
 
-def test_an_exact_format_that_lacks_its_zone_alone_asks_for_it_with_both_ways_out(run: Run, tmp_path: Path) -> None:
+def test_an_exact_format_that_lacks_its_zone_alone_asks_for_it_with_both_ways_out(
+    run: Run, tmp_path: Path
+) -> None:
     path = tmp_path / "kestrel.csv"
-    rows = "".join(f"2026-05-14 11:30:{k:02d},21.3,48.2,{5 + k % 3}.2,{220 + k}\n" for k in range(30))
+    rows = "".join(
+        f"2026-05-14 11:30:{k:02d},21.3,48.2,{5 + k % 3}.2,{220 + k}\n" for k in range(30)
+    )
     path.write_text(
         "Device Name,KESTREL - 2412345\nDevice Model,5500\nSerial Number,2412345\n"
         "FORMATTED DATE_TIME,Temperature,Relative Humidity,Wind Speed,Direction - True\n"
@@ -181,19 +202,27 @@ def test_a_table_of_several_sites_is_refused_with_the_lines_of_the_recipe_that_r
     run: Run, lake: Lake, tmp_path: Path
 ) -> None:
     path = tmp_path / "masts.csv"
-    rows = [f"2026-05-01T12:00:{k:02d}Z,{mast},{v + k % 3}.5" for k in range(30) for mast, v in (("A", 4), ("B", 9))]
+    rows = [
+        f"2026-05-01T12:00:{k:02d}Z,{mast},{v + k % 3}.5"
+        for k in range(30)
+        for mast, v in (("A", 4), ("B", 9))
+    ]
     path.write_text("\n".join(["time,site,wind_speed (m/s)", *rows]) + "\n")
     code, _, err = run("ingest", path)
     assert code == 3
     lines = '[rows]\ncolumn = "site"\nvalue = "A"\n'
     assert indent(lines, "  ") in err
     recipe = tmp_path / "mast-a.toml"
-    drafted = json.loads(run("ingest", "--sniff", path, "--json")[1])["sources"][0]["guesses"][0]["draft"]
+    drafted = json.loads(run("ingest", "--sniff", path, "--json")[1])["sources"][0]["guesses"][0][
+        "draft"
+    ]
     recipe.write_text(f"{drafted}\n{lines}")
     assert run("ingest", path, "--sensor", recipe)[0] == 0
     (row,) = lake.rows().to_pylist()
     assert json.loads(row["report"])["samples"] == 30
-    assert json.loads(row["report"])["mean_speed"] == pytest.approx(5.5)  # of mast A; of mast B it is 10.5
+    assert json.loads(row["report"])["mean_speed"] == pytest.approx(
+        5.5
+    )  # of mast A; of mast B it is 10.5
 
 
 def test_the_preview_shows_what_was_lost(tmp_path: Path) -> None:
@@ -223,7 +252,9 @@ def test_two_drafts_that_differ_are_two_artifacts_and_the_second_names_the_first
 ) -> None:
     right = read_log(table, ZONED.wind)
     monkeypatch.setattr(
-        source_artifacts, "read_log", lambda path, options: _understood(right, factor=3.6, drafted="as m/s")
+        source_artifacts,
+        "read_log",
+        lambda path, options: _understood(right, factor=3.6, drafted="as m/s"),
     )
     wrong = ingest_wind(lake, table, ZONED, confirm=CONFIRMED)
     monkeypatch.undo()
@@ -245,7 +276,9 @@ def _of_an_older_version(lake: Lake, path: Path, options: WindIngest) -> str:
     return older.id
 
 
-def test_a_log_that_an_older_version_read_alike_is_in_the_lake_already(lake: Lake, table: Path, tmp_path: Path) -> None:
+def test_a_log_that_an_older_version_read_alike_is_in_the_lake_already(
+    lake: Lake, table: Path, tmp_path: Path
+) -> None:
     recipe = tmp_path / "mast.toml"
     recipe.write_text(read_log(table, ZONED.wind).drafted)
     options = WindIngest(wind=WindOptions(recipe=str(recipe), zone="+02:00"))

@@ -1,4 +1,5 @@
-"""Data sets of other programs are examined before they come in: order, rates, gaps, and what would be lost."""
+"""Data sets of other programs are examined before they come in: order, rates, gaps, and what would
+be lost."""
 
 from __future__ import annotations
 
@@ -55,7 +56,9 @@ def test_order_rate_gaps_and_losses_of_topics_are_reported(write_json: Callable[
 def test_an_instant_that_64_bits_do_not_hold_is_damage_of_its_topic(
     write_json: Callable[..., Path], instant: dict[str, int]
 ) -> None:
-    path = write_json({"/far": [{"timestamp": instant, "x": 1.0}], "/even": [{"timestamp": at(0), "x": 1.0}]})
+    path = write_json(
+        {"/far": [{"timestamp": instant, "x": 1.0}], "/even": [{"timestamp": at(0), "x": 1.0}]}
+    )
     found = examine(path)
     assert [one.name for one in found.streams] == ["/even"]
     assert [(one.kind, one.where) for one in found.findings if one.severity is Severity.ERROR] == [
@@ -70,21 +73,29 @@ def test_messages_that_are_stated_and_not_there_are_damage_of_their_topic(
     monkeypatch.setattr(topics, "messages", lambda *_, **__: iter(()))
     found = examine(path)
     assert found.streams == ()
-    assert [one.kind for one in found.findings if one.severity is Severity.ERROR] == ["topic-unread"]
+    assert [one.kind for one in found.findings if one.severity is Severity.ERROR] == [
+        "topic-unread"
+    ]
 
 
 def test_a_message_whose_channel_is_not_in_the_summary_is_damage(
     write_json: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = write_json({"/odd": [{"x": 1.0}]})
-    monkeypatch.setattr(topics, "_from_json", lambda data: {}[data])  # KeyError, as the mcap library raises it
+    monkeypatch.setattr(
+        topics, "_from_json", lambda data: {}[data]
+    )  # KeyError, as the mcap library raises it
     with pytest.raises(CorruptError, match="damaged or cut off"):
         list(topics.messages(path, "/odd"))
 
 
 def test_a_lerobot_data_set_is_examined_by_its_episodes(known: Any, tmp_path: Path) -> None:
     folder = tmp_path / "set"
-    export(known.lake, Export(format="lerobot", where="kind = 'clip'", options={"frames": "png"}), folder)
+    export(
+        known.lake,
+        Export(format="lerobot", where="kind = 'clip'", options={"frames": "png"}),
+        folder,
+    )
     found = examine(folder)
     assert [one.name for one in found.streams] == ["episode 0", "episode 1", "episode 2"]
     assert {finding.kind for finding in found.findings} == {"lost-colour", "lost-features"}
@@ -97,9 +108,15 @@ def test_a_lerobot_data_set_is_examined_by_its_episodes(known: Any, tmp_path: Pa
     assert {"lost-instants", "timing-uneven", "episodes-missing", "files-missing"} <= kinds
 
 
-def test_what_an_operating_system_puts_beside_tables_is_no_table_of_a_data_set(known: Any, tmp_path: Path) -> None:
+def test_what_an_operating_system_puts_beside_tables_is_no_table_of_a_data_set(
+    known: Any, tmp_path: Path
+) -> None:
     folder = tmp_path / "set"
-    export(known.lake, Export(format="lerobot", where="kind = 'clip'", options={"frames": "png"}), folder)
+    export(
+        known.lake,
+        Export(format="lerobot", where="kind = 'clip'", options={"frames": "png"}),
+        folder,
+    )
     whole = examine(folder)
     for path in list(folder.rglob("*.parquet")):
         path.with_name(f"._{path.name}").write_bytes(b"\0\5\x16\7 beside")
@@ -108,9 +125,15 @@ def test_what_an_operating_system_puts_beside_tables_is_no_table_of_a_data_set(k
         assert len(list(stream)) > 0
 
 
-def test_the_command_exits_with_3_where_there_is_something_to_act_on(write_json: Callable[..., Path]) -> None:
-    even = write_json({"/even": [{"timestamp": at(k / 10), "x": 1.0} for k in range(20)]}, name="even.mcap")
-    back = write_json({"/back": [{"timestamp": at(-k / 10), "x": 1.0} for k in range(20)]}, name="back.mcap")
+def test_the_command_exits_with_3_where_there_is_something_to_act_on(
+    write_json: Callable[..., Path],
+) -> None:
+    even = write_json(
+        {"/even": [{"timestamp": at(k / 10), "x": 1.0} for k in range(20)]}, name="even.mcap"
+    )
+    back = write_json(
+        {"/back": [{"timestamp": at(-k / 10), "x": 1.0} for k in range(20)]}, name="back.mcap"
+    )
     run = CliRunner()
     sound = run.invoke(root, ["doctor", str(even)])
     assert sound.exit_code == 0

@@ -1,4 +1,5 @@
-"""From a source file to an artifact: identity, provenance, and a lake that is unchanged by what fails."""
+"""From a source file to an artifact: identity, provenance, and a lake that is unchanged by what
+fails."""
 
 from __future__ import annotations
 
@@ -34,18 +35,32 @@ START = 1_777_629_600_000_000_000  # 2026-05-01T10:00:00Z
 
 def _everything(lake: Lake) -> list[str]:
     return sorted(
-        str(p.relative_to(lake.path)) for p in lake.path.rglob("*") if p.is_file() and "staging" not in p.parts
+        str(p.relative_to(lake.path))
+        for p in lake.path.rglob("*")
+        if p.is_file() and "staging" not in p.parts
     )
 
 
-def test_a_camera_file_becomes_one_row_and_one_record_on_its_own_clock(lake: Lake, video: Path) -> None:
+def test_a_camera_file_becomes_one_row_and_one_record_on_its_own_clock(
+    lake: Lake, video: Path
+) -> None:
     result = ingest_camera(lake, video, labels=Labels(session="field-1"))
     assert result.created
     row = lake.rows().to_pylist()[0]
-    assert (row["kind"], row["name"], row["session"], row["day"]) == ("camera", "field", "field-1", "2026-05-01")
+    assert (row["kind"], row["name"], row["session"], row["day"]) == (
+        "camera",
+        "field",
+        "field-1",
+        "2026-05-01",
+    )
     assert (row["source_name"], row["source_hash"]) == ("field.mp4", file_hash(video))
     # 100 frames at 50 Hz last from 0 to 1.98 s; at 25 Hz that is every second frame, 0 to 1.96 s.
-    assert (row["frame_count"], row["rate"], row["start"], row["end"]) == (50, 25.0, START, START + 1_960_000_000)
+    assert (row["frame_count"], row["rate"], row["start"], row["end"]) == (
+        50,
+        25.0,
+        START,
+        START + 1_960_000_000,
+    )
     record = Record.open(lake.object_path(row["object"]))
     np.testing.assert_array_equal(record.frame_times, START + 40_000_000 * np.arange(50))
     np.testing.assert_array_equal(record.device_frame_times, record.frame_times)
@@ -68,7 +83,12 @@ def test_the_frames_stored_are_the_frames_of_the_stream(lake: Lake, video: Path)
 def test_a_log_becomes_one_row_with_the_vendor_file_attached(lake: Lake, wind_log: Path) -> None:
     result = ingest_wind(lake, wind_log)
     row = lake.rows().to_pylist()[0]
-    assert (row["kind"], row["name"], row["rate"], row["frame_count"]) == ("wind", "mast", 1.0, None)
+    assert (row["kind"], row["name"], row["rate"], row["frame_count"]) == (
+        "wind",
+        "mast",
+        1.0,
+        None,
+    )
     assert (row["start"], row["end"]) == (START, START + 119_000_000_000)
     record = Record.open(lake.object_path(row["object"]))
     assert record.attachment("mast.csv") == wind_log.read_bytes()
@@ -114,9 +134,14 @@ def test_other_options_are_another_artifact(lake: Lake, video: Path) -> None:
     assert len({whole.artifact.id, cropped.artifact.id, archived.artifact.id}) == 3
 
 
-def test_a_file_that_is_read_by_other_options_names_the_one_before(lake: Lake, tmp_path: Path) -> None:
+def test_a_file_that_is_read_by_other_options_names_the_one_before(
+    lake: Lake, tmp_path: Path
+) -> None:
     path = tmp_path / "mast.csv"
-    path.write_text("time,wind_speed (m/s)\n" + "".join(f"2026-05-01 12:00:{k:02d},{5 + k % 3}\n" for k in range(60)))
+    path.write_text(
+        "time,wind_speed (m/s)\n"
+        + "".join(f"2026-05-01 12:00:{k:02d},{5 + k % 3}\n" for k in range(60))
+    )
     wrong = ingest_wind(lake, path, WindIngest(wind=WindOptions(zone="UTC")))
     right = ingest_wind(lake, path, WindIngest(wind=WindOptions(zone="+02:00")))
     (found,) = [found for found in right.report["findings"] if found["kind"] == "ingested-before"]
@@ -176,13 +201,17 @@ def test_a_session_for_an_artifact_without_one_is_refused(lake: Lake, wind_log: 
         ingest_wind(lake, wind_log, labels=Labels(session="field-1"))
 
 
-def test_the_same_ingest_in_two_lakes_gives_the_same_object(tmp_path: Path, video: Path, wind_log: Path) -> None:
+def test_the_same_ingest_in_two_lakes_gives_the_same_object(
+    tmp_path: Path, video: Path, wind_log: Path
+) -> None:
     lakes = [Lake.create(tmp_path / name) for name in ("a", "b")]
     assert len({ingest_camera(lake, video).artifact.object for lake in lakes}) == 1
     assert len({ingest_wind(lake, wind_log).artifact.object for lake in lakes}) == 1
 
 
-def test_a_recipe_file_counts_by_its_content_and_is_attached(lake: Lake, wind_log: Path, tmp_path: Path) -> None:
+def test_a_recipe_file_counts_by_its_content_and_is_attached(
+    lake: Lake, wind_log: Path, tmp_path: Path
+) -> None:
     recipe = tmp_path / "mine.toml"
     text = """
 name = "mine"
@@ -237,7 +266,9 @@ def test_a_source_that_changes_while_it_is_read_is_refused(lake: Lake, tmp_path:
     assert lake.rows().num_rows == 0
 
 
-def test_a_missing_start_is_a_time_error_and_a_missing_file_is_named(lake: Lake, tmp_path: Path) -> None:
+def test_a_missing_start_is_a_time_error_and_a_missing_file_is_named(
+    lake: Lake, tmp_path: Path
+) -> None:
     with pytest.raises(TimeError, match="--start"):
         ingest_camera(lake, write_video(tmp_path / "a.mp4", creation_time=None))
     with pytest.raises((InputError, NotFoundError), match="nothing"):
@@ -251,13 +282,17 @@ def test_a_log_over_the_attachment_limit_is_ingested_and_says_so(
     result = ingest_wind(lake, wind_log)
     assert "log-not-attached" in result.artifact.quality
     assert result.artifact.object is not None
-    assert Record.open(lake.object_path(result.artifact.object)).attachments == ("drafted.recipe.toml",)
+    assert Record.open(lake.object_path(result.artifact.object)).attachments == (
+        "drafted.recipe.toml",
+    )
 
 
 def test_a_crop_from_motion_is_attached_as_a_picture(lake: Lake, video: Path) -> None:
     artifact = ingest_camera(lake, video, CameraIngest(camera=CameraOptions(crop="auto"))).artifact
     assert artifact.object is not None
-    picture = Record.open(lake.object_path(artifact.object)).attachment(source_artifacts.CROP_PICTURE)
+    picture = Record.open(lake.object_path(artifact.object)).attachment(
+        source_artifacts.CROP_PICTURE
+    )
     assert picture.startswith(b"\x89PNG")
 
 

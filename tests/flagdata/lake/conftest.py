@@ -22,7 +22,10 @@ from flagdata.storage import Place
 
 AGES = "it sets the age of files, which a store gives them itself"
 LINKS = "a bucket has no links, pipes and permissions of files"
-LOCKS = "a bucket has no locks of the kernel; `test_leases_in_a_bucket.py` has those that it has instead"
+LOCKS = (
+    "a bucket has no locks of the kernel; `test_leases_in_a_bucket.py` has those that it has "
+    "instead"
+)
 """Why a test is marked `disk`."""
 _WORKER = Path(__file__).with_name("ingest_worker.py")
 _ENDS = {"done", "failed", "killed"}
@@ -36,19 +39,30 @@ def dead_owner() -> dict[str, object]:
     return {**lake_locks.owner(), "pid": process.pid, "started": started}
 
 
-def put_text(lake: Lake, text: str, *, branch: str = "main", parents: tuple[str, ...] = ()) -> Artifact:
+def put_text(
+    lake: Lake, text: str, *, branch: str = "main", parents: tuple[str, ...] = ()
+) -> Artifact:
     """Commits one row whose object is a small text."""
     with lake.transaction(f"ingest {text}", branch=branch) as tx:
         path = tx.staging(".mcap")
         path.write_text(text)
         name = tx.put(path)
-        artifact = Artifact(kind=Kind.WIND, name=text, object=name, source_hash=name.partition("/")[2], parents=parents)
+        artifact = Artifact(
+            kind=Kind.WIND,
+            name=text,
+            object=name,
+            source_hash=name.partition("/")[2],
+            parents=parents,
+        )
         tx.add(artifact)
     return artifact
 
 
-def put_older_ref(lake: Lake, kind: str, name: str, *, created: str = "2026-05-14T09:30:00+00:00") -> Place:
-    """Makes a tag or branch from the head of main, as versions of flagdata did whose refs were files alone."""
+def put_older_ref(
+    lake: Lake, kind: str, name: str, *, created: str = "2026-05-14T09:30:00+00:00"
+) -> Place:
+    """Makes a tag or branch from the head of main, as versions of flagdata did whose refs were
+    files alone."""
     content: dict[str, object] = {
         "schema": "flagdata.ref/1",
         "name": name,
@@ -56,7 +70,9 @@ def put_older_ref(lake: Lake, kind: str, name: str, *, created: str = "2026-05-1
         "view": [{"branch": "main", "version": lake.catalog.head()}],
     }
     path = lake.refs.root / kind / f"{name}.json"
-    path.write_bytes((json.dumps({**content, "sha256": recipe_hash(content)}, indent=2) + "\n").encode())
+    path.write_bytes(
+        (json.dumps({**content, "sha256": recipe_hash(content)}, indent=2) + "\n").encode()
+    )
     return path
 
 
@@ -128,7 +144,8 @@ class Worker:
 
 @pytest.fixture
 def start_worker(lake: Lake, tmp_path: Path) -> Iterator[Callable[..., Worker]]:
-    """Starts a process that ingests, given its name and how many sources of its own and shared ones."""
+    """Starts a process that ingests, given its name and how many sources of its own and shared
+    ones."""
     workers: list[Worker] = []
     command = [sys.executable, str(_WORKER), str(lake.path)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, text=True) as server:

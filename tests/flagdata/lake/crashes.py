@@ -1,9 +1,10 @@
 """A process that dies before its next step on the disk or in the store, and what it had flushed.
 
-Each step is a call by which something becomes durable or goes: of the operating system for a lake in a folder, of
-`RemotePath` for one in a bucket. `dying` counts them and raises `Killed` at one. From then on each further step raises
-too, so that no `finally` of the product mends what a process that is gone would not; only what the kernel does for a
-dead process, it drops its locks, is left to the end of the block.
+Each step is a call by which something becomes durable or goes: of the operating system for a lake
+in a folder, of `RemotePath` for one in a bucket. `dying` counts them and raises `Killed` at one.
+From then on each further step raises too, so that no `finally` of the product mends what a process
+that is gone would not; only what the kernel does for a dead process, it drops its locks, is left to
+the end of the block.
 """
 
 from __future__ import annotations
@@ -107,7 +108,10 @@ def _stepping(steps: Steps, call: Callable[..., Any], name: str) -> Callable[...
     def stepping(*arguments: Any, **named: Any) -> Any:
         steps.step()
         result = call(*arguments, **named)
-        if name in ("unlink", "remove", "rmdir", "rename", "replace") and named.get("dir_fd") is None:
+        if (
+            name in ("unlink", "remove", "rmdir", "rename", "replace")
+            and named.get("dir_fd") is None
+        ):
             steps.deleted(arguments[0])
         if name == "fsync":
             steps.unflushed.discard(steps.paths.get(arguments[0], Path()))

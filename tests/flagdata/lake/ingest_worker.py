@@ -2,11 +2,11 @@
 
     python ingest_worker.py LAKE
 
-It imports what is needed once, then forks a worker for each line "PREFIX COUNT SHARED FILE" it is given; nothing of the
-lake has been used before the fork. A worker writes to FILE its process id and "ready", then "begun" before each
-with-block and an artifact's id after it was left: what is there was acknowledged. The first SHARED sources are the same
-for all workers, the next COUNT are its own, fewer where a file FILE-stop is made meanwhile. Records and folders take
-turns.
+It imports what is needed once, then forks a worker for each line "PREFIX COUNT SHARED FILE" it is
+given; nothing of the lake has been used before the fork. A worker writes to FILE its process id and
+"ready", then "begun" before each with-block and an artifact's id after it was left: what is there
+was acknowledged. The first SHARED sources are the same for all workers, the next COUNT are its own,
+fewer where a file FILE-stop is made meanwhile. Records and folders take turns.
 """
 
 import os
@@ -46,7 +46,10 @@ def ingest(lake: Lake, prefix: str, count: int, shared: int, said: int, stop: Pa
         with lake.transaction(f"ingest {source}") as tx:
             name = put(tx, source, folder=i % 2 == 1)
             artifact = Artifact(
-                kind=Kind.WIND, name=source, object=name, source_hash=sha256(source.encode()).hexdigest()
+                kind=Kind.WIND,
+                name=source,
+                object=name,
+                source_hash=sha256(source.encode()).hexdigest(),
             )
             tx.add(artifact)
         os.write(said, f"{artifact.id}\n".encode())
@@ -62,7 +65,9 @@ def serve(address: str) -> None:
             status = 1
             try:
                 signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-                ingest(Lake.open(address), prefix, int(count), int(shared), said, Path(f"{file}-stop"))
+                ingest(
+                    Lake.open(address), prefix, int(count), int(shared), said, Path(f"{file}-stop")
+                )
                 status = 0
             except BaseException:  # noqa: BLE001 — the worker ends here whatever happened
                 traceback.print_exc()  # os._exit says nothing of what ended the worker

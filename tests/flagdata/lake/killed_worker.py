@@ -2,8 +2,8 @@
 
     python -m tests.flagdata.lake.killed_worker
 
-It imports what is needed once, then forks a process for each line "OPERATION STEP LAKE", and answers "killed" or
-"ended" once that is gone; nothing of the lake has been used before the fork.
+It imports what is needed once, then forks a process for each line "OPERATION STEP LAKE", and
+answers "killed" or "ended" once that is gone; nothing of the lake has been used before the fork.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
-"""Any operations on two lakes, each of which may be killed before any of its steps, show what a plain model shows.
+"""Any operations on two lakes, each of which may be killed before any of its steps, show what a
+plain model shows.
 
-Every acknowledged view stays readable and whole, every acknowledged erasure stays, and nothing is left half done that
-`doctor` does not report and the same command, or `gc`, does not finish.
+Every acknowledged view stays readable and whole, every acknowledged erasure stays, and nothing is
+left half done that `doctor` does not report and the same command, or `gc`, does not finish.
 """
 
 from __future__ import annotations
@@ -22,7 +23,13 @@ from typing import Any, ClassVar
 import pytest
 from hypothesis import HealthCheck, Phase, seed, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
+from hypothesis.stateful import (
+    RuleBasedStateMachine,
+    initialize,
+    precondition,
+    rule,
+    run_state_machine_as_test,
+)
 
 from flagdata.core.findings import Severity
 from flagdata.core.schema import Kind
@@ -96,7 +103,8 @@ def stage(item: str, folder: Path) -> Path | None:
 
 
 class Items:
-    """The artifacts of the items, and the names of their objects, which are the same in every lake."""
+    """The artifacts of the items, and the names of their objects, which are the same in every
+    lake."""
 
     def __init__(self, lake: Lake) -> None:
         self.artifacts: dict[str, Artifact] = {}
@@ -116,7 +124,9 @@ class Items:
     def ids(self, names: Sequence[str]) -> list[str]:
         return [self.artifacts[name].id for name in names]
 
-    def ingest(self, lake: Lake, branch: str, names: Sequence[str], *, gives_up: bool = False) -> None:
+    def ingest(
+        self, lake: Lake, branch: str, names: Sequence[str], *, gives_up: bool = False
+    ) -> None:
         """Commit some items, in this order, or give up before that."""
         with suppress(KeyboardInterrupt), lake.transaction("ingest", branch=branch) as transaction:
             for name in names:
@@ -156,7 +166,11 @@ class LakeMachine(RuleBasedStateMachine):
         self.clone()
 
     def place(self) -> Place | str:
-        return self.folder / uuid.uuid4().hex if self.in_bucket is None else f"{self.in_bucket}/{uuid.uuid4().hex}"
+        return (
+            self.folder / uuid.uuid4().hex
+            if self.in_bucket is None
+            else f"{self.in_bucket}/{uuid.uuid4().hex}"
+        )
 
     def teardown(self) -> None:
         try:
@@ -170,9 +184,15 @@ class LakeMachine(RuleBasedStateMachine):
     # What is done, and what it must do
 
     def perform(
-        self, name: str, which: str, run: Callable[[Lake], object], predict: Predict, kill: int | None = None
+        self,
+        name: str,
+        which: str,
+        run: Callable[[Lake], object],
+        predict: Predict,
+        kill: int | None = None,
     ) -> None:
-        """Do something on a lake, perhaps killed before a step of it, and compare what it did with the model."""
+        """Do something on a lake, perhaps killed before a step of it, and compare what it did with
+        the model."""
         self.is_sound = False
         before = self.models[which].copied(len(self.models[which].versions) - 1)
         try:
@@ -185,7 +205,12 @@ class LakeMachine(RuleBasedStateMachine):
         was_killed, refusal = self.run(which, run, kill)
         model = self.models[which]
         committed = self.enter(which)
-        ends = {"was killed": was_killed, "was refused": refusal, "committed": committed, "changed nothing": True}
+        ends = {
+            "was killed": was_killed,
+            "was refused": refusal,
+            "committed": committed,
+            "changed nothing": True,
+        }
         did = next(end for end, happened in ends.items() if happened)
         self.tally[f"{name} {did}{' after its commit' if was_killed and committed else ''}"] += 1
         try:
@@ -203,7 +228,9 @@ class LakeMachine(RuleBasedStateMachine):
             self.go_on(name, which, run, predict, how=kill % 3)
         self.is_sound = True
 
-    def run(self, which: str, run: Callable[[Lake], object], kill: int | None) -> tuple[bool, FlagdataError | None]:
+    def run(
+        self, which: str, run: Callable[[Lake], object], kill: int | None
+    ) -> tuple[bool, FlagdataError | None]:
         """Returns whether it was killed, and the error that refused it."""
         refusal = None
         with dying(kill) as steps:
@@ -221,23 +248,30 @@ class LakeMachine(RuleBasedStateMachine):
         return False, refusal
 
     def enter(self, which: str) -> list[dict[str, Any]]:
-        """Enter new versions that tidied the catalog into the model, which change nothing; the other new entries."""
+        """Enter new versions that tidied the catalog into the model, which change nothing; the
+        other new entries."""
         lake, model = self.lakes[which], self.models[which]
         fresh = lake.catalog.history(lake.catalog.head() + 1 - len(model.versions))[::-1]
         fresh = fresh if lake.catalog.head() >= len(model.versions) else []
         tidying = [entry for entry in fresh if _TIDYING.match(entry.get("message", ""))]
         others = [entry for entry in fresh if entry not in tidying]
         for entry in tidying:
-            assert all(entry["version"] < other["version"] for other in others), "tidied after a commit"
+            assert all(entry["version"] < other["version"] for other in others), (
+                "tidied after a commit"
+            )
             model.versions.append(State(**vars(model.head)))
         return others
 
-    def settle(self, which: str, outcome: Outcome, committed: Sequence[dict[str, Any]], *, was_killed: bool) -> None:
+    def settle(
+        self, which: str, outcome: Outcome, committed: Sequence[dict[str, Any]], *, was_killed: bool
+    ) -> None:
         """Enter what was committed into the model, if it is what was predicted."""
         model = self.models[which]
         before = model.stored
         expected = 0 if outcome.state is None else 1
-        assert len(committed) == expected or (was_killed and not committed), f"{len(committed)} commits: {committed}"
+        assert len(committed) == expected or (was_killed and not committed), (
+            f"{len(committed)} commits: {committed}"
+        )
         for entry in committed:
             assert outcome.state is not None
             model.versions.append(State(**vars(outcome.state)))
@@ -252,7 +286,9 @@ class LakeMachine(RuleBasedStateMachine):
             assert there >= before
         model.stored = there
 
-    def go_on(self, name: str, which: str, run: Callable[[Lake], object], predict: Predict, *, how: int) -> None:
+    def go_on(
+        self, name: str, which: str, run: Callable[[Lake], object], predict: Predict, *, how: int
+    ) -> None:
         """After a kill: give the command again, or run `gc`, or leave it."""
         if how == 0:
             self.perform(name, which, run, predict)
@@ -276,11 +312,17 @@ class LakeMachine(RuleBasedStateMachine):
 
     def check_findings(self, which: str) -> None:
         """`doctor` reports what is unfinished, and nothing else but what a killed process left."""
-        found = [finding for finding in doctor(self.lakes[which]) if finding.severity is not Severity.NOTE]
+        found = [
+            finding
+            for finding in doctor(self.lakes[which])
+            if finding.severity is not Severity.NOTE
+        ]
         assert all(finding.fix for finding in found)
         if self.models[which].unfinished():
             kinds = {finding.kind for finding in found}
-            assert kinds & {"erasure-unfinished", "expiry-unfinished"}, "something is unfinished, and nothing is said"
+            assert kinds & {"erasure-unfinished", "expiry-unfinished"}, (
+                "something is unfinished, and nothing is said"
+            )
         elif not self.has_leftovers[which]:
             assert found == []
 
@@ -293,7 +335,11 @@ class LakeMachine(RuleBasedStateMachine):
         for name, expected in rows.items():
             shown = labels.get(self.items.artifacts[name].id, {})
             assert shown.keys() == expected.keys(), (at, name)
-            assert all(same(shown[key], value) for key, value in expected.items()), (at, name, shown)
+            assert all(same(shown[key], value) for key, value in expected.items()), (
+                at,
+                name,
+                shown,
+            )
 
     def check_queries(self, lake: Lake, at: str, rows: Rows) -> None:
         """Labels are columns of SQL."""
@@ -302,7 +348,8 @@ class LakeMachine(RuleBasedStateMachine):
             assert sorted(found) == sorted(name for name, labels in rows.items() if label in labels)
 
     def check_all(self, which: str) -> None:
-        """What a new process finds: all that was ever acknowledged, and every byte that is needed."""
+        """What a new process finds: all that was ever acknowledged, and every byte that is
+        needed."""
         self.lakes[which] = lake = Lake.open(self.places[which])
         model = self.models[which]
         self.check(which)
@@ -355,19 +402,33 @@ class LakeMachine(RuleBasedStateMachine):
             return str(pick % len(self.models[which].versions))
         return refs[pick % len(refs)]
 
-    @rule(which=LAKE, pick=PICK, items=SOME, gives_up=st.sampled_from([False] * 5 + [True]), kill=KILL)
-    def ingest(self, which: str, pick: int, items: list[str], gives_up: bool, kill: int | None) -> None:
+    @rule(
+        which=LAKE, pick=PICK, items=SOME, gives_up=st.sampled_from([False] * 5 + [True]), kill=KILL
+    )
+    def ingest(
+        self, which: str, pick: int, items: list[str], gives_up: bool, kill: int | None
+    ) -> None:
         """Some items with what they are made from; or the data are put, and the user gives up."""
         branch = self.branch_of(which, pick)
-        order = [name for name in ITEMS if name in {*items, *(p for item in items for p in ITEMS[item].parents)}]
+        order = [
+            name
+            for name in ITEMS
+            if name in {*items, *(p for item in items for p in ITEMS[item].parents)}
+        ]
 
         def predict(model: LakeModel) -> Outcome:
             return (
-                Outcome(state=None, stored=model.stored | data_of(order)) if gives_up else model.ingest(branch, order)
+                Outcome(state=None, stored=model.stored | data_of(order))
+                if gives_up
+                else model.ingest(branch, order)
             )
 
         self.perform(
-            "ingest", which, lambda lake: self.items.ingest(lake, branch, order, gives_up=gives_up), predict, kill
+            "ingest",
+            which,
+            lambda lake: self.items.ingest(lake, branch, order, gives_up=gives_up),
+            predict,
+            kill,
         )
 
     @rule(
@@ -378,7 +439,9 @@ class LakeMachine(RuleBasedStateMachine):
         value=st.sampled_from([1, 1, 2, "red", "red", True, None]),
         kill=KILL,
     )
-    def label(self, which: str, pick: int, items: list[str], name: str, value: Any, kill: int | None) -> None:
+    def label(
+        self, which: str, pick: int, items: list[str], name: str, value: Any, kill: int | None
+    ) -> None:
         branch = self.branch_of(which, pick)
         items = self.some_of(self.models[which].rows(branch), items)
         if not items:
@@ -392,7 +455,9 @@ class LakeMachine(RuleBasedStateMachine):
         )
 
     @rule(which=LAKE, pick=PICK, items=SOME, with_descendants=st.booleans(), kill=KILL)
-    def withdraw(self, which: str, pick: int, items: list[str], with_descendants: bool, kill: int | None) -> None:
+    def withdraw(
+        self, which: str, pick: int, items: list[str], with_descendants: bool, kill: int | None
+    ) -> None:
         branch = self.branch_of(which, pick)
         items = self.some_of(self.models[which].rows(branch), items)
         if not items:
@@ -411,33 +476,55 @@ class LakeMachine(RuleBasedStateMachine):
             kill,
         )
 
-    @precondition(lambda self: all(any(self.models[which].refs().values()) for which in self.written))
+    @precondition(
+        lambda self: all(any(self.models[which].refs().values()) for which in self.written)
+    )
     @rule(which=LAKE, items=SOME, with_descendants=st.booleans(), kill=KILL)
     def erase(self, which: str, items: list[str], with_descendants: bool, kill: int | None) -> None:
-        items = self.some_of({name for rows in self.models[which].refs().values() for name in rows}, items)
+        items = self.some_of(
+            {name for rows in self.models[which].refs().values() for name in rows}, items
+        )
         self.perform(
             "erase",
             which,
-            lambda lake: lake.erase(self.items.ids(items), "erase", with_descendants=with_descendants),
+            lambda lake: lake.erase(
+                self.items.ids(items), "erase", with_descendants=with_descendants
+            ),
             lambda model: model.erase(items, with_descendants=with_descendants),
             kill,
         )
 
-    @precondition(lambda self: any(self.models[which].head.tags.keys() < {*TAGS} for which in self.written))
+    @precondition(
+        lambda self: any(self.models[which].head.tags.keys() < {*TAGS} for which in self.written)
+    )
     @rule(which=LAKE, new=PICK, pick=PICK, back=st.integers(0, 4), kill=KILL)
     def tag(self, which: str, new: int, pick: int, back: int, kill: int | None) -> None:
         name = self.name(which, TAGS, new)
         at = self.at(which, pick, back)
-        self.perform("tag", which, lambda lake: lake.tag(name, at=at), lambda model: model.tag(name, at), kill)
+        self.perform(
+            "tag",
+            which,
+            lambda lake: lake.tag(name, at=at),
+            lambda model: model.tag(name, at),
+            kill,
+        )
 
     @precondition(
-        lambda self: any(self.models[which].head.branches.keys() < {MAIN, *BRANCHES} for which in self.written)
+        lambda self: any(
+            self.models[which].head.branches.keys() < {MAIN, *BRANCHES} for which in self.written
+        )
     )
     @rule(which=LAKE, new=PICK, pick=PICK, back=st.integers(0, 4), kill=KILL)
     def branch(self, which: str, new: int, pick: int, back: int, kill: int | None) -> None:
         name = self.name(which, BRANCHES, new)
         at = self.at(which, pick, back)
-        self.perform("branch", which, lambda lake: lake.branch(name, at=at), lambda model: model.branch(name, at), kill)
+        self.perform(
+            "branch",
+            which,
+            lambda lake: lake.branch(name, at=at),
+            lambda model: model.branch(name, at),
+            kill,
+        )
 
     @precondition(lambda self: any(len(self.refs(which)) > 1 for which in self.written))
     @rule(which=LAKE, pick=PICK, discard=st.booleans(), kill=KILL)
@@ -475,12 +562,20 @@ class LakeMachine(RuleBasedStateMachine):
         up_to = len(self.models[which].versions) - 1 - back
         if up_to < 0:
             return
-        self.perform("expire", which, lambda lake: expire(lake, up_to), lambda model: model.expire(up_to), kill)
+        self.perform(
+            "expire",
+            which,
+            lambda lake: expire(lake, up_to),
+            lambda model: model.expire(up_to),
+            kill,
+        )
 
     @precondition(lambda self: any(self.has_garbage(which) for which in self.written))
     @rule(which=LAKE, kill=KILL)
     def gc(self, which: str, kill: int | None) -> None:
-        self.perform("gc", which, lambda lake: collect(lake, grace=NOW), lambda model: model.collect(), kill)
+        self.perform(
+            "gc", which, lambda lake: collect(lake, grace=NOW), lambda model: model.collect(), kill
+        )
         if kill is None:
             self.collect(which)
 
@@ -489,7 +584,9 @@ class LakeMachine(RuleBasedStateMachine):
 
     def collect(self, which: str) -> None:
         """`gc` leaves nothing that is not needed, and nothing to act on."""
-        self.perform("collect", which, lambda lake: collect(lake, grace=NOW), lambda model: model.collect())
+        self.perform(
+            "collect", which, lambda lake: collect(lake, grace=NOW), lambda model: model.collect()
+        )
         self.has_leftovers[which] = False
         assert is_healthy(doctor(self.lakes[which], grace=NOW))
         assert self.models[which].unfinished() == frozenset()
@@ -509,7 +606,9 @@ class LakeMachine(RuleBasedStateMachine):
             return transfer(self.lakes[HERE if to == THERE else THERE], lake, bars=no_bar)
 
         was_killed, refusal = self.run(to, run, kill)
-        self.tally[f"transfer {'was killed' if was_killed else 'was refused' if refusal else 'committed'}"] += 1
+        self.tally[
+            f"transfer {'was killed' if was_killed else 'was refused' if refusal else 'committed'}"
+        ] += 1
         assert was_killed or (refusal is not None) == (after is None), refusal
         head = self.lakes[to].catalog.head()
         if after is not None:
@@ -563,13 +662,22 @@ class LakeMachine(RuleBasedStateMachine):
             names = sorted(name for name, data in self.items.objects.items() if data in needed)
             return [lake.objects.path(name) for name in names]
         if kind == "entries":
-            return [lake.catalog.path / "_delta_log" / f"{version:020d}.json" for version in range(self.common())]
+            return [
+                lake.catalog.path / "_delta_log" / f"{version:020d}.json"
+                for version in range(self.common())
+            ]
         files = (other.catalog.entry(version)[1] for version in range(self.common()))
         return [lake.catalog.path / name for names in files for name in names]
 
-    @rule(kind=st.sampled_from(["objects", "entries", "rows"]), is_lost=st.booleans(), pick=PICK, kill=KILL)
+    @rule(
+        kind=st.sampled_from(["objects", "entries", "rows"]),
+        is_lost=st.booleans(),
+        pick=PICK,
+        kill=KILL,
+    )
     def heal(self, kind: str, is_lost: bool, pick: int, kill: int | None) -> None:
-        """Something is lost here, or changes, that the other lake has, older or newer: it is taken from there."""
+        """Something is lost here, or changes, that the other lake has, older or newer: it is taken
+        from there."""
         paths = self.replaceable(kind)
         if not paths:
             return
@@ -580,7 +688,9 @@ class LakeMachine(RuleBasedStateMachine):
         else:
             overwrite(path, b"changed")
         self.lakes[HERE] = Lake.found(self.places[HERE])
-        was_killed, refusal = self.run(HERE, lambda lake: heal(lake, self.lakes[THERE], bars=no_bar), kill)
+        was_killed, refusal = self.run(
+            HERE, lambda lake: heal(lake, self.lakes[THERE], bars=no_bar), kill
+        )
         assert refusal is None, refusal
         if was_killed:
             heal(Lake.found(self.places[HERE]), self.lakes[THERE], bars=no_bar)
@@ -593,7 +703,12 @@ class LakeMachine(RuleBasedStateMachine):
 
     @rule(which=LAKE, pick=PICK, back=st.integers(0, 2))
     def look_back(self, which: str, pick: int, back: int) -> None:
-        lake, model, before, after = self.lakes[which], self.models[which], self.at(which, pick, back), MAIN
+        lake, model, before, after = (
+            self.lakes[which],
+            self.models[which],
+            self.at(which, pick, back),
+            MAIN,
+        )
         self.check_rows(lake, before, model.rows(before))
         old, new = model.rows(before).keys(), model.rows(after).keys()
         found = difference(lake, before, after)
@@ -602,24 +717,42 @@ class LakeMachine(RuleBasedStateMachine):
 
 
 RULES = frozenset(
-    {"ingest", "label", "withdraw", "erase", "tag", "branch", "delete", "merge", "expire", "gc", "transfer", "clone"}
+    {
+        "ingest",
+        "label",
+        "withdraw",
+        "erase",
+        "tag",
+        "branch",
+        "delete",
+        "merge",
+        "expire",
+        "gc",
+        "transfer",
+        "clone",
+    }
     | {"lose_refs", "heal", "look_back"}
 )
 """Names of the operations."""
 
 
 def machine_of(among: Collection[str], *, in_bucket: str | None = None) -> type[LakeMachine]:
-    """The machine with some of its operations, all on one lake where these are not all: so sequences go deeper."""
+    """The machine with some of its operations, all on one lake where these are not all: so
+    sequences go deeper."""
 
     def undrawn(name: str) -> Callable[..., None]:
         return lambda self, *arguments: getattr(LakeMachine, name)(self, *arguments)
 
     others: dict[str, Any] = {name: undrawn(name) for name in RULES - frozenset(among)}
     written = (HERE,) if others else LakeMachine.written
-    return type("MachineOfSome", (LakeMachine,), {**others, "in_bucket": in_bucket, "written": written})
+    return type(
+        "MachineOfSome", (LakeMachine,), {**others, "in_bucket": in_bucket, "written": written}
+    )
 
 
-def try_machine(machine: type[LakeMachine], *, examples: int, steps: int, number: int, shrinking: bool = False) -> None:
+def try_machine(
+    machine: type[LakeMachine], *, examples: int, steps: int, number: int, shrinking: bool = False
+) -> None:
     """Run a machine on drawn operations.
 
     Args:
@@ -638,8 +771,14 @@ def try_machine(machine: type[LakeMachine], *, examples: int, steps: int, number
         database=None,
         phases=[Phase.generate, *([Phase.shrink] if shrinking else [])],
         report_multiple_bugs=False,
-        suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_too_much],
+        suppress_health_check=[
+            HealthCheck.too_slow,
+            HealthCheck.data_too_large,
+            HealthCheck.filter_too_much,
+        ],
     )
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "unclosed file", ResourceWarning)  # a process that dies closes none
+        warnings.filterwarnings(
+            "ignore", "unclosed file", ResourceWarning
+        )  # a process that dies closes none
         run_state_machine_as_test(seed(number)(machine), settings=drawn)

@@ -1,8 +1,9 @@
 """What a lake must show, as a plain model: it knows nothing of how flagdata keeps it.
 
-A lake is the list of its versions; each is a `State`: what the branches and tags are, and what was erased. The commits
-of all lakes are one graph, as git has them: a commit is the rows that it shows, each with its labels, and the commits
-that it was made from. A method says what an operation does, as the documentation has it, without doing it.
+A lake is the list of its versions; each is a `State`: what the branches and tags are, and what was
+erased. The commits of all lakes are one graph, as git has them: a commit is the rows that it shows,
+each with its labels, and the commits that it was made from. A method says what an operation does,
+as the documentation has it, without doing it.
 """
 
 from __future__ import annotations
@@ -173,9 +174,9 @@ def check_columns(rows: Rows) -> None:
     types: dict[str, type] = {}
     for labels in rows.values():
         for name, value in labels.items():
-            if spellings.setdefault(name.lower(), name) != name or types.setdefault(name, type(value)) is not type(
-                value
-            ):
+            if spellings.setdefault(name.lower(), name) != name or types.setdefault(
+                name, type(value)
+            ) is not type(value):
                 raise Refused(f"the label {name}")
 
 
@@ -214,7 +215,9 @@ class LakeModel:
         """The lake as it was at a version, with all data."""
         other = LakeModel(self.graph)
         other.versions = self.versions[: upto + 1]
-        other.commits = {commit: shown for commit, shown in self.commits.items() if shown.version <= upto}
+        other.commits = {
+            commit: shown for commit, shown in self.commits.items() if shown.version <= upto
+        }
         other.stored = self.stored
         return other
 
@@ -237,15 +240,19 @@ class LakeModel:
 
     def needed(self) -> frozenset[str]:
         """The data that a branch shows, or a tag that is not older than their erasure."""
-        return data_of(name for ref, rows in self.refs().items() for name in self.unerased(rows, self.shown(ref)))
+        return data_of(
+            name
+            for ref, rows in self.refs().items()
+            for name in self.unerased(rows, self.shown(ref))
+        )
 
     def unerased(self, rows: Iterable[str], shown: Shown) -> set[str]:
         """Those of some rows that were not erased after a version that showed them."""
         return {name for name in rows if self.head.erased.get(name, -1) <= shown.version}
 
     def unfinished(self) -> frozenset[str]:
-        """Data that are there though they were given up: all items of them were erased, or they expired, and no version
-        showed them since."""
+        """Data that are there though they were given up: all items of them were erased, or they
+        expired, and no version showed them since."""
         given_up = data_of(self.head.erased) | self.head.expired.keys()
         return (self.stored & given_up) - self._wanted()
 
@@ -260,14 +267,20 @@ class LakeModel:
             data
             for version, state in enumerate(self.versions)
             for branch in state.branches
-            for data in data_of(self.unerased(self.graph.rows(state.tip(branch)), Shown(commit=0, version=version)))
+            for data in data_of(
+                self.unerased(self.graph.rows(state.tip(branch)), Shown(commit=0, version=version))
+            )
             if version >= given_up.get(data, 0)
         }
         return self.needed() | shown
 
-    def _committed(self, branch: str, rows: Rows, *merged: int, stored: Collection[str] = ()) -> Outcome:
+    def _committed(
+        self, branch: str, rows: Rows, *merged: int, stored: Collection[str] = ()
+    ) -> Outcome:
         commit = self.graph.add(_without_orphans(rows), self.head.tip(branch), *merged)
-        return Outcome(state=self.head.moved(branch, commit), stored=self.stored | frozenset(stored))
+        return Outcome(
+            state=self.head.moved(branch, commit), stored=self.stored | frozenset(stored)
+        )
 
     def ingest(self, branch: str, items: Sequence[str]) -> Outcome:
         """Those that the branch has are left as they are; what is new has no label."""
@@ -277,13 +290,17 @@ class LakeModel:
             return Outcome(state=None, stored=self.stored | stored)
         return self._committed(branch, {**{name: {} for name in items}, **rows}, stored=stored)
 
-    def label(self, branch: str, items: Collection[str], labels: Mapping[str, Value | None]) -> Outcome:
+    def label(
+        self, branch: str, items: Collection[str], labels: Mapping[str, Value | None]
+    ) -> Outcome:
         """Clips are labelled with what they are slices of."""
         rows = self.rows(branch)
         if not rows.keys() >= set(items):
             raise Refused("not there")
         labelled = {
-            name: {key: value for key, value in {**rows[name], **labels}.items() if value is not None}
+            name: {
+                key: value for key, value in {**rows[name], **labels}.items() if value is not None
+            }
             for name in {*items, *clips_of(items, rows)}
         }
         check_columns({**rows, **labelled})
@@ -293,12 +310,19 @@ class LakeModel:
         rows = self.rows(branch)
         if not rows.keys() >= set(items):
             raise Refused("not there")
-        going = {*items, *clips_of(items, rows), *(made_from(items, rows) if with_descendants else ())}
-        return self._committed(branch, {name: labels for name, labels in rows.items() if name not in going})
+        going = {
+            *items,
+            *clips_of(items, rows),
+            *(made_from(items, rows) if with_descendants else ()),
+        }
+        return self._committed(
+            branch, {name: labels for name, labels in rows.items() if name not in going}
+        )
 
     def erase(self, items: Collection[str], *, with_descendants: bool) -> Outcome:
-        """Off all branches at once; tags go on to list the rows, without data. What was erased before, and did not come
-        again, is erased again only as far as its data are still there, and what was erased with it.
+        """Off all branches at once; tags go on to list the rows, without data. What was erased
+        before, and did not come again, is erased again only as far as its data are still there, and
+        what was erased with it.
         """
         refs = self.refs()
         going = set(items)
@@ -309,7 +333,9 @@ class LakeModel:
         if not unseen <= self.head.erased.keys() or data_of(unseen) & self._wanted():
             raise Refused("no ref shows it")
         together = {self.head.erased[name] for name in {*items} & self.head.erased.keys()}
-        rest = self.unfinished() & data_of(name for name, version in self.head.erased.items() if version in together)
+        rest = self.unfinished() & data_of(
+            name for name, version in self.head.erased.items() if version in together
+        )
         for rows in refs.values():
             if made_from(going & rows.keys(), rows) - going:
                 raise Refused("something that was made from it would stay")
@@ -338,7 +364,10 @@ class LakeModel:
     def tag(self, name: str, at: str) -> Outcome:
         shown = self.shown(at)
         self._check_new(name, shown)
-        if self.head.deleted.get(name, self.graph.rows(shown.commit).keys()) != self.graph.rows(shown.commit).keys():
+        if (
+            self.head.deleted.get(name, self.graph.rows(shown.commit).keys())
+            != self.graph.rows(shown.commit).keys()
+        ):
             raise Refused("it showed something else")
         state = replace(self.head, tags={**self.head.tags, name: shown})
         return Outcome(state=state, stored=self.stored)
@@ -349,7 +378,11 @@ class LakeModel:
         self._check_new(name, shown)
         rows = self.graph.rows(shown.commit)
         alive = {item for branch in self.head.branches for item in self.rows(branch)}
-        staying = {item: labels for item, labels in rows.items() if item in self.unerased(rows, shown) | alive}
+        staying = {
+            item: labels
+            for item, labels in rows.items()
+            if item in self.unerased(rows, shown) | alive
+        }
         if made_from(rows.keys() - staying.keys(), rows) & staying.keys():
             raise Refused("something that was made from what was erased would stay")
         hiding = () if len(staying) == len(rows) else (self.graph.add(staying, shown.commit),)
@@ -366,21 +399,31 @@ class LakeModel:
             raise Refused("it alone shows something")
         tags = {tag: shown for tag, shown in head.tags.items() if tag != name}
         branches = {branch: line for branch, line in head.branches.items() if branch != name}
-        deleted = {**head.deleted, **({name: frozenset(self.rows(name))} if name in head.tags else {})}
-        return Outcome(state=replace(head, tags=tags, branches=branches, deleted=deleted), stored=self.stored)
+        deleted = {
+            **head.deleted,
+            **({name: frozenset(self.rows(name))} if name in head.tags else {}),
+        }
+        return Outcome(
+            state=replace(head, tags=tags, branches=branches, deleted=deleted), stored=self.stored
+        )
 
     def mergeable(self) -> list[tuple[str, str]]:
         """The pairs of branches that each have commits which the other does not know."""
         tips = {branch: self.head.tip(branch) for branch in sorted(self.head.branches)}
         known = {branch: self.graph.ancestors(tip) for branch, tip in tips.items()}
         pairs = itertools.permutations(tips, 2)
-        return [(one, other) for one, other in pairs if tips[one] not in known[other] and tips[other] not in known[one]]
+        return [
+            (one, other)
+            for one, other in pairs
+            if tips[one] not in known[other] and tips[other] not in known[one]
+        ]
 
     def merge(self, into: str, branch: str) -> Outcome:
         """Three ways, for rows and for the labels of each.
 
         Raises:
-            Refused: both changed a label, a row would lack a parent, or the labels would be no columns.
+            Refused: both changed a label, a row would lack a parent, or the labels would be no
+                columns.
             Unclear: which commit they had in common last is no law.
         """
         if not {into, branch} <= self.head.branches.keys() or into == branch:
@@ -405,12 +448,14 @@ class LakeModel:
         return self._committed(into, rows, theirs)
 
     def _stays_withdrawn(self, name: str, into: str, branch: str, base: int) -> bool:
-        """Whether the last commit since the base that took a row off `into` is later than the branch's own row."""
+        """Whether the last commit since the base that took a row off `into` is later than the
+        branch's own row."""
         line = self.head.branches[into]
         taken = [
             after
             for before, after in itertools.pairwise(line)
-            if after > base and name in self.graph.rows(before).keys() - self.graph.rows(after).keys()
+            if after > base
+            and name in self.graph.rows(before).keys() - self.graph.rows(after).keys()
         ]
         if not taken:
             return False
@@ -434,7 +479,10 @@ class LakeModel:
                 rows = self.graph.rows(state.tip(branch))
                 kept |= data_of(self.unerased(rows, Shown(commit=0, version=version)))
         committed = {
-            name for state in self.versions for branch in state.branches for name in self.graph.rows(state.tip(branch))
+            name
+            for state in self.versions
+            for branch in state.branches
+            for name in self.graph.rows(state.tip(branch))
         }
         going = self.stored & (data_of(committed) - kept)
         expired = {**self.head.expired, **dict.fromkeys(going, len(self.versions))}
@@ -446,7 +494,10 @@ class LakeModel:
         Raises:
             Refused: it has versions that the source lacks.
         """
-        if len(source.versions) < len(self.versions) or source.versions[len(self.versions) - 1] is not self.head:
+        if (
+            len(source.versions) < len(self.versions)
+            or source.versions[len(self.versions) - 1] is not self.head
+        ):
             raise Refused("it has versions that the source lacks")
         after = source.copied(len(source.versions) - 1)
         after.stored = self.stored | source.needed()

@@ -1,4 +1,5 @@
-"""Defects that a lake had, put back one at a time, each with the operations among which it shows."""
+"""Defects that a lake had, put back one at a time, each with the operations among which it
+shows."""
 
 from __future__ import annotations
 
@@ -68,9 +69,16 @@ def _last_label_wins(patches: pytest.MonkeyPatch) -> None:
 def _made_again_is_another(patches: pytest.MonkeyPatch) -> None:
     def check(source: Any, target: Any) -> None:
         _CHECK_REFS(source, target)
-        for one, other in ((source.refs.tags(), target.refs.tags()), (source.refs.branches(), target.refs.branches())):
+        for one, other in (
+            (source.refs.tags(), target.refs.tags()),
+            (source.refs.branches(), target.refs.branches()),
+        ):
             if any(other.get(name, ref) != ref for name, ref in one.items()):
-                raise ConflictError("both lakes have it, and not the same", where="refs", fix="delete one of the two")
+                raise ConflictError(
+                    "both lakes have it, and not the same",
+                    where="refs",
+                    fix="delete one of the two",
+                )
 
     patches.setattr(copying, "_check_refs", check)
 
@@ -123,15 +131,27 @@ def _silent(kind: str) -> Callable[[pytest.MonkeyPatch], None]:
 
 
 BUGS = {
-    "labels-by-capitals": Bug(put=_unchecked_at_a_merge(2), among=frozenset({"label", "merge"}), seed=3),
-    "labels-by-type": Bug(put=_unchecked_at_a_merge(1), among=frozenset({"label", "merge"}), seed=6),
+    "labels-by-capitals": Bug(
+        put=_unchecked_at_a_merge(2), among=frozenset({"label", "merge"}), seed=3
+    ),
+    "labels-by-type": Bug(
+        put=_unchecked_at_a_merge(1), among=frozenset({"label", "merge"}), seed=6
+    ),
     "last-label-wins": Bug(put=_last_label_wins, among=frozenset({"label", "merge"}), seed=9),
-    "made-again": Bug(put=_made_again_is_another, among=frozenset({"branch", "delete", "transfer"}), seed=8),
+    "made-again": Bug(
+        put=_made_again_is_another, among=frozenset({"branch", "delete", "transfer"}), seed=8
+    ),
     "erased-by-branch": Bug(put=_erased_branch_by_branch, among=frozenset({"erase", "ingest"})),
-    "deleted-by-two": Bug(put=_deleted_by_two_commits, among=frozenset({"ingest", "branch", "delete"}), seed=11),
+    "deleted-by-two": Bug(
+        put=_deleted_by_two_commits, among=frozenset({"ingest", "branch", "delete"}), seed=11
+    ),
     "not-flushed": Bug(put=_deletions_not_flushed, among=frozenset({"erase", "ingest"})),
-    "refs-are-files": Bug(put=_refs_are_files, among=frozenset({"branch", "tag", "lose_refs"}), seed=6),
-    "tag-names-free": Bug(put=_tag_names_are_free_again, among=frozenset({"ingest", "tag", "delete"}), seed=2),
+    "refs-are-files": Bug(
+        put=_refs_are_files, among=frozenset({"branch", "tag", "lose_refs"}), seed=6
+    ),
+    "tag-names-free": Bug(
+        put=_tag_names_are_free_again, among=frozenset({"ingest", "tag", "delete"}), seed=2
+    ),
     "never-tidied": Bug(put=_never_tidied, among=frozenset({"label", "withdraw"}), seed=5),
     "silent-expiry": Bug(put=_silent("expiry"), among=frozenset({"withdraw", "delete", "expire"})),
     "silent-erasure": Bug(put=_silent("erasure"), among=frozenset({"erase", "ingest"})),

@@ -1,4 +1,5 @@
-"""Lineages: all generations up and down, as text, document and picture; many of a kind are counted."""
+"""Lineages: all generations up and down, as text, document and picture; many of a kind are
+counted."""
 
 from __future__ import annotations
 
@@ -32,7 +33,9 @@ def run(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> Run:
     return lambda *arguments: invoke(*arguments)
 
 
-def rows(parents: Mapping[str, Sequence[str]], *, names: Mapping[str, str] | None = None) -> pa.Table:
+def rows(
+    parents: Mapping[str, Sequence[str]], *, names: Mapping[str, str] | None = None
+) -> pa.Table:
     """Rows of a catalog: id → parents; of the kind "wind", named as their id."""
     values = {
         "kind": "wind",
@@ -44,7 +47,10 @@ def rows(parents: Mapping[str, Sequence[str]], *, names: Mapping[str, str] | Non
         "quality": [],
     }
     return pa.Table.from_pylist(
-        [{**values, "artifact": one, "name": (names or {}).get(one, one), "parents": p} for one, p in parents.items()],
+        [
+            {**values, "artifact": one, "name": (names or {}).get(one, one), "parents": p}
+            for one, p in parents.items()
+        ],
         schema=catalog_schema(),
     )
 
@@ -103,9 +109,17 @@ def test_the_tree_shows_each_relative_once_with_what_belongs_to_it(run: Run, lak
         "made into no other artifact",
     ]
     details = run("lineage", mast.id, "--details").out.splitlines()[0]
-    assert details == f"{mast.id[:12]} wind mast  (recipe {mast.recipe_hash[:12]}, code {mast.code_version})"
+    assert (
+        details
+        == f"{mast.id[:12]} wind mast  (recipe {mast.recipe_hash[:12]}, code {mast.code_version})"
+    )
     document = run("lineage", mast.id, "--json").document
-    assert [relative["name"] for relative in document["relatives"]] == ["mast", "first", "second", "last"]
+    assert [relative["name"] for relative in document["relatives"]] == [
+        "mast",
+        "first",
+        "second",
+        "last",
+    ]
     assert [last.id, mast.id] not in document["edges"]
     assert [first.id, last.id] in document["edges"]
     assert run("lineage", "absent").code == 1
@@ -140,15 +154,37 @@ def test_a_name_moves_no_cursor_and_adds_no_element() -> None:
 
 def test_boxes_of_a_picture_are_apart_and_lines_that_pass_a_column_cross_none() -> None:
     columns = {"a": 0, "b": 0, "c": 0, "d": 1, "e": 1, "f": 2, "g": 3, "h": 3}
-    edges = [("a", "d"), ("b", "d"), ("c", "g"), ("a", "h"), ("d", "f"), ("e", "f"), ("f", "g"), ("b", "h")]
+    edges = [
+        ("a", "d"),
+        ("b", "d"),
+        ("c", "g"),
+        ("a", "h"),
+        ("d", "f"),
+        ("e", "f"),
+        ("f", "g"),
+        ("b", "h"),
+    ]
     boxes = [
-        Box(key=key, column=column, kind="wind", title=key * 40, lines=["w"], about=key, link=f"/{key}")
+        Box(
+            key=key,
+            column=column,
+            kind="wind",
+            title=key * 40,
+            lines=["w"],
+            about=key,
+            link=f"/{key}",
+        )
         for key, column in columns.items()
     ]
     whole = ET.fromstring(svg(boxes, edges, title="t"))
     assert [link.get("href") for link in whole.iter(f"{SVG}a")] == [f"/{key}" for key in columns]
     frames = [
-        (float(r.get("x", "")), float(r.get("y", "")), float(r.get("width", "")), float(r.get("height", "")))
+        (
+            float(r.get("x", "")),
+            float(r.get("y", "")),
+            float(r.get("width", "")),
+            float(r.get("height", "")),
+        )
         for r in whole.iter(f"{SVG}rect")
         if "box" in r.get("class", "")
     ]
@@ -176,7 +212,8 @@ def test_a_png_shows_the_boxes_and_lines_of_the_svg() -> None:
     columns = {"one": 0, "other": 0, "between": 1, "last": 2}
     edges = [("one", "between"), ("between", "last"), ("other", "last")]  # the last passes a column
     boxes = [
-        Box(key=key, column=column, kind="wind", title=key, lines=["w"], about=key) for key, column in columns.items()
+        Box(key=key, column=column, kind="wind", title=key, lines=["w"], about=key)
+        for key, column in columns.items()
     ]
     whole = ET.fromstring(svg(boxes, edges, title="t"))
     picture = Image.open(io.BytesIO(png(boxes, edges))).convert("RGB")

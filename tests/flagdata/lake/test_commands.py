@@ -71,10 +71,15 @@ def test_show_finds_an_artifact_by_its_name_where_only_one_has_it(run: Run, lake
     with lake.transaction("another of that name") as tx:
         tx.add(Artifact(kind="wind", name="cup", object=second.object))
     listed = run("ls", "--json").document["artifacts"]
-    of_one_name = [f"{row['kind']} {row['artifact'][:12]}" for row in listed if row["name"] == "cup"]
+    of_one_name = [
+        f"{row['kind']} {row['artifact'][:12]}" for row in listed if row["name"] == "cup"
+    ]
     ended = run("show", "cup")
     assert ended.code == 1
-    assert ended.err.splitlines()[0] == f"flagdata: 'cup' may mean 2 artifacts: {', '.join(of_one_name)}"
+    assert (
+        ended.err.splitlines()[0]
+        == f"flagdata: 'cup' may mean 2 artifacts: {', '.join(of_one_name)}"
+    )
     assert "give the id of one" in ended.err
     assert run("show", first.id, "--json").document["artifact"]["name"] == "cup"
 
@@ -164,8 +169,13 @@ def test_withdraw_says_what_went_along(run: Run, lake: Lake) -> None:
     refused = run("withdraw", recording.id[:10], "-m", "wrong")
     assert refused.code == 1
     assert "--with-descendants" in refused.err
-    done = run("withdraw", recording.id[:10], "-m", "wrong", "--with-descendants", "--json").document
-    assert (done["withdrawn"], done["descendants"]) == ([recording.id], sorted([clip.id, measured.id]))
+    done = run(
+        "withdraw", recording.id[:10], "-m", "wrong", "--with-descendants", "--json"
+    ).document
+    assert (done["withdrawn"], done["descendants"]) == (
+        [recording.id],
+        sorted([clip.id, measured.id]),
+    )
     assert run("ls", "--json").document["artifacts"] == []
 
 
@@ -173,7 +183,15 @@ def test_withdraw_takes_a_recordings_clips_without_an_option(run: Run, lake: Lak
     recording = put_text(lake, "recording")
     with lake.transaction("clips") as tx:
         for i in range(200):
-            tx.add(Artifact(kind="clip", name="c", object=recording.object, parents=(recording.id,), frame_first=i))
+            tx.add(
+                Artifact(
+                    kind="clip",
+                    name="c",
+                    object=recording.object,
+                    parents=(recording.id,),
+                    frame_first=i,
+                )
+            )
     done = run("withdraw", recording.id, "-m", "wrong")
     assert (done.code, done.out) == (0, "version 3: 1 withdrawn from main, 200 clips went along\n")
 
@@ -205,7 +223,11 @@ def test_verify_and_doctor_exit_with_3_when_the_lake_is_damaged(run: Run, lake: 
     assert artifact.object is not None
     path = lake.objects.path(artifact.object)
     overwrite(path, b"b")
-    assert [run(*verb).code for verb in (("verify",), ("doctor",), ("doctor", "--deep"))] == [3, 0, 3]
+    assert [run(*verb).code for verb in (("verify",), ("doctor",), ("doctor", "--deep"))] == [
+        3,
+        0,
+        3,
+    ]
     document = run("verify", "--json").document
     assert (document["schema"], document["healthy"]) == ("flagdata.verify/1", False)
     assert document["findings"][0]["kind"] == "object-changed"
@@ -246,7 +268,9 @@ def test_recover_salvages_a_record_that_was_cut_off(run: Run, tmp_path: Path) ->
     with RecordWriter(whole, metadata={}) as writer:
         for i in range(200):
             image = np.full((300, 300), i, dtype=np.uint8)
-            writer.frame(log_time=i * 40_000_000, publish_time=i, timestamp=i * 40_000_000, image=image)
+            writer.frame(
+                log_time=i * 40_000_000, publish_time=i, timestamp=i * 40_000_000, image=image
+            )
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(whole.read_bytes()[: whole.stat().st_size // 2])
     ended = run("recover", cut, tmp_path / "saved.mcap", "--json")

@@ -1,4 +1,5 @@
-"""A process that is killed by a signal leaves what a process leaves that dies as `crashes` has it."""
+"""A process that is killed by a signal leaves what a process leaves that dies as `crashes` has
+it."""
 
 from __future__ import annotations
 
@@ -16,7 +17,9 @@ from tests.flagdata.lake.killed_worker import OPERATIONS, prepare
 from tests.flagdata.lake.lake_machine import Items
 from tests.pausing import ROOT, finding_tests
 
-pytestmark = pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")  # a process that dies closes none
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:unclosed file:ResourceWarning"
+)  # a process that dies closes none
 STEPS = (1, 4, 8, 11)
 _DRAWN = re.compile(r"(?<![0-9a-f])[0-9a-f]{32}(?![0-9a-f])")
 
@@ -32,7 +35,12 @@ def test_a_process_killed_by_a_signal_leaves_what_one_leaves_that_dies_here(tmp_
     killed = 0
     command = [sys.executable, "-m", "tests.flagdata.lake.killed_worker"]
     with subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT, env=finding_tests()
+        command,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd=ROOT,
+        env=finding_tests(),
     ) as worker:
         assert worker.stdin is not None
         assert worker.stdout is not None

@@ -1,4 +1,5 @@
-"""Erasing everywhere: bytes gone at once from all refs, rows that say so, and nothing that others need."""
+"""Erasing everywhere: bytes gone at once from all refs, rows that say so, and nothing that others
+need."""
 
 from __future__ import annotations
 
@@ -17,7 +18,9 @@ from flagdata.lake import Artifact, Lake, collect, doctor, lost, verify, verify_
 from tests.flagdata.lake.conftest import put_text
 
 
-def test_bytes_go_from_tags_branches_and_old_versions_and_each_says_by_which_version(lake: Lake) -> None:
+def test_bytes_go_from_tags_branches_and_old_versions_and_each_says_by_which_version(
+    lake: Lake,
+) -> None:
     film, other = put_text(lake, "film"), put_text(lake, "other")
     lake.tag("v1")
     lake.branch("b")
@@ -27,17 +30,23 @@ def test_bytes_go_from_tags_branches_and_old_versions_and_each_says_by_which_ver
     for ref in ("main", "b"):
         assert lake.rows(at=ref)["artifact"].to_pylist() == [other.id]
     assert set(lake.rows(at="v1")["artifact"].to_pylist()) == {film.id, other.id}
-    with pytest.raises(NotFoundError, match=r"erased from all versions by version 5 .asked to be erased."):
+    with pytest.raises(
+        NotFoundError, match=r"erased from all versions by version 5 .asked to be erased."
+    ):
         lake.object_path(str(film.object))
     assert list(lost(lake, lake.rows(at="v1"))) == [film.object]
     notes = doctor(lake)
-    assert [(note.kind, note.severity, note.where) for note in notes] == [("erased", Severity.NOTE, "ref v1")]
+    assert [(note.kind, note.severity, note.where) for note in notes] == [
+        ("erased", Severity.NOTE, "ref v1")
+    ]
     assert not verify(lake, [str(other.object)])
     assert not verify_catalog(lake)
     assert collect(lake, grace=timedelta(0)).objects == ()
 
 
-def test_an_old_version_whose_data_gc_took_says_so_to_ls_export_and_doctor_alike(lake: Lake, tmp_path: Path) -> None:
+def test_an_old_version_whose_data_gc_took_says_so_to_ls_export_and_doctor_alike(
+    lake: Lake, tmp_path: Path
+) -> None:
     film = put_text(lake, "film")
     version = str(lake.catalog.head())
     lake.withdraw([film.id], "blurred")
@@ -113,7 +122,9 @@ def test_the_command_reports_what_it_erased_and_ls_marks_the_rows(lake: Lake) ->
     assert "without data: film" in shown.stderr
 
 
-def test_a_new_branch_shows_nothing_that_was_erased_and_a_new_tag_lists_it_as_older_tags_do(place: Lake) -> None:
+def test_a_new_branch_shows_nothing_that_was_erased_and_a_new_tag_lists_it_as_older_tags_do(
+    place: Lake,
+) -> None:
     lake = place
     film, other = put_text(lake, "film"), put_text(lake, "other")  # versions 1 and 2
     lake.tag("before", at="2")
@@ -126,16 +137,23 @@ def test_a_new_branch_shows_nothing_that_was_erased_and_a_new_tag_lists_it_as_ol
         assert lake.rows(at=branch)["artifact"].to_pylist() == [other.id]
     for tag in ("before", "after"):
         assert lake.rows(at=tag)["artifact"].to_pylist() == [film.id, other.id]
-    assert {(note.kind, note.where) for note in doctor(lake)} == {("erased", "ref before"), ("erased", "ref after")}
+    assert {(note.kind, note.where) for note in doctor(lake)} == {
+        ("erased", "ref before"),
+        ("erased", "ref after"),
+    }
     put_text(lake, "later", branch="b")
     lake.merge("b", "bring in")
     assert lake.rows()["name"].to_pylist() == ["other", "later"]
 
 
-def test_no_ref_keeps_the_bytes_of_an_erasure_that_was_killed(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_ref_keeps_the_bytes_of_an_erasure_that_was_killed(
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
     film = put_text(lake, "film")
     with monkeypatch.context() as patches:
-        patches.setattr("flagdata.lake.removal._delete", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+        patches.setattr(
+            "flagdata.lake.removal._delete", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt)
+        )
         with pytest.raises(KeyboardInterrupt):
             lake.erase([film.id], "asked")
     lake.branch("b", at="1")
@@ -158,7 +176,9 @@ def test_a_branch_of_what_was_made_from_what_was_erased_is_refused(lake: Lake) -
     made = put_text(lake, "made", parents=(film.id,))
     lake.withdraw([made.id], "blurred")
     lake.erase([film.id], "asked")
-    with pytest.raises(ConflictError, match="wind 'made' of that version was made from what was erased since"):
+    with pytest.raises(
+        ConflictError, match="wind 'made' of that version was made from what was erased since"
+    ):
         lake.branch("b", at="2")
 
 
@@ -180,7 +200,9 @@ def test_neither_tag_nor_branch_shows_a_version_whose_data_gc_took(place: Lake) 
     assert {note.severity for note in doctor(lake)} <= {Severity.NOTE}
 
 
-def test_a_tag_that_lists_erased_rows_does_not_stand_for_the_bytes_that_another_row_needs(lake: Lake) -> None:
+def test_a_tag_that_lists_erased_rows_does_not_stand_for_the_bytes_that_another_row_needs(
+    lake: Lake,
+) -> None:
     film = put_text(lake, "film")
     lake.tag("v1")
     with lake.transaction("the same bytes") as tx:

@@ -1,4 +1,5 @@
-"""Expiring versions: what only they show goes at once, with a trace; branches, tags and newer versions lose nothing."""
+"""Expiring versions: what only they show goes at once, with a trace; branches, tags and newer
+versions lose nothing."""
 
 from __future__ import annotations
 
@@ -9,7 +10,17 @@ import pytest
 
 from flagdata.errors import ConflictError, NotFoundError
 from flagdata.export import Export, export
-from flagdata.lake import Artifact, Lake, collect, doctor, expire, is_healthy, last_version, lost, verify_catalog
+from flagdata.lake import (
+    Artifact,
+    Lake,
+    collect,
+    doctor,
+    expire,
+    is_healthy,
+    last_version,
+    lost,
+    verify_catalog,
+)
 from tests.flagdata.lake.conftest import put_text, stored
 from tests.program import invoke
 
@@ -38,7 +49,9 @@ def test_what_only_expired_versions_show_goes_and_ls_export_and_doctor_say_alike
 
 
 def test_branches_tags_and_versions_that_have_not_expired_keep_their_data(lake: Lake) -> None:
-    tagged, branched, later, gone = (put_text(lake, name) for name in ("tagged", "branched", "later", "gone"))
+    tagged, branched, later, gone = (
+        put_text(lake, name) for name in ("tagged", "branched", "later", "gone")
+    )
     lake.tag("v1", at="1")  # version 5
     lake.branch("b", at="2")
     lake.withdraw([gone.id], "version 7")
@@ -75,16 +88,26 @@ def test_what_a_running_transaction_holds_stays(lake: Lake) -> None:
     assert stored(lake) == {film.object}
 
 
-def test_versions_are_chosen_by_age_and_by_how_many_are_newer(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_versions_are_chosen_by_age_and_by_how_many_are_newer(
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
     for name in ("a", "b", "c"):
         put_text(lake, name)  # versions 1 to 3
-    assert [last_version(lake, older_than=None, keep=keep) for keep in (1, 2, 4, 9)] == [2, 1, -1, -1]
+    assert [last_version(lake, older_than=None, keep=keep) for keep in (1, 2, 4, 9)] == [
+        2,
+        1,
+        -1,
+        -1,
+    ]
     now = lake.catalog.history()[0]["timestamp"]
     days = {0: 40, 1: 30, 2: 20, 3: 0}
     dated = [{"version": v, "timestamp": now - days[v] * 86_400_000} for v in (3, 2, 1, 0)]
     monkeypatch.setattr(lake.catalog, "history", lambda: dated)
     # Version 0 was replaced 30 days ago, version 1 20 days ago, version 2 just now.
-    ages = {day: last_version(lake, older_than=timedelta(days=day), keep=None) for day in (35, 25, 15, 0)}
+    ages = {
+        day: last_version(lake, older_than=timedelta(days=day), keep=None)
+        for day in (35, 25, 15, 0)
+    }
     assert ages == {35: -1, 25: 0, 15: 1, 0: 2}
     assert last_version(lake, older_than=timedelta(days=15), keep=4) == -1
 

@@ -21,13 +21,21 @@ from deltalake.exceptions import TableNotFoundError
 
 from flagdata.core.findings import Severity
 from flagdata.core.schema import Kind
-from flagdata.errors import ConflictError, CorruptError, FlagdataError, InputError, NotFoundError, UsageError
+from flagdata.errors import (
+    ConflictError,
+    CorruptError,
+    FlagdataError,
+    InputError,
+    NotFoundError,
+    UsageError,
+)
 from flagdata.lake import Artifact, Lake, collect, doctor
 from tests.flagdata.lake.conftest import LINKS, put_text
 
 NOW = timedelta(0)
 
-# A process that may not write more than so many bytes to one file: the kernel refuses, as a full disk does.
+# A process that may not write more than so many bytes to one file: the kernel refuses, as a full
+# disk does.
 _LIMITED = """
 import resource, sys
 from flagdata.errors import FlagdataError
@@ -64,8 +72,8 @@ def test_a_write_that_the_kernel_refuses_is_a_clear_error_and_publishes_nothing(
 def test_a_disk_that_refuses_the_folder_of_the_catalog_is_a_clear_error_and_leaves_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What the Delta library says where the folder of a new table cannot be made; it does so in another class of error
-    than for files."""
+    """What the Delta library says where the folder of a new table cannot be made; it does so in
+    another class of error than for files."""
 
     def refused(*_: object, **__: object) -> None:
         raise TableNotFoundError(
@@ -110,7 +118,9 @@ def test_a_disk_that_fills_at_any_step_leaves_a_whole_lake_and_ingesting_again_s
         assert "free some space" in fix
         assert [f for f in doctor(lake, grace=NOW) if f.severity is Severity.ERROR] == []
         put_text(lake, f"step {step}")
-    assert step >= 4  # object, its folder, rows, their folder; what follows the log entry is a warning
+    assert (
+        step >= 4
+    )  # object, its folder, rows, their folder; what follows the log entry is a warning
     collect(lake, grace=NOW)
     assert doctor(lake, grace=NOW) == ()
     assert lake.rows()["name"].to_pylist() == ["before", *(f"step {i}" for i in range(step + 1))]
@@ -131,7 +141,9 @@ def test_a_folder_that_may_not_be_written_is_a_clear_error(lake: Lake) -> None:
     assert doctor(lake, grace=NOW) == ()
 
 
-def taken(error: type[FlagdataError], *uses: Callable[[str], object], names: Sequence[str]) -> list[str]:
+def taken(
+    error: type[FlagdataError], *uses: Callable[[str], object], names: Sequence[str]
+) -> list[str]:
     """Of the names, those that any of the uses does not refuse with this error."""
 
     def refused(use: Callable[[str], object], name: str) -> bool:
@@ -159,8 +171,24 @@ def test_object_names_cannot_reach_out_of_the_stores(lake: Lake) -> None:
     assert taken(InputError, lake.object_path, lambda name: made(object=name), names=names) == []
 
 
-def test_names_that_are_paths_versions_or_commits_are_refused_for_tags_and_branches(lake: Lake) -> None:
-    paths = ["", ".", "..", "../v1", "a/b", "a\\b", "-v", ".v", "v 1", "v1\n", "é", "a" * 101, "v1.json"]
+def test_names_that_are_paths_versions_or_commits_are_refused_for_tags_and_branches(
+    lake: Lake,
+) -> None:
+    paths = [
+        "",
+        ".",
+        "..",
+        "../v1",
+        "a/b",
+        "a\\b",
+        "-v",
+        ".v",
+        "v 1",
+        "v1\n",
+        "é",
+        "a" * 101,
+        "v1.json",
+    ]
     before = sorted((lake.path / "refs").rglob("*"))
     assert taken(UsageError, lake.tag, lake.branch, names=[*paths, "17", "c" + "0" * 16]) == []
     assert sorted((lake.path / "refs").rglob("*")) == before
@@ -204,7 +232,9 @@ def test_a_file_from_elsewhere_is_copied_and_stays(lake: Lake, tmp_path: Path) -
 
 
 @pytest.mark.disk(LINKS)
-def test_a_read_only_folder_is_copied_to_one_that_can_be_moved_and_collected(lake: Lake, tmp_path: Path) -> None:
+def test_a_read_only_folder_is_copied_to_one_that_can_be_moved_and_collected(
+    lake: Lake, tmp_path: Path
+) -> None:
     source = tmp_path / "mine.zarr"
     (source / "inner").mkdir(parents=True)
     (source / "inner" / "zarr.json").write_text("{}")
@@ -254,7 +284,12 @@ def test_a_malformed_value_is_refused_by_its_column() -> None:
 
 def test_numbers_of_numpy_have_the_identity_of_python_s(lake: Lake) -> None:
     python = Artifact(kind=Kind.CLIP, name="a", frame_first=0, frame_count=30, seed=7, wind=4.5)
-    values = {"frame_first": np.int64(0), "frame_count": np.uint8(30), "seed": np.int32(7), "wind": np.float32(4.5)}
+    values = {
+        "frame_first": np.int64(0),
+        "frame_count": np.uint8(30),
+        "seed": np.int32(7),
+        "wind": np.float32(4.5),
+    }
     numpy = Artifact(kind=Kind.CLIP, name="a", **values)
     assert numpy.id == python.id
     with lake.transaction("numpy") as tx:
@@ -273,7 +308,9 @@ def test_a_lake_is_not_made_where_something_is(lake: Lake, tmp_path: Path) -> No
         Lake.create(tmp_path / "other" / "file")
 
 
-def test_a_lake_that_could_not_be_made_leaves_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_lake_that_could_not_be_made_leaves_an_empty_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def full(descriptor: int) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
@@ -288,7 +325,10 @@ def test_a_lake_that_could_not_be_made_leaves_an_empty_folder(tmp_path: Path, mo
 def test_of_several_processes_that_make_a_lake_at_once_one_does(tmp_path: Path) -> None:
     code = "import sys; from flagdata.cli import main; main(['init', sys.argv[1]])"
     command = [sys.executable, "-c", code, str(tmp_path / "lake")]
-    started = [subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) for _ in range(4)]
+    started = [
+        subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        for _ in range(4)
+    ]
     assert sorted(process.wait(timeout=500) for process in started) == [0, 1, 1, 1]
     assert doctor(Lake.open(tmp_path / "lake"), grace=NOW) == ()
 
@@ -321,7 +361,9 @@ def test_a_process_that_died_between_a_checkpoint_and_its_hint_stops_no_commit(l
         put_text(lake, str(count))
         count += 1
     log = lake.path / "catalog" / "_delta_log"
-    DeltaTable(lake.catalog.path.as_uri(), storage_options=lake.catalog._options()).create_checkpoint()
+    DeltaTable(
+        lake.catalog.path.as_uri(), storage_options=lake.catalog._options()
+    ).create_checkpoint()
     (log / "_last_checkpoint").unlink()
     (left,) = log.glob("*.checkpoint.parquet")
     later = Lake.open(lake.path)
@@ -329,7 +371,9 @@ def test_a_process_that_died_between_a_checkpoint_and_its_hint_stops_no_commit(l
         put_text(later, str(i))
     newest = max(log.glob("*.checkpoint.parquet"))
     assert newest > left
-    assert json.loads((log / "_last_checkpoint").read_bytes())["version"] == int(newest.name.split(".")[0])
+    assert json.loads((log / "_last_checkpoint").read_bytes())["version"] == int(
+        newest.name.split(".")[0]
+    )
     assert Lake.open(lake.path).rows().num_rows == 2 * count + 1
     assert doctor(later, grace=NOW) == ()
 

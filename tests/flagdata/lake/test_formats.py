@@ -1,4 +1,5 @@
-"""What others see of a lake: its catalog is plain Delta, its hashes are sha256sum's, its folder may be anywhere."""
+"""What others see of a lake: its catalog is plain Delta, its hashes are sha256sum's, its folder may
+be anywhere."""
 
 from __future__ import annotations
 
@@ -50,7 +51,9 @@ def test_a_folder_has_the_hash_of_the_lines_that_sha256sum_prints(tmp_path: Path
         (folder / name).write_text(name)
     (folder / "empty").mkdir()
     command = "find . -type f -printf '%P\\n' | LC_ALL=C sort | xargs -d '\\n' sha256sum"
-    lines = subprocess.run(["bash", "-c", command], cwd=folder, capture_output=True, check=True).stdout
+    lines = subprocess.run(
+        ["bash", "-c", command], cwd=folder, capture_output=True, check=True
+    ).stdout
     assert content_hash(folder) == hashlib.sha256(lines).hexdigest()
 
 
@@ -94,8 +97,11 @@ def test_of_two_appends_at_one_version_the_second_fails_and_publishes_nothing(la
     assert lake.catalog.unpublished_files() == []
 
 
-def test_a_catalog_whose_protocol_another_program_raised_is_read_and_not_written(lake: Lake) -> None:
-    """Delta: a writer must not write to a table that asks for a later writer version than it implements."""
+def test_a_catalog_whose_protocol_another_program_raised_is_read_and_not_written(
+    lake: Lake,
+) -> None:
+    """Delta: a writer must not write to a table that asks for a later writer version than it
+    implements."""
     kept = put_text(lake, "before")
     raised = {"protocol": {"minReaderVersion": 1, "minWriterVersion": 4}}
     log = Log(lake.path / "catalog" / "_delta_log", lake.path / "refs" / "newest")
@@ -119,7 +125,15 @@ def test_a_batch_of_rows_is_one_version_and_one_file(lake: Lake) -> None:
 def test_rows_come_in_the_order_of_commit_then_start_then_frame(lake: Lake) -> None:
     with lake.transaction("first") as tx:
         for start, frame in ((20, 0), (10, 30), (10, 0)):
-            tx.add(Artifact(kind=Kind.CLIP, name=f"{start}-{frame}", start=start, frame_first=frame, seed=start))
+            tx.add(
+                Artifact(
+                    kind=Kind.CLIP,
+                    name=f"{start}-{frame}",
+                    start=start,
+                    frame_first=frame,
+                    seed=start,
+                )
+            )
     with lake.transaction("second") as tx:
         tx.add(Artifact(kind=Kind.CLIP, name="5-0", start=5, frame_first=0))
     expected = ["10-0", "10-30", "20-0", "5-0"]
@@ -153,10 +167,16 @@ def test_an_emptied_or_altered_log_entry_stops_collection(lake: Lake, version: i
     put_text(lake, "b")
     entry = lake.path / "catalog" / "_delta_log" / f"{version:020d}.json"
     content = entry.read_bytes()
-    for damaged in (b"", content.replace(b'"add"', b'"adx"'), content.replace(b"ingest", b"jngest")):
+    for damaged in (
+        b"",
+        content.replace(b'"add"', b'"adx"'),
+        content.replace(b"ingest", b"jngest"),
+    ):
         entry.write_bytes(damaged)
         fresh = Lake.open(lake.path)
-        assert any(f.where == str(entry) and f.severity is Severity.ERROR for f in verify_catalog(fresh))
+        assert any(
+            f.where == str(entry) and f.severity is Severity.ERROR for f in verify_catalog(fresh)
+        )
         with pytest.raises(CorruptError) as caught:
             collect(fresh, grace=timedelta(0))
         assert caught.value.where == str(entry)
@@ -183,7 +203,9 @@ def test_an_empty_entry_that_a_power_cut_left_before_it_was_acknowledged_may_be_
 
 
 @pytest.mark.disk(AGES)
-def test_another_program_s_vacuum_takes_no_file_that_a_tag_needs(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_program_s_vacuum_takes_no_file_that_a_tag_needs(
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
     month = 30 * 86_400 * 10**9  # ns; Delta's default is to keep replaced files for a week
     now = time.time_ns
     monkeypatch.setattr(time, "time_ns", lambda: now() - month)
@@ -195,7 +217,9 @@ def test_another_program_s_vacuum_takes_no_file_that_a_tag_needs(lake: Lake, mon
     for path in (lake.path / "catalog").glob("*.parquet"):
         os.utime(path, ns=(now() - month, now() - month))
     table = DeltaTable(str(lake.path / "catalog"))
-    assert len(table.file_uris()) < 20  # the small files have been merged, so the first ones are not the head's
+    assert (
+        len(table.file_uris()) < 20
+    )  # the small files have been merged, so the first ones are not the head's
     assert table.vacuum(dry_run=False) == []
     assert Lake.open(lake.path).rows(at="v1").num_rows == 6
     assert doctor(lake) == ()

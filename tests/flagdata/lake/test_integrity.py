@@ -1,4 +1,5 @@
-"""Numbers in a lake that cannot be right, bits that flip in what is read, and files that an operating system adds."""
+"""Numbers in a lake that cannot be right, bits that flip in what is read, and files that an
+operating system adds."""
 
 from __future__ import annotations
 
@@ -99,7 +100,9 @@ def test_an_entry_of_a_version_that_cannot_be_is_named_at_once_and_moving_it_awa
 
 
 @pytest.mark.parametrize("number", HUGE)
-def test_a_push_to_a_lake_with_a_mark_that_cannot_be_is_refused(filled: Lake, tmp_path: Path, number: str) -> None:
+def test_a_push_to_a_lake_with_a_mark_that_cannot_be_is_refused(
+    filled: Lake, tmp_path: Path, number: str
+) -> None:
     copy, _ = clone(filled, tmp_path / "copy", bars=no_bar)
     (copy.path / "refs" / "newest" / number).write_bytes(b"0\n")
     assert refused(lambda: transfer(filled, Lake.open(copy.path), bars=no_bar)).kind == "log-gap"
@@ -113,12 +116,16 @@ def test_a_ref_of_a_version_that_cannot_be_is_named(filled: Lake, number: str) -
         path.write_bytes((text % (number.lstrip("0"))).encode())
         error = refused(lambda: Lake.open(filled.path).rows(at="odd"))
         assert error.where == str(path)
-        assert "ref-unreadable" in {finding.kind for finding in doctor(Lake.open(filled.path), grace=NOW)}
+        assert "ref-unreadable" in {
+            finding.kind for finding in doctor(Lake.open(filled.path), grace=NOW)
+        }
         path.unlink()
 
 
 @pytest.mark.parametrize("at", ["7" * 5000, "9" * 20, "6"])
-def test_a_version_beyond_the_newest_is_not_there_however_many_digits_it_has(filled: Lake, at: str) -> None:
+def test_a_version_beyond_the_newest_is_not_there_however_many_digits_it_has(
+    filled: Lake, at: str
+) -> None:
     with pytest.raises(NotFoundError, match="the newest is 5") as caught:
         filled.rows(at=at)
     assert len(caught.value.what) < 200
@@ -133,12 +140,16 @@ def test_a_listing_of_a_bucket_with_a_flipped_digit_ends_in_an_error(
 
     def flipped(self: RemotePath) -> Iterator[RemotePath]:
         for path in listed(self):
-            name = path.name.replace("0000000001.json", "9000000001.json") if path.suffix else "8" * 19
+            name = (
+                path.name.replace("0000000001.json", "9000000001.json") if path.suffix else "8" * 19
+            )
             yield RemotePath(path.bucket, f"{self.key}/{name}", status=path.stat())
 
     for folder in ("newest", "_delta_log"):
         monkeypatch.setattr(
-            RemotePath, "iterdir", lambda self, folder=folder: flipped(self) if self.name == folder else listed(self)
+            RemotePath,
+            "iterdir",
+            lambda self, folder=folder: flipped(self) if self.name == folder else listed(self),
         )
         assert refused(lambda: Lake.open(remote_lake.path).rows()).kind == "log-gap"
     monkeypatch.setattr(RemotePath, "iterdir", listed)
@@ -176,7 +187,9 @@ ODD = [{**STATED, "version": 1}, {**STATED, "timestamp": -1}, {**STATED, "rows":
 
 
 @pytest.mark.parametrize("versions", [[], [STATED] * 2, 7, *([one] for one in ODD)])
-def test_a_summary_that_states_other_versions_than_its_name_is_refused(filled: Lake, versions: Any) -> None:
+def test_a_summary_that_states_other_versions_than_its_name_is_refused(
+    filled: Lake, versions: Any
+) -> None:
     content = {"schema": "flagdata.history/1", "before": "", "end": "", "versions": versions}
     path = summary(filled, content, 0, 0)
     error = refused(lambda: Lake.open(filled.path).rows())
@@ -190,7 +203,9 @@ def test_a_file_of_rows_that_states_more_than_its_bytes_can_hold_is_refused_befo
 ) -> None:
     count = 3_000_000
     schema = catalog_schema()
-    rows = pa.Table.from_arrays([pa.nulls(count, field.type) for field in schema], names=schema.names)
+    rows = pa.Table.from_arrays(
+        [pa.nulls(count, field.type) for field in schema], names=schema.names
+    )
     pq.write_table(rows, tmp_path / "rows.parquet", compression="zstd")
     content = (tmp_path / "rows.parquet").read_bytes()
     path = next(iter((filled.path / "catalog").glob("*.parquet")))
@@ -208,7 +223,9 @@ def copied(lake: Lake, tmp_path: Path, name: str) -> Place:
 
 
 @pytest.mark.disk("it reads a lake hundreds of times")
-def test_a_bit_that_flips_in_a_file_of_rows_is_refused_and_a_clone_heals(filled: Lake, tmp_path: Path) -> None:
+def test_a_bit_that_flips_in_a_file_of_rows_is_refused_and_a_clone_heals(
+    filled: Lake, tmp_path: Path
+) -> None:
     copy = copied(filled, tmp_path, "copy")
     draw = random.Random(5)
     for path in sorted((filled.path / "catalog").glob("*.parquet")):  # type: ignore[type-var]
@@ -217,7 +234,10 @@ def test_a_bit_that_flips_in_a_file_of_rows_is_refused_and_a_clone_heals(filled:
             changed = bytearray(content)
             changed[draw.randrange(len(content))] ^= 1 << draw.randrange(8)
             overwrite(path, bytes(changed))
-            for read in (lambda: Lake.open(filled.path).rows(), lambda: Lake.open(filled.path).rows("kind = 'wind'")):
+            for read in (
+                lambda: Lake.open(filled.path).rows(),
+                lambda: Lake.open(filled.path).rows("kind = 'wind'"),
+            ):
                 error = refused(read)
                 assert error.where == str(path)
                 assert "flagdata heal FROM" in error.fix
@@ -226,7 +246,9 @@ def test_a_bit_that_flips_in_a_file_of_rows_is_refused_and_a_clone_heals(filled:
 
 
 @pytest.mark.disk("it reads a lake hundreds of times")
-def test_a_bit_that_flips_in_an_entry_of_the_log_is_refused_and_a_clone_heals(filled: Lake, tmp_path: Path) -> None:
+def test_a_bit_that_flips_in_an_entry_of_the_log_is_refused_and_a_clone_heals(
+    filled: Lake, tmp_path: Path
+) -> None:
     copy = copied(filled, tmp_path, "copy")
     log = filled.path / "catalog" / "_delta_log"
     draw = random.Random(6)
@@ -379,10 +401,19 @@ NOTES = ("rows", "withdrawn", "merged_version", "expired", "labels", "hidden", "
 
 @pytest.mark.parametrize("key", NOTES)
 @pytest.mark.parametrize(
-    "value", ["9" * 5000, '{"up_to": 1e999, "objects": []}', "[[]]", '{"a": ["b"]}', '{"a": {"b": [1]}}']
+    "value",
+    ["9" * 5000, '{"up_to": 1e999, "objects": []}', "[[]]", '{"a": ["b"]}', '{"a": {"b": [1]}}'],
 )
-def test_notes_of_the_log_that_cannot_be_read_are_never_unforeseen(filled: Lake, key: str, value: str) -> None:
-    info = {"commit": "c" + "0" * 16, "message": "m", "branch": "main", "merged": "side", key: value}
+def test_notes_of_the_log_that_cannot_be_read_are_never_unforeseen(
+    filled: Lake, key: str, value: str
+) -> None:
+    info = {
+        "commit": "c" + "0" * 16,
+        "message": "m",
+        "branch": "main",
+        "merged": "side",
+        key: value,
+    }
     filled.catalog.append(catalog_schema().empty_table(), base=filled.catalog.head(), info=info)
     acts: list[Callable[[], object]] = [
         lambda: Lake.open(filled.path).rows(),
@@ -402,17 +433,23 @@ def test_notes_of_the_log_that_cannot_be_read_are_never_unforeseen(filled: Lake,
     assert (key in ("rows", "withdrawn", "expired")) <= (not is_healthy(found))
 
 
-def test_the_log_counts_up_to_no_number_that_a_name_states(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_log_counts_up_to_no_number_that_a_name_states(
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
     looked: list[int] = []
     path = Log.path
-    monkeypatch.setattr(Log, "path", lambda self, version: looked.append(version) or path(self, version))
+    monkeypatch.setattr(
+        Log, "path", lambda self, version: looked.append(version) or path(self, version)
+    )
     (lake.path / "refs" / "newest" / ("8" * 19)).write_bytes(b"0\n")
     refused(lake.catalog.head)
     assert len(looked) < 20
 
 
 @pytest.mark.parametrize("end", ["\u2028", "\u2029", "\x85", "\x0b", "\x1c", "\n", "\r"])
-def test_a_message_with_any_line_end_of_unicode_is_read_as_it_was_written(lake: Lake, end: str) -> None:
+def test_a_message_with_any_line_end_of_unicode_is_read_as_it_was_written(
+    lake: Lake, end: str
+) -> None:
     put_text(lake, "a")
     message = f"first{end}second"
     with lake.transaction(message) as tx:
@@ -426,12 +463,17 @@ def test_a_message_with_any_line_end_of_unicode_is_read_as_it_was_written(lake: 
 def test_a_clone_takes_no_damaged_entry_and_no_damaged_file(
     lake: Lake, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(catalog, "_TIDY_EVERY", 3)  # so that no reader of the head needs what is old
+    monkeypatch.setattr(
+        catalog, "_TIDY_EVERY", 3
+    )  # so that no reader of the head needs what is old
     for number in range(7):
         put_text(lake, str(number))
     entry = lake.path / "catalog" / "_delta_log" / f"{1:020d}.json"
     name = lake.catalog.history()[-2]["files"][0]
-    for place, old, new in ((entry, b"ingest 0", b"ingest 1"), (lake.path / "catalog" / name, b"PAR1", b"PAR2")):
+    for place, old, new in (
+        (entry, b"ingest 0", b"ingest 1"),
+        (lake.path / "catalog" / name, b"PAR1", b"PAR2"),
+    ):
         content = place.read_bytes()
         overwrite(place, content.replace(old, new))
         assert Lake.open(lake.path).rows().num_rows == 7
@@ -449,14 +491,18 @@ MADE: dict[str, Any] = {"schemaString": "{", "partitionColumns": 7}
 
 @pytest.mark.disk("it changes files behind the lake's back")
 @pytest.mark.parametrize(("key", "value"), [*ADDED.items(), *MADE.items()])
-def test_an_entry_that_the_delta_library_cannot_read_is_named(filled: Lake, key: str, value: Any) -> None:
+def test_an_entry_that_the_delta_library_cannot_read_is_named(
+    filled: Lake, key: str, value: Any
+) -> None:
     number, action = (2, "add") if key in ADDED else (0, "metaData")
     path = filled.path / "catalog" / "_delta_log" / f"{number:020d}.json"
     lines = [json.loads(line) for line in path.read_bytes().decode().split("\n") if line]
     next(line[action] for line in lines if action in line)[key] = value
     overwrite(path, "\n".join(map(json.dumps, lines)).encode())
     fresh = Lake.open(filled.path)
-    fresh.catalog._entries.entries = partial(unchained, fresh.catalog._entries)  # as of users who know the hashes
+    fresh.catalog._entries.entries = partial(
+        unchained, fresh.catalog._entries
+    )  # as of users who know the hashes
     error = refused(fresh.rows)
     assert error.where == str(path)
     assert "Kernel" not in error.what
@@ -488,13 +534,17 @@ def test_an_entry_that_a_summary_covers_is_compared_where_an_old_version_is_read
 
 @pytest.mark.disk(LINKS)
 @pytest.mark.timeout(60)
-def test_a_pipe_in_place_of_what_the_delta_library_reads_is_named_and_nobody_waits(lake: Lake) -> None:
+def test_a_pipe_in_place_of_what_the_delta_library_reads_is_named_and_nobody_waits(
+    lake: Lake,
+) -> None:
     put_text(lake, "gusts")
     hint = lake.path / "catalog" / "_delta_log" / "_last_checkpoint"
     hint.unlink(missing_ok=True)
     os.mkfifo(hint)
     for _ in range(2):
-        with pytest.raises(CorruptError, match="_last_checkpoint of the catalog's log is no regular file") as error:
+        with pytest.raises(
+            CorruptError, match="_last_checkpoint of the catalog's log is no regular file"
+        ) as error:
             Lake.open(lake.path).rows()
     assert error.value.where == str(hint)
     assert str(error.value.fix).startswith("delete _last_checkpoint")
@@ -509,7 +559,10 @@ def test_a_name_in_the_log_that_the_delta_library_does_not_take_is_named_and_mov
 ) -> None:
     stray = filled.path / "catalog" / "_delta_log" / name
     stray.write_bytes(b"{}")
-    for read in (lambda: Lake.open(filled.path).rows(), lambda: clone(filled, tmp_path / "copy", bars=no_bar)):
+    for read in (
+        lambda: Lake.open(filled.path).rows(),
+        lambda: clone(filled, tmp_path / "copy", bars=no_bar),
+    ):
         error = refused(read)
         assert (error.where, error.fix.startswith("move it away")) == (str(stray), True)
     assert str(stray) in {finding.where for finding in doctor(Lake.open(filled.path), grace=NOW)}

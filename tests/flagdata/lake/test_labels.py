@@ -1,4 +1,5 @@
-"""The user's own columns: typed, versioned, in queries, pairs and exports, and none of an older reader's business."""
+"""The user's own columns: typed, versioned, in queries, pairs and exports, and none of an older
+reader's business."""
 
 from __future__ import annotations
 
@@ -22,7 +23,10 @@ from tests.flagdata.lake.conftest import put_text
 
 
 def test_a_value_is_a_number_a_truth_value_or_a_text() -> None:
-    assert [given(text)[1] for text in ("a=4", "a=-0.5", "a=true", "a=red", 'a="5"', "a=", "a=2026-05-01")] == [
+    assert [
+        given(text)[1]
+        for text in ("a=4", "a=-0.5", "a=true", "a=red", 'a="5"', "a=", "a=2026-05-01")
+    ] == [
         4,
         -0.5,
         True,
@@ -41,12 +45,16 @@ def test_labels_are_columns_of_queries_with_their_type_and_of_their_version(lake
     lake.label([one.id], {"rating": 4, "colour": "red", "usable": True}, "looked at")
     lake.tag("v1")
     lake.label([one.id, two.id], {"rating": 2.5, "colour": None}, "again")
-    rows = select(lake, "label_rating > 2", columns=["name", "label_rating", "label_usable"], order="name").to_pylist()
+    rows = select(
+        lake, "label_rating > 2", columns=["name", "label_rating", "label_usable"], order="name"
+    ).to_pylist()
     assert rows == [
         {"name": "one", "label_rating": 2.5, "label_usable": True},
         {"name": "two", "label_rating": 2.5, "label_usable": None},
     ]
-    before = select(lake, "label_colour = 'red'", at="v1", columns=["name", "label_rating"]).to_pylist()
+    before = select(
+        lake, "label_colour = 'red'", at="v1", columns=["name", "label_rating"]
+    ).to_pylist()
     assert before == [{"name": "one", "label_rating": 4.0}]
     with pytest.raises(UnknownNameError, match="label_colour"):
         select(lake, columns=["label_colour"])
@@ -57,7 +65,8 @@ def test_a_name_keeps_its_type_and_an_artifact_has_to_be_there(lake: Lake) -> No
     one, two = put_text(lake, "one"), put_text(lake, "two")
     lake.label([one.id], {"rating": 4}, "a number")
     with pytest.raises(
-        ConflictError, match="rating is a number on some artifacts, as 4, and a text on others, as 'good'"
+        ConflictError,
+        match="rating is a number on some artifacts, as 4, and a text on others, as 'good'",
     ):
         lake.label([two.id], {"rating": "good"}, "a text")
     lake.label([one.id], {"rating": "good"}, "the only one may change")
@@ -115,9 +124,15 @@ def test_clips_of_a_labelled_recording_are_pairs_with_its_numbers_and_exports_ha
     table = pq.read_table(tmp_path / "rows" / "rows")
     assert table["label_colour"].to_pylist() == ["red"] * 3
     assert table["label_rating"].to_pylist() == [4.0] * 3
-    export(lake, Export(format="parquet", where="kind = 'clip'", options={"frames": "jpg"}), tmp_path / "frames")
+    export(
+        lake,
+        Export(format="parquet", where="kind = 'clip'", options={"frames": "jpg"}),
+        tmp_path / "frames",
+    )
     assert pq.read_table(tmp_path / "frames" / "rows")["label_usable"].to_pylist() == [True] * 3
-    export(lake, Export(format="parquet", where="kind = 'clip'", at=str(version)), tmp_path / "before")
+    export(
+        lake, Export(format="parquet", where="kind = 'clip'", at=str(version)), tmp_path / "before"
+    )
     assert pq.read_table(tmp_path / "before" / "rows").column_names == list(CATALOG)
 
 

@@ -1,4 +1,5 @@
-"""What a user of the lake relies on: rows and objects appear together, once, and are found again."""
+"""What a user of the lake relies on: rows and objects appear together, once, and are found
+again."""
 
 from __future__ import annotations
 
@@ -46,7 +47,11 @@ def test_a_transaction_is_of_no_use_outside_its_block(lake: Lake) -> None:
         pass
     assert tx.result is not None
     assert (tx.result.commit, tx.result.added) == (None, ())
-    for use in (lambda: tx.staging(".mcap"), lambda: tx.put(lake.path), lambda: lake.transaction(" ")):
+    for use in (
+        lambda: tx.staging(".mcap"),
+        lambda: tx.put(lake.path),
+        lambda: lake.transaction(" "),
+    ):
         with pytest.raises(UsageError):
             use()
     with pytest.raises(NotFoundError), lake.transaction("nowhere", branch="nope"):
@@ -139,7 +144,9 @@ def test_a_merge_brings_all_that_the_branch_shows_what_it_began_from_too(lake: L
 def test_a_merge_brings_parents_and_children_whatever_begins_earlier(lake: Lake) -> None:
     lake.branch("try")
     wind = Artifact(kind=Kind.WIND, name="log", start=200, end=300)
-    recording = Artifact(kind=Kind.RECORDING, name="made of it", start=100, end=300, parents=(wind.id,))
+    recording = Artifact(
+        kind=Kind.RECORDING, name="made of it", start=100, end=300, parents=(wind.id,)
+    )
     with lake.transaction("both", branch="try") as tx:
         tx.add(wind)
         tx.add(recording)

@@ -1,4 +1,5 @@
-"""Folders that are links, links inside them, files that cannot be opened, lakes that can only be read."""
+"""Folders that are links, links inside them, files that cannot be opened, lakes that can only be
+read."""
 
 from __future__ import annotations
 
@@ -16,7 +17,16 @@ import pytest
 from flagdata.core.findings import Finding, Severity
 from flagdata.core.schema import Kind
 from flagdata.errors import CorruptError, FlagdataError
-from flagdata.lake import Artifact, Lake, collect, doctor, garbage, object_names, verify, verify_catalog
+from flagdata.lake import (
+    Artifact,
+    Lake,
+    collect,
+    doctor,
+    garbage,
+    object_names,
+    verify,
+    verify_catalog,
+)
 from flagdata.lake.lake_layout import FOLDERS, LinkError
 from tests.flagdata.lake.conftest import LINKS, put_older_ref, put_text
 from tests.program import invoke
@@ -28,7 +38,10 @@ NOW = timedelta(0)
 def tree(folder: Path) -> dict[str, tuple[int, bytes]]:
     """Every file of a folder by its path: when it was last written, and its bytes."""
     files = (path for path in folder.rglob("*") if path.is_file())
-    return {str(path.relative_to(folder)): (path.stat().st_mtime_ns, path.read_bytes()) for path in files}
+    return {
+        str(path.relative_to(folder)): (path.stat().st_mtime_ns, path.read_bytes())
+        for path in files
+    }
 
 
 def brief(findings: tuple[Finding, ...]) -> list[tuple[str, Severity, str | None]]:
@@ -98,7 +111,9 @@ def test_a_folder_that_is_a_file_is_refused_too(lake: Lake) -> None:
 def test_a_linked_object_and_a_linked_chunk_are_findings_and_others_are_checked_all_the_same(
     lake: Lake, tmp_path: Path
 ) -> None:
-    file, damaged = (lake.object_path(str(put_text(lake, text).object)) for text in ("linked", "damaged"))
+    file, damaged = (
+        lake.object_path(str(put_text(lake, text).object)) for text in ("linked", "damaged")
+    )
     folder = put_folder(lake)
     damaged.chmod(0o644)
     damaged.write_text("demaged")
@@ -123,13 +138,17 @@ def test_doctor_and_verify_name_a_link_once_each(lake: Lake) -> None:
         assert said.count("error: ") == said.count("error: link:") == 1, said
 
 
-def test_ingesting_again_replaces_a_link_by_the_object_and_leaves_what_it_leads_to(lake: Lake, tmp_path: Path) -> None:
+def test_ingesting_again_replaces_a_link_by_the_object_and_leaves_what_it_leads_to(
+    lake: Lake, tmp_path: Path
+) -> None:
     put_text(lake, "file")
     for path in (lake.object_path(str(put_text(lake, "file").object)), put_folder(lake)):
         elsewhere = tmp_path / path.name
         path.rename(elsewhere)
         for target in (elsewhere, tmp_path / "nowhere"):
-            path.unlink(missing_ok=True) if path.is_symlink() or path.is_file() else shutil.rmtree(path, True)
+            path.unlink(missing_ok=True) if path.is_symlink() or path.is_file() else shutil.rmtree(
+                path, True
+            )
             path.symlink_to(target)
             put_text(lake, "file")
             put_folder(lake)
@@ -157,7 +176,9 @@ def test_an_orphan_that_is_a_link_is_deleted_and_what_it_leads_to_is_not(
     assert doctor(lake, grace=NOW) == ()
 
 
-def test_a_lock_that_is_a_link_is_refused_and_makes_no_file_elsewhere(lake: Lake, tmp_path: Path) -> None:
+def test_a_lock_that_is_a_link_is_refused_and_makes_no_file_elsewhere(
+    lake: Lake, tmp_path: Path
+) -> None:
     for name in (".collect", ".turn"):
         (lake.staging / name).unlink(missing_ok=True)
         (lake.staging / name).symlink_to(tmp_path / "made")
@@ -169,7 +190,9 @@ def test_a_lock_that_is_a_link_is_refused_and_makes_no_file_elsewhere(lake: Lake
     assert not (tmp_path / "made").exists()
 
 
-def test_a_lease_that_is_no_file_proves_nothing_and_ends_nothing(lake: Lake, tmp_path: Path) -> None:
+def test_a_lease_that_is_no_file_proves_nothing_and_ends_nothing(
+    lake: Lake, tmp_path: Path
+) -> None:
     for name, make in (
         ("link", lambda path: path.symlink_to(tmp_path / "lease")),
         ("folder", lambda path: path.mkdir()),
@@ -183,7 +206,8 @@ def test_a_lease_that_is_no_file_proves_nothing_and_ends_nothing(lake: Lake, tmp
 
 
 def test_what_is_left_of_the_shared_locks_is_nobodys_leftover(lake: Lake) -> None:
-    """In a bucket their folder is listed, and gone with the last of them before anything about it can be asked."""
+    """In a bucket their folder is listed, and gone with the last of them before anything about it
+    can be asked."""
     (lake.staging / "shared").write_text("")
     assert not doctor(lake, grace=NOW)
     assert collect(lake, grace=NOW).leftovers == ()
@@ -199,7 +223,12 @@ _MAKE: dict[str, Callable[[Path], object]] = {
 
 @pytest.mark.parametrize(
     ("part", "kind"),
-    [*itertools.product(("entry", "rows", "tag"), _MAKE), ("mark", "folder"), ("mark", "pipe"), ("mark", "no UTF-8")],
+    [
+        *itertools.product(("entry", "rows", "tag"), _MAKE),
+        ("mark", "folder"),
+        ("mark", "pipe"),
+        ("mark", "no UTF-8"),
+    ],
 )
 def test_a_file_of_the_catalog_or_refs_that_cannot_be_opened_is_a_finding_and_a_clear_error(
     lake: Lake, part: str, kind: str
@@ -216,8 +245,14 @@ def test_a_file_of_the_catalog_or_refs_that_cannot_be_opened_is_a_finding_and_a_
     path.unlink()
     _MAKE[kind](path)
     fresh = Lake.open(lake.path)
-    named = {"tag": "v1", "mark": "1"}.get(part, path.name)  # a damaged mark says that the entry of its name changed
-    damage = [f.where for f in (*doctor(fresh, grace=NOW), *verify_catalog(fresh)) if f.severity is Severity.ERROR]
+    named = {"tag": "v1", "mark": "1"}.get(
+        part, path.name
+    )  # a damaged mark says that the entry of its name changed
+    damage = [
+        f.where
+        for f in (*doctor(fresh, grace=NOW), *verify_catalog(fresh))
+        if f.severity is Severity.ERROR
+    ]
     assert any(named in Path(str(where)).name for where in damage), damage
     if part != "mark":  # of which only the name says something to readers
         with pytest.raises(CorruptError):
@@ -273,7 +308,9 @@ def test_a_marker_that_is_a_pipe_is_refused_at_once(lake: Lake) -> None:
 @pytest.mark.parametrize("version", ["-1", "0", "1e999", "true", "2.5", '"1"', "null", "9" * 5000])
 def test_a_marker_without_a_version_of_the_format_is_refused(lake: Lake, version: str) -> None:
     marker = lake.path / "lake.json"
-    marker.write_text(re.sub(r'("format_version": )\d+', lambda match: match[1] + version, marker.read_text()))
+    marker.write_text(
+        re.sub(r'("format_version": )\d+', lambda match: match[1] + version, marker.read_text())
+    )
     with pytest.raises(CorruptError, match="marker cannot be read"):
         Lake.open(lake.path)
 
@@ -300,7 +337,11 @@ def test_each_verb_that_writes_refuses_a_lake_that_can_only_be_read_before_it_wo
     lake: Lake, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Their input does not exist: a verb that looks at its input first reports that instead."""
-    monkeypatch.setattr(os, "access", lambda path, mode: not (mode & os.W_OK and str(path).startswith(str(lake.path))))
+    monkeypatch.setattr(
+        os,
+        "access",
+        lambda path, mode: not (mode & os.W_OK and str(path).startswith(str(lake.path))),
+    )
     refused = (1, "flagdata: this lake can be read, but not written", True)
     offenders = {}
     for arguments in VERBS:
@@ -320,9 +361,15 @@ def test_doctor_makes_no_file_in_a_copy_that_came_without_its_empty_folders(lake
     assert sorted(lake.path.rglob("*")) == before
 
 
-def test_what_only_looks_opens_a_lake_that_can_only_be_read(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_only_looks_opens_a_lake_that_can_only_be_read(
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
     put_text(lake, "a")
-    monkeypatch.setattr(os, "access", lambda path, mode: not (mode & os.W_OK and str(path).startswith(str(lake.path))))
+    monkeypatch.setattr(
+        os,
+        "access",
+        lambda path, mode: not (mode & os.W_OK and str(path).startswith(str(lake.path))),
+    )
     looking = (["ls"], ["tag"], ["branch"], ["log"], ["doctor"], ["verify"], ["gc", "--dry-run"])
     for arguments in looking:
         ended = invoke(*arguments, "--lake", lake.path)

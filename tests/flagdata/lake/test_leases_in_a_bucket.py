@@ -1,4 +1,5 @@
-"""Locks of a lake in a bucket: leases that their holders renew, and that count no longer where they were not."""
+"""Locks of a lake in a bucket: leases that their holders renew, and that count no longer where they
+were not."""
 
 from __future__ import annotations
 
@@ -34,11 +35,15 @@ def test_locks_of_a_process_that_was_killed_hold_nobody_up(remote_lake: Lake) ->
     assert doctor(remote_lake, grace=NOW) == ()
 
 
-def test_a_lease_of_another_machine_counts_until_it_was_not_renewed_for_its_life(bucket_folder: str) -> None:
+def test_a_lease_of_another_machine_counts_until_it_was_not_renewed_for_its_life(
+    bucket_folder: str,
+) -> None:
     staging = RemotePath.parse(bucket_folder)
     owner = {**lake_locks.owner(), "machine": "another", "pid": 1, "started": 1}
     for life, folder in ((60.0, "0" * 32), (-60.0, "1" * 32)):
-        (staging / folder / "lease").write_bytes(json.dumps({**owner, "life": life}).encode() + b"\nmcap/x\n")
+        (staging / folder / "lease").write_bytes(
+            json.dumps({**owner, "life": life}).encode() + b"\nmcap/x\n"
+        )
     assert [(state.alive, state.objects) for state in leases(staging)] == [
         (True, frozenset({"mcap/x"})),
         (False, frozenset({"mcap/x"})),
@@ -53,7 +58,9 @@ def test_a_lease_that_names_no_objects_stops_no_collection(remote_lake: Lake) ->
     assert collect(remote_lake, grace=NOW).objects == ()
 
 
-def test_who_was_cut_off_for_long_publishes_nothing(remote_lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_who_was_cut_off_for_long_publishes_nothing(
+    remote_lake: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
     put = Transaction.put
 
     def slow(transaction: Transaction, path: Path) -> str:
@@ -107,7 +114,9 @@ def test_a_lease_that_the_store_refuses_leaves_nothing_on_this_machine(
     assert leases(tmp_path / "cache" / "staging") == []
 
 
-def test_erasing_stops_where_its_lock_was_lost_on_the_way(remote_lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_erasing_stops_where_its_lock_was_lost_on_the_way(
+    remote_lake: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
     one, two = put_text(remote_lake, "one"), put_text(remote_lake, "two")
     remove = remote_lake.objects.remove
 
@@ -119,7 +128,10 @@ def test_erasing_stops_where_its_lock_was_lost_on_the_way(remote_lake: Lake, mon
     with pytest.raises(ConflictError, match="take this process for dead"):
         remote_lake.erase([one.id, two.id], "asked to")
     monkeypatch.undo()
-    assert sorted(remote_lake.objects.has(str(artifact.object)) for artifact in (one, two)) == [False, True]
+    assert sorted(remote_lake.objects.has(str(artifact.object)) for artifact in (one, two)) == [
+        False,
+        True,
+    ]
 
 
 def test_an_exclusive_lock_whose_renewal_was_answered_to_nobody_is_still_its_holders(

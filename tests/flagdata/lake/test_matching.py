@@ -34,7 +34,9 @@ def test_rows_have_all_of_the_values_and_one_of_several() -> None:
         ({"seed": {None, 0}}, (NAMES[0], *NAMES[3:])),
         ({"name": []}, ()),
     ]
-    assert [tuple(matching(TABLE, values)["name"].to_pylist()) for values, _ in wanted] == [rows for _, rows in wanted]
+    assert [tuple(matching(TABLE, values)["name"].to_pylist()) for values, _ in wanted] == [
+        rows for _, rows in wanted
+    ]
 
 
 def test_what_no_column_holds_is_refused() -> None:

@@ -1,4 +1,5 @@
-"""Labels where branches come together: merged name by name, refused where that is not right, never unreadable."""
+"""Labels where branches come together: merged name by name, refused where that is not right, never
+unreadable."""
 
 from __future__ import annotations
 
@@ -62,7 +63,9 @@ def test_what_one_branch_changed_counts(
     assert labels(lake, "side") == labels(lake)
 
 
-@pytest.mark.parametrize(("here", "there"), [(2, 3), (2, None), (None, 3), (True, "red"), ("a b", "it's")])
+@pytest.mark.parametrize(
+    ("here", "there"), [(2, 3), (2, None), (None, 3), (True, "red"), ("a b", "it's")]
+)
 def test_what_both_changed_is_refused_until_they_agree_as_the_remedy_says(
     forked: tuple[Lake, str, str], here: Any, there: Any
 ) -> None:
@@ -80,7 +83,9 @@ def test_what_both_changed_is_refused_until_they_agree_as_the_remedy_says(
     assert labels(lake)["one"].get("n") == here
 
 
-def test_two_names_that_are_one_column_are_refused_with_what_takes_one_off(forked: tuple[Lake, str, str]) -> None:
+def test_two_names_that_are_one_column_are_refused_with_what_takes_one_off(
+    forked: tuple[Lake, str, str],
+) -> None:
     lake, one, two = forked
     lake.label([one], {"note": "a"}, "on main")
     lake.label([two], {"Note": "b"}, "on side", branch="side")
@@ -89,11 +94,16 @@ def test_two_names_that_are_one_column_are_refused_with_what_takes_one_off(forke
     command = shlex.split(str(refused.value.fix).partition("; ")[2].partition(" takes")[0])
     assert invoke(*command[1:], "--lake", lake.path).code == 0
     lake.merge("side", "one of them")
-    assert len({name for values in labels(lake).values() for name in values if name.lower() == "note"}) == 1
+    assert (
+        len({name for values in labels(lake).values() for name in values if name.lower() == "note"})
+        == 1
+    )
     assert invoke("ls", "--lake", lake.path).code == 0
 
 
-def test_values_of_two_types_are_refused_with_what_takes_one_off(forked: tuple[Lake, str, str]) -> None:
+def test_values_of_two_types_are_refused_with_what_takes_one_off(
+    forked: tuple[Lake, str, str],
+) -> None:
     lake, _, two = forked
     lake.label([two], {"n": None}, "not here")
     lake.branch("texts", at="0")

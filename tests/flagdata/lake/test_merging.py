@@ -1,4 +1,5 @@
-"""Merging, withdrawing on a branch, deleting branches and tags: what a user of versions relies on."""
+"""Merging, withdrawing on a branch, deleting branches and tags: what a user of versions relies
+on."""
 
 from __future__ import annotations
 
@@ -29,7 +30,9 @@ def names(lake: Lake, at: str | None = None) -> list[str]:
     return sorted(lake.rows(at=at)["name"].to_pylist())
 
 
-def test_what_was_withdrawn_after_a_merge_stays_withdrawn_when_the_branch_is_merged_again(lake: Lake) -> None:
+def test_what_was_withdrawn_after_a_merge_stays_withdrawn_when_the_branch_is_merged_again(
+    lake: Lake,
+) -> None:
     put_text(lake, "base")
     lake.branch("b")
     a = put_text(lake, "A", branch="b")
@@ -45,7 +48,8 @@ def test_what_was_withdrawn_after_a_merge_stays_withdrawn_when_the_branch_is_mer
 
 
 def test_a_merge_that_nothing_records_brings_nothing_back_either(lake: Lake) -> None:
-    """As lakes have them that were written before merges were recorded: the same row was committed on both."""
+    """As lakes have them that were written before merges were recorded: the same row was committed
+    on both."""
     lake.branch("b")
     a = put_text(lake, "A", branch="b")
     put_text(lake, "A")
@@ -68,7 +72,9 @@ def test_what_is_made_anew_after_it_was_withdrawn_comes_back_and_is_named(lake: 
     assert names(lake) == ["A"]
 
 
-def test_a_withdrawal_on_a_branch_hides_a_row_of_main_there_and_goes_to_main_with_a_merge(lake: Lake) -> None:
+def test_a_withdrawal_on_a_branch_hides_a_row_of_main_there_and_goes_to_main_with_a_merge(
+    lake: Lake,
+) -> None:
     wrong, right = put_text(lake, "wrong"), put_text(lake, "right")
     lake.branch("b")
     lake.withdraw([wrong.id], "to try the data without it", branch="b")
@@ -131,7 +137,13 @@ def test_a_branch_that_is_merged_can_be_deleted_and_its_name_used_again(lake: La
     commits = {e["message"]: e["commit"] for e in lake.catalog.history() if "commit" in e}
     lake.delete_branch("b")
     assert lake.refs.branches().keys() == {"c"}
-    assert names(lake) == names(lake, "kept") == names(lake, "c") == names(lake, commits["ingest A"]) == ["A", "base"]
+    assert (
+        names(lake)
+        == names(lake, "kept")
+        == names(lake, "c")
+        == names(lake, commits["ingest A"])
+        == ["A", "base"]
+    )
     with pytest.raises(NotFoundError, match="no branch 'b'"):
         put_text(lake, "more", branch="b")
     lake.branch("b", at="1")
@@ -143,7 +155,9 @@ def test_a_branch_that_is_merged_can_be_deleted_and_its_name_used_again(lake: La
     assert doctor(lake, grace=NOW) == ()
 
 
-def test_a_branch_or_tag_that_alone_shows_rows_is_deleted_only_when_they_are_given_up(lake: Lake) -> None:
+def test_a_branch_or_tag_that_alone_shows_rows_is_deleted_only_when_they_are_given_up(
+    lake: Lake,
+) -> None:
     lake.branch("b")
     a = put_text(lake, "A", branch="b")
     with pytest.raises(ConflictError, match="1 artifacts are shown by this branch alone"):
@@ -155,7 +169,9 @@ def test_a_branch_or_tag_that_alone_shows_rows_is_deleted_only_when_they_are_giv
     assert names(lake, "v1") == ["A"]
     lake.delete_tag("v1", discard=True)
     assert lake.refs.tags() == {}
-    assert a.object in mark(lake, grace=DAY).objects  # what was deleted a moment ago may have been a mistake
+    assert (
+        a.object in mark(lake, grace=DAY).objects
+    )  # what was deleted a moment ago may have been a mistake
     assert collect(lake, grace=NOW).objects == (a.object,)
 
 
@@ -213,10 +229,20 @@ def test_versions_whose_data_gc_deleted_are_named_by_doctor_and_by_what_needs_th
     assert doctor(lake, grace=DAY) == ()
     collect(lake, grace=NOW)
     (finding,) = doctor(lake, grace=DAY)
-    assert (finding.kind, finding.severity, finding.count) == ("withdrawn-collected", Severity.NOTE, 1)
+    assert (finding.kind, finding.severity, finding.count) == (
+        "withdrawn-collected",
+        Severity.NOTE,
+        1,
+    )
     assert finding.where == "versions before 3"
-    for use in (lake.object_path, lake.whole_object, lambda _: prepare(lake, request).write(tmp_path / "out")):
-        with pytest.raises(NotFoundError, match=r"withdrawn by version 3 \(faces of people in it\).*gc") as caught:
+    for use in (
+        lake.object_path,
+        lake.whole_object,
+        lambda _: prepare(lake, request).write(tmp_path / "out"),
+    ):
+        with pytest.raises(
+            NotFoundError, match=r"withdrawn by version 3 \(faces of people in it\).*gc"
+        ) as caught:
             use(str(gone.object))
         assert "from 3 on" in caught.value.fix
         assert "doctor" not in caught.value.fix
@@ -233,11 +259,20 @@ def test_a_file_that_only_older_versions_need_does_not_end_doctor(lake: Lake) ->
     (old,) = (lake.path / "catalog").glob("*.parquet")
     lake.withdraw([artifact.id], "no")
     old.write_bytes(b"damaged")
-    assert "catalog-file-unreadable" in {finding.kind for finding in doctor(Lake.open(lake.path), grace=NOW)}
+    assert "catalog-file-unreadable" in {
+        finding.kind for finding in doctor(Lake.open(lake.path), grace=NOW)
+    }
 
 
 @pytest.mark.parametrize(
-    "note", [{"hidden": "{"}, {"hidden": "3"}, {"hidden": "9" * 5000}, {"hidden_on": "[1]"}, {"hidden_on": '{"b": 3}'}]
+    "note",
+    [
+        {"hidden": "{"},
+        {"hidden": "3"},
+        {"hidden": "9" * 5000},
+        {"hidden_on": "[1]"},
+        {"hidden_on": '{"b": 3}'},
+    ],
 )
 def test_a_note_of_the_log_that_cannot_be_read_is_damage(note: dict[str, str]) -> None:
     with pytest.raises(CorruptError, match="version 7"):
@@ -274,12 +309,18 @@ def test_the_verbs_say_what_a_merge_and_a_deletion_did(lake: Lake) -> None:
     assert run("tag", "v1")[0] == 0
     assert json.loads(run("tag", "v1", "--delete", "-m", "not ready", "--json")[1])["version"] == 12
     assert lake.catalog.history()[0]["message"] == "not ready"
-    for wrong in (["tag", "--delete"], ["tag", "v", "--delete", "--at", "1"], ["branch", "b", "--discard"]):
+    for wrong in (
+        ["tag", "--delete"],
+        ["tag", "v", "--delete", "--at", "1"],
+        ["branch", "b", "--discard"],
+    ):
         assert run(*wrong)[0] == 2
     assert run("log")[0] == 0
 
 
-def test_a_path_through_many_branches_brings_each_row_once_and_keeps_each_withdrawal(lake: Lake) -> None:
+def test_a_path_through_many_branches_brings_each_row_once_and_keeps_each_withdrawal(
+    lake: Lake,
+) -> None:
     def put(name: str, branch: str) -> Artifact:
         artifact = Artifact(kind=Kind.WIND, name=name, recipe={"name": name})
         with lake.transaction(name, branch=branch) as tx:
@@ -299,7 +340,9 @@ def test_a_path_through_many_branches_brings_each_row_once_and_keeps_each_withdr
     assert names(lake, "one") == ["b"]
 
 
-def test_of_many_withdrawals_one_catalog_is_held_at_a_time(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_many_withdrawals_one_catalog_is_held_at_a_time(
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
     alive: list[weakref.ref[pa.Table]] = []
 
     def withdrawn(*_: object, **__: object) -> Iterator[pa.Table]:

@@ -15,7 +15,15 @@ from flagdata.core.files.checksums import content_hash
 from flagdata.core.rng import stream
 from flagdata.core.schema import Kind
 from flagdata.errors import ConflictError, CorruptError, InputError
-from flagdata.lake import Artifact, Lake, MeshSequence, RaggedMeshSequence, open_meshes, read_meshes, write_meshes
+from flagdata.lake import (
+    Artifact,
+    Lake,
+    MeshSequence,
+    RaggedMeshSequence,
+    open_meshes,
+    read_meshes,
+    write_meshes,
+)
 
 
 def flag(frames: int = 60, rows: int = 21, columns: int = 31) -> MeshSequence:
@@ -26,7 +34,12 @@ def flag(frames: int = 60, rows: int = 21, columns: int = 31) -> MeshSequence:
     wave = 0.1 * np.sin(4 * rest[None, :, 0] - 0.3 * np.arange(frames)[:, None])
     noise = stream(1, "mesh").normal(scale=1e-3, size=wave.shape)
     positions = np.stack(
-        [np.broadcast_to(rest[:, 0], wave.shape), wave + noise, np.broadcast_to(rest[:, 1], wave.shape)], 2
+        [
+            np.broadcast_to(rest[:, 0], wave.shape),
+            wave + noise,
+            np.broadcast_to(rest[:, 1], wave.shape),
+        ],
+        2,
     )
     corner = np.arange(rows * columns).reshape(rows, columns)
     lower = np.stack([corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:]], axis=-1).reshape(-1, 3)
@@ -62,8 +75,12 @@ def same(one: MeshSequence | RaggedMeshSequence, other: MeshSequence | RaggedMes
     return type(one) is type(other) and equal and one.attributes == other.attributes
 
 
-@pytest.mark.parametrize("sequence", [flag(), ragged(), flag(frames=1)], ids=["fixed", "ragged", "one-frame"])
-def test_a_sequence_comes_back_bit_for_bit(tmp_path: Path, sequence: MeshSequence | RaggedMeshSequence) -> None:
+@pytest.mark.parametrize(
+    "sequence", [flag(), ragged(), flag(frames=1)], ids=["fixed", "ragged", "one-frame"]
+)
+def test_a_sequence_comes_back_bit_for_bit(
+    tmp_path: Path, sequence: MeshSequence | RaggedMeshSequence
+) -> None:
     write_meshes(tmp_path / "a.zarr", sequence)
     back = read_meshes(tmp_path / "a.zarr")
     assert same(back, sequence)
@@ -75,7 +92,10 @@ def test_equal_sequences_have_equal_bytes_and_others_do_not(
     tmp_path: Path, sequence: MeshSequence | RaggedMeshSequence
 ) -> None:
     write_meshes(tmp_path / "a.zarr", sequence)
-    write_meshes(tmp_path / "b.zarr", replace(sequence, attributes=dict(reversed(sequence.attributes.items()))))
+    write_meshes(
+        tmp_path / "b.zarr",
+        replace(sequence, attributes=dict(reversed(sequence.attributes.items()))),
+    )
     moved = sequence.positions.copy()
     moved[(0,) * (moved.ndim - 1) + (2,)] += np.float32(1e-6)
     write_meshes(tmp_path / "c.zarr", replace(sequence, positions=moved))
@@ -119,7 +139,15 @@ def test_a_sequence_and_its_copy_are_one_object_of_the_lake(lake: Lake) -> None:
             path = tx.staging(".zarr")
             write_meshes(path, flag())
             names.append(tx.put(path))
-            tx.add(Artifact(kind=Kind.MESHES, name=name, object=names[-1], recipe={"name": name}, frame_count=60))
+            tx.add(
+                Artifact(
+                    kind=Kind.MESHES,
+                    name=name,
+                    object=names[-1],
+                    recipe={"name": name},
+                    frame_count=60,
+                )
+            )
     assert names[0] == names[1]
     assert lake.rows().num_rows == 2
     assert same(read_meshes(lake.object_path(names[0])), flag())
@@ -140,7 +168,12 @@ def test_arrays_that_do_not_fit_are_refused_by_name() -> None:
     for change, message in MISFITS:
         with pytest.raises(InputError, match=message):
             replace(flag(), **change)
-    for offset in ([0, 3, 7, 9], [1, 3, 7, 10], [0, 7, 3, 10], [0, 3, 10]):  # they do not cover the rows
+    for offset in (
+        [0, 3, 7, 9],
+        [1, 3, 7, 10],
+        [0, 7, 3, 10],
+        [0, 3, 10],
+    ):  # they do not cover the rows
         with pytest.raises(InputError, match="vertex_offset"):
             replace(ragged(), vertex_offset=np.array(offset, dtype=np.int64))
 

@@ -29,10 +29,14 @@ def test_a_day_ends_at_midnight_a_time_names_its_zone_and_ago_counts_from_now() 
 def test_the_newest_version_up_to_an_instant_is_shown(lake: Lake) -> None:
     put_text(lake, "one")
     assert lake.resolve("0.seconds.ago") == lake.catalog.head()
-    hours = [{"version": n, "timestamp": (1_795_694_400 + 3600 * n) * 1000} for n in range(4)]  # from noon on
+    hours = [
+        {"version": n, "timestamp": (1_795_694_400 + 3600 * n) * 1000} for n in range(4)
+    ]  # from noon on
 
     def at(text: str) -> int:
-        return references.resolve(lake.refs, text, head=3, commits=dict, history=lambda: reversed(hours))[0].version
+        return references.resolve(
+            lake.refs, text, head=3, commits=dict, history=lambda: reversed(hours)
+        )[0].version
 
     assert at("2026-11-26T13:59:59Z") == 1
     assert at("2026-11-26T14:00:00Z") == 2

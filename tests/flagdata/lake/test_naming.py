@@ -19,8 +19,21 @@ def run(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> Run:
     return lambda *arguments: invoke(*arguments)
 
 
-def row(artifact: str, kind: Kind, name: str, *, parents: tuple[str, ...] = (), source: str | None = None) -> Any:
-    return {"artifact": artifact, "kind": kind, "name": name, "parents": list(parents), "source_name": source}
+def row(
+    artifact: str,
+    kind: Kind,
+    name: str,
+    *,
+    parents: tuple[str, ...] = (),
+    source: str | None = None,
+) -> Any:
+    return {
+        "artifact": artifact,
+        "kind": kind,
+        "name": name,
+        "parents": list(parents),
+        "source_name": source,
+    }
 
 
 ROWS = [
@@ -51,7 +64,9 @@ ROWS = [
         ("", (), []),
     ],
 )
-def test_a_name_means_what_a_person_means_by_it(wanted: str, kinds: tuple[Kind, ...], found: list[str]) -> None:
+def test_a_name_means_what_a_person_means_by_it(
+    wanted: str, kinds: tuple[Kind, ...], found: list[str]
+) -> None:
     assert {one["artifact"] for one in meant(ROWS, wanted, kinds=kinds)} == set(found)
 
 
@@ -69,14 +84,23 @@ def test_a_name_that_is_nearly_right_is_suggested(run: Run, lake: Lake) -> None:
     assert "did you mean 'anemometer'?" in run("show", "anemometre").err
 
 
-def test_show_says_what_matters_of_a_verdict_and_lists_twenty_of_what_was_made_from_it(run: Run, lake: Lake) -> None:
+def test_show_says_what_matters_of_a_verdict_and_lists_twenty_of_what_was_made_from_it(
+    run: Run, lake: Lake
+) -> None:
     words = "Adding lift explains a third of the error."
     with lake.transaction("verdict") as tx:
-        verdict = Artifact(kind="measurement", name="flag", report=f'{{"words": "{words}"}}', recipe={"secret": 1})
+        verdict = Artifact(
+            kind="measurement", name="flag", report=f'{{"words": "{words}"}}', recipe={"secret": 1}
+        )
         tx.add(verdict)
     with lake.transaction("models") as tx:
         for number in range(23):
-            model = Artifact(kind="model", name=f"flag-{number}", parents=(verdict.id,), recipe={"number": number})
+            model = Artifact(
+                kind="model",
+                name=f"flag-{number}",
+                parents=(verdict.id,),
+                recipe={"number": number},
+            )
             tx.add(replace(model, parameters='{"effects": {"lift": {}}}'))
     shown = run("show", "flag").out
     assert shown.splitlines()[0] == f"says            {words}"

@@ -1,4 +1,5 @@
-"""A catalog whose JSON columns are nested deeper than any parser goes is refused by the row's name, by every reader."""
+"""A catalog whose JSON columns are nested deeper than any parser goes is refused by the row's name,
+by every reader."""
 
 from __future__ import annotations
 
@@ -58,13 +59,17 @@ def test_older_films_pairs_and_labels_name_the_row() -> None:
         assert str(where["artifact"]) in str(caught.value.where)
 
 
-@pytest.mark.parametrize("arguments", [("ls",), ("show", "train-train-00001"), ("show", "train-train-00001", "--json")])
+@pytest.mark.parametrize(
+    "arguments", [("ls",), ("show", "train-train-00001"), ("show", "train-train-00001", "--json")]
+)
 def test_commands_on_a_nested_row_end_with_an_error_that_names_it(
     arguments: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     artifact = Artifact(kind=Kind.WIND, name="train-train-00001", source_hash="1" * 64)
     stated = Artifact.row
-    monkeypatch.setattr(Artifact, "row", lambda self: {**stated(self), "report": DEEP})  # as another program may write
+    monkeypatch.setattr(
+        Artifact, "row", lambda self: {**stated(self), "report": DEEP}
+    )  # as another program may write
     with Lake.create(tmp_path / "lake").transaction("made by another program") as transaction:
         transaction.add(artifact)
     ended = invoke(*arguments, "--lake", tmp_path / "lake")
@@ -76,7 +81,9 @@ def test_commands_on_a_nested_row_end_with_an_error_that_names_it(
 
 
 @pytest.mark.parametrize("column", ["recipe", "report"])
-def test_a_nested_row_is_withdrawn_as_doctor_says(column: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_nested_row_is_withdrawn_as_doctor_says(
+    column: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     artifact = Artifact(kind=Kind.WIND, name="log", source_hash="1" * 64)
     stated = Artifact.row
     monkeypatch.setattr(Artifact, "row", lambda self: {**stated(self), column: DEEP})

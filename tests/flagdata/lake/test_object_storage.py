@@ -1,4 +1,5 @@
-"""A lake in a bucket: the same protocol as in a folder, by conditional puts and leases that their holders renew."""
+"""A lake in a bucket: the same protocol as in a folder, by conditional puts and leases that their
+holders renew."""
 
 from __future__ import annotations
 
@@ -21,8 +22,25 @@ from flagdata.core.files import durable, object_cache
 from flagdata.core.files.caches import beside
 from flagdata.core.findings import Severity
 from flagdata.core.schema import Kind
-from flagdata.errors import ConflictError, CorruptError, FlagdataError, NotFoundError, RefusedError, UsageError
-from flagdata.lake import Artifact, Lake, collect, doctor, lake_locks, object_names, select, verify, verify_catalog
+from flagdata.errors import (
+    ConflictError,
+    CorruptError,
+    FlagdataError,
+    NotFoundError,
+    RefusedError,
+    UsageError,
+)
+from flagdata.lake import (
+    Artifact,
+    Lake,
+    collect,
+    doctor,
+    lake_locks,
+    object_names,
+    select,
+    verify,
+    verify_catalog,
+)
 from flagdata.lake.leases import last_written
 from flagdata.storage import RemotePath, StoreError, plain
 from tests.flagdata.conftest import write_video
@@ -42,7 +60,9 @@ def put_folder(lake: Lake, text: str) -> Artifact:
         (path / "positions" / "c" / "0").write_text(text)
         (path / "zarr.json").write_text("{}")
         name = tx.put(path)
-        artifact = Artifact(kind=Kind.MESHES, name=text, object=name, source_hash=name.partition("/")[2])
+        artifact = Artifact(
+            kind=Kind.MESHES, name=text, object=name, source_hash=name.partition("/")[2]
+        )
         tx.add(artifact)
     return artifact
 
@@ -53,13 +73,24 @@ def test_rows_and_objects_of_a_bucket_are_found_whole_by_a_fresh_handle(remote_l
     assert set(again.rows()["name"].to_pylist()) == {"gusts", "sheet"}
     assert again.object_path(str(record.object)).read_text() == "gusts"
     local = again.whole_object(str(folder.object))
-    files = {file.relative_to(local).as_posix(): file.read_text() for file in local.rglob("*") if file.is_file()}
+    files = {
+        file.relative_to(local).as_posix(): file.read_text()
+        for file in local.rglob("*")
+        if file.is_file()
+    }
     assert files == {"positions/c/0": "sheet", "zarr.json": "{}"}
     assert again.artifact(folder.id).object_bytes == len("sheet{}")
-    assert verify(again, object_names(again)) == verify_catalog(again) == doctor(again, grace=NOW) == ()
+    assert (
+        verify(again, object_names(again))
+        == verify_catalog(again)
+        == doctor(again, grace=NOW)
+        == ()
+    )
 
 
-def test_what_is_withdrawn_is_collected_and_tags_keep_theirs(remote_lake: Lake, tmp_path: Path) -> None:
+def test_what_is_withdrawn_is_collected_and_tags_keep_theirs(
+    remote_lake: Lake, tmp_path: Path
+) -> None:
     kept, gone = put_text(remote_lake, "kept"), put_folder(remote_lake, "gone")
     remote_lake.tag("v1")
     put_text(remote_lake, "later")
@@ -70,7 +101,10 @@ def test_what_is_withdrawn_is_collected_and_tags_keep_theirs(remote_lake: Lake, 
     assert not any(str(gone.object)[5:] in str(path) for path in remote_lake.path.rglob("*"))
     copies = [path.name for path in (tmp_path / "cache" / "objects").iterdir()]
     assert len(copies) > 1
-    assert not any(name.endswith((f"{str(kept.object)[5:]}.mcap", f"{str(gone.object)[5:]}.zarr")) for name in copies)
+    assert not any(
+        name.endswith((f"{str(kept.object)[5:]}.mcap", f"{str(gone.object)[5:]}.zarr"))
+        for name in copies
+    )
     assert [finding.kind for finding in doctor(remote_lake, grace=NOW)] == ["withdrawn-collected"]
 
 
@@ -106,7 +140,9 @@ def test_an_object_that_changed_in_the_bucket_is_found_and_healed_by_ingesting_a
     assert remote_lake.object_path(name).read_text() == "gusts"
 
 
-def test_a_store_that_ignores_conditions_is_refused_before_anything_is_written(use_store: Use) -> None:
+def test_a_store_that_ignores_conditions_is_refused_before_anything_is_written(
+    use_store: Use,
+) -> None:
     with serving(Careless) as address:
         use_store(address)
         with pytest.raises(RefusedError, match="ignores the conditions"):
@@ -114,16 +150,28 @@ def test_a_store_that_ignores_conditions_is_refused_before_anything_is_written(u
         assert not any("lake.json" in key or "catalog" in key for key in Careless.objects)
 
 
-def test_credentials_show_nowhere(remote_lake: Lake, use_store: Use, caplog: pytest.LogCaptureFixture) -> None:
+def test_credentials_show_nowhere(
+    remote_lake: Lake, use_store: Use, caplog: pytest.LogCaptureFixture
+) -> None:
     with caplog.at_level(logging.DEBUG):
         put_text(remote_lake, "gusts")
-        shown = [invoke(command, "--lake", remote_lake.path, "--json").out for command in ("ls", "log")]
+        shown = [
+            invoke(command, "--lake", remote_lake.path, "--json").out for command in ("ls", "log")
+        ]
         shown += [repr(remote_lake.path), pickle.dumps(remote_lake).decode(errors="replace")]
-        shown += [path.read_bytes().decode(errors="replace") for path in remote_lake.path.rglob("*")]
+        shown += [
+            path.read_bytes().decode(errors="replace") for path in remote_lake.path.rglob("*")
+        ]
         assert len(shown) > 8  # of the bucket, too
         with serving(Denying) as address:
             use_store(address)
-            for arguments in (("ls",), ("ls", "--json"), ("--debug", "verify"), ("gc",), ("tag", "v1")):
+            for arguments in (
+                ("ls",),
+                ("ls", "--json"),
+                ("--debug", "verify"),
+                ("gc",),
+                ("tag", "v1"),
+            ):
                 ended = invoke(*arguments, "--lake", remote_lake.path)
                 assert ended.code == 1
                 shown += [ended.out, ended.err]
@@ -136,15 +184,24 @@ def test_credentials_show_nowhere(remote_lake: Lake, use_store: Use, caplog: pyt
 
 
 def test_an_address_with_credentials_is_refused_without_repeating_them() -> None:
-    for address in ("key:secret@bucket/lake", "key:secret/lake", "bucket/lake?X-Amz-Signature=secret"):
+    for address in (
+        "key:secret@bucket/lake",
+        "key:secret/lake",
+        "bucket/lake?X-Amz-Signature=secret",
+    ):
         with pytest.raises(UsageError) as caught:
             Lake.open(f"s3://{address}")
         assert "secret" not in f"{caught.value} {caught.value.where}"
     assert plain("Generic S3 error \x1b[31m↳\x1b[0m no route") == "Generic S3 error ↳ no route"
-    assert plain("no answer of (http://key:secret@store:9000/bucket)") == "no answer of (http://…@store:9000/bucket)"
+    assert (
+        plain("no answer of (http://key:secret@store:9000/bucket)")
+        == "no answer of (http://…@store:9000/bucket)"
+    )
 
 
-@pytest.mark.parametrize("address", ["s3://", "s3://b", "s3://bucket//x", "s3://bucket/../x", "s3://bucket/a%41"])
+@pytest.mark.parametrize(
+    "address", ["s3://", "s3://b", "s3://bucket//x", "s3://bucket/../x", "s3://bucket/a%41"]
+)
 def test_an_address_that_clients_write_in_several_ways_is_refused(address: str) -> None:
     with pytest.raises(UsageError):
         Lake.create(address)
@@ -189,8 +246,12 @@ def test_the_credentials_of_a_profile_are_used(
     use_store(s3_server)
     for name in (*SECRETS, "AWS_ENDPOINT_URL", "AWS_REGION"):
         monkeypatch.delenv(name)
-    (tmp_path / "credentials").write_text("[lab]\naws_access_key_id = profilekey\naws_secret_access_key = hidden\n")
-    (tmp_path / "config").write_text(f"[profile lab]\nendpoint_url = {s3_server}\nregion = us-east-1\n")
+    (tmp_path / "credentials").write_text(
+        "[lab]\naws_access_key_id = profilekey\naws_secret_access_key = hidden\n"
+    )
+    (tmp_path / "config").write_text(
+        f"[profile lab]\nendpoint_url = {s3_server}\nregion = us-east-1\n"
+    )
     monkeypatch.setenv("AWS_CONFIG_FILE", str(tmp_path / "config"))
     monkeypatch.setenv("AWS_SHARED_CREDENTIALS_FILE", str(tmp_path / "credentials"))
     monkeypatch.setenv("AWS_PROFILE", "lab")
@@ -202,7 +263,9 @@ def test_the_credentials_of_a_profile_are_used(
         Lake.open("s3://bucket/lake")
 
 
-def test_a_put_whose_bytes_are_there_has_succeeded_however_often_it_was_sent(bucket_folder: str) -> None:
+def test_a_put_whose_bytes_are_there_has_succeeded_however_often_it_was_sent(
+    bucket_folder: str,
+) -> None:
     place = RemotePath.parse(bucket_folder) / "entry"
     assert place.create(b"mine")
     assert place.create(b"mine")  # as when the answer to the first was lost
@@ -309,7 +372,10 @@ def test_a_copy_that_is_not_what_was_fetched_is_fetched_again_and_said_once(
     remote_lake: Lake, caplog: pytest.LogCaptureFixture, damage: Callable[[Path], None]
 ) -> None:
     folder = str(put_folder(remote_lake, "sheet").object)
-    for name, inside in ((folder, "positions/c/0"), (str(put_text(remote_lake, "gusts").object), "")):
+    for name, inside in (
+        (folder, "positions/c/0"),
+        (str(put_text(remote_lake, "gusts").object), ""),
+    ):
         copy = remote_lake.object_path(name)
         right = (copy / inside).read_bytes()
         damage(copy / inside)
@@ -323,7 +389,10 @@ def test_a_copy_that_is_not_what_was_fetched_is_fetched_again_and_said_once(
 def test_copies_of_before_this_machine_was_started_are_compared_once(
     remote_lake: Lake, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    names = [str(put_folder(remote_lake, "sheet").object), str(put_text(remote_lake, "gusts").object)]
+    names = [
+        str(put_folder(remote_lake, "sheet").object),
+        str(put_text(remote_lake, "gusts").object),
+    ]
     compared: list[Path] = []
 
     def hashed(path: Path, content_hash: Callable[[Path], str] = object_cache.content_hash) -> str:
@@ -346,7 +415,9 @@ def test_a_copy_has_its_name_after_its_bytes_are_on_the_disk_and_a_deletion_is_c
     shutil.rmtree(tmp_path / "cache" / "objects")
     done: list[str] = []
     rename, flush = Path.rename, durable._flush
-    monkeypatch.setattr(durable, "_flush", lambda path, noun: (done.append(path.name), flush(path, noun)))
+    monkeypatch.setattr(
+        durable, "_flush", lambda path, noun: (done.append(path.name), flush(path, noun))
+    )
 
     def renamed(path: Path, target: Path) -> Path:
         done.append(f"{target.name} takes its name")
@@ -386,12 +457,16 @@ def test_a_sweep_passes_over_what_another_process_renames_meanwhile(
     staged.write_text("gusts")
     gone = objects / "part-0.mcap"
     listed = Path.iterdir
-    monkeypatch.setattr(Path, "iterdir", lambda path: [*listed(path), gone] if path == objects else listed(path))
+    monkeypatch.setattr(
+        Path, "iterdir", lambda path: [*listed(path), gone] if path == objects else listed(path)
+    )
     object_cache.kept("mcap/0", ".mcap", staged)
     assert (objects / "mcap-0.mcap").read_text() == "gusts"
 
 
-def test_files_of_a_folder_that_its_name_does_not_vouch_for_are_not_fetched(remote_lake: Lake, tmp_path: Path) -> None:
+def test_files_of_a_folder_that_its_name_does_not_vouch_for_are_not_fetched(
+    remote_lake: Lake, tmp_path: Path
+) -> None:
     name = str(put_folder(remote_lake, "sheet").object)
     shutil.rmtree(tmp_path / "cache" / "objects")
     (remote_lake.objects.path(name) / ".sums").write_bytes(f"{'0' * 64}  zarr.json\n".encode())
@@ -411,13 +486,17 @@ def test_labels_and_what_was_erased_are_as_in_a_folder(remote_lake: Lake) -> Non
     gone, kept = put_folder(remote_lake, "gone"), put_text(remote_lake, "kept")
     remote_lake.tag("v1")
     remote_lake.label([kept.id], {"rating": 4}, "looked at")
-    assert select(remote_lake, "label_rating = 4", columns=["name"]).to_pylist() == [{"name": "kept"}]
+    assert select(remote_lake, "label_rating = 4", columns=["name"]).to_pylist() == [
+        {"name": "kept"}
+    ]
     erasure = remote_lake.erase([gone.id], "asked to")
     assert (erasure.objects, erasure.tags, erasure.kept) == ((gone.object,), ("v1",), {})
     assert not (remote_lake.objects.path(str(gone.object))).is_dir()
     with pytest.raises(NotFoundError, match="was erased from all versions"):
         remote_lake.object_path(str(gone.object))
-    assert [finding.kind for finding in doctor(Lake.open(str(remote_lake.path)), grace=NOW)] == ["erased"]
+    assert [finding.kind for finding in doctor(Lake.open(str(remote_lake.path)), grace=NOW)] == [
+        "erased"
+    ]
 
 
 def test_a_film_and_a_log_are_ingested_aligned_exported_and_loaded(
@@ -431,12 +510,16 @@ def test_a_film_and_a_log_are_ingested_aligned_exported_and_loaded(
     aligned = invoke("align", camera, wind, *given, "--json", *place).document
     assert len(aligned["clips"]) == 2  # 130 frames at 50 Hz are 65 at 25 Hz
     assert invoke("tag", "v1", *place).code == 0
-    exported = invoke("export", "csv", "--where", "kind = 'recording'", "--to", tmp_path / "csv", *place)
+    exported = invoke(
+        "export", "csv", "--where", "kind = 'recording'", "--to", tmp_path / "csv", *place
+    )
     assert exported.code == 0
     assert len(list((tmp_path / "csv").rglob("*.csv"))) == 1
     shutil.rmtree(tmp_path / "cache" / "objects")
     pairs = flagdata.open(str(remote_lake.path)).pairs(at="v1")
-    assert list((tmp_path / "cache" / "objects").glob("mcap-*")) == []  # nothing is fetched before it is needed
+    assert (
+        list((tmp_path / "cache" / "objects").glob("mcap-*")) == []
+    )  # nothing is fetched before it is needed
     assert [pairs[index].clip.shape[:2] for index in range(len(pairs))] == [(1, 30), (1, 30)]
     assert [sample.recording for sample in pairs] == [aligned["recording"]] * 2
     assert doctor(remote_lake, grace=NOW) == ()
@@ -472,7 +555,9 @@ def test_with_keys_that_only_read_every_command_that_commits_nothing_works_and_a
     remote_lake.tag("v1")
     put_text(remote_lake, "more")
     leftover = json.dumps({**lake_locks.owner(), "machine": "another", "pid": 1}).encode() + b"\n"
-    (remote_lake.staging / ("0" * 32) / "lease").write_bytes(leftover)  # of a transaction on another machine
+    (remote_lake.staging / ("0" * 32) / "lease").write_bytes(
+        leftover
+    )  # of a transaction on another machine
     with read_only(s3_server) as address:
         use_store(address)
         for command in READING:
@@ -495,18 +580,28 @@ def test_what_is_young_by_the_stores_clock_is_kept_whatever_this_machines_says(
     withdrawn = put_text(remote_lake, "withdrawn")
     for ahead in (-7200.0, 7200.0):
         with monkeypatch.context() as patch:
-            patch.setattr(time, "time_ns", lambda ahead=ahead, now=time.time_ns: now() + int(ahead * 1e9))
+            patch.setattr(
+                time, "time_ns", lambda ahead=ahead, now=time.time_ns: now() + int(ahead * 1e9)
+            )
             patch.setattr(time, "time", lambda ahead=ahead, now=time.time: now() + ahead)
             if ahead < 0:
                 remote_lake.withdraw([withdrawn.id], "by a clock that is behind")
             assert collect(remote_lake, grace=timedelta(hours=1)).objects == ()
-            assert [found.severity for found in doctor(remote_lake, grace=timedelta(hours=1))] == [Severity.NOTE]
+            assert [found.severity for found in doctor(remote_lake, grace=timedelta(hours=1))] == [
+                Severity.NOTE
+            ]
     assert remote_lake.objects.has(name)
     assert set(collect(remote_lake, grace=NOW).objects) == {name, str(withdrawn.object)}
 
 
-def test_a_put_in_conflict_with_another_is_made_again(bucket_folder: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    place, asked, conflicts = RemotePath.parse(bucket_folder) / "ref.json", RemotePath._ask, [True, True]
+def test_a_put_in_conflict_with_another_is_made_again(
+    bucket_folder: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place, asked, conflicts = (
+        RemotePath.parse(bucket_folder) / "ref.json",
+        RemotePath._ask,
+        [True, True],
+    )
 
     def conflicting(path: RemotePath, request: Callable[..., object]) -> object:
         if conflicts and "put" in request.__code__.co_names:  # 409 ConditionalRequestConflict
@@ -590,12 +685,20 @@ def test_an_answer_that_breaks_off_is_asked_for_again_and_a_listing_goes_on_behi
         list(folder.names())
 
 
-def test_a_conditional_put_whose_answer_is_lost_counts_for_its_writer(s3_server: str, use_store: Use) -> None:
+def test_a_conditional_put_whose_answer_is_lost_counts_for_its_writer(
+    s3_server: str, use_store: Use
+) -> None:
     address = f"s3://bucket/lost-answers-{time.time_ns()}"
     with failing(s3_server) as proxy:
         use_store(proxy)
         planned(proxy, lost=0.5, seed=1)
-        commands = (("init", address), ("tag", "v1"), ("branch", "side"), ("tag", "v1", "--delete"), ("gc",))
+        commands = (
+            ("init", address),
+            ("tag", "v1"),
+            ("branch", "side"),
+            ("tag", "v1", "--delete"),
+            ("gc",),
+        )
         for name, *arguments in commands:
             place = () if name == "init" else ("--lake", address)
             ended = invoke(name, *arguments, *place)
@@ -605,4 +708,6 @@ def test_a_conditional_put_whose_answer_is_lost_counts_for_its_writer(s3_server:
         lake.withdraw(artifacts[:1], "wrong")
         assert lake.rows()["artifact"].to_pylist() == artifacts[1:]
         assert planned(proxy)["faults"]["lost answer of a conditional put"] > 5
-        assert [finding.severity for finding in doctor(lake, grace=NOW)] == [Severity.WARNING]  # what was withdrawn
+        assert [finding.severity for finding in doctor(lake, grace=NOW)] == [
+            Severity.WARNING
+        ]  # what was withdrawn

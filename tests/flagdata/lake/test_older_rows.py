@@ -1,4 +1,5 @@
-"""Films that were built before the catalog had the columns `dataset` and `side` are of the set and side they state."""
+"""Films that were built before the catalog had the columns `dataset` and `side` are of the set and
+side they state."""
 
 from __future__ import annotations
 
@@ -17,7 +18,11 @@ def catalog(*artifacts: Artifact) -> pa.Table:
 def film(name: str, *, format_version: int = 2, **changes: object) -> Artifact:
     """A film as `flagdata build` committed it until format 2."""
     own = Artifact(
-        kind=Kind.RECORDING, name=name, seed=3, recipe={"film": 2, "begin": 0}, format_version=format_version
+        kind=Kind.RECORDING,
+        name=name,
+        seed=3,
+        recipe={"film": 2, "begin": 0},
+        format_version=format_version,
     )
     return replace(own, **changes)
 
@@ -38,7 +43,9 @@ CALLED = {
 def test_a_film_and_its_clips_are_of_what_it_is_called_after() -> None:
     for name, stated in CALLED.items():
         own = film(name)
-        clip = Artifact(kind=Kind.CLIP, name=name, recording=own.id, parents=(own.id,), seed=3, format_version=2)
+        clip = Artifact(
+            kind=Kind.CLIP, name=name, recording=own.id, parents=(own.id,), seed=3, format_version=2
+        )
         rows = with_data_sets(catalog(Artifact(kind=Kind.MESHES, name=name, seed=3), clip, own))
         assert sides(rows) == [(None, None), stated, stated], name
         assert rows.schema.equals(catalog_schema(), check_metadata=True)
@@ -54,9 +61,14 @@ def test_what_no_build_made_is_of_no_data_set() -> None:
         film("-train-00000"),
         film("X-train-00000", format_version=3),  # by then a film of a data set has the columns
     ]
-    assert [other for other in others if sides(with_data_sets(catalog(other))) != [(None, None)]] == []
+    assert [
+        other for other in others if sides(with_data_sets(catalog(other))) != [(None, None)]
+    ] == []
 
 
 def test_what_the_columns_say_stays() -> None:
     kept = film("X-train-00000", format_version=3, dataset="Y", side="test")
-    assert sides(with_data_sets(catalog(kept, film("X-train-00001")))) == [("Y", "test"), ("X", "train")]
+    assert sides(with_data_sets(catalog(kept, film("X-train-00001")))) == [
+        ("Y", "test"),
+        ("X", "train"),
+    ]

@@ -1,4 +1,5 @@
-"""A disk that lacks what a lake relies on is refused before the first write; new folders outlive a power cut."""
+"""A disk that lacks what a lake relies on is refused before the first write; new folders outlive a
+power cut."""
 
 from __future__ import annotations
 
@@ -23,7 +24,15 @@ from flagdata.lake.lake_layout import FOLDERS
 from tests.flagdata.lake.conftest import put_text
 
 pytestmark = pytest.mark.disk("it is about disks")
-LACKS = [errno.EPERM, errno.EACCES, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK, errno.EINVAL, errno.EXDEV]
+LACKS = [
+    errno.EPERM,
+    errno.EACCES,
+    errno.EOPNOTSUPP,
+    errno.ENOSYS,
+    errno.EMLINK,
+    errno.EINVAL,
+    errno.EXDEV,
+]
 """What file systems answer to a hard link that they cannot make."""
 
 
@@ -54,23 +63,42 @@ def _keeping(source: Path, _: Path) -> None:
 
 
 DISKS: dict[str, tuple[object, str, Callable[..., Any], str]] = {
-    **{f"no links, {errno.errorcode[n]}": (os, "link", _refusing(n), "no hard links, as exFAT") for n in LACKS},
+    **{
+        f"no links, {errno.errorcode[n]}": (os, "link", _refusing(n), "no hard links, as exFAT")
+        for n in LACKS
+    },
     "links that overwrite": (os, "link", _overwriting, "gives a name that is taken away again"),
     "locks refused": (fcntl, "flock", _refusing(errno.ENOLCK), "refuses locks"),
     "locks unknown": (fcntl, "flock", _refusing(errno.ENOSYS), "refuses locks"),
     "locks for everybody": (fcntl, "flock", lambda *_: None, "grants a lock to everybody"),
-    "files not flushed": (os, "fsync", _flushing(errno.EINVAL, folders=False), "confirm that a file has reached it"),
-    "folders not flushed": (os, "fsync", _flushing(errno.EINVAL, folders=True), "that a folder has reached it"),
+    "files not flushed": (
+        os,
+        "fsync",
+        _flushing(errno.EINVAL, folders=False),
+        "confirm that a file has reached it",
+    ),
+    "folders not flushed": (
+        os,
+        "fsync",
+        _flushing(errno.EINVAL, folders=True),
+        "that a folder has reached it",
+    ),
     "no rename over a file": (os, "replace", _refusing(errno.EEXIST), "does not replace a name"),
     "a rename that keeps the old file": (os, "replace", _keeping, "does not replace a name"),
-    "no rename over a folder": (os, "rename", _refusing(errno.ENOTEMPTY), "does not replace a name"),
+    "no rename over a folder": (
+        os,
+        "rename",
+        _refusing(errno.ENOTEMPTY),
+        "does not replace a name",
+    ),
 }
 """What a disk lacks → what stands for that, and what is reported."""
 
 
 @pytest.fixture(params=DISKS)
 def lack(request: pytest.FixtureRequest, lake: Lake, monkeypatch: pytest.MonkeyPatch) -> str:
-    """A disk that lacks something from now on, with a lake that was copied to it; what is reported of it."""
+    """A disk that lacks something from now on, with a lake that was copied to it; what is reported
+    of it."""
     module, name, stand_in, said = DISKS[request.param]
     put_text(lake, "before")
     place_probing.probe.cache_clear()
@@ -78,7 +106,9 @@ def lack(request: pytest.FixtureRequest, lake: Lake, monkeypatch: pytest.MonkeyP
     return said
 
 
-def test_a_disk_that_lacks_what_a_lake_relies_on_is_refused_by_name(lack: str, lake: Lake, tmp_path: Path) -> None:
+def test_a_disk_that_lacks_what_a_lake_relies_on_is_refused_by_name(
+    lack: str, lake: Lake, tmp_path: Path
+) -> None:
     writes: list[Callable[[], object]] = [
         lambda: Lake.create(tmp_path / "new"),
         lambda: Lake.adopt(tmp_path / "clone", lake),
@@ -128,7 +158,9 @@ def test_a_process_that_died_in_a_probe_leaves_what_a_collection_takes(
     assert {finding.kind for finding in doctor(lake)} == {"staging-left"}
 
 
-def test_a_full_disk_is_no_disk_that_lacks_something(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_is_no_disk_that_lacks_something(
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
     place_probing.probe.cache_clear()
     monkeypatch.setattr(os, "fsync", _refusing(errno.ENOSPC))
     with pytest.raises(FlagdataError, match=r"No space left.*free some space"):
@@ -176,7 +208,9 @@ def test_a_network_that_locks_for_one_alone_what_that_one_may_write_carries_a_la
 
     def as_nfs(file: Any, mode: int) -> None:
         opened = fcntl.fcntl(file, fcntl.F_GETFL) & os.O_ACCMODE
-        if opened == {fcntl.LOCK_EX: os.O_RDONLY, fcntl.LOCK_SH: os.O_WRONLY}.get(mode & ~fcntl.LOCK_NB):
+        if opened == {fcntl.LOCK_EX: os.O_RDONLY, fcntl.LOCK_SH: os.O_WRONLY}.get(
+            mode & ~fcntl.LOCK_NB
+        ):
             raise OSError(errno.EBADF, os.strerror(errno.EBADF))
         flock(file, mode)
 
@@ -195,7 +229,10 @@ def test_a_folder_that_one_process_works_in_is_refused_without_locks(
 ) -> None:
     check_locks.cache_clear()
     monkeypatch.setattr(fcntl, "flock", stand_in)
-    with pytest.raises(RefusedError, match="lock"), alone_in(tmp_path / "models", occupied=lambda: None):
+    with (
+        pytest.raises(RefusedError, match="lock"),
+        alone_in(tmp_path / "models", occupied=lambda: None),
+    ):
         raise AssertionError("it was let in")
 
 
@@ -219,8 +256,16 @@ def _made_and_flushed(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, Path]]
 
 def _lost(seen: list[tuple[str, Path]], root: Path) -> list[Path]:
     """Lists the folders whose names a power cut would take, but transactions' own."""
-    made = [(at, path) for at, (what, path) in enumerate(seen) if what == "made" and path.is_relative_to(root)]
-    return [path for at, path in made if path.parent.name != "staging" and ("flushed", path.parent) not in seen[at:]]
+    made = [
+        (at, path)
+        for at, (what, path) in enumerate(seen)
+        if what == "made" and path.is_relative_to(root)
+    ]
+    return [
+        path
+        for at, path in made
+        if path.parent.name != "staging" and ("flushed", path.parent) not in seen[at:]
+    ]
 
 
 def test_the_folders_of_a_new_lake_and_of_a_clone_outlive_a_power_cut(
@@ -243,7 +288,9 @@ class _bar:  # noqa: N801  a context manager that reports to nobody
     def __exit__(self, *_: object) -> None: ...
 
 
-def test_the_folders_that_a_copy_came_without_outlive_a_power_cut(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_folders_that_a_copy_came_without_outlive_a_power_cut(
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
     root = Path(str(lake.path))
     for name in ("model", "mcap", "zarr", "staging"):
         shutil.rmtree(root / name)

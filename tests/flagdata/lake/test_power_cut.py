@@ -14,7 +14,9 @@ from tests.contract.imports import ROOT
 from tests.studies.failing.disk import Disk, State, read, write
 from tests.studies.failing.recorder import Recorder, can_record
 
-pytestmark = pytest.mark.skipif(not can_record(), reason="calls are recorded by a library of C that Linux loads first")
+pytestmark = pytest.mark.skipif(
+    not can_record(), reason="calls are recorded by a library of C that Linux loads first"
+)
 
 PUBLISH = """
 import os, sys
@@ -63,7 +65,9 @@ def answered(recorder: Recorder, folder: Path, program: str, *words: str) -> lis
     return list(disk.states(np.random.default_rng(0)))
 
 
-@pytest.mark.parametrize("steps", ["publish file folder", "delete folder", "publish file delete folder"])
+@pytest.mark.parametrize(
+    "steps", ["publish file folder", "delete folder", "publish file delete folder"]
+)
 def test_of_a_program_that_flushes_all_nothing_that_it_answered_is_lost(
     steps: str, work: Path, recorder: Recorder
 ) -> None:
@@ -86,7 +90,9 @@ def test_a_flush_that_a_program_lacks_is_found_by_what_is_lost_without_it(
         assert None in left
 
 
-def test_a_deletion_whose_folder_is_not_flushed_may_be_undone(work: Path, recorder: Recorder) -> None:
+def test_a_deletion_whose_folder_is_not_flushed_may_be_undone(
+    work: Path, recorder: Recorder
+) -> None:
     states = answered(recorder, work, PUBLISH, "delete")
     assert {"inside/old" in state.tree for state in states} == {True, False}
 
@@ -94,9 +100,13 @@ def test_a_deletion_whose_folder_is_not_flushed_may_be_undone(work: Path, record
 def test_a_file_system_that_keeps_entries_in_order_never_has_a_later_one_without_those_before(
     work: Path, recorder: Recorder
 ) -> None:
-    program = "import os, sys\nfor name in 'abcdef': os.mkdir(f'{sys.argv[1]}/{name}')\nprint('done')"
+    program = (
+        "import os, sys\nfor name in 'abcdef': os.mkdir(f'{sys.argv[1]}/{name}')\nprint('done')"
+    )
     states = answered(recorder, work, program)
-    names = [sorted(path for path in state.tree if len(path) == 1) for state in states if state.ordered]
+    names = [
+        sorted(path for path in state.tree if len(path) == 1) for state in states if state.ordered
+    ]
     assert all("".join(found) == "abcdef"[: len(found)] for found in names)
     assert any("".join(found) != "abcdef"[: len(found)] for found in _names(states))
 

@@ -1,4 +1,5 @@
-"""Several processes at once, and processes that die: nothing acknowledged is lost, nothing dangles."""
+"""Several processes at once, and processes that die: nothing acknowledged is lost, nothing
+dangles."""
 
 from __future__ import annotations
 
@@ -19,7 +20,9 @@ from tests.flagdata.lake.conftest import put_text
 NOW = timedelta(0)
 
 
-def test_four_processes_ingesting_at_once_lose_no_row(lake: Lake, start_worker: Callable[..., Any]) -> None:
+def test_four_processes_ingesting_at_once_lose_no_row(
+    lake: Lake, start_worker: Callable[..., Any]
+) -> None:
     workers = [start_worker(f"w{i}", count=8, shared=5) for i in range(4)]
     for worker in workers:
         worker.await_line("done")
@@ -29,13 +32,19 @@ def test_four_processes_ingesting_at_once_lose_no_row(lake: Lake, start_worker: 
     rows = lake.rows()["artifact"].to_pylist()
     assert len(rows) == len(expected)  # the five shared sources raced, and are there once
     assert set(rows) == expected
-    merges = [entry for entry in lake.catalog.history() if entry.get("message", "").startswith("merge ")]
-    assert len(merges) == 1  # of the catalog's files, after 32 of some 40 versions, overtaken by no commit
+    merges = [
+        entry for entry in lake.catalog.history() if entry.get("message", "").startswith("merge ")
+    ]
+    assert (
+        len(merges) == 1
+    )  # of the catalog's files, after 32 of some 40 versions, overtaken by no commit
     assert doctor(lake, grace=NOW) == ()
     assert verify(lake, object_names(lake)) == ()
 
 
-def test_the_history_at_a_head_is_the_same_while_others_commit(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_history_at_a_head_is_the_same_while_others_commit(
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
     put_text(lake, "before")
     expected = Lake.open(lake.path).catalog.history()
     assert [entry["version"] for entry in expected] == list(range(len(expected)))[::-1]
@@ -81,7 +90,9 @@ def test_a_process_reads_what_others_committed_once_and_finds_the_history_that_a
     assert reader.history()[0]["message"] == "ingest one"
     read: list[int] = []
     of_one = reader._entries._read
-    monkeypatch.setattr(reader._entries, "_read", lambda version: read.append(version) or of_one(version))
+    monkeypatch.setattr(
+        reader._entries, "_read", lambda version: read.append(version) or of_one(version)
+    )
     put_text(lake, "two")
     lake.branch("side")
     put_text(lake, "three", branch="side")
@@ -102,13 +113,17 @@ def test_collection_beside_ingests_deletes_nothing_that_they_publish(
     for worker in workers:
         worker.stop()
     acknowledged = {identity for worker in workers for identity in worker.acknowledged()}
-    assert len(acknowledged) >= 2 * 6 - 3  # one at least of each worker and round, three of which they may share
+    assert (
+        len(acknowledged) >= 2 * 6 - 3
+    )  # one at least of each worker and round, three of which they may share
     assert acknowledged == set(lake.rows()["artifact"].to_pylist())
     assert doctor(lake, grace=NOW) == ()
     assert verify(lake, object_names(lake)) == ()
 
 
-def test_kills_during_ingest_lose_nothing_acknowledged(lake: Lake, start_worker: Callable[..., Any]) -> None:
+def test_kills_during_ingest_lose_nothing_acknowledged(
+    lake: Lake, start_worker: Callable[..., Any]
+) -> None:
     began = time.monotonic()
     undisturbed = [start_worker(f"undisturbed-{i}", count=3) for i in range(2)]
     for worker in undisturbed:
@@ -116,7 +131,9 @@ def test_kills_during_ingest_lose_nothing_acknowledged(lake: Lake, start_worker:
         began = time.monotonic()
     for worker in undisturbed:
         worker.await_line("done")
-    one_ingest = (time.monotonic() - began) / 3  # beside another process's, on this disk or store, under this load
+    one_ingest = (
+        time.monotonic() - began
+    ) / 3  # beside another process's, on this disk or store, under this load
     moments = random.Random(2020)
     killed = []
     for wave in range(6):

@@ -1,4 +1,5 @@
-"""What makes an artifact puts its object back where that is damaged or missing, and never says "already" of it."""
+"""What makes an artifact puts its object back where that is damaged or missing, and never says
+"already" of it."""
 
 from __future__ import annotations
 
@@ -50,7 +51,9 @@ def largest(place: Place) -> Place:
     """The largest file of an object."""
     if not place.is_dir():
         return place
-    return max((file for file in place.rglob("*") if file.is_file()), key=lambda file: file.stat().st_size)
+    return max(
+        (file for file in place.rglob("*") if file.is_file()), key=lambda file: file.stat().st_size
+    )
 
 
 def flip(lake: Lake, name: str) -> None:
@@ -97,16 +100,22 @@ def test_a_film_and_a_log_that_are_ingested_again_replace_what_was_damaged(
     place.tag("v1")
     for name in made:
         damage(place, name)
-    assert len(verify(place, object_names(place), read_refs(place))) == 2  # of a bucket it is this that finds a flip
+    assert (
+        len(verify(place, object_names(place), read_refs(place))) == 2
+    )  # of a bucket it is this that finds a flip
     again = ingested()
     assert [one.created for one in again] == [False, False]
-    assert [(one.healed.before, one.healed.now) for one in again if one.healed] == [(name, name) for name in made]
+    assert [(one.healed.before, one.healed.now) for one in again if one.healed] == [
+        (name, name) for name in made
+    ]
     assert is_whole(place)
     assert [one.healed for one in ingested()] == [None, None]
 
 
 @pytest.mark.parametrize("damage", OF_A_FILE)
-def test_in_a_folder_the_bytes_are_compared_without_a_verify_before(lake: Lake, damage: Damage, video: Path) -> None:
+def test_in_a_folder_the_bytes_are_compared_without_a_verify_before(
+    lake: Lake, damage: Damage, video: Path
+) -> None:
     damage(lake, str(ingest_camera(lake, video).artifact.object))
     assert ingest_camera(lake, video).healed is not None
     assert is_whole(lake)
@@ -120,7 +129,9 @@ def test_meshes_markers_and_records_are_put_back_by_their_sources(
     for k in range(3):
         (folder / f"{k:04d}.obj").write_text(SQUARE.replace("v 0 0 0", f"v 0 0 {k / 100}", 1))
     table = tmp_path / "markers.csv"
-    rows = [f"{k / 10},{name},{u},0,{k},{u},1" for k in range(5) for name, u in (("a", 0), ("b", 1))]
+    rows = [
+        f"{k / 10},{name},{u},0,{k},{u},1" for k in range(5) for name, u in (("a", 0), ("b", 1))
+    ]
     table.write_text("\n".join(("time,marker,u,v,x,y,z", *rows)) + "\n")
     record = tmp_path / "film.mcap"
     other = Lake.create(tmp_path / "other")
@@ -142,9 +153,13 @@ def test_meshes_markers_and_records_are_put_back_by_their_sources(
 
 
 @pytest.mark.parametrize(
-    ("place", "damage"), [*(("folder", damage) for damage in DAMAGES), ("bucket", flip)], indirect=["place"]
+    ("place", "damage"),
+    [*(("folder", damage) for damage in DAMAGES), ("bucket", flip)],
+    indirect=["place"],
 )
-def test_a_simulation_that_is_repeated_makes_only_what_is_damaged(place: Lake, damage: Damage, tmp_path: Path) -> None:
+def test_a_simulation_that_is_repeated_makes_only_what_is_damaged(
+    place: Lake, damage: Damage, tmp_path: Path
+) -> None:
     (scene := tmp_path / "scene.toml").write_text(SCENE.replace("count = 1", "count = 2"))
 
     def simulated() -> dict[str, object]:
@@ -183,7 +198,9 @@ def test_a_recording_is_put_back_by_the_command_that_aligned_or_declared_it(
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_a_result_that_is_kept_again_by_the_same_code_replaces_its_damaged_object(lake: Lake, damage: Damage) -> None:
+def test_a_result_that_is_kept_again_by_the_same_code_replaces_its_damaged_object(
+    lake: Lake, damage: Damage
+) -> None:
     row = Artifact(kind=Kind.MEASUREMENT, name="flag", recipe={"measure": 1})
 
     def write(path: Path) -> None:
@@ -196,7 +213,11 @@ def test_a_result_that_is_kept_again_by_the_same_code_replaces_its_damaged_objec
 
     damage(lake, str(lake.artifact(kept().artifact.id).object))
     again = kept()
-    assert (again.new, again.healed is not None, "replaced" in again.sentence) == (False, True, True)
+    assert (again.new, again.healed is not None, "replaced" in again.sentence) == (
+        False,
+        True,
+        True,
+    )
     assert is_whole(lake)
     assert kept().sentence == "there already"
 
@@ -209,7 +230,11 @@ def test_a_record_that_is_made_again_by_later_code_has_the_bytes_that_tags_need(
     for one in made:
         lose(lake, str(one.object))
     monkeypatch.setattr(provenance, "code_version", lambda: "9.0.0")
-    for name in ("flagdata.ingest.source_artifacts", "flagdata.lake.remaking", "flagdata.lake.transaction"):
+    for name in (
+        "flagdata.ingest.source_artifacts",
+        "flagdata.lake.remaking",
+        "flagdata.lake.transaction",
+    ):
         monkeypatch.setattr(f"{name}.code_version", lambda: "9.0.0", raising=False)
     again = [ingest_camera(lake, video), ingest_wind(lake, wind_log)]
     assert [one.artifact.object for one in again] == [one.object for one in made]
@@ -217,11 +242,14 @@ def test_a_record_that_is_made_again_by_later_code_has_the_bytes_that_tags_need(
 
 
 def put_bytes(lake: Lake, text: str, *, branch: str = "main") -> dict[str, object]:
-    """An artifact of one identity whatever its bytes are, and a part of it, as an encoder of another version makes."""
+    """An artifact of one identity whatever its bytes are, and a part of it, as an encoder of
+    another version makes."""
     with lake.transaction("ingest", branch=branch) as transaction:
         staged = transaction.staging(".mcap")
         staged.write_text(text)
-        row = Artifact(kind=Kind.RECORDING, name="film", object=transaction.put(staged), recipe={"ingest": "x"})
+        row = Artifact(
+            kind=Kind.RECORDING, name="film", object=transaction.put(staged), recipe={"ingest": "x"}
+        )
         transaction.add(row)
         transaction.add(
             Artifact(
@@ -237,7 +265,9 @@ def put_bytes(lake: Lake, text: str, *, branch: str = "main") -> dict[str, objec
     return dict(transaction.result.healed)
 
 
-def test_other_bytes_take_the_place_of_damaged_ones_and_what_still_lacks_these_is_named(lake: Lake) -> None:
+def test_other_bytes_take_the_place_of_damaged_ones_and_what_still_lacks_these_is_named(
+    lake: Lake,
+) -> None:
     put_bytes(lake, "by one encoder")
     before = str(lake.rows()["object"][0])
     lake.tag("v1")
@@ -268,14 +298,21 @@ def test_other_bytes_keep_the_name_session_and_labels_of_the_artifact(lake: Lake
     with lake.transaction("ingest") as transaction:
         staged = transaction.staging(".mcap")
         staged.write_text("by another encoder")
-        row = Artifact(kind=Kind.RECORDING, name="other", object=transaction.put(staged), recipe={"ingest": "x"})
+        row = Artifact(
+            kind=Kind.RECORDING,
+            name="other",
+            object=transaction.put(staged),
+            recipe={"ingest": "x"},
+        )
         assert not transaction.add(row)
     assert lake.artifact(identity).name == "film"
     assert labels_of(lake.table(lake.view(None)))[identity] == {"site": "roof"}
 
 
 @pytest.mark.parametrize("damage", [cut, lose])
-def test_a_pull_from_a_clone_puts_back_what_is_damaged(lake: Lake, damage: Damage, tmp_path: Path) -> None:
+def test_a_pull_from_a_clone_puts_back_what_is_damaged(
+    lake: Lake, damage: Damage, tmp_path: Path
+) -> None:
     made = put_text(lake, "film")
     copy, _ = clone(lake, tmp_path / "copy", bars=no_bar)
     damage(lake, str(made.object))
@@ -293,7 +330,9 @@ def test_a_pull_puts_back_what_verify_found_changed(place: Lake, tmp_path: Path)
     assert transfer(copy, place, bars=no_bar).objects == ()
 
 
-def test_a_note_of_damage_is_no_stray_file_and_goes_where_the_object_is_restored_by_hand(lake: Lake) -> None:
+def test_a_note_of_damage_is_no_stray_file_and_goes_where_the_object_is_restored_by_hand(
+    lake: Lake,
+) -> None:
     made = put_text(lake, "film")
     path = lake.objects.path(str(made.object))
     flip(lake, str(made.object))
@@ -318,7 +357,11 @@ def test_what_is_asked_for_of_many_objects_is_what_is_asked_for_of_each(place: L
     flip(place, names[7])
     verify(place, [names[7]])
     assert place.objects.unsound(sizes) == {names[3], names[5], names[7]}
-    assert {name for name in names if not place.objects.is_sound(name, sizes[name])} == {names[3], names[5], names[7]}
+    assert {name for name in names if not place.objects.is_sound(name, sizes[name])} == {
+        names[3],
+        names[5],
+        names[7],
+    }
 
 
 def test_the_remedy_says_which_source_is_ingested_again_on_which_branch(
@@ -335,11 +378,15 @@ def test_the_remedy_says_which_source_is_ingested_again_on_which_branch(
     assert "flagdata ingest mast.csv --branch side again" in remedies
     for one in (film, wind):
         lose(lake, str(one.object))
-    remedies = " ".join(str(finding.fix) for finding in doctor(lake) if finding.kind == "dangling-row")
+    remedies = " ".join(
+        str(finding.fix) for finding in doctor(lake) if finding.kind == "dangling-row"
+    )
     assert "flagdata ingest mast.csv --branch side again" in remedies
 
 
-def test_a_lake_that_cannot_be_written_is_verified_all_the_same(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_lake_that_cannot_be_written_is_verified_all_the_same(
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
     made = put_text(lake, "film")
     flip(lake, str(made.object))
 

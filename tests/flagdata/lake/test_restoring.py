@@ -1,4 +1,5 @@
-"""What is damaged or missing in a lake is taken from another one of its history, whichever of the two is older."""
+"""What is damaged or missing in a lake is taken from another one of its history, whichever of the
+two is older."""
 
 from __future__ import annotations
 
@@ -51,7 +52,8 @@ def flip(path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def lakes(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder of a lake, `lake`; of its clone of two versions before, `older`, and of one after, `newer`."""
+    """A folder of a lake, `lake`; of its clone of two versions before, `older`, and of one after,
+    `newer`."""
     folder = tmp_path_factory.mktemp("lakes")
     lake = Lake.create(folder / "lake")
     for text in "ab":
@@ -108,7 +110,10 @@ def test_every_file_that_is_damaged_comes_from_a_newer_lake_and_from_an_older_on
             damage(damaged / name)
             done = healed(damaged, lakes / source)
             known = there.get(name) == right[name] or kind_of(name) == "mark"
-            assert ([taken.kind for taken in done.taken], done.left == ()) == ([kind_of(name)] * known, known), name
+            assert ([taken.kind for taken in done.taken], done.left == ()) == (
+                [kind_of(name)] * known,
+                known,
+            ), name
             assert (files(damaged) == right) == known, name
             (damaged / name).unlink(missing_ok=True)
             (damaged / name).write_bytes(right[name])
@@ -136,9 +141,15 @@ def test_what_is_damaged_in_many_places_comes_from_lakes_that_are_damaged_themse
 
 
 @pytest.mark.disk("it deletes folders")
-def test_folders_and_a_log_that_are_gone_come_back_and_nothing_newer_comes(lakes: Path, damaged: Path) -> None:
+def test_folders_and_a_log_that_are_gone_come_back_and_nothing_newer_comes(
+    lakes: Path, damaged: Path
+) -> None:
     right = files(lakes / "lake")
-    for gone in (("catalog/_delta_log",), ("catalog", "mcap", "staging"), ("lake.json", "catalog/_delta_log", "zarr")):
+    for gone in (
+        ("catalog/_delta_log",),
+        ("catalog", "mcap", "staging"),
+        ("lake.json", "catalog/_delta_log", "zarr"),
+    ):
         for name in gone:
             path = damaged / name
             shutil.rmtree(path) if path.is_dir() else path.unlink()
@@ -149,7 +160,9 @@ def test_folders_and_a_log_that_are_gone_come_back_and_nothing_newer_comes(lakes
 
 
 @pytest.mark.disk("it deletes folders")
-def test_of_a_log_that_is_gone_with_its_mark_all_entries_are_taken(lakes: Path, damaged: Path) -> None:
+def test_of_a_log_that_is_gone_with_its_mark_all_entries_are_taken(
+    lakes: Path, damaged: Path
+) -> None:
     shutil.rmtree(damaged / "catalog")
     shutil.rmtree(damaged / "refs")
     assert healed(damaged, lakes / "newer").left == ()
@@ -164,7 +177,11 @@ def test_a_heal_that_was_stopped_at_any_step_goes_on(
     for number, name in enumerate(right):
         if kind_of(name) != "mark":
             (lose, cut)[number % 2](damaged / name)
-    for owner, method, step in ((Path, "replace", 0), (Path, "replace", 3), (Objects, "publish", 1)):
+    for owner, method, step in (
+        (Path, "replace", 0),
+        (Path, "replace", 3),
+        (Objects, "publish", 1),
+    ):
         stopped(monkeypatch, owner, method, lambda: healed(damaged, lakes / "newer"), at=step)
         assert files(damaged) != right
     assert healed(damaged, lakes / "newer").left == ()
@@ -173,7 +190,9 @@ def test_a_heal_that_was_stopped_at_any_step_goes_on(
 
 
 @pytest.mark.disk("it damages files of a folder")
-def test_a_mark_that_makes_no_sense_says_again_what_the_newest_entry_is(lakes: Path, damaged: Path) -> None:
+def test_a_mark_that_makes_no_sense_says_again_what_the_newest_entry_is(
+    lakes: Path, damaged: Path
+) -> None:
     mark = next((damaged / "refs" / "newest").iterdir())
     right = mark.read_bytes()
     for wrong in (b"", b"no hash\n", bytes([right[0] ^ 64]) + right[1:], right[:60] + b"0000\n"):
@@ -190,14 +209,20 @@ def test_of_a_lake_whose_entries_note_no_hashes_an_entry_is_taken_that_the_same_
     for lake in (damaged, tmp_path / "source"):
         shutil.rmtree(lake / "refs" / "newest")
         for entry in (lake / "catalog" / "_delta_log").iterdir():
-            text = re.sub(rf',"({re.escape(PREVIOUS_HASH)}|flagdata.file_sha256)":"[0-9a-f]+"', "", entry.read_text())
+            text = re.sub(
+                rf',"({re.escape(PREVIOUS_HASH)}|flagdata.file_sha256)":"[0-9a-f]+"',
+                "",
+                entry.read_text(),
+            )
             overwrite(entry, text.encode())
     right = files(damaged)
     assert healed(damaged, tmp_path / "source") == restoring.Healed(taken=(), left=())
     for name in right:
         if kind_of(name) in ("log entry", "file of rows") and not name.name.endswith("4.json"):
             lose(damaged / name)
-            assert [taken.kind for taken in healed(damaged, tmp_path / "source").taken] == [kind_of(name)]
+            assert [taken.kind for taken in healed(damaged, tmp_path / "source").taken] == [
+                kind_of(name)
+            ]
     assert files(damaged) == right
 
 
@@ -251,7 +276,9 @@ def test_a_lake_that_went_on_otherwise_gives_what_both_had(lake: Lake, tmp_path:
     assert Lake.open(lake.path).rows()["name"].to_pylist() == ["common", "here"]
 
 
-def test_a_lake_of_another_history_and_what_is_no_lake_are_refused(lake: Lake, tmp_path: Path) -> None:
+def test_a_lake_of_another_history_and_what_is_no_lake_are_refused(
+    lake: Lake, tmp_path: Path
+) -> None:
     put_text(lake, "first")
     with pytest.raises(ConflictError, match="share no history"):
         healed(lake.path, Lake.create(tmp_path / "another").path)
@@ -261,18 +288,25 @@ def test_a_lake_of_another_history_and_what_is_no_lake_are_refused(lake: Lake, t
 
 
 @pytest.mark.disk(LINKS)
-def test_a_lake_whose_folder_is_a_link_is_refused(lakes: Path, damaged: Path, tmp_path: Path) -> None:
+def test_a_lake_whose_folder_is_a_link_is_refused(
+    lakes: Path, damaged: Path, tmp_path: Path
+) -> None:
     (damaged / "mcap").rename(tmp_path / "elsewhere")
     (damaged / "mcap").symlink_to(tmp_path / "elsewhere")
     with pytest.raises(FlagdataError, match="is a link"):
         healed(damaged, lakes / "newer")
 
 
-def test_a_lake_in_a_bucket_is_healed_from_a_folder_and_heals_one(remote_lake: Lake, tmp_path: Path) -> None:
+def test_a_lake_in_a_bucket_is_healed_from_a_folder_and_heals_one(
+    remote_lake: Lake, tmp_path: Path
+) -> None:
     artifacts = [put_text(remote_lake, text) for text in "abc"]
     backup, _ = clone(remote_lake, tmp_path / "backup", bars=no_bar)
     put_text(remote_lake, "d")
-    log, names = remote_lake.path / "catalog" / "_delta_log", [str(artifact.object) for artifact in artifacts]
+    log, names = (
+        remote_lake.path / "catalog" / "_delta_log",
+        [str(artifact.object) for artifact in artifacts],
+    )
     (log / f"{2:020d}.json").unlink()
     (log / f"{3:020d}.json").write_bytes(b"{")
     (remote_lake.path / "lake.json").unlink()
@@ -299,7 +333,9 @@ def test_a_lake_in_a_bucket_is_healed_from_a_folder_and_heals_one(remote_lake: L
     assert is_whole(Lake.open(backup.path))
 
 
-def test_a_pull_from_a_lake_that_is_behind_takes_what_was_lost_or_found_damaged(lake: Lake, tmp_path: Path) -> None:
+def test_a_pull_from_a_lake_that_is_behind_takes_what_was_lost_or_found_damaged(
+    lake: Lake, tmp_path: Path
+) -> None:
     lost, changed = put_text(lake, "lost"), put_text(lake, "changed")
     older, _ = clone(lake, tmp_path / "older", bars=no_bar)
     put_text(lake, "later")
@@ -309,11 +345,17 @@ def test_a_pull_from_a_lake_that_is_behind_takes_what_was_lost_or_found_damaged(
     done = pull(older, lake, bars=no_bar)
     assert (done.versions, done.head) == (0, lake.catalog.head())
     assert set(done.objects) == {lost.object, changed.object}
-    assert (*verify(lake, object_names(lake)), *verify_catalog(lake), *doctor(lake, grace=timedelta(0))) == ()
+    assert (
+        *verify(lake, object_names(lake)),
+        *verify_catalog(lake),
+        *doctor(lake, grace=timedelta(0)),
+    ) == ()
     assert pull(older, lake, bars=no_bar).healed == ()
 
 
-def test_a_push_to_a_lake_that_is_ahead_names_the_pull_that_brings_its_versions(lake: Lake, tmp_path: Path) -> None:
+def test_a_push_to_a_lake_that_is_ahead_names_the_pull_that_brings_its_versions(
+    lake: Lake, tmp_path: Path
+) -> None:
     put_text(lake, "first")
     older, _ = clone(lake, tmp_path / "older", bars=no_bar)
     put_text(lake, "second")
@@ -323,7 +365,9 @@ def test_a_push_to_a_lake_that_is_ahead_names_the_pull_that_brings_its_versions(
     assert older.rows().equals(lake.rows())
 
 
-def test_the_command_says_item_by_item_what_it_took_and_what_is_left(lake: Lake, tmp_path: Path) -> None:
+def test_the_command_says_item_by_item_what_it_took_and_what_is_left(
+    lake: Lake, tmp_path: Path
+) -> None:
     had = put_text(lake, "had")
     older, _ = clone(lake, tmp_path / "older", bars=no_bar)
     later = put_text(lake, "later")
@@ -336,12 +380,20 @@ def test_the_command_says_item_by_item_what_it_took_and_what_is_left(lake: Lake,
     assert "flagdata heal FROM" in ended.out
     assert "1 item taken" in ended.err
     document = invoke("heal", older.path, "--lake", lake.path, "--json").document
-    assert (document["taken"], [left["kind"] for left in document["left"]]) == ([], ["object-missing"])
+    assert (document["taken"], [left["kind"] for left in document["left"]]) == (
+        [],
+        ["object-missing"],
+    )
 
 
-def test_refs_of_earlier_versions_that_are_damaged_or_lost_come_from_an_older_lake(lake: Lake, tmp_path: Path) -> None:
+def test_refs_of_earlier_versions_that_are_damaged_or_lost_come_from_an_older_lake(
+    lake: Lake, tmp_path: Path
+) -> None:
     put_text(lake, "first")
-    paths = [put_older_ref(lake, kind, name) for kind, name in (("tags", "v1"), ("tags", "v2"), ("branches", "side"))]
+    paths = [
+        put_older_ref(lake, kind, name)
+        for kind, name in (("tags", "v1"), ("tags", "v2"), ("branches", "side"))
+    ]
     older, _ = clone(lake, tmp_path / "older", bars=no_bar)
     right = [path.read_bytes() for path in paths]
     overwrite(paths[0], b"{")
@@ -355,7 +407,9 @@ def test_refs_of_earlier_versions_that_are_damaged_or_lost_come_from_an_older_la
     assert set(Lake.open(lake.path).refs.tags()) == {"v2"}
 
 
-def test_a_tag_that_the_log_states_needs_no_other_lake_and_is_pulled_from_none(lake: Lake, tmp_path: Path) -> None:
+def test_a_tag_that_the_log_states_needs_no_other_lake_and_is_pulled_from_none(
+    lake: Lake, tmp_path: Path
+) -> None:
     put_text(lake, "first")
     lake.tag("v1")
     older, _ = clone(lake, tmp_path / "older", bars=no_bar)

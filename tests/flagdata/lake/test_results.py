@@ -1,4 +1,5 @@
-"""A result that other code infers from the same inputs is another version of it; both are kept, the newest is meant."""
+"""A result that other code infers from the same inputs is another version of it; both are kept, the
+newest is meant."""
 
 from __future__ import annotations
 
@@ -36,7 +37,9 @@ def kept(lake: Lake, row: Artifact, *, branch: str = "main") -> Placed:
         lambda staged: (staged.mkdir(), (staged / "x").write_text(str(row.report))),
         "infer",
         branch=branch,
-        derived=lambda one: [replace(one, kind=Kind.MODEL, name="flag-base", object=None, parents=[one.id])],
+        derived=lambda one: [
+            replace(one, kind=Kind.MODEL, name="flag-base", object=None, parents=[one.id])
+        ],
     )
 
 
@@ -56,7 +59,11 @@ def test_what_newer_code_infers_is_kept_beside_the_older_result_and_found_by_the
     assert [one.code_version for one in versions(lake, lake.artifact("flag"))] == [OLD, NEW]
     made = ancestry(lake.rows(), recording.id).relatives.values()
     assert {one.code_version for one in made if one.kind == Kind.MEASUREMENT} == {OLD, NEW}
-    assert second.sentence == f"committed as version 2 of 'flag'; version 1, {first.artifact.id[:12]}, is by code {OLD}"
+    assert (
+        second.sentence
+        == f"committed as version 2 of 'flag'; version 1, {first.artifact.id[:12]}, is by code "
+        f"{OLD}"
+    )
 
 
 def test_the_first_version_has_the_identity_of_what_went_in_as_in_every_lake_before(
@@ -75,7 +82,8 @@ def test_the_same_code_again_adds_nothing(lake: Lake, recording: Artifact) -> No
     ]
     assert lake.resolve(None) == head
     assert [one.sentence for one in again] == [
-        f"there already as version 1 of 'flag'; version 2, {second.artifact.id[:12]}, is by code {NEW}",
+        f"there already as version 1 of 'flag'; version 2, {second.artifact.id[:12]}, is by code "
+        f"{NEW}",
         "there already",
     ]
 
@@ -96,7 +104,9 @@ def test_branches_that_run_the_same_code_have_the_same_version_once_they_are_mer
 ) -> None:
     kept(lake, verdict(recording, OLD))
     lake.branch("other")
-    here, there = (kept(lake, verdict(recording, NEW), branch=branch) for branch in ("main", "other"))
+    here, there = (
+        kept(lake, verdict(recording, NEW), branch=branch) for branch in ("main", "other")
+    )
     assert here.artifact.id == there.artifact.id
     kept(lake, verdict(recording, NEWEST), branch="other")
     lake.merge("other", "take in")
@@ -118,7 +128,9 @@ def test_ls_and_show_say_which_version_is_superseded(
     first, second = (kept(lake, verdict(recording, code)).artifact for code in (OLD, NEW))
     listed = {row["artifact"]: row for row in run("ls", "--json").document["artifacts"]}
     assert (listed[first.id]["superseded"], listed[second.id]["superseded"]) == (True, False)
-    models = {row["parents"][0]: row["superseded"] for row in listed.values() if row["kind"] == "model"}
+    models = {
+        row["parents"][0]: row["superseded"] for row in listed.values() if row["kind"] == "model"
+    }
     assert models == {first.id: True, second.id: False}
     shown = run("show", "flag", "--json").document
     assert shown["artifact"]["artifact"] == second.id
@@ -131,9 +143,14 @@ def test_ls_and_show_say_which_version_is_superseded(
 
 def test_the_sql_of_the_docs_chooses_the_newest_versions(lake: Lake, recording: Artifact) -> None:
     page = Path(__file__).resolve().parents[3] / "docs" / "versions-and-recovery.md"
-    (sql,) = re.findall(r"^```sql\n(.*?)^```", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    (sql,) = re.findall(
+        r"^```sql\n(.*?)^```", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE
+    )
     for code in (OLD, NEW, NEWEST):
         kept(lake, verdict(recording, code))
     other = kept(lake, verdict(recording, OLD, level=0.01))
     found = Selection(lake.scan(lake.view(None)), Request(sql=sql)).table()
-    assert set(found["artifact"].to_pylist()) == {versions(lake, verdict(recording, OLD))[-1].id, other.artifact.id}
+    assert set(found["artifact"].to_pylist()) == {
+        versions(lake, verdict(recording, OLD))[-1].id,
+        other.artifact.id,
+    }

@@ -1,4 +1,5 @@
-"""Queries and commits decode what they use of the catalog's files, and give what the whole table would."""
+"""Queries and commits decode what they use of the catalog's files, and give what the whole table
+would."""
 
 from __future__ import annotations
 
@@ -17,7 +18,9 @@ from tests.flagdata.lake.conftest import overwrite, put_text
 from tests.program import invoke
 
 
-def test_queries_look_ups_and_commits_do_not_decode_whole_rows(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_queries_look_ups_and_commits_do_not_decode_whole_rows(
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
     identities = [put_text(lake, name).id for name in ("one", "two", "three")]
 
     def refuse(self: RowFiles, name: str) -> pa.Table:
@@ -41,7 +44,13 @@ def test_queries_look_ups_and_commits_do_not_decode_whole_rows(lake: Lake, monke
         transaction.add(Artifact(kind=Kind.CLIP, name="clip", parents=(identities[0],), recipe={}))
     lake.withdraw([identities[1]], "not on the side", branch="side")
     assert lake.merge("side", "what was done aside", into="other").added == transaction.result.added
-    assert lake.rows(columns=["name"], at="other")["name"].to_pylist() == ["one", "three", "four", "fifth", "clip"]
+    assert lake.rows(columns=["name"], at="other")["name"].to_pylist() == [
+        "one",
+        "three",
+        "four",
+        "fifth",
+        "clip",
+    ]
     listed = invoke("ls", "--lake", lake.path)
     assert ("two" in listed.out, "5 artifacts" in listed.err) == (True, True)
 
@@ -73,7 +82,9 @@ def test_a_withdrawal_writes_anew_only_the_files_that_have_its_rows(lake: Lake) 
     put_text(lake, "three")
     before = {name for version in range(1, 4) for name in lake.catalog.entry(version)[1]}
     lake.withdraw([gone.id], "wrong")
-    assert {path.name for path in lake.catalog.path.glob("*.parquet")} - before == set(lake.catalog.entry(4)[1])
+    assert {path.name for path in lake.catalog.path.glob("*.parquet")} - before == set(
+        lake.catalog.entry(4)[1]
+    )
     kept = {file.rpartition("/")[2] for file in DeltaTable(str(lake.catalog.path)).file_uris()}
     assert len(kept & before) == 2
     assert lake.rows()["name"].to_pylist() == ["one", "three"]
@@ -81,8 +92,18 @@ def test_a_withdrawal_writes_anew_only_the_files_that_have_its_rows(lake: Lake) 
 
 def test_rows_are_sorted_as_arrow_sorts_them() -> None:
     row = Artifact(kind=Kind.CLIP, name="c", source_hash="a" * 64, recipe={}).row()
-    starts: list[tuple[int | None, int | None]] = [(2, 1), (1, None), (1, 3), (None, 5), (1, 3), (2, 0)]
-    rows = [{**row, "start": s, "end": s, "frame_first": f, "artifact": f"{k:032x}"} for k, (s, f) in enumerate(starts)]
+    starts: list[tuple[int | None, int | None]] = [
+        (2, 1),
+        (1, None),
+        (1, 3),
+        (None, 5),
+        (1, 3),
+        (2, 0),
+    ]
+    rows = [
+        {**row, "start": s, "end": s, "frame_first": f, "artifact": f"{k:032x}"}
+        for k, (s, f) in enumerate(starts)
+    ]
     table = pa.Table.from_pylist(rows, schema=catalog_schema())
     ordered = table.sort_by([(name, "ascending") for name in ROW_ORDER])
     assert in_order(table).equals(ordered)
@@ -96,13 +117,22 @@ def test_a_damaged_column_is_named_by_its_file(lake: Lake) -> None:
     (file,) = lake.catalog.path.glob("*.parquet")
     content = bytearray(file.read_bytes())
     group = pq.read_metadata(pa.BufferReader(bytes(content))).row_group(0)
-    name = next(group.column(k) for k in range(group.num_columns) if group.column(k).path_in_schema == "name")
+    name = next(
+        group.column(k)
+        for k in range(group.num_columns)
+        if group.column(k).path_in_schema == "name"
+    )
     first = name.data_page_offset
     content[first : first + name.total_compressed_size] = b"\xff" * name.total_compressed_size
     overwrite(file, bytes(content))
     lake = Lake.open(lake.path)
     other = partial(select, lake, columns=["kind"])
-    for look in (other, lambda: select(lake, "name = 'gusts'"), lambda: lake.artifact("gusts"), lake.rows):
+    for look in (
+        other,
+        lambda: select(lake, "name = 'gusts'"),
+        lambda: lake.artifact("gusts"),
+        lake.rows,
+    ):
         with pytest.raises(CorruptError, match="has changed") as caught:
             look()
         assert caught.value.where == str(file)

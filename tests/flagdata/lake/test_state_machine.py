@@ -1,4 +1,5 @@
-"""Any operations on two lakes, killed before any of their steps, show what a plain model shows: see `lake_machine`.
+"""Any operations on two lakes, killed before any of their steps, show what a plain model shows: see
+`lake_machine`.
 
 Many more are tried by `python -m tests.studies state-machine`.
 """
@@ -28,8 +29,12 @@ def test_the_machine_finds_a_seeded_bug(name: str, monkeypatch: pytest.MonkeyPat
         try_machine(machine_of(bug.among), examples=40, steps=12, number=bug.seed)
 
 
-def test_the_machine_finds_a_seeded_bug_in_a_bucket(bucket_folder: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_machine_finds_a_seeded_bug_in_a_bucket(
+    bucket_folder: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     bug = BUGS["erased-by-branch"]
     bug.put(monkeypatch)
     with pytest.raises((AssertionError, FlagdataError)):
-        try_machine(machine_of(bug.among, in_bucket=bucket_folder), examples=10, steps=12, number=bug.seed)
+        try_machine(
+            machine_of(bug.among, in_bucket=bucket_folder), examples=10, steps=12, number=bug.seed
+        )

@@ -35,18 +35,23 @@ def stated(lake: Lake) -> list[dict[str, Any]]:
     """What a process that finds no summary reads of the log's own entries, newest first."""
     log = lake.catalog._entries
     versions = range(lake.catalog.head() + 1)
-    return [lake.catalog._version_entry(*pair) for pair in zip(versions, log.entries(versions, head=-1), strict=True)][
-        ::-1
-    ]
+    return [
+        lake.catalog._version_entry(*pair)
+        for pair in zip(versions, log.entries(versions, head=-1), strict=True)
+    ][::-1]
 
 
-def test_a_fresh_process_reads_the_history_in_few_files(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fresh_process_reads_the_history_in_few_files(
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
     commit(lake, 50, "version")
     files = [path.name for path in (lake.path / "refs" / "history").iterdir()]
     assert len(files) <= 2 + 3
     read: list[int] = []
     of_one = Log._read
-    monkeypatch.setattr(Log, "_read", lambda self, version: read.append(version) or of_one(self, version))
+    monkeypatch.setattr(
+        Log, "_read", lambda self, version: read.append(version) or of_one(self, version)
+    )
     found = Lake.open(lake.path).catalog.history()
     assert len(read) <= EVERY
     assert found == stated(lake)
@@ -54,7 +59,9 @@ def test_a_fresh_process_reads_the_history_in_few_files(lake: Lake, monkeypatch:
 
 
 @pytest.mark.disk("it puts an older copy of files in place")
-def test_a_log_that_was_restored_and_went_on_otherwise_is_read_as_it_is(lake: Lake, tmp_path: Path) -> None:
+def test_a_log_that_was_restored_and_went_on_otherwise_is_read_as_it_is(
+    lake: Lake, tmp_path: Path
+) -> None:
     assert isinstance(lake.path, Path)
     commit(lake, 10, "before")
     kept = ("catalog", "refs/newest")

@@ -1,4 +1,5 @@
-"""Every change tidies the catalog, so that a fresh reader opens few files, however it was filled."""
+"""Every change tidies the catalog, so that a fresh reader opens few files, however it was
+filled."""
 
 from __future__ import annotations
 
@@ -23,13 +24,18 @@ def _often(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def opened(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> tuple[int, int]:
-    """How many entries of the log, and files of rows, a fresh process reads to list the rows of main."""
+    """How many entries of the log, and files of rows, a fresh process reads to list the rows of
+    main."""
     entries: list[int] = []
     files: list[str] = []
     of_one, of_file = Log._read, RowFiles.read
     with monkeypatch.context() as patch:
-        patch.setattr(Log, "_read", lambda self, version: entries.append(version) or of_one(self, version))
-        patch.setattr(RowFiles, "read", lambda self, name: files.append(name) or of_file(self, name))
+        patch.setattr(
+            Log, "_read", lambda self, version: entries.append(version) or of_one(self, version)
+        )
+        patch.setattr(
+            RowFiles, "read", lambda self, name: files.append(name) or of_file(self, name)
+        )
         Lake.open(lake.path).rows()
     return len(entries), len(files)
 

@@ -1,4 +1,5 @@
-"""Versions move between lakes as they are: a tag means the same in a clone, and nothing is moved twice."""
+"""Versions move between lakes as they are: a tag means the same in a clone, and nothing is moved
+twice."""
 
 from __future__ import annotations
 
@@ -11,7 +12,16 @@ import pytest
 
 from flagdata.core.files.object_cache import forget
 from flagdata.errors import ConflictError, CorruptError
-from flagdata.lake import Lake, clone, collect, doctor, object_names, transfer, verify, verify_catalog
+from flagdata.lake import (
+    Lake,
+    clone,
+    collect,
+    doctor,
+    object_names,
+    transfer,
+    verify,
+    verify_catalog,
+)
 from tests.flagdata.lake.conftest import overwrite, put_older_ref, put_text
 from tests.program import invoke
 
@@ -24,10 +34,16 @@ def no_bar(total: int, label: str, unit: str) -> Iterator[Callable[[int], None]]
 
 
 def is_whole(lake: Lake) -> bool:
-    return (*doctor(lake, grace=NOW), *verify(lake, object_names(lake)), *verify_catalog(lake)) == ()
+    return (
+        *doctor(lake, grace=NOW),
+        *verify(lake, object_names(lake)),
+        *verify_catalog(lake),
+    ) == ()
 
 
-def test_a_clone_has_the_versions_tags_and_branches_of_its_source(lake: Lake, tmp_path: Path) -> None:
+def test_a_clone_has_the_versions_tags_and_branches_of_its_source(
+    lake: Lake, tmp_path: Path
+) -> None:
     first = put_text(lake, "first")
     lake.tag("v1")
     lake.branch("side")
@@ -39,7 +55,9 @@ def test_a_clone_has_the_versions_tags_and_branches_of_its_source(lake: Lake, tm
     assert len(done.objects) == 3
     for at in (None, "v1", "side", "1", lake.catalog.history()[1]["commit"]):
         assert copy.rows(at=at).equals(lake.rows(at=at))
-    assert [entry["message"] for entry in copy.catalog.history()] == [e["message"] for e in lake.catalog.history()]
+    assert [entry["message"] for entry in copy.catalog.history()] == [
+        e["message"] for e in lake.catalog.history()
+    ]
     assert is_whole(copy)
 
 
@@ -49,7 +67,12 @@ def test_what_was_moved_before_is_not_moved_again(lake: Lake, tmp_path: Path) ->
     later = put_text(lake, "second")
     lake.tag("v2")
     done = transfer(lake, copy, bars=no_bar)
-    assert (done.versions, done.objects, done.size, done.refs) == (2, (later.object,), len("second"), ("v2",))
+    assert (done.versions, done.objects, done.size, done.refs) == (
+        2,
+        (later.object,),
+        len("second"),
+        ("v2",),
+    )
     again = transfer(lake, copy, bars=no_bar)
     assert (again.versions, again.objects, again.refs) == (0, (), ())
     assert copy.rows(at="v2").equals(lake.rows(at="v2"))
@@ -64,7 +87,9 @@ def test_commits_of_a_clone_are_pushed_back(lake: Lake, tmp_path: Path) -> None:
     assert is_whole(lake)
 
 
-def test_a_transfer_that_was_stopped_goes_on(lake: Lake, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_transfer_that_was_stopped_goes_on(
+    lake: Lake, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     for text in ("first", "second", "third"):
         put_text(lake, text)
     lake.tag("v1")
@@ -155,7 +180,9 @@ def test_a_damaged_object_is_not_moved(lake: Lake, tmp_path: Path) -> None:
 
 
 @pytest.mark.disk("it clones a lake on a disk to a bucket")
-def test_a_lake_is_cloned_to_a_bucket_and_back(lake: Lake, bucket_folder: str, tmp_path: Path) -> None:
+def test_a_lake_is_cloned_to_a_bucket_and_back(
+    lake: Lake, bucket_folder: str, tmp_path: Path
+) -> None:
     put_text(lake, "first")
     lake.tag("v1")
     assert invoke("clone", lake.path, bucket_folder, "--json").document["refs"] == ["v1"]
@@ -172,7 +199,9 @@ def test_a_lake_is_cloned_to_a_bucket_and_back(lake: Lake, bucket_folder: str, t
     assert collect(Lake.open(bucket_folder), grace=NOW).objects == ()
 
 
-def test_a_lake_of_which_something_was_erased_is_cloned_without_it(lake: Lake, tmp_path: Path) -> None:
+def test_a_lake_of_which_something_was_erased_is_cloned_without_it(
+    lake: Lake, tmp_path: Path
+) -> None:
     gone, kept = put_text(lake, "gone"), put_text(lake, "kept")
     lake.tag("v1")
     lake.erase([gone.id], "consent withdrawn")

@@ -1,4 +1,5 @@
-"""What was cut off between two of its steps is found in the log, named with the command that goes on, and finished."""
+"""What was cut off between two of its steps is found in the log, named with the command that goes
+on, and finished."""
 
 from __future__ import annotations
 
@@ -43,8 +44,16 @@ class Killed(BaseException):
     """The process ends here."""
 
 
-def stopped(monkeypatch: pytest.MonkeyPatch, owner: type, method: str, action: Callable[[], object], *, at: int) -> int:
-    """Run an action whose process is killed before it calls a method for the time `at`; how often it did."""
+def stopped(
+    monkeypatch: pytest.MonkeyPatch,
+    owner: type,
+    method: str,
+    action: Callable[[], object],
+    *,
+    at: int,
+) -> int:
+    """Run an action whose process is killed before it calls a method for the time `at`; how often
+    it did."""
     whole, calls = getattr(owner, method), 0
 
     def counted(*arguments: object, **named: object) -> object:
@@ -64,7 +73,10 @@ def stopped(monkeypatch: pytest.MonkeyPatch, owner: type, method: str, action: C
 
 
 def is_whole(lake: Lake) -> bool:
-    return is_healthy(doctor(lake)) and (*verify(lake, object_names(lake)), *verify_catalog(lake)) == ()
+    return (
+        is_healthy(doctor(lake))
+        and (*verify(lake, object_names(lake)), *verify_catalog(lake)) == ()
+    )
 
 
 def put_folder(lake: Lake, text: str, *, parents: tuple[str, ...] = ()) -> Artifact:
@@ -73,7 +85,13 @@ def put_folder(lake: Lake, text: str, *, parents: tuple[str, ...] = ()) -> Artif
         (staged / "c").mkdir(parents=True)
         for k in range(3):
             (staged / "c" / str(k)).write_text(f"{text} {k}")
-        row = Artifact(kind="meshes", name=text, object=transaction.put(staged), recipe={"of": text}, parents=parents)  # type: ignore[arg-type]
+        row = Artifact(
+            kind="meshes",
+            name=text,
+            object=transaction.put(staged),
+            recipe={"of": text},
+            parents=parents,
+        )  # type: ignore[arg-type]
         transaction.add(row)
     return row
 
@@ -95,17 +113,24 @@ def test_an_erasure_that_was_killed_between_its_deletions_is_finished_by_the_sam
     left = stored(place) - {other.object}
     found = [finding for finding in doctor(place) if finding.kind == "erasure-unfinished"]
     assert len(left) == len(found) == 3 - at
-    assert all(finding.severity is Severity.ERROR and "flagdata gc" in str(finding.fix) for finding in found)
+    assert all(
+        finding.severity is Severity.ERROR and "flagdata gc" in str(finding.fix)
+        for finding in found
+    )
     done = erase()
     assert set(done.objects) == left
     assert (set(done.artifacts), stored(place)) == ({film.id, made.id, third.id}, {other.object})
     assert is_whole(place)
 
 
-def test_a_folder_that_was_half_deleted_is_found_and_deleted(place: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_that_was_half_deleted_is_found_and_deleted(
+    place: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
     sheet = put_folder(place, "sheet")
     path = place.objects.path(str(sheet.object))
-    assert stopped(monkeypatch, type(place.objects), "delete", lambda: place.erase([sheet.id], "asked"), at=0)
+    assert stopped(
+        monkeypatch, type(place.objects), "delete", lambda: place.erase([sheet.id], "asked"), at=0
+    )
     if (path / ".sums").exists():
         (path / ".sums").unlink()
     (path / "c" / "1").unlink()
@@ -130,7 +155,12 @@ def test_an_erasure_takes_its_artifacts_off_all_branches_by_one_commit(
 
     assert stopped(monkeypatch, Objects, "delete", erase, at=0) == 1
     assert lake.catalog.head() == head + 1
-    assert [lake.rows(at=branch).num_rows for branch in ("main", "side", "other", "v1")] == [0, 0, 0, 2]
+    assert [lake.rows(at=branch).num_rows for branch in ("main", "side", "other", "v1")] == [
+        0,
+        0,
+        0,
+        2,
+    ]
     assert {finding.kind for finding in doctor(lake)} >= {"erasure-unfinished"}
     assert erase().branches == ()
     assert (stored(lake), is_whole(lake)) == (set(), True)
@@ -149,14 +179,18 @@ def test_an_erasure_that_was_killed_is_found_though_its_bytes_were_withdrawn_of_
         transaction.add(twin)
     lake.withdraw([twin.id], "wrong")
     head = lake.catalog.head()
-    assert stopped(monkeypatch, Objects, "delete", lambda: lake.erase([film.id], "asked"), at=0) == 1
+    assert (
+        stopped(monkeypatch, Objects, "delete", lambda: lake.erase([film.id], "asked"), at=0) == 1
+    )
     assert "erasure-unfinished" in {finding.kind for finding in doctor(lake)}
     assert lake.erase([film.id], "asked").objects == (film.object,)
     assert lake.catalog.head() == head + 1
     assert (stored(lake), is_whole(lake)) == (set(), True)
 
 
-def test_an_expiry_that_was_killed_is_found_and_finished_by_gc(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_expiry_that_was_killed_is_found_and_finished_by_gc(
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
     gone, film = put_text(lake, "gone"), put_text(lake, "film")
     lake.withdraw([gone.id], "wrong")
     assert stopped(monkeypatch, Objects, "delete", lambda: expire(lake, 2), at=0) == 1
@@ -170,7 +204,9 @@ def test_an_expiry_that_was_killed_is_found_and_finished_by_gc(lake: Lake, monke
     [("folder", "id"), ("folder", "beginning"), ("folder", "name"), ("bucket", "name")],
     indirect=["place"],
 )
-def test_the_command_is_repeated_as_it_was_typed(place: Lake, monkeypatch: pytest.MonkeyPatch, called: str) -> None:
+def test_the_command_is_repeated_as_it_was_typed(
+    place: Lake, monkeypatch: pytest.MonkeyPatch, called: str
+) -> None:
     film = put_text(place, "film")
     name = {"id": film.id, "beginning": film.id[:10], "name": "film"}[called]
     command = ("withdraw", name, "--everywhere", "-m", "asked", "--lake", place.path)
@@ -188,10 +224,14 @@ def test_the_command_is_repeated_as_it_was_typed(place: Lake, monkeypatch: pytes
     assert (stored(place), place.catalog.head(), is_whole(place)) == (set(), head, True)
 
 
-def test_gc_deletes_what_was_erased_however_young_it_is(place: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_gc_deletes_what_was_erased_however_young_it_is(
+    place: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
     film, orphan = put_text(place, "film"), put_text(place, "orphan")
     place.withdraw([orphan.id], "later")
-    stopped(monkeypatch, type(place.objects), "delete", lambda: place.erase([film.id], "asked"), at=0)
+    stopped(
+        monkeypatch, type(place.objects), "delete", lambda: place.erase([film.id], "asked"), at=0
+    )
     assert garbage(place, grace=DAY).objects == (film.object,)
     assert collect(place, grace=DAY).objects == (film.object,)
     assert (stored(place), is_whole(place)) == ({orphan.object}, True)
@@ -241,7 +281,15 @@ def test_a_disk_that_refuses_a_deletion_is_reported_and_the_others_go(
             raise PermissionError(13, "Permission denied", str(path))
         whole(path)  # type: ignore[arg-type]
 
-    command = ("withdraw", *(film.id for film in films), "--everywhere", "-m", "asked", "--lake", place.path)
+    command = (
+        "withdraw",
+        *(film.id for film in films),
+        "--everywhere",
+        "-m",
+        "asked",
+        "--lake",
+        place.path,
+    )
     with monkeypatch.context() as patch:
         patch.setattr(type(place.objects), "remove", staticmethod(refuse))
         done = invoke(*command)
@@ -267,7 +315,8 @@ def test_an_erasure_that_a_clone_pulled_is_finished_there_by_gc(lake: Lake, tmp_
 
 
 @pytest.mark.parametrize(
-    ("owner", "method"), [(Objects, "publish"), (Catalog, "adopt"), (Catalog, "acknowledge"), (Refs, "write_files")]
+    ("owner", "method"),
+    [(Objects, "publish"), (Catalog, "adopt"), (Catalog, "acknowledge"), (Refs, "write_files")],
 )
 def test_a_push_that_was_killed_at_any_step_names_the_push_that_heals(
     lake: Lake, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, owner: type, method: str
@@ -281,9 +330,13 @@ def test_a_push_that_was_killed_at_any_step_names_the_push_that_heals(
         lake.tag(f"v{at}")
         if at:
             lake.delete_branch(f"side-{at - 1}", discard=True)
-        calls = stopped(monkeypatch, owner, method, lambda c=copy: transfer(lake, c, bars=no_bar), at=at)  # type: ignore[misc]
+        calls = stopped(
+            monkeypatch, owner, method, lambda c=copy: transfer(lake, c, bars=no_bar), at=at
+        )  # type: ignore[misc]
         for finding in (*doctor(copy), *verify_catalog(copy)):
-            assert finding.severity is not Severity.ERROR or "flagdata push or pull" in str(finding.fix)
+            assert finding.severity is not Severity.ERROR or "flagdata push or pull" in str(
+                finding.fix
+            )
         transfer(lake, copy, bars=no_bar)
         assert copy.refs.stored() == lake.refs.stored()
         collect(copy, grace=timedelta(0))
@@ -308,7 +361,9 @@ def test_a_deleted_branch_goes_with_the_next_transfer_where_one_was_killed_befor
     assert copy.refs.stale_files() == []
 
 
-def test_a_branch_that_was_made_again_goes_to_clones_that_have_the_one_before(lake: Lake, tmp_path: Path) -> None:
+def test_a_branch_that_was_made_again_goes_to_clones_that_have_the_one_before(
+    lake: Lake, tmp_path: Path
+) -> None:
     put_text(lake, "first")
     lake.branch("dev")
     put_text(lake, "old", branch="dev")
@@ -323,7 +378,9 @@ def test_a_branch_that_was_made_again_goes_to_clones_that_have_the_one_before(la
     assert is_whole(copy)
 
 
-def test_a_branch_of_an_earlier_version_that_was_made_again_goes_to_clones(lake: Lake, tmp_path: Path) -> None:
+def test_a_branch_of_an_earlier_version_that_was_made_again_goes_to_clones(
+    lake: Lake, tmp_path: Path
+) -> None:
     put_text(lake, "first")
     put_older_ref(lake, "branches", "dev", created="2020-01-01T00:00:00+00:00")
     copy, _ = clone(lake, tmp_path / "copy", bars=no_bar)
@@ -359,7 +416,9 @@ def test_a_lake_whose_making_was_killed_is_distinguished_from_another_folder(
         target = tmp_path / name
         with monkeypatch.context() as patch:
             patch.setattr("flagdata.lake.lake.put_if_absent", kill)
-            patch.setattr(Objects, "remove", staticmethod(lambda path: None))  # a killed process tidies nothing
+            patch.setattr(
+                Objects, "remove", staticmethod(lambda path: None)
+            )  # a killed process tidies nothing
             with pytest.raises(Killed):
                 make(target)
         with pytest.raises(ConflictError, match="its making was stopped") as refused:
@@ -371,7 +430,9 @@ def test_a_lake_whose_making_was_killed_is_distinguished_from_another_folder(
 
 @pytest.mark.parametrize("kind", ["tags", "branches"])
 @pytest.mark.parametrize("content", [b"{", b"", None])
-def test_a_ref_is_what_the_log_says_whatever_becomes_of_its_file(lake: Lake, kind: str, content: bytes | None) -> None:
+def test_a_ref_is_what_the_log_says_whatever_becomes_of_its_file(
+    lake: Lake, kind: str, content: bytes | None
+) -> None:
     put_text(lake, "first")
     lake.tag("name", notes={"split": "stated"}) if kind == "tags" else lake.branch("name")
     path = lake.refs.root / kind / "name.json"
@@ -400,13 +461,19 @@ def test_a_lake_without_its_refs_folder_has_its_tags_and_branches(lake: Lake) ->
     doctor(again)
     assert is_whole(again)
     assert {path.stem for path in lake.refs.root.glob("*/*.json")} == {"v1", "side"}
-    assert [path.name for path in (lake.refs.root / "newest").iterdir()] == [str(lake.catalog.head())]
+    assert [path.name for path in (lake.refs.root / "newest").iterdir()] == [
+        str(lake.catalog.head())
+    ]
 
 
 @pytest.mark.parametrize("kind", ["tags", "branches"])
-def test_the_file_of_a_ref_that_was_deleted_is_no_ref(lake: Lake, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
+def test_the_file_of_a_ref_that_was_deleted_is_no_ref(
+    lake: Lake, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
     put_text(lake, "first")
-    make, delete = (lake.tag, lake.delete_tag) if kind == "tags" else (lake.branch, lake.delete_branch)
+    make, delete = (
+        (lake.tag, lake.delete_tag) if kind == "tags" else (lake.branch, lake.delete_branch)
+    )
     make("name")
     assert stopped(monkeypatch, Refs, "remove", lambda: delete("name"), at=0) == 1
     path = lake.refs.root / kind / "name.json"
@@ -419,7 +486,9 @@ def test_the_file_of_a_ref_that_was_deleted_is_no_ref(lake: Lake, monkeypatch: p
 
 
 @pytest.mark.parametrize("kind", ["tags", "branches"])
-def test_a_ref_of_an_earlier_version_is_entered_into_the_log_by_the_next_commit(lake: Lake, kind: str) -> None:
+def test_a_ref_of_an_earlier_version_is_entered_into_the_log_by_the_next_commit(
+    lake: Lake, kind: str
+) -> None:
     put_text(lake, "first")
     path = put_older_ref(lake, kind, "name")
     put_text(lake, "second")

@@ -1,4 +1,5 @@
-"""Doctor names every kind of damage; garbage collection takes what nothing needs and nothing else."""
+"""Doctor names every kind of damage; garbage collection takes what nothing needs and nothing
+else."""
 
 from __future__ import annotations
 
@@ -91,7 +92,10 @@ def test_a_missing_object_is_a_dangling_row(lake: Lake) -> None:
 
 
 def test_a_truncated_object_is_found_by_its_size_and_a_changed_one_by_its_hash(lake: Lake) -> None:
-    short, changed = object_of(lake, put_text(lake, "long enough")), object_of(lake, put_text(lake, "same size"))
+    short, changed = (
+        object_of(lake, put_text(lake, "long enough")),
+        object_of(lake, put_text(lake, "same size")),
+    )
     overwrite(short, b"long")
     overwrite(changed, b"some size")
     assert kinds(doctor(lake)) == ["object-size"]
@@ -106,7 +110,9 @@ def test_ingesting_again_heals_a_damaged_object(lake: Lake) -> None:
     assert doctor(lake, grace=NOW) == ()
 
 
-@pytest.mark.disk("what a folder of a bucket holds is said by its `.sums`; another file of it is not read")
+@pytest.mark.disk(
+    "what a folder of a bucket holds is said by its `.sums`; another file of it is not read"
+)
 def test_a_folder_with_one_file_more_is_not_the_object_any_more(lake: Lake) -> None:
     with lake.transaction("folder") as tx:
         path = tx.staging(".zarr")
@@ -137,7 +143,9 @@ def test_a_ref_that_cannot_be_read_is_an_error_and_stops_collection(lake: Lake) 
 
 
 @pytest.mark.parametrize("lost", [0, 2, 3])
-def test_every_reader_reports_a_lost_log_entry_and_nothing_is_collected(lake: Lake, lost: int) -> None:
+def test_every_reader_reports_a_lost_log_entry_and_nothing_is_collected(
+    lake: Lake, lost: int
+) -> None:
     artifacts = [put_text(lake, text) for text in "abc"]
     entry = lake.path / "catalog" / "_delta_log" / f"{lost:020d}.json"
     content = entry.read_bytes()
@@ -180,7 +188,9 @@ def flip(path: Place, position: int) -> None:
     path.write_bytes(data)
 
 
-def test_a_bit_that_flips_anywhere_in_a_file_of_the_catalog_is_found_and_stops_collection(lake: Lake) -> None:
+def test_a_bit_that_flips_anywhere_in_a_file_of_the_catalog_is_found_and_stops_collection(
+    lake: Lake,
+) -> None:
     put_text(lake, "a")
     lake.withdraw([put_text(lake, "b").id], "so that one file is of an older version only")
     name = abandon(lake, "orphan")
@@ -188,7 +198,9 @@ def test_a_bit_that_flips_anywhere_in_a_file_of_the_catalog_is_found_and_stops_c
     for path in (lake.path / "catalog").glob("*.parquet"):
         for position in (4, path.stat().st_size // 2, -9):
             flip(path, position)
-            damage = [f for f in verify_catalog(Lake.open(lake.path)) if f.kind == "catalog-file-changed"]
+            damage = [
+                f for f in verify_catalog(Lake.open(lake.path)) if f.kind == "catalog-file-changed"
+            ]
             assert [(f.where, f.severity) for f in damage] == [(str(path), Severity.ERROR)]
             with pytest.raises(CorruptError):
                 collect(Lake.open(lake.path), grace=NOW)
@@ -199,7 +211,8 @@ def test_a_bit_that_flips_anywhere_in_a_file_of_the_catalog_is_found_and_stops_c
 
 
 def of_an_earlier_version(lake: Lake) -> None:
-    """Makes the log one that says nothing of refs, as versions of flagdata wrote it whose refs were files alone."""
+    """Makes the log one that says nothing of refs, as versions of flagdata wrote it whose refs were
+    files alone."""
     folder = lake.path / "catalog" / "_delta_log"
     noted: dict[str, str] = {}
     for path in sorted(folder.glob("*.json")):
@@ -207,8 +220,14 @@ def of_an_earlier_version(lake: Lake) -> None:
         for action in actions:
             info = action.get("commitInfo", {})
             info.pop("flagdata.made", None)
-            info.update({"flagdata.previous_sha256": noted["before"]} if "flagdata.previous_sha256" in info else {})
-        text = "\n".join(json.dumps(action, ensure_ascii=False, separators=(",", ":")) for action in actions)
+            info.update(
+                {"flagdata.previous_sha256": noted["before"]}
+                if "flagdata.previous_sha256" in info
+                else {}
+            )
+        text = "\n".join(
+            json.dumps(action, ensure_ascii=False, separators=(",", ":")) for action in actions
+        )
         overwrite(path, text.encode())
         noted["before"] = hashlib.sha256(text.encode()).hexdigest()
     for mark in (lake.path / "refs" / "newest").iterdir():
@@ -284,7 +303,9 @@ def test_collection_spares_what_a_running_transaction_has_put(lake: Lake) -> Non
 
 
 @pytest.mark.disk(AGES)
-def test_collection_spares_an_old_orphan_that_a_running_transaction_has_found_again(lake: Lake) -> None:
+def test_collection_spares_an_old_orphan_that_a_running_transaction_has_found_again(
+    lake: Lake,
+) -> None:
     name = abandon(lake, "again")
     age(lake.object_path(name), timedelta(days=30))
     with lake.transaction("again") as tx:
@@ -352,7 +373,9 @@ def is_free(lock: Path) -> bool:
 
 
 @pytest.mark.disk(AGES)
-def test_a_withdrawn_row_leaves_the_branch_stays_at_tags_and_keeps_its_object_while_a_tag_needs_it(lake: Lake) -> None:
+def test_a_withdrawn_row_leaves_the_branch_stays_at_tags_and_keeps_its_object_while_a_tag_needs_it(
+    lake: Lake,
+) -> None:
     tagged = put_text(lake, "tagged")
     lake.tag("v1")
     untagged = put_text(lake, "untagged")
@@ -365,13 +388,17 @@ def test_a_withdrawn_row_leaves_the_branch_stays_at_tags_and_keeps_its_object_wh
     time.sleep(0.01)  # so that the withdrawal is older than no time at all
     assert collect(lake, grace=NOW).objects == (untagged.object,)
     assert object_of(lake, tagged).read_bytes() == b"tagged"
-    assert [(f.kind, f.severity) for f in doctor(lake, grace=NOW)] == [("withdrawn-collected", Severity.NOTE)]
+    assert [(f.kind, f.severity) for f in doctor(lake, grace=NOW)] == [
+        ("withdrawn-collected", Severity.NOTE)
+    ]
     assert put_text(lake, "untagged").id == untagged.id
     assert doctor(lake, grace=NOW) == ()
     assert lake.rows()["name"].to_pylist() == ["untagged"]
 
 
-def test_withdrawal_spares_what_others_were_made_from_and_what_other_branches_show(lake: Lake) -> None:
+def test_withdrawal_spares_what_others_were_made_from_and_what_other_branches_show(
+    lake: Lake,
+) -> None:
     parent = put_text(lake, "parent")
     child = put_text(lake, "child", parents=(parent.id,))
     lake.branch("try")
@@ -405,14 +432,19 @@ def clips(lake: Lake, recording: Artifact, count: int) -> list[Artifact]:
     return made
 
 
-def test_clips_go_along_with_their_recording_and_what_was_made_from_it_otherwise_does_not(lake: Lake) -> None:
+def test_clips_go_along_with_their_recording_and_what_was_made_from_it_otherwise_does_not(
+    lake: Lake,
+) -> None:
     recording, other = put_text(lake, "recording"), put_text(lake, "other")
     own, others = clips(lake, recording, 3), clips(lake, other, 2)
     measured = put_text(lake, "measured", parents=(own[1].id,))
     of_measured = put_text(lake, "of measured", parents=(measured.id, other.id))
     with pytest.raises(ConflictError, match=r"measured.*--with-descendants"):
         lake.withdraw([recording.id], "wrong camera")
-    assert lake.descendants([recording.id]) == {clip.id for clip in own} | {measured.id, of_measured.id}
+    assert lake.descendants([recording.id]) == {clip.id for clip in own} | {
+        measured.id,
+        of_measured.id,
+    }
     done = lake.withdraw([recording.id, measured.id, of_measured.id], "wrong camera")
     assert done.clips == tuple(sorted(clip.id for clip in own))
     assert set(lake.rows()["artifact"].to_pylist()) == {other.id, *(clip.id for clip in others)}
@@ -442,7 +474,10 @@ def test_leftovers_of_the_commit_protocol_are_explained_and_collected(lake: Lake
     left = [
         lake.path / "catalog" / "0123.parquet",
         lake.path / "catalog" / "_delta_log" / "00000000000000000009.json#1",
-        *(lake.path / folder / f".{0:032x}" for folder in (".", "refs/tags", "refs/newest", "catalog/_delta_log")),
+        *(
+            lake.path / folder / f".{0:032x}"
+            for folder in (".", "refs/tags", "refs/newest", "catalog/_delta_log")
+        ),
     ]
     for path in left:
         path.write_text("half")
@@ -461,7 +496,9 @@ def test_leftovers_of_the_commit_protocol_are_explained_and_collected(lake: Lake
 
 
 @pytest.mark.disk(AGES)
-def test_staged_files_without_a_lease_are_reported_and_collected_after_the_grace_period(lake: Lake) -> None:
+def test_staged_files_without_a_lease_are_reported_and_collected_after_the_grace_period(
+    lake: Lake,
+) -> None:
     file, folder = lake.staging / "notes.txt", lake.staging / "mine"
     folder.mkdir()
     for path in (file, folder / "inner.mcap"):
@@ -483,7 +520,9 @@ def test_staged_files_without_a_lease_are_reported_and_collected_after_the_grace
 
 
 @pytest.mark.disk(LINKS)
-def test_a_link_in_staging_is_deleted_and_what_it_leads_to_is_not(lake: Lake, tmp_path: Path) -> None:
+def test_a_link_in_staging_is_deleted_and_what_it_leads_to_is_not(
+    lake: Lake, tmp_path: Path
+) -> None:
     target = tmp_path / "mine"
     target.mkdir()
     (target / "thesis.txt").write_text("mine")
@@ -528,7 +567,9 @@ def test_values_in_the_log_that_no_writer_writes_are_refused(lake: Lake) -> None
             Lake.open(lake.path).catalog.history()
 
 
-def test_an_entry_before_the_checkpoint_that_is_cut_off_is_named(lake: Lake, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_entry_before_the_checkpoint_that_is_cut_off_is_named(
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(catalog, "_TIDY_EVERY", 3)
     for text in "abcde":
         put_text(lake, text)

@@ -1,4 +1,5 @@
-"""What a lake takes: each byte counted once, shared apart from own, and what gc would free as gc then does."""
+"""What a lake takes: each byte counted once, shared apart from own, and what gc would free as gc
+then does."""
 
 from __future__ import annotations
 
@@ -24,7 +25,11 @@ def shown(found: Usage, name: str) -> tuple[int, int, int]:
 def test_every_file_counts_once_also_where_rows_of_two_kinds_share_it(lake: Lake) -> None:
     film = put_text(lake, "film")
     with lake.transaction("a clip of it") as tx:
-        tx.add(Artifact(kind=Kind.CLIP, name="clip", object=film.object, parents=(film.id,), frame_first=0))
+        tx.add(
+            Artifact(
+                kind=Kind.CLIP, name="clip", object=film.object, parents=(film.id,), frame_first=0
+            )
+        )
         tx.add(Artifact(kind=Kind.MEASUREMENT, name="number"))
     found = usage(lake, grace=AT_ONCE)
     assert {name: (share.artifacts, share.objects) for name, share in found.kinds.items()} == {
@@ -38,7 +43,9 @@ def test_every_file_counts_once_also_where_rows_of_two_kinds_share_it(lake: Lake
     assert found.kinds["wind"].size == len("film")
     assert found.total == sum(share.size for share in found.kinds.values())
     if isinstance(lake.path, Path):
-        assert found.total == sum(path.stat().st_size for path in lake.path.rglob("*") if path.is_file())
+        assert found.total == sum(
+            path.stat().st_size for path in lake.path.rglob("*") if path.is_file()
+        )
 
 
 def test_what_two_versions_show_is_shared_and_the_rest_their_own(lake: Lake) -> None:
@@ -73,7 +80,9 @@ def test_what_gc_would_free_is_what_it_frees(lake: Lake) -> None:
     assert shown(after, version) == (5, 0, 1)
 
 
-def test_a_copy_without_empty_folders_and_one_with_links_is_counted(lake: Lake, tmp_path: Path) -> None:
+def test_a_copy_without_empty_folders_and_one_with_links_is_counted(
+    lake: Lake, tmp_path: Path
+) -> None:
     if not isinstance(lake.path, Path):
         return
     film = put_text(lake, "film")
@@ -110,5 +119,8 @@ def test_du_prints_a_table_of_kinds_one_of_versions_and_a_document(lake: Lake) -
     assert "gc would free 0 B" in ended.err
     document = run("du", "--json").document
     assert document["gc_frees"] == 0
-    assert [(v["name"], v["own"], v["shared"]) for v in document["versions"]] == [("main", 0, 4), ("v1", 0, 4)]
+    assert [(v["name"], v["own"], v["shared"]) for v in document["versions"]] == [
+        ("main", 0, 4),
+        ("v1", 0, 4),
+    ]
     assert run("du", "--at", "nothing").code == 1

@@ -1,4 +1,5 @@
-"""Texts of TOML and JSON that are too deep, too long or hold no finite numbers are refused at once."""
+"""Texts of TOML and JSON that are too deep, too long or hold no finite numbers are refused at
+once."""
 
 from __future__ import annotations
 
@@ -74,7 +75,9 @@ def test_a_file_of_json_that_cannot_be_read_is_named_with_the_fix(tmp_path: Path
 
 def test_a_lake_whose_marker_is_nested_without_end_is_refused(tmp_path: Path) -> None:
     lake = Lake.create(tmp_path / "lake")
-    (lake.path / "refs" / "tags" / "v1.json").write_text('{"view":' + "[" * MANY)  # of an earlier version
+    (lake.path / "refs" / "tags" / "v1.json").write_text(
+        '{"view":' + "[" * MANY
+    )  # of an earlier version
     with pytest.raises(CorruptError, match="the ref cannot be read"):
         lake.rows(at="v1")
     (lake.path / "lake.json").write_text("[" * MANY)

@@ -1,4 +1,5 @@
-"""The look-up of recipes: by name in the catalog, by path in the user's files; what is not there is refused."""
+"""The look-up of recipes: by name in the catalog, by path in the user's files; what is not there is
+refused."""
 
 from __future__ import annotations
 
@@ -20,7 +21,11 @@ SENSORS = Shelf(folder="sensors", noun="sensor recipe")
 def test_a_name_is_the_file_of_that_name_in_the_catalog() -> None:
     found = SENSORS.find("generic-csv")
     assert found.data == (ROOT / "catalogs" / "sensors" / "generic-csv.toml").read_bytes()
-    assert (found.name, found.folder, found.where) == ("generic-csv", Path(), "sensor recipe 'generic-csv'")
+    assert (found.name, found.folder, found.where) == (
+        "generic-csv",
+        Path(),
+        "sensor recipe 'generic-csv'",
+    )
 
 
 @pytest.mark.parametrize("kind", ["datasets", "sensors"])
@@ -29,7 +34,9 @@ def test_the_catalog_prints_a_recipe_that_can_be_copied(kind: str, tmp_path: Pat
     for name in shelf.names():
         copy = tmp_path / f"{name}.toml"
         copy.write_text(invoke("catalog", kind, name).out)
-        assert parse_recipe(shelf.find(str(copy)).text, where="") == parse_recipe(shelf.named(name).text, where="")
+        assert parse_recipe(shelf.find(str(copy)).text, where="") == parse_recipe(
+            shelf.named(name).text, where=""
+        )
     assert invoke("catalog", kind, "generic-csw").code == 2
 
 
@@ -41,7 +48,9 @@ def test_every_file_of_a_folder_has_a_name_and_can_be_found_by_it() -> None:
         assert [shelf.named(name).name for name in stems] == stems
 
 
-def test_a_path_is_the_users_file_and_its_folder_is_where_its_own_paths_begin(tmp_path: Path) -> None:
+def test_a_path_is_the_users_file_and_its_folder_is_where_its_own_paths_begin(
+    tmp_path: Path,
+) -> None:
     file = tmp_path / "generic-csv.toml"  # as one of the catalog: a path is never taken for a name
     file.write_bytes("title = 'Zürich'\r\n".encode())
     found = SENSORS.find(str(file))
@@ -51,7 +60,9 @@ def test_a_path_is_the_users_file_and_its_folder_is_where_its_own_paths_begin(tm
 
 
 def test_an_unknown_name_suggests_the_nearest_and_says_where_it_stands() -> None:
-    with pytest.raises(UnknownNameError, match=r"unknown sensor recipe 'generic-cvs'; did you mean 'generic-csv'\?"):
+    with pytest.raises(
+        UnknownNameError, match=r"unknown sensor recipe 'generic-cvs'; did you mean 'generic-csv'\?"
+    ):
         SENSORS.find("generic-cvs")
     with pytest.raises(UnknownNameError, match=r"mast\.toml: unknown sensor recipe"):
         SENSORS.named("generic-cvs", where="mast.toml")

@@ -21,7 +21,9 @@ EXPOSURE = 1_250_000
 def pictures() -> np.ndarray:
     """(60, 48, 64) uint8: a bright bar that wanders over a gradient, all frames different."""
     column, row = np.meshgrid(np.arange(64), np.arange(48))
-    bar = [40 * (np.abs(column - (8 + 0.8 * k) - 3 * np.sin(row / 9 + k / 4)) < 4) for k in range(60)]
+    bar = [
+        40 * (np.abs(column - (8 + 0.8 * k) - 3 * np.sin(row / 9 + k / 4)) < 4) for k in range(60)
+    ]
     return (60 + 2 * row + column + np.array(bar)).astype(np.uint8)
 
 
@@ -48,16 +50,28 @@ def series() -> WindSeries:
 def write(pictures: np.ndarray, series: WindSeries) -> Callable[..., Path]:
     """Writes the whole sample record to a path."""
 
-    def write(path: Path, *, coding: Coding = Coding.JPEG, chunking: Chunking = Chunking.COMMITTED) -> Path:
+    def write(
+        path: Path, *, coding: Coding = Coding.JPEG, chunking: Chunking = Chunking.COMMITTED
+    ) -> Path:
         with RecordWriter(
-            path, metadata={"camera": {"codec": "test"}, "provenance": {"a": "ü"}}, coding=coding, chunking=chunking
+            path,
+            metadata={"camera": {"codec": "test"}, "provenance": {"a": "ü"}},
+            coding=coding,
+            chunking=chunking,
         ) as writer:
             for k, image in enumerate(pictures):
                 time = START + k * PERIOD
-                writer.frame(log_time=time, publish_time=time - DEVICE_LAG, timestamp=time + EXPOSURE, image=image)
+                writer.frame(
+                    log_time=time,
+                    publish_time=time - DEVICE_LAG,
+                    timestamp=time + EXPOSURE,
+                    image=image,
+                )
             writer.wind(series)
             writer.truth({"bending": 1e-6, "area_weight": 0.284}, log_time=START)
-            writer.attach("log.csv", b"time,speed\n" * 20_000, media_type="text/csv", log_time=START)
+            writer.attach(
+                "log.csv", b"time,speed\n" * 20_000, media_type="text/csv", log_time=START
+            )
             writer.attach("note.txt", b"by hand", media_type="text/plain", log_time=START)
         return path
 

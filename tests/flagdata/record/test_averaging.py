@@ -16,7 +16,12 @@ T0 = 1_777_636_800 * S
 
 
 def series(
-    time: object, speed: object, *, direction: object = None, flags: object = None, sensor: Sensor | None = None
+    time: object,
+    speed: object,
+    *,
+    direction: object = None,
+    flags: object = None,
+    sensor: Sensor | None = None,
 ) -> WindSeries:
     channels = {"wind_speed": np.asarray(speed, dtype=np.float64)}
     if direction is not None:
@@ -25,7 +30,9 @@ def series(
     return WindSeries(
         time=at,
         channels=channels,
-        flags=np.zeros(len(at), dtype=np.uint16) if flags is None else np.asarray(flags, dtype=np.uint16),
+        flags=np.zeros(len(at), dtype=np.uint16)
+        if flags is None
+        else np.asarray(flags, dtype=np.uint16),
         sensor=sensor or Sensor(name="test"),
     )
 
@@ -63,7 +70,9 @@ def test_stronger_wind_counts_more_in_the_direction() -> None:
 
 
 def test_opposite_winds_have_no_direction() -> None:
-    assert np.isnan(average(series([T0 + S // 2, T0 + S], [2, 2], direction=[90, 270])).direction[0])
+    assert np.isnan(
+        average(series([T0 + S // 2, T0 + S], [2, 2], direction=[90, 270])).direction[0]
+    )
 
 
 def test_calm_has_no_direction() -> None:
@@ -74,7 +83,8 @@ def test_the_sigma_of_independent_samples_is_their_scatter_over_root_n() -> None
     draw = stream(1, "averaging").normal(5.0, 0.8, 20 * 3000)
     means = average(series(T0 + 1 + np.arange(len(draw)) * (S // 20), draw))
     inside = means.count == 20
-    # the scatter of 3,000 means is σ/√n; it is known to 1/√6000 = 1.3 %, the mean of the sigmas to less
+    # the scatter of 3,000 means is σ/√n; it is known to 1/√6000 = 1.3 %, the mean of the sigmas to
+    # less
     assert np.std(means.speed[inside]) == pytest.approx(0.8 / np.sqrt(20), rel=0.05)
     assert np.sqrt(np.mean(means.sigma[inside] ** 2)) == pytest.approx(0.8 / np.sqrt(20), rel=0.05)
 
@@ -90,13 +100,15 @@ def test_correlated_samples_count_as_fewer(rho: float) -> None:
     means = average(series(T0 + 1 + np.arange(len(value)) * (S // 400), 10 + value))
     inside = means.count == 400
     expected = np.sqrt((1 + rho) / (1 - rho) / 400)
-    # 600 means give the scatter to 3 %; the within-bin variance is low by n_eff⁻¹, up to 2.5 % at ρ = 0.8
+    # 600 means give the scatter to 3 %; the within-bin variance is low by n_eff⁻¹, up to 2.5 % at ρ
+    # = 0.8
     assert np.std(means.speed[inside]) == pytest.approx(expected, rel=0.1)
     assert np.sqrt(np.mean(means.sigma[inside] ** 2)) == pytest.approx(expected, rel=0.1)
 
 
 def test_a_sample_read_several_times_over_counts_once() -> None:
-    # 100 independent readings, each logged five times: ρ = 1 - 1/5 · 2σ²/2σ² = 0.8, n_eff = 500 · 0.2/1.8 = 56 of 100
+    # 100 independent readings, each logged five times: ρ = 1 - 1/5 · 2σ²/2σ² = 0.8, n_eff = 500 ·
+    # 0.2/1.8 = 56 of 100
     draw = np.repeat(stream(3, "repeat").normal(0, 1, 100 * 200), 5)
     starts = np.arange(0, len(draw), 500)
     rho = correlation(draw, starts, np.full(len(starts), 500))
@@ -106,8 +118,11 @@ def test_a_sample_read_several_times_over_counts_once() -> None:
 def test_one_sample_in_a_bin_has_the_instruments_sigma_alone() -> None:
     sensor = Sensor(name="s", accuracy=0.1, accuracy_relative=0.03, resolution=0.12)
     means = average(series([T0, T0 + 2 * S], [2.0, 10.0], sensor=sensor))
-    # the larger of 0.1 and 3 % of the reading; the resolution as q/√12 = 0.0346 (JCGM 100:2008, F.2.2.1)
-    assert means.sigma == pytest.approx([np.hypot(0.1, 0.12 / np.sqrt(12)), np.hypot(0.3, 0.12 / np.sqrt(12))])
+    # the larger of 0.1 and 3 % of the reading; the resolution as q/√12 = 0.0346 (JCGM 100:2008,
+    # F.2.2.1)
+    assert means.sigma == pytest.approx(
+        [np.hypot(0.1, 0.12 / np.sqrt(12)), np.hypot(0.3, 0.12 / np.sqrt(12))]
+    )
 
 
 def test_an_instrument_of_unknown_accuracy_counts_as_exact() -> None:
@@ -147,4 +162,11 @@ def test_a_period_that_is_no_length_of_time_is_refused(period: float) -> None:
 
 def test_nothing_usable_gives_no_bins() -> None:
     means = average(series([T0, T0 + S], [np.nan, 1.0], flags=[0, SampleFlag.STALE]))
-    assert len(means.time) == len(means.speed) == len(means.sigma) == len(means.direction) == len(means.count) == 0
+    assert (
+        len(means.time)
+        == len(means.speed)
+        == len(means.sigma)
+        == len(means.direction)
+        == len(means.count)
+        == 0
+    )

@@ -1,4 +1,5 @@
-"""Records written in bulk have the bytes that the mcap library and protobuf write one message at a time."""
+"""Records written in bulk have the bytes that the mcap library and protobuf write one message at a
+time."""
 
 from __future__ import annotations
 
@@ -32,7 +33,11 @@ def wind(n: int) -> WindSeries:
     speed[3] = -0.0
     return WindSeries(
         time=time,
-        channels={"wind_speed": speed, "sonic_temperature": rng.normal(290, 1, n), "wind_x": np.zeros(n)},
+        channels={
+            "wind_speed": speed,
+            "sonic_temperature": rng.normal(290, 1, n),
+            "wind_x": np.zeros(n),
+        },
         flags=rng.choice([0, 1, 127, 128, 0xFFFF], n).astype(np.uint16),
         sensor=Sensor(name="a made one"),
         host_time=time + 700_000_001,
@@ -43,7 +48,10 @@ def one_by_one(series: WindSeries) -> list[bytes]:
     """Each sample through protobuf's own serialiser."""
     out = []
     for i, time in enumerate(series.time.tolist()):
-        values = {messages.WIND_FIELDS[name][0]: float(series.channels[name][i]) for name in series.channels}
+        values = {
+            messages.WIND_FIELDS[name][0]: float(series.channels[name][i])
+            for name in series.channels
+        }
         sample = messages.WindSample(flags=int(series.flags[i]), **values)
         messages.set_timestamp(sample.timestamp, time)
         assert series.host_time is not None
@@ -103,22 +111,38 @@ def test_a_file_in_bulk_is_the_mcap_librarys() -> None:
     payloads = writer.samples(series, series.time, slice(0, 400))
     schema = messages.descriptor_set(messages.WindSample)
     theirs, ours = io.BytesIO(), io.BytesIO()
-    library = Writer(theirs, chunk_size=CHUNK, compression=CompressionType.NONE, enable_data_crcs=True)
+    library = Writer(
+        theirs, chunk_size=CHUNK, compression=CompressionType.NONE, enable_data_crcs=True
+    )
     library.start(profile="p", library="l")
     file = McapFile(ours, chunk_size=CHUNK, profile="p", library="l")
     library.add_metadata("m", {"a": "ä", "b": "2"})
     file.add_metadata("m", {"a": "ä", "b": "2"})
     for topic in ("/one", "/two"):
-        number = library.register_schema(name="flagdata.WindSample", encoding=SchemaEncoding.Protobuf, data=schema)
-        known = {"topic": topic, "message_encoding": MessageEncoding.Protobuf, "metadata": {"of": topic, "ä": "1"}}
+        number = library.register_schema(
+            name="flagdata.WindSample", encoding=SchemaEncoding.Protobuf, data=schema
+        )
+        known = {
+            "topic": topic,
+            "message_encoding": MessageEncoding.Protobuf,
+            "metadata": {"of": topic, "ä": "1"},
+        }
         library.register_channel(schema_id=number, **known)
-        number = file.register_schema(name="flagdata.WindSample", encoding=SchemaEncoding.Protobuf, data=schema)
+        number = file.register_schema(
+            name="flagdata.WindSample", encoding=SchemaEncoding.Protobuf, data=schema
+        )
         file.register_channel(schema_id=number, **known)
-    library.add_message(channel_id=2, log_time=START, publish_time=START + 1, sequence=0, data=b"before")
-    file.add_message(channel_id=2, log_time=START, publish_time=START + 1, sequence=0, data=b"before")
+    library.add_message(
+        channel_id=2, log_time=START, publish_time=START + 1, sequence=0, data=b"before"
+    )
+    file.add_message(
+        channel_id=2, log_time=START, publish_time=START + 1, sequence=0, data=b"before"
+    )
     for i, data in enumerate(one_by_one(series)):
         time = int(series.time[i])
-        library.add_message(channel_id=1, log_time=time, publish_time=time + 5, sequence=i, data=data)
+        library.add_message(
+            channel_id=1, log_time=time, publish_time=time + 5, sequence=i, data=data
+        )
     for rows in (slice(0, 150), slice(150, 151), slice(151, 400)):
         block = MessageBlock(
             log_time=series.time[rows],
@@ -140,14 +164,18 @@ def test_a_file_in_bulk_is_the_mcap_librarys() -> None:
 
 def test_a_file_without_messages_is_the_mcap_librarys() -> None:
     theirs, ours = io.BytesIO(), io.BytesIO()
-    library = Writer(theirs, chunk_size=CHUNK, compression=CompressionType.NONE, enable_data_crcs=True)
+    library = Writer(
+        theirs, chunk_size=CHUNK, compression=CompressionType.NONE, enable_data_crcs=True
+    )
     library.start(profile="p", library="l")
     library.finish()
     McapFile(ours, chunk_size=CHUNK, profile="p", library="l").finish()
     assert ours.getvalue() == theirs.getvalue()
 
 
-@pytest.mark.parametrize("size", [100, 70_000, 9_000_000], ids=["as-it-is", "packed", "packed-quickly"])
+@pytest.mark.parametrize(
+    "size", [100, 70_000, 9_000_000], ids=["as-it-is", "packed", "packed-quickly"]
+)
 def test_an_attached_file_comes_back_whole(tmp_path: Path, size: int) -> None:
     source = tmp_path / "log.csv"
     source.write_bytes((b"2021-05-14 00:00:00,1.25\n" * (size // 25 + 1))[:size])

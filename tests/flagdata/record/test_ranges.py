@@ -1,4 +1,5 @@
-"""A record in a bucket: the frames that are asked for, whatever else it holds, and no byte unchecked."""
+"""A record in a bucket: the frames that are asked for, whatever else it holds, and no byte
+unchecked."""
 
 from __future__ import annotations
 
@@ -60,8 +61,12 @@ def test_all_that_a_record_holds_is_read_as_from_a_file(
     assert remote.frame_count == 60
     for first, count in ((0, 1), (17, 5), (59, 1), (0, 60)):
         np.testing.assert_array_equal(remote.frames(first, count), local.frames(first, count))
-        np.testing.assert_array_equal(remote.times(first, count), START + np.arange(first, first + count) * PERIOD)
-        np.testing.assert_array_equal(remote.timestamps(first, count), local.timestamps(first, count))
+        np.testing.assert_array_equal(
+            remote.times(first, count), START + np.arange(first, first + count) * PERIOD
+        )
+        np.testing.assert_array_equal(
+            remote.timestamps(first, count), local.timestamps(first, count)
+        )
     np.testing.assert_array_equal(remote.frame_times, local.frame_times)
     np.testing.assert_array_equal(remote.device_frame_times, local.device_frame_times)
     assert remote.metadata == local.metadata
@@ -116,7 +121,8 @@ def test_a_changed_frame_is_refused_and_read_rightly_once_the_object_is_healed(
 
 @pytest.fixture
 def unordered(sample: Path, tmp_path: Path) -> Path:
-    """The frames of a record as a salvage may find them: those of the second half of the time first."""
+    """The frames of a record as a salvage may find them: those of the second half of the time
+    first."""
     from mcap.reader import make_reader
 
     path = tmp_path / "unordered.mcap"
@@ -125,9 +131,13 @@ def unordered(sample: Path, tmp_path: Path) -> Path:
         writer = ChecksummedFile(sink, chunk_size=20_000, profile="", library="")
         schema = found[0][0]
         assert schema is not None
-        number = writer.register_schema(name=schema.name, encoding=schema.encoding, data=schema.data)
+        number = writer.register_schema(
+            name=schema.name, encoding=schema.encoding, data=schema.data
+        )
         encoding = found[0][1].message_encoding
-        channel = writer.register_channel(topic="/camera/image", message_encoding=encoding, schema_id=number)
+        channel = writer.register_channel(
+            topic="/camera/image", message_encoding=encoding, schema_id=number
+        )
         for _, _, message in found[30:] + found[:30]:
             times = {"log_time": message.log_time, "publish_time": message.publish_time}
             writer.add_message(channel_id=channel, sequence=0, data=message.data, **times)

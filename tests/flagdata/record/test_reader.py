@@ -26,7 +26,9 @@ from .conftest import DEVICE_LAG, EXPOSURE, PERIOD, START
 
 def _stored(path: Path) -> list[bytes]:
     with path.open("rb") as stream:
-        found = make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages(["/camera/image"])
+        found = make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages(
+            ["/camera/image"]
+        )
         return [bytes(image.data) for *_, image in found]
 
 
@@ -36,7 +38,9 @@ def test_frames_equal_what_the_mcap_package_reads(sample: Path) -> None:
     assert record.frame_count == len(stored)
     assert [record.jpeg(k) for k in range(record.frame_count)] == stored
     assert record.jpegs(5, 20) == stored[5:25]
-    expected = np.stack([simplejpeg.decode_jpeg(data, colorspace="GRAY")[..., 0] for data in stored])
+    expected = np.stack(
+        [simplejpeg.decode_jpeg(data, colorspace="GRAY")[..., 0] for data in stored]
+    )
     for first, count in [(0, 60), (0, 1), (59, 1), (13, 30)]:
         np.testing.assert_array_equal(record.frames(first, count), expected[first : first + count])
 
@@ -63,7 +67,9 @@ def test_wind_reads_back_exactly(sample: Path, series: WindSeries) -> None:
     assert found.sensor == series.sensor
 
 
-def test_means_over_a_second_are_those_of_the_usable_samples(sample: Path, series: WindSeries) -> None:
+def test_means_over_a_second_are_those_of_the_usable_samples(
+    sample: Path, series: WindSeries
+) -> None:
     means = Record.open(sample).wind_1hz()
     assert means is not None
     assert means.period == 1.0
@@ -72,7 +78,10 @@ def test_means_over_a_second_are_those_of_the_usable_samples(sample: Path, serie
     third = np.flatnonzero(means.time == START + 3_000_000_000)[0]
     inside = (series.time > START + 2_000_000_000) & (series.time <= START + 3_000_000_000)
     also = (series.time >= START + 2_000_000_000) & (series.time < START + 3_000_000_000)
-    assert means.speed[third] in (pytest.approx(speed[inside].mean()), pytest.approx(speed[also].mean()))
+    assert means.speed[third] in (
+        pytest.approx(speed[inside].mean()),
+        pytest.approx(speed[also].mean()),
+    )
 
 
 def test_truth_metadata_and_attachments_read_back(sample: Path) -> None:
@@ -99,7 +108,9 @@ def test_a_record_without_a_topic_says_none(tmp_path: Path, pictures: np.ndarray
 
 
 def test_every_channel_of_one_dimension_has_a_field() -> None:
-    assert set(messages.WIND_FIELDS) == {name for name, channel in CHANNELS.items() if channel.dims == ("time",)}
+    assert set(messages.WIND_FIELDS) == {
+        name for name, channel in CHANNELS.items() if channel.dims == ("time",)
+    }
     numbers = [number for _, number in messages.WIND_FIELDS.values()]
     assert len(set(numbers)) == len(numbers)
 
@@ -154,13 +165,19 @@ def _fork_reads(record: Record, first: int, out: multiprocessing.Queue) -> None:
 @pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
 def test_forks_and_threads_of_one_open_record_read_the_same(sample: Path) -> None:
     record = Record.open(sample)
-    expected = {first: int(record.frames(first, 5).astype(np.int64).sum()) for first in range(0, 50, 5)}
+    expected = {
+        first: int(record.frames(first, 5).astype(np.int64).sum()) for first in range(0, 50, 5)
+    }
     with ThreadPoolExecutor(4) as pool:
-        sums = list(pool.map(lambda first: int(record.frames(first, 5).astype(np.int64).sum()), expected))
+        sums = list(
+            pool.map(lambda first: int(record.frames(first, 5).astype(np.int64).sum()), expected)
+        )
     assert sums == list(expected.values())
     context = multiprocessing.get_context("fork")
     out = context.Queue()
-    children = [context.Process(target=_fork_reads, args=(record, first, out)) for first in expected]
+    children = [
+        context.Process(target=_fork_reads, args=(record, first, out)) for first in expected
+    ]
     for child in children:
         child.start()
     assert dict(out.get(timeout=500) for _ in children) == expected
@@ -178,15 +195,21 @@ def test_a_pickle_carries_the_path_and_no_data(sample: Path) -> None:
 
 def test_frames_beyond_the_end_are_not_found(sample: Path) -> None:
     cases = [(0, 61), (60, 1), (59, 2)]
-    assert not unrefused(lambda first, count: Record.open(sample).frames(first, count), cases, NotFoundError)
+    assert not unrefused(
+        lambda first, count: Record.open(sample).frames(first, count), cases, NotFoundError
+    )
 
 
 def test_frames_that_cannot_be_asked_for_are_refused(sample: Path) -> None:
     cases = [(0, 0), (-1, 1), (3, -2)]
-    assert not unrefused(lambda first, count: Record.open(sample).frames(first, count), cases, UsageError)
+    assert not unrefused(
+        lambda first, count: Record.open(sample).frames(first, count), cases, UsageError
+    )
 
 
-def test_video_frames_are_the_same_from_any_start(tmp_path: Path, write: Callable[..., Path], pictures) -> None:
+def test_video_frames_are_the_same_from_any_start(
+    tmp_path: Path, write: Callable[..., Path], pictures
+) -> None:
     record = Record.open(write(tmp_path / "v.mcap", coding=Coding.H264))
     assert record.coding is Coding.H264
     whole = record.frames(0, 60)
@@ -205,10 +228,18 @@ def test_video_is_annex_b_with_parameter_sets_on_each_key_frame_and_no_b_frames(
 ) -> None:
     path = write(tmp_path / "v.mcap", coding=Coding.H264)
     with path.open("rb") as stream:
-        found = list(make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages(["/camera/image"]))
-    assert {(schema.name, image.format) for schema, _, _, image in found} == {("foxglove.CompressedVideo", "h264")}
+        found = list(
+            make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages(
+                ["/camera/image"]
+            )
+        )
+    assert {(schema.name, image.format) for schema, _, _, image in found} == {
+        ("foxglove.CompressedVideo", "h264")
+    }
     for k, (*_, image) in enumerate(found):
-        units = [unit[0] & 31 for unit in image.data.replace(b"\0\0\0\1", b"\0\0\1").split(b"\0\0\1")[1:]]
+        units = [
+            unit[0] & 31 for unit in image.data.replace(b"\0\0\0\1", b"\0\0\1").split(b"\0\0\1")[1:]
+        ]
         assert image.data.startswith((b"\0\0\0\1", b"\0\0\1"))
         if k % 25 == 0:
             assert {7, 8, 5} <= set(units)  # SPS, PPS, IDR (ITU-T H.264, table 7-1)
@@ -216,8 +247,11 @@ def test_video_is_annex_b_with_parameter_sets_on_each_key_frame_and_no_b_frames(
             assert set(units) == {1}
 
 
-def test_a_flipped_byte_is_an_error_or_leaves_the_rest_right(tmp_path: Path, sample: Path, pictures) -> None:
-    """No damage ends in anything but a flagdata error, and none in frames of another shape or time."""
+def test_a_flipped_byte_is_an_error_or_leaves_the_rest_right(
+    tmp_path: Path, sample: Path, pictures
+) -> None:
+    """No damage ends in anything but a flagdata error, and none in frames of another shape or
+    time."""
     whole = sample.read_bytes()
     times = Record.open(sample).frame_times
     rng = np.random.default_rng(11)
@@ -262,13 +296,17 @@ def test_an_attachment_that_unpacks_beyond_the_limit_is_refused(sample: Path, mo
         Record.open(sample).attachment("log.csv")
 
 
-def test_compressed_chunks_are_refused_with_the_way_out(tmp_path: Path, pictures: np.ndarray) -> None:
+def test_compressed_chunks_are_refused_with_the_way_out(
+    tmp_path: Path, pictures: np.ndarray
+) -> None:
     path = tmp_path / "packed.mcap"
     with path.open("wb") as stream:
         packed = Writer(stream, compression=CompressionType.ZSTD)
         packed.start()
         schema = packed.register_schema(
-            "foxglove.CompressedImage", "protobuf", messages.descriptor_set(messages.CompressedImage)
+            "foxglove.CompressedImage",
+            "protobuf",
+            messages.descriptor_set(messages.CompressedImage),
         )
         channel = packed.register_channel("/camera/image", "protobuf", schema)
         packed.add_message(channel, 1, b"", 1)

@@ -13,7 +13,15 @@ from mcap.reader import make_reader
 
 from flagdata.core.schema import TOPIC_IMAGE, TOPIC_TRUTH, TOPIC_WIND, TOPIC_WIND_1HZ
 from flagdata.errors import CorruptError
-from flagdata.record import CHECKSUMS, Coding, Record, open_bytes, read_messages, read_summary, salvage
+from flagdata.record import (
+    CHECKSUMS,
+    Coding,
+    Record,
+    open_bytes,
+    read_messages,
+    read_summary,
+    salvage,
+)
 
 OLD = Path(__file__).parents[2] / "compat" / "record-v1.mcap"
 READERS: dict[str, Callable[[Record], object]] = {
@@ -39,14 +47,19 @@ def test_the_checksums_are_those_of_the_messages_that_the_mcap_package_reads(sam
     with sample.open("rb") as stream:
         reader = make_reader(stream)
         (stored,) = [m.metadata for m in reader.iter_metadata() if m.name == CHECKSUMS]
-        found = {topic: [message.data for *_, message in reader.iter_messages([topic])] for topic in READERS}
+        found = {
+            topic: [message.data for *_, message in reader.iter_messages([topic])]
+            for topic in READERS
+        }
         frames = [message.data for *_, message in reader.iter_messages([TOPIC_IMAGE])]
     document = json.loads(stored["content"])
     assert int(stored["crc32"], 16) == zlib.crc32(stored["content"].encode())
     for topic, payloads in found.items():
         assert document["channels"][topic]["data"] == zlib.crc32(b"".join(payloads))
         assert document["channels"][topic]["count"] == len(payloads)
-    assert document["channels"][TOPIC_IMAGE]["messages"] == "".join(f"{zlib.crc32(frame):08x}" for frame in frames)
+    assert document["channels"][TOPIC_IMAGE]["messages"] == "".join(
+        f"{zlib.crc32(frame):08x}" for frame in frames
+    )
     assert set(document["metadata"]) == {"camera", "provenance", "sensor"}
 
 
@@ -70,7 +83,9 @@ def test_a_changed_frame_is_refused_and_the_others_are_read(
 
 
 @pytest.mark.parametrize("topic", READERS)
-def test_a_changed_message_of_any_other_channel_is_refused(tmp_path: Path, sample: Path, topic: str) -> None:
+def test_a_changed_message_of_any_other_channel_is_refused(
+    tmp_path: Path, sample: Path, topic: str
+) -> None:
     table = messages(sample, topic)
     place = int(table.offset[-1] + table.length[-1] - 1)
     record = Record.open(flip(sample, place, tmp_path / "damaged.mcap"))
@@ -79,7 +94,9 @@ def test_a_changed_message_of_any_other_channel_is_refused(tmp_path: Path, sampl
 
 
 def test_a_changed_device_time_of_a_frame_is_refused(tmp_path: Path, sample: Path) -> None:
-    place = int(messages(sample, TOPIC_IMAGE).offset[5]) - 3  # in the publish time, the head's last eight bytes
+    place = (
+        int(messages(sample, TOPIC_IMAGE).offset[5]) - 3
+    )  # in the publish time, the head's last eight bytes
     with pytest.raises(CorruptError, match="times of /camera/image"):
         _ = Record.open(flip(sample, place, tmp_path / "damaged.mcap")).frame_times
 

@@ -17,10 +17,14 @@ from flagdata.record.signals import Sensor, WindSeries
 
 _CHANNELS = sorted(name for name, channel in CHANNELS.items() if channel.dims == ("time",))
 _NUMBERS = st.floats(allow_nan=True, allow_infinity=True)
-_TEXT = st.text(st.characters(exclude_categories=("Cs",)), max_size=30)  # no lone surrogates: they are no text
+_TEXT = st.text(
+    st.characters(exclude_categories=("Cs",)), max_size=30
+)  # no lone surrogates: they are no text
 _OPTIONAL = st.none() | st.floats(min_value=0, max_value=1e6)
 # From 1970 to 2200: instants are unsigned in MCAP, and a camera with an unset clock says 1970.
-_INSTANTS = st.lists(st.integers(0, 7_258_118_400 * 10**9), min_size=1, max_size=30, unique=True).map(sorted)
+_INSTANTS = st.lists(
+    st.integers(0, 7_258_118_400 * 10**9), min_size=1, max_size=30, unique=True
+).map(sorted)
 
 
 @st.composite
@@ -63,12 +67,18 @@ def _same(found: WindSeries | None, series: WindSeries) -> None:
 
 @given(series=_series())
 @settings(max_examples=60, deadline=None)
-def test_any_wind_series_reads_back_exactly_and_so_does_its_salvaged_copy(series: WindSeries) -> None:
+def test_any_wind_series_reads_back_exactly_and_so_does_its_salvaged_copy(
+    series: WindSeries,
+) -> None:
     # Means of infinite speeds are not asked for: readers flag those before a series gets here.
     channels = {name: values for name, values in series.channels.items() if name != "wind_speed"}
     assume(channels)
     series = WindSeries(
-        time=series.time, channels=channels, flags=series.flags, sensor=series.sensor, host_time=series.host_time
+        time=series.time,
+        channels=channels,
+        flags=series.flags,
+        sensor=series.sensor,
+        host_time=series.host_time,
     )
     with tempfile.TemporaryDirectory() as folder:
         path, copy = Path(folder) / "a.mcap", Path(folder) / "b.mcap"
@@ -83,7 +93,9 @@ def test_any_wind_series_reads_back_exactly_and_so_does_its_salvaged_copy(series
     times=_INSTANTS,
     lag=st.integers(0, 10**12),
     metadata=st.dictionaries(
-        _TEXT.filter(lambda name: name != CHECKSUMS), st.dictionaries(_TEXT, _TEXT, max_size=3), max_size=3
+        _TEXT.filter(lambda name: name != CHECKSUMS),
+        st.dictionaries(_TEXT, _TEXT, max_size=3),
+        max_size=3,
     ),
     parameters=st.dictionaries(_TEXT, st.floats(allow_nan=False, allow_infinity=False), max_size=5),
     attachments=st.dictionaries(_TEXT, st.binary(max_size=300), max_size=3),
@@ -101,7 +113,9 @@ def test_any_times_texts_parameters_and_attachments_read_back_exactly(
         path = Path(folder) / "a.mcap"
         with RecordWriter(path, metadata=metadata) as writer:
             for time in times:
-                writer.frame(log_time=time, publish_time=time + lag, timestamp=time + 1, image=image)
+                writer.frame(
+                    log_time=time, publish_time=time + lag, timestamp=time + 1, image=image
+                )
             writer.truth(parameters, log_time=times[0])
             for name, data in attachments.items():
                 writer.attach(name, data, media_type="application/octet-stream", log_time=0)
@@ -112,5 +126,7 @@ def test_any_times_texts_parameters_and_attachments_read_back_exactly(
         assert record.metadata == metadata
         assert record.truth is not None
         assert dict(record.truth) == parameters
-        assert all(math.copysign(1, record.truth[n]) == math.copysign(1, v) for n, v in parameters.items())
+        assert all(
+            math.copysign(1, record.truth[n]) == math.copysign(1, v) for n, v in parameters.items()
+        )
         assert {name: record.attachment(name) for name in record.attachments} == attachments

@@ -69,7 +69,9 @@ def test_cut_anywhere_every_whole_chunk_and_every_whole_message_before_the_cut_c
         found = _messages(target)
         assert found == whole[: len(found)], f"cut at {cut}"
         assert len(found) >= len(before) - 1, f"cut at {cut}"
-        assert len(found) >= sum(any(s < start < e <= cut for s, e in chunks) for start, _ in places)
+        assert len(found) >= sum(
+            any(s < start < e <= cut for s, e in chunks) for start, _ in places
+        )
         kinds = {f.kind: f for f in findings}
         assert kinds["recovered"].count == len(found)
         if cut < len(data):
@@ -83,7 +85,9 @@ def test_a_whole_record_comes_back_with_the_same_content(tmp_path: Path, sample:
     assert _messages(tmp_path / "out.mcap") == _messages(sample)
     before, after = Record.open(sample), Record.open(tmp_path / "out.mcap")
     assert after.metadata == before.metadata
-    assert [after.attachment(n) for n in after.attachments] == [before.attachment(n) for n in before.attachments]
+    assert [after.attachment(n) for n in after.attachments] == [
+        before.attachment(n) for n in before.attachments
+    ]
 
 
 def test_a_damaged_chunk_is_left_out_and_named(tmp_path: Path, live: Path) -> None:
@@ -91,7 +95,9 @@ def test_a_damaged_chunk_is_left_out_and_named(tmp_path: Path, live: Path) -> No
     chunks = [(s, e) for s, opcode, e in _boundaries(bytes(data)) if opcode == 6]
     start, end = chunks[1]
     data[(start + end) // 2] ^= 0x55
-    head = data.find(b"flagdata.checksums") + 30  # a record without checksums of its messages, as older ones are
+    head = (
+        data.find(b"flagdata.checksums") + 30
+    )  # a record without checksums of its messages, as older ones are
     data[head] ^= 0x55
     (tmp_path / "bad.mcap").write_bytes(data)
     findings = salvage(tmp_path / "bad.mcap", tmp_path / "out.mcap")
@@ -120,7 +126,9 @@ def test_a_damaged_byte_in_a_frame_costs_that_frame(tmp_path: Path, live: Path) 
         assert "1 of its" in findings[0].what
 
 
-def _touched(data: bytes, chunks: list[tuple[int, int]], first: int, last: int, whole: list) -> list:
+def _touched(
+    data: bytes, chunks: list[tuple[int, int]], first: int, last: int, whole: list
+) -> list:
     """Messages of the chunks that share a byte with first…last."""
     hit = [(s, e) for s, e in chunks if s <= last and e > first]
     return [m for m in whole if any(s < data.find(m[4]) < e for s, e in hit)]
@@ -148,7 +156,9 @@ def test_a_bad_sector_costs_the_chunks_it_touches_and_no_more(tmp_path: Path, li
         assert sum(f.count for f in errors) == len(lost), f"at {first}"
 
 
-def test_a_chunk_with_a_damaged_head_does_not_take_the_next_ones_along(tmp_path: Path, live: Path) -> None:
+def test_a_chunk_with_a_damaged_head_does_not_take_the_next_ones_along(
+    tmp_path: Path, live: Path
+) -> None:
     data = live.read_bytes()
     whole = _messages(live)
     chunks = [(s, e) for s, opcode, e in _boundaries(data) if opcode == 6]
@@ -179,7 +189,9 @@ def test_a_chunk_with_a_damaged_head_does_not_take_the_next_ones_along(tmp_path:
 
 
 @pytest.mark.parametrize("length", [1, 4096, 300_000])
-def test_zeros_that_a_crash_left_behind_become_no_messages(tmp_path: Path, live: Path, length: int) -> None:
+def test_zeros_that_a_crash_left_behind_become_no_messages(
+    tmp_path: Path, live: Path, length: int
+) -> None:
     """Delayed allocation: the file has its length, the last pages were never written."""
     data = live.read_bytes()
     chunks = [(s, e) for s, opcode, e in _boundaries(data) if opcode == 6]
@@ -198,7 +210,9 @@ def test_packed_records_of_other_writers_are_rewritten_plain(tmp_path: Path, sam
             packed = Writer(stream, compression=packing)
             packed.start()
             schema = packed.register_schema(
-                "foxglove.CompressedImage", "protobuf", messages.descriptor_set(messages.CompressedImage)
+                "foxglove.CompressedImage",
+                "protobuf",
+                messages.descriptor_set(messages.CompressedImage),
             )
             channel = packed.register_channel("/camera/image", "protobuf", schema)
             for topic, sequence, log_time, publish_time, data in _messages(sample):
@@ -206,7 +220,9 @@ def test_packed_records_of_other_writers_are_rewritten_plain(tmp_path: Path, sam
                     packed.add_message(channel, log_time, data, publish_time, sequence)
             packed.finish()
         salvage(source, target)
-        np.testing.assert_array_equal(Record.open(target).frames(0, 60), Record.open(sample).frames(0, 60))
+        np.testing.assert_array_equal(
+            Record.open(target).frames(0, 60), Record.open(sample).frames(0, 60)
+        )
 
 
 def test_salvage_of_a_salvaged_record_keeps_the_history(tmp_path: Path, live: Path) -> None:
@@ -230,9 +246,14 @@ def test_video_cut_off_still_decodes(tmp_path: Path, write: Callable[..., Path])
     np.testing.assert_array_equal(record.frames(0, record.frame_count), whole[: record.frame_count])
 
 
-def test_a_disk_that_refuses_the_target_is_one_clear_error_and_leaves_none(tmp_path: Path, sample: Path) -> None:
+def test_a_disk_that_refuses_the_target_is_one_clear_error_and_leaves_none(
+    tmp_path: Path, sample: Path
+) -> None:
     target = tmp_path / "out.mcap"
-    with small_files(), pytest.raises(FlagdataError, match="writing a record failed: File too large"):
+    with (
+        small_files(),
+        pytest.raises(FlagdataError, match="writing a record failed: File too large"),
+    ):
         salvage(sample, target)
     assert not target.exists()
 
@@ -252,7 +273,9 @@ def test_what_cannot_be_salvaged_leaves_no_target(tmp_path: Path, sample: Path) 
 
 
 @pytest.mark.parametrize("cut", [0.3, 0.6, 1.0])
-def test_a_small_record_takes_little_memory_to_be_salvaged(tmp_path: Path, live: Path, cut: float) -> None:
+def test_a_small_record_takes_little_memory_to_be_salvaged(
+    tmp_path: Path, live: Path, cut: float
+) -> None:
     data = live.read_bytes()
     (tmp_path / "cut.mcap").write_bytes(data[: int(cut * len(data))])
     tracemalloc.start()

@@ -1,4 +1,5 @@
-"""What a compressed chunk unpacks to is bounded by what it states, and that by a limit; memory follows."""
+"""What a compressed chunk unpacks to is bounded by what it states, and that by a limit; memory
+follows."""
 
 from __future__ import annotations
 
@@ -48,12 +49,15 @@ def _chunk(compression: str, data: bytes, stated: int, crc: int = 0) -> Chunk:
 
 
 def _lying(path: Path, packing: str, *, stated: int) -> Path:
-    """A file with one small message, and one of `BOMB` zeros in a last chunk, which states another size."""
+    """A file with one small message, and one of `BOMB` zeros in a last chunk, which states another
+    size."""
     with path.open("wb") as stream:
         writer = Writer(stream, compression=PACKINGS[packing], chunk_size=1 << 20)
         writer.start()
         channel = writer.register_channel(topic="/a", message_encoding="json", schema_id=0)
-        writer.add_message(channel, log_time=1, publish_time=1, data=b'{"x": "' + b"0" * (1 << 20) + b'"}')
+        writer.add_message(
+            channel, log_time=1, publish_time=1, data=b'{"x": "' + b"0" * (1 << 20) + b'"}'
+        )
         writer.add_message(channel, log_time=2, publish_time=2, data=bytes(BOMB))
         writer.finish()
     true = struct.pack("<Q", BOMB + MESSAGE_HEAD)
@@ -95,7 +99,9 @@ def test_a_chunk_that_states_more_than_the_limit_is_not_unpacked() -> None:
 
 
 @pytest.mark.parametrize("packing", PACKERS)
-def test_reading_a_topic_of_a_chunk_that_lies_takes_no_memory_for_it(tmp_path: Path, packing: str) -> None:
+def test_reading_a_topic_of_a_chunk_that_lies_takes_no_memory_for_it(
+    tmp_path: Path, packing: str
+) -> None:
     path = _lying(tmp_path / "bomb.mcap", packing, stated=1000)
 
     def read() -> None:
@@ -107,7 +113,9 @@ def test_reading_a_topic_of_a_chunk_that_lies_takes_no_memory_for_it(tmp_path: P
 
 
 @pytest.mark.parametrize("packing", PACKERS)
-def test_recovery_leaves_a_chunk_out_that_lies_and_takes_no_memory_for_it(tmp_path: Path, packing: str) -> None:
+def test_recovery_leaves_a_chunk_out_that_lies_and_takes_no_memory_for_it(
+    tmp_path: Path, packing: str
+) -> None:
     path = _lying(tmp_path / "bomb.mcap", packing, stated=1000)
     found: list[str] = []
     assert _peak(lambda: found.extend(f.what for f in salvage(path, tmp_path / "out.mcap"))) < BOUND
@@ -115,12 +123,17 @@ def test_recovery_leaves_a_chunk_out_that_lies_and_takes_no_memory_for_it(tmp_pa
     assert any(what.startswith("1 messages") for what in found)
 
 
-def test_a_file_of_nothing_but_heads_of_chunks_is_looked_through_in_bounded_time(tmp_path: Path) -> None:
-    """Each head states a chunk to the end of the file, whose checksum is wrong: a comparison of all takes a day."""
+def test_a_file_of_nothing_but_heads_of_chunks_is_looked_through_in_bounded_time(
+    tmp_path: Path,
+) -> None:
+    """Each head states a chunk to the end of the file, whose checksum is wrong: a comparison of all
+    takes a day."""
     head, count = 49, 100_000
     total = 17 + head * count
     heads = (
-        struct.pack("<BQQQQIIQ", 6, total - at - 9, 1, 1, total - at - head, 7, 0, total - at - head)
+        struct.pack(
+            "<BQQQQIIQ", 6, total - at - 9, 1, 1, total - at - head, 7, 0, total - at - head
+        )
         for at in range(17, total, head)
     )
     path = tmp_path / "heads.mcap"

@@ -60,7 +60,9 @@ def test_frames_are_foxglove_images_to_the_mcap_package(sample: Path, pictures: 
         assert np.abs(decoded.astype(int) - pictures[k]).max() <= 16
 
 
-def test_wind_samples_keep_every_value_and_absence_differs_from_zero(sample: Path, series: WindSeries) -> None:
+def test_wind_samples_keep_every_value_and_absence_differs_from_zero(
+    sample: Path, series: WindSeries
+) -> None:
     found = _decoded(sample, "/wind/samples")
     assert found[0][0].name == "flagdata.WindSample"
     assert [message.log_time for _, _, message, _ in found] == series.time.tolist()
@@ -69,7 +71,9 @@ def test_wind_samples_keep_every_value_and_absence_differs_from_zero(sample: Pat
     np.testing.assert_array_equal([s.direction for s in samples], series.channels["wind_direction"])
     assert [s.flags for s in samples] == series.flags.tolist()
     assert not any(s.HasField("air_temperature") for s in samples)
-    assert [s.host_time.nanos + s.host_time.seconds * 10**9 for s in samples] == (series.time + 80_000_000).tolist()
+    assert [s.host_time.nanos + s.host_time.seconds * 10**9 for s in samples] == (
+        series.time + 80_000_000
+    ).tolist()
 
 
 def test_units_travel_in_the_schema_of_the_file(sample: Path) -> None:
@@ -80,7 +84,9 @@ def test_units_travel_in_the_schema_of_the_file(sample: Path) -> None:
     assert any("clockwise from true north" in c for c in comments)
 
 
-def test_same_input_gives_same_bytes(tmp_path: Path, write: Callable[..., Path], sample: Path) -> None:
+def test_same_input_gives_same_bytes(
+    tmp_path: Path, write: Callable[..., Path], sample: Path
+) -> None:
     assert write(tmp_path / "again.mcap").read_bytes() == sample.read_bytes()
 
 
@@ -89,7 +95,9 @@ def test_video_gives_same_bytes_twice(tmp_path: Path, write: Callable[..., Path]
     assert first.read_bytes() == second.read_bytes()
 
 
-def test_a_clock_model_moves_log_time_and_leaves_publish_time(tmp_path: Path, series: WindSeries) -> None:
+def test_a_clock_model_moves_log_time_and_leaves_publish_time(
+    tmp_path: Path, series: WindSeries
+) -> None:
     end = int(series.time[-1]) + 1
     clock = ClockModel(
         device="cup",
@@ -104,10 +112,15 @@ def test_a_clock_model_moves_log_time_and_leaves_publish_time(tmp_path: Path, se
     # common = device - 1.5 s + 1e-3 (device - start): the last sample, 9.95 s in, lands 9.95 ms later.
     assert found[-1][2].log_time == int(series.time[-1]) - 1_500_000_000 + 9_950_000
     assert found[-1][2].publish_time == int(series.time[-1])
-    assert ClockModel.from_json(Record.open(tmp_path / "a.mcap").metadata["clock/cup"]["model"]) == clock
+    assert (
+        ClockModel.from_json(Record.open(tmp_path / "a.mcap").metadata["clock/cup"]["model"])
+        == clock
+    )
 
 
-def test_chunks_are_plain_and_of_the_stated_size(tmp_path: Path, write: Callable[..., Path]) -> None:
+def test_chunks_are_plain_and_of_the_stated_size(
+    tmp_path: Path, write: Callable[..., Path]
+) -> None:
     noise = np.random.default_rng(5).integers(0, 256, (300, 300), dtype=np.uint8)
     with RecordWriter(tmp_path / "a.mcap", metadata={}) as record:
         for k in range(60):
@@ -119,7 +132,9 @@ def test_chunks_are_plain_and_of_the_stated_size(tmp_path: Path, write: Callable
     assert all(2**20 < chunk.uncompressed_size < 2**20 + 200_000 for chunk in chunks[:-1])
 
 
-def test_while_recording_no_more_than_a_second_is_at_risk(tmp_path: Path, pictures: np.ndarray) -> None:
+def test_while_recording_no_more_than_a_second_is_at_risk(
+    tmp_path: Path, pictures: np.ndarray
+) -> None:
     path = tmp_path / "live.mcap"
     with RecordWriter(path, metadata={}, chunking=Chunking.LIVE) as live:
         for k in range(200):
@@ -127,10 +142,14 @@ def test_while_recording_no_more_than_a_second_is_at_risk(tmp_path: Path, pictur
             live.frame(log_time=time, publish_time=time, timestamp=time, image=pictures[k % 60])
             if k >= 26:
                 a_second_ago = struct.pack("<Q", START + (k - 26) * PERIOD)
-                assert a_second_ago in path.read_bytes(), f"frame {k - 26} is not on disk after frame {k}"
+                assert a_second_ago in path.read_bytes(), (
+                    f"frame {k - 26} is not on disk after frame {k}"
+                )
 
 
-def test_an_exception_leaves_a_file_that_does_not_look_whole(tmp_path: Path, pictures: np.ndarray) -> None:
+def test_an_exception_leaves_a_file_that_does_not_look_whole(
+    tmp_path: Path, pictures: np.ndarray
+) -> None:
     def interrupted() -> None:
         with RecordWriter(tmp_path / "a.mcap", metadata={}) as record:
             record.frame(log_time=1, publish_time=1, timestamp=1, image=pictures[0])
@@ -150,20 +169,33 @@ def test_an_existing_file_is_not_overwritten(sample: Path) -> None:
 
 
 @pytest.mark.parametrize("times", [(5, 5), (5, 4)])
-def test_frames_out_of_order_are_refused(tmp_path: Path, pictures: np.ndarray, times: tuple[int, int]) -> None:
+def test_frames_out_of_order_are_refused(
+    tmp_path: Path, pictures: np.ndarray, times: tuple[int, int]
+) -> None:
     with RecordWriter(tmp_path / "a.mcap", metadata={}) as record:
-        record.frame(log_time=times[0], publish_time=times[0], timestamp=times[0], image=pictures[0])
+        record.frame(
+            log_time=times[0], publish_time=times[0], timestamp=times[0], image=pictures[0]
+        )
         with pytest.raises(InputError, match="order of time"):
-            record.frame(log_time=times[1], publish_time=times[1], timestamp=times[1], image=pictures[0])
+            record.frame(
+                log_time=times[1], publish_time=times[1], timestamp=times[1], image=pictures[0]
+            )
 
 
 def test_instants_before_1970_are_refused(tmp_path: Path, pictures: np.ndarray) -> None:
-    with RecordWriter(tmp_path / "a.mcap", metadata={}) as record, pytest.raises(TimeError, match="1970"):
+    with (
+        RecordWriter(tmp_path / "a.mcap", metadata={}) as record,
+        pytest.raises(TimeError, match="1970"),
+    ):
         record.frame(log_time=-1, publish_time=1, timestamp=1, image=pictures[0])
 
 
 def test_what_is_no_gray_frame_is_refused(tmp_path: Path) -> None:
-    colour, numbers, nothing = np.zeros((4, 4, 3), dtype=np.uint8), np.zeros((4, 4)), np.zeros((0, 4), dtype=np.uint8)
+    colour, numbers, nothing = (
+        np.zeros((4, 4, 3), dtype=np.uint8),
+        np.zeros((4, 4)),
+        np.zeros((0, 4), dtype=np.uint8),
+    )
     for coding, image in product(Coding, (colour, numbers, nothing, b"", b"\xff\xd8cut")):
         path = tmp_path / f"{len(list(tmp_path.iterdir()))}.mcap"
         with RecordWriter(path, metadata={}, coding=coding) as record, pytest.raises(InputError):
@@ -173,10 +205,16 @@ def test_what_is_no_gray_frame_is_refused(tmp_path: Path) -> None:
 def test_odd_sizes_and_mixed_sizes_are_refused_for_video(tmp_path: Path) -> None:
     with RecordWriter(tmp_path / "a.mcap", metadata={}, coding=Coding.H264) as record:
         with pytest.raises(InputError, match="even"):
-            record.frame(log_time=1, publish_time=1, timestamp=1, image=np.zeros((15, 16), dtype=np.uint8))
-        record.frame(log_time=2, publish_time=2, timestamp=2, image=np.zeros((16, 16), dtype=np.uint8))
+            record.frame(
+                log_time=1, publish_time=1, timestamp=1, image=np.zeros((15, 16), dtype=np.uint8)
+            )
+        record.frame(
+            log_time=2, publish_time=2, timestamp=2, image=np.zeros((16, 16), dtype=np.uint8)
+        )
         with pytest.raises(InputError, match="one size"):
-            record.frame(log_time=3, publish_time=3, timestamp=3, image=np.zeros((16, 18), dtype=np.uint8))
+            record.frame(
+                log_time=3, publish_time=3, timestamp=3, image=np.zeros((16, 18), dtype=np.uint8)
+            )
 
 
 def test_wind_truth_names_and_quality_are_refused_the_second_time_or_out_of_range(

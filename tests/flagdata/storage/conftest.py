@@ -20,8 +20,11 @@ def scripted() -> Iterator[str]:
 
 
 @pytest.fixture
-def answering(scripted: str, use_store: Callable[[str], None], monkeypatch: pytest.MonkeyPatch) -> Answering:
-    """Sets the store's answer, and gives a place of its bucket; failed requests are repeated once."""
+def answering(
+    scripted: str, use_store: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
+) -> Answering:
+    """Sets the store's answer, and gives a place of its bucket; failed requests are repeated
+    once."""
     monkeypatch.setattr(connection, "RETRIES", 1)
     use_store(scripted)
 

@@ -1,4 +1,5 @@
-"""What a store refuses is named as what it is, with the remedy of that: not as the network's or the credentials'."""
+"""What a store refuses is named as what it is, with the remedy of that: not as the network's or the
+credentials'."""
 
 from __future__ import annotations
 
@@ -37,12 +38,19 @@ REQUESTS: dict[str, Callable[[RemotePath], object]] = {
 ABROAD = {"x-amz-bucket-region": "eu-west-1"}
 NAMED = {
     "another region, by the code": (
-        refusing(400, "AuthorizationHeaderMalformed", "expecting 'us-west-2'", rest="<Region>us-west-2</Region>"),
+        refusing(
+            400,
+            "AuthorizationHeaderMalformed",
+            "expecting 'us-west-2'",
+            rest="<Region>us-west-2</Region>",
+        ),
         "us-west-2",
         "AWS_REGION=us-west-2",
     ),
     "another region, by the end point": (
-        refusing(301, "PermanentRedirect", rest="<Endpoint>case.s3-us-west-2.amazonaws.com</Endpoint>"),
+        refusing(
+            301, "PermanentRedirect", rest="<Endpoint>case.s3-us-west-2.amazonaws.com</Endpoint>"
+        ),
         "another region",
         "AWS_REGION",
     ),
@@ -57,20 +65,40 @@ NAMED = {
     "expired credentials": (refusing(400, "ExpiredToken"), "expired", "AWS_SESSION_TOKEN"),
     "another's token": (refusing(400, "InvalidToken"), "token", "AWS_SESSION_TOKEN"),
     "an unknown key": (refusing(403, "InvalidAccessKeyId"), "access key", "AWS_ACCESS_KEY_ID"),
-    "a wrong secret": (refusing(403, "SignatureDoesNotMatch"), "secret key", "AWS_SECRET_ACCESS_KEY"),
+    "a wrong secret": (
+        refusing(403, "SignatureDoesNotMatch"),
+        "secret key",
+        "AWS_SECRET_ACCESS_KEY",
+    ),
     "a key service that does not permit it": (
-        refusing(403, "AccessDenied", "User: me is not authorized to perform: kms:Decrypt on resource: key"),
+        refusing(
+            403,
+            "AccessDenied",
+            "User: me is not authorized to perform: kms:Decrypt on resource: key",
+        ),
         "key service",
         "kms:Decrypt",
     ),
-    "a disabled key of the key service": (refusing(400, "KMS.DisabledException"), "key service", "key"),
+    "a disabled key of the key service": (
+        refusing(400, "KMS.DisabledException"),
+        "key service",
+        "key",
+    ),
     "too many requests": (refusing(503, "SlowDown"), "request rate", "fewer"),
     "too many requests, by the state": ((429, {}, b""), "request rate", "fewer"),
     "a store that fails": (refusing(500, "InternalError"), "store failed", "later"),
     "a gateway that fails": ((502, {}, b"<html>bad gateway</html>"), "store failed", "later"),
     "a redirection": ((307, {}, b""), "another end point", "AWS_REGION"),
-    "what the store lacks": (refusing(501, "NotImplemented"), "cannot do this", "another store|use a store"),
-    "names in hosts": (refusing(403, "SecondLevelDomainForbidden"), "host", "AWS_VIRTUAL_HOSTED_STYLE_REQUEST"),
+    "what the store lacks": (
+        refusing(501, "NotImplemented"),
+        "cannot do this",
+        "another store|use a store",
+    ),
+    "names in hosts": (
+        refusing(403, "SecondLevelDomainForbidden"),
+        "host",
+        "AWS_VIRTUAL_HOSTED_STYLE_REQUEST",
+    ),
     "an archive": (refusing(403, "InvalidObjectState"), "archive", "storage class"),
     "a full store": (refusing(507, "XMinioStorageFull"), "no room", "space"),
 }
@@ -97,7 +125,9 @@ def test_each_cause_is_named_with_its_remedy_whatever_was_asked_for(
 
 
 @pytest.mark.parametrize("cause", NAMED)
-def test_the_catalogs_library_is_refused_for_the_same_causes(answering: Answering, cause: str) -> None:
+def test_the_catalogs_library_is_refused_for_the_same_causes(
+    answering: Answering, cause: str
+) -> None:
     answer, what, fix = NAMED[cause]
     answering(answer)
     with pytest.raises((DeltaError, OSError)) as caught:
@@ -119,7 +149,9 @@ def test_the_catalogs_library_is_refused_for_the_same_causes(answering: Answerin
         ("delete", "s3:DeleteObject"),
     ],
 )
-def test_what_is_not_permitted_is_named_by_its_action(answering: Answering, name: str, action: str) -> None:
+def test_what_is_not_permitted_is_named_by_its_action(
+    answering: Answering, name: str, action: str
+) -> None:
     with pytest.raises(DeniedError) as caught:
         REQUESTS[name](answering(refusing(403, "AccessDenied")))
     assert action in caught.value.fix
@@ -131,7 +163,9 @@ def test_a_bucket_that_is_not_there_is_no_object_that_is_not_there(answering: An
         answering(refusing(404, "NoSuchBucket")).read_bytes()
 
 
-def test_missing_credentials_are_named(answering: Answering, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_credentials_are_named(
+    answering: Answering, monkeypatch: pytest.MonkeyPatch
+) -> None:
     place = answering(refusing(403, "AccessDenied"))
     for name in SECRETS:
         monkeypatch.delenv(name)
@@ -180,7 +214,11 @@ def test_what_keeps_a_request_from_the_store_is_named(
     answering: Answering, monkeypatch: pytest.MonkeyPatch, reason: OSError, what: str
 ) -> None:
     place = answering(None)
-    monkeypatch.setattr(requests.urllib.request.OpenerDirector, "open", lambda *_, **__: (_ for _ in ()).throw(reason))
+    monkeypatch.setattr(
+        requests.urllib.request.OpenerDirector,
+        "open",
+        lambda *_, **__: (_ for _ in ()).throw(reason),
+    )
     with pytest.raises(StoreError, match=what) as caught:
         place.read_bytes()
     assert "AWS_ENDPOINT_URL" in caught.value.fix
@@ -190,7 +228,10 @@ def test_a_name_without_address_and_a_closed_port_are_named_as_they_are(
     use_store: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(connection, "RETRIES", 1)
-    for address, what in (("http://store.invalid", "has no address"), ("http://127.0.0.1:1", "refuses connections")):
+    for address, what in (
+        ("http://store.invalid", "has no address"),
+        ("http://127.0.0.1:1", "refuses connections"),
+    ):
         use_store(address)
         with pytest.raises(FlagdataError, match=what):
             Lake.open("s3://bucket/lake")

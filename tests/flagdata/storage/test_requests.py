@@ -26,12 +26,18 @@ WHEN = datetime(2026, 11, 28, 6, 30, tzinfo=UTC)
 def test_a_request_is_signed_as_amazons_library_signs_it(
     method: str, url: str, query: str, token: str | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    options = {"aws_access_key_id": "AKIDEXAMPLE", "aws_secret_access_key": "secret/key+", "aws_region": "eu-west-1"}
+    options = {
+        "aws_access_key_id": "AKIDEXAMPLE",
+        "aws_secret_access_key": "secret/key+",
+        "aws_region": "eu-west-1",
+    }
     options |= {"aws_session_token": token} if token else {}
     ours = signed_headers(method, url, query, options, when=WHEN)
     monkeypatch.setattr("botocore.auth.get_current_datetime", lambda: WHEN.replace(tzinfo=None))
     request = AWSRequest(method=method, url=f"{url}?{query}")
-    S3SigV4Auth(Credentials("AKIDEXAMPLE", "secret/key+", token), "s3", "eu-west-1").add_auth(request)
+    S3SigV4Auth(Credentials("AKIDEXAMPLE", "secret/key+", token), "s3", "eu-west-1").add_auth(
+        request
+    )
     assert ours["Authorization"] == request.headers["Authorization"]
 
 

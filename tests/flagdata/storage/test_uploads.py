@@ -36,12 +36,18 @@ def begin(s3_server: str, key: str) -> str:
     return identity
 
 
-def test_an_upload_that_was_cut_off_is_named_by_doctor_and_aborted_by_gc(remote_lake: Lake, s3_server: str) -> None:
+def test_an_upload_that_was_cut_off_is_named_by_doctor_and_aborted_by_gc(
+    remote_lake: Lake, s3_server: str
+) -> None:
     place = root(remote_lake) / "mcap" / f"{'0' * 64}.mcap"
     begin(s3_server, place.key)
     elsewhere = begin(s3_server, f"{root(remote_lake).key}-of-another-lake/mcap/x.mcap")
     (found,) = doctor(remote_lake, grace=DAY)
-    assert (found.kind, found.severity, found.where) == ("upload-unfinished", Severity.WARNING, str(place))
+    assert (found.kind, found.severity, found.where) == (
+        "upload-unfinished",
+        Severity.WARNING,
+        str(place),
+    )
     assert [str(upload) for upload in garbage(remote_lake, grace=DAY).uploads] == [str(place)]
     assert doctor(remote_lake, grace=DAY) == (found,)  # a dry run aborts nothing
     ended = invoke("gc", "--lake", remote_lake.path)
@@ -49,10 +55,14 @@ def test_an_upload_that_was_cut_off_is_named_by_doctor_and_aborted_by_gc(remote_
     assert str(place) in ended.out
     assert "1 unfinished upload aborted" in ended.err
     assert doctor(remote_lake, grace=NOW) == ()
-    assert [upload.identity for upload in list_unfinished("bucket", root(remote_lake).key)] == [elsewhere]
+    assert [upload.identity for upload in list_unfinished("bucket", root(remote_lake).key)] == [
+        elsewhere
+    ]
 
 
-def test_an_upload_of_a_running_transaction_is_left_alone(remote_lake: Lake, s3_server: str) -> None:
+def test_an_upload_of_a_running_transaction_is_left_alone(
+    remote_lake: Lake, s3_server: str
+) -> None:
     name = f"mcap/{'1' * 64}"
     lease = Lease(remote_lake.staging)
     lease.hold(name)
@@ -65,18 +75,31 @@ def test_an_upload_of_a_running_transaction_is_left_alone(remote_lake: Lake, s3_
     assert root(remote_lake).uploads() == []
 
 
-def test_young_uploads_stay_for_the_grace_period_and_pages_are_read_to_the_end(answering: Answering) -> None:
-    entry = "<Upload><Key>lake/mcap/{}</Key><UploadId>{}</UploadId><Initiated>{}</Initiated></Upload>"
+def test_young_uploads_stay_for_the_grace_period_and_pages_are_read_to_the_end(
+    answering: Answering,
+) -> None:
+    entry = (
+        "<Upload><Key>lake/mcap/{}</Key><UploadId>{}</UploadId><Initiated>{}</Initiated></Upload>"
+    )
     now = datetime.now(UTC)
     text = "".join(entry.format(n, n, (now - timedelta(hours=n)).isoformat()) for n in range(3))
     more = "<IsTruncated>true</IsTruncated><NextKeyMarker>lake/mcap/2</NextKeyMarker>"
     space = 'xmlns="http://s3.amazonaws.com/doc/2006-03-01/"'
-    answering((200, {}, f"<ListMultipartUploadsResult {space}>{text}{more}</ListMultipartUploadsResult>".encode()))
+    answering(
+        (
+            200,
+            {},
+            f"<ListMultipartUploadsResult {space}>{text}{more}</ListMultipartUploadsResult>".encode(),
+        )
+    )
     found = list_unfinished("case", "lake/")
     assert [upload.begun for upload in found if upload.key.endswith("1")] == pytest.approx(
         [now.timestamp() - 3600] * 2, abs=1
     )
-    assert [path.count("key-marker=lake%2Fmcap%2F2") for _, path in Scripted.asked] == [0, 1]  # no endless listing
+    assert [path.count("key-marker=lake%2Fmcap%2F2") for _, path in Scripted.asked] == [
+        0,
+        1,
+    ]  # no endless listing
 
 
 @pytest.mark.parametrize(
@@ -106,7 +129,11 @@ def test_where_uploads_may_not_be_listed_a_lake_is_examined_and_collected_all_th
 
 @pytest.mark.parametrize("failing", ["partNumber", "complete"])
 def test_an_upload_that_fails_leaves_no_parts(
-    s3_server: str, use_store: Callable[[str], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failing: str
+    s3_server: str,
+    use_store: Callable[[str], None],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    failing: str,
 ) -> None:
     monkeypatch.setattr(connection, "RETRIES", 1)
     (tmp_path / "film.mcap").write_bytes(bytes(2 * BLOCK + 1))

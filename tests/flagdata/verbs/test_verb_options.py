@@ -1,4 +1,5 @@
-"""One class states a verb's options: its command, its Python call and the recipe of its result agree, and stay."""
+"""One class states a verb's options: its command, its Python call and the recipe of its result
+agree, and stay."""
 
 from __future__ import annotations
 
@@ -46,7 +47,13 @@ FORMS = {
 }
 OTHERWISE = {
     "calibrate": {"workers"},  # a notebook begins no processes of its own accord
-    "close_loop": {"wind", "rest", "material", "attachment", "workers"},  # arrays state what sources on a disk know
+    "close_loop": {
+        "wind",
+        "rest",
+        "material",
+        "attachment",
+        "workers",
+    },  # arrays state what sources on a disk know
 }
 """Parameters of a call whose default is another one on the command line, or that are not there."""
 
@@ -77,7 +84,9 @@ OF_THE_TERMINAL = {"blender-setup", "completion", "demo", "help", "view"}
 
 
 def test_every_other_verb_is_a_call() -> None:
-    assert {name for name in VERBS if name.replace("-", "_") not in flagdata.__all__} == OF_THE_TERMINAL
+    assert {
+        name for name in VERBS if name.replace("-", "_") not in flagdata.__all__
+    } == OF_THE_TERMINAL
 
 
 def typed_words(name: str, form: type, *words: str) -> Any:
@@ -93,11 +102,16 @@ def called_with(place: str, call: Callable[[], object], monkeypatch: pytest.Monk
     return handed[0]
 
 
-def test_a_measurement_is_asked_for_alike_and_keeps_its_recipe(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_measurement_is_asked_for_alike_and_keeps_its_recipe(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     from measure.commands.measure import MeasureCommand
     from measure.commands.measure_film import Request
 
-    words = "flag.mp4 --flag-size 1.5x1.0 --area-weight 0.19±0.01 --windows 1.2s --seed 3 --level 0.8 --end 3s"
+    words = (
+        "flag.mp4 --flag-size 1.5x1.0 --area-weight 0.19±0.01 --windows 1.2s --seed 3 --level 0.8 "
+        "--end 3s"
+    )
     of_command = typed_words("measure", MeasureCommand, *words.split(), "--crop", "10,10,240,240")
     of_call = called_with(
         "measure.commands.measure_film.measure_one",
@@ -132,14 +146,21 @@ def test_a_measurement_is_asked_for_alike_and_keeps_its_recipe(monkeypatch: pyte
         assert request.options.seed == 3
 
 
-def test_a_calibration_is_asked_for_alike_and_keeps_its_recipe(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_calibration_is_asked_for_alike_and_keeps_its_recipe(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     from measure.cloth import options_of
     from measure.commands import CloseLoopCommand
     from measure.commands.calibrate import CalibrateCommand
     from measure.film import FlagSize
 
-    words = "t.csv --flag-size 1.5x1.0 --azimuth 70±7 --elevation 3 --simulations 64 --seed 3 --material knit"
-    of_command = typed_words("calibrate", CalibrateCommand, *words.split(), "--level", "0.8", "--attachment", "hoist")
+    words = (
+        "t.csv --flag-size 1.5x1.0 --azimuth 70±7 --elevation 3 --simulations 64 --seed 3 "
+        "--material knit"
+    )
+    of_command = typed_words(
+        "calibrate", CalibrateCommand, *words.split(), "--level", "0.8", "--attachment", "hoist"
+    )
     of_films = typed_words("close-loop", CloseLoopCommand, *words.split(), "--attachment", "hoist")
     of_call = called_with(
         "measure.cloth.calibrate_call.calibrate_arrays",
@@ -158,18 +179,30 @@ def test_a_calibration_is_asked_for_alike_and_keeps_its_recipe(monkeypatch: pyte
     )
     for chosen in (of_command, of_films, of_call):
         size = FlagSize.of(chosen.flag_size)
-        found = options_of(chosen, size, simulations=chosen.simulations, level=0.8, seed=chosen.seed)
-        assert recipe_hash(found.recipe()) == "3f9483f81f16623aa2bbc93067e0ff7e58c50f9d1bbc46834cc4eb27cee09725"
+        found = options_of(
+            chosen, size, simulations=chosen.simulations, level=0.8, seed=chosen.seed
+        )
+        assert (
+            recipe_hash(found.recipe())
+            == "3f9483f81f16623aa2bbc93067e0ff7e58c50f9d1bbc46834cc4eb27cee09725"
+        )
     assert of_command.level == of_call.level == 0.8
 
 
-def test_an_ingest_is_asked_for_alike_and_keeps_its_recipes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_ingest_is_asked_for_alike_and_keeps_its_recipes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     from flagdata.commands.ingest import IngestCommand
     from flagdata.commands.ingest_options import IngestRequest
     from flagdata.ingest import UNASKED
 
-    words = "a.mp4 b.csv --rate 10 --archive h264 --crop 1,2,30,40 --start 2026-05-01T12:00:00Z --unit km/h"
-    of_command = typed_words("ingest", IngestCommand, *words.split(), "--azimuth", "90", "--missing", "-99.9")
+    words = (
+        "a.mp4 b.csv --rate 10 --archive h264 --crop 1,2,30,40 --start 2026-05-01T12:00:00Z --unit "
+        "km/h"
+    )
+    of_command = typed_words(
+        "ingest", IngestCommand, *words.split(), "--azimuth", "90", "--missing", "-99.9"
+    )
     of_call = called_with(
         "flagdata.commands.ingest_sources.ingest_from_python",
         lambda: flagdata.ingest(
@@ -187,22 +220,35 @@ def test_an_ingest_is_asked_for_alike_and_keeps_its_recipes(monkeypatch: pytest.
     for chosen in (of_command, of_call):
         given = IngestRequest.of(chosen, confirm=UNASKED)
         assert given.sources == (Path("a.mp4"), Path("b.csv"))
-        assert recipe_hash(given.camera.recipe()) == "0865a8d1b241b73349372d493e34d8430681f7c6adea4966ca7dc67af043158e"
-        assert recipe_hash(given.wind.recipe()) == "ec606ac40db61fd876fbb82587158da201defaca1b29b73a5a0450999f589f6e"
+        assert (
+            recipe_hash(given.camera.recipe())
+            == "0865a8d1b241b73349372d493e34d8430681f7c6adea4966ca7dc67af043158e"
+        )
+        assert (
+            recipe_hash(given.wind.recipe())
+            == "ec606ac40db61fd876fbb82587158da201defaca1b29b73a5a0450999f589f6e"
+        )
 
 
-def test_an_alignment_is_asked_for_alike_and_keeps_its_recipe(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_alignment_is_asked_for_alike_and_keeps_its_recipe(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     from flagdata.commands.align import AlignCommand, Report
 
-    of_command = typed_words("align", AlignCommand, "film", "mast", "--search", "30", "--response", "0.5")
+    of_command = typed_words(
+        "align", AlignCommand, "film", "mast", "--search", "30", "--response", "0.5"
+    )
     handed: list[Any] = []
     report = Report(tag="align", content={}, lines=())
-    monkeypatch.setattr("flagdata.commands.align.align_pair", lambda chosen: handed.append(chosen) or report)
+    monkeypatch.setattr(
+        "flagdata.commands.align.align_pair", lambda chosen: handed.append(chosen) or report
+    )
     assert flagdata.align("film", "mast", search=30, response=0.5, lake="x") == {}
     for chosen in (of_command, handed[0]):
         assert (chosen.first, chosen.second) == ("film", "mast")
         assert (
-            recipe_hash(chosen.clock().recipe()) == "a2bd792e5668e1d33c047a46b31be994dc8b38d8d921b2fff4eb37dde8973f5f"
+            recipe_hash(chosen.clock().recipe())
+            == "a2bd792e5668e1d33c047a46b31be994dc8b38d8d921b2fff4eb37dde8973f5f"
         )
 
 
@@ -211,7 +257,9 @@ class Made:
     """Options of a verb that is made here."""
 
     source: str = argument("What is read.", "SOURCE")
-    window: float = option("Length of a window [s].", default=2.5, type=DURATION, section="The film")
+    window: float = option(
+        "Length of a window [s].", default=2.5, type=DURATION, section="The film"
+    )
     names: tuple[str, ...] = option("Names.", "--name", default=())
     loud: bool = option("Whether it is said aloud.", default=False)
 
@@ -220,7 +268,9 @@ class Made:
             raise UsageError("the window is too short", where="--window", fix="give 1s or more")
 
 
-def test_the_name_of_the_last_version_is_read_with_a_warning(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_name_of_the_last_version_is_read_with_a_warning(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     taken: list[tuple[float, frozenset[str]]] = []
 
     @options
@@ -256,7 +306,9 @@ def test_the_name_of_the_last_version_is_read_with_a_warning(capsys: pytest.Capt
     assert "--offset" not in shift.get_help(click.Context(shift)).replace("--clock-offset", "")
 
 
-def test_the_value_of_a_former_option_is_read_where_an_argument_stands_now(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_value_of_a_former_option_is_read_where_an_argument_stands_now(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     @options
     class Sources:
         sources: tuple[str, ...] = argument("Sources.", "SOURCE...", default=(), was=("--recipe",))
@@ -267,7 +319,11 @@ def test_the_value_of_a_former_option_is_read_where_an_argument_stands_now(capsy
         taken.append(chosen.sources)
 
     taken: list[tuple[str, ...]] = []
-    for words in (["--recipe", "x.toml", "a.csv"], ["--recipe=x.toml", "a.csv"], ["x.toml", "a.csv"]):
+    for words in (
+        ["--recipe", "x.toml", "a.csv"],
+        ["--recipe=x.toml", "a.csv"],
+        ["x.toml", "a.csv"],
+    ):
         judge.main(words, standalone_mode=False)
     assert taken == [("x.toml", "a.csv")] * 3
     warned = "warning: give SOURCE without --recipe, which is no longer an option"

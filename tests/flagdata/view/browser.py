@@ -1,7 +1,8 @@
 """A browser that opens a page of `flagdata view` and answers a question about it from inside.
 
-The question is a script that is sent with the page's own; it leaves its answer at an address of the server. A picture
-that the server holds back until then keeps the browser from taking the page for loaded.
+The question is a script that is sent with the page's own; it leaves its answer at an address of the
+server. A picture that the server holds back until then keeps the browser from taking the page for
+loaded.
 """
 
 from __future__ import annotations
@@ -20,7 +21,9 @@ import pytest
 from flagdata.lake import Lake
 from flagdata.view import ServerAnswer, pages, server
 
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+BROWSER = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+)
 _PATIENCE = 60.0  # s
 _NARROWEST = 500  # px of a window; a narrower page is put into a frame
 
@@ -57,8 +60,8 @@ def asked(
     height: int = 1000,
     screenshot: Path | None = None,
 ) -> dict[str, Any]:
-    """What the script `question` returns in the page at a path, with its width, by how much it is wider than that, what
-    the browser refused, and the hosts that were asked.
+    """What the script `question` returns in the page at a path, with its width, by how much it is
+    wider than that, what the browser refused, and the hosts that were asked.
 
     Args:
         question: the body of an asynchronous function; `until(condition)` waits.
@@ -82,7 +85,10 @@ def asked(
     script = pages.script() + _ASKED.replace("QUESTION", question).encode()
 
     def framed(*_: object) -> ServerAnswer:
-        frame = f'<!doctype html><body style="margin:0"><iframe src="{path or "./"}" width="{width}" height="{height}" '
+        frame = (
+            f'<!doctype html><body style="margin:0"><iframe src="{path or "./"}" width="{width}" '
+            f'height="{height}" '
+        )
         content = f'{frame}style="border:0"></iframe>'.encode()
         return ServerAnswer(status=HTTPStatus.OK, media_type="text/html", content=content)
 
@@ -91,7 +97,9 @@ def asked(
         patch.setitem(server._ROUTES, "held", held)
         patch.setitem(server._ROUTES, "found", found)
         if width < _NARROWEST:
-            policy = server.HEADERS["Content-Security-Policy"].replace("frame-ancestors 'none'", "frame-src 'self'")
+            policy = server.HEADERS["Content-Security-Policy"].replace(
+                "frame-ancestors 'none'", "frame-src 'self'"
+            )
             policy = policy.replace("style-src 'self'", "style-src 'self' 'unsafe-inline'")
             patch.setitem(server._ROUTES, "framed", framed)
             patch.setitem(server.HEADERS, "Content-Security-Policy", policy)

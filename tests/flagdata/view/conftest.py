@@ -67,7 +67,12 @@ def shown(lake: Lake) -> Shown:
         path = tx.staging(".mcap")
         with RecordWriter(path, metadata={}) as writer:
             writer.wind(wind)
-            writer.attach("alignment.json", json.dumps(CURVE).encode(), media_type="application/json", log_time=START)
+            writer.attach(
+                "alignment.json",
+                json.dumps(CURVE).encode(),
+                media_type="application/json",
+                log_time=START,
+            )
             for time, data in zip(times.tolist(), jpegs, strict=True):
                 writer.frame(log_time=time, publish_time=time, timestamp=time, image=data)
         finding = {"kind": "gaps", "severity": "warning", "what": "<i>two</i>"}
@@ -100,19 +105,29 @@ def shown(lake: Lake) -> Shown:
         )
         folder = tx.staging(".zarr")
         write_meshes(folder, _cloth())
-        meshes = Artifact(kind=Kind.MESHES, name="cloth", object=tx.put(folder), frame_count=3, seed=1)
+        meshes = Artifact(
+            kind=Kind.MESHES, name="cloth", object=tx.put(folder), frame_count=3, seed=1
+        )
         network = Artifact(kind=Kind.NETWORK, name="wave", parents=(recording.id,))
         for artifact in (recording, clip, meshes, network):
             tx.add(artifact)
     return Shown(
-        lake=lake, recording=recording.id, clip=clip.id, meshes=meshes.id, network=network.id, jpegs=jpegs, wind=speed
+        lake=lake,
+        recording=recording.id,
+        clip=clip.id,
+        meshes=meshes.id,
+        network=network.id,
+        jpegs=jpegs,
+        wind=speed,
     )
 
 
 def _cloth() -> MeshSequence:
     """A square that turns about its hoist."""
     rest = np.array([[0, 0], [1, 0], [0, 1], [1, 1]], dtype=np.float32)
-    turned = [[[u * np.cos(a), u * np.sin(a), v] for u, v in rest.tolist()] for a in (0.0, 0.4, 0.8)]
+    turned = [
+        [[u * np.cos(a), u * np.sin(a), v] for u, v in rest.tolist()] for a in (0.0, 0.4, 0.8)
+    ]
     return MeshSequence(
         time=np.arange(3) * PERIOD,
         positions=np.array(turned, dtype=np.float32),

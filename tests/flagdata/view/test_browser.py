@@ -1,4 +1,5 @@
-"""The pages in a browser, at the width of a desk and of a telephone: the film plays, and the cursor goes along."""
+"""The pages in a browser, at the width of a desk and of a telephone: the film plays, and the cursor
+goes along."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Addresses and their answers: what each page shows, that names are escaped, and that bad input is a clear refusal."""
+"""Addresses and their answers: what each page shows, that names are escaped, and that bad input is
+a clear refusal."""
 
 from __future__ import annotations
 
@@ -50,14 +51,22 @@ def test_the_overview_lists_artifacts_but_clips_and_filters_by_kind_and_name(sho
 
 def test_the_page_of_a_result_lists_its_versions_with_the_code_of_each(shown: Shown) -> None:
     lake = shown.site.lake
-    result = Artifact(kind=Kind.MEASUREMENT, name="wind", parents=[shown.recording], code_version="0.1.0+aaaaaaa")
+    result = Artifact(
+        kind=Kind.MEASUREMENT, name="wind", parents=[shown.recording], code_version="0.1.0+aaaaaaa"
+    )
     ids = [
-        keep(lake, one, lambda staged: (staged.mkdir(), (staged / "x").write_text("y")), "measure").artifact.id
+        keep(
+            lake, one, lambda staged: (staged.mkdir(), (staged / "x").write_text("y")), "measure"
+        ).artifact.id
         for one in (result, replace(result, code_version="0.1.0+<b>"))
     ]
     says = "wind 4.2 m/s [2.9, 5.8] 90 % <b>"
-    told = replace(result, code_version="0.1.0+c", report=json.dumps({"sentence": says, "findings": []}))
-    weighed = keep(lake, told, lambda staged: (staged.mkdir(), (staged / "x").write_text("y")), "measure").artifact.id
+    told = replace(
+        result, code_version="0.1.0+c", report=json.dumps({"sentence": says, "findings": []})
+    )
+    weighed = keep(
+        lake, told, lambda staged: (staged.mkdir(), (staged / "x").write_text("y")), "measure"
+    ).artifact.id
     for address in ("?kind=measurement", f"artifact/{weighed}"):
         assert html.escape(says) in text(shown, address)
     page = text(shown, f"artifact/{ids[1]}")
@@ -72,12 +81,16 @@ def test_names_texts_and_queries_of_others_are_escaped(shown: Shown) -> None:
         assert html.escape(NAME) in page or address == "?name=<b>"
         assert "<b>&amp;</b>" not in page
         assert "<i>two</i>" not in page
-    assert '<script>"' not in text(shown, "query?sql=" + quote('select 1 as "<script>"'), status=200)
+    assert '<script>"' not in text(
+        shown, "query?sql=" + quote('select 1 as "<script>"'), status=200
+    )
     assert "<script>x" not in text(shown, "query?sql=" + quote("<script>x"), status=400)
     assert "<script>x" not in text(shown, "?at=" + quote('"><script>x'), status=404)
 
 
-def test_the_page_of_an_artifact_shows_film_clips_alignment_findings_and_lineage(shown: Shown) -> None:
+def test_the_page_of_an_artifact_shows_film_clips_alignment_findings_and_lineage(
+    shown: Shown,
+) -> None:
     page = text(shown, f"artifact/{shown.recording}")
     assert cards(page) == [shown.clip]
     assert f'data-series="/key/series/{shown.recording}"' in page
@@ -136,9 +149,14 @@ def test_a_thumbnail_is_the_middle_frame_and_is_gone_once_the_film_is_erased(sho
     site = shown.site
     found = answer(site, f"/key/thumbnail/{shown.recording}")
     assert found.media_type == "image/jpeg"
-    with Image.open(io.BytesIO(found.content)) as small, Image.open(io.BytesIO(shown.jpegs[75])) as stored:
+    with (
+        Image.open(io.BytesIO(found.content)) as small,
+        Image.open(io.BytesIO(shown.jpegs[75])) as stored,
+    ):
         assert small.size == stored.size == (64, 48)
-        assert np.abs(np.asarray(small, float) - np.asarray(stored, float)).mean() < 3  # encoded twice
+        assert (
+            np.abs(np.asarray(small, float) - np.asarray(stored, float)).mean() < 3
+        )  # encoded twice
     shown.lake.tag("v1")
     shown.lake.erase([shown.recording], "a person in it", with_descendants=True)
     gone = answer(site, f"/key/thumbnail/{shown.recording}?at=v1")
@@ -159,12 +177,15 @@ def test_meshes_are_drawn_and_move(shown: Shown) -> None:
     assert json.loads(answer(shown.site, f"/key/series/{shown.meshes}").content)["wind"] is None
 
 
-def test_the_wind_beside_a_film_is_that_of_its_truth_window_on_the_clock_of_its_frames(shown: Shown) -> None:
+def test_the_wind_beside_a_film_is_that_of_its_truth_window_on_the_clock_of_its_frames(
+    shown: Shown,
+) -> None:
     found = json.loads(answer(shown.site, f"/key/series/{shown.recording}").content)
     assert found["frames"]["count"] == 150
     assert found["frames"]["time"][-1] == pytest.approx(149 * 0.04)
     time, speed = np.array(found["wind"]["time"]), np.array(found["wind"]["speed"])
-    # Sample k was read 60 − k seconds before the first frame; a mean of a second stands at the middle of it.
+    # Sample k was read 60 − k seconds before the first frame; a mean of a second stands at the
+    # middle of it.
     expected = shown.wind[np.round(time + 60 + 0.5).astype(int)]
     assert np.abs(speed - expected).max() < 0.011
     assert time.min() >= -60.5

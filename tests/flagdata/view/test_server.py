@@ -26,7 +26,9 @@ def server(lake: Lake) -> Iterator[Server]:
         server.shutdown()
 
 
-def ask(server: Server, path: str, *, method: str = "GET", **headers: str) -> tuple[HTTPResponse, bytes]:
+def ask(
+    server: Server, path: str, *, method: str = "GET", **headers: str
+) -> tuple[HTTPResponse, bytes]:
     """The answer to a request with these headers, underscores as dashes."""
     connection = HTTPConnection("127.0.0.1", server.server_address[1], timeout=300)
     connection.putrequest(method, path, skip_host="Host" in headers)
@@ -39,7 +41,9 @@ def ask(server: Server, path: str, *, method: str = "GET", **headers: str) -> tu
     return found, content
 
 
-def test_it_listens_on_loopback_and_each_start_has_another_address(server: Server, lake: Lake) -> None:
+def test_it_listens_on_loopback_and_each_start_has_another_address(
+    server: Server, lake: Lake
+) -> None:
     assert server.server_address[0] == "127.0.0.1"
     with Server(lake) as other:
         assert other.site.base != server.site.base
@@ -49,13 +53,20 @@ def test_it_listens_on_loopback_and_each_start_has_another_address(server: Serve
 
 
 def test_every_answer_forbids_what_is_not_of_this_server_and_is_not_kept(server: Server) -> None:
-    for path in (server.site.base, f"{server.site.base}script.js", f"{server.site.base}nothing", "/"):
+    for path in (
+        server.site.base,
+        f"{server.site.base}script.js",
+        f"{server.site.base}nothing",
+        "/",
+    ):
         found, _ = ask(server, path)
         assert {name: found.headers[name] for name in HEADERS} == HEADERS
     assert "default-src 'none'" in HEADERS["Content-Security-Policy"]
 
 
-@pytest.mark.parametrize("host", ["evil.example", "evil.example:80", "127.0.0.1", "127.0.0.1.evil.example:1"])
+@pytest.mark.parametrize(
+    "host", ["evil.example", "evil.example:80", "127.0.0.1", "127.0.0.1.evil.example:1"]
+)
 def test_a_request_by_another_name_is_refused(server: Server, host: str) -> None:
     found, content = ask(server, server.site.base, Host=host)
     assert found.status == 403
@@ -87,7 +98,9 @@ def test_it_can_only_be_read(server: Server) -> None:
 
 def test_the_command_prints_the_address_and_ends_by_an_interrupt(lake: Lake) -> None:
     command = [sys.executable, "-m", "flagdata", "view", "--lake", str(lake.path)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
         assert process.stdout is not None
         with urlopen(process.stdout.readline().strip()) as found:
             assert found.status == 200

@@ -1,4 +1,5 @@
-"""Films that are not looked at: features that are a known function of a gusty wind, and the log beside it."""
+"""Films that are not looked at: features that are a known function of a gusty wind, and the log
+beside it."""
 
 from __future__ import annotations
 
@@ -27,10 +28,13 @@ NETWORK: Any = SimpleNamespace(identity="0" * 64, estimator=SimpleNamespace(name
 
 
 def gusts(seconds: float, *, seed: int) -> tuple[FloatArray, FloatArray]:
-    """Times and a wind of 5 ± 0.8 m/s with a correlation time of 4 s, 30 s before and after the film as well."""
+    """Times and a wind of 5 ± 0.8 m/s with a correlation time of 4 s, 30 s before and after the
+    film as well."""
     rng = stream(seed, "made", "gusts")
     count = round((seconds + 60) * _RATE)
-    return np.arange(count) / _RATE - 30.0, 5.0 + 0.8 * slow(rng.standard_normal((count, 1)), 4 * _RATE)[:, 0]
+    return np.arange(count) / _RATE - 30.0, 5.0 + 0.8 * slow(
+        rng.standard_normal((count, 1)), 4 * _RATE
+    )[:, 0]
 
 
 def slow(kicks: FloatArray, time: float) -> FloatArray:
@@ -40,7 +44,8 @@ def slow(kicks: FloatArray, time: float) -> FloatArray:
 
 
 def place(*, seed: int = 0, shifted: float = 0.0) -> Place:
-    """A textured background with the flag's hoist in the middle, `shifted` by heights of the hoist."""
+    """A textured background with the flag's hoist in the middle, `shifted` by heights of the
+    hoist."""
     picture = 100 + 20 * stream(seed, "made", "background").standard_normal((64, 64))
     bare = np.ones((64, 64), bool)
     bare[16:48, 24:60] = False
@@ -49,12 +54,17 @@ def place(*, seed: int = 0, shifted: float = 0.0) -> Place:
 
 
 def features(
-    wind: tuple[FloatArray, FloatArray], *, seed: int, other: float = 0.0, where: Place | None = None
+    wind: tuple[FloatArray, FloatArray],
+    *,
+    seed: int,
+    other: float = 0.0,
+    where: Place | None = None,
 ) -> Features:
     """Six features, four of which follow the wind of the window, with noise.
 
     Args:
-        other: by how much a feature that does not follow the wind is shifted, in its scatter: another flag.
+        other: by how much a feature that does not follow the wind is shifted, in its scatter:
+            another flag.
     """
     times, speed = wind
     count = int((times[-1] + 1 / _RATE - 30.0) / STEP + 1e-6)
@@ -62,9 +72,13 @@ def features(
     means = np.array([speed[(times >= a) & (times < a + STEP)].mean() for a in starts])
     noise = stream(seed, "made", "features").standard_normal((count, 6))
     values = noise.copy()
-    values[:, :4] = (means[:, None] - 5.0) / 0.8 * np.array([1.0, -1.0, 0.5, 2.0]) + NOISE * noise[:, :4]
+    values[:, :4] = (means[:, None] - 5.0) / 0.8 * np.array([1.0, -1.0, 0.5, 2.0]) + NOISE * noise[
+        :, :4
+    ]
     values[:, 5] += other
-    layout = WindowLayout(frames=30, spacings=(0.04,), step=STEP, period=0.04, first=0.0, last=count * STEP)
+    layout = WindowLayout(
+        frames=30, spacings=(0.04,), step=STEP, period=0.04, first=0.0, last=count * STEP
+    )
     return Features(
         film="made",
         starts=starts,
@@ -84,7 +98,9 @@ def recording(
     """A film and a log of one sample a second, whose stamps are `late` seconds too early."""
     wind = gusts(seconds, seed=seed)
     samples = np.arange(-29.0, seconds + 29.0)
-    read = np.interp(samples, *wind) + 0.05 * stream(seed, "made", "log").standard_normal(len(samples))
+    read = np.interp(samples, *wind) + 0.05 * stream(seed, "made", "log").standard_normal(
+        len(samples)
+    )
     log = Log(times=samples - late, speed=read, clock=clock)
     return Recording(
         name="made",

@@ -1,4 +1,5 @@
-"""Films read by a reading model, and why one is refused. What is looked at in a film is replaced."""
+"""Films read by a reading model, and why one is refused. What is looked at in a film is
+replaced."""
 
 from __future__ import annotations
 
@@ -40,21 +41,31 @@ def measure(found: Calibrated, monkeypatch: pytest.MonkeyPatch) -> Measure:
     """Measure a film of these features."""
     estimator: Any = SimpleNamespace(targets=(TARGETS["wind_speed"],))
 
-    def measured(own: Features, *, options: Options | None = None, findings: tuple[Finding, ...] = ()) -> Measurement:
-        film: Any = SimpleNamespace(name="film", rate=25.0, duration=240.0, findings=lambda: findings)
+    def measured(
+        own: Features, *, options: Options | None = None, findings: tuple[Finding, ...] = ()
+    ) -> Measurement:
+        film: Any = SimpleNamespace(
+            name="film", rate=25.0, duration=240.0, findings=lambda: findings
+        )
         monkeypatch.setattr(anemometer_measuring, "features_of", lambda *_, **__: own)
-        return anemometer_measuring.measure_by(film, found.model, estimator, options or Options(), name="garden")
+        return anemometer_measuring.measure_by(
+            film, found.model, estimator, options or Options(), name="garden"
+        )
 
     return measured
 
 
-def test_the_same_flag_on_another_day_is_read_window_by_window(measure: Measure, found: Calibrated) -> None:
+def test_the_same_flag_on_another_day_is_read_window_by_window(
+    measure: Measure, found: Calibrated
+) -> None:
     wind = gusts(120.0, seed=21)
     own = measure(features(wind, seed=21))
     assert not own.verdict.refused
     assert own.model == "garden"
     times, speed = wind
-    truth = np.array([speed[(times >= a) & (times < a + STEP)].mean() for a in STEP * np.arange(100)])
+    truth = np.array(
+        [speed[(times >= a) & (times < a + STEP)].mean() for a in STEP * np.arange(100)]
+    )
     series = beside(own, start=None, wind=None)
     assert np.sqrt(np.mean((series.wind - truth) ** 2)) < 0.2
     np.testing.assert_allclose(series.high - series.low, 2 * found.half_width)
@@ -73,7 +84,9 @@ def test_the_same_flag_on_another_day_is_read_window_by_window(measure: Measure,
         ({"where": bare(place(shifted=1.0))}, "another-framing"),
     ],
 )
-def test_another_flag_or_place_is_refused_with_its_figure(measure: Measure, changed: dict[str, Any], kind: str) -> None:
+def test_another_flag_or_place_is_refused_with_its_figure(
+    measure: Measure, changed: dict[str, Any], kind: str
+) -> None:
     own = measure(features(gusts(120.0, seed=21), seed=21, **changed))
     assert own.verdict.refused
     assert [reason.kind for reason in own.verdict.reasons if reason.p is None] == [kind]
@@ -81,8 +94,8 @@ def test_another_flag_or_place_is_refused_with_its_figure(measure: Measure, chan
 
 
 def test_a_film_of_few_windows_is_no_more_another_flag_than_a_long_one(found: Calibrated) -> None:
-    """The mean of three windows scatters by 1/√3 of a window's scatter or more, which is no shift; a shift of one
-    feature of six by four deviations is √(16/6) in each."""
+    """The mean of three windows scatters by 1/√3 of a window's scatter or more, which is no shift;
+    a shift of one feature of six by four deviations is √(16/6) in each."""
     shifts = []
     for seed in range(30, 42):
         own = features(gusts(6.1, seed=seed), seed=seed)
@@ -92,11 +105,15 @@ def test_a_film_of_few_windows_is_no_more_another_flag_than_a_long_one(found: Ca
     assert np.isfinite(shifts).sum() > 6
     far = features(gusts(120.0, seed=21), seed=21, other=4.0)
     used = found.model.used(far)
-    assert found.model.familiar.shift(used, found.model.read(used)) == pytest.approx(np.sqrt(16 / 6), rel=0.15)
+    assert found.model.familiar.shift(used, found.model.read(used)) == pytest.approx(
+        np.sqrt(16 / 6), rel=0.15
+    )
 
 
 def test_a_short_calibration_does_not_recognise_the_flag_and_says_so(found: Calibrated) -> None:
-    few = replace(found.model.familiar, distances=found.model.familiar.distances[:17])  # of six features, three each
+    few = replace(
+        found.model.familiar, distances=found.model.familiar.distances[:17]
+    )  # of six features, three each
     own = features(gusts(120.0, seed=21), seed=21, other=4.0)
     used = found.model.used(own)
     shift = few.shift(used, found.model.read(used))
@@ -108,7 +125,9 @@ def test_a_short_calibration_does_not_recognise_the_flag_and_says_so(found: Cali
 
 def test_another_size_and_a_fault_of_the_film_refuse_it(measure: Measure) -> None:
     own = features(gusts(120.0, seed=21), seed=21)
-    fault = Finding(kind="cut-off", severity=Severity.WARNING, what="the edge cuts the cloth off", value=0.5)
+    fault = Finding(
+        kind="cut-off", severity=Severity.WARNING, what="the edge cuts the cloth off", value=0.5
+    )
     both = measure(own, options=Options(size=FlagSize(length=2.0, height=1.0)), findings=(fault,))
     assert [reason.kind for reason in both.verdict.faults] == ["cut-off", "another-size"]
     assert "1 more reason" in both.verdict.sentence
@@ -119,10 +138,15 @@ def test_the_hoist_counts_where_no_background_shows_the_place(measure: Measure) 
     moved = place(shifted=1.0)
     assert not measure(features(gusts(120.0, seed=21), seed=21, where=moved)).verdict.refused
     other = bare(replace(place(), side=-1.0))
-    assert "on the other side" in measure(features(gusts(120.0, seed=21), seed=21, where=other)).verdict.sentence
+    assert (
+        "on the other side"
+        in measure(features(gusts(120.0, seed=21), seed=21, where=other)).verdict.sentence
+    )
 
 
-def test_a_picture_of_another_shape_is_refused_and_one_without_details_is_judged_by_the_rest(measure: Measure) -> None:
+def test_a_picture_of_another_shape_is_refused_and_one_without_details_is_judged_by_the_rest(
+    measure: Measure,
+) -> None:
     own = place()
     wide = replace(own, background=own.background[:36], bare=own.bare[:36])
     found = measure(features(gusts(120.0, seed=21), seed=21, where=wide))
@@ -135,7 +159,9 @@ def test_a_picture_of_another_shape_is_refused_and_one_without_details_is_judged
 def test_a_brighter_day_is_the_same_place(measure: Measure) -> None:
     own = place()
     light = np.linspace(0.5, 1.5, 64, dtype=np.float32) * own.background + 20.0
-    assert not measure(features(gusts(120.0, seed=21), seed=21, where=replace(own, background=light))).verdict.refused
+    assert not measure(
+        features(gusts(120.0, seed=21), seed=21, where=replace(own, background=light))
+    ).verdict.refused
 
 
 def test_winds_beyond_the_calibration_are_reported(measure: Measure, found: Calibrated) -> None:
@@ -161,8 +187,14 @@ def test_a_model_is_the_same_once_it_was_stored(found: Calibrated, tmp_path: Pat
     write(tmp_path / "model.zarr", found.model, found.as_dict())
     again = read(tmp_path / "model.zarr")
     own = features(gusts(120.0, seed=21), seed=21)
-    np.testing.assert_array_equal(again.read(again.used(own)), found.model.read(found.model.used(own)))
-    assert (again.size, again.names, again.block) == (found.model.size, found.model.names, found.model.block)
+    np.testing.assert_array_equal(
+        again.read(again.used(own)), found.model.read(found.model.used(own))
+    )
+    assert (again.size, again.names, again.block) == (
+        found.model.size,
+        found.model.names,
+        found.model.block,
+    )
     used, winds = again.used(own), again.read(again.used(own))
     assert again.familiar.shift(used, winds) == found.model.familiar.shift(used, winds)
     with pytest.raises(CorruptError, match="damaged"):

@@ -1,4 +1,5 @@
-"""From a recording in a lake to a reading model by which another film is measured; what is looked at is replaced."""
+"""From a recording in a lake to a reading model by which another film is measured; what is looked
+at is replaced."""
 
 from __future__ import annotations
 
@@ -28,7 +29,8 @@ _SECONDS = 120
 
 @pytest.fixture
 def lake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A recording "monday" of two minutes with a gusty log, whose windows show what `made.features` says."""
+    """A recording "monday" of two minutes with a gusty log, whose windows show what `made.features`
+    says."""
     wind = gusts(float(_SECONDS), seed=1)
     samples = np.arange(-29, _SECONDS + 29, dtype=np.int64)
     picture = np.zeros((8, 8), np.uint8)
@@ -47,7 +49,13 @@ def lake(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
                 )
             )
         transaction.add(
-            Artifact(kind=Kind.RECORDING, name="monday", object=transaction.put(staged), start=_START, rate=1.0)
+            Artifact(
+                kind=Kind.RECORDING,
+                name="monday",
+                object=transaction.put(staged),
+                start=_START,
+                rate=1.0,
+            )
         )
     _shown(monkeypatch, seed=1)
     return tmp_path / "lake"
@@ -66,7 +74,17 @@ def _run(command: Any, *arguments: str | Path) -> Result:
 def test_a_recording_becomes_a_model_by_which_another_film_is_read(
     lake: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    given = ("monday", "--lake", lake, "--flag-size", "1.5x1.0", "--only", "anemometer", "--name", "garden")
+    given = (
+        "monday",
+        "--lake",
+        lake,
+        "--flag-size",
+        "1.5x1.0",
+        "--only",
+        "anemometer",
+        "--name",
+        "garden",
+    )
     done = _run(calibrate, *given, "--json", "--report", tmp_path / "garden.html")
     assert done.exit_code == 0, done.output
     said = json.loads(done.stdout)["anemometer"]
@@ -102,7 +120,9 @@ def test_a_recording_becomes_a_model_by_which_another_film_is_read(
     assert newest.code_version == "0.1.0+mended"
 
 
-def test_a_model_whose_network_has_changed_is_refused(lake: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_model_whose_network_has_changed_is_refused(
+    lake: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     given = ("monday", "--lake", lake, "--flag-size", "1.5x1.0", "--only", "anemometer")
     assert _run(calibrate, *given).exit_code == 0
     monkeypatch.setattr("measure.anemometer.networks.file_hash", lambda _: "another")
@@ -113,11 +133,16 @@ def test_a_model_whose_network_has_changed_is_refused(lake: Path, monkeypatch: p
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        (("--only", "anemometer", "--azimuth", "70±7"), "--azimuth cannot be combined with --only anemometer"),
+        (
+            ("--only", "anemometer", "--azimuth", "70±7"),
+            "--azimuth cannot be combined with --only anemometer",
+        ),
         (("--only", "weight", "--name", "garden"), "--name cannot be combined with --only weight"),
     ],
 )
-def test_options_of_what_is_not_done_are_refused(lake: Path, given: tuple[str, ...], said: str) -> None:
+def test_options_of_what_is_not_done_are_refused(
+    lake: Path, given: tuple[str, ...], said: str
+) -> None:
     done = _run(calibrate, "monday", "--lake", lake, "--flag-size", "1.5x1.0", *given)
     assert isinstance(done.exception, UsageError)
     assert said in str(done.exception)
@@ -140,11 +165,23 @@ def test_a_recording_that_cannot_be_looked_at_is_left_out_of_two_and_named(
     def recorded(subject: Any, *given: Any, **named: Any) -> Any:
         asked.append(subject.film.name)
         if len(asked) == 1:
-            raise RefusedError("the picture changes at once", where=subject.film.name, fix="choose a part")
+            raise RefusedError(
+                "the picture changes at once", where=subject.film.name, fix="choose a part"
+            )
         return plain(subject, *given, **named)
 
     monkeypatch.setattr(making, "recorded", recorded)
-    given = ("monday", "monday", "--lake", lake, "--flag-size", "1.5x1.0", "--only", "anemometer", "--json")
+    given = (
+        "monday",
+        "monday",
+        "--lake",
+        lake,
+        "--flag-size",
+        "1.5x1.0",
+        "--only",
+        "anemometer",
+        "--json",
+    )
     done = _run(calibrate, *given)
     assert done.exit_code == 0, done.output
     said = json.loads(done.stdout)["anemometer"]

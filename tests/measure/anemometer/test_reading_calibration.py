@@ -20,12 +20,16 @@ def test_a_ridge_without_a_penalty_is_the_least_squares_line() -> None:
     """Of wind = 2 + 3 a − b exactly."""
     rows = _RNG.normal(size=(50, 2))
     found = Ridge.fitted(rows, 2 + 3 * rows[:, 0] - rows[:, 1], 1e-9)
-    np.testing.assert_allclose(found(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])), [2.0, 5.0, 1.0], atol=1e-6)
+    np.testing.assert_allclose(
+        found(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])), [2.0, 5.0, 1.0], atol=1e-6
+    )
 
 
 def test_neighbours_stand_beside_each_window_and_missing_ones_are_the_window_itself() -> None:
     values = np.array([[1.0], [2.0], [np.nan], [4.0]])
-    np.testing.assert_array_equal(with_neighbours(values)[[0, 1, 3]], [[1, 1, 2], [2, 1, 2], [4, 4, 4]])
+    np.testing.assert_array_equal(
+        with_neighbours(values)[[0, 1, 3]], [[1, 1, 2], [2, 1, 2], [4, 4, 4]]
+    )
 
 
 def test_blocks_are_twenty_seconds_of_one_recording() -> None:
@@ -36,12 +40,16 @@ def test_blocks_are_twenty_seconds_of_one_recording() -> None:
 
 
 def test_slow_noise_is_not_read_as_skill() -> None:
-    """Features that have nothing but their slowness in common with the wind predict nothing of blocks that were left
-    out; single windows that are left out are interpolated between their neighbours, which looks like skill."""
+    """Features that have nothing but their slowness in common with the wind predict nothing of
+    blocks that were left out; single windows that are left out are interpolated between their
+    neighbours, which looks like skill."""
     both = slow(np.random.default_rng(3).standard_normal((300, 81)), 8.0)
     rows, wind = both[:, :80], both[:, 80]
     by_blocks = validate_penalties(
-        rows, wind, blocks_of(STEP * np.arange(300, dtype=np.float64), np.zeros(300, int)), np.zeros(80, bool)
+        rows,
+        wind,
+        blocks_of(STEP * np.arange(300, dtype=np.float64), np.zeros(300, int)),
+        np.zeros(80, bool),
     )
     assert by_blocks.rmse > 0.97 * wind.std()
     by_windows = np.empty(300)
@@ -52,7 +60,8 @@ def test_slow_noise_is_not_read_as_skill() -> None:
 
 
 def test_a_few_features_that_say_much_have_a_penalty_of_their_own() -> None:
-    """Of wind = a + noise beside 99 columns of noise: the error is nearly that of a regression on a alone."""
+    """Of wind = a + noise beside 99 columns of noise: the error is nearly that of a regression on a
+    alone."""
     rng = np.random.default_rng(5)
     rows = rng.standard_normal((200, 100))
     wind = rows[:, 0] + 0.2 * rng.standard_normal(200)
@@ -63,8 +72,9 @@ def test_a_few_features_that_say_much_have_a_penalty_of_their_own() -> None:
 
 
 def test_intervals_contain_the_wind_and_the_error_is_that_of_the_features() -> None:
-    """The best linear reading of a window has the variance σ²/(1 + s) of its four features, with s the sum of their
-    squared slopes over their noise; the log adds its own scatter and what it misses between samples."""
+    """The best linear reading of a window has the variance σ²/(1 + s) of its four features, with s
+    the sum of their squared slopes over their noise; the log adds its own scatter and what it
+    misses between samples."""
     found = model()
     slopes = np.array([1.0, 1.0, 0.5, 2.0]) / 0.3
     best = 0.8 / np.sqrt(1 + np.square(slopes).sum())
@@ -110,7 +120,8 @@ def test_windows_beside_a_silence_of_the_log_are_left_out() -> None:
     own = recording()
     heard = (own.log.times < 50.0) | (own.log.times > 60.0)
     found = model(replace(own, log=Log(times=own.log.times[heard], speed=own.log.speed[heard])))
-    # From the last sample before 50 s to the first after 60 s: 12 s, that is ten windows and the part of one more.
+    # From the last sample before 50 s to the first after 60 s: 12 s, that is ten windows and the
+    # part of one more.
     assert len(own.features.starts) - len(found.model.winds) in (10, 11)
     with pytest.raises(InputError, match="a log beside them"):
         model(replace(own, log=Log(times=own.log.times + 1000.0, speed=own.log.speed)))
@@ -123,7 +134,10 @@ def test_the_half_width_is_the_conformal_quantile() -> None:
 
 
 def test_the_mean_of_windows_errs_as_blocks_do() -> None:
-    """Errors that are alike within a block of five do not average out within it: σ/√(n/5), not σ/√n."""
+    """Errors that are alike within a block of five do not average out within it: σ/√(n/5), not
+    σ/√n."""
     errors = np.repeat(_RNG.normal(size=400), 5)
-    drawn = mean_errors(errors, count=100, length=50, draws=4000, generator=np.random.default_rng(1))
+    drawn = mean_errors(
+        errors, count=100, length=50, draws=4000, generator=np.random.default_rng(1)
+    )
     assert drawn.std() == pytest.approx(errors.std() * np.sqrt(5 / 100), rel=0.1)

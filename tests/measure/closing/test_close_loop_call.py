@@ -1,4 +1,5 @@
-"""Closing the loop on arrays: the experiment is that of the arrays, and the answer that of the verdict."""
+"""Closing the loop on arrays: the experiment is that of the arrays, and the answer that of the
+verdict."""
 
 from __future__ import annotations
 
@@ -23,7 +24,8 @@ REST = np.stack(np.meshgrid(np.linspace(0, 0.9, 7), np.linspace(0, 0.6, 5)), axi
 
 
 def swaying(frames: int = 80) -> FloatArray:
-    """(frame, marker, 3): a sheet held at its hoist whose fly turns from side to side about the pole, by up to 0.2."""
+    """(frame, marker, 3): a sheet held at its hoist whose fly turns from side to side about the
+    pole, by up to 0.2."""
     angle = 0.2 * np.sin(4 * np.pi * np.arange(frames) / RATE)[:, None] * REST[:, 0]
     plane = np.broadcast_to(REST[:, 0], angle.shape)
     height = np.broadcast_to(REST[:, 1], angle.shape)
@@ -49,11 +51,19 @@ def test_arrays_become_an_experiment_and_a_verdict_its_answer(
 ) -> None:
     positions = swaying()
     found = flagdata.close_loop(
-        [positions, positions], rest=REST, rate=RATE, wind=[1.0, (1.5, 0.0, 0.0)], noise=5e-4, seed=3
+        [positions, positions],
+        rest=REST,
+        rate=RATE,
+        wind=[1.0, (1.5, 0.0, 0.0)],
+        noise=5e-4,
+        seed=3,
     )
     ((experiment, options),) = judged
     assert options.seed == 3
-    assert [one.wind.velocity.tolist() for one in experiment.recordings if one.wind] == [[[1, 0, 0]], [[1.5, 0, 0]]]
+    assert [one.wind.velocity.tolist() for one in experiment.recordings if one.wind] == [
+        [[1, 0, 0]],
+        [[1.5, 0, 0]],
+    ]
     np.testing.assert_allclose(experiment.recordings[0].positions, positions, atol=0.02)
     expected = verdict(Conclusion.EFFECT)
     assert (found.conclusion, found.named) == ("effect", expected.named)
@@ -64,14 +74,22 @@ def test_arrays_become_an_experiment_and_a_verdict_its_answer(
     assert found.named[0] in found._repr_html_()
 
 
-def test_a_mesh_sequence_states_its_own_rate_and_rest_coordinates(judged: list[tuple[Experiment, LoopOptions]]) -> None:
+def test_a_mesh_sequence_states_its_own_rate_and_rest_coordinates(
+    judged: list[tuple[Experiment, LoopOptions]],
+) -> None:
     positions = swaying().astype(np.float32)
     corner = np.arange(35).reshape(5, 7)
-    squares = np.stack([corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]], axis=-1).reshape(-1, 4)
+    squares = np.stack(
+        [corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]], axis=-1
+    ).reshape(-1, 4)
     faces = np.concatenate([squares[:, [0, 1, 2]], squares[:, [0, 2, 3]]]).astype(np.int32)
     time = (np.arange(len(positions)) * 40_000_000).astype(np.int64)
-    sequence = MeshSequence(time=time, positions=positions, faces=faces, rest=REST.astype(np.float32))
-    flagdata.close_loop(sequence, wind=(np.array([0.0, 4.0]), np.array([[1.0, 0, 0], [1.5, 0, 0]])), noise=5e-4)
+    sequence = MeshSequence(
+        time=time, positions=positions, faces=faces, rest=REST.astype(np.float32)
+    )
+    flagdata.close_loop(
+        sequence, wind=(np.array([0.0, 4.0]), np.array([[1.0, 0, 0], [1.5, 0, 0]])), noise=5e-4
+    )
     ((experiment, _),) = judged
     np.testing.assert_allclose(np.diff(experiment.recordings[0].times), 1 / RATE)
     assert experiment.recordings[0].wind is not None

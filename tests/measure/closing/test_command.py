@@ -1,4 +1,5 @@
-"""`flagdata close-loop`: what does not fit is refused before anything is simulated, with the option it is about."""
+"""`flagdata close-loop`: what does not fit is refused before anything is simulated, with the option
+it is about."""
 
 from __future__ import annotations
 
@@ -86,7 +87,9 @@ def test_options_of_a_log_are_not_ignored_where_there_is_none(table: Path, optio
 def test_a_log_is_read_as_its_sensor_and_zone_say(table: Path, tmp_path: Path) -> None:
     """Its first frame at the log's second sample, whose speed is 5."""
     log = tmp_path / "log.csv"
-    log.write_text("time,wind_speed\n2026-05-14 09:30:00,4\n2026-05-14 09:30:01,5\n2026-05-14 09:30:02,6\n")
+    log.write_text(
+        "time,wind_speed\n2026-05-14 09:30:00,4\n2026-05-14 09:30:01,5\n2026-05-14 09:30:02,6\n"
+    )
     reading = SourceOptions(rate=RATE, offset=1.0, sensor="generic-csv", zone="+02:00")
     calm, _ = read([str(table)], [str(log)], reading, None)
     assert calm.wind is not None
@@ -95,10 +98,18 @@ def test_a_log_is_read_as_its_sensor_and_zone_say(table: Path, tmp_path: Path) -
 
 def test_a_warning_that_may_explain_the_verdict_is_reported_with_it() -> None:
     whole = verdict(Conclusion.EFFECT, Size(across=3, up=3, frames=20, stretch=2))
-    doubt = Finding(kind="inertia-does-not-fit", severity=Severity.WARNING, what="it moves as in 8 m/s", where="flag")
+    doubt = Finding(
+        kind="inertia-does-not-fit",
+        severity=Severity.WARNING,
+        what="it moves as in 8 m/s",
+        where="flag",
+    )
     other = replace(doubt, kind="cloth-not-covered", what="no marker near", severity=Severity.NOTE)
     changed = with_warnings(whole, (doubt, other))
-    remark = "The data themselves may be wrong, which would look like an effect: flag: it moves as in 8 m/s."
+    remark = (
+        "The data themselves may be wrong, which would look like an effect: flag: it moves as in 8 "
+        "m/s."
+    )
     assert changed.words == f"{whole.words} {remark}"
     assert changed.findings == (
         ("inertia-does-not-fit", "flag: it moves as in 8 m/s"),
@@ -120,7 +131,9 @@ def test_a_warning_that_may_explain_the_verdict_is_reported_with_it() -> None:
         "--zone=UTC",
     ],
 )
-def test_beside_a_recipe_with_recordings_no_option_is_ignored(table: Path, tmp_path: Path, option: str) -> None:
+def test_beside_a_recipe_with_recordings_no_option_is_ignored(
+    table: Path, tmp_path: Path, option: str
+) -> None:
     recipe = tmp_path / "flag.toml"
     recipe.write_text(f'[[recording]]\nsource = "{table}"\ntake = "calm"\n')
     code, error = said([str(recipe), option])
@@ -132,14 +145,30 @@ def test_beside_a_recipe_with_recordings_no_option_is_ignored(table: Path, tmp_p
 def test_a_draft_is_the_recipe_of_what_the_command_line_states(table: Path, tmp_path: Path) -> None:
     path = tmp_path / "deeper" / "flag.toml"
     path.parent.mkdir()
-    words = "--wind 4 --wind 8 --axis 0,2,0 --attachment 0,0;0,0.4 --flag-size 1.2x0.8 --material paper"
+    words = (
+        "--wind 4 --wind 8 --axis 0,2,0 --attachment 0,0;0,0.4 --flag-size 1.2x0.8 --material paper"
+    )
     words += " --density-uncertainty 0.02"
-    given = ("close-loop", table, *words.split(), "--noise", "0.001", "--rate", RATE, "--draft", path, "--json")
+    given = (
+        "close-loop",
+        table,
+        *words.split(),
+        "--noise",
+        "0.001",
+        "--rate",
+        RATE,
+        "--draft",
+        path,
+        "--json",
+    )
     ended = invoke(*given)
     assert (ended.code, ended.document["recipe"]) == (0, str(path))
     recipe = parse(path)
     assert [(one.take, one.noise) for one in recipe.recordings] == [("calm", 1e-3), ("brisk", 1e-3)]
-    assert [one.wind.velocity for one in recipe.recordings if one.wind] == [(0.0, 4.0, 0.0), (0.0, 8.0, 0.0)]
+    assert [one.wind.velocity for one in recipe.recordings if one.wind] == [
+        (0.0, 4.0, 0.0),
+        (0.0, 8.0, 0.0),
+    ]
     chosen = CloseLoopCommand(
         sources=(str(table),),
         attachment="0,0;0,0.4",
@@ -151,14 +180,19 @@ def test_a_draft_is_the_recipe_of_what_the_command_line_states(table: Path, tmp_
     assert recipe.setup.pins == setup.pins
     assert recipe.setup.material is not None
     assert recipe.setup.material.name == "paper"
-    assert (recipe.setup.mass_known, recipe.setup.area_weight_uncertainty) == (True, pytest.approx(0.02))
+    assert (recipe.setup.mass_known, recipe.setup.area_weight_uncertainty) == (
+        True,
+        pytest.approx(0.02),
+    )
     np.testing.assert_allclose(recipe.setup.outline, setup.outline)  # type: ignore[arg-type]
     assert invoke(*given).code == 1  # the file is there
     again = invoke("close-loop", path, "--draft", tmp_path / "other.toml", "--json")
     assert (again.code, again.document["where"]) == (2, "--draft")
 
 
-@pytest.mark.parametrize(("line", "what"), [("nuls = 64", "did you mean 'nulls'"), ("nulls = 0.5", "whole number")])
+@pytest.mark.parametrize(
+    ("line", "what"), [("nuls = 64", "did you mean 'nulls'"), ("nulls = 0.5", "whole number")]
+)
 def test_a_recipe_says_what_the_test_is_and_no_more(tmp_path: Path, line: str, what: str) -> None:
     recipe = tmp_path / "flag.toml"
     recipe.write_text(f"[test]\n{line}\n")
@@ -206,7 +240,9 @@ def test_markers_of_a_lake_and_of_a_file_are_the_same(table: Path, tmp_path: Pat
     for one, other, result in zip(from_file, from_lake, kept, strict=True):
         np.testing.assert_array_equal(one.positions, other.positions)
         assert one.wind is not None
-        np.testing.assert_array_equal(one.wind.velocity, [[4, 0, 0]])  # given with z up, whatever the recording's axes
+        np.testing.assert_array_equal(
+            one.wind.velocity, [[4, 0, 0]]
+        )  # given with z up, whatever the recording's axes
         assert (one.source, other.source) == ("", result.artifact.id)
 
 
@@ -219,7 +255,9 @@ def test_a_speed_needs_an_axis_and_a_source_a_place(table: Path) -> None:
 
 
 def test_recordings_of_one_name_get_names_that_differ(table: Path) -> None:
-    names = [seen.name for seen in read([str(table), str(table)], ["4"], SourceOptions(rate=RATE), None)]
+    names = [
+        seen.name for seen in read([str(table), str(table)], ["4"], SourceOptions(rate=RATE), None)
+    ]
     assert len(set(names)) == 4
 
 
@@ -231,12 +269,15 @@ def test_the_uncertainty_of_the_weight_on_the_command_line_is_that_of_the_setup(
 
 
 def test_a_weighed_cloth_has_the_weight_that_the_command_line_states() -> None:
-    """N(0.155, 0.003²) is 1.94 % of its value; a range is uniform, of standard deviation width / √12."""
+    """N(0.155, 0.003²) is 1.94 % of its value; a range is uniform, of standard deviation width /
+    √12."""
     given = CloseLoopCommand(material="paper", area_weight=Stated.of("0.155±0.003"))
     setup = setup_of(Setup(mass_known=False), given)
     assert (setup.area_weight, setup.mass_known) == (0.155, True)
     assert setup.area_weight_uncertainty == pytest.approx(0.003 / 0.155)
-    between = setup_of(Setup(), CloseLoopCommand(material="paper", area_weight=Stated.of("0.15:0.16")))
+    between = setup_of(
+        Setup(), CloseLoopCommand(material="paper", area_weight=Stated.of("0.15:0.16"))
+    )
     assert between.area_weight_uncertainty == pytest.approx(0.01 / math.sqrt(12) / 0.155)
 
 
@@ -252,11 +293,15 @@ def test_a_weight_that_cannot_be_used_is_refused(given: dict[str, Any], what: st
         setup_of(Setup(), CloseLoopCommand(**given))
 
 
-def test_recordings_of_a_bucket_are_those_of_their_table(table: Path, bucket_folder: str, tmp_path: Path) -> None:
+def test_recordings_of_a_bucket_are_those_of_their_table(
+    table: Path, bucket_folder: str, tmp_path: Path
+) -> None:
     lake = Lake.create(bucket_folder)
     taken = ingest_markers(lake, table, MarkerOptions(rate=RATE))
     shutil.rmtree(tmp_path / "cache")
-    found = read([result.artifact.id for result in taken], ["4"], SourceOptions(), Lake.open(bucket_folder))
+    found = read(
+        [result.artifact.id for result in taken], ["4"], SourceOptions(), Lake.open(bucket_folder)
+    )
     expected = read([str(table)], ["4"], SourceOptions(rate=RATE), None)
     assert [one.source for one in found] == [result.artifact.id for result in taken]
     for one, other in zip(found, expected, strict=True):

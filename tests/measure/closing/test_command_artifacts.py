@@ -1,4 +1,5 @@
-"""A verdict and its models in the lake: one commit, once; a model that is named runs with the verdict's parameters."""
+"""A verdict and its models in the lake: one commit, once; a model that is named runs with the
+verdict's parameters."""
 
 from __future__ import annotations
 
@@ -52,7 +53,9 @@ def concluded(conclusion: Conclusion) -> Verdict:
     return replace(made, parameters=parameters)
 
 
-def experiment(specimen: Specimen, *, source: str = "", name: str = "a", speed: float = 4.0) -> Experiment:
+def experiment(
+    specimen: Specimen, *, source: str = "", name: str = "a", speed: float = 4.0
+) -> Experiment:
     rest = specimen.mesh.rest
     positions = np.tile(np.stack([rest[:, 0], 0 * rest[:, 0], rest[:, 1]], axis=1), (50, 1, 1))
     recording = Trajectory(
@@ -119,7 +122,9 @@ def test_what_was_kept_comes_back_as_it_was(lake: Lake, specimen: Specimen) -> N
     lake.objects.check(stored)
 
 
-def test_a_loop_that_was_closed_is_kept_in_a_bucket(tmp_path: Path, specimen: Specimen, bucket_folder: str) -> None:
+def test_a_loop_that_was_closed_is_kept_in_a_bucket(
+    tmp_path: Path, specimen: Specimen, bucket_folder: str
+) -> None:
     kept = keep(Lake.create(bucket_folder), closed(experiment(specimen)))
     shutil.rmtree(tmp_path / "cache")
     again = Lake.open(bucket_folder)
@@ -155,7 +160,10 @@ def test_newer_code_leaves_its_verdict_and_models_under_the_same_names(
     second = keep(lake, closed(observed))
     assert (second.place.version, second.measurement != first.measurement) == (2, True)
     assert json.loads(str(lake.artifact("tracks").report))["conclusion"] == Conclusion.EFFECT.value
-    assert json.loads(str(lake.artifact(first.measurement).report))["conclusion"] == Conclusion.SUFFICIENT.value
+    assert (
+        json.loads(str(lake.artifact(first.measurement).report))["conclusion"]
+        == Conclusion.SUFFICIENT.value
+    )
     assert sim.run.lake_models.load("tracks-base", lake).model == second.models[0]
     assert lake.artifact("tracks-lift").parents == (second.measurement, recorded)
 
@@ -201,8 +209,12 @@ def test_a_verdict_leaves_a_larger_model_where_an_effect_acts(
 
 
 @pytest.mark.parametrize(("place", "stage"), [(0, 0), (1, 1)], ids=["base", "larger"])
-def test_a_model_has_the_parameters_of_the_verdict(specimen: Specimen, place: int, stage: int) -> None:
-    model = models(concluded(Conclusion.EFFECT), experiment(specimen, speed=5.0), name="x", seed=0)[place]
+def test_a_model_has_the_parameters_of_the_verdict(
+    specimen: Specimen, place: int, stage: int
+) -> None:
+    model = models(concluded(Conclusion.EFFECT), experiment(specimen, speed=5.0), name="x", seed=0)[
+        place
+    ]
     text = to_toml(model.content)
     crew = Crew(of_content(tomllib.loads(text), name="x", folder=Path(), where="x"))
     member, nominal = crew.member(0), named_material("camel-ponte-roma")
@@ -213,7 +225,9 @@ def test_a_model_has_the_parameters_of_the_verdict(specimen: Specimen, place: in
     assert member.scene.material.damping == pytest.approx(damping)
     assert member.wind_speed == 5.0
     assert {name: dict(values) for name, values in member.effects.items()} == (
-        {} if place == 0 else {"lift": {"coefficient": 0.62, "density": pytest.approx(1.225, abs=0.1)}}
+        {}
+        if place == 0
+        else {"lift": {"coefficient": 0.62, "density": pytest.approx(1.225, abs=0.1)}}
     )
     np.testing.assert_allclose(crew.mesh.rest, specimen.mesh.rest)
     np.testing.assert_array_equal(crew.mesh.faces, specimen.mesh.faces)
@@ -243,10 +257,14 @@ def test_a_cloth_of_any_outline_held_anywhere_keeps_its_mesh_and_pins(specimen: 
         held=held,
         anchors=anchors,
         stiffness=math.inf,
-        material=replace(specimen.material, name="of a mill", bending=1.5 * specimen.material.bending),
+        material=replace(
+            specimen.material, name="of a mill", bending=1.5 * specimen.material.bending
+        ),
     )
     (model,) = models(concluded(Conclusion.SUFFICIENT), experiment(odd), name="odd", seed=0)
-    crew = Crew(of_content(tomllib.loads(to_toml(model.content)), name="odd", folder=Path(), where="odd"))
+    crew = Crew(
+        of_content(tomllib.loads(to_toml(model.content)), name="odd", folder=Path(), where="odd")
+    )
     scene = crew.member(0).scene
     np.testing.assert_array_equal(scene.mesh.rest, rest)
     np.testing.assert_array_equal(scene.position[list(held)], anchors)
@@ -270,7 +288,8 @@ def test_simulate_runs_a_model_by_its_name(lake: Lake, specimen: Specimen) -> No
 
 
 @pytest.mark.parametrize(
-    ("source", "what"), [("tracks-lfit", "did you mean 'tracks-lift'"), ("flag-gust", "did you mean 'flag-gusts'")]
+    ("source", "what"),
+    [("tracks-lfit", "did you mean 'tracks-lift'"), ("flag-gust", "did you mean 'flag-gusts'")],
 )
 def test_a_name_that_is_neither_a_recipe_nor_a_model_is_refused_with_the_nearest(
     lake: Lake, specimen: Specimen, source: str, what: str

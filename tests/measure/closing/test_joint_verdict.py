@@ -52,7 +52,10 @@ def both(markers: Verdict, films: Verdict) -> Joint:
     ],
 )
 def test_the_joint_p_is_twice_the_smaller_and_each_kind_that_rejects_has_its_say(
-    markers: tuple[Conclusion, float], films: tuple[Conclusion, float], conclusion: Conclusion, p: float
+    markers: tuple[Conclusion, float],
+    films: tuple[Conclusion, float],
+    conclusion: Conclusion,
+    p: float,
 ) -> None:
     found = both(judged(*markers), judged(*films))
     assert found.conclusion is conclusion
@@ -78,7 +81,10 @@ def test_what_may_be_missing_is_what_both_kinds_leave() -> None:
 
 
 def test_the_joint_document_is_what_it_was() -> None:
-    found = both(judged(Conclusion.ONE_OF, 0.02, named=("added-mass", "lift")), judged(Conclusion.ONE_OF, 0.02))
+    found = both(
+        judged(Conclusion.ONE_OF, 0.02, named=("added-mass", "lift")),
+        judged(Conclusion.ONE_OF, 0.02),
+    )
     assert changes("joint-verdict", plain(found.as_dict()), relative=1e-9) == []
 
 
@@ -99,7 +105,10 @@ def test_an_error_that_both_share_is_not_averaged_out() -> None:
     held = 0
     for _ in range(4000):
         common = rng.normal(0.0, shared)
-        drawn = [interval(math.exp(common + rng.normal(0.0, sigma)), math.hypot(sigma, shared)) for sigma in own]
+        drawn = [
+            interval(math.exp(common + rng.normal(0.0, sigma)), math.hypot(sigma, shared))
+            for sigma in own
+        ]
         found = _multiply_likelihoods("x", *drawn, shared=shared).together
         assert found is not None
         held += found.low <= 1.0 <= found.high
@@ -121,7 +130,11 @@ def test_an_upper_limit_is_not_combined_and_opposite_signs_are_apart() -> None:
 def test_the_cloth_of_markers_is_brought_to_the_films_units_and_the_page_has_both_kinds() -> None:
     markers = replace(
         judged(Conclusion.EFFECT, 0.02),
-        parameters=(Parameter(name="area_weight", before=interval(1.1, 0.1), after=interval(1.0, 0.1), shift=None),),
+        parameters=(
+            Parameter(
+                name="area_weight", before=interval(1.1, 0.1), after=interval(1.0, 0.1), shift=None
+            ),
+        ),
     )
     films = replace(
         judged(Conclusion.EFFECT, 0.01),
@@ -145,5 +158,10 @@ def test_the_cloth_of_markers_is_brought_to_the_films_units_and_the_page_has_bot
     assert with_lift.together.unit == "kg/m²"
     page = joint_page(found)
     assert "joint p = 0.020" in found.words
-    for text in ("markers/report.html", "films/report.html", "area weight, with lift", markers.comparisons[0].what):
+    for text in (
+        "markers/report.html",
+        "films/report.html",
+        "area weight, with lift",
+        markers.comparisons[0].what,
+    ):
         assert text in page

@@ -1,4 +1,5 @@
-"""The demonstration's recording: files as a user brings them, which state nothing of what is to be found."""
+"""The demonstration's recording: files as a user brings them, which state nothing of what is to be
+found."""
 
 from __future__ import annotations
 
@@ -22,7 +23,9 @@ RECIPE = RecordingRecipe(seed=5, duration=10, columns=6, width=120, rows=90, sam
 def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Recording, int]:
     """A short film of a coarse flag, and the frames that were counted."""
     frames: list[int] = []
-    return make_recording(RECIPE, tmp_path_factory.mktemp("made"), workers=1, advance=frames.append), sum(frames)
+    return make_recording(
+        RECIPE, tmp_path_factory.mktemp("made"), workers=1, advance=frames.append
+    ), sum(frames)
 
 
 def test_the_film_is_a_colour_file_of_a_camera_with_its_time(made: tuple[Recording, int]) -> None:
@@ -34,15 +37,23 @@ def test_the_film_is_a_colour_file_of_a_camera_with_its_time(made: tuple[Recordi
     assert len(frames) == 300
     assert counted == 2 * 300
     assert frames[0].shape == (90, 120, 3)
-    assert np.ptp(np.stack(frames).astype(float), axis=0).max() > 60  # something moves in front of the background
+    assert (
+        np.ptp(np.stack(frames).astype(float), axis=0).max() > 60
+    )  # something moves in front of the background
 
 
-def test_the_log_runs_by_a_clock_that_is_off_by_the_hidden_offset(made: tuple[Recording, int]) -> None:
-    """Against the true wind, which the cups follow late: the logger's stamps less the offset are the camera's time."""
+def test_the_log_runs_by_a_clock_that_is_off_by_the_hidden_offset(
+    made: tuple[Recording, int],
+) -> None:
+    """Against the true wind, which the cups follow late: the logger's stamps less the offset are
+    the camera's time."""
     recording, _ = made
     with recording.log.open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file, delimiter=";"))
-    stamps = [datetime.strptime(f"{row['Date']} {row['Time']} +0200", "%d.%m.%Y %H:%M:%S.%f %z") for row in rows]
+    stamps = [
+        datetime.strptime(f"{row['Date']} {row['Time']} +0200", "%d.%m.%Y %H:%M:%S.%f %z")
+        for row in rows
+    ]
     since = np.array([(stamp - START).total_seconds() for stamp in stamps])
     speed = np.array([float(row["Wind speed [km/h]"].replace(",", ".")) for row in rows]) / 3.6
     true = np.arange(len(recording.wind)) / 10 - BEFORE
@@ -51,7 +62,9 @@ def test_the_log_runs_by_a_clock_that_is_off_by_the_hidden_offset(made: tuple[Re
         return float(np.mean((np.interp(since - offset - 0.9, true, recording.wind) - speed) ** 2))
 
     tried = recording.clock_offset + np.arange(-5, 5.1, 0.25)
-    assert abs(tried[np.argmin([error(offset) for offset in tried])] - recording.clock_offset) <= 0.5
+    assert (
+        abs(tried[np.argmin([error(offset) for offset in tried])] - recording.clock_offset) <= 0.5
+    )
     assert abs(recording.clock_offset) <= 46
 
 
@@ -61,7 +74,12 @@ def test_no_file_states_what_acts_or_what_the_cloth_weighs(made: tuple[Recording
     with av.open(str(recording.video)) as container:
         texts.append(repr(container.metadata))
     assert recording.acting is not None
-    for word in (*EFFECTS, "damping", f"{recording.area_weight:.3f}", f"{recording.clock_offset:.2f}"):
+    for word in (
+        *EFFECTS,
+        "damping",
+        f"{recording.area_weight:.3f}",
+        f"{recording.clock_offset:.2f}",
+    ):
         assert not [text for text in texts if word in text], word
 
 

@@ -1,4 +1,5 @@
-"""The demonstration's folder: replaced when the demonstration runs again, and never with anything of a user's in it."""
+"""The demonstration's folder: replaced when the demonstration runs again, and never with anything
+of a user's in it."""
 
 from __future__ import annotations
 
@@ -29,7 +30,11 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(Transcript, "show", init)
     monkeypatch.setattr(story, "field_steps", part("recording.html"))
-    for step, name in (("weighing_step", "weighed.html"), ("loop_step", "loop.html"), ("markers_step", "tracked.html")):
+    for step, name in (
+        ("weighing_step", "weighed.html"),
+        ("loop_step", "loop.html"),
+        ("markers_step", "tracked.html"),
+    ):
         monkeypatch.setattr(story, step, part(name))
 
 
@@ -38,7 +43,9 @@ def demo(out: Path, *arguments: str) -> Ended:
 
 
 def names(folder: Path) -> list[str]:
-    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
+    return sorted(
+        path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()
+    )
 
 
 def test_it_replaces_what_it_wrote_and_lists_it(quick: None, tmp_path: Path) -> None:
@@ -67,7 +74,9 @@ def test_a_lake_that_a_user_made_in_it_is_named_and_kept(quick: None, tmp_path: 
     assert (out / "field.lake" / "lake.json").read_text() == "mine"
 
 
-def test_a_lake_of_the_demonstration_that_a_user_went_on_with_is_kept(quick: None, tmp_path: Path) -> None:
+def test_a_lake_of_the_demonstration_that_a_user_went_on_with_is_kept(
+    quick: None, tmp_path: Path
+) -> None:
     out = tmp_path / "demo"
     assert demo(out).code == 0
     (out / "lake" / "mcap").mkdir()
@@ -84,7 +93,9 @@ def test_a_demonstration_without_a_list_is_kept(quick: None, tmp_path: Path) -> 
     assert names(tmp_path) == [".flagdata-demo", "mine"]
 
 
-def test_one_that_fails_leaves_the_earlier_one(quick: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_that_fails_leaves_the_earlier_one(
+    quick: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     out = tmp_path / "demo"
     assert demo(out, "--full").code == 0
 

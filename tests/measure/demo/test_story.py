@@ -1,4 +1,5 @@
-"""The demonstration's steps where a command refuses: what a person would do then is done, and said."""
+"""The demonstration's steps where a command refuses: what a person would do then is done, and
+said."""
 
 from __future__ import annotations
 
@@ -28,8 +29,13 @@ def codes(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
     def run(arguments: list[str], **others: Any) -> subprocess.CompletedProcess[str]:
         typed = " ".join(arguments[3:])
         code = next((code for word, code in wanted.items() if word in typed), 0)
-        printed = '{"artifacts": [{"kind": "camera", "artifact": "c1"}, {"kind": "wind", "artifact": "w1"}]}'
-        return subprocess.CompletedProcess(arguments, code, stdout=printed if "--json" in typed else f"{typed}\n")
+        printed = (
+            '{"artifacts": [{"kind": "camera", "artifact": "c1"}, {"kind": "wind", "artifact": '
+            '"w1"}]}'
+        )
+        return subprocess.CompletedProcess(
+            arguments, code, stdout=printed if "--json" in typed else f"{typed}\n"
+        )
 
     monkeypatch.setattr(subprocess, "run", run)
     return wanted
@@ -83,19 +89,29 @@ def test_the_cloth_is_weighed_with_what_a_person_noted_and_the_truth_stands_besi
 def test_the_loop_is_closed_with_the_scales_weight_and_its_finding_is_judged_by_the_truth(
     codes: dict[str, int], tmp_path: Path
 ) -> None:
-    """On the same part of the film as the cloth was weighed on, which is not given what the scale showed."""
+    """On the same part of the film as the cloth was weighed on, which is not given what the scale
+    showed."""
     acting = Acting(effect="hem-mass", parameter="line_density", strength=0.06)
-    noted = SimpleNamespace(azimuth=math.pi / 2, elevation=math.radians(20.2), distance=8.24, area_weight=0.1731)
+    noted = SimpleNamespace(
+        azimuth=math.pi / 2, elevation=math.radians(20.2), distance=8.24, area_weight=0.1731
+    )
     made = cast(Any, SimpleNamespace(noted=noted, area_weight=0.1754, acting=acting))
     (tmp_path / "loop").mkdir()
     for conclusion, named, judgement, found in (
         ("effect", ["hem-mass"], Judgement.RIGHT, "close-loop flag"),
-        ("effect", ["wet-mass", "hem-mass"], Judgement.RIGHT, "one of 2 effects; it is number 2 of them"),
+        (
+            "effect",
+            ["wet-mass", "hem-mass"],
+            Judgement.RIGHT,
+            "one of 2 effects; it is number 2 of them",
+        ),
         ("effect", ["lift", "shear"], Judgement.MISSED, "close-loop flag"),
         ("no effect needed", [], Judgement.MISSED, "close-loop flag"),
         ("not decided", [], Judgement.UNDECIDED, "close-loop flag"),
     ):
-        (tmp_path / "loop" / "verdict.json").write_text(json.dumps({"conclusion": conclusion, "named": named}))
+        (tmp_path / "loop" / "verdict.json").write_text(
+            json.dumps({"conclusion": conclusion, "named": named})
+        )
         shell = Transcript(folder=tmp_path)
         story.weighing_step(shell, made)
         story.loop_step(shell, made)
@@ -116,7 +132,9 @@ def test_the_loop_is_closed_with_the_scales_weight_and_its_finding_is_judged_by_
         ("area weight at least 0.41 kg/m²", 0.4, Judgement.MISSED),
     ],
 )
-def test_a_finding_is_right_if_its_interval_contains_the_truth(found: str, true: float, judgement: Judgement) -> None:
+def test_a_finding_is_right_if_its_interval_contains_the_truth(
+    found: str, true: float, judgement: Judgement
+) -> None:
     assert story._judgement(found, true) is judgement
 
 
@@ -126,15 +144,23 @@ def test_a_cloth_that_cannot_be_weighed_is_no_failure_of_the_demonstration(
     codes["calibrate"] = 3
     noted = SimpleNamespace(azimuth=1.5, elevation=0.3, distance=8.0)
     shell = Transcript(folder=tmp_path)
-    story.weighing_step(shell, cast(Any, SimpleNamespace(noted=noted, area_weight=0.15, acting=None)))
+    story.weighing_step(
+        shell, cast(Any, SimpleNamespace(noted=noted, area_weight=0.15, acting=None))
+    )
     (card,) = shell.cards
     assert (card.found.startswith("Refused"), card.page) == (True, "")
-    assert (card.truths[0].found.startswith("Refused"), card.truths[0].judgement) == (True, Judgement.REFUSED)
+    assert (card.truths[0].found.startswith("Refused"), card.truths[0].judgement) == (
+        True,
+        Judgement.REFUSED,
+    )
 
 
 @pytest.fixture
-def aligned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, codes: dict[str, int]) -> Callable[[], Card]:
-    """Puts the clocks on one: the lake then has a recording whose offset is 0.3 s off a true one of −12.0 s."""
+def aligned(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, codes: dict[str, int]
+) -> Callable[[], Card]:
+    """Puts the clocks on one: the lake then has a recording whose offset is 0.3 s off a true one of
+    −12.0 s."""
 
     def step() -> Card:
         shell = Transcript(folder=tmp_path)

@@ -1,4 +1,5 @@
-"""The demonstration's tracked flag: files a user could have brought, which do not state what acted on the cloth."""
+"""The demonstration's tracked flag: files a user could have brought, which do not state what acted
+on the cloth."""
 
 from __future__ import annotations
 

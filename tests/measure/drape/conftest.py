@@ -19,10 +19,16 @@ NOISE = 0.005
 
 
 def shapes(values: Mapping[str, FloatArray], rng: np.random.Generator) -> FloatArray:
-    """(drape, 7) figures: a coefficient that grows with the bending length, lobes with anisotropy and curvature."""
+    """(drape, 7) figures: a coefficient that grows with the bending length, lobes with anisotropy
+    and curvature."""
     length, curvature = values["bending_length"], values["rest_curvature"]
     count = len(length)
-    coefficient = 0.7 + 0.55 * np.log(length / 0.02) + 0.03 * np.log(values["shear"] / 400) + 0.0007 * curvature
+    coefficient = (
+        0.7
+        + 0.55 * np.log(length / 0.02)
+        + 0.03 * np.log(values["shear"] / 400)
+        + 0.0007 * curvature
+    )
     lobe = 0.025 * values["anisotropy"] + 0.0014 * curvature
     figures = np.zeros((count, 7))
     figures[:, 0] = coefficient + NOISE * rng.standard_normal(count)
@@ -38,7 +44,8 @@ def simulated(count: int, *, seed: int, **_: object) -> tuple[Mapping[str, Float
 
 
 def scan(coefficient: float, *, lobe: float = 0.0) -> Obj:
-    """A drape with folds of the seventh order and this drape coefficient, z upwards, on a table 0.3 m above zero."""
+    """A drape with folds of the seventh order and this drape coefficient, z upwards, on a table 0.3
+    m above zero."""
     mesh = disc(np.random.default_rng(0), rows=5)
     radius = np.hypot(mesh.rest[:, 0], mesh.rest[:, 1])
     angle = np.arctan2(mesh.rest[:, 1], mesh.rest[:, 0])
@@ -47,8 +54,12 @@ def scan(coefficient: float, *, lobe: float = 0.0) -> Obj:
     reach = (rim - PEDESTAL) / (DISC - PEDESTAL)
     fold = DISC * (0.004 * np.cos(7 * angle) + lobe * np.cos(2 * angle)) / (DISC - PEDESTAL)
     across = np.minimum(radius, PEDESTAL) + outside * (reach + fold)
-    position = np.stack([across * np.cos(angle), across * np.sin(angle), 0.3 - outside * np.sqrt(1 - reach**2)], 1)
-    return Obj(positions=position + np.array([1.0, 2.0, 0.0]), faces=mesh.faces, rest=10 * mesh.rest + 5.0)
+    position = np.stack(
+        [across * np.cos(angle), across * np.sin(angle), 0.3 - outside * np.sqrt(1 - reach**2)], 1
+    )
+    return Obj(
+        positions=position + np.array([1.0, 2.0, 0.0]), faces=mesh.faces, rest=10 * mesh.rest + 5.0
+    )
 
 
 @pytest.fixture

@@ -1,4 +1,5 @@
-"""A model that is small and untrained, and films that it looks at: what it says means nothing, how it is used does."""
+"""A model that is small and untrained, and films that it looks at: what it says means nothing, how
+it is used does."""
 
 from __future__ import annotations
 
@@ -34,7 +35,9 @@ def pictures(count: int, *, seed: int = 3, height: int = 32, width: int = 40) ->
     y, x = np.mgrid[0:height, 0:width]
     patch = np.exp(-(((x - width / 2) / 10) ** 4) - ((y - height / 2) / 8) ** 4)
     waves = np.cos(0.5 * x - 2 * np.pi * rng.uniform(2, 6) * t)
-    return np.clip(110 + 80 * patch * waves + rng.normal(0, 2, waves.shape), 0, 255).astype(np.uint8)
+    return np.clip(110 + 80 * patch * waves + rng.normal(0, 2, waves.shape), 0, 255).astype(
+        np.uint8
+    )
 
 
 def even(count: int, *, rate: float = RATE, seed: int = 3) -> Frames:
@@ -53,7 +56,9 @@ def written(folder: Path, targets: tuple[str, ...]) -> Path:
     folder.mkdir()
     options = {"dimension": 4, "widths": (6, 6, 6)}
     with torch_draws(1, "weights"):
-        learner = Learner(WaveNetwork(**options), loss=Loss.POSTERIOR, targets=targets, components=2).eval()  # type: ignore[arg-type]
+        learner = Learner(
+            WaveNetwork(**options), loss=Loss.POSTERIOR, targets=targets, components=2
+        ).eval()  # type: ignore[arg-type]
     front_end = FrontEnd(maps="wave-maps", size=SIZE, frames=FRAMES, rate=RATE)
     cropping = Cropping(frames=FRAMES, size=SIZE)
     write_card(
@@ -65,7 +70,12 @@ def written(folder: Path, targets: tuple[str, ...]) -> Path:
             "cropping": asdict(cropping),
             "recipe": {
                 "network": {"name": "wave", "options": options},
-                "loss": {"name": "posterior", "targets": list(targets), "components": 2, "margin": 1.0},
+                "loss": {
+                    "name": "posterior",
+                    "targets": list(targets),
+                    "components": 2,
+                    "margin": 1.0,
+                },
                 "data": {"dataset": "made", "sequences": None},
             },
         },
@@ -77,7 +87,11 @@ def written(folder: Path, targets: tuple[str, ...]) -> Path:
     with torch.no_grad():
         summaries = bare.embeddings(bare.inputs(clips))[0].numpy()
     cloud = Familiarity.of(summaries[:28], summaries[28:])
-    renew(folder, CLOUD, tensor_bytes({name: torch.from_numpy(value) for name, value in cloud.arrays().items()}))
+    renew(
+        folder,
+        CLOUD,
+        tensor_bytes({name: torch.from_numpy(value) for name, value in cloud.arrays().items()}),
+    )
     return folder
 
 
@@ -90,7 +104,8 @@ def model(model_folder: Path) -> Estimator:
 def cloth_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A model of hanging cloth as a folder."""
     return written(
-        tmp_path_factory.mktemp("cloth") / "small-cloth", ("cloth_wind", "cloth_area_weight", "cloth_bending")
+        tmp_path_factory.mktemp("cloth") / "small-cloth",
+        ("cloth_wind", "cloth_area_weight", "cloth_bending"),
     )
 
 

@@ -1,4 +1,5 @@
-"""What the lake keeps of a wind that is bounded on one side only: no value, and no end where there is none."""
+"""What the lake keeps of a wind that is bounded on one side only: no value, and no end where there
+is none."""
 
 from __future__ import annotations
 
@@ -20,7 +21,9 @@ from tests.measure.estimate.test_film_measuring import far, measured
 def test_a_bound_is_no_wind_of_the_catalog(model: Estimator) -> None:
     film, strong = even(3 * FRAMES), far(model, 0, 1.0)
     network = Network(estimator=strong, identity="0" * 64, artifact=None, folder=Path())
-    row = artifact(measured(film, strong), Subject(film=ConditionedFilm(film)), network, FilmReading())
+    row = artifact(
+        measured(film, strong), Subject(film=ConditionedFilm(film)), network, FilmReading()
+    )
     assert (row.wind, row.wind_sigma) == (None, None)
     assert "wind_speed" not in json.loads(str(row.parameters))
     assert "wind-speed-at-end" in row.quality
@@ -29,7 +32,9 @@ def test_a_bound_is_no_wind_of_the_catalog(model: Estimator) -> None:
     assert kept["quantities"]["wind_speed"]["interval"][1] is None
 
 
-def test_the_series_of_bounds_is_kept_with_infinite_ends_and_without_values(model: Estimator, tmp_path: Path) -> None:
+def test_the_series_of_bounds_is_kept_with_infinite_ends_and_without_values(
+    model: Estimator, tmp_path: Path
+) -> None:
     found = measured(even(3 * FRAMES), far(model, 0, 1.0))
     write(tmp_path / "found.zarr", found, beside(found, start=None, wind=None))
     answer, arrays = read(tmp_path / "found.zarr")

@@ -11,7 +11,9 @@ from measure.gate import CheckedGate, FamiliarityGate, write
 from tests.measure.gate.made import learned
 
 
-def test_the_gate_in_a_models_folder_is_taken_and_else_the_distance(model_folder: Path, tmp_path: Path) -> None:
+def test_the_gate_in_a_models_folder_is_taken_and_else_the_distance(
+    model_folder: Path, tmp_path: Path
+) -> None:
     found = network(str(model_folder), lake=None, at=None)
     assert isinstance(gate_beside(found, false_alarm=0.05), FamiliarityGate)
     folder = tmp_path / "model"

@@ -75,7 +75,10 @@ def test_an_uninformative_window_changes_nothing() -> None:
     rng = stream(4, "nothing")
     narrow = posterior(1.0, 0.5, 40_000, rng)
     wide = rng.normal(0.0, 1.3, size=narrow.shape)  # wider than the prior
-    alone, both = cloth_of(np.stack([narrow, narrow]), 0.0), cloth_of(np.stack([narrow, narrow, wide]), 0.0)
+    alone, both = (
+        cloth_of(np.stack([narrow, narrow]), 0.0),
+        cloth_of(np.stack([narrow, narrow, wide]), 0.0),
+    )
     assert both.mean() == pytest.approx(alone.mean(), abs=0.02)
     assert both.var() == pytest.approx(alone.var(), rel=0.05)
 
@@ -89,7 +92,8 @@ def test_windows_of_the_priors_width_keep_their_shape() -> None:
 
 @pytest.mark.parametrize("correlation", [0.0, 0.5])
 def test_intervals_cover_as_stated_when_errors_correlate_as_given(correlation: float) -> None:
-    # 800 flags, five windows each, observed with noise of variance 1 that correlates between windows.
+    # 800 flags, five windows each, observed with noise of variance 1 that correlates between
+    # windows.
     rng = stream(5, "coverage")
     problems, covered = 800, 0
     draws = np.empty((5, 300, 1))
@@ -125,7 +129,8 @@ def test_the_mean_of_winds_has_the_variance_of_correlated_estimates(correlation:
 
 
 def test_a_wind_that_trades_with_the_cloth_follows_what_all_windows_say_of_the_cloth() -> None:
-    # In each window wind = 2 + cloth + a little: once the cloth is known from all of them, so is the wind.
+    # In each window wind = 2 + cloth + a little: once the cloth is known from all of them, so is
+    # the wind.
     rng = stream(7, "trade")
     cloth = np.stack([posterior(1.0, 0.2, 20_000, rng) for _ in range(10)])
     wind = 2 + cloth + rng.normal(0, 0.05, size=cloth.shape)

@@ -1,4 +1,5 @@
-"""`flagdata measure` from files and lakes: the answer, the refusal, the artifact, and clear errors."""
+"""`flagdata measure` from files and lakes: the answer, the refusal, the artifact, and clear
+errors."""
 
 from __future__ import annotations
 
@@ -51,7 +52,9 @@ def answer(*arguments: str | Path) -> dict[str, object]:
 
 @pytest.fixture(scope="module")
 def film(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_video(tmp_path_factory.mktemp("films") / "flag.mkv", pictures(4 * FRAMES, height=40, width=56))
+    return write_video(
+        tmp_path_factory.mktemp("films") / "flag.mkv", pictures(4 * FRAMES, height=40, width=56)
+    )
 
 
 @pytest.fixture
@@ -97,7 +100,9 @@ def lake(tmp_path: Path) -> Path:
                 rate=RATE,
             )
             transaction.add(artifact)
-            for clip in clip_rows(Record.open(made.object_path(stored)), artifact, frames=FRAMES + 2):
+            for clip in clip_rows(
+                Record.open(made.object_path(stored)), artifact, frames=FRAMES + 2
+            ):
                 transaction.add(clip)
     return made.path
 
@@ -109,13 +114,17 @@ def measurements(lake: Path) -> Sequence[dict[str, object]]:
 def test_a_video_file_is_answered_in_one_line(film: Path, model_folder: Path) -> None:
     done = run(film, *SIZED, "--model", model_folder, "--anyway")
     assert len(done.out.splitlines()) == 1
-    assert re.search(r"wind(: not constrained by this clip| \d+\.\d m/s \[\d+\.\d, \d+\.\d\] 90 %)", done.out)
+    assert re.search(
+        r"wind(: not constrained by this clip| \d+\.\d m/s \[\d+\.\d, \d+\.\d\] 90 %)", done.out
+    )
 
 
 def test_python_gives_the_answer_of_the_command_as_arrays(film: Path, model_folder: Path) -> None:
     options = ("--model", model_folder, "--area-weight", "0.12:0.15", "--anyway")
     said = answer(film, *SIZED, *options)
-    found = flagdata.measure(film, flag_size=(1.5, 1.0), area_weight=(0.12, 0.15), model=str(model_folder), anyway=True)
+    found = flagdata.measure(
+        film, flag_size=(1.5, 1.0), area_weight=(0.12, 0.15), model=str(model_folder), anyway=True
+    )
     assert found.sentence == said["sentence"]
     assert found.refused == said["gate"]["refused"]  # type: ignore[index]
     assert [finding.as_dict() for finding in found.findings] == said["findings"]
@@ -133,7 +142,9 @@ def test_python_gives_the_answer_of_the_command_as_arrays(film: Path, model_fold
     assert {values.shape for values in found.windows.value.values()} == {(4,)}
 
 
-def test_python_returns_a_refused_film_with_its_reasons_and_hides_its_values(strange: Path, model_folder: Path) -> None:
+def test_python_returns_a_refused_film_with_its_reasons_and_hides_its_values(
+    strange: Path, model_folder: Path
+) -> None:
     found = flagdata.measure(strange, flag_size=(1.5, 1.0), model=str(model_folder))
     assert found.refused
     kinds = [reason.kind for reason in found.reasons]
@@ -142,7 +153,12 @@ def test_python_returns_a_refused_film_with_its_reasons_and_hides_its_values(str
     for name in ("answer", "sentence", "quantities", "wind", "draws", "windows"):
         with pytest.raises(RefusedError, match=r"noise of [\d.]+ gray levels"):
             getattr(found, name)
-    assert flagdata.measure(strange, flag_size=(1.5, 1.0), model=str(model_folder), anyway=True).wind.unit == "m/s"
+    assert (
+        flagdata.measure(
+            strange, flag_size=(1.5, 1.0), model=str(model_folder), anyway=True
+        ).wind.unit
+        == "m/s"
+    )
     with pytest.raises(UsageError, match="twice"):
         flagdata.measure(strange, area_weight=0.1, material="paper")
 
@@ -154,7 +170,9 @@ def test_the_shipped_model_measures_a_file_without_any_option_but_the_films(tmp_
     assert "size-assumed" in [finding["kind"] for finding in found["findings"]]  # type: ignore[index, union-attr]
 
 
-def test_a_material_states_its_area_weight_from_the_catalog_or_the_lakes_films(film: Path, lake: Path) -> None:
+def test_a_material_states_its_area_weight_from_the_catalog_or_the_lakes_films(
+    film: Path, lake: Path
+) -> None:
     named = (film, *SIZED, "--anyway", "--json", "--read-only", "--lake", lake, "--material")
     done = run(*named, "tango-red-jet-set")
     assert "Wang" in done.err
@@ -164,9 +182,17 @@ def test_a_material_states_its_area_weight_from_the_catalog_or_the_lakes_films(f
     assert found["sentence"].endswith("area weight 0.113 kg/m², as given")
     made = Lake.open(lake)
     with made.transaction("declared") as transaction:
-        for name, session, area_weight in (("one", "felt", 0.24), ("two", "linen", 0.2), ("three", "linen", 0.21)):
+        for name, session, area_weight in (
+            ("one", "felt", 0.24),
+            ("two", "linen", 0.2),
+            ("three", "linen", 0.21),
+        ):
             cloth = {"cloth": {"fabric": session, "density": area_weight}}  # as recipes are hashed
-            transaction.add(Artifact(kind=Kind.RECORDING, name=name, session=session, recipe=cloth, frame_count=1))
+            transaction.add(
+                Artifact(
+                    kind=Kind.RECORDING, name=name, session=session, recipe=cloth, frame_count=1
+                )
+            )
     assert weight_of("felt", lake=made, at=None)[0] == Stated.of(0.24)
     with pytest.raises(UsageError, match=r"2 area weights, 0\.2 to 0\.21"):
         weight_of("linen", lake=made, at=None)
@@ -183,13 +209,18 @@ def test_the_shipped_model_of_hanging_cloth_gives_weights_of_its_range(film: Pat
     assert 0.079 <= low < high <= 0.454
 
 
-def test_a_folder_of_images_and_the_video_of_them_say_the_same(film: Path, model_folder: Path, tmp_path: Path) -> None:
+def test_a_folder_of_images_and_the_video_of_them_say_the_same(
+    film: Path, model_folder: Path, tmp_path: Path
+) -> None:
     folder = tmp_path / "images"
     folder.mkdir()
     for k, image in enumerate(pictures(4 * FRAMES, height=40, width=56)):
         Image.fromarray(image).save(folder / f"{k:03d}.png")
     options = (*SIZED, "--model", model_folder, "--anyway")
-    assert answer(folder, "--sequence-fps", "25", *options)["quantities"] == answer(film, *options)["quantities"]
+    assert (
+        answer(folder, "--sequence-fps", "25", *options)["quantities"]
+        == answer(film, *options)["quantities"]
+    )
 
 
 def test_a_refused_film_ends_with_3_and_shows_no_estimate(strange: Path, tmp_path: Path) -> None:
@@ -210,12 +241,17 @@ def test_a_refused_film_ends_with_3_and_shows_no_estimate(strange: Path, tmp_pat
 def test_a_still_film_is_given_no_number_even_anyway(tmp_path: Path, form: tuple[str, ...]) -> None:
     still = write_video(tmp_path / "still.mkv", pictures(1, height=40, width=56).repeat(40, axis=0))
     done = run(still, *SIZED, "--anyway", *form, code=3)
-    assert "no number is given, not even with --anyway: no motion is found in the picture" in done.out + done.err
+    assert (
+        "no number is given, not even with --anyway: no motion is found in the picture"
+        in done.out + done.err
+    )
     assert "m/s" not in done.out + done.err
     assert not form or "quantities" not in done.out
 
 
-def test_the_report_is_one_file_that_refers_to_no_other(film: Path, model_folder: Path, tmp_path: Path) -> None:
+def test_the_report_is_one_file_that_refers_to_no_other(
+    film: Path, model_folder: Path, tmp_path: Path
+) -> None:
     page = tmp_path / "report.html"
     run(film, *SIZED, "--model", model_folder, "--anyway", "--report", page)
     text = page.read_text()
@@ -224,7 +260,9 @@ def test_the_report_is_one_file_that_refers_to_no_other(film: Path, model_folder
     assert text.count("data:image/png") == 2
 
 
-def test_a_crop_beyond_the_picture_is_refused_and_one_inside_changes_the_answer(film: Path, model_folder: Path) -> None:
+def test_a_crop_beyond_the_picture_is_refused_and_one_inside_changes_the_answer(
+    film: Path, model_folder: Path
+) -> None:
     options = (*SIZED, "--model", model_folder, "--anyway")
     assert "reaches beyond" in run(film, *options, "--crop", "30,0,30,30", code=2).err
     whole, part = answer(film, *options), answer(film, *options, "--crop", "0,0,30,30")
@@ -254,14 +292,21 @@ def test_a_recording_measured_by_newer_code_is_a_new_version_of_the_measurement(
     first = answer("made-1", *options)
     monkeypatch.setattr("flagdata.core.provenance.code_version", lambda: "0.1.0+mended")
     done = run("made-1", *options)
-    assert f"committed as version 2 of 'made-1'; version 1, {str(first['artifact'])[:12]}, is by code " in done.err
+    assert (
+        f"committed as version 2 of 'made-1'; version 1, {str(first['artifact'])[:12]}, is by code "
+        in done.err
+    )
     old, new = measurements(lake)
     assert (old["artifact"], new["code_version"]) == (first["artifact"], "0.1.0+mended")
     assert new["parents"] == old["parents"]
 
 
 def test_a_recording_in_a_bucket_is_measured_by_its_parts_as_in_a_folder(
-    lake: Path, model_folder: Path, bucket_folder: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    lake: Path,
+    model_folder: Path,
+    bucket_folder: str,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
 ) -> None:
     options = (*SIZED, "--model", model_folder, "--anyway", "--seed", "5")
     expected = answer("made-1", "--lake", lake, "--read-only", *options)
@@ -270,15 +315,23 @@ def test_a_recording_in_a_bucket_is_measured_by_its_parts_as_in_a_folder(
     shutil.rmtree(tmp_path / "cache", ignore_errors=True)
     found = answer("made-1", "--lake", bucket_folder, *options)
     assert found["quantities"] == expected["quantities"]
-    assert [row["artifact"] for row in remote.rows("kind = 'measurement'").to_pylist()] == [found["artifact"]]
+    assert [row["artifact"] for row in remote.rows("kind = 'measurement'").to_pylist()] == [
+        found["artifact"]
+    ]
     assert list((tmp_path / "cache" / "objects").glob("*.blocks/*"))  # no whole record was fetched
     stored, _ = read(remote.object_path(str(remote.artifact(str(found["artifact"])).object)))
     assert stored["quantities"] == expected["quantities"]
 
 
-def test_a_network_of_the_lake_is_a_parent_of_what_it_measured(lake: Path, model_folder: Path) -> None:
+def test_a_network_of_the_lake_is_a_parent_of_what_it_measured(
+    lake: Path, model_folder: Path
+) -> None:
     with Lake.open(lake).transaction("a network") as transaction:
-        network = Artifact(kind=Kind.NETWORK, name="small-net", object=transaction.put(_as_model(model_folder, lake)))
+        network = Artifact(
+            kind=Kind.NETWORK,
+            name="small-net",
+            object=transaction.put(_as_model(model_folder, lake)),
+        )
         transaction.add(network)
     found = answer("made-1", "--lake", lake, *SIZED, "--model", "small-net", "--anyway")
     assert measurements(lake)[0]["parents"] == [found["source"], network.id]
@@ -292,7 +345,9 @@ def _as_model(folder: Path, lake: Path) -> Path:
     return target
 
 
-def test_the_nearest_simulated_clips_are_those_of_other_recordings(lake: Path, model: Estimator) -> None:
+def test_the_nearest_simulated_clips_are_those_of_other_recordings(
+    lake: Path, model: Estimator
+) -> None:
     opened = Lake.open(lake)
     first, other = opened.rows("kind = 'recording'").to_pylist()
     record_ = Record.open(opened.object_path(first["object"]))
@@ -305,13 +360,17 @@ def test_the_nearest_simulated_clips_are_those_of_other_recordings(lake: Path, m
     assert found[0].distance <= found[1].distance <= found[2].distance
     rest, fewer = nearest(opened, model, summary, without=first["artifact"], at=None, seed=0)
     assert (compared, fewer) == (6, 3)
-    clips = opened.rows(f"kind = 'clip' and recording = '{other['artifact']}'")["artifact"].to_pylist()
+    clips = opened.rows(f"kind = 'clip' and recording = '{other['artifact']}'")[
+        "artifact"
+    ].to_pylist()
     assert {one.artifact for one in rest} == set(clips)
     assert rest[0].known["area_weight"] == 0.12
 
 
 def test_reading_only_adds_nothing_to_the_lake(lake: Path, model_folder: Path) -> None:
-    found = answer("made-1", "--lake", lake, *SIZED, "--model", model_folder, "--anyway", "--read-only")
+    found = answer(
+        "made-1", "--lake", lake, *SIZED, "--model", model_folder, "--anyway", "--read-only"
+    )
     assert found["artifact"] is None
     assert not measurements(lake)
 
@@ -324,7 +383,11 @@ def test_a_refused_recording_leaves_no_measurement(lake: Path, film: Path) -> No
 def test_a_query_measures_each_clip(lake: Path, model_folder: Path) -> None:
     options = ("--lake", lake, *SIZED, "--model", model_folder, "--anyway")
     found = answer("--query", "wind between 3 and 5 and seed = 1", *options)["measurements"]
-    clips = Lake.open(lake).rows("kind = 'clip' and seed = 1", columns=["artifact"])["artifact"].to_pylist()
+    clips = (
+        Lake.open(lake)
+        .rows("kind = 'clip' and seed = 1", columns=["artifact"])["artifact"]
+        .to_pylist()
+    )
     assert sorted(one["source"] for one in found) == sorted(clips)  # type: ignore[union-attr, index]
     assert {one["simulated_with"]["wind_speed"] for one in found} == {4.0}  # type: ignore[union-attr, index]
     assert "no clip matches" in run("--query", "wind > 90", *options, code=1).err
@@ -341,7 +404,9 @@ def test_a_clip_is_its_part_of_the_recording(lake: Path, model_folder: Path) -> 
         assert quantity["interval"] == pytest.approx(cut["quantities"][name]["interval"], rel=5e-3)  # type: ignore[index]
 
 
-def test_a_wind_series_is_a_table_and_a_data_set(lake: Path, model_folder: Path, tmp_path: Path) -> None:
+def test_a_wind_series_is_a_table_and_a_data_set(
+    lake: Path, model_folder: Path, tmp_path: Path
+) -> None:
     import xarray
 
     target = tmp_path / "series.zarr"
@@ -381,7 +446,11 @@ def test_a_wind_series_is_a_table_and_a_data_set(lake: Path, model_folder: Path,
         (("FILM", "--json", "--csv"), 2, "more than one form"),
         (("FILM", "--refine", "28"), 2, "whose size is not known"),
         (("FILM", "--cache", "clips"), 2, "--cache needs --refine"),
-        (("--query", "true", "--flag-size", "1.5x1.0", "--refine", "28", "--lake", "LAKE"), 2, "is of one film"),
+        (
+            ("--query", "true", "--flag-size", "1.5x1.0", "--refine", "28", "--lake", "LAKE"),
+            2,
+            "is of one film",
+        ),
         (("FILM", "--report", "nowhere/report.html"), 1, "create it first"),
         (("FILM", "--lake", "nowhere"), 1, "no lake here"),
     ],
@@ -408,7 +477,18 @@ def test_a_hanging_cloth_is_measured_by_a_model_of_it(film: Path, cloth_folder: 
 
 
 def test_a_hanging_cloth_is_not_refined_by_simulating_flags(film: Path, cloth_folder: Path) -> None:
-    said = run(film, "--model", cloth_folder, "--flag-size", "1.0x1.0", "--anyway", "--refine", "28", "--json", code=2)
+    said = run(
+        film,
+        "--model",
+        cloth_folder,
+        "--flag-size",
+        "1.0x1.0",
+        "--anyway",
+        "--refine",
+        "28",
+        "--json",
+        code=2,
+    )
     assert "hanging-cloth" in said.out + said.err
 
 
@@ -423,11 +503,24 @@ def test_a_measurement_that_is_committed_is_reported_whatever_becomes_of_its_fil
     monkeypatch.setattr("flagdata.core.files.outputs.fresh_folder", refused_by_the_disk)
     monkeypatch.setattr("flagdata.core.files.outputs.write_file", refused_by_the_disk)
     files = ("--report", tmp_path / "report.html", "--zarr", tmp_path / "series.zarr")
-    options = ("made-1", "--lake", lake, *SIZED, "--model", model_folder, "--anyway", *files, "--json")
+    options = (
+        "made-1",
+        "--lake",
+        lake,
+        *SIZED,
+        "--model",
+        model_folder,
+        "--anyway",
+        *files,
+        "--json",
+    )
     done = run(*options)
     assert json.loads(done.out)["artifact"] == measurements(lake)[0]["artifact"]
     for what in ("its Zarr folder", "its report"):
-        assert f"is published, but writing {what} failed: the system refused: Input/output error" in done.err
+        assert (
+            f"is published, but writing {what} failed: the system refused: Input/output error"
+            in done.err
+        )
     run(*options, "--read-only", code=1)
 
 

@@ -1,4 +1,5 @@
-"""The example that comes with the package: small, read and measured as any film and log, its truth in the intervals."""
+"""The example that comes with the package: small, read and measured as any film and log, its truth
+in the intervals."""
 
 from __future__ import annotations
 
@@ -36,13 +37,15 @@ def test_film_and_log_are_of_the_flag_that_is_stated() -> None:
     during = wind.start * 1e-9 + wind.time - 1778751000.0 - flag.clock_offset
     logged = wind.speed[(during >= 0) & (during <= 12)]
     assert len(logged) == 12
-    # A cup lags by half a second, and its noise is 0.05 m/s: 12 readings follow the mean within 0.1 m/s.
+    # A cup lags by half a second, and its noise is 0.05 m/s: 12 readings follow the mean within 0.1
+    # m/s.
     assert logged.mean() == pytest.approx(flag.truth["wind_speed"], abs=0.1)
     assert np.isfinite(wind.direction).all()
 
 
 def test_the_command_measures_the_example_with_its_truth_beside() -> None:
-    """The flag's size is taken from the example: with none the answer would be of the network's own flag.
+    """The flag's size is taken from the example: with none the answer would be of the network's own
+    flag.
 
     `tests/test_readme.py` makes the same measurement by the call.
     """

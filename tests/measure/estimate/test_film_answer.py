@@ -1,4 +1,5 @@
-"""The answer in words: which quantities get a value, which do not, and how much the film added to what was assumed."""
+"""The answer in words: which quantities get a value, which do not, and how much the film added to
+what was assumed."""
 
 from __future__ import annotations
 
@@ -21,7 +22,13 @@ def whole(low: float, high: float) -> Span:
 
 
 WIND = Quantity(
-    name="wind_speed", unit="m/s", value=4.3, sigma=0.27, span=whole(3.9, 4.8), assumed=(0.0, 10.0), information=1.9
+    name="wind_speed",
+    unit="m/s",
+    value=4.3,
+    sigma=0.27,
+    span=whole(3.9, 4.8),
+    assumed=(0.0, 10.0),
+    information=1.9,
 )
 WEIGHT = Quantity(
     name="area_weight",
@@ -63,21 +70,28 @@ CALM = Quantity(
 
 
 def test_the_answer_is_one_line() -> None:
-    assert sentence([WIND, WEIGHT]) == "wind 4.3 m/s [3.9, 4.8] 90 %, area weight 0.13 kg/m² [0.11, 0.16]"
+    assert (
+        sentence([WIND, WEIGHT])
+        == "wind 4.3 m/s [3.9, 4.8] 90 %, area weight 0.13 kg/m² [0.11, 0.16]"
+    )
 
 
 def test_a_quantity_without_information_is_reported_with_its_prior_range() -> None:
     assert sentence([WIND, UNCONSTRAINED]) == (
-        "wind 4.3 m/s [3.9, 4.8] 90 %; area weight: not constrained by this clip (prior range 0.10 to 0.17 kg/m²)"
+        "wind 4.3 m/s [3.9, 4.8] 90 %; area weight: not constrained by this clip (prior range 0.10 "
+        "to 0.17 kg/m²)"
     )
     assert sentence([UNCONSTRAINED]).startswith("area weight: not constrained")
 
 
 def test_a_wind_at_the_end_of_what_the_model_knows_is_bounded_on_one_side_with_the_reason() -> None:
     assert sentence([STRONG, WEIGHT]) == (
-        "wind at least 9.4 m/s, 95 % (the network's range ends at 10.0 m/s), area weight 0.13 kg/m² [0.11, 0.16] 90 %"
+        "wind at least 9.4 m/s, 95 % (the network's range ends at 10.0 m/s), area weight 0.13 "
+        "kg/m² [0.11, 0.16] 90 %"
     )
-    assert sentence([CALM, UNCONSTRAINED]).startswith("wind at most 0.5 m/s, 95 %; area weight: not constrained")
+    assert sentence([CALM, UNCONSTRAINED]).startswith(
+        "wind at most 0.5 m/s, 95 %; area weight: not constrained"
+    )
     finding = explain_bound(STRONG)
     assert finding is not None
     assert finding.kind == "wind-speed-at-end"
@@ -122,7 +136,12 @@ def test_information_is_the_divergence_of_gaussians() -> None:
 
 
 def found(
-    draws: np.ndarray, prior: np.ndarray, name: str, *, assumed: tuple[float, float], level: float = 0.9
+    draws: np.ndarray,
+    prior: np.ndarray,
+    name: str,
+    *,
+    assumed: tuple[float, float],
+    level: float = 0.9,
 ) -> Quantity:
     low, high = assumed
     return quantities(
@@ -139,8 +158,12 @@ def found(
 def test_a_posterior_equal_to_the_prior_gives_no_value_and_a_narrow_one_does() -> None:
     rng = stream(2, "told")
     prior = rng.uniform(0.1, 0.17, size=(5000, 1))
-    assert not found(rng.uniform(0.1, 0.17, size=(400, 1)), prior, "area_weight", assumed=(0.1, 0.17)).constrained
-    assert found(rng.normal(0.13, 0.01, size=(400, 1)), prior, "area_weight", assumed=(0.1, 0.17)).constrained
+    assert not found(
+        rng.uniform(0.1, 0.17, size=(400, 1)), prior, "area_weight", assumed=(0.1, 0.17)
+    ).constrained
+    assert found(
+        rng.normal(0.13, 0.01, size=(400, 1)), prior, "area_weight", assumed=(0.1, 0.17)
+    ).constrained
 
 
 def test_the_interval_contains_its_share_of_the_draws() -> None:

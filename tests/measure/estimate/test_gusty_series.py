@@ -1,4 +1,5 @@
-"""A film's windows as one gusty series: its limits, against dense formulas, and on series drawn from the model."""
+"""A film's windows as one gusty series: its limits, against dense formulas, and on series drawn
+from the model."""
 
 from __future__ import annotations
 
@@ -16,7 +17,13 @@ from flagdata.core.rng import stream
 from flagdata.errors import CorruptError, InputError
 from measure.anemometer import network
 from measure.estimate import SERIES_KEY, Gusts, Pair, SeriesErrors, errors_of_model
-from measure.estimate.gusty_series import Course, GustPrior, error_correlation, gust_covariance, log_moments
+from measure.estimate.gusty_series import (
+    Course,
+    GustPrior,
+    error_correlation,
+    gust_covariance,
+    log_moments,
+)
 from models.trained.estimator import Estimator
 from models.trained.model_folder import CARD, card_bytes, read_card, renew
 
@@ -64,7 +71,9 @@ def test_with_gusts_of_any_strength_and_no_memory_each_window_stands_alone() -> 
     mean, covariance = course(logs, sigmas, prior=only(1e4, 1e-3)).given(1e4, 1e-3)
     shared = 0.8**2 * np.mean(sigmas**2)
     np.testing.assert_allclose(mean, logs, atol=1e-5)
-    np.testing.assert_allclose(covariance, np.diag(0.5**2 * sigmas**2) + shared, rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(
+        covariance, np.diag(0.5**2 * sigmas**2) + shared, rtol=1e-4, atol=1e-6
+    )
 
 
 def test_without_gusts_all_windows_have_one_wind_and_many_leave_the_shared_error_alone() -> None:
@@ -76,11 +85,14 @@ def test_without_gusts_all_windows_have_one_wind_and_many_leave_the_shared_error
 
 
 def test_the_posterior_is_that_of_a_dense_gaussian_with_a_wide_prior_of_the_mean() -> None:
-    # All of it written out: (u, m) are jointly normal, μ of a standard deviation of 1,000 in place of a flat prior.
+    # All of it written out: (u, m) are jointly normal, μ of a standard deviation of 1,000 in place
+    # of a flat prior.
     rng = stream(2, "dense")
     k, intensity, length = 7, 0.2, 90.0
     sigmas, logs = rng.uniform(0.1, 0.3, k), np.log(6.0) + rng.normal(0, 0.2, k)
-    found = course(logs, sigmas, prior=only(intensity, length), halves=0.35, neighbours=0.1, step=0.6)
+    found = course(
+        logs, sigmas, prior=only(intensity, length), halves=0.35, neighbours=0.1, step=0.6
+    )
     mean, covariance = found.given(intensity, length)
     time = length / np.exp(logs.mean())
     gusts = np.empty((k, k))
@@ -120,7 +132,9 @@ def test_points_of_the_grid_are_as_probable_as_contrasts_of_the_windows_make_the
 @pytest.mark.parametrize("apart", [0.0, 0.5, 1.2, 7.0])
 def test_gusts_are_averaged_over_windows(apart: float) -> None:
     found = gust_covariance(np.array([0.0, apart]), window=WINDOW, intensity=0.2, time=2.5)[0, 1]
-    total, _ = dblquad(lambda s, t: np.exp(-abs(apart + s - t) / 2.5), 0, WINDOW, 0, WINDOW, epsabs=1e-7)
+    total, _ = dblquad(
+        lambda s, t: np.exp(-abs(apart + s - t) / 2.5), 0, WINDOW, 0, WINDOW, epsabs=1e-7
+    )
     assert found == pytest.approx(0.04 * total / WINDOW**2, rel=1e-5)
 
 
@@ -137,10 +151,16 @@ def test_series_drawn_from_the_model_lie_in_their_intervals_as_often_as_these_sa
     prior = GustPrior.standard()
     in_windows, in_means, in_intensity = [], [], []
     for _ in range(films):
-        intensity, length, centre = rng.uniform(0, 0.5), rng.choice(prior.length), np.log(rng.uniform(4, 8))
+        intensity, length, centre = (
+            rng.uniform(0, 0.5),
+            rng.choice(prior.length),
+            np.log(rng.uniform(4, 8)),
+        )
         sigmas = np.full(k, 0.2)
         starts = WINDOW * np.arange(k)
-        gusts = gust_covariance(starts, window=WINDOW, intensity=intensity, time=length / np.exp(centre))
+        gusts = gust_covariance(
+            starts, window=WINDOW, intensity=intensity, time=length / np.exp(centre)
+        )
         true = centre + rng.multivariate_normal(np.zeros(k), gusts)
         logs = true + rng.normal(0, 0.8 * 0.2) + rng.normal(0, 0.5 * sigmas)
         winds, strengths = course(logs, sigmas).draws(400, rng)
@@ -150,7 +170,9 @@ def test_series_drawn_from_the_model_lie_in_their_intervals_as_often_as_these_sa
         in_means.append(ends[0] <= np.exp(true).mean() <= ends[1])
         ends = np.quantile(strengths, [0.05, 0.95])
         in_intensity.append(ends[0] <= intensity <= ends[1])
-    slack = 3 * np.sqrt(0.9 * 0.1 / films)  # three binomial standard errors; windows of a film are not independent
+    slack = 3 * np.sqrt(
+        0.9 * 0.1 / films
+    )  # three binomial standard errors; windows of a film are not independent
     for share in (in_windows, in_means, in_intensity):
         assert np.mean(share) == pytest.approx(0.9, abs=slack)
 
@@ -160,7 +182,9 @@ def test_draws_have_the_moments_of_the_exact_posterior() -> None:
     found = course(logs, sigmas, prior=only(0.15, 80.0))
     mean, covariance = found.given(0.15, 80.0)
     winds, intensity = found.draws(40_000, stream(5, "moments"))
-    np.testing.assert_allclose(np.log(winds).mean(axis=1), mean, atol=4 * np.sqrt(covariance.max() / 40_000))
+    np.testing.assert_allclose(
+        np.log(winds).mean(axis=1), mean, atol=4 * np.sqrt(covariance.max() / 40_000)
+    )
     np.testing.assert_allclose(np.cov(np.log(winds)), covariance, rtol=0.03)
     assert (intensity == 0.15).all()
 
@@ -205,15 +229,25 @@ def test_a_card_states_the_errors_and_an_old_one_none(model: Estimator) -> None:
 
 @pytest.mark.parametrize(
     "change",
-    [{"format": 2}, {"open": {"shared": -1.0, "own": 0.5}}, {"stated": None}, {"halves": 0.9}, {"neighbours": "much"}],
+    [
+        {"format": 2},
+        {"open": {"shared": -1.0, "own": 0.5}},
+        {"stated": None},
+        {"halves": 0.9},
+        {"neighbours": "much"},
+    ],
 )
-def test_a_damaged_entry_is_refused_with_what_makes_it_anew(model: Estimator, change: dict[str, object]) -> None:
+def test_a_damaged_entry_is_refused_with_what_makes_it_anew(
+    model: Estimator, change: dict[str, object]
+) -> None:
     card = {**model.card, SERIES_KEY: {**ERRORS.entry(), **change}}
     with pytest.raises(CorruptError, match="series-errors"):
         errors_of_model(replace(model, card=card))
 
 
-def test_a_card_that_states_the_errors_since_is_one_of_the_same_network(model_folder: Path, tmp_path: Path) -> None:
+def test_a_card_that_states_the_errors_since_is_one_of_the_same_network(
+    model_folder: Path, tmp_path: Path
+) -> None:
     folder = tmp_path / model_folder.name
     shutil.copytree(model_folder, folder)
     before = network(str(folder), lake=None, at=None)

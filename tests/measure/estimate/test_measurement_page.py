@@ -31,9 +31,15 @@ def found(model: Estimator) -> Measurement:
 
 
 def drawn(
-    found: Measurement, context: Context = PLAIN, *, anyway: bool = False, sections: tuple[Section, ...] = ()
+    found: Measurement,
+    context: Context = PLAIN,
+    *,
+    anyway: bool = False,
+    sections: tuple[Section, ...] = (),
 ) -> str:
-    return page(found, beside(found, start=None, wind=None), context, anyway=anyway, sections=sections)
+    return page(
+        found, beside(found, start=None, wind=None), context, anyway=anyway, sections=sections
+    )
 
 
 def test_the_answer_stands_first_and_every_quantity_has_a_row(found: Measurement) -> None:
@@ -43,7 +49,9 @@ def test_the_answer_stands_first_and_every_quantity_has_a_row(found: Measurement
     folded = text.partition("Not constrained by this film")[2].partition("</details>")[0]
     for quantity in found.quantities:
         assert (f"<td>{SHORT[quantity.name]}</td>" in folded) is not quantity.constrained
-    assert [text.count(f"<td>{name}</td>") for name in ("wind", "area weight", "bending", "anisotropy")] == [1] * 4
+    assert [
+        text.count(f"<td>{name}</td>") for name in ("wind", "area weight", "bending", "anisotropy")
+    ] == [1] * 4
 
 
 def test_a_wind_from_elsewhere_is_compared_on_the_page_too(found: Measurement) -> None:
@@ -60,14 +68,20 @@ def test_a_bound_is_shown_as_one_without_a_value(model: Estimator) -> None:
     assert f"<b>{strong.sentence}</b>" in text
     (headline,) = re.findall(r'<p class="headline">(.*?)</p>', text)
     assert re.fullmatch(r"wind <b>at least \d\.\d\d m/s</b> 95 %", headline)
-    assert text.index(headline) < text.index(f"<b>{strong.sentence}</b>") < text.index("<h2>The film")
+    assert (
+        text.index(headline) < text.index(f"<b>{strong.sentence}</b>") < text.index("<h2>The film")
+    )
     assert re.search(r"<td>wind</td> <td></td><td>at least \d\.\d\d \(95 %\)</td>", text)
     assert "range ends at 10.0 m/s" in text
     assert "inf" not in re.sub(r"data:[^\"]*|inference|information|inform", "", text)
 
 
-def test_a_film_in_which_nothing_moves_is_shown_without_estimates_even_anyway(model: Estimator) -> None:
-    still = measured(Frames(time=np.arange(24) / 25.0, images=pictures(1).repeat(24, axis=0)), model)
+def test_a_film_in_which_nothing_moves_is_shown_without_estimates_even_anyway(
+    model: Estimator,
+) -> None:
+    still = measured(
+        Frames(time=np.arange(24) / 25.0, images=pictures(1).repeat(24, axis=0)), model
+    )
     text = drawn(still, anyway=True)
     assert "no motion is found in the picture" in text
     assert "What the film says" not in text
@@ -80,7 +94,9 @@ def test_names_from_outside_are_escaped(found: Measurement) -> None:
     assert "&lt;flag&gt;.mkv" in text
 
 
-def test_a_refused_film_is_shown_without_estimates_unless_asked_for_and_then_marked(found: Measurement) -> None:
+def test_a_refused_film_is_shown_without_estimates_unless_asked_for_and_then_marked(
+    found: Measurement,
+) -> None:
     refused = replace(found, verdict=replace(found.verdict, p=0.001))
     assert found.sentence not in drawn(refused)
     assert "What the film says" not in drawn(refused)
@@ -89,15 +105,21 @@ def test_a_refused_film_is_shown_without_estimates_unless_asked_for_and_then_mar
     assert "not to be relied on" in " ".join(marked.split())
 
 
-def test_a_section_of_another_program_comes_between_the_answer_and_its_provenance(found: Measurement) -> None:
-    section = Section(anchor="refinement", title="Refined by simulation", body=Markup("<p>fifty <b>runs</b></p>"))
+def test_a_section_of_another_program_comes_between_the_answer_and_its_provenance(
+    found: Measurement,
+) -> None:
+    section = Section(
+        anchor="refinement", title="Refined by simulation", body=Markup("<p>fifty <b>runs</b></p>")
+    )
     text = drawn(found, sections=(section,))
     assert '<section id="refinement">' in text
     assert "<b>runs</b>" in text
     assert text.index("What the film says") < text.index("fifty") < text.index("Where it is from")
 
 
-def test_simulated_neighbours_are_shown_in_motion_with_what_they_were_made_with(found: Measurement) -> None:
+def test_simulated_neighbours_are_shown_in_motion_with_what_they_were_made_with(
+    found: Measurement,
+) -> None:
     neighbour = Neighbour(
         artifact="a" * 32,
         name="clip",

@@ -1,4 +1,5 @@
-"""A film measured by a model whose card states how it errs in windows: one gusty series, coherent with its mean."""
+"""A film measured by a model whose card states how it errs in windows: one gusty series, coherent
+with its mean."""
 
 from __future__ import annotations
 
@@ -98,7 +99,9 @@ def test_one_window_and_a_model_without_constants_are_answered_as_before(
     assert several.as_dict(anyway=True)["gusts"] is None
 
 
-def test_windows_that_bound_the_wind_are_no_series_and_keep_their_bounds(series_model: Estimator) -> None:
+def test_windows_that_bound_the_wind_are_no_series_and_keep_their_bounds(
+    series_model: Estimator,
+) -> None:
     found = measured(even(4 * FRAMES), far(series_model, 0, 1.0))
     assert found.gusts is None
     assert {window.quantity("wind_speed").value for window in found.windows} == {None}
@@ -106,7 +109,9 @@ def test_windows_that_bound_the_wind_are_no_series_and_keep_their_bounds(series_
     assert note.count == 4
 
 
-def test_a_strange_window_keeps_its_own_answer_and_its_mark(model: Estimator, series_model: Estimator) -> None:
+def test_a_strange_window_keeps_its_own_answer_and_its_mark(
+    model: Estimator, series_model: Estimator
+) -> None:
     film, p = even(6 * FRAMES), (0.5, 0.001, 0.4, 0.6, 0.5, 0.5)
     found, alone = (
         measure(film, one, gate=Listed(*p), dependence=APART, options=Options(size=WHOLE))
@@ -119,7 +124,9 @@ def test_a_strange_window_keeps_its_own_answer_and_its_mark(model: Estimator, se
     assert (found.gusts.windows, found.combined) == (5, 5)
 
 
-def test_windows_that_overlap_are_as_wide_as_others_and_say_no_more_of_the_gusts(series_model: Estimator) -> None:
+def test_windows_that_overlap_are_as_wide_as_others_and_say_no_more_of_the_gusts(
+    series_model: Estimator,
+) -> None:
     film = even(8 * FRAMES)
     apart = measured(film, series_model)
     overlapping = measured(film, series_model, step=LENGTH / 4)
@@ -162,12 +169,17 @@ def test_the_gusts_are_in_the_json_and_in_the_terminal(
     assert "films that were made up" in note.what
 
 
-def test_python_has_the_gusts_with_their_interval(model: Estimator, series_model: Estimator) -> None:
+def test_python_has_the_gusts_with_their_interval(
+    model: Estimator, series_model: Estimator
+) -> None:
     film = even(6 * FRAMES)
     found = measured(film, series_model)
     assert found.gusts is not None
     gusts = answer_of(found).gusts
     assert gusts is not None
-    assert (gusts.value, gusts.interval) == (found.gusts.intensity.value, found.gusts.intensity.interval)
+    assert (gusts.value, gusts.interval) == (
+        found.gusts.intensity.value,
+        found.gusts.intensity.interval,
+    )
     assert gusts.constrained == found.gusts.as_dict()["constrained"]
     assert answer_of(measured(film, model)).gusts is None

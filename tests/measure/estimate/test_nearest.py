@@ -1,4 +1,5 @@
-"""The clip of a simulated film that is set beside a film: as much time as the network takes, at any frame rate."""
+"""The clip of a simulated film that is set beside a film: as much time as the network takes, at any
+frame rate."""
 
 from __future__ import annotations
 

@@ -18,11 +18,15 @@ CLIP = "video/dyntex_flag_571c110.avi"  # 352 × 288 px, 25 Hz, 250 frames
 SIZE = FlagSize(length=1.5, height=1.0)
 
 
-def test_every_window_of_the_film_has_a_wind_in_the_range_that_was_assumed(reference_data: Path) -> None:
+def test_every_window_of_the_film_has_a_wind_in_the_range_that_was_assumed(
+    reference_data: Path,
+) -> None:
     film = CameraFilm(reference_data / CLIP)
     assert film.rate == pytest.approx(25.0)
     model = estimator.load_shipped()
-    found = measure(film, model, gate=gate_of(model), dependence=UNKNOWN, options=Options(size=SIZE))
+    found = measure(
+        film, model, gate=gate_of(model), dependence=UNKNOWN, options=Options(size=SIZE)
+    )
     assert len(found.windows) == 8
     winds = [window.quantity("wind_speed") for window in found.windows]
     assert all(0.0 <= wind.span.low < wind.span.high for wind in winds)
@@ -36,7 +40,8 @@ def test_the_first_of_two_flags_is_found_and_the_camera_is_steadied(reference_da
     assert pictures.shape == (250, 300, 300)
     found = film.as_dict()
     assert found is not None
-    # By eye: the flag's hoist is at 88 px, its tip reaches 345 px; the second flag lies below 235 px.
+    # By eye: the flag's hoist is at 88 px, its tip reaches 345 px; the second flag lies below 235
+    # px.
     left, _, right, bottom = found["flags"][0]["box"]
     assert (left, right) == (pytest.approx(90, abs=12), pytest.approx(343, abs=12))
     assert bottom < 215

@@ -1,4 +1,5 @@
-"""A refinement of a flag of another size: what was found of the simulated one scales with the flag."""
+"""A refinement of a flag of another size: what was found of the simulated one scales with the
+flag."""
 
 from __future__ import annotations
 
@@ -58,14 +59,17 @@ def found() -> Refinement:
 def test_a_flag_four_times_as_long_has_twice_the_wind_four_times_the_weight_and_4_to_the_4th_the_stiffness(
     found: Refinement,
 ) -> None:
-    """Froude number U²/(gL), mass ratio ρ_s/(ρ_air L) and B/(ρ_air U² L³) are those of the simulated flag."""
+    """Froude number U²/(gL), mass ratio ρ_s/(ρ_air L) and B/(ρ_air U² L³) are those of the
+    simulated flag."""
     larger = scale_refinement(found, 4.0)
     by_name = {entry.name: entry for entry in larger.intervals}
     assert (by_name["wind_speed"].median, by_name["wind_speed"].span.high) == (8.0, 9.0)
     assert by_name["wind_speed.1"].span.low == 10.0
     assert by_name["area_weight"].median == pytest.approx(0.48)
     assert by_name["bending_scale"].median == pytest.approx(-4.0 + math.log10(256))
-    assert by_name["bending_scale"].span.high - by_name["bending_scale"].span.low == pytest.approx(0.4)
+    assert by_name["bending_scale"].span.high - by_name["bending_scale"].span.low == pytest.approx(
+        0.4
+    )
     np.testing.assert_allclose(larger.bending, 256e-4)
 
 
@@ -75,7 +79,12 @@ def test_a_bound_scales_and_stays_one(found: Refinement) -> None:
     larger = scale_refinement(replace(found, intervals=(strong, *found.intervals[1:])), 4.0)
     assert larger.intervals[0].span == replace(least, low=18.8)
     interval = larger.intervals[0].as_dict()
-    assert (interval["median"], interval["low"], interval["high"], interval["bound"]) == (None, 18.8, None, "at-least")
+    assert (interval["median"], interval["low"], interval["high"], interval["bound"]) == (
+        None,
+        18.8,
+        None,
+        "at-least",
+    )
     assert larger.intervals[0].phrase(2, " m/s") == "at least 18.80 m/s"
 
 
@@ -100,7 +109,9 @@ def test_the_view_that_a_record_states_is_that_of_the_simulated_clips_whatever_p
     found: Refinement, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     given: list[Clip] = []
-    monkeypatch.setattr("measure.estimate.refined.run", lambda clips, *_, **__: given.extend(clips) or found)
+    monkeypatch.setattr(
+        "measure.estimate.refined.run", lambda clips, *_, **__: given.extend(clips) or found
+    )
     recording: Any = object()
     measured: Any = SimpleNamespace(
         film="flag",

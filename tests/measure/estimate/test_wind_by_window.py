@@ -45,7 +45,8 @@ def log(times: np.ndarray, speed: np.ndarray) -> WindSeries:
 
 
 def saying(model: Estimator, wind: np.ndarray, *, step: float) -> Measurement:
-    """A measurement whose windows, one each `step`, say these winds ± 0.5 m/s, at least `STRONG` where they are NaN."""
+    """A measurement whose windows, one each `step`, say these winds ± 0.5 m/s, at least `STRONG`
+    where they are NaN."""
     found = measured(even(2 * FRAMES), model)
     first = found.windows[0]
     quantity = replace(first.quantities[0], information=1.0)
@@ -54,12 +55,19 @@ def saying(model: Estimator, wind: np.ndarray, *, step: float) -> Measurement:
         if math.isnan(v):
             least = Span(low=STRONG, high=math.inf, level=0.95, bound=Bound.LEAST, estimated=False)
             return replace(quantity, value=None, sigma=None, span=least)
-        return replace(quantity, value=v, span=Span(low=v - 0.5, high=v + 0.5, level=0.9, bound=None, estimated=True))
+        return replace(
+            quantity,
+            value=v,
+            span=Span(low=v - 0.5, high=v + 0.5, level=0.9, bound=None, estimated=True),
+        )
 
     windows = tuple(
-        replace(first, start=k * step, end=k * step + 0.44, quantities=(said(v),)) for k, v in enumerate(wind.tolist())
+        replace(first, start=k * step, end=k * step + 0.44, quantities=(said(v),))
+        for k, v in enumerate(wind.tolist())
     )
-    return replace(found, windows=windows, verdict=replace(found.verdict, window_p=(0.5,) * len(wind)))
+    return replace(
+        found, windows=windows, verdict=replace(found.verdict, window_p=(0.5,) * len(wind))
+    )
 
 
 def test_bias_and_rmse_are_those_that_were_put_in(model: Estimator) -> None:
@@ -76,7 +84,9 @@ def test_bias_and_rmse_are_those_that_were_put_in(model: Estimator) -> None:
     assert agreement(found, np.full(100, np.nan), seed=0) is None
 
 
-def test_the_rmse_of_few_windows_has_no_interval_and_that_of_many_has_one_about_it(model: Estimator) -> None:
+def test_the_rmse_of_few_windows_has_no_interval_and_that_of_many_has_one_about_it(
+    model: Estimator,
+) -> None:
     """Windows of 1.2 s without a gap: five blocks of 12 s are 50 of them."""
     off = np.random.default_rng(2).normal(0.0, 0.5, 200)
     wind = gusts(200)
@@ -89,16 +99,21 @@ def test_the_rmse_of_few_windows_has_no_interval_and_that_of_many_has_one_about_
         assert ("without an interval" in agreed.sentence) is not known
         if agreed.interval is not None:
             assert agreed.interval[0] < agreed.rmse < agreed.interval[1]
-    # 200 errors of 0.5 m/s: the RMSE scatters by 0.5 / √400 = 0.025 m/s, its interval is 3.3 times as wide.
+    # 200 errors of 0.5 m/s: the RMSE scatters by 0.5 / √400 = 0.025 m/s, its interval is 3.3 times
+    # as wide.
     assert agreed.interval is not None
     assert agreed.interval[1] - agreed.interval[0] == pytest.approx(3.29 * 0.025, rel=0.4)
 
 
-def test_windows_with_a_bound_count_where_intervals_are_compared_and_among_no_errors(model: Estimator) -> None:
-    """Every second wind is 12 m/s, of which the model knows that it is 9.4 m/s or more; the others are read 0.3 m/s too
-    high."""
+def test_windows_with_a_bound_count_where_intervals_are_compared_and_among_no_errors(
+    model: Estimator,
+) -> None:
+    """Every second wind is 12 m/s, of which the model knows that it is 9.4 m/s or more; the others
+    are read 0.3 m/s too high."""
     wind = np.where(np.arange(100) % 2, 12.0, gusts(100))
-    series = beside(saying(model, np.where(wind == 12.0, np.nan, wind + 0.3), step=1.0), start=START, wind=None)
+    series = beside(
+        saying(model, np.where(wind == 12.0, np.nan, wind + 0.3), step=1.0), start=START, wind=None
+    )
     agreed = agreement(series, wind, seed=0)
     assert agreed is not None
     assert (agreed.count, agreed.bounded, agreed.covered) == (100, 50, 1.0)
@@ -110,7 +125,9 @@ def test_windows_with_a_bound_count_where_intervals_are_compared_and_among_no_er
     assert spectrum(series.time, series.wind, wind) is None  # no two windows in a row have values
 
 
-def test_a_series_of_bounds_alone_has_no_error_and_json_without_infinities(model: Estimator) -> None:
+def test_a_series_of_bounds_alone_has_no_error_and_json_without_infinities(
+    model: Estimator,
+) -> None:
     strong = saying(model, np.full(200, np.nan), step=1.0)
     series = beside(strong, start=START, wind=log(np.arange(-70, 210, 1.0), np.full(280, 12.0)))
     assert series.window is not None
@@ -131,7 +148,8 @@ def test_a_series_of_bounds_alone_has_no_error_and_json_without_infinities(model
 
 
 def test_the_window_sees_its_own_wind_and_the_minute_the_mean_before_it(model: Estimator) -> None:
-    # The wind rises from 0 by 0.1 m/s a second: a window of 0.44 s ends 0.22 s after its mean, a minute 30 s.
+    # The wind rises from 0 by 0.1 m/s a second: a window of 0.44 s ends 0.22 s after its mean, a
+    # minute 30 s.
     times = np.arange(-70, 40, 0.02)
     ramp = np.maximum(0.1 * (times + 70), 0)
     found = beside(saying(model, np.full(30, 7.0), step=1.0), start=START, wind=log(times, ramp))
@@ -158,7 +176,10 @@ def test_series_that_share_a_slow_part_are_coherent_there_and_not_elsewhere() ->
 @pytest.mark.parametrize(
     ("coherence", "sentence"),
     [
-        ((0.9, 0.7, 0.1, 0.2, 0.8), "Below 0.3 Hz, in gusts of more than 3.3 s, .*coherence 0.80.*; above, they are"),
+        (
+            (0.9, 0.7, 0.1, 0.2, 0.8),
+            "Below 0.3 Hz, in gusts of more than 3.3 s, .*coherence 0.80.*; above, they are",
+        ),
         ((0.9, 0.7, 0.1, 0.9, 0.8), "up to 0.5 Hz"),
         ((0.3, 0.2, 0.9, 0.9, 0.9), "nothing in common at any frequency"),
     ],
@@ -193,7 +214,9 @@ def test_the_delay_between_film_and_anemometer_is_found(model: Estimator) -> Non
     rng = stream(6, "noise")
     seen = np.interp(np.arange(600) + 0.22, times, wind) + 0.3 * rng.normal(size=600)
     late = 4.2  # the anemometer's clock is ahead
-    found = beside(saying(model, np.maximum(seen, 0), step=1.0), start=START, wind=log(times + late, wind))
+    found = beside(
+        saying(model, np.maximum(seen, 0), step=1.0), start=START, wind=log(times + late, wind)
+    )
     assert found.delay is not None
     assert not found.delay.reasons
     assert found.delay.offset is not None
@@ -203,7 +226,11 @@ def test_the_delay_between_film_and_anemometer_is_found(model: Estimator) -> Non
 
 
 def test_a_short_film_has_no_delay_and_says_why(model: Estimator) -> None:
-    found = beside(saying(model, gusts(30), step=1.0), start=START, wind=log(np.arange(-70, 40, 1.0), gusts(110)))
+    found = beside(
+        saying(model, gusts(30), step=1.0),
+        start=START,
+        wind=log(np.arange(-70, 40, 1.0), gusts(110)),
+    )
     assert found.delay is not None
     assert found.delay.offset is None
     assert "shorter than 120 s" in found.delay.reasons[0]
@@ -212,7 +239,9 @@ def test_a_short_film_has_no_delay_and_says_why(model: Estimator) -> None:
 def test_a_table_has_a_row_a_window_and_empty_cells_where_nothing_is_known() -> None:
     nothing = np.array([np.nan, 4.0])
     both = np.array([1.0, 2.0])
-    found = Beside(time=both, wind=both, low=both, high=both, p=both, logged=nothing, minute=nothing)
+    found = Beside(
+        time=both, wind=both, low=both, high=both, p=both, logged=nothing, minute=nothing
+    )
     rows = list(found.rows())
     assert rows[0] == ["time", "wind", "low", "high", "p", "anemometer", "anemometer_minute"]
     assert rows[1][-2:] == ["", ""]

@@ -1,4 +1,5 @@
-"""A film that is made fit while it is read: once or twice decoded, in a part, within a crop, against a given size."""
+"""A film that is made fit while it is read: once or twice decoded, in a part, within a crop,
+against a given size."""
 
 from __future__ import annotations
 
@@ -29,7 +30,9 @@ def kinds(made: ConditionedFilm) -> set[str]:
     return {finding.kind for finding in made.findings()}
 
 
-def test_a_film_too_large_to_be_held_is_read_twice_and_shows_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_film_too_large_to_be_held_is_read_twice_and_shows_the_same(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     source = film(Drawn())
     held = read(ConditionedFilm(source))
     monkeypatch.setattr(conditioned_film, "_HELD", 3 * source.images[0].nbytes)
@@ -91,7 +94,10 @@ def test_what_the_camera_did_is_stated_with_its_figures() -> None:
 
 def test_a_flag_that_is_longer_than_the_size_that_was_given_contradicts_it() -> None:
     # The drawn flag is 80 px long and 56 px high at its hoist: 1.4, a little less with its flutter.
-    fitting, wrong = ConditionedFilm(film(Drawn()), aspect=1.5), ConditionedFilm(film(Drawn()), aspect=1.0)
+    fitting, wrong = (
+        ConditionedFilm(film(Drawn()), aspect=1.5),
+        ConditionedFilm(film(Drawn()), aspect=1.0),
+    )
     read(fitting)
     read(wrong)
     assert "flag-size-contradicted" not in kinds(fitting)

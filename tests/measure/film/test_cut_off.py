@@ -46,9 +46,13 @@ def test_a_piece_that_is_shorter_than_what_is_needed_does_not_leave_the_rest_out
 
 
 @pytest.mark.parametrize(("scale", "step"), [(1.0, None), (4.0, None), (1.0, 3.0)])
-def test_the_piece_that_windows_need_holds_one_wherever_it_begins(scale: float, step: float | None) -> None:
+def test_the_piece_that_windows_need_holds_one_wherever_it_begins(
+    scale: float, step: float | None
+) -> None:
     model: Any = SimpleNamespace(front_end=SimpleNamespace(rate=25.0, frames=30))
-    film = ConditionedFilm(Frames(time=np.arange(500) / RATE, images=np.zeros((500, 8, 8), np.uint8)))
+    film = ConditionedFilm(
+        Frames(time=np.arange(500) / RATE, images=np.zeros((500, 8, 8), np.uint8))
+    )
     layout = WindowReader(film, model, [scale], step=step).layout
     starts = np.array([layout.start(index) for index in range(layout.count)])
     for begin in np.linspace(0.0, 2 * layout.step, 50):

@@ -1,4 +1,5 @@
-"""Commands that read films take the processor time of their work, also on a machine that is busy or has a quota."""
+"""Commands that read films take the processor time of their work, also on a machine that is busy or
+has a quota."""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ SECONDS = 2.5
 
 
 def _processor_time(threads: int) -> float:
-    """Measures a film for a caller whose torch has so many threads; the processor time that it took [s]."""
+    """Measures a film for a caller whose torch has so many threads; the processor time that it took
+    [s]."""
     before = torch.get_num_threads()
     torch.set_num_threads(threads)
     try:
@@ -40,8 +42,11 @@ def _processor_time(threads: int) -> float:
 
 @pytest.fixture
 def busy() -> Iterator[None]:
-    """Twice as many processes as cores that do nothing but turn; their time is no child's that was waited for."""
-    loops = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2 * cores())]
+    """Twice as many processes as cores that do nothing but turn; their time is no child's that was
+    waited for."""
+    loops = [
+        subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(2 * cores())
+    ]
     yield
     for loop in loops:
         loop.kill()
@@ -50,7 +55,8 @@ def busy() -> Iterator[None]:
 
 
 def test_measuring_on_a_busy_machine_takes_the_processor_time_of_its_work(busy: None) -> None:
-    """The work is what one thread takes, whose time is nearly that of an idle machine on a busy one, too."""
+    """The work is what one thread takes, whose time is nearly that of an idle machine on a busy
+    one, too."""
     _processor_time(1)  # what is loaded once
     pairs = [(_processor_time(1), _processor_time(cores())) for _ in range(3)]
     work, taken = (statistics.median(times) for times in zip(*pairs, strict=True))
@@ -66,8 +72,14 @@ ENTRIES: dict[str, tuple[str, Callable[[], object]]] = {
         "measure.commands.measure_film.gate_beside",
         lambda: run(Mock(), Mock(reading=None), Mock()),
     ),
-    "observe": ("measure.film.film_source.subjects", lambda: flagdata.observe("flag.mp4", flag_size=(1.5, 1.0))),
-    "calibrate, films": ("measure.cloth.flag_recordings.usable", lambda: Sources(opened=(), left_out=()).read(Mock())),
+    "observe": (
+        "measure.film.film_source.subjects",
+        lambda: flagdata.observe("flag.mp4", flag_size=(1.5, 1.0)),
+    ),
+    "calibrate, films": (
+        "measure.cloth.flag_recordings.usable",
+        lambda: Sources(opened=(), left_out=()).read(Mock()),
+    ),
     "calibrate, weight": (
         "measure.cloth.cloth_calibration.designs_of",
         lambda: calibrate((), Mock(), folder=Path("unused")),
@@ -93,7 +105,9 @@ ENTRIES: dict[str, tuple[str, Callable[[], object]]] = {
 
 
 @pytest.mark.parametrize("entry", ENTRIES)
-def test_films_are_read_by_one_thread_and_the_callers_threads_stay(entry: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_films_are_read_by_one_thread_and_the_callers_threads_stay(
+    entry: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     place, call = ENTRIES[entry]
     seen: list[int] = []
 

@@ -21,8 +21,11 @@ CAMEL = named_material("camel-ponte-roma")
 
 
 def flight(scale: float, *, wind: float, material: Material, frames: int = 12) -> FloatArray:
-    """(frame, vertex, 3) positions of a flag of length 1.5 m · scale, in its own lengths, frames √scale/25 s apart."""
-    scene = flag(material=material, wind_speed=wind, width=1.5 * scale, height=1.0 * scale, columns=6)
+    """(frame, vertex, 3) positions of a flag of length 1.5 m · scale, in its own lengths, frames
+    √scale/25 s apart."""
+    scene = flag(
+        material=material, wind_speed=wind, width=1.5 * scale, height=1.0 * scale, columns=6
+    )
     stiffness = scene.handles.stiffness * scale**2
     scene = replace(scene, handles=replace(scene.handles, stiffness=stiffness))
     system, state = assemble([scene], dtype=torch.float64)
@@ -50,19 +53,25 @@ def test_values_scaled_back_make_half_a_flag_move_like_the_whole() -> None:
     names = ("wind_speed", "area_weight", "bending_scale")
     wind, area_weight, bending = scaled_back(values, names, 0.5)
     whole = flight(1.0, wind=4.0, material=cloth(area_weight=0.12, bending=3e-5))
-    half = flight(0.5, wind=wind, material=cloth(area_weight=area_weight, bending=10**bending, scale=0.5))
+    half = flight(
+        0.5, wind=wind, material=cloth(area_weight=area_weight, bending=10**bending, scale=0.5)
+    )
     moved = np.abs(whole - whole[0]).max()
     assert moved > 0.1  # of a length; it is not a flag at rest that is compared
-    # The step follows from the mesh, so it scales by √s too: equal to rounding, which motion amplifies (10⁻¹⁵ seen).
+    # The step follows from the mesh, so it scales by √s too: equal to rounding, which motion
+    # amplifies (10⁻¹⁵ seen).
     np.testing.assert_allclose(half, whole, atol=1e-9)
-    unscaled = flight(0.5, wind=4.0, material=cloth(area_weight=area_weight, bending=10**bending, scale=0.5))
+    unscaled = flight(
+        0.5, wind=4.0, material=cloth(area_weight=area_weight, bending=10**bending, scale=0.5)
+    )
     assert np.abs(unscaled - whole).max() > 0.01
 
 
 def test_scaling_back_at_the_trained_size_changes_nothing() -> None:
     values = np.array([[4.0, 0.12, -4.5, 0.3]])
     np.testing.assert_array_equal(
-        scaled_back(values, ("wind_speed", "area_weight", "bending_scale", "anisotropy"), 1.0), values
+        scaled_back(values, ("wind_speed", "area_weight", "bending_scale", "anisotropy"), 1.0),
+        values,
     )
 
 
@@ -77,7 +86,10 @@ def test_a_film_slower_than_the_scaled_frames_is_refused_with_the_least_rate() -
     small = FlagSize(length=0.375, height=0.25)  # s = 1/4: frames 1/50 s apart
     with pytest.raises(RefusedError, match=r"needs 47\.5; film at 47\.5"):
         sizes(small, rate=30.0, frames_rate=25.0, draws=4, generator=stream(0, "sizes"))
-    assert sizes(small, rate=50.0, frames_rate=25.0, draws=4, generator=stream(0, "sizes")).scale[0] == 0.25
+    assert (
+        sizes(small, rate=50.0, frames_rate=25.0, draws=4, generator=stream(0, "sizes")).scale[0]
+        == 0.25
+    )
 
 
 def test_an_unknown_size_is_drawn_from_its_stated_prior() -> None:

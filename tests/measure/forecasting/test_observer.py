@@ -60,14 +60,19 @@ def test_behind_a_gap_a_prediction_is_compared_from_the_third_tracked_frame_on(
     np.testing.assert_array_equal(np.flatnonzero(~counted[:, marker, 0]), np.arange(8, 17))
     assert float(errors[8:17, marker].abs().max()) == 0.0
     complete = forecaster.errors(*forecaster.system(whole, calibrations), whole)[..., 0]
-    # The free corner drifts off in the gap, by the velocity that it had; on its return nothing of that is compared.
+    # The free corner drifts off in the gap, by the velocity that it had; on its return nothing of
+    # that is compared.
     assert float((errors - complete)[:8].abs().max()) < 1e-6
     assert float(errors[17:, marker].norm(dim=-1).max()) < 5e-3
 
 
-def test_errors_are_observed_less_predicted(forecaster: Forecaster, own_recording: Trajectory) -> None:
+def test_errors_are_observed_less_predicted(
+    forecaster: Forecaster, own_recording: Trajectory
+) -> None:
     segments = Segments.of([own_recording])
-    errors, predicted = forecaster.run(*forecaster.system(segments, [NOMINAL] * len(segments)), segments)
+    errors, predicted = forecaster.run(
+        *forecaster.system(segments, [NOMINAL] * len(segments)), segments
+    )
     observed = np.stack([s.positions[segments.first :] for s in segments.items], axis=-1)
     np.testing.assert_allclose((predicted + errors).numpy(), observed, atol=1e-12)
 
@@ -84,7 +89,8 @@ def test_errors_are_observed_less_predicted(forecaster: Forecaster, own_recordin
 def test_what_a_model_lacks_returns_along_its_sensitivity(
     forecaster: Forecaster, own_recording: Trajectory, effect: str, parameter: str, step: float
 ) -> None:
-    # Data of the base model, judged by one that has the effect: the errors are −step times the sensitivity.
+    # Data of the base model, judged by one that has the effect: the errors are −step times the
+    # sensitivity.
     segments = Segments.of([own_recording])
     column = EffectColumn(effect=effect, parameter=parameter, step=step)
     base = forecaster.errors(*forecaster.system(segments, [NOMINAL] * len(segments)), segments)
@@ -119,11 +125,13 @@ def test_a_motion_column_is_the_observed_motion_at_the_frames_of_the_errors(
 def test_a_column_across_the_motion_is_what_a_slowly_turning_frame_does(
     forecaster: Forecaster, own_recording: Trajectory
 ) -> None:
-    # Seen from a frame that turns at Ω, a point of steady velocity has the acceleration −2 Ω z × v (Coriolis), and in
-    # one period moves by that times T² beyond even motion.
+    # Seen from a frame that turns at Ω, a point of steady velocity has the acceleration −2 Ω z × v
+    # (Coriolis), and in one period moves by that times T² beyond even motion.
     period, v, turned = 1 / own_recording.rate, np.array([0.3, -0.2, 0.1]), 1e-4
     t = np.arange(len(own_recording.positions))[:, None, None] * period
-    moving = replace(own_recording, positions=np.zeros_like(own_recording.positions[:1]) + v * (t - t.mean()))
+    moving = replace(
+        own_recording, positions=np.zeros_like(own_recording.positions[:1]) + v * (t - t.mean())
+    )
     angle = -turned * t[:, 0, 0]
     cos, sin, still = np.cos(angle), np.sin(angle), np.ones_like(angle)
     turn = np.stack([[cos, -sin, 0 * still], [sin, cos, 0 * still], [0 * still, 0 * still, still]])
@@ -131,10 +139,14 @@ def test_a_column_across_the_motion_is_what_a_slowly_turning_frame_does(
     beyond = there.positions[2:] - 2 * there.positions[1:-1] + there.positions[:-2]
     segments = Segments.of([there])
     base = forecaster.errors(*forecaster.system(segments, [NOMINAL] * len(segments)), segments)
-    change = forecaster.sensitivity(AcrossColumn(mode=(0, 0)), segments, [NOMINAL] * len(segments), base)
+    change = forecaster.sensitivity(
+        AcrossColumn(mode=(0, 0)), segments, [NOMINAL] * len(segments), base
+    )
     for place, segment in enumerate(segments.items):
         frame = round(segment.start / period) + segments.first - 2
-        np.testing.assert_allclose(-2 * turned * change[0, :, :, place].numpy(), beyond[frame], rtol=1e-3, atol=1e-10)
+        np.testing.assert_allclose(
+            -2 * turned * change[0, :, :, place].numpy(), beyond[frame], rtol=1e-3, atol=1e-10
+        )
 
 
 def test_a_force_along_the_velocity_moves_cloth_about_as_it_moves_free_points(
@@ -145,7 +157,9 @@ def test_a_force_along_the_velocity_moves_cloth_about_as_it_moves_free_points(
     base = forecaster.errors(*forecaster.system(segments, nominal), segments)
     (drag,) = columns_of([Term(field="against_motion", shape="everywhere")])
     simulated = forecaster.sensitivity(drag, segments, nominal, base)
-    written = forecaster.sensitivity(MotionColumn(derivative=1, mode=(0, 0)), segments, nominal, base)
+    written = forecaster.sensitivity(
+        MotionColumn(derivative=1, mode=(0, 0)), segments, nominal, base
+    )
     assert float((simulated * written).sum() / simulated.norm() / written.norm()) < -0.8
     assert 0.5 < float(simulated.norm() / written.norm()) < 1.0
 
@@ -185,7 +199,9 @@ def test_steps_in_a_joint_batch_are_those_taken_alone(
         torch.testing.assert_close(change, alone, rtol=1e-9, atol=1e-12)
 
 
-def test_batches_that_are_not_of_one_cloth_are_not_joined(forecaster: Forecaster, own_recording: Trajectory) -> None:
+def test_batches_that_are_not_of_one_cloth_are_not_joined(
+    forecaster: Forecaster, own_recording: Trajectory
+) -> None:
     segments = Segments.of([own_recording])
     system, state = forecaster.system(segments, [NOMINAL] * len(segments))
     held = replace(system, handles=replace(system.handles, stiffness=2.0))
@@ -218,7 +234,10 @@ def test_models_in_one_batch_leave_what_they_leave_alone(
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
 def test_sensitivities_do_not_depend_on_how_many_threads_share_them_out(
-    forecaster: Forecaster, own_recording: Trajectory, monkeypatch: pytest.MonkeyPatch, dtype: torch.dtype
+    forecaster: Forecaster,
+    own_recording: Trajectory,
+    monkeypatch: pytest.MonkeyPatch,
+    dtype: torch.dtype,
 ) -> None:
     segments = Segments.of([own_recording])
     calibrations = [NOMINAL] * len(segments)
@@ -226,18 +245,25 @@ def test_sensitivities_do_not_depend_on_how_many_threads_share_them_out(
     forecaster = replace(forecaster, dtype=dtype)
     base = forecaster.errors(*forecaster.system(segments, calibrations), segments)
     alone, shared = (
-        replace(forecaster, workers=workers).sensitivities(library()[:3], segments, calibrations, base)
+        replace(forecaster, workers=workers).sensitivities(
+            library()[:3], segments, calibrations, base
+        )
         for workers in (1, 2)
     )
     for one, two in zip(alone, shared, strict=True):
         assert torch.equal(one, two)
 
 
-def test_members_of_a_batch_do_not_touch_one_another(forecaster: Forecaster, own_recording: Trajectory) -> None:
+def test_members_of_a_batch_do_not_touch_one_another(
+    forecaster: Forecaster, own_recording: Trajectory
+) -> None:
     twice = Segments.of([own_recording, replace(own_recording, name="again")])
     alone = Segments.of([own_recording])
     errors = forecaster.errors(
-        *forecaster.system(twice, [NOMINAL] * len(alone) + [Calibration(area_weight=1.2)] * len(alone)), twice
+        *forecaster.system(
+            twice, [NOMINAL] * len(alone) + [Calibration(area_weight=1.2)] * len(alone)
+        ),
+        twice,
     )
     single = forecaster.errors(*forecaster.system(alone, [NOMINAL] * len(alone)), alone)
     torch.testing.assert_close(errors[..., : len(alone)], single, rtol=0, atol=1e-9)
@@ -247,18 +273,24 @@ def test_each_segment_has_the_wind_of_its_own_time(specimen: Specimen) -> None:
     times = np.linspace(0, 10, 101)
     wind = WindTrack(times=times, velocity=np.stack([times, 0 * times, 0 * times], axis=1))
     still = np.zeros((250, specimen.mesh.vertex_count, 3))
-    recording = Trajectory(name="ramp", markers=specimen.mesh.rest, positions=still, rate=25.0, wind=wind)
+    recording = Trajectory(
+        name="ramp", markers=specimen.mesh.rest, positions=still, rate=25.0, wind=wind
+    )
     segments = Segments.of([recording])
     forecaster = Forecaster(specimen=specimen, markers=specimen.mesh.rest, integrator=None)  # pyright: ignore
     system, _ = forecaster.system(segments, [NOMINAL] * len(segments))
     for place, segment in enumerate(segments.items):
-        assert float(system.wind.velocity(1.0)[0, place]) == pytest.approx(segment.start + 1.0, abs=1e-5)
+        assert float(system.wind.velocity(1.0)[0, place]) == pytest.approx(
+            segment.start + 1.0, abs=1e-5
+        )
 
 
 def test_frames_between_horizons_are_left_out(specimen: Specimen) -> None:
     still = np.zeros((300, specimen.mesh.vertex_count, 3))
     wind = WindTrack.constant((4.0, 0.0, 0.0))
-    fast = Trajectory(name="fast", markers=specimen.mesh.rest, positions=still, rate=60.0, wind=wind)
+    fast = Trajectory(
+        name="fast", markers=specimen.mesh.rest, positions=still, rate=60.0, wind=wind
+    )
     segments = Segments.of([fast])
     assert segments.period == pytest.approx(2 / 60)
     assert segments.warm == 7
@@ -268,7 +300,11 @@ def test_frames_between_horizons_are_left_out(specimen: Specimen) -> None:
 def test_recordings_too_short_for_a_segment_are_refused(specimen: Specimen, frames: int) -> None:
     still = np.zeros((frames, specimen.mesh.vertex_count, 3))
     short = Trajectory(
-        name="short", markers=specimen.mesh.rest, positions=still, rate=25.0, wind=WindTrack.constant((4.0, 0.0, 0.0))
+        name="short",
+        markers=specimen.mesh.rest,
+        positions=still,
+        rate=25.0,
+        wind=WindTrack.constant((4.0, 0.0, 0.0)),
     )
     with pytest.raises(InputError, match="too short"):
         Segments.of([short])
@@ -284,8 +320,9 @@ def test_lost_markers_are_refused(own_recording: Trajectory) -> None:
 def test_sensitivities_in_single_precision_are_within_half_a_percent_of_those_in_double(
     forecaster: Forecaster, own_recording: Trajectory
 ) -> None:
-    # Of a soft and damped cloth, which bending hardly moves: simulated in single precision, sensitivities to bending,
-    # to stiff hems and to rest curvature would be rounding to 1.5, 2 and 22 %.
+    # Of a soft and damped cloth, which bending hardly moves: simulated in single precision,
+    # sensitivities to bending, to stiff hems and to rest curvature would be rounding to 1.5, 2 and
+    # 22 %.
     segments = Segments.of([own_recording])
     calibrations = [Calibration(bending=0.1, damping=30e-3)] * len(segments)
     columns = (*library(), *winds())
@@ -296,24 +333,35 @@ def test_sensitivities_in_single_precision_are_within_half_a_percent_of_those_in
         found.append(own.sensitivities(columns, segments, calibrations, base))
         assert all(change.dtype == dtype for change in found[-1])
     names = [name for name, *_ in THETA] + [column.name for column in columns]
-    off = {name: float((one - two).norm() / two.norm()) for name, one, two in zip(names, *found, strict=True)}
+    off = {
+        name: float((one - two).norm() / two.norm())
+        for name, one, two in zip(names, *found, strict=True)
+    }
     assert {name: share for name, share in off.items() if share >= 0.005} == {}
 
 
-def test_nothing_changes_with_an_effect_that_the_cloth_cannot_have(specimen: Specimen, forecaster: Forecaster) -> None:
+def test_nothing_changes_with_an_effect_that_the_cloth_cannot_have(
+    specimen: Specimen, forecaster: Forecaster
+) -> None:
     """A hoist that is held along its length cannot be laced to the pole as well."""
     rest = specimen.mesh.rest
     held = handles.full_hoist(rest)
-    anchors = np.stack([0 * rest[list(held), 1], 0 * rest[list(held), 1], rest[list(held), 1]], axis=1)
+    anchors = np.stack(
+        [0 * rest[list(held), 1], 0 * rest[list(held), 1], rest[list(held), 1]], axis=1
+    )
     still = np.stack([rest[:, 0], 0.05 * np.sin(8 * rest[:, 0]), rest[:, 1]], axis=1)
     wind = WindTrack.constant((4.0, 0.0, 0.0))
-    recording = Trajectory(name="bulging", markers=rest, positions=np.tile(still, (60, 1, 1)), rate=25.0, wind=wind)
+    recording = Trajectory(
+        name="bulging", markers=rest, positions=np.tile(still, (60, 1, 1)), rate=25.0, wind=wind
+    )
     hoist = replace(forecaster, specimen=replace(specimen, held=held, anchors=anchors))
     segments = Segments.of([recording]).select([0])
     columns = [one for one in library() if one.effect in ("lift", "full-hoist", "air-density")]
     base = hoist.errors(*hoist.system(segments, [NOMINAL]), segments)
     found = hoist.sensitivities(columns, segments, [NOMINAL], base)[len(THETA) :]
-    assert [one.effect for one, own in zip(columns, found, strict=True) if not own.any()] == ["full-hoist"]
+    assert [one.effect for one, own in zip(columns, found, strict=True) if not own.any()] == [
+        "full-hoist"
+    ]
     statistics = reduce_errors(base, found, segments.recording, segments.noise)
     assert np.isfinite(statistics.r).all()
     assert np.isfinite(statistics.response).all()

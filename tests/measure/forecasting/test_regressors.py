@@ -38,11 +38,15 @@ def test_a_turned_wind_has_turned_before_a_segment_begins() -> None:
     wind = torch.tensor([5.0, 0.0, 0.0], dtype=torch.float64)[:, None]
     for time in (0.0, 0.04, 2.0):
         blown = effect.velocity(time, wind)[:, 0].tolist()
-        assert blown == pytest.approx([5 * math.cos(math.radians(10)), 5 * math.sin(math.radians(10)), 0.0])
+        assert blown == pytest.approx(
+            [5 * math.cos(math.radians(10)), 5 * math.sin(math.radians(10)), 0.0]
+        )
 
 
 @given(area_weight=st.floats(-0.5, 0.5), bending=st.floats(-1.5, 1.5), damping=st.floats(-2.0, 4.0))
-def test_steps_between_calibrations_undo_one_another(area_weight: float, bending: float, damping: float) -> None:
+def test_steps_between_calibrations_undo_one_another(
+    area_weight: float, bending: float, damping: float
+) -> None:
     start = Calibration()
     moved = start.moved((area_weight, bending, damping))
     back = moved.moved(tuple(-step for step in moved.steps_from(start)))
@@ -77,15 +81,20 @@ def test_a_calibration_at_its_bounds_says_so() -> None:
 
 def test_a_field_mode_is_a_force_per_mass_along_its_axis() -> None:
     system, state = assemble(
-        [flag(material=named_material("camel-ponte-roma"), wind_speed=4.0, columns=6)], dtype=torch.float64
+        [flag(material=named_material("camel-ponte-roma"), wind_speed=4.0, columns=6)],
+        dtype=torch.float64,
     )
     column = FieldColumn(axis=2, mode=(1, 0), step=0.5)
     pushed, _ = column.system(system, state)
     (effect,) = pushed.effects
-    force = effect.force(system.cloth, 0.0, state.position, state.velocity, system.wind.velocity(0.0))
+    force = effect.force(
+        system.cloth, 0.0, state.position, state.velocity, system.wind.velocity(0.0)
+    )
     u = system.cloth.mesh.rest[:, 0] / 1.5
     expected = 0.5 * np.cos(np.pi * u)
-    np.testing.assert_allclose((force[:, 2, 0] / system.cloth.mass[:, 0]).numpy(), expected, atol=1e-12)
+    np.testing.assert_allclose(
+        (force[:, 2, 0] / system.cloth.mass[:, 0]).numpy(), expected, atol=1e-12
+    )
     assert not force[:, :2].any()
 
 

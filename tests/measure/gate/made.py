@@ -1,5 +1,5 @@
-"""Small made films of a waving patch before a still background, a small network that was never trained, and gates
-learned from drawn feature vectors."""
+"""Small made films of a waving patch before a still background, a small network that was never
+trained, and gates learned from drawn feature vectors."""
 
 from __future__ import annotations
 
@@ -28,20 +28,25 @@ def background(seed: int = 0) -> FloatArray:
 
     rng = np.random.default_rng(seed)
     noise = rng.normal(size=(SIZE, SIZE))
-    picture = np.sum([ndimage.gaussian_filter(noise, s, mode="wrap") * s for s in (1.5, 4, 12)], axis=0)
+    picture = np.sum(
+        [ndimage.gaussian_filter(noise, s, mode="wrap") * s for s in (1.5, 4, 12)], axis=0
+    )
     return 60 + 130 * (picture - picture.min()) / np.ptp(picture)
 
 
 def film(
     *, seed: int = 0, at: tuple[float, float] = (0.5, 0.5), frames: int = FRAMES, noise: float = 0.7
 ) -> UInt8Array:
-    """(frames, SIZE, SIZE): a patch with travelling waves, its middle at (x, y) in sides of the picture."""
+    """(frames, SIZE, SIZE): a patch with travelling waves, its middle at (x, y) in sides of the
+    picture."""
     rng = np.random.default_rng(seed)
     t = np.arange(frames)[:, None, None] / 25
     y, x = np.mgrid[:SIZE, :SIZE]
     inside = (np.abs(x - at[0] * SIZE) < 22) & (np.abs(y - at[1] * SIZE) < 15)
     wind = rng.uniform(1, 4)
-    waves = 120 + 70 * np.cos(0.35 * x - 2 * np.pi * wind * t + rng.uniform(0, 6)) * np.cos(0.2 * y + wind * t)
+    waves = 120 + 70 * np.cos(0.35 * x - 2 * np.pi * wind * t + rng.uniform(0, 6)) * np.cos(
+        0.2 * y + wind * t
+    )
     gray = np.where(inside, waves, background(seed)) + rng.normal(0, noise, (frames, SIZE, SIZE))
     return np.clip(np.rint(gray), 0, 255).astype(np.uint8)
 
@@ -71,14 +76,19 @@ def small_model(seed: int = 0) -> Estimator:
 
 
 def plain(seed: int, count: int) -> FloatArray:
-    """(count, DIMENSION) of a heavy-tailed law: Student's t with five degrees of freedom, correlated."""
+    """(count, DIMENSION) of a heavy-tailed law: Student's t with five degrees of freedom,
+    correlated."""
     rng = np.random.default_rng(seed)
-    mixing = np.eye(DIMENSION) + 0.3 * np.random.default_rng(0).normal(size=(DIMENSION, DIMENSION)) / DIMENSION**0.5
+    mixing = (
+        np.eye(DIMENSION)
+        + 0.3 * np.random.default_rng(0).normal(size=(DIMENSION, DIMENSION)) / DIMENSION**0.5
+    )
     return rng.standard_t(5, (count, DIMENSION)) @ mixing
 
 
 def distorted(seed: int, count: int, kind: str, strength: float = 40.0) -> FloatArray:
-    """Plain vectors moved along a direction of the distortion's own, among the hand-made features."""
+    """Plain vectors moved along a direction of the distortion's own, among the hand-made
+    features."""
     moved = plain(seed, count)
     moved[:, len(CHECKS) + 2 * KINDS.index(kind)] += strength
     return moved

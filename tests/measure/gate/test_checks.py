@@ -1,4 +1,5 @@
-"""The image statistics: each fault is detected by its own, on made clips whose fault has a known size."""
+"""The image statistics: each fault is detected by its own, on made clips whose fault has a known
+size."""
 
 from __future__ import annotations
 
@@ -14,10 +15,18 @@ from tests.measure.gate.made import FRAMES, SIZE, background, film, value
 
 @pytest.mark.parametrize("pixels", [1.0, 2.0, 4.0])
 def test_the_shift_of_a_panning_camera_is_measured(pixels: float) -> None:
-    """All frames but the first are moved by so many pixels; the tiles' windows and the noise take at most 0.2 px."""
+    """All frames but the first are moved by so many pixels; the tiles' windows and the noise take
+    at most 0.2 px."""
     still = background(3)
-    frames = np.stack([still, *(ndimage.shift(still, (0, pixels), order=3, mode="wrap") for _ in range(FRAMES - 1))])
-    assert 10 ** value("shift", np.clip(frames, 0, 255).astype(np.uint8)) == pytest.approx(pixels, abs=0.2)
+    frames = np.stack(
+        [
+            still,
+            *(ndimage.shift(still, (0, pixels), order=3, mode="wrap") for _ in range(FRAMES - 1)),
+        ]
+    )
+    assert 10 ** value("shift", np.clip(frames, 0, 255).astype(np.uint8)) == pytest.approx(
+        pixels, abs=0.2
+    )
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -28,7 +37,9 @@ def test_a_camera_that_stands_still_has_no_shift(seed: int) -> None:
 
 def test_a_camera_that_shakes_moves_all_edges() -> None:
     rng = np.random.default_rng(1)
-    moved = [ndimage.shift(frame, rng.normal(0, 1.5, 2), order=1, mode="nearest") for frame in film()]
+    moved = [
+        ndimage.shift(frame, rng.normal(0, 1.5, 2), order=1, mode="nearest") for frame in film()
+    ]
     shaken = np.array(moved, dtype=np.uint8)
     assert value("edges-moving", shaken) > 0.9
     assert 10 ** value("sway", shaken) > 10 * 10 ** value("sway", film())
@@ -68,7 +79,8 @@ def test_two_patches_are_two_regions_of_equal_motion() -> None:
 
 
 def test_the_size_and_place_of_what_moves_are_measured() -> None:
-    """The patch is 43 px wide and 29 px high of 112, and half a side away from the other's place."""
+    """The patch is 43 px wide and 29 px high of 112, and half a side away from the other's
+    place."""
     clip = film(at=(0.3, 0.5))
     assert 10 ** value("area", clip) == pytest.approx(43 * 29 / SIZE**2, rel=0.1)
     assert value("width", clip) == pytest.approx(0.9 * 43 / SIZE, abs=0.05)
@@ -93,7 +105,8 @@ def test_under_exposure_is_detected_by_level_contrast_and_noise() -> None:
 
 
 def test_a_picture_of_another_size_has_the_same_statistics() -> None:
-    """But for the noise, which averaging takes away, and a pixel around the patch: 45·31/(43·29) is 0.05 in log10."""
+    """But for the noise, which averaging takes away, and a pixel around the patch: 45·31/(43·29) is
+    0.05 in log10."""
     clip = film(noise=0)
     doubled = clip.repeat(2, axis=1).repeat(2, axis=2)
     for name in ("level", "contrast", "area", "energy", "width", "off-centre", "loop"):

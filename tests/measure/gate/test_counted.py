@@ -1,4 +1,5 @@
-"""Faults of a film are counted: drawn films of which it is known what is wrong, and how much of it."""
+"""Faults of a film are counted: drawn films of which it is known what is wrong, and how much of
+it."""
 
 from __future__ import annotations
 
@@ -33,7 +34,8 @@ def drawn(
     bar: bool = False,
     droop: float = 0.0,
 ) -> UInt8Array:
-    """(COUNT, HEIGHT, WIDTH): striped cloth on a pole, whose waves grow towards its free end and never come again.
+    """(COUNT, HEIGHT, WIDTH): striped cloth on a pole, whose waves grow towards its free end and
+    never come again.
 
     Args:
         scenery: whether the background has features.
@@ -45,7 +47,11 @@ def drawn(
     rough = rng.uniform(40, 220, (HEIGHT // 10 + 4, WIDTH // 10 + 4))
     pad = 20
     high, wide = HEIGHT + 2 * pad, WIDTH + 2 * pad
-    behind = cv2.resize(rough, (wide, high), interpolation=cv2.INTER_CUBIC) if scenery else np.full((high, wide), 150.0)
+    behind = (
+        cv2.resize(rough, (wide, high), interpolation=cv2.INTER_CUBIC)
+        if scenery
+        else np.full((high, wide), 150.0)
+    )
     rows, columns = np.mgrid[:high, :wide].astype(np.float64)
     x, y, width, height = box[0] + pad, box[1] + pad, box[2], box[3]
     if pole:
@@ -56,9 +62,18 @@ def drawn(
     out = []
     for k in range(COUNT):
         time = k / RATE
-        phases = [2 * np.pi * (a * along - b * time) for a, b in ((1.4, 2.3), (0.9, 1.31), (2.1, 3.77))]
-        down = (rows - y - droop * width * along - 0.07 * height * along * np.sum(np.sin(phases), axis=0)) / height
-        cloth = np.where((down * 4).astype(int) % 2, 200.0, 60.0) + 15 * np.sum(np.cos(phases), axis=0)
+        phases = [
+            2 * np.pi * (a * along - b * time) for a, b in ((1.4, 2.3), (0.9, 1.31), (2.1, 3.77))
+        ]
+        down = (
+            rows
+            - y
+            - droop * width * along
+            - 0.07 * height * along * np.sum(np.sin(phases), axis=0)
+        ) / height
+        cloth = np.where((down * 4).astype(int) % 2, 200.0, 60.0) + 15 * np.sum(
+            np.cos(phases), axis=0
+        )
         picture = np.where((along >= 0) & (along < 1) & (down >= 0) & (down < 1), cloth, behind)
         dx, dy = (0.0, 0.0) if shift is None else shift[k]
         moved = cv2.warpAffine(
@@ -127,9 +142,13 @@ def test_a_cut_to_another_scene_has_its_instant(plain: UInt8Array) -> None:
 
 def test_a_loop_is_counted_by_the_frames_that_look_like_others(plain: UInt8Array) -> None:
     rng = stream(3, "loop")
-    looped = plain[np.arange(2 * COUNT) % 13].astype(np.float64) + rng.normal(0, 1, (2 * COUNT, *plain.shape[1:]))
+    looped = plain[np.arange(2 * COUNT) % 13].astype(np.float64) + rng.normal(
+        0, 1, (2 * COUNT, *plain.shape[1:])
+    )
     fault = next(
-        fault for fault in counted(np.clip(looped, 0, 255).astype(np.uint8)) if fault.kind == "repeated-frames"
+        fault
+        for fault in counted(np.clip(looped, 0, 255).astype(np.uint8))
+        if fault.kind == "repeated-frames"
     )
     assert fault.value == 1.0
     assert fault.what.endswith("100% of the frames look like another one")
@@ -143,7 +162,10 @@ def test_a_film_in_which_nothing_moves_and_one_that_is_black_say_so(plain: UInt8
 
 
 def test_a_camera_that_moves_before_an_even_background_is_named() -> None:
-    path = np.stack([14 * np.sin(2.6 * np.arange(COUNT) / RATE), 9 * np.cos(2 * np.arange(COUNT) / RATE)], axis=1)
+    path = np.stack(
+        [14 * np.sin(2.6 * np.arange(COUNT) / RATE), 9 * np.cos(2 * np.arange(COUNT) / RATE)],
+        axis=1,
+    )
     assert kinds(drawn(shift=path, scenery=False))[0] == "moving-camera"
     assert kinds(drawn(scenery=False)) == []
     assert kinds(drawn(shift=0.3 * path)) == []
@@ -157,8 +179,8 @@ def test_a_flag_of_few_pixels_is_too_small() -> None:
 
 
 def test_what_moves_as_finely_as_leaves_is_no_cloth() -> None:
-    """Pixels that take one of two values by themselves: a pixel changes by half of their difference d on average, the
-    mean of 36 by √(2/π) σ with σ = d √½/6."""
+    """Pixels that take one of two values by themselves: a pixel changes by half of their difference
+    d on average, the mean of 36 by √(2/π) σ with σ = d √½/6."""
     leaves = scenery()
     leaves[:, 60:130, 70:170] = stream(6, "leaves").integers(0, 2, (COUNT, 70, 100)) * 120 + 60
     fault, no_pole = counted(leaves)
@@ -206,10 +228,14 @@ def test_an_outline_longer_than_the_flag_that_was_given_is_another_thing() -> No
     assert counted(wide, aspect=3.0) == []
     (fault,) = counted(wide, aspect=1.0)
     assert fault.kind == "another-shape"
-    assert fault.value == pytest.approx(150 / 65, rel=0.15)  # the waves at the free end reach beyond the hoist's 50 px
+    assert fault.value == pytest.approx(
+        150 / 65, rel=0.15
+    )  # the waves at the free end reach beyond the hoist's 50 px
 
 
-def test_a_second_pole_before_the_cloth_is_another_flag_s_and_a_stripe_is_none(plain: UInt8Array) -> None:
+def test_a_second_pole_before_the_cloth_is_another_flag_s_and_a_stripe_is_none(
+    plain: UInt8Array,
+) -> None:
     x, y, width, height = FLAG
     middle = slice(x + width // 2 - 3, x + width // 2 + 3)
     two, striped = plain.copy(), plain.copy()
@@ -218,7 +244,9 @@ def test_a_second_pole_before_the_cloth_is_another_flag_s_and_a_stripe_is_none(p
     (fault,) = counted(two)
     assert fault.kind == "second-pole"
     assert fault.value is not None
-    assert 0.5 < fault.value < 0.9  # the cloth is 60 px high, its places 74 or more; its dark stripes are like the pole
+    assert (
+        0.5 < fault.value < 0.9
+    )  # the cloth is 60 px high, its places 74 or more; its dark stripes are like the pole
     assert f"along {fault.value:.0%} of its height" in fault.what
     assert kinds(striped) == []
 
@@ -268,8 +296,8 @@ def test_what_is_no_flag_is_refused_for_reasons_that_are_true_of_it(film: Film) 
 
 
 def test_what_has_no_hoist_is_no_flag_and_a_drawn_flag_has_one(plain: UInt8Array) -> None:
-    """The palm's trunk and the houses behind it have upright edges beside the fronds, which `no-pole` takes for a
-    pole; the fronds come from one point."""
+    """The palm's trunk and the houses behind it have upright edges beside the fronds, which
+    `no-pole` takes for a pole; the fronds come from one point."""
     houses = drawn(box=(0, 0, 1, 1), pole=False)
     houses[:, 40:, 150:156] = 30
     (fault,) = counted(no_flag.palms(houses, stream(1, "palms")), size=300)

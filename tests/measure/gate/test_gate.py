@@ -19,7 +19,8 @@ def gate() -> Gate:
 
 
 def test_exchangeable_clips_are_refused_at_the_level(gate: Gate) -> None:
-    """Given one calibration of 199, the rate at k/200 is Beta(k, 200 − k): three of its deviations are allowed."""
+    """Given one calibration of 199, the rate at k/200 is Beta(k, 200 − k): three of its deviations
+    are allowed."""
     largest = gate.surprises(plain(7, 4000)).max(axis=1)
     p = np.array([gate.p_value(one) for one in largest])
     for k in (10, 20, 100):
@@ -28,12 +29,15 @@ def test_exchangeable_clips_are_refused_at_the_level(gate: Gate) -> None:
 
 
 def test_the_stated_rate_of_all_checks_together_is_kept() -> None:
-    """Over 40 gates of their own calibrations, each keeps to 5 % with 90 %: 4 may not, 9 or more have p = 0.02."""
+    """Over 40 gates of their own calibrations, each keeps to 5 % with 90 %: 4 may not, 9 or more
+    have p = 0.02."""
     base = learned(2)
     fresh = base.surprises(plain(8, 4000)).max(axis=1)
     at, broken = level(199, 0.05, 0.9), 0
     for draw in range(40):
-        own = replace(base, calibration=np.sort(base.surprises(plain(9000 + draw, 199)).max(axis=1)))
+        own = replace(
+            base, calibration=np.sort(base.surprises(plain(9000 + draw, 199)).max(axis=1))
+        )
         broken += np.mean([own.p_value(one) <= at for one in fresh]) > 0.05
     assert broken <= 8
 
@@ -47,17 +51,24 @@ def test_a_known_distortion_is_refused_for_its_own_reason(gate: Gate, kind: str)
 
 
 def test_the_log_likelihood_ratio_is_that_of_linear_discriminant_analysis() -> None:
-    """Against scikit-learn's, with as much shrinkage: of classes of one size the pooled covariances are the same."""
+    """Against scikit-learn's, with as much shrinkage: of classes of one size the pooled covariances
+    are the same."""
     from sklearn.covariance import ledoit_wolf
     from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 
     clips, other = plain(3, 500), distorted(4, 300, "camera", strength=2.0)
     gate = Gate.of(clips, dict.fromkeys(KINDS, other), clips[:100])
-    first, second, fresh = (squash_tails(x, gate.centre, gate.scale) for x in (clips[:300], other, plain(5, 200)))
-    _, shrinkage = ledoit_wolf(np.concatenate([first - first.mean(axis=0), second - second.mean(axis=0)]))
+    first, second, fresh = (
+        squash_tails(x, gate.centre, gate.scale) for x in (clips[:300], other, plain(5, 200))
+    )
+    _, shrinkage = ledoit_wolf(
+        np.concatenate([first - first.mean(axis=0), second - second.mean(axis=0)])
+    )
     theirs = LinearDiscriminantAnalysis(solver="lsqr", shrinkage=shrinkage, priors=[0.5, 0.5])
     theirs.fit(np.concatenate([first, second]), np.repeat([0, 1], 300))
-    np.testing.assert_allclose(gate.scores(plain(5, 200))[:, -1], theirs.decision_function(fresh), rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(
+        gate.scores(plain(5, 200))[:, -1], theirs.decision_function(fresh), rtol=1e-6, atol=1e-6
+    )
 
 
 def test_every_score_has_a_reason_with_words() -> None:

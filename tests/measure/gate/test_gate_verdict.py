@@ -25,12 +25,18 @@ def exact(rate: float) -> float:
 
 @pytest.mark.parametrize("windows", [2, 7])
 @pytest.mark.parametrize("correlation", [0.0, 0.5, 1.0])
-def test_familiar_recordings_are_refused_at_most_at_the_stated_rate(correlation: float, windows: int) -> None:
+def test_familiar_recordings_are_refused_at_most_at_the_stated_rate(
+    correlation: float, windows: int
+) -> None:
     rng = stream(1, "gate")
     refused = 0
     for _ in range(2000):
-        score = np.sqrt(correlation) * rng.normal() + np.sqrt(1 - correlation) * rng.normal(size=windows)
-        refused += verdict([[reason(float(p))] for p in ndtr(score)], false_alarm=0.1, level=exact).refused
+        score = np.sqrt(correlation) * rng.normal() + np.sqrt(1 - correlation) * rng.normal(
+            size=windows
+        )
+        refused += verdict(
+            [[reason(float(p))] for p in ndtr(score)], false_alarm=0.1, level=exact
+        ).refused
     assert refused / 2000 <= 0.1 + 0.015  # two binomial standard errors
 
 
@@ -46,7 +52,8 @@ def test_a_gate_of_few_clips_may_ask_for_a_smaller_p() -> None:
 
 
 def test_a_film_that_is_familiar_at_one_size_alone_is_refused_until_its_size_is_given() -> None:
-    """So leaving the size out lets no film pass that is refused with one of the sizes considered."""
+    """So leaving the size out lets no film pass that is refused with one of the sizes
+    considered."""
     found = verdict([[reason(0.001), reason(0.4)]], false_alarm=0.05, level=exact)
     assert (found.p, found.sizes, found.size) == (0.4, (1,), 1)
     assert found.refused
@@ -57,9 +64,11 @@ def test_a_film_that_is_familiar_at_one_size_alone_is_refused_until_its_size_is_
     assert not verdict([[reason(0.3), reason(0.4)]], false_alarm=0.05, level=exact).refused
 
 
-def test_a_film_that_is_refused_at_every_size_is_refused_however_its_windows_pass_at_different_sizes() -> None:
-    """Of two sizes each is strange in half of the windows, always in the other half: a flag has one size, not a new one
-    for each window."""
+def test_a_film_that_is_refused_at_every_size_is_refused_however_its_windows_pass_at_different_sizes() -> (
+    None
+):
+    """Of two sizes each is strange in half of the windows, always in the other half: a flag has one
+    size, not a new one for each window."""
     windows = [[reason(0.001), reason(0.5)], [reason(0.5), reason(0.001)]] * 10
     found = verdict(windows, false_alarm=0.05, level=exact)
     assert found.refused
@@ -70,7 +79,11 @@ def test_a_film_that_is_refused_at_every_size_is_refused_however_its_windows_pas
 
 def test_of_a_hundred_windows_48_that_are_strange_refuse_and_few_do_not() -> None:
     def judged(strange: int) -> Verdict:
-        return verdict([[reason(0.01)]] * strange + [[reason(0.5)]] * (100 - strange), false_alarm=0.05, level=exact)
+        return verdict(
+            [[reason(0.01)]] * strange + [[reason(0.5)]] * (100 - strange),
+            false_alarm=0.05,
+            level=exact,
+        )
 
     assert judged(48).refused
     assert judged(26).refused
@@ -80,8 +93,12 @@ def test_of_a_hundred_windows_48_that_are_strange_refuse_and_few_do_not() -> Non
     assert (judged(25).as_dict()["strange"], judged(25).as_dict()["refusing"]) == (25, 26)
 
 
-def test_a_recording_of_which_most_windows_are_strange_is_refused_with_the_reason_of_a_usual_one() -> None:
-    found = verdict([[reason(p)] for p in (0.001, 0.002, 0.003, 0.6, 0.004)], false_alarm=0.05, level=exact)
+def test_a_recording_of_which_most_windows_are_strange_is_refused_with_the_reason_of_a_usual_one() -> (
+    None
+):
+    found = verdict(
+        [[reason(p)] for p in (0.001, 0.002, 0.003, 0.6, 0.004)], false_alarm=0.05, level=exact
+    )
     assert found.refused
     assert found.strange.tolist() == [True, True, True, False, True]
     assert "p = 0.003" in found.sentence
@@ -90,18 +107,23 @@ def test_a_recording_of_which_most_windows_are_strange_is_refused_with_the_reaso
 
 def test_a_summary_far_from_the_training_clips_has_a_small_p() -> None:
     rng = stream(2, "cloud")
-    gate = FamiliarityGate(cloud=Familiarity.of(rng.normal(size=(300, 3)), rng.normal(size=(199, 3))))
+    gate = FamiliarityGate(
+        cloud=Familiarity.of(rng.normal(size=(300, 3)), rng.normal(size=(199, 3)))
+    )
     frames = pictures(4)
     assert gate.judge(frames, np.full(3, 30.0))[0].p == pytest.approx(1 / 200)
     assert (gate.judge(frames, np.zeros(3))[0].p or 0.0) > 0.9
 
 
 @pytest.mark.parametrize(
-    ("frames", "kind"), [(np.zeros((4, 32, 32), dtype=np.uint8), "too-dark"), (pictures(1).repeat(4, 0), "no-motion")]
+    ("frames", "kind"),
+    [(np.zeros((4, 32, 32), dtype=np.uint8), "too-dark"), (pictures(1).repeat(4, 0), "no-motion")],
 )
 def test_a_blank_or_still_film_has_nothing_to_measure(frames: np.ndarray, kind: str) -> None:
     rng = stream(2, "cloud")
-    gate = FamiliarityGate(cloud=Familiarity.of(rng.normal(size=(300, 3)), rng.normal(size=(199, 3))))
+    gate = FamiliarityGate(
+        cloud=Familiarity.of(rng.normal(size=(300, 3)), rng.normal(size=(199, 3)))
+    )
     (found,) = gate.judge(frames, np.zeros(3))
     assert (found.kind, found.p, found.blank) == (kind, pytest.approx(1 / 200), True)
     judged = verdict([[[found]], [reason(0.5)]], false_alarm=0.05, level=exact)
@@ -112,7 +134,9 @@ def test_a_blank_or_still_film_has_nothing_to_measure(frames: np.ndarray, kind: 
 def test_a_gate_of_too_few_clips_for_the_rate_is_refused_and_lets_nothing_pass() -> None:
     """Of 15 clips the smallest p is 1/16, above any level of a rate of 5 %."""
     rng = stream(2, "cloud")
-    gate = FamiliarityGate(cloud=Familiarity.of(rng.normal(size=(300, 3)), rng.normal(size=(15, 3))))
+    gate = FamiliarityGate(
+        cloud=Familiarity.of(rng.normal(size=(300, 3)), rng.normal(size=(15, 3)))
+    )
     with pytest.raises(InputError, match="15 validation clips are too few"):
         verdict([[reason(0.5)]], false_alarm=0.05, level=gate.level)
 

@@ -1,4 +1,5 @@
-"""How many strange windows refuse a recording: the stated rate holds whatever the windows have in common."""
+"""How many strange windows refuse a recording: the stated rate holds whatever the windows have in
+common."""
 
 from __future__ import annotations
 
@@ -25,12 +26,24 @@ def refused(scores: FloatArray) -> float:
 
 
 def test_more_than_a_quarter_refuses_and_two_at_least_where_there_are_two() -> None:
-    assert [refusing(windows) for windows in (1, 2, 3, 4, 7, 8, 11, 12, 100)] == [1, 2, 2, 2, 2, 3, 3, 4, 26]
+    assert [refusing(windows) for windows in (1, 2, 3, 4, 7, 8, 11, 12, 100)] == [
+        1,
+        2,
+        2,
+        2,
+        2,
+        3,
+        3,
+        4,
+        26,
+    ]
 
 
 @pytest.mark.parametrize("windows", [1, 2, 5, 7, 30])
 @pytest.mark.parametrize("correlation", [0.0, 0.5, 0.85, 0.97, 1.0])
-def test_windows_that_are_alike_by_any_degree_keep_the_rate(windows: int, correlation: float) -> None:
+def test_windows_that_are_alike_by_any_degree_keep_the_rate(
+    windows: int, correlation: float
+) -> None:
     rng = stream(1, "alike", windows)
     shared, own = rng.normal(size=(RECORDINGS, 1)), rng.normal(size=(RECORDINGS, windows))
     assert refused(np.sqrt(correlation) * shared + np.sqrt(1 - correlation) * own) <= RATE + SLACK
@@ -44,10 +57,12 @@ def test_windows_that_are_the_more_alike_the_nearer_they_are_keep_the_rate(memor
 
 
 def test_however_many_sizes_are_tried_a_recording_of_one_of_them_keeps_the_rate() -> None:
-    """It is refused where it is refused at every size: at others it may be as strange as can be, or less than at its
-    own."""
+    """It is refused where it is refused at every size: at others it may be as strange as can be, or
+    less than at its own."""
     rng = stream(3, "sizes")
-    own = np.sqrt(0.7) * rng.normal(size=(RECORDINGS, 1)) + np.sqrt(0.3) * rng.normal(size=(RECORDINGS, 8))
+    own = np.sqrt(0.7) * rng.normal(size=(RECORDINGS, 1)) + np.sqrt(0.3) * rng.normal(
+        size=(RECORDINGS, 8)
+    )
     level, needed = window_rate(8, RATE), refusing(8)
     at = [(ndtr(own + shift) <= level).sum(axis=1) >= needed for shift in (-10.0, -0.5, 0.0, 0.5)]
     assert float(np.all(at, axis=0).mean()) <= RATE + SLACK
@@ -57,13 +72,15 @@ def test_the_rate_of_one_window_is_its_own_and_that_of_many_follows_the_formula(
     assert window_rate(1, RATE) == RATE
     assert window_rate(3, RATE) == RATE  # the median of three
     many = window_rate(4000, RATE)
-    assert ndtri(many) == pytest.approx(-np.sqrt(ndtri(RATE / 1.15) ** 2 + ndtri(0.25) ** 2), abs=0.01)
+    assert ndtri(many) == pytest.approx(
+        -np.sqrt(ndtri(RATE / 1.15) ** 2 + ndtri(0.25) ** 2), abs=0.01
+    )
     assert refused_share(many, 4000) == pytest.approx(RATE / 1.15, rel=1e-3)
 
 
 def test_no_correlation_is_left_out_at_which_more_are_refused() -> None:
-    """Two of four independent windows are strange with the probability of the binomial distribution, two that are the
-    same with that of one."""
+    """Two of four independent windows are strange with the probability of the binomial
+    distribution, two that are the same with that of one."""
     assert refused_share(0.4, 4) == pytest.approx(1 - 0.6**4 - 4 * 0.4 * 0.6**3)
     assert refused_share(0.4, 2) == pytest.approx(0.4)
 

@@ -12,7 +12,8 @@ from models.trained.outliers import conformal_p
 
 
 def test_one_more_surprise_is_e_times_rarer_in_an_exponential_tail() -> None:
-    """Exponential scores of any scale: 20 % lie above 0, and 20 %/e above 1; 20,000 draws estimate it to 0.01."""
+    """Exponential scores of any scale: 20 % lie above 0, and 20 %/e above 1; 20,000 draws estimate
+    it to 0.01."""
     rng = np.random.default_rng(1)
     scores = rng.exponential(1, (20_000, 2)) * np.array([0.3, 70]) + np.array([5, -2])
     surprise = ExponentialTails.of(scores, np.zeros(2)).surprise(scores)
@@ -32,8 +33,11 @@ def test_p_counts_the_calibration_clips_with_at_least_as_much() -> None:
 
 
 @pytest.mark.parametrize("count", [99, 200])
-def test_familiar_clips_are_refused_no_more_often_than_stated_with_the_stated_confidence(count: int) -> None:
-    """Of 2,000 gates, calibrated on uniform scores, 10 % may refuse more; their number has a deviation of 13."""
+def test_familiar_clips_are_refused_no_more_often_than_stated_with_the_stated_confidence(
+    count: int,
+) -> None:
+    """Of 2,000 gates, calibrated on uniform scores, 10 % may refuse more; their number has a
+    deviation of 13."""
     rng = np.random.default_rng(2)
     at = level(count, 0.05, 0.9)
     kept = np.sort(rng.random((2000, count)), axis=1)
@@ -50,7 +54,8 @@ def test_more_calibration_clips_bring_the_level_nearer_to_the_rate() -> None:
 
 
 def test_a_rate_too_low_for_the_calibration_clips_is_an_error() -> None:
-    """No threshold above all of 44 clips keeps to 5 % with 90 %: 0.95⁴⁴ = 0.105; with 45 it does, 0.95⁴⁵ = 0.099."""
+    """No threshold above all of 44 clips keeps to 5 % with 90 %: 0.95⁴⁴ = 0.105; with 45 it does,
+    0.95⁴⁵ = 0.099."""
     with pytest.raises(InputError, match="at least 45 clips"):
         level(44, 0.05, 0.9)
     assert level(45, 0.05, 0.9) == pytest.approx(1 / 46)

@@ -34,19 +34,35 @@ def model() -> Estimator:
 def gate(model: Estimator) -> Gate:
     training = [clip(seed) for seed in range(PLAIN + DISTORTED)]
     validation = [clip(1000 + seed) for seed in range(VALIDATION)]
-    return calibrated(model, training, validation, seed=1, advance=lambda _: None, plain=PLAIN, distorted=DISTORTED)
+    return calibrated(
+        model,
+        training,
+        validation,
+        seed=1,
+        advance=lambda _: None,
+        plain=PLAIN,
+        distorted=DISTORTED,
+    )
 
 
 def test_most_films_like_the_calibration_clips_are_familiar(model: Estimator, gate: Gate) -> None:
-    """At a level that lets 5 % be refused at most, with 90 %, of 20 films four refusals have p = 0.02."""
+    """At a level that lets 5 % be refused at most, with 90 %, of 20 films four refusals have p =
+    0.02."""
     judged = [judge(clip(5000 + seed)[:12], model, gate) for seed in range(20)]
     assert sum(not one.familiar for one in judged) <= 3
-    assert all(one.familiar == (one.p > one.level) and one.familiar == (not one.reasons) for one in judged)
+    assert all(
+        one.familiar == (one.p > one.level) and one.familiar == (not one.reasons) for one in judged
+    )
 
 
 @pytest.mark.parametrize(
     ("fault", "kind"),
-    [("still", "no-motion"), ("held", "low-frame-rate"), ("dark", "too-dark"), ("pair", "several-flags")],
+    [
+        ("still", "no-motion"),
+        ("held", "low-frame-rate"),
+        ("dark", "too-dark"),
+        ("pair", "several-flags"),
+    ],
 )
 def test_a_fault_is_refused_and_named(model: Estimator, gate: Gate, fault: str, kind: str) -> None:
     plain = clip(42)
@@ -54,9 +70,15 @@ def test_a_fault_is_refused_and_named(model: Estimator, gate: Gate, fault: str, 
     frames = {
         "still": np.repeat(plain[:1], 12, axis=0),
         "held": plain[(np.floor(np.arange(12) / 2.5) * 2.5).astype(int)],
-        "dark": np.clip(plain[:12] * 0.08 + rng.normal(0, 2, plain[:12].shape), 0, 255).astype(np.uint8),
+        "dark": np.clip(plain[:12] * 0.08 + rng.normal(0, 2, plain[:12].shape), 0, 255).astype(
+            np.uint8
+        ),
         "pair": np.concatenate(
-            [film(seed=42, at=(0.25, 0.5))[:12, :, :56], film(seed=43, at=(0.75, 0.5))[:12, :, 56:]], axis=2
+            [
+                film(seed=42, at=(0.25, 0.5))[:12, :, :56],
+                film(seed=43, at=(0.75, 0.5))[:12, :, 56:],
+            ],
+            axis=2,
         ),
     }[fault]
     judged = judge(frames, model, gate)
@@ -65,7 +87,9 @@ def test_a_fault_is_refused_and_named(model: Estimator, gate: Gate, fault: str, 
     assert len({one.kind for one in judged.reasons}) == len(judged.reasons)
     assert all(one.p is not None and one.p <= judged.level for one in judged.reasons)
     assert not next(one for one in judged.reasons if one.kind == kind).check.startswith("like-")
-    assert all(one.fix and one.figure in one.what and one.value is not None for one in judged.reasons)
+    assert all(
+        one.fix and one.figure in one.what and one.value is not None for one in judged.reasons
+    )
 
 
 def test_kinds_that_are_left_out_refuse_nothing_and_make_no_other_kind_more_suspicious(
@@ -93,7 +117,9 @@ def test_where_nothing_moves_no_reason_is_about_what_moves(model: Estimator, gat
     assert without.reasons[0].blank
 
 
-def test_too_few_frames_and_a_black_film_are_refused_before_anything_is_measured(model: Estimator, gate: Gate) -> None:
+def test_too_few_frames_and_a_black_film_are_refused_before_anything_is_measured(
+    model: Estimator, gate: Gate
+) -> None:
     short = judge(clip(1)[:10], model, gate)
     assert [one.kind for one in short.reasons] == ["too-few-frames"]
     assert "10 instead of 12" in short.reasons[0].what
@@ -102,7 +128,9 @@ def test_too_few_frames_and_a_black_film_are_refused_before_anything_is_measured
     assert black.p == pytest.approx(1 / (VALIDATION + 1))
 
 
-def test_measuring_refuses_a_still_film_with_the_checks_own_reason_and_fix(model: Estimator, gate: Gate) -> None:
+def test_measuring_refuses_a_still_film_with_the_checks_own_reason_and_fix(
+    model: Estimator, gate: Gate
+) -> None:
     asked = CheckedGate(model=model, calibrated=gate, false_alarm=0.05)
     still = np.repeat(clip(42)[:1], 12, axis=0)
     reasons = asked.judge(still, model.summaries(model.inputs(still[None]))[0].numpy())
@@ -144,7 +172,9 @@ def test_a_gate_is_the_same_after_storing_and_fits_its_own_network_alone(
 @pytest.mark.parametrize("name", DISTORTIONS)
 def test_a_distortion_is_the_same_from_the_same_seed_and_of_the_length_wanted(name: str) -> None:
     make = DISTORTIONS[name].apply
-    one, other, again = (make(clip(1), clip(2), np.random.default_rng(seed), 12) for seed in (3, 4, 3))
+    one, other, again = (
+        make(clip(1), clip(2), np.random.default_rng(seed), 12) for seed in (3, 4, 3)
+    )
     np.testing.assert_array_equal(one, again)
     assert (len(one), one.dtype, one.ndim) == (12, np.uint8, 3)
     assert one.shape != other.shape or (one != other).any()

@@ -30,22 +30,37 @@ class World:
         self.slopes = self.rng.normal(size=(3, COLUMNS)) * np.array([[1.0], [0.2], [0.02]])
         self.direction = 2 * self.rng.normal(size=COLUMNS)
 
-    def draw(self, delta: FloatArray, *, recordings: int, numerics: FloatArray, speeds: FloatArray) -> Statistics:
+    def draw(
+        self, delta: FloatArray, *, recordings: int, numerics: FloatArray, speeds: FloatArray
+    ) -> Statistics:
         """Segments of recordings with coefficients (recording, column)."""
         recording = np.repeat(np.arange(recordings), SEGMENTS)
         response = self.rng.normal(size=(len(recording), COLUMNS, COLUMNS)) + 4 * np.eye(COLUMNS)
-        noise = self.rng.multivariate_normal(np.zeros(COLUMNS), self.covariance, size=len(recording))
+        noise = self.rng.multivariate_normal(
+            np.zeros(COLUMNS), self.covariance, size=len(recording)
+        )
         u = speeds[recording]
-        mean = np.stack([np.ones_like(u), u, u**2], axis=1) @ self.slopes + numerics[recording, None] * self.direction
+        mean = (
+            np.stack([np.ones_like(u), u, u**2], axis=1) @ self.slopes
+            + numerics[recording, None] * self.direction
+        )
         r = mean + np.einsum("sij,sj->si", response, delta[recording]) + noise
         return Statistics(
-            recording=recording, r=r, response=response, error=np.ones(len(r)), marker_error=np.ones((len(r), 1))
+            recording=recording,
+            r=r,
+            response=response,
+            error=np.ones(len(r)),
+            marker_error=np.ones((len(r), 1)),
         )
 
     def nulls(self) -> Nulls:
         kinds = np.repeat(np.arange(KINDS), CLOTHS * WINDS)
-        offsets = np.repeat(self.rng.normal(size=(KINDS * CLOTHS, len(THETA))) * PRIOR, WINDS, axis=0)
-        delta = np.zeros((RECORDINGS, COLUMNS))  # statistics are taken at each one's own calibration
+        offsets = np.repeat(
+            self.rng.normal(size=(KINDS * CLOTHS, len(THETA))) * PRIOR, WINDS, axis=0
+        )
+        delta = np.zeros(
+            (RECORDINGS, COLUMNS)
+        )  # statistics are taken at each one's own calibration
         speeds = self.rng.uniform(3, 8, RECORDINGS)
         shift = np.repeat(self.rng.normal(size=KINDS * CLOTHS), WINDS)
         own = self.draw(delta, recordings=RECORDINGS, numerics=shift, speeds=speeds)
@@ -102,8 +117,8 @@ def test_coefficients_that_nothing_was_taken_along_are_found_by_the_other_column
 def test_the_null_model_finds_mean_and_covariance(world: World, null: NullModel) -> None:
     speeds = np.array([3.0, 5.0, 8.0])
     features = np.stack([np.ones(3), speeds, speeds**2], axis=1)
-    # Forty experiments, whose shift has deviation 1: 1/√40 of the direction, twice that at a parabola's ends; three
-    # deviations, and as many of the noise of 640 segments.
+    # Forty experiments, whose shift has deviation 1: 1/√40 of the direction, twice that at a
+    # parabola's ends; three deviations, and as many of the noise of 640 segments.
     bound = 6 / 40**0.5 * np.abs(world.direction) + 0.5
     assert (np.abs(null.mean(speeds) - features @ world.slopes) < bound).all()
     ratio = np.diag(null.covariance) / np.diag(world.covariance)
@@ -111,12 +126,17 @@ def test_the_null_model_finds_mean_and_covariance(world: World, null: NullModel)
 
 
 def test_the_mean_is_that_of_the_design_of_the_data(world: World) -> None:
-    # Nulls whose r rise by 3 a mm² of noise and fall by 2 for 10 ms of period; of 40 experiments, as above.
+    # Nulls whose r rise by 3 a mm² of noise and fall by 2 for 10 ms of period; of 40 experiments,
+    # as above.
     nulls, rng = world.nulls(), np.random.default_rng(3)
     kinds = np.arange(nulls.numerics.max() + 1)
     noise, period = rng.choice([0.0, 1e-3, 2e-3], len(kinds))[nulls.numerics], (0.03, 0.04)
     period = rng.choice(period, len(kinds))[nulls.numerics]
-    moved = nulls.statistics.r + 3.0 * (1e3 * noise[:, None]) ** 2 - 2.0 * (period[:, None] - 0.04) / 0.01
+    moved = (
+        nulls.statistics.r
+        + 3.0 * (1e3 * noise[:, None]) ** 2
+        - 2.0 * (period[:, None] - 0.04) / 0.01
+    )
     seen = replace(nulls, statistics=replace(nulls.statistics, r=moved), noise=noise, period=period)
     speed = np.array([5.0])
     plain = NullModel.fit(nulls, nulls.design).mean(speed)
@@ -142,24 +162,32 @@ def test_the_mean_is_that_of_the_cloth_of_the_data() -> None:
     unknown = NullModel.fit(nulls, replace(nulls.design, cloth="linen"))
     for name, move in moves.items():
         known = NullModel.fit(nulls, replace(nulls.design, cloth=name))
-        # Of the five kinds of a cloth: their shifts have deviation 1 along the direction, two experiments each; and of
-        # the 160 segments noise. Three deviations.
-        bound = 3 * (np.abs(world.direction) / 10**0.5 + np.sqrt(np.diag(world.covariance) / 160)) + 0.2
-        assert (np.abs((known.mean(speed) - unknown.mean(speed))[0] - (move - centre)) < bound).all(), name
+        # Of the five kinds of a cloth: their shifts have deviation 1 along the direction, two
+        # experiments each; and of the 160 segments noise. Three deviations.
+        bound = (
+            3 * (np.abs(world.direction) / 10**0.5 + np.sqrt(np.diag(world.covariance) / 160)) + 0.2
+        )
+        assert (
+            np.abs((known.mean(speed) - unknown.mean(speed))[0] - (move - centre)) < bound
+        ).all(), name
         # How cloths differ is a shift of one that is not known, and of no other.
         spread = [np.linalg.norm(model.shifts) for model in (known, unknown)]
         assert spread[0] < 0.75 * spread[1]
 
 
 def test_cloths_that_are_alike_move_no_mean() -> None:
-    # Where the cloth moves nothing, its share is a few hundredths: the moments of 20 kinds say it is little or none.
+    # Where the cloth moves nothing, its share is a few hundredths: the moments of 20 kinds say it
+    # is little or none.
     world = World(1)
     nulls = of_cloths(world, {name: np.zeros(COLUMNS) for name in ("wool", "silk", "felt", "jute")})
     speed = np.array([5.0])
     means = [
-        NullModel.fit(nulls, replace(nulls.design, cloth=name)).mean(speed)[0] for name in ("wool", "silk", "none")
+        NullModel.fit(nulls, replace(nulls.design, cloth=name)).mean(speed)[0]
+        for name in ("wool", "silk", "none")
     ]
-    own = np.linalg.solve(np.linalg.cholesky(world.covariance), np.stack([means[0] - means[2], means[1] - means[2]]).T)
+    own = np.linalg.solve(
+        np.linalg.cholesky(world.covariance), np.stack([means[0] - means[2], means[1] - means[2]]).T
+    )
     assert np.abs(own).max() < 1.0
 
 
@@ -178,20 +206,29 @@ def test_recordings_of_one_cloth_by_one_numerics_are_one_experiment(world: World
 
 def test_p_values_of_nulls_are_uniform() -> None:
     world = World(3)
-    columns = (*(name for name, _, _ in THETA), *(f"c{k}" for k in range(COLUMNS - len(THETA) - 1)), GUSTS)
+    columns = (
+        *(name for name, _, _ in THETA),
+        *(f"c{k}" for k in range(COLUMNS - len(THETA) - 1)),
+        GUSTS,
+    )
     bank = NullBank(nulls=world.nulls(), columns=columns, duration=2.0, words="made")
     null, reference = bank.model(bank.nulls.design), bank.reference(3 * SEGMENTS, noise=0.0, seed=0)
     found = []
     for _ in range(150):
         data = world.data(null, effect(0.0))
         found.append(reference.p_left_by(data, columns, ()))
-    # Of 150 draws against 40 experiments: their quantiles are themselves uncertain by 1/√40 at the most.
+    # Of 150 draws against 40 experiments: their quantiles are themselves uncertain by 1/√40 at the
+    # most.
     assert kstest(found, uniform.cdf).statistic < 2 / 40**0.5
     assert np.mean(np.array(found) <= 0.05) < 0.05 + 3 * (0.05 / 40) ** 0.5
 
 
 def test_a_bank_of_shorter_experiments_than_the_data_is_refused(world: World) -> None:
-    columns = (*(name for name, _, _ in THETA), *(f"c{k}" for k in range(COLUMNS - len(THETA) - 1)), GUSTS)
+    columns = (
+        *(name for name, _, _ in THETA),
+        *(f"c{k}" for k in range(COLUMNS - len(THETA) - 1)),
+        GUSTS,
+    )
     bank = NullBank(nulls=world.nulls(), columns=columns, duration=2.0, words="made")
     with pytest.raises(InputError, match="17 segments"):
         bank.reference(WINDS * SEGMENTS + 1, noise=0.0, seed=0)
@@ -199,8 +236,8 @@ def test_a_bank_of_shorter_experiments_than_the_data_is_refused(world: World) ->
 
 @pytest.fixture
 def worlds() -> list[tuple[World, NullModel]]:
-    """Thirty worlds, each with a null model of its own: one model of 40 kinds knows a variance to √(2/40) = 22 %, and
-    all draws against it share that."""
+    """Thirty worlds, each with a null model of its own: one model of 40 kinds knows a variance to
+    √(2/40) = 22 %, and all draws against it share that."""
     found = []
     for seed in range(30):
         own = World(seed)
@@ -220,12 +257,18 @@ def test_strengths_are_found_within_their_errors(worlds: list[tuple[World, NullM
 
 
 def test_drops_of_nulls_follow_a_chi_square_of_one(worlds: list[tuple[World, NullModel]]) -> None:
-    drops = np.array([own.data(null, effect(0.0)).drops()[5] for own, null in worlds for _ in range(10)])
-    # A model's inflated covariance makes them somewhat smaller; the share beyond has a deviation of 0.017.
+    drops = np.array(
+        [own.data(null, effect(0.0)).drops()[5] for own, null in worlds for _ in range(10)]
+    )
+    # A model's inflated covariance makes them somewhat smaller; the share beyond has a deviation of
+    # 0.017.
     assert 0.7 < drops.mean() < 1.2
     assert kstest(drops, chi2(1).cdf).pvalue > 1e-3
     for level in (0.5, 0.1, 0.05):
-        assert abs(np.mean(drops > chi2(1).isf(level)) - level) < 4 * (level * (1 - level) / 300) ** 0.5
+        assert (
+            abs(np.mean(drops > chi2(1).isf(level)) - level)
+            < 4 * (level * (1 - level) / 300) ** 0.5
+        )
 
 
 def test_drops_are_those_of_fits(world: World, null: NullModel) -> None:
@@ -249,7 +292,10 @@ def test_an_unobserved_column_carries_no_information() -> None:
     null = NullModel.fit(replace(nulls, statistics=blind(nulls.statistics)), nulls.design)
     speeds = np.repeat([3.5, 5.0, 7.0], SEGMENTS)
     found = world.draw(
-        np.tile(effect(0.6), (3, 1)), recordings=3, numerics=np.zeros(3), speeds=np.array([3.5, 5.0, 7.0])
+        np.tile(effect(0.6), (3, 1)),
+        recordings=3,
+        numerics=np.zeros(3),
+        speeds=np.array([3.5, 5.0, 7.0]),
     )
     evidence = Evidence.of(blind(found), speeds, null)
     drops = evidence.drops()
@@ -260,7 +306,9 @@ def test_an_unobserved_column_carries_no_information() -> None:
 
 
 def test_moments_of_nulls_or_data_alone_are_refused(world: World, null: NullModel) -> None:
-    own = world.draw(np.zeros((3, COLUMNS)), recordings=3, numerics=np.zeros(3), speeds=np.full(3, 5.0))
+    own = world.draw(
+        np.zeros((3, COLUMNS)), recordings=3, numerics=np.zeros(3), speeds=np.full(3, 5.0)
+    )
     with pytest.raises(UsageError, match="only the nulls or only the data have moments"):
         Evidence.of(replace(own, turning=own), np.full(3 * SEGMENTS, 5.0), null)
 
@@ -271,7 +319,8 @@ def test_always_fitted_columns_never_drop(world: World, null: NullModel) -> None
 
 def test_the_true_effect_predicts_left_out_recordings_best(world: World, null: NullModel) -> None:
     best = [
-        int(np.argmax(gains(world.data(null, effect(0.6)), [[3], [4], [5], [6], [7]]).sum(axis=1))) for _ in range(20)
+        int(np.argmax(gains(world.data(null, effect(0.6)), [[3], [4], [5], [6], [7]]).sum(axis=1)))
+        for _ in range(20)
     ]
     assert best == [2] * 20
 
@@ -292,7 +341,9 @@ def fluctuating(world: World, null: NullModel) -> Evidence:
         curvature=evidence.curvature,
         columns=evidence.columns,
         score=evidence.score + extra[:, None] * column,
-        energy=evidence.energy + 2 * extra * evidence.score[:, 5] + extra**2 * evidence.curvature[:, 5, 5],
+        energy=evidence.energy
+        + 2 * extra * evidence.score[:, 5]
+        + extra**2 * evidence.curvature[:, 5, 5],
     )
 
 
@@ -303,9 +354,16 @@ def test_a_fluctuation_is_found_with_its_size(world: World, null: NullModel) -> 
 
 
 def test_a_constant_does_not_fluctuate(worlds: list[tuple[World, NullModel]]) -> None:
-    """Of a strength that is the same in all segments, a likelihood ratio no larger than that of nulls."""
+    """Of a strength that is the same in all segments, a likelihood ratio no larger than that of
+    nulls."""
     constant, nothing = (
-        np.array([fluctuation(own.data(null, effect(size)), 5).likelihood for own, null in worlds for _ in range(5)])
+        np.array(
+            [
+                fluctuation(own.data(null, effect(size)), 5).likelihood
+                for own, null in worlds
+                for _ in range(5)
+            ]
+        )
         for size in (0.5, 0.0)
     )
     error = nothing.std() / np.sqrt(len(nothing))
@@ -324,7 +382,10 @@ def test_what_is_left_beside_a_free_coefficient_is_that_of_a_coefficient_for_eve
     total, score, energy = evidence._total()  # pyright: ignore[reportPrivateUsage]
     across = evidence.curvature[:, nuisance, 5].T
     curvature = np.block(
-        [[total[np.ix_(nuisance, nuisance)], across], [across.T, np.diag(evidence.curvature[:, 5, 5])]]
+        [
+            [total[np.ix_(nuisance, nuisance)], across],
+            [across.T, np.diag(evidence.curvature[:, 5, 5])],
+        ]
     )
     right = np.concatenate([score[nuisance], evidence.score[:, 5]])
     assert len(right) == len(nuisance) + count
@@ -337,9 +398,17 @@ def test_what_is_left_beside_a_free_coefficient_is_that_of_a_coefficient_for_eve
 
 def test_beside_gusts_a_pressure_that_fluctuates_leaves_what_nulls_do() -> None:
     world = World(5)
-    columns = (*(name for name, _, _ in THETA), *(f"c{k}" for k in range(COLUMNS - len(THETA) - 1)), GUSTS)
+    columns = (
+        *(name for name, _, _ in THETA),
+        *(f"c{k}" for k in range(COLUMNS - len(THETA) - 1)),
+        GUSTS,
+    )
     bank = NullBank(nulls=world.nulls(), columns=columns, duration=2.0, words="made")
-    reference, null, place = bank.reference(12, noise=0.0, seed=1), bank.model(bank.nulls.design), COLUMNS - 1
+    reference, null, place = (
+        bank.reference(12, noise=0.0, seed=1),
+        bank.model(bank.nulls.design),
+        COLUMNS - 1,
+    )
     before, after = [], []
     for _ in range(30):
         evidence = world.data(null, effect(0.0))
@@ -362,12 +431,15 @@ def test_beside_gusts_a_pressure_that_fluctuates_leaves_what_nulls_do() -> None:
 
 
 def test_nulls_fluctuate_little(world: World, null: NullModel) -> None:
-    assert np.median([fluctuation(world.data(null, effect(0.0)), 5).deviation for _ in range(40)]) < 0.1
+    assert (
+        np.median([fluctuation(world.data(null, effect(0.0)), 5).deviation for _ in range(40)])
+        < 0.1
+    )
 
 
 def test_what_numerics_leave_is_that_of_the_damping_of_the_data(world: World) -> None:
-    """Where all of r is 1.5 times larger for each factor of e in the damping, so are the mean, the shifts and Σ of a
-    design's null model."""
+    """Where all of r is 1.5 times larger for each factor of e in the damping, so are the mean, the
+    shifts and Σ of a design's null model."""
     nulls = world.nulls()
     rng = np.random.default_rng(5)
     damping = rng.uniform(-1.5, 2.5, nulls.experiment.max() + 1)[nulls.experiment]
@@ -381,11 +453,17 @@ def test_what_numerics_leave_is_that_of_the_damping_of_the_data(world: World) ->
         own = NullModel.fit(seen, replace(nulls.design, damping=2.5e-3 * np.exp(step)))
         ratio = np.sqrt(np.diag(own.covariance) / np.diag(plain.covariance))
         np.testing.assert_allclose(ratio, 1.5**step, rtol=0.15)
-        np.testing.assert_allclose(np.linalg.norm(own.shifts[0]) / np.linalg.norm(plain.shifts[0]), 1.5**step, rtol=0.2)
-        np.testing.assert_allclose(own.mean(speeds), 1.5**step * plain.mean(speeds), rtol=0.2, atol=0.6 * 1.5**step)
+        np.testing.assert_allclose(
+            np.linalg.norm(own.shifts[0]) / np.linalg.norm(plain.shifts[0]), 1.5**step, rtol=0.2
+        )
+        np.testing.assert_allclose(
+            own.mean(speeds), 1.5**step * plain.mean(speeds), rtol=0.2, atol=0.6 * 1.5**step
+        )
 
 
-def test_the_best_gain_is_that_of_the_column_that_acts_and_falls_when_it_is_there(null: NullModel) -> None:
+def test_the_best_gain_is_that_of_the_column_that_acts_and_falls_when_it_is_there(
+    null: NullModel,
+) -> None:
     world = World(11)
     without = [best_gain(world.data(null, effect(0.0))) for _ in range(20)]
     acts = world.data(null, effect(2.0))
@@ -397,7 +475,9 @@ def test_the_best_gain_is_that_of_the_column_that_acts_and_falls_when_it_is_ther
 
 
 @pytest.mark.parametrize("beside", [(), (5,), (4, 7)])
-def test_the_best_gain_is_the_largest_of_those_of_all_others(null: NullModel, beside: tuple[int, ...]) -> None:
+def test_the_best_gain_is_the_largest_of_those_of_all_others(
+    null: NullModel, beside: tuple[int, ...]
+) -> None:
     acts = World(12).data(null, effect(1.0))
     others = [column for column in range(len(THETA), COLUMNS) if column not in beside]
     alone, *more = gains(acts, [beside, *((*beside, column) for column in others)]).sum(axis=1)
@@ -405,13 +485,17 @@ def test_the_best_gain_is_the_largest_of_those_of_all_others(null: NullModel, be
 
 
 def test_what_a_parameter_takes_in_shows_on_recordings_left_out() -> None:
-    """An effect that grows by the square of the wind, beside a parameter that does the same in all: to 9, 25 and 49 the
-    mean, 27.7, leaves squares of 809; each left out, the mean of the others leaves 784 + 16 + 1024."""
+    """An effect that grows by the square of the wind, beside a parameter that does the same in all:
+    to 9, 25 and 49 the mean, 27.7, leaves squares of 809; each left out, the mean of the others
+    leaves 784 + 16 + 1024."""
     count, segments = len(THETA) + 1, 12
     recording, speeds = np.repeat(np.arange(3), 4), np.repeat([3.0, 5.0, 7.0], 4)
     free = np.array([1e3, 1e-3, 1e-3])
     null = NullModel(
-        coefficients=np.zeros((3, count)), covariance=np.eye(count), shifts=np.zeros((0, count)), prior=free
+        coefficients=np.zeros((3, count)),
+        covariance=np.eye(count),
+        shifts=np.zeros((0, count)),
+        prior=free,
     )
     response = np.zeros((segments, count, count))
     response[:, 0, 0], response[:, 0, -1] = 1.0, speeds**2

@@ -1,4 +1,5 @@
-"""Statistics that are drawn, in which it is known what acts: null banks, and experiments judged by them."""
+"""Statistics that are drawn, in which it is known what acts: null banks, and experiments judged by
+them."""
 
 from __future__ import annotations
 
@@ -36,12 +37,18 @@ def expected(column: int) -> float:
 EXPECTED = np.array([expected(column) for column in range(COUNT)])
 
 
-def drawn(rng: np.random.Generator, delta: FloatArray, numerics: FloatArray, speeds: FloatArray) -> Statistics:
+def drawn(
+    rng: np.random.Generator, delta: FloatArray, numerics: FloatArray, speeds: FloatArray
+) -> Statistics:
     """r = shift of the numerics + R δ + ε of recordings, with coefficients (segment, column) and ε ~ N(0, 1)."""
     recording = np.repeat(np.arange(len(speeds)), SEGMENTS)
     mixed = rng.normal(size=(len(recording), COUNT, COUNT)) + CLEAR * np.eye(COUNT)
     response = mixed / np.abs(EXPECTED)
-    r = np.einsum("sij,sj->si", response, delta) + numerics[recording] + rng.normal(size=(len(recording), COUNT))
+    r = (
+        np.einsum("sij,sj->si", response, delta)
+        + numerics[recording]
+        + rng.normal(size=(len(recording), COUNT))
+    )
     return Statistics(
         recording=recording,
         r=r,
@@ -55,12 +62,15 @@ def drawn(rng: np.random.Generator, delta: FloatArray, numerics: FloatArray, spe
 def blown(rng: np.random.Generator, segments: int, parts: FloatArray | float = 0.0) -> Course:
     """What noise makes of the wind's course, and a wind of parts (segment, window, part)."""
     size = 100.0
-    score = size * np.broadcast_to(parts, (segments, 10, 3)) + size**0.5 * rng.normal(size=(segments, 10, 3))
+    score = size * np.broadcast_to(parts, (segments, 10, 3)) + size**0.5 * rng.normal(
+        size=(segments, 10, 3)
+    )
     return Course(score=score, curvature=np.broadcast_to(size * np.eye(3), (*score.shape, 3)))
 
 
 def pulses(strength: float, *, turned: float = 0.0) -> FloatArray:
-    """(segment, window, part) of three recordings: a wind that is weaker for one window of every nine."""
+    """(segment, window, part) of three recordings: a wind that is weaker for one window of every
+    nine."""
     weaker = np.where(np.arange(3 * SEGMENTS * 10) % 9 < 3, -strength, 0.0).reshape(-1, 10, 1)
     return weaker * np.array([1.0, turned, 0.0])
 
@@ -70,11 +80,16 @@ def slow(strength: float) -> FloatArray:
     return strength * stream(5, "slow").normal(size=(3 * SEGMENTS, 1, 3)) * np.ones((1, 10, 1))
 
 
-def made(seed: int, *, moments: bool = False, courses: bool = False, settled: bool = False) -> NullBank:
-    """A bank of nulls, with moments about the pole or without, with courses of the wind, with settled quantities."""
+def made(
+    seed: int, *, moments: bool = False, courses: bool = False, settled: bool = False
+) -> NullBank:
+    """A bank of nulls, with moments about the pole or without, with courses of the wind, with
+    settled quantities."""
     rng = np.random.default_rng(seed)
     recordings = KINDS * CLOTHS * WINDS
-    cloths = np.repeat(rng.normal(size=(KINDS * CLOTHS, len(THETA))) * PRIOR, WINDS * SEGMENTS, axis=0)
+    cloths = np.repeat(
+        rng.normal(size=(KINDS * CLOTHS, len(THETA))) * PRIOR, WINDS * SEGMENTS, axis=0
+    )
     delta = np.zeros((len(cloths), COUNT))  # statistics are taken at each one's own calibration
     shifts = np.repeat(rng.normal(size=(KINDS * CLOTHS, COUNT)), WINDS, axis=0)
     speeds = rng.uniform(3, 8, recordings)
@@ -119,9 +134,9 @@ def seen(
     moments: Acting | None = None,
     course: FloatArray | None = None,
 ) -> Evidence:
-    """Of three recordings with strengths in units of what is expected, a pressure that fluctuates by `gusts`, and
-    `line` of power more at `SHED`, across the wind; beside them moments of other strengths, and a course of the
-    wind."""
+    """Of three recordings with strengths in units of what is expected, a pressure that fluctuates
+    by `gusts`, and `line` of power more at `SHED`, across the wind; beside them moments of other
+    strengths, and a course of the wind."""
     rng = np.random.default_rng(seed)
     delta = strengths(acting)
     delta[:, names().index(GUSTS)] += gusts * rng.normal(size=len(delta))

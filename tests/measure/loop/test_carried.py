@@ -92,7 +92,14 @@ def observations(*effects: Effect, seed: int) -> list[Observation]:
     )
     calm = WindTrack.constant((0.0, 0.0, 0.0))
     return [
-        from_arrays(name=f"way {k}", positions=r.positions, rest=r.markers, rate=RATE, wind=calm, noise=NOISE)
+        from_arrays(
+            name=f"way {k}",
+            positions=r.positions,
+            rest=r.markers,
+            rate=RATE,
+            wind=calm,
+            noise=NOISE,
+        )
         for k, r in enumerate(batch.simulate())
     ]
 
@@ -110,14 +117,19 @@ def bank(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_carried_cloths_without_effects_are_accepted_by_the_count_of_kinds(bank: Path) -> None:
-    """Twelve kinds of numerics reject at 1/13: two or more of four by chance in 3 of 100 such draws."""
-    verdicts = [close_loop(experiment(seed=seed), LoopOptions(bank=bank, level=LEVEL)) for seed in (5, 9, 11, 20)]
+    """Twelve kinds of numerics reject at 1/13: two or more of four by chance in 3 of 100 such
+    draws."""
+    verdicts = [
+        close_loop(experiment(seed=seed), LoopOptions(bank=bank, level=LEVEL))
+        for seed in (5, 9, 11, 20)
+    ]
     accepted = [verdict for verdict in verdicts if verdict.conclusion in NOT_REJECTED]
     assert len(accepted) >= 3
     for verdict in verdicts:
         test = verdict.test
         assert test.kinds == KINDS
-        # Each kind counts for the share of its groups that are as far, and the data for one more kind.
+        # Each kind counts for the share of its groups that are as far, and the data for one more
+        # kind.
         as_far = np.array(test.null) >= test.statistic
         assert 1 / (KINDS + 1) <= test.p_value.value <= (1 + as_far.sum()) / (KINDS + 1)
         assert (test.p_value.value > LEVEL) == (verdict in accepted)
@@ -137,8 +149,12 @@ def test_nulls_of_cloths_held_still_do_not_judge_one_that_is_carried(bank: Path)
     data = experiment(seed=1)
     setting = Setting.of(data)
     loaded = null_plan.load_bank(bank, setting)
-    still = Setting.of(replace(data, recordings=tuple(replace(own, attachments=None) for own in data.recordings)))
-    with pytest.raises(InputError, match="cloths were carried, that of the recordings is held still"):
+    still = Setting.of(
+        replace(data, recordings=tuple(replace(own, attachments=None) for own in data.recordings))
+    )
+    with pytest.raises(
+        InputError, match="cloths were carried, that of the recordings is held still"
+    ):
         null_plan.check(loaded, still)
 
 
@@ -148,7 +164,9 @@ def test_the_ways_of_the_data_shape_their_nulls() -> None:
     first, *others = setting.experiment.recordings
     assert first.attachments is not None
     moved = replace(first, attachments=first.attachments + 1e-3)
-    elsewhere = replace(setting, experiment=replace(setting.experiment, recordings=(moved, *others)))
+    elsewhere = replace(
+        setting, experiment=replace(setting.experiment, recordings=(moved, *others))
+    )
     assert null_plan.design_hash(elsewhere) != null_plan.design_hash(setting)
 
 
@@ -157,14 +175,17 @@ def test_close_loop_judges_a_table_of_a_carried_cloth(bank: Path, tmp_path: Path
     for seen in observations(seed=5):
         for frame, places in enumerate(seen.positions):
             for marker, ((u, v), (x, y, z)) in enumerate(zip(seen.markers, places, strict=True)):
-                lines.append(f"{seen.name},{frame},m{marker},{u:.6f},{v:.6f},{x:.6f},{y:.6f},{z:.6f}")
+                lines.append(
+                    f"{seen.name},{frame},m{marker},{u:.6f},{v:.6f},{x:.6f},{y:.6f},{z:.6f}"
+                )
     table = tmp_path / "tracks.csv"
     table.write_text("\n".join(lines) + "\n", encoding="utf-8")
     recipe = tmp_path / "carried.toml"
     source = f'source = "tracks.csv"\nrate = {RATE}\nnoise = {NOISE}\nwind = {{ speed = 0 }}'
     takes = "\n".join(f'[[recording]]\ntake = "way {k}"\n{source}' for k in range(2))
     recipe.write_text(
-        f'[cloth]\nwidth = {SIZE}\nheight = {SIZE}\nvertices = {VERTICES}\n[material]\nname = "camel-ponte-roma"\n'
+        f"[cloth]\nwidth = {SIZE}\nheight = {SIZE}\nvertices = {VERTICES}\n[material]\nname = "
+        '"camel-ponte-roma"\n'
         f'[attachment]\nat = "top-corners"\ncarried = true\n{takes}\n',
         encoding="utf-8",
     )
@@ -173,7 +194,14 @@ def test_close_loop_judges_a_table_of_a_carried_cloth(bank: Path, tmp_path: Path
     assert ended.code == 0
     said = ended.document
     assert said["conclusion"] in {one.value for one in NOT_REJECTED}
-    assert said["test"]["nulls"].endswith("carried along the recordings' own ways from other instants on")
-    assert "own ways from other instants on" in (tmp_path / "loop" / "report.html").read_text(encoding="utf-8")
+    assert said["test"]["nulls"].endswith(
+        "carried along the recordings' own ways from other instants on"
+    )
+    assert "own ways from other instants on" in (tmp_path / "loop" / "report.html").read_text(
+        encoding="utf-8"
+    )
     # Recipes of the simulator hold cloth still.
-    assert sorted(path.name for path in (tmp_path / "loop").iterdir()) == ["report.html", "verdict.json"]
+    assert sorted(path.name for path in (tmp_path / "loop").iterdir()) == [
+        "report.html",
+        "verdict.json",
+    ]

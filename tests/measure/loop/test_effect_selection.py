@@ -39,17 +39,22 @@ def test_two_effects_are_both_named(null: NullModel, reference: Reference) -> No
 
 
 def test_a_pressure_that_fluctuates_is_called_gusts(null: NullModel, reference: Reference) -> None:
-    """In nine of ten draws or more, other columns being large by chance in the others: of twelve draws fewer than nine
-    are then as rare as 2.6 % (binomial), where half of all draws would give nine in 7 % of cases. Seeds and rule were
-    fixed before the draws were made."""
+    """In nine of ten draws or more, other columns being large by chance in the others: of twelve
+    draws fewer than nine are then as rare as 2.6 % (binomial), where half of all draws would give
+    nine in 7 % of cases. Seeds and rule were fixed before the draws were made."""
     found = [judged(null, reference, {}, gusts=0.5, seed=seed) for seed in range(100, 112)]
     assert sum(named(one) == ["gusts"] for one in found) >= 9
-    # Half a relative deviation of the pressure is a quarter of the speed's; of twelve segments, known to a fifth.
-    strengths = [one.ranking[0].candidate.strength.value for one in found if named(one) == ["gusts"]]
+    # Half a relative deviation of the pressure is a quarter of the speed's; of twelve segments,
+    # known to a fifth.
+    strengths = [
+        one.ranking[0].candidate.strength.value for one in found if named(one) == ["gusts"]
+    ]
     assert strengths == pytest.approx([0.25] * len(strengths), rel=0.6)
 
 
-def test_a_pressure_that_differs_by_a_constant_is_not(null: NullModel, reference: Reference) -> None:
+def test_a_pressure_that_differs_by_a_constant_is_not(
+    null: NullModel, reference: Reference
+) -> None:
     assert "gusts" not in named(judged(null, reference, {GUSTS: 1.0}))
 
 
@@ -59,7 +64,9 @@ def test_an_effect_beside_gusts_is_named_with_them(null: NullModel, reference: R
     assert found.conclusion is Conclusion.EFFECT
 
 
-def test_a_force_along_the_motion_is_none_of_the_library(null: NullModel, reference: Reference) -> None:
+def test_a_force_along_the_motion_is_none_of_the_library(
+    null: NullModel, reference: Reference
+) -> None:
     found = judged(null, reference, {"motion.1.10": 2.0})
     assert (found.conclusion, named(found)) == (Conclusion.OUTSIDE, [])
 
@@ -68,7 +75,8 @@ def test_a_force_along_the_motion_is_none_of_the_library(null: NullModel, refere
 def test_a_strength_that_is_another_in_every_recording_is_not_the_whole(
     null: NullModel, reference: Reference, beside: float
 ) -> None:
-    """A wind that rises by a speed, fitted as one that rises by an angle; its mean is the same as that of the first."""
+    """A wind that rises by a speed, fitted as one that rises by an angle; its mean is the same as
+    that of the first."""
     hem = {"hem-mass.line_density": beside} if beside else {}
     same = judged(null, reference, {"vertical-wind.inclination": 1.0} | hem)
     other = judged(null, reference, {"vertical-wind.inclination": (1.8, 0.8, 0.4)} | hem)
@@ -76,7 +84,9 @@ def test_a_strength_that_is_another_in_every_recording_is_not_the_whole(
     assert other.conclusion is Conclusion.PARTLY
     assert beside or named(other) == ["vertical-wind.inclination"]
     first, second = (
-        next(w for w in found.ranking if w.candidate.effect == "vertical-wind").candidate.heterogeneity
+        next(
+            w for w in found.ranking if w.candidate.effect == "vertical-wind"
+        ).candidate.heterogeneity
         for found in (same, other)
     )
     assert first is not None
@@ -84,17 +94,24 @@ def test_a_strength_that_is_another_in_every_recording_is_not_the_whole(
     assert second < 0.02 < first
 
 
-def test_a_strength_that_an_effect_cannot_have_is_not_named(null: NullModel, reference: Reference) -> None:
+def test_a_strength_that_an_effect_cannot_have_is_not_named(
+    null: NullModel, reference: Reference
+) -> None:
     """A hem does not make cloth lighter."""
     found = judged(null, reference, {"hem-mass.line_density": -1.0})
     assert "hem-mass.line_density" not in named(found)
-    assert "is unphysical" in next(w for w in found.ranking if w.candidate.effect == "hem-mass").candidate.why_not
+    assert (
+        "is unphysical"
+        in next(w for w in found.ranking if w.candidate.effect == "hem-mass").candidate.why_not
+    )
 
 
 @pytest.mark.parametrize(("null", "coefficient"), [(0.0, 2.0), (1.0, 2.0), (0.0, -2.0)])
-def test_the_interval_of_a_strength_is_a_factor_to_either_side(null: float, coefficient: float) -> None:
-    """Without an error of its own 90 % of a log-normal factor with a standard deviation of 0.5: e^(1.645 · 0.5) = 2.28;
-    with one that is far larger, a normal interval."""
+def test_the_interval_of_a_strength_is_a_factor_to_either_side(
+    null: float, coefficient: float
+) -> None:
+    """Without an error of its own 90 % of a log-normal factor with a standard deviation of 0.5:
+    e^(1.645 · 0.5) = 2.28; with one that is far larger, a normal interval."""
     fitted = strength(null, coefficient, 0.0, "1")
     near, far = sorted(abs(end - null) for end in (fitted.low, fitted.high))
     assert fitted.value == null + coefficient
@@ -103,7 +120,9 @@ def test_the_interval_of_a_strength_is_a_factor_to_either_side(null: float, coef
     assert (wide.low, wide.high) == pytest.approx((-164.5, 164.5), abs=4)
 
 
-def test_finalists_are_the_first_by_gain_and_by_statistic(null: NullModel, reference: Reference) -> None:
+def test_finalists_are_the_first_by_gain_and_by_statistic(
+    null: NullModel, reference: Reference
+) -> None:
     found = judged(null, reference, {"lift.coefficient": 1.0})
     chosen = finalists(found)
     assert chosen[0] == found.ranking[0].column
@@ -118,7 +137,9 @@ def test_holes_stand_for_less_pressure_and_never_for_more() -> None:
     assert equivalent("lift", estimate(-0.2, 0.1, "1")) == ()
 
 
-def test_an_effect_that_the_cloth_cannot_have_is_not_weighed(null: NullModel, reference: Reference) -> None:
+def test_an_effect_that_the_cloth_cannot_have_is_not_weighed(
+    null: NullModel, reference: Reference
+) -> None:
     evidence, place = seen(null, {}), names().index(HOIST)
     curvature, score = evidence.curvature.copy(), evidence.score.copy()
     curvature[:, place] = curvature[:, :, place] = score[:, place] = 0.0

@@ -14,7 +14,9 @@ from measure.loop import gauss_newton
 from measure.probes import Statistics
 
 LIFT = EffectColumn(effect="lift", parameter="coefficient", step=0.3)
-FAR = Model(calibration=Calibration(area_weight=0.5, bending=4.0, damping=10e-3), effects=((LIFT, 2.0),))
+FAR = Model(
+    calibration=Calibration(area_weight=0.5, bending=4.0, damping=10e-3), effects=((LIFT, 2.0),)
+)
 NOTHING = cast(Forecaster, None), cast(Segments, None)
 
 
@@ -32,13 +34,16 @@ def linearised(_: Forecaster, __: Segments, model: Model) -> Statistics:
 
 
 def null(count: int) -> NullModel:
-    return NullModel(coefficients=np.zeros((3, count)), covariance=np.eye(count), shifts=np.zeros((0, count)))
+    return NullModel(
+        coefficients=np.zeros((3, count)), covariance=np.eye(count), shifts=np.zeros((0, count))
+    )
 
 
 def test_halfway_is_halfway_in_the_units_of_the_parameters() -> None:
     half = FAR.halfway_to_nominal()
     np.testing.assert_allclose(
-        np.array(half.calibration.steps_from(Calibration())), np.array(FAR.calibration.steps_from(Calibration())) / 2
+        np.array(half.calibration.steps_from(Calibration())),
+        np.array(FAR.calibration.steps_from(Calibration())) / 2,
     )
     assert half.effects == ((LIFT, 1.0),)
 
@@ -50,10 +55,17 @@ def test_a_model_that_diverges_is_drawn_back(
     monkeypatch.setattr(gauss_newton, "_linearise_models", linearised)
     model = Model(calibration=FAR.calibration, effects=effects)
     found = gauss_newton._round(  # pyright: ignore[reportPrivateUsage]
-        *NOTHING, model, null(len(THETA) + len(effects)), np.full(4, 5.0), (5,) * len(effects), anchor=Calibration()
+        *NOTHING,
+        model,
+        null(len(THETA) + len(effects)),
+        np.full(4, 5.0),
+        (5,) * len(effects),
+        anchor=Calibration(),
     )
     assert found.origin.calibration.area_weight == pytest.approx(0.5**0.5)
-    assert [strength for _, strength in found.origin.effects] == [strength / 2 for _, strength in effects]
+    assert [strength for _, strength in found.origin.effects] == [
+        strength / 2 for _, strength in effects
+    ]
 
 
 def test_a_model_that_always_diverges_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -61,19 +73,30 @@ def test_a_model_that_always_diverges_is_an_error(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(gauss_newton, "_linearise_models", lambda *_: lost)
     with pytest.raises(gauss_newton.FitDivergedError, match="does not stay one"):
         gauss_newton._round(  # pyright: ignore[reportPrivateUsage]
-            *NOTHING, Model(calibration=FAR.calibration), null(len(THETA)), np.full(4, 5.0), (), anchor=Calibration()
+            *NOTHING,
+            Model(calibration=FAR.calibration),
+            null(len(THETA)),
+            np.full(4, 5.0),
+            (),
+            anchor=Calibration(),
         )
 
 
-@pytest.mark.parametrize(("bending", "steps"), [(1.0, (0.7, 0.3)), (50.0, (-0.7, 0.3)), (35.0, (-0.7, 0.3))])
-def test_sensitivities_at_a_bound_are_taken_from_within(bending: float, steps: tuple[float, float]) -> None:
+@pytest.mark.parametrize(
+    ("bending", "steps"), [(1.0, (0.7, 0.3)), (50.0, (-0.7, 0.3)), (35.0, (-0.7, 0.3))]
+)
+def test_sensitivities_at_a_bound_are_taken_from_within(
+    bending: float, steps: tuple[float, float]
+) -> None:
     """The bending's factor is at most 50, its step a factor of e^0.7 = 2."""
     model = Model(calibration=Calibration(bending=bending), effects=((LIFT, 1.0),))
     for place, step in ((1, steps[0]), (3, steps[1])):
         size = abs(step)
         moved, taken = model.take_step(place, size)
         assert taken == pytest.approx(step)
-        np.testing.assert_allclose(moved.steps_from(model), np.where(np.arange(4) == place, step, 0.0), atol=1e-12)
+        np.testing.assert_allclose(
+            moved.steps_from(model), np.where(np.arange(4) == place, step, 0.0), atol=1e-12
+        )
 
 
 def test_a_fit_begins_where_across_the_prior_least_is_left(monkeypatch: pytest.MonkeyPatch) -> None:

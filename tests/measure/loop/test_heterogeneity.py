@@ -23,7 +23,10 @@ def test_of_two_it_is_the_test_of_their_difference() -> None:
 def test_of_one_strength_it_is_uniform() -> None:
     rng = stream(1, "steady")
     errors = np.array([0.1, 0.3, 0.2])
-    found = [heterogeneity([estimate(0.7 + e * rng.normal(), e, "1") for e in errors]) for _ in range(500)]
+    found = [
+        heterogeneity([estimate(0.7 + e * rng.normal(), e, "1") for e in errors])
+        for _ in range(500)
+    ]
     assert kstest(found, uniform.cdf).pvalue > 0.01
 
 

@@ -1,4 +1,5 @@
-"""What is looked at beside the columns: moments, spectra, the course of the wind, where recordings settle."""
+"""What is looked at beside the columns: moments, spectra, the course of the wind, where recordings
+settle."""
 
 from __future__ import annotations
 
@@ -12,7 +13,17 @@ from measure.inference import NullModel
 from measure.loop import GUST_COLUMN, LibraryJudgement, judge
 from measure.nulls import NullBank, Reference
 from measure.verdict import NOT_REJECTED, Conclusion
-from tests.measure.loop.drawn_statistics import SEGMENTS, SHED, Acting, judged, made, named, pulses, seen, slow
+from tests.measure.loop.drawn_statistics import (
+    SEGMENTS,
+    SHED,
+    Acting,
+    judged,
+    made,
+    named,
+    pulses,
+    seen,
+    slow,
+)
 
 
 @pytest.fixture(scope="module")
@@ -33,20 +44,30 @@ def test_what_moments_alone_show_rejects_and_counts_in_what_an_effect_leaves(
 
     assert found({}, {}).conclusion in NOT_REJECTED
     assert found({}, drag).conclusion not in NOT_REJECTED
-    assert (found(lift, lift).conclusion, named(found(lift, lift))) == (Conclusion.EFFECT, list(lift))
-    assert (found(lift, lift | drag).conclusion, named(found(lift, lift | drag))) == (Conclusion.PARTLY, list(lift))
+    assert (found(lift, lift).conclusion, named(found(lift, lift))) == (
+        Conclusion.EFFECT,
+        list(lift),
+    )
+    assert (found(lift, lift | drag).conclusion, named(found(lift, lift | drag))) == (
+        Conclusion.PARTLY,
+        list(lift),
+    )
 
 
 def test_beside_gusts_moments_are_not_looked_at(turning: tuple[NullModel, Reference]) -> None:
-    """Two true gusts of a challenge left 3.1 and 3.4 by the columns, of 3.9 that nulls leave, and 6.6 and 8.2 by the
-    moments: a pressure that swings within a segment moves them however it is set free from one to the next."""
+    """Two true gusts of a challenge left 3.1 and 3.4 by the columns, of 3.9 that nulls leave, and
+    6.6 and 8.2 by the
+    moments: a pressure that swings within a segment moves them however it is set free from one to
+    the next."""
     null, reference = turning
     drag = {"tangential-quadratic-drag.coefficient": 1.0}
     found = judge(seen(null, {}, gusts=1.0, moments=drag), reference, level=0.02)
     assert (found.conclusion, named(found)) == (Conclusion.EFFECT, ["gusts"])
 
 
-def test_errors_that_swing_with_the_wind_are_none_of_the_library(null: NullModel, reference: Reference) -> None:
+def test_errors_that_swing_with_the_wind_are_none_of_the_library(
+    null: NullModel, reference: Reference
+) -> None:
     found = judged(null, reference, {}, line=10.0, seed=3)
     assert (found.conclusion, named(found)) == (Conclusion.OUTSIDE, [])
     assert found.line is not None
@@ -77,32 +98,45 @@ def blowing() -> tuple[NullModel, Reference]:
 def test_a_course_alone_rejects_the_base_model(blowing: tuple[NullModel, Reference]) -> None:
     null, reference = blowing
     calm, windy = (
-        judge(seen(null, {}, course=c), reference, level=0.02) for c in (np.zeros((3 * SEGMENTS, 10, 3)), pulses(0.3))
+        judge(seen(null, {}, course=c), reference, level=0.02)
+        for c in (np.zeros((3 * SEGMENTS, 10, 3)), pulses(0.3))
     )
     assert calm.conclusion in NOT_REJECTED
     assert windy.conclusion not in NOT_REJECTED
     assert windy.statistic > calm.statistic
 
 
-def test_gusts_are_named_where_the_course_is_turbulences(blowing: tuple[NullModel, Reference]) -> None:
+def test_gusts_are_named_where_the_course_is_turbulences(
+    blowing: tuple[NullModel, Reference],
+) -> None:
     null, reference = blowing
     gusty = judge(seen(null, {}, gusts=1.0, course=slow(0.2)), reference, level=0.02)
     assert named(gusty) == ["gusts"]
-    # The same pressure, in a wind that comes in pulses and turns a little, as behind obstacles that pass.
-    passing = judge(seen(null, {}, gusts=1.0, course=pulses(2.0, turned=0.2)), reference, level=0.02)
+    # The same pressure, in a wind that comes in pulses and turns a little, as behind obstacles that
+    # pass.
+    passing = judge(
+        seen(null, {}, gusts=1.0, course=pulses(2.0, turned=0.2)), reference, level=0.02
+    )
     assert "gusts" not in named(passing)
-    assert "varies across its mean by" in next(w for w in passing.ranking if w.column == GUST_COLUMN).candidate.why_not
+    assert (
+        "varies across its mean by"
+        in next(w for w in passing.ranking if w.column == GUST_COLUMN).candidate.why_not
+    )
 
 
-def test_a_wind_that_varies_along_itself_alone_is_not_barred_from_gusts(blowing: tuple[NullModel, Reference]) -> None:
+def test_a_wind_that_varies_along_itself_alone_is_not_barred_from_gusts(
+    blowing: tuple[NullModel, Reference],
+) -> None:
     null, reference = blowing
     slowly = judge(seen(null, {}, gusts=1.0, course=pulses(2.0)), reference, level=0.02)
     assert named(slowly) == ["gusts"]
-    # Within segments alone: their mean pressure does not differ, and the course says how much it varies.
+    # Within segments alone: their mean pressure does not differ, and the course says how much it
+    # varies.
     within = judge(seen(null, {}, course=pulses(2.0)), reference, level=0.02)
     assert (within.conclusion, named(within)) == (Conclusion.EFFECT, ["gusts"])
     found = next(w for w in within.ranking if w.column == GUST_COLUMN).candidate
-    # Weaker by 2 in three windows of nine, and in both of two neighbours in two of nine: a covariance of 4 (2/9 − 1/9).
+    # Weaker by 2 in three windows of nine, and in both of two neighbours in two of nine: a
+    # covariance of 4 (2/9 − 1/9).
     assert found.strength.value == pytest.approx(2 / 3, rel=0.1)
     assert not found.why_not
 
@@ -127,6 +161,8 @@ def test_what_recordings_settle_at_rejects_alone_and_counts_in_what_is_left() ->
     assert found(-1.0).ranking[0].candidate.leftover < 0.05 < plain.ranking[0].candidate.leftover
 
 
-def test_settled_quantities_of_the_data_alone_are_refused(null: NullModel, reference: Reference) -> None:
+def test_settled_quantities_of_the_data_alone_are_refused(
+    null: NullModel, reference: Reference
+) -> None:
     with pytest.raises(UsageError, match="settled"):
         judge(replace(seen(null, {}), settled=np.zeros((12, 2))), reference, level=0.02)

@@ -27,12 +27,20 @@ def saturating(size: float) -> float:
     return 4.0 * max(math.log(1000.0 / size), 0.0)
 
 
-def test_of_a_misfit_that_is_flat_from_a_strength_on_the_strength_is_at_least_where_it_rises() -> None:
+def test_of_a_misfit_that_is_flat_from_a_strength_on_the_strength_is_at_least_where_it_rises() -> (
+    None
+):
     found = profile(HOIST, saturating).estimate(larger=1.0)
     assert found is not None
-    # 4 ln(1000/s) = 2.706, the quantile of chi-squared at 90 %: s = 508, less the factor of e^(1.645/2).
+    # 4 ln(1000/s) = 2.706, the quantile of chi-squared at 90 %: s = 508, less the factor of
+    # e^(1.645/2).
     assert found.low == pytest.approx(1000 * math.exp(-2.706 / 4) * math.exp(-1.645 / 2), rel=0.01)
-    assert (found.value, found.high, found.bound, found.level) == (found.low, math.inf, "at-least", 0.95)
+    assert (found.value, found.high, found.bound, found.level) == (
+        found.low,
+        math.inf,
+        "at-least",
+        0.95,
+    )
     assert with_level(found) == "at least 220 N/m² 95 %"
 
 
@@ -44,10 +52,16 @@ def test_errors_that_are_larger_than_the_misfit_says_lower_the_bound() -> None:
 
 
 def test_a_misfit_that_is_flat_towards_none_bounds_from_above() -> None:
-    found = profile(HOIST, lambda size: 4.0 * max(math.log(size / 1000.0), 0.0)).estimate(larger=1.0)
+    found = profile(HOIST, lambda size: 4.0 * max(math.log(size / 1000.0), 0.0)).estimate(
+        larger=1.0
+    )
     assert found is not None
     assert (found.low, found.bound) == (0.0, "at-most")
-    assert found.high == found.value == pytest.approx(1000 * math.exp(2.706 / 4) * math.exp(1.645 / 2), rel=0.01)
+    assert (
+        found.high
+        == found.value
+        == pytest.approx(1000 * math.exp(2.706 / 4) * math.exp(1.645 / 2), rel=0.01)
+    )
 
 
 def test_of_strengths_of_either_sign_a_misfit_that_is_flat_towards_none_is_no_bound() -> None:
@@ -62,15 +76,26 @@ def test_a_bound_of_a_negative_strength_is_one_from_above_and_ends_where_the_eff
     found = Profile(column=TURNED, sizes=sizes, sign=-1, misfit=misfit).estimate(larger=1.0)
     assert found is not None
     assert (found.low, found.bound) == (pytest.approx(TURNED.described.admissible[0]), "at-most")
-    assert found.high == found.value == pytest.approx(-0.1 * math.exp(-2.706 / 4) * math.exp(-1.645 / 2), rel=0.01)
+    assert (
+        found.high
+        == found.value
+        == pytest.approx(-0.1 * math.exp(-2.706 / 4) * math.exp(-1.645 / 2), rel=0.01)
+    )
 
 
 def test_a_misfit_that_rises_to_either_side_is_no_bound() -> None:
-    assert profile(HOIST, lambda size: 4.0 * abs(math.log(size / 1000.0))).estimate(larger=1.0) is None
+    assert (
+        profile(HOIST, lambda size: 4.0 * abs(math.log(size / 1000.0))).estimate(larger=1.0) is None
+    )
 
 
 def test_a_model_that_does_not_exist_beyond_a_strength_is_no_flat_end() -> None:
-    assert profile(HOIST, lambda size: saturating(size) if size < 2e4 else math.inf).estimate(larger=1.0) is None
+    assert (
+        profile(HOIST, lambda size: saturating(size) if size < 2e4 else math.inf).estimate(
+            larger=1.0
+        )
+        is None
+    )
 
 
 def test_a_misfit_that_is_flat_altogether_determines_nothing() -> None:
@@ -83,7 +108,11 @@ def test_a_misfit_that_is_flat_altogether_determines_nothing() -> None:
 def test_strengths_reach_beyond_what_is_expected_and_what_was_fitted() -> None:
     low, high = HOIST.described.prior
     sizes, sign = across(HOIST, 25.0)
-    assert (sign, sizes[0], sizes[-1]) == (1, pytest.approx(25.0 / BEYOND), pytest.approx(high * BEYOND, rel=1e-5))
+    assert (sign, sizes[0], sizes[-1]) == (
+        1,
+        pytest.approx(25.0 / BEYOND),
+        pytest.approx(high * BEYOND, rel=1e-5),
+    )
     assert across(HOIST, 2e10)[0][-1] == pytest.approx(2e10 * BEYOND, rel=1e-5)
     assert across(HOIST, -3.0)[0][0] == pytest.approx(low / BEYOND)
     assert across(TURNED, -0.1)[1] == -1

@@ -13,13 +13,22 @@ from measure.loop.effect_selection import withdrawn
 from measure.loop.refit import Refit
 from measure.nulls import Reference
 from measure.verdict import Conclusion
-from tests.measure.loop.drawn_statistics import COUNT, EXPECTED, SEGMENTS, drawn, judged, named, seen
+from tests.measure.loop.drawn_statistics import (
+    COUNT,
+    EXPECTED,
+    SEGMENTS,
+    drawn,
+    judged,
+    named,
+    seen,
+)
 
 LIFT, HEM = names().index("lift.coefficient"), names().index("hem-mass.line_density")
 
 
 def predicting(evidence: Evidence, each: float, *, leftover: float = 0.5, seed: int = 0) -> Refit:
-    """A model that predicts every segment better than the base model by so much, and a deviation of 1."""
+    """A model that predicts every segment better than the base model by so much, and a deviation of
+    1."""
     gained = each + stream(seed, "gains").normal(size=3 * SEGMENTS)
     return Refit(coefficient=0.3, gains=gained, leftover=leftover, evidence=evidence)
 
@@ -28,7 +37,11 @@ def predicting(evidence: Evidence, each: float, *, leftover: float = 0.5, seed: 
     ("hem", "left", "said"),
     [
         (5.0, (0.5, 0.5), ["hem-mass.line_density", "lift.coefficient"]),
-        (3.0, (0.5, 0.5), ["lift.coefficient"]),  # a difference of 24 to a standard error of √24 = 4.9
+        (
+            3.0,
+            (0.5, 0.5),
+            ["lift.coefficient"],
+        ),  # a difference of 24 to a standard error of √24 = 4.9
         (5.0, (0.01, 0.5), ["hem-mass.line_density"]),
         (5.0, (0.5, 0.01), ["lift.coefficient"]),
     ],
@@ -40,16 +53,27 @@ def test_what_is_named_is_the_confidence_set_less_what_fails_its_predictive_test
     refits = {
         LIFT: predicting(rest, 5.0, leftover=left[0]),
         HEM: predicting(rest, hem, leftover=left[1], seed=1),
-        **{column: None for column in range(len(THETA), len(THETA) + 18) if column not in (LIFT, HEM)},
+        **{
+            column: None
+            for column in range(len(THETA), len(THETA) + 18)
+            if column not in (LIFT, HEM)
+        },
     }
     found = judge(data, reference, level=0.02, refits=refits)
     assert sorted(named(found)) == said
     assert found.conclusion is (Conclusion.ONE_OF if len(said) > 1 else Conclusion.EFFECT)
 
 
-def test_where_the_base_model_predicts_as_well_nothing_is_named(null: NullModel, reference: Reference) -> None:
+def test_where_the_base_model_predicts_as_well_nothing_is_named(
+    null: NullModel, reference: Reference
+) -> None:
     """However well an effect fits what rejects the base model."""
-    useless = Refit(coefficient=0.3, gains=np.tile([1.0, -1.0], 6), leftover=0.5, evidence=seen(null, {}, seed=3))
+    useless = Refit(
+        coefficient=0.3,
+        gains=np.tile([1.0, -1.0], 6),
+        leftover=0.5,
+        evidence=seen(null, {}, seed=3),
+    )
     refits = dict.fromkeys(range(len(THETA), len(THETA) + 18), useless)
     found = judge(seen(null, {}, line=10.0), reference, level=0.02, refits=refits)
     assert (found.conclusion, found.named, found.confident) == (Conclusion.OUTSIDE, (), ())
@@ -76,7 +100,9 @@ def test_a_rerun_counts_in_place_of_the_linear(null: NullModel, reference: Refer
     assert place not in judge(evidence, reference, level=0.02, refits={place: useless}).named
 
 
-def test_an_effect_with_which_unseen_errors_rise_is_not_named(null: NullModel, reference: Reference) -> None:
+def test_an_effect_with_which_unseen_errors_rise_is_not_named(
+    null: NullModel, reference: Reference
+) -> None:
     found = withdrawn(judged(null, reference, {"lift.coefficient": 1.0}))
     assert (found.conclusion, named(found)) == (Conclusion.OUTSIDE, [])
     assert "unseen recordings are larger" in found.ranking[0].candidate.why_not

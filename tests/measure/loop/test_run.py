@@ -1,4 +1,5 @@
-"""The whole loop at small size: nulls stand, a strong effect is named, the same seed says the same."""
+"""The whole loop at small size: nulls stand, a strong effect is named, the same seed says the
+same."""
 
 from __future__ import annotations
 
@@ -44,10 +45,18 @@ class Push(ForceEffect):
         acceleration: of it [m/s²].
     """
 
-    acceleration: Annotated[Value, strength(unit="m/s²", prior=(-10.0, 10.0), source="made for a test")] = 0.0
+    acceleration: Annotated[
+        Value, strength(unit="m/s²", prior=(-10.0, 10.0), source="made for a test")
+    ] = 0.0
 
-    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
-        return torch.zeros_like(position).index_fill(1, torch.tensor(1), 1.0) * cloth.mass[:, None] * self.acceleration
+    def force(
+        self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor
+    ) -> Tensor:
+        return (
+            torch.zeros_like(position).index_fill(1, torch.tensor(1), 1.0)
+            * cloth.mass[:, None]
+            * self.acceleration
+        )
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +71,13 @@ def bank(specimen: Specimen, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def batches(specimen: Specimen) -> list[NullBatch]:
-    alike = {"markers": specimen.mesh.rest, "rate": 25.0, "duration": DURATION, "noise": NOISE, "speeds": (3.0, 6.5)}
+    alike = {
+        "markers": specimen.mesh.rest,
+        "rate": 25.0,
+        "duration": DURATION,
+        "noise": NOISE,
+        "speeds": (3.0, 6.5),
+    }
     return [banks.prior_batch(specimen, **alike, seed=seed) for seed in range(KINDS)]  # pyright: ignore[reportArgumentType]
 
 
@@ -102,7 +117,9 @@ def test_a_stored_bank_says_what_its_nulls_were_made_with(specimen: Specimen, ba
     first = batches(specimen)[0].calibrations[0].damping
     assert nulls.design.damping == pytest.approx(first, rel=1e-12)
     known = replace(nulls.design, damping=first)
-    assert known == Design(noise=NOISE, period=0.04, cloth=specimen.material.fingerprint, damping=first)
+    assert known == Design(
+        noise=NOISE, period=0.04, cloth=specimen.material.fingerprint, damping=first
+    )
     for kind, batch in enumerate(batches(specimen)):
         own = nulls.select(nulls.numerics == kind)
         recording = own.statistics.recording - own.statistics.recording.min()
@@ -118,16 +135,22 @@ def test_a_null_needs_no_effect(plain: Experiment, bank: Path) -> None:
     assert verdict.conclusion in NOT_REJECTED
     assert not verdict.named
     assert not verdict.comparisons
-    assert [one.share for one in verdict.power] == sorted((one.share for one in verdict.power), reverse=True)
+    assert [one.share for one in verdict.power] == sorted(
+        (one.share for one in verdict.power), reverse=True
+    )
     assert len(verdict.power) == len(on_markers())
 
 
-def test_a_suspicion_is_tested_alone_and_said_to_have_been_stated_before(plain: Experiment, bank: Path) -> None:
+def test_a_suspicion_is_tested_alone_and_said_to_have_been_stated_before(
+    plain: Experiment, bank: Path
+) -> None:
     suspicion = Suspicion.parse("lift", on_markers())
     verdict = close_loop(plain, LoopOptions(bank=bank, level=0.1, suspected=suspicion))
     assert (verdict.test.suspected, verdict.conclusion in NOT_REJECTED) == ("lift+", True)
     assert [one.effect for one in verdict.power] == ["lift"]
-    assert "along lift+ alone, suspected before the recordings were looked at" in " ".join(words(verdict).split())
+    assert "along lift+ alone, suspected before the recordings were looked at" in " ".join(
+        words(verdict).split()
+    )
 
 
 def test_a_strong_effect_is_named_and_helps_where_it_was_not_fitted(dragged: Verdict) -> None:
@@ -136,14 +159,16 @@ def test_a_strong_effect_is_named_and_helps_where_it_was_not_fitted(dragged: Ver
     slow, fast, late = dragged.comparisons
     for comparison in (fast, late):
         assert comparison.after.value < comparison.before.value
-    # At 3.5 m/s the base model errs by about as much as the numerical floor, so that there is nothing to gain.
+    # At 3.5 m/s the base model errs by about as much as the numerical floor, so that there is
+    # nothing to gain.
     assert slow.reduction.high > 0
     for left_out in (slow, fast):
         assert left_out.control_name == "tangential-quadratic-drag"
         assert left_out.apart is not None
         assert left_out.apart.value > 0
-    # At 3.5 m/s alone, by four segments, both drags may be within the floor's reach; both recordings together separate
-    # them by six standard errors, and so does the fast one by itself, in metres too.
+    # At 3.5 m/s alone, by four segments, both drags may be within the floor's reach; both
+    # recordings together separate them by six standard errors, and so does the fast one by itself,
+    # in metres too.
     assert dragged.apart is not None
     assert dragged.apart.low > 0
     assert fast.apart is not None
@@ -153,7 +178,9 @@ def test_a_strong_effect_is_named_and_helps_where_it_was_not_fitted(dragged: Ver
     assert fast.reduction.low > 0
 
 
-def test_a_hoist_that_is_attached_is_as_stiff_as_a_bound_and_the_bound_holds(specimen: Specimen, bank: Path) -> None:
+def test_a_hoist_that_is_attached_is_as_stiff_as_a_bound_and_the_bound_holds(
+    specimen: Specimen, bank: Path
+) -> None:
     """From some stiffness on nothing changes, and a fit ends anywhere."""
     true = 17_000.0
     attached = recorded(specimen, EFFECTS["full-hoist"](stiffness=true), seed=77)
@@ -163,15 +190,21 @@ def test_a_hoist_that_is_attached_is_as_stiff_as_a_bound_and_the_bound_holds(spe
     assert (found.strength.bound, found.strength.level) == ("at-least", 0.95)
     assert 0 < found.strength.low < true < found.strength.high
     assert found.strength.value == found.strength.low
-    assert from_document(json.loads(json.dumps(as_document(verdict), allow_nan=False))).ranking == verdict.ranking
+    assert (
+        from_document(json.loads(json.dumps(as_document(verdict), allow_nan=False))).ranking
+        == verdict.ranking
+    )
     said = f"stiffness at least {number(found.strength.low, digits=2)} N/m² 95 %"
     for text in (lead(verdict), words(verdict), page(verdict)):
         assert said.removesuffix(" 95 %") in text.replace("\N{NO-BREAK SPACE}", " ")
     assert said in lead(verdict)
 
 
-def test_a_verdict_that_rests_on_few_kinds_says_that_another_draw_could_decide_otherwise(dragged: Verdict) -> None:
-    """By nine kinds of numerics of which none is as far, up to 28 % of all may be: 0.05^(1/9) = 0.72."""
+def test_a_verdict_that_rests_on_few_kinds_says_that_another_draw_could_decide_otherwise(
+    dragged: Verdict,
+) -> None:
+    """By nine kinds of numerics of which none is as far, up to 28 % of all may be: 0.05^(1/9) =
+    0.72."""
     test = dragged.test
     assert test.p_value.value == pytest.approx(1 / 10)
     assert test.p_value.high == pytest.approx(1 - 0.05 ** (1 / 9))
@@ -181,7 +214,9 @@ def test_a_verdict_that_rests_on_few_kinds_says_that_another_draw_could_decide_o
     assert "(29 numerical set-ups) to decide" in dragged.words
 
 
-def test_the_same_data_and_seed_give_the_same_verdict(pulled: Experiment, bank: Path, dragged: Verdict) -> None:
+def test_the_same_data_and_seed_give_the_same_verdict(
+    pulled: Experiment, bank: Path, dragged: Verdict
+) -> None:
     again = close_loop(pulled, LoopOptions(bank=bank, level=0.1, workers=2))
     assert replace(again, seconds=0.0) == replace(dragged, seconds=0.0)
 
@@ -189,7 +224,9 @@ def test_the_same_data_and_seed_give_the_same_verdict(pulled: Experiment, bank: 
 def test_the_corrective_field_is_the_force_that_acts(specimen: Specimen, bank: Path) -> None:
     setting = Setting.of(recorded(specimen, Push(acceleration=6.0), seed=11))
     nominal = [setting.calibration] * len(setting.segments)
-    found, projection = projected_statistics(setting.forecaster, setting.segments, nominal, columns())
+    found, projection = projected_statistics(
+        setting.forecaster, setting.segments, nominal, columns()
+    )
     null = banks.load(bank, words="made").model(setting.design)
     whitened = WhitenedMisfit(
         statistics=found, projection=projection, null=null, speeds=setting.speeds[setting.recording]
@@ -209,8 +246,11 @@ def test_the_corrective_field_is_the_force_that_acts(specimen: Specimen, bank: P
     assert abs(unmoved.value) < across.error
 
 
-def test_turning_the_world_changes_nothing_of_what_is_judged(specimen: Specimen, pulled: Experiment) -> None:
-    """A verdict is made of its setting alone, which turns every experiment into the frame of its wind."""
+def test_turning_the_world_changes_nothing_of_what_is_judged(
+    specimen: Specimen, pulled: Experiment
+) -> None:
+    """A verdict is made of its setting alone, which turns every experiment into the frame of its
+    wind."""
     c, s = np.cos(2.0), np.sin(2.0)
     turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
@@ -219,11 +259,14 @@ def test_turning_the_world_changes_nothing_of_what_is_judged(specimen: Specimen,
         return replace(recording, positions=recording.positions @ turn, wind=wind)
 
     moved = Experiment(
-        specimen=replace(specimen, anchors=specimen.anchors @ turn), recordings=tuple(map(turned, pulled.recordings))
+        specimen=replace(specimen, anchors=specimen.anchors @ turn),
+        recordings=tuple(map(turned, pulled.recordings)),
     )
     one, other = Setting.of(pulled), Setting.of(moved)
     assert len(one.segments) == len(other.segments) == 4
-    close = partial(np.testing.assert_allclose, rtol=0, atol=1e-12)  # of places and speeds of some units
+    close = partial(
+        np.testing.assert_allclose, rtol=0, atol=1e-12
+    )  # of places and speeds of some units
     close(other.experiment.specimen.anchors, one.experiment.specimen.anchors)
     close(other.forecaster.specimen.anchors, one.forecaster.specimen.anchors)
     for mine, its in zip(one.segments.items, other.segments.items, strict=True):
@@ -240,22 +283,37 @@ def test_a_level_that_the_bank_cannot_test_is_reported(pulled: Experiment, bank:
     assert "at least 19 are needed" in verdict.words  # K + 1 ≥ 1/0.05
     assert not verdict.test.open
     assert "borderline" not in verdict.words
-    assert [p.name.split()[0] for p in verdict.parameters] == ["area_weight", "bending", "damping", "direction"]
+    assert [p.name.split()[0] for p in verdict.parameters] == [
+        "area_weight",
+        "bending",
+        "damping",
+        "direction",
+    ]
 
 
-def test_a_bank_of_other_segments_is_refused(specimen: Specimen, plain: Experiment, bank: Path) -> None:
+def test_a_bank_of_other_segments_is_refused(
+    specimen: Specimen, plain: Experiment, bank: Path
+) -> None:
     short = tuple(replace(r, positions=r.positions[:60]) for r in plain.recordings)
     with pytest.raises(InputError, match="segments last"):
-        close_loop(Experiment(specimen=specimen, recordings=short), LoopOptions(bank=bank, level=0.1))
+        close_loop(
+            Experiment(specimen=specimen, recordings=short), LoopOptions(bank=bank, level=0.1)
+        )
 
 
-def test_a_bank_with_anchors_known_in_another_way_is_refused(specimen: Specimen, plain: Experiment, bank: Path) -> None:
+def test_a_bank_with_anchors_known_in_another_way_is_refused(
+    specimen: Specimen, plain: Experiment, bank: Path
+) -> None:
     data = replace(plain, specimen=replace(specimen, anchors_given=False))
-    with pytest.raises(InputError, match="anchors were given, those of the recordings are taken from where"):
+    with pytest.raises(
+        InputError, match="anchors were given, those of the recordings are taken from where"
+    ):
         close_loop(data, LoopOptions(bank=bank, level=0.1))
 
 
-@pytest.mark.parametrize("wrong", [{"level": 0.0}, {"level": 1.5}, {"level": 0.01}, {"nulls": 10}, {"workers": 0}])
+@pytest.mark.parametrize(
+    "wrong", [{"level": 0.0}, {"level": 1.5}, {"level": 0.01}, {"nulls": 10}, {"workers": 0}]
+)
 def test_options_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(UsageError):
         LoopOptions(**wrong)  # pyright: ignore[reportArgumentType]
@@ -274,7 +332,8 @@ class At:
 def test_the_base_model_is_led_on_only_to_where_less_is_left(
     monkeypatch: pytest.MonkeyPatch, left: tuple[float, ...], looks: int
 ) -> None:
-    """Each step doubles the bending. The first look is that of the nominal cloth, at most four follow."""
+    """Each step doubles the bending. The first look is that of the nominal cloth, at most four
+    follow."""
 
     def fitted(setting: At, fits: object) -> CoefficientFit:
         place = round(math.log2(setting.calibration.bending))
@@ -308,6 +367,8 @@ def test_nulls_are_simulated_by_the_workers_of_a_scheduler(
 
     monkeypatch.setattr(banks, "connected", connected)
     banks.build(tmp_path, batches(specimen)[:2], scheduler="tcp://host:8786")
-    banks.build(tmp_path, batches(specimen)[:2], scheduler="tcp://host:8786")  # all there: nobody is asked
+    banks.build(
+        tmp_path, batches(specimen)[:2], scheduler="tcp://host:8786"
+    )  # all there: nobody is asked
     assert asked == ["tcp://host:8786"]
     assert [path.read_bytes() for path in banks.files(tmp_path)] == [b"nulls of a worker"] * 2

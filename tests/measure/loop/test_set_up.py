@@ -1,4 +1,5 @@
-"""How an experiment was set up is judged apart from what acts on the cloth: the log's direction, the hoist."""
+"""How an experiment was set up is judged apart from what acts on the cloth: the log's direction,
+the hoist."""
 
 from __future__ import annotations
 
@@ -27,7 +28,9 @@ def logged(null: NullModel, angle: float, tolerance: float) -> Evidence:
     return Evidence.of(replace(own, log=off), speeds[own.recording], null)
 
 
-def test_a_wind_turned_beyond_its_tolerance_is_the_verdict(null: NullModel, reference: Reference) -> None:
+def test_a_wind_turned_beyond_its_tolerance_is_the_verdict(
+    null: NullModel, reference: Reference
+) -> None:
     found = judge(logged(null, 0.8, 0.2), reference, level=0.02, set_up=SetUp(tolerance=0.2))
     assert (found.conclusion, named(found)) == (Conclusion.EFFECT, [TURNED])
     assert found.direction is not None
@@ -37,7 +40,9 @@ def test_a_wind_turned_beyond_its_tolerance_is_the_verdict(null: NullModel, refe
     assert names().index(TURNED) in finalists(found)
 
 
-def test_a_wind_turned_within_its_tolerance_is_no_effect(null: NullModel, reference: Reference) -> None:
+def test_a_wind_turned_within_its_tolerance_is_no_effect(
+    null: NullModel, reference: Reference
+) -> None:
     found = judge(logged(null, 0.8, 0.8), reference, level=0.02, set_up=SetUp(tolerance=0.8))
     assert TURNED not in named(found)
     shown = next(w for w in found.ranking if w.column == names().index(TURNED))
@@ -45,7 +50,9 @@ def test_a_wind_turned_within_its_tolerance_is_no_effect(null: NullModel, refere
     assert "46° of tolerance" in shown.unlike
 
 
-def test_a_hoist_that_stands_still_leads_whatever_the_test_says(null: NullModel, reference: Reference) -> None:
+def test_a_hoist_that_stands_still_leads_whatever_the_test_says(
+    null: NullModel, reference: Reference
+) -> None:
     found = judge(seen(null, {}), reference, level=0.02, set_up=SetUp(attached=True))
     assert found.p_value > 0.02
     assert (found.conclusion, named(found)) == (Conclusion.EFFECT, [HOIST])

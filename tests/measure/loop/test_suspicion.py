@@ -1,4 +1,5 @@
-"""An effect that is suspected before the recordings are looked at, and what would have been seen."""
+"""An effect that is suspected before the recordings are looked at, and what would have been
+seen."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ LEVEL = 0.05
 LIFT = names().index("lift.coefficient")
 WIND = names().index("vertical-wind.inclination")
 WEAK = 0.25
-"""Of the expected strength: where most tests along a lift alone see one, and hardly any along all."""
+"""Of the expected strength: where most tests along a lift alone see one, and hardly any along
+all."""
 
 
 @pytest.fixture(scope="module")
@@ -44,14 +46,22 @@ def test_a_suspected_effect_is_seen_where_it_is_weaker_and_its_opposite_never(
     assert counted["opposite"] == 0
 
 
-def test_its_level_holds_and_other_effects_are_not_taken_for_it(null: NullModel, reference: Reference) -> None:
+def test_its_level_holds_and_other_effects_are_not_taken_for_it(
+    null: NullModel, reference: Reference
+) -> None:
     """At 5 %, of 60 nulls 3 are expected, and more than 8 come once in 200 times."""
     alone = reference.along(WIND, 1)
-    chances = [alone.test.p(alone.tested(seen(null, {}, seed=300 + seed), names())) for seed in range(60)]
+    chances = [
+        alone.test.p(alone.tested(seen(null, {}, seed=300 + seed), names())) for seed in range(60)
+    ]
     assert sum(p <= LEVEL for p in chances) <= 8
     assert np.median(chances) > 0.3
     dragged = [
-        alone.test.p(alone.tested(seen(null, {"tangential-quadratic-drag.coefficient": 1.0}, seed=seed), names()))
+        alone.test.p(
+            alone.tested(
+                seen(null, {"tangential-quadratic-drag.coefficient": 1.0}, seed=seed), names()
+            )
+        )
         for seed in range(10)
     ]
     assert sum(p <= LEVEL for p in dragged) <= 2
@@ -61,7 +71,8 @@ def test_moments_count_along_it_as_well(looked: tuple[NullModel, Reference]) -> 
     null, reference = looked
     alone = reference.along(LIFT, 1)
     found = [
-        alone.tested(seen(null, {}, moments={"lift.coefficient": share}, seed=8), names()) for share in (0.0, 0.5, 1.0)
+        alone.tested(seen(null, {}, moments={"lift.coefficient": share}, seed=8), names())
+        for share in (0.0, 0.5, 1.0)
     ]
     assert found[0] < found[1] < found[2]
     assert alone.test.p(found[2]) == alone.test.least
@@ -72,10 +83,15 @@ def test_what_is_suspected_and_found_is_named(null: NullModel, reference: Refere
     found = judge(data, reference.along(LIFT, 1), level=LEVEL)
     assert (found.conclusion, named(found)) == (Conclusion.EFFECT, ["lift.coefficient"])
     away = judge(data, reference.along(LIFT, -1), level=LEVEL)
-    assert (away.conclusion in (Conclusion.SUFFICIENT, Conclusion.UNDECIDED), away.named) == (True, ())
+    assert (away.conclusion in (Conclusion.SUFFICIENT, Conclusion.UNDECIDED), away.named) == (
+        True,
+        (),
+    )
 
 
-def test_an_effect_that_acts_moves_evidence_as_it_does_statistics(looked: tuple[NullModel, Reference]) -> None:
+def test_an_effect_that_acts_moves_evidence_as_it_does_statistics(
+    looked: tuple[NullModel, Reference],
+) -> None:
     null, _ = looked
     rng, speeds = np.random.default_rng(5), np.array([3.5, 5.0, 7.0])
     delta, shifts = strengths({}), np.zeros((3, len(names())))
@@ -88,7 +104,10 @@ def test_an_effect_that_acts_moves_evidence_as_it_does_statistics(looked: tuple[
         turning=replace(own.turning, r=own.turning.r + 0.7 * own.turning.response[:, :, LIFT]),
     )
     u = speeds[own.recording]
-    by_formula, by_statistics = Evidence.of(own, u, null).moved(LIFT, 0.7), Evidence.of(moved, u, null)
+    by_formula, by_statistics = (
+        Evidence.of(own, u, null).moved(LIFT, 0.7),
+        Evidence.of(moved, u, null),
+    )
     for one, other in ((by_formula, by_statistics), (by_formula.turning, by_statistics.turning)):
         assert one is not None
         assert other is not None
@@ -112,7 +131,9 @@ def test_power_is_that_of_what_is_tested_for(null: NullModel, reference: Referen
     assert (move.name, move.sign) == ("lift.coefficient", 1)
     assert alone >= {own.name: share for own, share in every_one}["lift.coefficient"]
     ((down, _),) = reference.along(WIND, -1).power(LEVEL)
-    assert down.strength == -next(one.expected for one in on_markers() if one.name == "vertical-wind.inclination")
+    assert down.strength == -next(
+        one.expected for one in on_markers() if one.name == "vertical-wind.inclination"
+    )
     assert reference.power(1 / 60) == ()
     # A stricter test sees less.
     assert sum(share for _, share in reference.power(0.2)) > sum(share for _, share in every_one)
@@ -121,7 +142,10 @@ def test_power_is_that_of_what_is_tested_for(null: NullModel, reference: Referen
 def test_a_base_model_that_is_not_rejected_is_undecided_where_little_would_have_been_seen(
     null: NullModel, reference: Reference
 ) -> None:
-    quiet = max((seen(null, {}, seed=seed) for seed in range(8)), key=lambda own: -reference.farthest(own, names()))
+    quiet = max(
+        (seen(null, {}, seed=seed) for seed in range(8)),
+        key=lambda own: -reference.farthest(own, names()),
+    )
     concluded = set()
     for level in (0.05, 0.4):
         found = judge(quiet, reference, level=level)
@@ -134,7 +158,9 @@ def test_a_base_model_that_is_not_rejected_is_undecided_where_little_would_have_
 
 
 @pytest.mark.parametrize(("times", "near"), [(1.01, True), (1.99, True), (2.01, False)])
-def test_p_near_the_level_is_undecided(null: NullModel, reference: Reference, times: float, near: bool) -> None:
+def test_p_near_the_level_is_undecided(
+    null: NullModel, reference: Reference, times: float, near: bool
+) -> None:
     data = seen(null, {}, seed=1)
     p = reference.test.p(reference.tested(data, names()))
     found = judge(data, reference, level=p / times)
@@ -143,14 +169,21 @@ def test_p_near_the_level_is_undecided(null: NullModel, reference: Reference, ti
 
 
 def test_only_what_markers_weigh_can_be_suspected_of_them() -> None:
-    assert {one.name for one in all_strengths()} - {one.name for one in on_markers()} == {"slack.length"}
+    assert {one.name for one in all_strengths()} - {one.name for one in on_markers()} == {
+        "slack.length"
+    }
     with pytest.raises(UnknownNameError):
         Suspicion.parse("slack", on_markers())
 
 
 def test_what_the_cloth_cannot_have_is_refused_as_a_suspicion() -> None:
     suspicion = Suspicion.parse("lift", on_markers())
-    found = drawn(np.random.default_rng(1), strengths({}), np.zeros((3, len(names()))), np.array([3.5, 5.0, 7.0]))
+    found = drawn(
+        np.random.default_rng(1),
+        strengths({}),
+        np.zeros((3, len(names()))),
+        np.array([3.5, 5.0, 7.0]),
+    )
     assert _suspected_effect(found, suspicion) == (LIFT, 1)
     assert _suspected_effect(found, None) is None
     found.response[:, LIFT] = 0.0

@@ -15,23 +15,32 @@ NOISE = RNG.standard_normal(12)
 NOISE = (NOISE - NOISE.mean()) / NOISE.std(ddof=1)
 
 
-@pytest.mark.parametrize(("frames", "each", "late"), [(250, 4, 2), (202, 3, 1), (450, 8, 2), (500, 9, 3)])
+@pytest.mark.parametrize(
+    ("frames", "each", "late"), [(250, 4, 2), (202, 3, 1), (450, 8, 2), (500, 9, 3)]
+)
 def test_two_segments_of_four_are_late_and_a_third_of_more(
     specimen: Specimen, frames: int, each: int, late: int
 ) -> None:
-    """Of 2 s at 25 frames a second, after 8 frames; with one alone a recording's chance would not show."""
+    """Of 2 s at 25 frames a second, after 8 frames; with one alone a recording's chance would not
+    show."""
     wind = WindTrack.constant((4.0, 0.0, 0.0))
     still = np.zeros((frames, specimen.mesh.vertex_count, 3))
-    own = [Trajectory(name=n, markers=specimen.mesh.rest, positions=still, rate=25.0, wind=wind) for n in ("a", "b")]
+    own = [
+        Trajectory(name=n, markers=specimen.mesh.rest, positions=still, rate=25.0, wind=wind)
+        for n in ("a", "b")
+    ]
     segments = Segments.of(own)
     assert len(segments) == 2 * each
     *apart, last = folds(segments, [4.0, 4.0])
-    np.testing.assert_array_equal([fold.outside for fold in apart], [segments.recording == k for k in (0, 1)])
+    np.testing.assert_array_equal(
+        [fold.outside for fold in apart], [segments.recording == k for k in (0, 1)]
+    )
     np.testing.assert_array_equal(last.outside, np.tile(np.arange(each) >= each - late, 2))
 
 
 def test_what_differs_between_recordings_is_no_error() -> None:
-    """Three recordings of four segments with a standard deviation of 1 each about means far apart: √(3 · 4)."""
+    """Three recordings of four segments with a standard deviation of 1 each about means far apart:
+    √(3 · 4)."""
     own = np.array([-1.0, 1.0, -1.0, 1.0]) * np.sqrt(3 / 4)
     values = np.concatenate([own, 50 + own, -20 + own])
     assert total_error(values, np.repeat([0, 1, 2], 4)) == pytest.approx(np.sqrt(12), rel=1e-12)

@@ -1,4 +1,5 @@
-"""Null recordings are predicted from what a user would give; anchors not given are taken from the recordings."""
+"""Null recordings are predicted from what a user would give; anchors not given are taken from the
+recordings."""
 
 from __future__ import annotations
 
@@ -14,12 +15,16 @@ from measure.probes.statistics import statistics
 from sim.integrate import SplitEuler
 
 LEAN = EffectColumn(effect="tilted-pole", parameter="lean", step=0.02)
-CLOTHS = (Calibration(area_weight=1.2, damping=2e-3), Calibration(area_weight=0.8, bending=2.0, damping=2e-3))
+CLOTHS = (
+    Calibration(area_weight=1.2, damping=2e-3),
+    Calibration(area_weight=0.8, bending=2.0, damping=2e-3),
+)
 
 
 @pytest.fixture(scope="module")
 def batch(specimen: Specimen) -> NullBatch:
-    """Two cloths, each in two winds, on soft springs: anchors are seen some millimetres downstream of themselves."""
+    """Two cloths, each in two winds, on soft springs: anchors are seen some millimetres downstream
+    of themselves."""
     soft = replace(specimen, stiffness=100.0, anchors_given=False)
     return NullBatch(
         specimen=soft,
@@ -33,12 +38,15 @@ def batch(specimen: Specimen) -> NullBatch:
     )
 
 
-def test_anchors_that_are_not_given_are_taken_from_the_recordings_of_each_cloth(batch: NullBatch) -> None:
+def test_anchors_that_are_not_given_are_taken_from_the_recordings_of_each_cloth(
+    batch: NullBatch,
+) -> None:
     nulls, _ = evaluate(batch, 0, (LEAN,))
     recordings = batch.simulate()
     shown = [as_seen(batch.specimen, recordings[first : first + 2]) for first in (0, 2)]
     downstream = [float((own.anchors - batch.specimen.anchors)[:, 0].min()) for own in shown]
-    # A change of the wind by 1e-6 m/s moves the mean of this chaotic motion by a tenth: about 1 mm, on any platform.
+    # A change of the wind by 1e-6 m/s moves the mean of this chaotic motion by a tenth: about 1 mm,
+    # on any platform.
     assert min(downstream) > 5e-4
     for place, own in enumerate(shown):
         segments = Segments.of(recordings)
@@ -55,5 +63,6 @@ def test_anchors_that_are_not_given_are_taken_from_the_recordings_of_each_cloth(
 def test_given_anchors_are_those_of_the_simulation(batch: NullBatch) -> None:
     given = replace(batch, specimen=replace(batch.specimen, anchors_given=True))
     unlike, like = (evaluate(own, 0, (LEAN,))[0].statistics for own in (batch, given))
-    # Anchors a stretch too far downstream: the model's own springs draw it once more, and all errors grow.
+    # Anchors a stretch too far downstream: the model's own springs draw it once more, and all
+    # errors grow.
     assert like.error.mean() < unlike.error.mean()

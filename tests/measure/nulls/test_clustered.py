@@ -1,4 +1,5 @@
-"""p-values of statistics among null flags that are alike within a kind of numerics to some degree."""
+"""p-values of statistics among null flags that are alike within a kind of numerics to some
+degree."""
 
 from __future__ import annotations
 
@@ -14,7 +15,9 @@ KINDS, EACH = 20, 8
 WORLDS = 2000
 
 
-def world(rng: np.random.Generator, *, correlation: float, heavy: bool = False) -> tuple[ClusteredNulls, float]:
+def world(
+    rng: np.random.Generator, *, correlation: float, heavy: bool = False
+) -> tuple[ClusteredNulls, float]:
     """Nulls of an intraclass correlation; and the statistic of a flag of one kind more.
 
     Args:
@@ -33,7 +36,8 @@ def world(rng: np.random.Generator, *, correlation: float, heavy: bool = False) 
 def test_flags_of_the_base_model_are_rejected_at_the_level_however_alike_kinds_are(
     correlation: float, heavy: bool
 ) -> None:
-    """In 2,000 worlds; p is uniform but for the steps of one flag, or of one kind, and 0.01 of what ρ errs."""
+    """In 2,000 worlds; p is uniform but for the steps of one flag, or of one kind, and 0.01 of what
+    ρ errs."""
     rng = np.random.default_rng(4)
     both = [world(rng, correlation=correlation, heavy=heavy) for _ in range(WORLDS)]
     found = np.array([nulls.p(value) for nulls, value in both])
@@ -48,7 +52,11 @@ def test_flags_of_the_base_model_are_rejected_at_the_level_however_alike_kinds_a
 def test_the_correlation_is_that_of_the_world_and_not_below_none() -> None:
     rng = np.random.default_rng(5)
     for correlation in (0.0, 0.3, 0.8):
-        found = [world(rng, correlation=correlation, heavy=heavy)[0] for heavy in (False, True) for _ in range(200)]
+        found = [
+            world(rng, correlation=correlation, heavy=heavy)[0]
+            for heavy in (False, True)
+            for _ in range(200)
+        ]
         assert np.mean([one.correlation for one in found]) == pytest.approx(correlation, abs=0.05)
         assert min(one.correlation for one in found) >= 0
         assert all(KINDS <= one.effective <= KINDS * EACH for one in found)
@@ -61,7 +69,9 @@ def test_flags_that_are_unlike_count_one_by_one_and_those_that_are_alike_as_thei
     assert same.effective == pytest.approx(KINDS)
     assert same.p(18.5) == pytest.approx((1 + 1) / (1 + KINDS))
     # Each kind has one flag of each size, so that kinds differ less than by chance.
-    spread = ClusteredNulls(null=np.arange(float(KINDS * EACH)), kinds=np.tile(np.arange(KINDS), EACH))
+    spread = ClusteredNulls(
+        null=np.arange(float(KINDS * EACH)), kinds=np.tile(np.arange(KINDS), EACH)
+    )
     assert spread.correlation == 0.0
     assert spread.p(KINDS * EACH - 3.0) == pytest.approx((1 + 3) / (1 + KINDS * EACH))
     single = ClusteredNulls(null=np.arange(float(KINDS)), kinds=np.arange(KINDS))
@@ -95,7 +105,9 @@ def test_a_level_wants_so_many_kinds_as_alike_as_these() -> None:
 
 def test_the_tail_is_uniform_where_the_statistic_is_normal() -> None:
     rng = np.random.default_rng(3)
-    found = [nulls.tail(value) for nulls, value in (world(rng, correlation=0.0) for _ in range(WORLDS))]
+    found = [
+        nulls.tail(value) for nulls, value in (world(rng, correlation=0.0) for _ in range(WORLDS))
+    ]
     assert kstest(found, "uniform").pvalue > 1e-3
     assert binomtest(sum(p <= 0.01 for p in found), WORLDS, 0.01).pvalue > 1e-3
     nulls = ClusteredNulls(null=np.array([-1.0, 0.0, 1.0]), kinds=np.arange(3))

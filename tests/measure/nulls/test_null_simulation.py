@@ -51,17 +51,24 @@ def test_a_run_that_does_not_diverge_keeps_its_steps(specimen: Specimen) -> None
 
 
 def test_a_cloth_that_no_step_holds_is_refused_with_its_numbers(specimen: Specimen) -> None:
-    with pytest.raises(FlagdataError, match=r"1e\+05 m/s: .* even in steps 8 times smaller.*check the unit"):
+    with pytest.raises(
+        FlagdataError, match=r"1e\+05 m/s: .* even in steps 8 times smaller.*check the unit"
+    ):
         batch(specimen, speed=1e5).simulate()
 
 
 def test_a_wind_that_blows_is_the_steady_one_where_it_does_not_vary(specimen: Specimen) -> None:
-    """A logged wind without variation gives the recording of the steady one; a wind that falls to nothing half a second
-    before the first frame, another, and it is what stands beside the recording."""
+    """A logged wind without variation gives the recording of the steady one; a wind that falls to
+    nothing half a second before the first frame, another, and it is what stands beside the
+    recording."""
     calm = batch(specimen, speed=9.0)
     level = WindTrack(times=np.array([-4.0, 1.0]), velocity=np.full((2, 3), [9.0, 0.0, 0.0]))
-    falls = WindTrack(times=np.array([-4.0, -0.6, -0.5]), velocity=np.outer([9.0, 9.0, 0.0], [1.0, 0.0, 0.0]))
-    (steady,), (same,), (other,) = (made.simulate() for made in (calm, _in(calm, level), _in(calm, falls)))
+    falls = WindTrack(
+        times=np.array([-4.0, -0.6, -0.5]), velocity=np.outer([9.0, 9.0, 0.0], [1.0, 0.0, 0.0])
+    )
+    (steady,), (same,), (other,) = (
+        made.simulate() for made in (calm, _in(calm, level), _in(calm, falls))
+    )
     np.testing.assert_allclose(same.positions, steady.positions, rtol=0, atol=1e-6)
     assert np.abs(other.positions[0] - steady.positions[0]).max() > 1e-3
     assert other.wind is falls
@@ -78,9 +85,14 @@ def test_an_effect_on_the_wind_acts_on_one_that_blows(specimen: Specimen) -> Non
 
 
 def test_a_carried_null_is_held_where_its_way_goes_at_every_frame(specimen: Specimen) -> None:
-    """Two upper corners on ways of their own, one to and fro and one up and down, turned by 40° from the x axis."""
+    """Two upper corners on ways of their own, one to and fro and one up and down, turned by 40°
+    from the x axis."""
     held = handles.top_corners(specimen.mesh.rest)
-    turned = specimen.mesh.rest[list(held), 0, None] * [math.cos(0.7), math.sin(0.7), 0.0] + [0.0, 0.0, 2.0]
+    turned = specimen.mesh.rest[list(held), 0, None] * [math.cos(0.7), math.sin(0.7), 0.0] + [
+        0.0,
+        0.0,
+        2.0,
+    ]
     times = np.arange(-4.0, 3.0, 0.01)
     moved = np.zeros((len(times), 2, 3))
     moved[:, :, 1] = 0.1 * np.sin(4 * times)[:, None]
@@ -95,7 +107,8 @@ def test_a_carried_null_is_held_where_its_way_goes_at_every_frame(specimen: Spec
     )
     (recording,) = nulls.simulate()
     assert recording.attachments is not None
-    # At up to 0.4 m/s, half a millisecond of an explicit step is 0.2 mm; a frame of 40 ms would be 16 mm.
+    # At up to 0.4 m/s, half a millisecond of an explicit step is 0.2 mm; a frame of 40 ms would be
+    # 16 mm.
     np.testing.assert_allclose(recording.attachments, way.at(recording.times), rtol=0, atol=4e-4)
     assert np.ptp(recording.positions[:, :, 1]) > 0.1
 

@@ -23,9 +23,13 @@ def test_without_factors_it_is_the_nominal_material() -> None:
 def test_factors_are_on_their_own_directions_and_the_coupling_between_them() -> None:
     """C11 and C22 are multiplied by 2·3 and 2·12, C12 by their geometric mean 2·6, C33 by 2·0.5."""
     nominal = named_material("camel-ponte-roma")
-    made = StiffnessFactors(stretching=2.0, warp=3.0, weft=12.0, shear=0.5, bending=(1.0, 2.0, 4.0)).of(nominal)
+    made = StiffnessFactors(
+        stretching=2.0, warp=3.0, weft=12.0, shear=0.5, bending=(1.0, 2.0, 4.0)
+    ).of(nominal)
     shape = (1,) * (nominal.stretching.ndim - 1) + (4,)
-    np.testing.assert_allclose(made.stretching, nominal.stretching * np.reshape([6.0, 12.0, 24.0, 1.0], shape))
+    np.testing.assert_allclose(
+        made.stretching, nominal.stretching * np.reshape([6.0, 12.0, 24.0, 1.0], shape)
+    )
     np.testing.assert_allclose(made.bending, nominal.bending * np.array([[1.0], [2.0], [4.0]]))
 
 

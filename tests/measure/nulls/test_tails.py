@@ -30,7 +30,9 @@ def test_normal_ones_stay_as_they_are_however_far() -> None:
 
 def test_degrees_of_freedom_are_those_of_the_kurtosis() -> None:
     rng = np.random.default_rng(1)
-    drawn = np.stack([rng.standard_t(10, 200_000), rng.uniform(size=200_000), np.zeros(200_000)], axis=1)
+    drawn = np.stack(
+        [rng.standard_t(10, 200_000), rng.uniform(size=200_000), np.zeros(200_000)], axis=1
+    )
     heavy, light, nothing = freedom(drawn)
     assert heavy == pytest.approx(10, rel=0.1)
     assert light == nothing == 1e6
@@ -45,8 +47,12 @@ def test_one_odd_kind_no_longer_sets_the_critical_value_for_all() -> None:
     wild = blown(rng, int(odd.sum()), 0.5 * rng.normal(size=(int(odd.sum()), 1, 1)))
     score = course.score.copy()
     score[odd] = wild.score
-    nulls = replace(bank.nulls, statistics=replace(bank.nulls.statistics, course=replace(course, score=score)))
-    calm, windy = (replace(bank, nulls=own).reference(12, noise=0.0, seed=1) for own in (bank.nulls, nulls))
+    nulls = replace(
+        bank.nulls, statistics=replace(bank.nulls.statistics, course=replace(course, score=score))
+    )
+    calm, windy = (
+        replace(bank, nulls=own).reference(12, noise=0.0, seed=1) for own in (bank.nulls, nulls)
+    )
     most = [float(own.far[own.kinds != 7].max()) for own in (calm, windy)]
     odd_one = float(windy.far[windy.kinds == 7].max())
     swing = slice(len(windy.spread) + 2, len(windy.spread) + 2 + len(windy.powers))

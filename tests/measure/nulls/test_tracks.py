@@ -1,4 +1,5 @@
-"""How the attachments of nulls go: along the data's ways, from other instants on, without the noise of the markers."""
+"""How the attachments of nulls go: along the data's ways, from other instants on, without the noise
+of the markers."""
 
 from __future__ import annotations
 
@@ -25,7 +26,9 @@ def swinging(noise: float = 0.0, *, name: str = "swung", height: float = 0.0) ->
     places[:, :, 1] = FAR * np.sin(2 * math.pi * FREQUENCY * times)[:, None]
     places += noise * np.random.default_rng(3).standard_normal(places.shape)
     still = WindTrack.constant((0.0, 0.0, 0.0))
-    plain = Trajectory(name=name, markers=MARKERS, positions=places, rate=RATE, wind=still, noise=noise)
+    plain = Trajectory(
+        name=name, markers=MARKERS, positions=places, rate=RATE, wind=still, noise=noise
+    )
     return carry_attachments(plain, SEATS)
 
 
@@ -35,12 +38,15 @@ def velocity(places: FloatArray) -> FloatArray:
 
 def test_nulls_of_a_cloth_held_still_are_held_still() -> None:
     one = swinging()
-    held = Trajectory(name="held", markers=MARKERS, positions=one.positions, rate=RATE, wind=one.wind)
+    held = Trajectory(
+        name="held", markers=MARKERS, positions=one.positions, rate=RATE, wind=one.wind
+    )
     assert tracks.like([held], SEATS, 4, duration=5.0, seed=1) == ()
 
 
 def test_a_way_is_that_of_the_recording_or_its_reverse_where_it_does_not_turn() -> None:
-    """Its height says at which instant of the recording it is, which goes by at one second a second for most of it."""
+    """Its height says at which instant of the recording it is, which goes by at one second a second
+    for most of it."""
     for made in tracks.like([swinging()], SEATS, 6, duration=20.0, seed=1):
         assert made.times[0] == -SETTLE
         assert made.times[-1] >= 20.0
@@ -57,8 +63,8 @@ def test_a_way_is_that_of_the_recording_or_its_reverse_where_it_does_not_turn() 
 
 
 def test_a_way_turns_back_without_a_jump_of_its_velocity() -> None:
-    """At the ends of 8 s at 0.7 Hz the cloth moves at up to 2πf · FAR = 0.66 m/s; turned in a second, that changes by
-    1.3 m/s², beside (2πf)² · FAR = 2.9 m/s² of the swing itself."""
+    """At the ends of 8 s at 0.7 Hz the cloth moves at up to 2πf · FAR = 0.66 m/s; turned in a
+    second, that changes by 1.3 m/s², beside (2πf)² · FAR = 2.9 m/s² of the swing itself."""
     size = 2 * math.pi * FREQUENCY
     for made in tracks.like([swinging()], SEATS, 6, duration=30.0, seed=2):
         change = np.diff(velocity(made.places), axis=0) / CARRIED
@@ -73,7 +79,8 @@ def test_noise_is_taken_out_of_a_way_and_motion_is_not() -> None:
     made = tracks.smooth_way(tracked, SEATS)(tracked.times)
     off, before = made - plain.attachments, tracked.attachments - plain.attachments
     assert np.sqrt((before**2).mean()) == pytest.approx(noise, rel=0.05)
-    # 25 frames a second of a swing of 0.7 Hz: a smooth way through them has some five coefficients a second and axis.
+    # 25 frames a second of a swing of 0.7 Hz: a smooth way through them has some five coefficients
+    # a second and axis.
     assert np.sqrt((off**2).mean()) < 0.6 * noise
     # What is taken out is as large as the noise, by definition of the way.
     assert np.sqrt(((made - tracked.attachments) ** 2).mean()) == pytest.approx(noise, rel=0.01)
@@ -83,8 +90,12 @@ def test_noise_is_taken_out_of_a_way_and_motion_is_not() -> None:
 
 def test_ways_are_drawn_from_all_recordings_and_a_seed_gives_the_same() -> None:
     data = [swinging(), swinging(name="high", height=1.0)]
-    first, again, other = (tracks.like(data, SEATS, 12, duration=3.0, seed=seed) for seed in (1, 1, 2))
+    first, again, other = (
+        tracks.like(data, SEATS, 12, duration=3.0, seed=seed) for seed in (1, 1, 2)
+    )
     for one, same in zip(first, again, strict=True):
         np.testing.assert_array_equal(one.places, same.places)
-    assert any(not np.array_equal(one.places, than.places) for one, than in zip(first, other, strict=True))
+    assert any(
+        not np.array_equal(one.places, than.places) for one, than in zip(first, other, strict=True)
+    )
     assert {round(float(one.places[0, 0, 2] - SEATS[0, 1])) for one in first} == {0, 1}

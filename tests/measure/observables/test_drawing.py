@@ -1,4 +1,5 @@
-"""Silhouettes of triangles are what clipping says, with a kernel and without one, and nearly what OpenCV draws."""
+"""Silhouettes of triangles are what clipping says, with a kernel and without one, and nearly what
+OpenCV draws."""
 
 from __future__ import annotations
 
@@ -30,7 +31,10 @@ def clipped(triangle: list[Point], middle: Point) -> list[Point]:
                 if inside[k] != inside[k - 1]:
                     share = (end * side - before[axis]) / (point[axis] - before[axis])
                     kept.append(
-                        (before[0] + share * (point[0] - before[0]), before[1] + share * (point[1] - before[1]))
+                        (
+                            before[0] + share * (point[0] - before[0]),
+                            before[1] + share * (point[1] - before[1]),
+                        )
                     )
                 if inside[k]:
                     kept.append(point)
@@ -39,13 +43,18 @@ def clipped(triangle: list[Point], middle: Point) -> list[Point]:
 
 
 def by_clipping(places: FloatArray) -> BoolArray:
-    points = [(Fraction(int(x), STEPS), Fraction(int(y), STEPS)) for x, y in np.rint(places * STEPS)]
+    points = [
+        (Fraction(int(x), STEPS), Fraction(int(y), STEPS)) for x, y in np.rint(places * STEPS)
+    ]
     half = Fraction(1, 2)
-    return np.array([[bool(clipped(points, (x + half, y + half))) for x in range(WIDTH)] for y in range(HEIGHT)])
+    return np.array(
+        [[bool(clipped(points, (x + half, y + half))) for x in range(WIDTH)] for y in range(HEIGHT)]
+    )
 
 
 def triangles(count: int) -> FloatArray:
-    """(triangle, 3, 2) of all sizes, some beyond the picture, some on the pixels' own lines, some flat."""
+    """(triangle, 3, 2) of all sizes, some beyond the picture, some on the pixels' own lines, some
+    flat."""
     rng = stream(5, "triangles")
     drawn_at_random = rng.uniform(-4, 13, (count, 3, 2))
     drawn_at_random[::3] = np.rint(drawn_at_random[::3] * 6) / 6
@@ -55,7 +64,9 @@ def triangles(count: int) -> FloatArray:
 
 
 @pytest.fixture(params=["kernel", "numpy"])
-def with_or_without_a_kernel(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+def with_or_without_a_kernel(
+    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
     if request.param == "numpy":
         monkeypatch.setattr(drawing, "library", lambda: None)
     elif drawing.library() is None:
@@ -83,8 +94,9 @@ def test_the_order_of_corners_does_not_matter_and_triangles_unite() -> None:
 def test_opencv_draws_the_same_but_for_pixels_whose_middle_third_an_edge_just_touches() -> None:
     """Drawn three times as fine, of which each third pixel is taken.
 
-    OpenCV leaves out what an edge crosses at a corner only: of dx + dy fine pixels it draws max(dx, dy), so up to a
-    half is missing, and a third of an outline's pixels has an edge in its middle third.
+    OpenCV leaves out what an edge crosses at a corner only: of dx + dy fine pixels it draws max(dx,
+    dy), so up to a half is missing, and a third of an outline's pixels has an edge in its middle
+    third.
     """
     rng = stream(6, "cloth")
     places = 20 + rng.uniform(0, 60, (4, 40, 2))
@@ -107,5 +119,6 @@ def test_the_area_is_that_of_the_polygon_and_a_sixth_of_a_pixel_about_it() -> No
     places = np.concatenate([[[50.0, 50.0]], rim])[None]
     faces = np.array([[0, 1 + k, 1 + (k + 1) % 400] for k in range(400)])
     mask = drawn(places, faces, width=100, height=100)
-    # The square reaches a sixth along an axis and sqrt(2) times as far along a diagonal: 4/pi of it in the mean.
+    # The square reaches a sixth along an axis and sqrt(2) times as far along a diagonal: 4/pi of it
+    # in the mean.
     assert mask.sum() == pytest.approx(np.pi * (40 + 4 / np.pi / 6) ** 2, rel=2e-3)

@@ -23,7 +23,13 @@ def value(name: str, *args: object, **options: object) -> float:
 
 @pytest.mark.parametrize(
     ("name", "expected"),
-    [("droop", DROOPED), ("extension", 1.0), ("area", math.cos(DROOPED)), ("asymmetry", 0.0), ("outline-speed", 0.0)],
+    [
+        ("droop", DROOPED),
+        ("extension", 1.0),
+        ("area", math.cos(DROOPED)),
+        ("asymmetry", 0.0),
+        ("outline-speed", 0.0),
+    ],
 )
 def test_a_still_flag(name: str, expected: float) -> None:
     still = hinged(lambda t: DROOPED)
@@ -34,21 +40,26 @@ def test_a_still_flag(name: str, expected: float) -> None:
 def test_a_view_shortens_what_is_along_it(azimuth: float) -> None:
     view = View(azimuth=math.radians(azimuth))
     straight = hinged(lambda t: 0.0)
-    assert value("extension", straight, view=view) == pytest.approx(math.sin(view.azimuth), abs=1e-6)
+    assert value("extension", straight, view=view) == pytest.approx(
+        math.sin(view.azimuth), abs=1e-6
+    )
     assert value("area", straight, view=view) == pytest.approx(math.sin(view.azimuth), abs=0.02)
 
 
 def test_the_hoist_gives_the_scale_from_any_elevation() -> None:
     """An upright hoist has the flag's height in the picture, as it is by it that people scale."""
     for elevation, distance in ((-0.3, math.inf), (0.0, 5.0), (0.4, 5.0)):
-        seen = window(hinged(lambda t: 0.1), view=View(elevation=elevation, azimuth=1.2, distance=distance))
+        seen = window(
+            hinged(lambda t: 0.1), view=View(elevation=elevation, azimuth=1.2, distance=distance)
+        )
         ends = seen.points[:, [seen.hoist[0], seen.hoist[-1]]]
         np.testing.assert_allclose(ends[:, 0, 1] - ends[:, 1, 1], HEIGHT, rtol=1e-9)
 
 
 def test_what_is_nearer_looks_larger() -> None:
-    """The free edge of a flag that flies at 45° to a camera 6 m from its middle, against the pinhole's formula:
-    the hoist is nearer by a, the free edge farther by a, both a aside; lengths are scaled by the hoist's."""
+    """The free edge of a flag that flies at 45° to a camera 6 m from its middle, against the
+    pinhole's formula: the hoist is nearer by a, the free edge farther by a, both a aside; lengths
+    are scaled by the hoist's."""
     view = View(azimuth=math.radians(45), distance=6.0)
     seen = window(hinged(lambda t: 0.0), view=view)
     a = LENGTH / 2 / math.sqrt(2)
@@ -60,20 +71,30 @@ def test_a_swing_has_its_speed_frequency_and_amplitude() -> None:
     swing = hinged(lambda t: SWING * math.sin(2 * math.pi * BEAT * t))
     rate = 2 * math.pi * BEAT
     assert value("droop", swing) == pytest.approx(0.0, abs=1e-3)
-    assert value("amplitude-up", swing) == pytest.approx(SWING * LENGTH / math.sqrt(2) / HEIGHT, rel=0.03)
+    assert value("amplitude-up", swing) == pytest.approx(
+        SWING * LENGTH / math.sqrt(2) / HEIGHT, rel=0.03
+    )
     assert value("amplitude-across", swing) == pytest.approx(0.0, abs=0.01)
     assert value("frequency", swing) == pytest.approx(BEAT, abs=0.03)
-    # Central differences over 80 ms see sin(x)/x of a speed, x = ω · 40 ms; the mean of the middle third is at half.
+    # Central differences over 80 ms see sin(x)/x of a speed, x = ω · 40 ms; the mean of the middle
+    # third is at half.
     seen = math.sin(rate * 0.04) / (rate * 0.04)
-    assert value("middle-speed", swing) == pytest.approx(SWING * rate / 2 / math.sqrt(2) * seen, rel=0.04)
-    # Both long edges move up and down by u φ', the free edge along itself: the mean of |φ'| u/L beyond 15 % of L.
+    assert value("middle-speed", swing) == pytest.approx(
+        SWING * rate / 2 / math.sqrt(2) * seen, rel=0.04
+    )
+    # Both long edges move up and down by u φ', the free edge along itself: the mean of |φ'| u/L
+    # beyond 15 % of L.
     swept = 2 * LENGTH * (1 - 0.15**2) / 2 * SWING * rate * 2 / math.pi * seen
-    assert value("outline-speed", swing) == pytest.approx(swept / (2 * 0.85 * LENGTH + HEIGHT), rel=0.05)
+    assert value("outline-speed", swing) == pytest.approx(
+        swept / (2 * 0.85 * LENGTH + HEIGHT), rel=0.05
+    )
 
 
 def test_two_beats_have_a_bandwidth() -> None:
     """Two frequencies of the same power: their mean, and half of their distance."""
-    swing = hinged(lambda t: 0.05 * (math.sin(2 * math.pi * 1.2 * t) + math.sin(2 * math.pi * 4.0 * t)))
+    swing = hinged(
+        lambda t: 0.05 * (math.sin(2 * math.pi * 1.2 * t) + math.sin(2 * math.pi * 4.0 * t))
+    )
     assert value("frequency", swing) == pytest.approx(2.6, abs=0.15)
     assert value("bandwidth", swing) == pytest.approx(1.4, abs=0.1)
 
@@ -123,8 +144,11 @@ def test_every_observable_is_the_same_from_the_other_side_and_at_another_rate(na
 
 
 @pytest.mark.parametrize(("sag", "expected"), [(0.0, 0.0), (0.15, 0.15), (0.3, 0.3), (-0.15, 0.0)])
-def test_cloth_that_departs_from_the_pole_between_its_corners_is_its_bulge(sag: float, expected: float) -> None:
-    """A parabola of a depth [m] between two held corners; what bulges to the pole's other side counts as on it."""
+def test_cloth_that_departs_from_the_pole_between_its_corners_is_its_bulge(
+    sag: float, expected: float
+) -> None:
+    """A parabola of a depth [m] between two held corners; what bulges to the pole's other side
+    counts as on it."""
 
     def held(u: np.ndarray, v: np.ndarray, t: float) -> tuple[np.ndarray, ...]:
         return u + sag * (1 - (2 * v / HEIGHT) ** 2) * (1 - u / LENGTH), 0 * u, v
@@ -134,4 +158,6 @@ def test_cloth_that_departs_from_the_pole_between_its_corners_is_its_bulge(sag: 
 
 
 def test_a_hoist_that_is_held_along_its_length_has_no_bulge() -> None:
-    assert value("hoist-bulge", hinged(lambda t: 0.3 + 0.1 * math.sin(9 * t))) == pytest.approx(0.0, abs=1 / 240)
+    assert value("hoist-bulge", hinged(lambda t: 0.3 + 0.1 * math.sin(9 * t))) == pytest.approx(
+        0.0, abs=1 / 240
+    )

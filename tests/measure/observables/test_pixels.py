@@ -1,4 +1,5 @@
-"""Observables of pictures of cloth whose motion is a formula: a painted film in which the true silhouette is known."""
+"""Observables of pictures of cloth whose motion is a formula: a painted film in which the true
+silhouette is known."""
 
 from __future__ import annotations
 
@@ -25,11 +26,16 @@ POLE = 6
 
 
 def waving(u: FloatArray, v: FloatArray, t: float) -> tuple[FloatArray, ...]:
-    """A flag that droops, swings and carries a wave; its threads turn with it, by half its droop at the free edge."""
+    """A flag that droops, swings and carries a wave; its threads turn with it, by half its droop at
+    the free edge."""
     angle = 0.3 + 0.12 * math.sin(2 * math.pi * 1.5 * t) + 0.05 * math.sin(2 * math.pi * 0.7 * t)
     wave = 0.08 * u / LENGTH * np.sin(2 * np.pi * (u / 1.2 - 1.9 * t))
     turned = 0.5 * angle * u / LENGTH
-    return u * math.cos(angle) + v * np.sin(turned), wave, v * np.cos(turned) - u * math.sin(angle) + wave
+    return (
+        u * math.cos(angle) + v * np.sin(turned),
+        wave,
+        v * np.cos(turned) - u * math.sin(angle) + wave,
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,11 +47,13 @@ class Painted:
 
 
 def painted(*, contrast: float, seconds: float = 2.6, house: bool = False) -> Painted:
-    """A film of it before a bright sky, or before a house with dark windows behind its free end: cloth darker by a
-    contrast [gray levels], shaded by its wave; a dark pole."""
+    """A film of it before a bright sky, or before a house with dark windows behind its free end:
+    cloth darker by a contrast [gray levels], shaded by its wave; a dark pole."""
     cloth = window(waving, seconds=seconds)
     rng = np.random.default_rng(4)
-    sky = np.linspace(200, 170, SIDE)[:, None] + cv2.GaussianBlur(rng.normal(0, 40, (SIDE, SIDE)), (0, 0), 6)
+    sky = np.linspace(200, 170, SIDE)[:, None] + cv2.GaussianBlur(
+        rng.normal(0, 40, (SIDE, SIDE)), (0, 0), 6
+    )
     if house:
         for row, column in ((row, column) for row in range(60, 260, 20) for column in (200, 230)):
             sky[row : row + 16, column : column + 12] = 60
@@ -62,9 +70,14 @@ def painted(*, contrast: float, seconds: float = 2.6, house: bool = False) -> Pa
             cv2.fillConvexPoly(large, triangle, shade, shift=4)
             cv2.fillConvexPoly(mask, triangle, 255, shift=4)
         picture = cv2.resize(large, (SIDE, SIDE), interpolation=cv2.INTER_AREA)
-        frames.append(np.clip(np.rint(picture + rng.normal(0, 1.0, picture.shape)), 0, 255).astype(np.uint8))
+        frames.append(
+            np.clip(np.rint(picture + rng.normal(0, 1.0, picture.shape)), 0, 255).astype(np.uint8)
+        )
         masks.append(
-            halve_picture(np.asarray(cv2.resize(mask, (SIDE, SIDE), interpolation=cv2.INTER_AREA), np.uint8)) > 127
+            halve_picture(
+                np.asarray(cv2.resize(mask, (SIDE, SIDE), interpolation=cv2.INTER_AREA), np.uint8)
+            )
+            > 127
         )
     return Painted(cloth=cloth, frames=np.stack(frames), silhouettes=np.stack(masks))
 
@@ -102,7 +115,8 @@ def seen() -> Seen:
 
 
 def test_masks_are_the_silhouettes(seen: Seen) -> None:
-    """Within a pixel of the halved picture along an outline of some 250 px about 4800 px: an overlap of 0.95."""
+    """Within a pixel of the halved picture along an outline of some 250 px about 4800 px: an
+    overlap of 0.95."""
     true, found = seen.painted.silhouettes, seen.masks
     overlap = (true & found).sum(axis=(1, 2)) / (true | found).sum(axis=(1, 2))
     assert np.median(overlap) > 0.95
@@ -151,17 +165,23 @@ def test_a_picture_in_which_nothing_moves_shows_no_hoist(seen: Seen) -> None:
 
 
 def test_the_hoist_is_where_the_pole_ends(seen: Seen) -> None:
-    """To a pixel of the halved picture along the wind, and to 4 % of the height, which gives the scale."""
+    """To a pixel of the halved picture along the wind, and to 4 % of the height, which gives the
+    scale."""
     ends = (HOIST + np.array([[0.0, -HEIGHT / 2], [0.0, HEIGHT / 2]]) * SCALE) / HALVED
     np.testing.assert_allclose(seen.outliner.hoist[:, 0], ends[:, 0], atol=1.0)
-    np.testing.assert_allclose(seen.outliner.hoist[:, 1], ends[:, 1], atol=0.04 * HEIGHT * SCALE / HALVED)
+    np.testing.assert_allclose(
+        seen.outliner.hoist[:, 1], ends[:, 1], atol=0.04 * HEIGHT * SCALE / HALVED
+    )
 
 
 @pytest.mark.parametrize("name", list(OBSERVABLES))
 def test_pixels_agree_with_geometry(seen: Seen, name: str) -> None:
-    """Within twice the stated sigma of one window, before the bias is taken off, which is that of films less clean.
-    Pixels may not show a wave that geometry shows, and no other."""
-    pixels, geometry = OBSERVABLES[name].of_film(seen.window), OBSERVABLES[name].of_cloth(seen.painted.cloth)
+    """Within twice the stated sigma of one window, before the bias is taken off, which is that of
+    films less clean. Pixels may not show a wave that geometry shows, and no other."""
+    pixels, geometry = (
+        OBSERVABLES[name].of_film(seen.window),
+        OBSERVABLES[name].of_cloth(seen.painted.cloth),
+    )
     if geometry.reason is not None:
         assert pixels.reason == geometry.reason
         return

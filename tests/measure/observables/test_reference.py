@@ -1,7 +1,8 @@
 """Observables of the reference simulator's runs, against the first study of them.
 
-The study took the geometry of runs in winds of 3, 5 and 7 m/s (10 s, 486 vertices), seen from 70° to the wind, in
-blocks of 2.5 s. Its figures are quoted; the runs are read where the reference data are.
+The study took the geometry of runs in winds of 3, 5 and 7 m/s (10 s, 486 vertices), seen from 70°
+to the wind, in blocks of 2.5 s. Its figures are quoted; the runs are read where the reference data
+are.
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ from measure.observables import OBSERVABLES, View, edges_of, seen_from
 from tests.evidence import REFERENCE
 
 RUNS = REFERENCE / "arcsim" / "jittered"
-pytestmark = pytest.mark.skipif(not RUNS.is_dir(), reason="no reference data; set FLAGDATA_REFERENCE to their folder")
+pytestmark = pytest.mark.skipif(
+    not RUNS.is_dir(), reason="no reference data; set FLAGDATA_REFERENCE to their folder"
+)
 WINDS = (3, 5, 7)
 DROOP = {"null": (37.6, 18.7, 13.4), "pressure-x1.6": (29.9, 16.0, 10.6)}
 """Mean droop [degrees] at each wind."""
@@ -55,15 +58,17 @@ def blocks(name: str, wind: int, observable: str) -> FloatArray:
 
 @pytest.mark.parametrize("name", DROOP)
 def test_droop_of_the_first_study(name: str) -> None:
-    """Within 1°: the study's middle of the hoist is not stated, and another choice of it makes 0.6°."""
+    """Within 1°: the study's middle of the hoist is not stated, and another choice of it makes
+    0.6°."""
     for wind, expected in zip(WINDS, DROOP[name], strict=True):
         assert math.degrees(blocks(name, wind, "droop").mean()) == pytest.approx(expected, abs=1.0)
 
 
 @pytest.mark.parametrize(("name", "observable"), SIGNS)
 def test_effects_of_the_first_study(name: str, observable: str) -> None:
-    """In the direction of the study at each wind, and at least a third of its standard errors over all three: those of
-    four blocks are known to a third at best, and the study's middle is a point where ours is a third of the cloth."""
+    """In the direction of the study at each wind, and at least a third of its standard errors over
+    all three: those of four blocks are known to a third at best, and the study's middle is a point
+    where ours is a third of the cloth."""
     total = 0.0
     for wind, expected in zip(WINDS, SIGNS[name, observable], strict=True):
         with_effect, without = blocks(name, wind, observable), blocks("null", wind, observable)

@@ -45,7 +45,9 @@ def test_a_film_shorter_than_a_window_is_refused() -> None:
         watch_film(ConditionedFilm(Still()), SIZE, last=1.0)
 
 
-def test_the_bar_of_observe_ends_at_the_whole_windows_of_the_part(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_bar_of_observe_ends_at_the_whole_windows_of_the_part(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """The example lasts 12 s: four windows of 2.5 s, and of its last 7 s three of 2 s."""
     lengths: list[int] = []
 

@@ -1,4 +1,5 @@
-"""What is wrong with a recording is refused or reported with its reason; one in order gives no finding."""
+"""What is wrong with a recording is refused or reported with its reason; one in order gives no
+finding."""
 
 from __future__ import annotations
 
@@ -9,7 +10,16 @@ import numpy as np
 import pytest
 
 from flagdata.errors import InputError
-from measure.observe import Hold, Observation, Setup, Up, WindTrack, hoist_stands_still, observe, sheet
+from measure.observe import (
+    Hold,
+    Observation,
+    Setup,
+    Up,
+    WindTrack,
+    hoist_stands_still,
+    observe,
+    sheet,
+)
 from tests.measure.observe.flags import HEIGHT, RATE, SETUP, WIDTH, flag
 from tests.refusals import unrefused
 
@@ -37,7 +47,10 @@ def test_nothing_is_found_in_a_recording_that_is_in_order(seen: Observation):
 
 
 def test_what_nothing_can_be_concluded_from_is_refused_with_its_reason(seen: Observation):
-    draws, still = np.random.default_rng(1).standard_normal(seen.positions.shape), seen.positions[:1]
+    draws, still = (
+        np.random.default_rng(1).standard_normal(seen.positions.shape),
+        seen.positions[:1],
+    )
     jitter = 0.3 / RATE * np.random.default_rng(2).uniform(-1, 1, len(seen.times))
 
     def up(axis: Up) -> Observation:
@@ -60,14 +73,22 @@ def test_what_nothing_can_be_concluded_from_is_refused_with_its_reason(seen: Obs
         (placed(seen.positions * 100.0), SETUP, "cm for m"),
         (placed(seen.positions * 39.37), SETUP, "inches for m"),
         (placed(seen.positions * 0.85), SETUP, "rest shape does not fit"),
-        (replace(seen, markers=seen.markers * [0.85, 1.0]), ends(0.85 * WIDTH), "rest shape does not fit"),
+        (
+            replace(seen, markers=seen.markers * [0.85, 1.0]),
+            ends(0.85 * WIDTH),
+            "rest shape does not fit",
+        ),
         (seen, ends(0.9 * WIDTH), "not on the cloth"),
         (seen, pins((WIDTH, 0.0), (WIDTH, HEIGHT)), r"not held there.*\(0, "),
         (replace(seen, markers=[WIDTH, 0.0] + seen.markers * [-1.0, 1.0]), SETUP, "not held there"),
         (seen, pins((-0.5, 0.0), (0.0, HEIGHT)), "not on the cloth"),
         (first(60), SETUP, "60 frames"),
         (first(30), SETUP, "30 frames"),
-        (replace(seen, markers=seen.markers[::3], positions=seen.positions[:, ::3]), SETUP, "24 markers"),
+        (
+            replace(seen, markers=seen.markers[::3], positions=seen.positions[:, ::3]),
+            SETUP,
+            "24 markers",
+        ),
         (placed(np.full_like(seen.positions, np.nan)), SETUP, "no marker was tracked"),
         (placed(still + NOISE * draws), SETUP, "no motion is found"),
         (placed(np.repeat(still, len(seen.times), axis=0)), SETUP, "no motion is found"),
@@ -92,7 +113,9 @@ def test_a_hoist_that_stands_still_between_its_declared_pins_is_attached(seen: O
     assert hoist_stands_still(observe([seen], attached).experiment)
     assert not hoist_stands_still(observe([seen], replace(SETUP, pins=Hold.HOIST)).experiment)
     moved = seen.positions.copy()
-    middle = np.flatnonzero((seen.markers[:, 0] == 0) & (np.abs(seen.markers[:, 1] - HEIGHT / 2) < 0.3 * HEIGHT))[0]
+    middle = np.flatnonzero(
+        (seen.markers[:, 0] == 0) & (np.abs(seen.markers[:, 1] - HEIGHT / 2) < 0.3 * HEIGHT)
+    )[0]
     moved[:, middle, 1] += 0.05 * np.sin(7 * seen.times)
     assert not hoist_stands_still(observe([replace(seen, positions=moved)], attached).experiment)
 
@@ -156,7 +179,9 @@ def test_frames_lost_silently_are_reported(seen: Observation):
 
 
 def test_times_rounded_to_a_millisecond_are_even(seen: Observation):
-    shifted = np.round(seen.times * (29.97 / RATE) ** -1, 3)  # 29.97 frames a second, in whole milliseconds
+    shifted = np.round(
+        seen.times * (29.97 / RATE) ** -1, 3
+    )  # 29.97 frames a second, in whole milliseconds
     observed = observe([replace(seen, times=shifted)], SETUP)
     assert observed.experiment.recordings[0].rate == pytest.approx(29.97, rel=1e-4)
 
@@ -187,7 +212,10 @@ def test_rest_coordinates_upside_down_are_reported(seen: Observation):
 
 
 def test_pins_of_two_recordings_must_be_in_one_place(seen: Observation):
-    other = replace(flag(noise=NOISE, seed=5, name="other"), positions=seen.positions + np.array([0.1, 0.0, 0.0]))
+    other = replace(
+        flag(noise=NOISE, seed=5, name="other"),
+        positions=seen.positions + np.array([0.1, 0.0, 0.0]),
+    )
     with pytest.raises(InputError, match=r"pins are up to 0\.1"):
         observe([seen, other], SETUP)
 

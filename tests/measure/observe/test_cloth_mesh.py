@@ -1,4 +1,5 @@
-"""Model meshes: about as many vertices as asked for, over the whole cloth and nothing else, held where it is held."""
+"""Model meshes: about as many vertices as asked for, over the whole cloth and nothing else, held
+where it is held."""
 
 from __future__ import annotations
 
@@ -13,7 +14,9 @@ from sim.cloth.mesh import grid
 OUTLINES = {
     "pennant": np.array([[0.0, 0.0], [2.0, 0.5], [0.0, 1.0]]),
     "swallowtail": np.array([[0.0, 0.0], [1.5, 0.0], [1.2, 0.5], [1.5, 1.0], [0.0, 1.0]]),
-    "round": np.stack([f(np.linspace(0, 2 * np.pi, 120, endpoint=False)) for f in (np.cos, np.sin)], axis=1),
+    "round": np.stack(
+        [f(np.linspace(0, 2 * np.pi, 120, endpoint=False)) for f in (np.cos, np.sin)], axis=1
+    ),
 }
 
 
@@ -30,7 +33,8 @@ def test_a_rectangle_has_nearly_square_cells_and_about_200_vertices(sides: tuple
 def test_other_outlines_are_filled(name: str):
     mesh = model_mesh(OUTLINES[name])
     assert 150 <= mesh.vertex_count <= 250
-    # Straight edges are met exactly; a circle's chords leave out less than its 120-gon does at this spacing.
+    # Straight edges are met exactly; a circle's chords leave out less than its 120-gon does at this
+    # spacing.
     assert mesh.areas.sum() == pytest.approx(area(OUTLINES[name]), rel=5e-3)
 
 

@@ -18,8 +18,17 @@ FEW = replace(SETUP, vertices=40)
 def on_mesh(columns: int, rows: int, name: str, noise: float = 0.0) -> Observation:
     rest, times = markers(columns, rows), np.arange(round(4 * RATE)) / RATE
     positions = flutter(rest, times)
-    positions = positions + noise * np.random.default_rng(len(rest)).standard_normal(positions.shape)
-    return Observation(name=name, markers=rest, positions=positions, times=times, known=Known(wind=WIND), noise=noise)
+    positions = positions + noise * np.random.default_rng(len(rest)).standard_normal(
+        positions.shape
+    )
+    return Observation(
+        name=name,
+        markers=rest,
+        positions=positions,
+        times=times,
+        known=Known(wind=WIND),
+        noise=noise,
+    )
 
 
 def test_meshes_that_differ_are_followed_at_the_same_points() -> None:
@@ -28,8 +37,11 @@ def test_meshes_that_differ_are_followed_at_the_same_points() -> None:
     np.testing.assert_array_equal(first.markers, second.markers)
     assert len(first.markers) == observed.experiment.specimen.mesh.vertex_count
     for recording in (first, second):
-        # The truth at those points; between markers 80 mm apart a spline misses a wave of 1.1 m by less than 1 mm.
-        np.testing.assert_allclose(recording.positions, flutter(recording.markers, recording.times), atol=1e-3)
+        # The truth at those points; between markers 80 mm apart a spline misses a wave of 1.1 m by
+        # less than 1 mm.
+        np.testing.assert_allclose(
+            recording.positions, flutter(recording.markers, recording.times), atol=1e-3
+        )
     assert [f.kind for f in observed.findings].count("markers-resampled") == 2
     assert len(Segments.of([first, second])) > 2
 

@@ -1,4 +1,5 @@
-"""Experiment recipes: sources of every kind become one checked experiment; what is not known is refused."""
+"""Experiment recipes: sources of every kind become one checked experiment; what is not known is
+refused."""
 
 from __future__ import annotations
 
@@ -50,7 +51,9 @@ def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_a_table_of_two_recordings_with_another_axis_up_and_in_millimetres(table: Path, tmp_path: Path):
+def test_a_table_of_two_recordings_with_another_axis_up_and_in_millimetres(
+    table: Path, tmp_path: Path
+):
     entry = f'[[recording]]\nsource = "{table}"\nrate = {RATE}\nunit = "mm"\nnoise = 0.0005\n'
     text = f'up = "y"\n{COMMON}' + "".join(
         f'{entry}take = "{take}"\nwind = {{ speed = {speed}, toward = 0.1 }}\n'
@@ -65,7 +68,9 @@ def test_a_table_of_two_recordings_with_another_axis_up_and_in_millimetres(table
     np.testing.assert_allclose(brisk.wind.velocity, [[6 * math.cos(0.1), 6 * math.sin(0.1), 0]])
     specimen = observed.experiment.specimen
     assert specimen.material.area_weight == 0.2
-    np.testing.assert_array_equal(specimen.material.bending, named_material("camel-ponte-roma").bending)
+    np.testing.assert_array_equal(
+        specimen.material.bending, named_material("camel-ponte-roma").bending
+    )
     np.testing.assert_allclose(specimen.anchors[:, :2], 0.0, atol=1e-3)
     assert observed.findings == ()
 
@@ -82,7 +87,10 @@ def test_a_table_of_two_recordings_with_another_axis_up_and_in_millimetres(table
 def test_how_well_the_cloth_was_weighed_is_the_prior_of_its_area_weight(
     table: Path, tmp_path: Path, lines: str, uncertainty: float
 ):
-    entry = f'[[recording]]\nsource = "{table}"\nrate = {RATE}\nunit = "mm"\ntake = "calm"\nwind = {{ speed = 4.0 }}\n'
+    entry = (
+        f'[[recording]]\nsource = "{table}"\nrate = {RATE}\nunit = "mm"\ntake = "calm"\nwind = {{ '
+        f"speed = 4.0 }}\n"
+    )
     common = COMMON.replace("area-weight = 0.2", lines)
     observed = read(load(_recipe(tmp_path, f'up = "y"\n{common}{entry}')))
     assert observed.experiment.specimen.material.area_weight == 0.2
@@ -105,7 +113,12 @@ SCENE = {
     "frame_steps": 4,
     "gravity": [0, 0, -9.81],
     "wind": {"velocity": [5, 0, 0], "density": 1.2},
-    "cloths": [{"mesh": "flag.obj", "materials": [{"data": "materials/camel-ponte-roma.json", "thicken": 2}]}],
+    "cloths": [
+        {
+            "mesh": "flag.obj",
+            "materials": [{"data": "materials/camel-ponte-roma.json", "thicken": 2}],
+        }
+    ],
     "handles": [{"nodes": list(range(7))}],
     "magic": {"handle_stiffness": 2e3},
 }
@@ -130,7 +143,10 @@ def test_an_arcsim_folder_needs_nothing_else(folder: Path, tmp_path: Path):
     assert len(specimen.held) == 7
     np.testing.assert_array_equal(recording.wind.velocity, [[5, 0, 0]])
     assert recording.rate == pytest.approx(RATE, rel=1e-6)
-    assert {f.kind for f in observed.findings} == {"simulated-with-numerical-damping", "simulated-with-other-stages"}
+    assert {f.kind for f in observed.findings} == {
+        "simulated-with-numerical-damping",
+        "simulated-with-other-stages",
+    }
 
 
 def test_a_rate_other_than_the_folders_own_is_reported(folder: Path):
@@ -141,14 +157,19 @@ def test_a_rate_other_than_the_folders_own_is_reported(folder: Path):
 def test_artifacts_are_the_parents_of_what_is_read(folder: Path, table: Path, tmp_path: Path):
     lake = Lake.create(tmp_path / "lake")
     meshes = ingest_meshes(lake, folder).artifact
-    assert read(load(_recipe(tmp_path, f'[[recording]]\nsource = "{meshes.id}"\n')), lake).experiment.recordings[
-        0
-    ].source == (meshes.id)
+    assert read(
+        load(_recipe(tmp_path, f'[[recording]]\nsource = "{meshes.id}"\n')), lake
+    ).experiment.recordings[0].source == (meshes.id)
     small = tmp_path / "small.csv"
     lines = table.read_text().splitlines()
-    small.write_text("\n".join([lines[0], *(line for line in lines if line.startswith("calm,"))]) + "\n")
+    small.write_text(
+        "\n".join([lines[0], *(line for line in lines if line.startswith("calm,"))]) + "\n"
+    )
     (markers,) = ingest_markers(lake, small, MarkerOptions(rate=RATE, unit="mm"))
-    text = f'up = "y"\n{COMMON}[[recording]]\nsource = "{markers.artifact.id[:12]}"\nwind = {{ speed = 5.0 }}\n'
+    text = (
+        f'up = "y"\n{COMMON}[[recording]]\nsource = "{markers.artifact.id[:12]}"\nwind = {{ speed '
+        f"= 5.0 }}\n"
+    )
     (recording,) = read(load(_recipe(tmp_path, text)), lake).experiment.recordings
     assert recording.source == markers.artifact.id
     assert recording.name == "small calm"
@@ -161,7 +182,11 @@ def test_artifacts_are_the_parents_of_what_is_read(folder: Path, table: Path, tm
         ("[[recording]]\nsorce = 'a'", UnknownNameError, "did you mean 'source'"),
         ("[[recording]]\nname = 'a'", InputError, "the key source is missing"),
         ("[[recording]]\nsource = 'a'\nnoize = 1", UnknownNameError, "did you mean 'noise'"),
-        ("[[recording]]\nsource = 'a'\nwind = { speed = 1, velocity = [1, 0, 0] }", UsageError, "2 winds"),
+        (
+            "[[recording]]\nsource = 'a'\nwind = { speed = 1, velocity = [1, 0, 0] }",
+            UsageError,
+            "2 winds",
+        ),
         (
             "[[recording]]\nsource = 'a'\nwind = { velocity = [1, 0] }",
             InputError,
@@ -190,9 +215,14 @@ def test_artifacts_are_the_parents_of_what_is_read(folder: Path, table: Path, tm
             UsageError,
             "both at and points",
         ),
-        ("[attachment]\nat = 'hoists'\n[[recording]]\nsource = 'a'", UnknownNameError, "did you mean 'hoist'"),
         (
-            "[material]\nmass-unknown = true\ndensity-uncertainty = 0.1\n[[recording]]\nsource = 'a'",
+            "[attachment]\nat = 'hoists'\n[[recording]]\nsource = 'a'",
+            UnknownNameError,
+            "did you mean 'hoist'",
+        ),
+        (
+            "[material]\nmass-unknown = true\ndensity-uncertainty = 0.1\n[[recording]]\nsource = "
+            "'a'",
             UsageError,
             "both mass-unknown and an uncertainty",
         ),
@@ -201,19 +231,34 @@ def test_artifacts_are_the_parents_of_what_is_read(folder: Path, table: Path, tm
             InputError,
             "uncertainty of the area weight is 2.0",
         ),
-        ("[material]\ndensity-uncertainty = 0\n[[recording]]\nsource = 'a'", InputError, "density-uncertainty"),
         (
-            "[material]\narea-weight = '0.2±0.01'\ndensity-uncertainty = 0.1\n[[recording]]\nsource = 'a'",
+            "[material]\ndensity-uncertainty = 0\n[[recording]]\nsource = 'a'",
+            InputError,
+            "density-uncertainty",
+        ),
+        (
+            "[material]\narea-weight = '0.2±0.01'\ndensity-uncertainty = "
+            "0.1\n[[recording]]\nsource = 'a'",
             UsageError,
             "given twice",
         ),
-        ("[material]\narea-weight = '-0.2±0.01'\n[[recording]]\nsource = 'a'", UsageError, "not above 0"),
-        ("[material]\narea-weight = 0.2\ndensity = 0.2\n[[recording]]\nsource = 'a'", UsageError, "both are given"),
+        (
+            "[material]\narea-weight = '-0.2±0.01'\n[[recording]]\nsource = 'a'",
+            UsageError,
+            "not above 0",
+        ),
+        (
+            "[material]\narea-weight = 0.2\ndensity = 0.2\n[[recording]]\nsource = 'a'",
+            UsageError,
+            "both are given",
+        ),
         ("[material]\nname = 'camel'\n[[recording]]\nsource = 'a'", UnknownNameError, "camel"),
         ("up = 'w'\n[[recording]]\nsource = 'a'", UnknownNameError, "unknown up 'w'"),
     ],
 )
-def test_what_does_not_fit_is_refused_with_its_place(tmp_path: Path, text: str, kind: type[FlagdataError], what: str):
+def test_what_does_not_fit_is_refused_with_its_place(
+    tmp_path: Path, text: str, kind: type[FlagdataError], what: str
+):
     with pytest.raises(kind, match=what):
         load(_recipe(tmp_path, text))
 
@@ -224,7 +269,9 @@ def test_angles_of_a_wind_may_be_in_degrees(tmp_path: Path):
     assert constant.wind is not None
     assert constant.wind.velocity == pytest.approx((0.0, 2.0, 0.0), abs=1e-12)
     assert constant.wind.direction == pytest.approx(math.pi)
-    (logged,) = load(_recipe(tmp_path, "[[recording]]\nsource = 'a'\nwind = { log = 'b', north-deg = 90 }")).recordings
+    (logged,) = load(
+        _recipe(tmp_path, "[[recording]]\nsource = 'a'\nwind = { log = 'b', north-deg = 90 }")
+    ).recordings
     assert logged.wind is not None
     assert logged.wind.placement.north == pytest.approx(math.pi / 2)
 

@@ -1,4 +1,5 @@
-"""Thin-plate splines between points of the flat cloth, and points followed through a mesh that is remeshed."""
+"""Thin-plate splines between points of the flat cloth, and points followed through a mesh that is
+remeshed."""
 
 from __future__ import annotations
 
@@ -22,7 +23,9 @@ def test_a_linear_field_is_reproduced_everywhere(points: np.ndarray):
     field = np.array([1.0, -2.0, 0.5])
     values = np.c_[np.ones(50), points] @ field
     # The linear part of the spline is exact; 1e-9 is the conditioning of its equations.
-    np.testing.assert_allclose(onto(points, target) @ values, np.c_[np.ones(3), target] @ field, atol=1e-9)
+    np.testing.assert_allclose(
+        onto(points, target) @ values, np.c_[np.ones(3), target] @ field, atol=1e-9
+    )
 
 
 def test_where_points_coincide_it_is_the_identity_to_the_bit(points: np.ndarray):
@@ -31,7 +34,8 @@ def test_where_points_coincide_it_is_the_identity_to_the_bit(points: np.ndarray)
 
 
 def test_it_is_the_thin_plate_spline(points: np.ndarray):
-    # Hand-written: weights w and a plane, Σ w = Σ w u = Σ w v = 0, with the kernel r² log r (Duchon, 1977).
+    # Hand-written: weights w and a plane, Σ w = Σ w u = Σ w v = 0, with the kernel r² log r
+    # (Duchon, 1977).
     target = np.array([[0.4, 0.4], [1.2, 0.1]])
     values = np.sin(3 * points[:, 0]) * points[:, 1]
 
@@ -73,10 +77,14 @@ def _affine(rest: np.ndarray, frame: int) -> np.ndarray:
 
 def remeshed() -> RaggedMeshSequence:
     """An affine motion of a cloth that has another grid in every frame."""
-    meshes: list[Mesh] = [grid(width=1.5, height=1.0, columns=3 + k, rows=2 + 2 * k) for k in range(4)]
+    meshes: list[Mesh] = [
+        grid(width=1.5, height=1.0, columns=3 + k, rows=2 + 2 * k) for k in range(4)
+    ]
     return RaggedMeshSequence(
         time=np.arange(4, dtype=np.int64) * 40_000_000,
-        positions=np.concatenate([_affine(m.rest, k) for k, m in enumerate(meshes)]).astype(np.float32),
+        positions=np.concatenate([_affine(m.rest, k) for k, m in enumerate(meshes)]).astype(
+            np.float32
+        ),
         faces=np.concatenate([m.faces for m in meshes]).astype(np.int32),
         rest=np.concatenate([m.rest for m in meshes]).astype(np.float32),
         vertex_offset=np.cumsum([0, *(m.vertex_count for m in meshes)]).astype(np.int64),
@@ -87,7 +95,9 @@ def remeshed() -> RaggedMeshSequence:
 def test_an_affine_motion_survives_any_remeshing(points: np.ndarray):
     positions = sample(remeshed(), points)
     for k in range(4):
-        np.testing.assert_allclose(positions[k], _affine(points, k), atol=1e-6)  # meshes are kept in single precision
+        np.testing.assert_allclose(
+            positions[k], _affine(points, k), atol=1e-6
+        )  # meshes are kept in single precision
 
 
 def test_a_remeshed_cloth_is_followed_at_about_200_points_that_include_its_corners():

@@ -18,11 +18,20 @@ FEW = replace(SETUP, vertices=40)
 REST = markers(12, 8)
 
 
-def recording(name: str, *, rate: float = 25.0, seconds: float = 4.2, share: float = 0.0, seed: int = 0) -> Observation:
+def recording(
+    name: str, *, rate: float = 25.0, seconds: float = 4.2, share: float = 0.0, seed: int = 0
+) -> Observation:
     times = np.arange(round(seconds * rate)) / rate
     positions = flutter(REST, times)
     positions[lost(positions.shape[:2], share, seed)] = np.nan
-    return Observation(name=name, markers=REST, positions=positions, times=times, known=Known(wind=WIND), noise=1e-3)
+    return Observation(
+        name=name,
+        markers=REST,
+        positions=positions,
+        times=times,
+        known=Known(wind=WIND),
+        noise=1e-3,
+    )
 
 
 def lost(shape: tuple[int, ...], share: float, seed: int) -> BoolArray:
@@ -31,7 +40,9 @@ def lost(shape: tuple[int, ...], share: float, seed: int) -> BoolArray:
 
 @pytest.mark.parametrize("share", [0.01, 0.05, 0.2])
 def test_markers_missing_at_random_are_used_in_all_recordings(share: float) -> None:
-    observed = observe([recording("one", share=share, seed=1), recording("two", share=share, seed=2)], FEW)
+    observed = observe(
+        [recording("one", share=share, seed=1), recording("two", share=share, seed=2)], FEW
+    )
     for own in observed.experiment.recordings:
         assert len(own.markers) == len(REST)
         assert own.seen is not None
@@ -49,7 +60,8 @@ def test_what_is_filled_in_is_near_where_the_marker_was() -> None:
     assert filled.seen is not None
     np.testing.assert_array_equal(filled.seen, ~gone)
     np.testing.assert_array_equal(filled.positions[~gone], truth[~gone])
-    # Markers 0.13 m apart on waves of a metre: a quadratic map of its neighbours is off by centimetres at most.
+    # Markers 0.13 m apart on waves of a metre: a quadratic map of its neighbours is off by
+    # centimetres at most.
     assert np.linalg.norm(filled.positions[gone] - truth[gone], axis=1).max() < 0.03
 
 
@@ -57,7 +69,9 @@ def test_a_marker_that_hardly_moves_is_held_through_a_long_gap() -> None:
     times = np.arange(105) / 25.0
     truth = flutter(REST, times)
     still = 55  # held amid others that swing
-    truth[:, still] = truth[0, still] + 1e-3 * np.random.default_rng(3).standard_normal((len(times), 3))
+    truth[:, still] = truth[0, still] + 1e-3 * np.random.default_rng(3).standard_normal(
+        (len(times), 3)
+    )
     positions = truth.copy()
     positions[20:35, still] = np.nan
     positions[95:, still] = np.nan
@@ -75,11 +89,15 @@ def test_a_long_gap_that_ends_among_hardly_a_marker_is_filled_all_the_same() -> 
     positions[[19, 35], 41:] = np.nan
     filled = fill_positions(positions, REST, period=0.04, where="here")
     assert np.isfinite(filled.positions).all()
-    np.testing.assert_array_equal(filled.positions[np.isfinite(positions)], truth[np.isfinite(positions)])
+    np.testing.assert_array_equal(
+        filled.positions[np.isfinite(positions)], truth[np.isfinite(positions)]
+    )
 
 
 @pytest.mark.parametrize(("rate", "frames"), [(10.0, 1), (25.0, 3), (100.0, 12), (500.0, 60)])
-def test_the_longest_gap_that_a_markers_own_motion_fills_is_of_seconds(rate: float, frames: int) -> None:
+def test_the_longest_gap_that_a_markers_own_motion_fills_is_of_seconds(
+    rate: float, frames: int
+) -> None:
     assert frames_of(LONGEST, 1 / rate) == frames
 
 
@@ -96,14 +114,17 @@ def test_recordings_of_different_rates_are_followed_at_the_lowest() -> None:
     slow, fast = recording("slow", rate=30.0), recording("fast", rate=100.0, share=0.05)
     first, second = observe([slow, fast], FEW).experiment.recordings
     assert first.rate == second.rate == pytest.approx(30.0)
-    # Splines over a few lost positions beside white gaps: a tenth of a millimetre on waves of a metre, some at gaps.
+    # Splines over a few lost positions beside white gaps: a tenth of a millimetre on waves of a
+    # metre, some at gaps.
     assert second.seen is not None
     error = np.linalg.norm(second.positions - flutter(second.markers, second.times), axis=2)
     assert error[second.seen].max() < 2e-3
 
 
 def test_a_recording_of_the_lowest_rate_is_left_as_it_is() -> None:
-    own = Trajectory(name="own", markers=REST, positions=flutter(REST, np.arange(60) / 25), rate=25.0, wind=WIND)
+    own = Trajectory(
+        name="own", markers=REST, positions=flutter(REST, np.arange(60) / 25), rate=25.0, wind=WIND
+    )
     (same,), found = at_same_rate([own])
     assert same is own
     assert not found

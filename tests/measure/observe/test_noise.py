@@ -21,12 +21,15 @@ def test_white_noise_on_a_smooth_motion_is_estimated_within_a_tenth(sigma: float
 def test_the_estimate_scales_with_the_data_and_ignores_where_they_are():
     seen = flag(noise=1e-3, seed=3)
     once = estimate(seen.markers, seen.positions, where="")
-    assert estimate(seen.markers, 7.0 * seen.positions + 100.0, where="") == pytest.approx(7.0 * once, rel=1e-6)
+    assert estimate(seen.markers, 7.0 * seen.positions + 100.0, where="") == pytest.approx(
+        7.0 * once, rel=1e-6
+    )
 
 
 def test_without_noise_little_is_left():
     seen = flag()
-    # A 1.5 Hz wave with harmonics, 60 markers, 50 frames a second: nothing above a tenth of a millimetre.
+    # A 1.5 Hz wave with harmonics, 60 markers, 50 frames a second: nothing above a tenth of a
+    # millimetre.
     assert estimate(seen.markers, seen.positions, where="") < 1e-4
 
 
@@ -49,4 +52,8 @@ def test_departures_from_a_polynomial_vanish_on_it():
 def test_two_frames_are_too_few():
     seen = flag()
     with pytest.raises(InputError, match="too few values"):
-        estimate(seen.markers, replace(seen, positions=seen.positions[:2], times=seen.times[:2]).positions, where="")
+        estimate(
+            seen.markers,
+            replace(seen, positions=seen.positions[:2], times=seen.times[:2]).positions,
+            where="",
+        )

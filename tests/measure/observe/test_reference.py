@@ -1,4 +1,5 @@
-"""ArcSim's own runs, read and checked: in order as they are, refused when something is made wrong."""
+"""ArcSim's own runs, read and checked: in order as they are, refused when something is made
+wrong."""
 
 from __future__ import annotations
 
@@ -11,7 +12,16 @@ import pytest
 
 from flagdata.errors import InputError
 from flagdata.ingest import read_folder
-from measure.observe import Hold, Observation, Setup, WindTrack, from_arrays, from_folder, observe, sample
+from measure.observe import (
+    Hold,
+    Observation,
+    Setup,
+    WindTrack,
+    from_arrays,
+    from_folder,
+    observe,
+    sample,
+)
 from measure.observe.describing import of_arcsim
 from sim.cloth.mesh import grid
 
@@ -20,7 +30,9 @@ pytestmark = pytest.mark.reference
 
 def run(reference_data: Path, name: str, frames: slice = slice(50, 150)) -> Observation:
     with np.load(reference_data / "arcsim" / f"flag_{name}.npz") as stored:
-        known, _ = of_arcsim(json.loads(str(stored["scene"])), stored["rest"].astype(np.float64), where=name)
+        known, _ = of_arcsim(
+            json.loads(str(stored["scene"])), stored["rest"].astype(np.float64), where=name
+        )
         return from_arrays(
             name=name,
             positions=stored["positions"][frames],
@@ -41,16 +53,22 @@ def test_a_run_in_order_gives_its_scene_and_no_warning(reference_data: Path, nam
     # Held at (0, 0, 0) and (0, 0, 1) by springs of 1 kN/m, which give by millimetres.
     np.testing.assert_allclose(specimen.anchors, [[0, 0, 0], [0, 0, 1]], atol=8e-3)
     assert recording.wind.speed == float(name[1])
-    assert recording.noise < 1.5e-3  # none was added: what is left is motion too quick for 25 frames a second
+    assert (
+        recording.noise < 1.5e-3
+    )  # none was added: what is left is motion too quick for 25 frames a second
 
 
 @pytest.mark.parametrize("name", ["w0_dt05", "w4_dt5", "w8_dt5"])
-def test_a_millimetre_of_noise_is_found_within_a_third_and_four_within_a_tenth(reference_data: Path, name: str):
+def test_a_millimetre_of_noise_is_found_within_a_third_and_four_within_a_tenth(
+    reference_data: Path, name: str
+):
     seen = run(reference_data, name)
     setup = Setup(outline=seen.outline)
     for sigma, share in ((1e-3, 0.35), (4e-3, 0.1)):
         noise = sigma * np.random.default_rng(0).standard_normal(seen.positions.shape)
-        (recording,) = observe([replace(seen, positions=seen.positions + noise)], setup).experiment.recordings
+        (recording,) = observe(
+            [replace(seen, positions=seen.positions + noise)], setup
+        ).experiment.recordings
         assert recording.noise == pytest.approx(sigma, rel=share)
 
 
@@ -79,7 +97,8 @@ def test_points_of_a_remeshed_run_keep_their_distances(reference_data: Path):
     edges = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]]])
     length = np.linalg.norm(np.diff(positions[:, edges], axis=2)[:, :, 0], axis=2)
     rest = np.linalg.norm(np.diff(mesh.rest[edges], axis=1)[:, 0], axis=1)
-    # The scene limits strain to ±5 %, wherever its own meshes are fine enough for the limit to hold along an edge.
+    # The scene limits strain to ±5 %, wherever its own meshes are fine enough for the limit to hold
+    # along an edge.
     assert 0.95 <= np.median(length / rest) <= 1.05
     assert np.quantile(length / rest, 0.99) <= 1.1
 
@@ -107,7 +126,9 @@ def misfits(seen: Observation) -> bool:
 
 @pytest.mark.parametrize("name", ["w4_dt5", "w8_dt5", "w4_dt05"])
 def test_a_rate_off_by_two_and_a_wind_in_another_unit_do_not_pass(reference_data: Path, name: str):
-    seen = run(reference_data, name, slice(20, 140))  # twice as fast they are as long as a recording must be
+    seen = run(
+        reference_data, name, slice(20, 140)
+    )  # twice as fast they are as long as a recording must be
     speed = float(name[1])
     assert not misfits(seen)
     for rate in (2.0, 0.5):

@@ -33,7 +33,9 @@ def series(**channels: list[float]) -> WindSeries:
     ("degrees", "velocity"),
     [(0.0, (0, -5)), (90.0, (-5, 0)), (180.0, (0, 5)), (270.0, (5, 0)), (225.0, (3.5355, 3.5355))],
 )
-def test_a_direction_is_where_it_blows_from_clockwise_from_north(degrees: float, velocity: tuple[float, float]):
+def test_a_direction_is_where_it_blows_from_clockwise_from_north(
+    degrees: float, velocity: tuple[float, float]
+):
     log = series(wind_speed=[5.0, 5.0], wind_direction=[math.radians(degrees)] * 2)
     wind, _ = track(log, LogPlacement(north=NORTH_IS_Y, offset=0.0), where="log")
     np.testing.assert_allclose(wind.velocity, [[*velocity, 0]] * 2, atol=1e-4)
@@ -73,7 +75,9 @@ def test_a_part_of_a_log_has_its_own_mean_and_is_no_longer_than_the_log():
     assert wind.between(5000.0, 6000.0) is wind  # beside the recording; it is refused for that
 
 
-@pytest.mark.parametrize("placement", [LogPlacement(offset=1.5), LogPlacement(start=BEGIN + 1_500_000_000)])
+@pytest.mark.parametrize(
+    "placement", [LogPlacement(offset=1.5), LogPlacement(start=BEGIN + 1_500_000_000)]
+)
 def test_times_count_from_the_first_frame(placement: LogPlacement):
     log = series(wind_x=[0.0, 1.0, 2.0, 3.0], wind_y=[0.0] * 4)
     wind, found = track(log, placement, where="log")
@@ -105,6 +109,8 @@ def test_a_vendors_file_is_read_as_ingest_reads_it(tmp_path: Path):
     path = tmp_path / "mast.csv"
     rows = [f"2026-05-01T12:00:{k:02d}+02:00,{4 + 0.1 * k:.1f},270" for k in range(40)]
     path.write_text("\n".join(["time,wind_speed (m/s),wind_direction (deg)", *rows]) + "\n")
-    answers = WindOptions(expect=("fixed", "grows"))  # it blows from west all the time, and ever faster
+    answers = WindOptions(
+        expect=("fixed", "grows")
+    )  # it blows from west all the time, and ever faster
     wind, _ = from_log(path, LogPlacement(north=NORTH_IS_Y, start=BEGIN + 2_000_000_000), answers)
     np.testing.assert_allclose(wind.at(np.array([0.0])), [[4.2, 0, 0]], atol=1e-9)

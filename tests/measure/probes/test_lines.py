@@ -1,4 +1,5 @@
-"""Lines of the errors' spectra: found where something swings at a frequency that goes with the wind, and only there."""
+"""Lines of the errors' spectra: found where something swings at a frequency that goes with the
+wind, and only there."""
 
 from __future__ import annotations
 
@@ -25,11 +26,14 @@ def noise(seed: int) -> FloatArray:
 
 
 def swinging(reduced: float, size: float, *, axis: int = 1, goes: bool = True) -> FloatArray:
-    """The same everywhere along an axis, at `reduced` Hz for each m/s of wind, or whatever the wind at that of 5."""
+    """The same everywhere along an axis, at `reduced` Hz for each m/s of wind, or whatever the wind
+    at that of 5."""
     phase = np.random.default_rng(9).uniform(0, 2 * np.pi, SEGMENTS)
     frequency = reduced * (SPEEDS if goes else np.full(SEGMENTS, 5.0))
     errors = np.zeros((FRAMES, len(MARKERS), 3, SEGMENTS))
-    errors[:, :, axis] = size * np.sin(2 * np.pi * frequency * PERIOD * np.arange(FRAMES)[:, None] + phase)[:, None]
+    errors[:, :, axis] = (
+        size * np.sin(2 * np.pi * frequency * PERIOD * np.arange(FRAMES)[:, None] + phase)[:, None]
+    )
     return errors
 
 
@@ -46,15 +50,18 @@ def nulls() -> tuple[Lines, FloatArray]:
 
 def far(nulls: tuple[Lines, FloatArray], errors: FloatArray) -> tuple[float, float, int]:
     lines, standing = nulls
-    line = lines.line(prominence(errors), centre=float(standing.mean()), width=float(standing.std()))
+    line = lines.line(
+        prominence(errors), centre=float(standing.mean()), width=float(standing.std())
+    )
     return line.far, line.reduced, line.axis
 
 
 def test_white_noise_has_the_prominence_of_an_exponential_over_its_median() -> None:
     found = prominence(noise(1))
     assert found.shape == (SEGMENTS, len(REDUCED), 3 * len(SHAPES))
-    # Periodograms of white noise are exponential: mean over median 1/ln 2. 12 segments of 25 independent frequencies
-    # in 15 directions, 4500 draws: 1.5 %; medians are those of the ten draws or so within 2 Hz, which adds a tenth.
+    # Periodograms of white noise are exponential: mean over median 1/ln 2. 12 segments of 25
+    # independent frequencies in 15 directions, 4500 draws: 1.5 %; medians are those of the ten
+    # draws or so within 2 Hz, which adds a tenth.
     assert np.nanmean(found) == pytest.approx(1 / math.log(2), rel=0.15)
 
 
@@ -74,8 +81,8 @@ def test_what_swings_as_fast_in_any_wind_counts_in_one_wind_at_a_time() -> None:
         across = 1  # of the first shape
         return float(strongest(prominence(noise(seed) + swinging(1.33, 1.0, goes=goes)))[across])
 
-    # One of three winds shows it at any one reduced frequency: a third of the power's logarithm, and what the best of
-    # the noise adds in the others.
+    # One of three winds shows it at any one reduced frequency: a third of the power's logarithm,
+    # and what the best of the noise adds in the others.
     shares = [logarithm(seed, goes=False) / logarithm(seed, goes=True) for seed in range(8)]
     assert 1 / 3 < np.mean(shares) < 0.6
 

@@ -37,7 +37,9 @@ def test_the_shares_are_the_cloths_area(forecaster: Forecaster, segments: Segmen
     assert shares(forecaster.specimen, segments.markers).sum() == pytest.approx(width * height)
 
 
-def test_an_angular_acceleration_has_the_moment_of_inertias(forecaster: Forecaster, segments: Segments) -> None:
+def test_an_angular_acceleration_has_the_moment_of_inertias(
+    forecaster: Forecaster, segments: Segments
+) -> None:
     """α ẑ × r has the moment α Σ w (x² + y²), whatever else pushes along the axis or toward it."""
     r = seen(forecaster, segments)
     turned = np.stack([-r[:, :, 1], r[:, :, 0], 0 * r[:, :, 2]], axis=2)
@@ -50,7 +52,9 @@ def test_an_angular_acceleration_has_the_moment_of_inertias(forecaster: Forecast
 
 def test_forces_between_two_points_have_none(forecaster: Forecaster, segments: Segments) -> None:
     r, share = seen(forecaster, segments), shares(forecaster.specimen, segments.markers)
-    one, other = stream(1, "pair").choice(np.flatnonzero(share > 0.5 * share.mean()), 2, replace=False)
+    one, other = stream(1, "pair").choice(
+        np.flatnonzero(share > 0.5 * share.mean()), 2, replace=False
+    )
     along = r[:, other] - r[:, one]
     field = np.zeros_like(r)
     field[:, one], field[:, other] = along / share[one], -along / share[other]

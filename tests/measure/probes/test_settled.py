@@ -18,9 +18,12 @@ def found(positions: np.ndarray, noise: float = 0.0) -> dict[str, float]:
 
 
 def swinging(amplitude: float) -> np.ndarray:
-    """A sheet whose fly swings across by an amplitude of that share of u at 0.5 Hz; its hoist stands still."""
+    """A sheet whose fly swings across by an amplitude of that share of u at 0.5 Hz; its hoist
+    stands still."""
     across = amplitude * np.sin(np.pi * TIMES)[:, None] * U / WIDTH
-    return np.stack([np.broadcast_to(U, across.shape), across, np.broadcast_to(V, across.shape)], axis=-1)
+    return np.stack(
+        [np.broadcast_to(U, across.shape), across, np.broadcast_to(V, across.shape)], axis=-1
+    )
 
 
 def test_a_sheet_that_hangs_by_an_angle_and_is_folded_has_that_droop_and_extension() -> None:

@@ -25,7 +25,9 @@ def segments(own_recording: Trajectory) -> Segments:
     return Segments.of([own_recording])
 
 
-def test_the_projection_of_the_base_models_errors_is_r(forecaster: Forecaster, segments: Segments) -> None:
+def test_the_projection_of_the_base_models_errors_is_r(
+    forecaster: Forecaster, segments: Segments
+) -> None:
     nominal = [Calibration(area_weight=1.1)] * len(segments)
     found, projection = projected_statistics(forecaster, segments, nominal, COLUMNS)
     errors = forecaster.errors(*forecaster.system(segments, nominal), segments)
@@ -38,13 +40,17 @@ def test_the_projection_of_the_base_models_errors_is_r(forecaster: Forecaster, s
     assert again is not None
     assert found.lines is not None
     np.testing.assert_allclose(again, found.lines, rtol=1e-6)
-    whole = Statistics.joined([alone.select(np.array([0])), alone.select(np.arange(1, len(segments)))])
+    whole = Statistics.joined(
+        [alone.select(np.array([0])), alone.select(np.arange(1, len(segments)))]
+    )
     np.testing.assert_array_equal(whole.lines, found.lines)
     with pytest.raises(UsageError, match="only some parts have lines"):
         Statistics.joined([alone, replace(alone, lines=None)])
 
 
-def test_errors_along_a_sensitivity_project_as_its_response(forecaster: Forecaster, segments: Segments) -> None:
+def test_errors_along_a_sensitivity_project_as_its_response(
+    forecaster: Forecaster, segments: Segments
+) -> None:
     nominal = [Calibration()] * len(segments)
     found, projection = projected_statistics(forecaster, segments, nominal, COLUMNS)
     base = forecaster.errors(*forecaster.system(segments, nominal), segments)
@@ -55,15 +61,20 @@ def test_errors_along_a_sensitivity_project_as_its_response(forecaster: Forecast
     expected = float(small) * found.response[:, :, column]
     np.testing.assert_allclose(projection.of(small * moved), expected, rtol=1e-9, atol=1e-12)
     response = projection.response([moved, 2 * moved])
-    np.testing.assert_allclose(response[:, :, 0], found.response[:, :, column], rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(response[:, :, 1], 2 * found.response[:, :, column], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(
+        response[:, :, 0], found.response[:, :, column], rtol=1e-9, atol=1e-12
+    )
+    np.testing.assert_allclose(
+        response[:, :, 1], 2 * found.response[:, :, column], rtol=1e-9, atol=1e-12
+    )
 
 
 def test_mirrored_across_the_wind_only_what_pushes_across_the_motion_changes_its_sign(
     forecaster: Forecaster, own_recording: Trajectory
 ) -> None:
-    # Base model, lift and added mass do not know left from right: cloth mirrored in the plane of wind and gravity moves
-    # as the mirror image, but for its small bending, which by ArcSim's tables knows the faces.
+    # Base model, lift and added mass do not know left from right: cloth mirrored in the plane of
+    # wind and gravity moves as the mirror image, but for its small bending, which by ArcSim's
+    # tables knows the faces.
     columns = (*COLUMNS, AcrossColumn(mode=(0, 0)))
     mirrored = replace(own_recording, positions=own_recording.positions * [1.0, -1.0, 1.0])
     found, image = (
@@ -80,12 +91,20 @@ def test_mirrored_across_the_wind_only_what_pushes_across_the_motion_changes_its
         np.testing.assert_allclose(other[:, alike], signs * own[:, alike], atol=close)
 
 
-def test_what_is_not_along_any_direction_does_not_count(forecaster: Forecaster, segments: Segments) -> None:
-    found, projection = projected_statistics(forecaster, segments, [Calibration()] * len(segments), COLUMNS)
+def test_what_is_not_along_any_direction_does_not_count(
+    forecaster: Forecaster, segments: Segments
+) -> None:
+    found, projection = projected_statistics(
+        forecaster, segments, [Calibration()] * len(segments), COLUMNS
+    )
     shape = (-1, *projection.scale.shape[:1], 3)
     directions = projection.directions[0]
-    noise = torch.randn(directions.shape[1], dtype=directions.dtype, generator=torch.Generator().manual_seed(1))
+    noise = torch.randn(
+        directions.shape[1], dtype=directions.dtype, generator=torch.Generator().manual_seed(1)
+    )
     span, _ = torch.linalg.qr(directions.T)
-    orthogonal = (noise - span @ (span.T @ noise)).reshape(shape) * projection.scale[None, :, 0, None]
+    orthogonal = (noise - span @ (span.T @ noise)).reshape(shape) * projection.scale[
+        None, :, 0, None
+    ]
     errors = torch.stack([0.1 * orthogonal] * len(segments), dim=-1)
     assert np.abs(projection.of(errors)[0]).max() < 1e-9 * np.abs(found.r).max() + 1e-9

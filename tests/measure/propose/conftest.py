@@ -1,4 +1,5 @@
-"""A small flag, its null recordings seen along a few terms, and recordings with a force the library does not have."""
+"""A small flag, its null recordings seen along a few terms, and recordings with a force the library
+does not have."""
 
 from __future__ import annotations
 
@@ -22,7 +23,9 @@ from sim.effects import Effect, ForceEffect, Value, strength
 
 RATE, DURATION, NOISE, SPEEDS = 25.0, 4.64, 5e-4, (3.5, 4.3, 5.1, 6.0)
 KINDS, CLOTHS, RECORDINGS = 6, 2, 6
-PUSH = 8.0  # m/s²; nearly a flag's weight, so that the term nearest to it is chosen whatever rounding does to the runs
+# m/s²; nearly a flag's weight, so that the term nearest to it is chosen whatever rounding does to
+# the runs
+PUSH = 8.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,9 +36,13 @@ class SidePush(ForceEffect):
         acceleration: well below the middle.
     """
 
-    acceleration: Annotated[Value, strength(unit="m/s²", prior=(0.0, 8.0), source="made up for a test")] = 0.0
+    acceleration: Annotated[
+        Value, strength(unit="m/s²", prior=(0.0, 8.0), source="made up for a test")
+    ] = 0.0
 
-    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+    def force(
+        self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor
+    ) -> Tensor:
         push = torch.zeros_like(position)
         push[:, 1] = cloth.mass * below(cloth.mesh.rest)[:, None] * self.acceleration
         return push
@@ -61,7 +68,8 @@ def columns() -> tuple[EffectColumn, ...]:
 
 @pytest.fixture(scope="session")
 def directions() -> tuple[Column, ...]:
-    """What terms are seen along: the smooth fields, of which the small bank can hold the null distribution."""
+    """What terms are seen along: the smooth fields, of which the small bank can hold the null
+    distribution."""
     return fields()
 
 
@@ -86,8 +94,11 @@ def simulated(
 
 
 @pytest.fixture(scope="session")
-def nulls(specimen: Specimen, columns: tuple[EffectColumn, ...], directions: tuple[Column, ...]) -> tuple[Nulls, float]:
-    """36 recordings of six meshes and methods, projected on directions, then on terms; duration of a segment [s]."""
+def nulls(
+    specimen: Specimen, columns: tuple[EffectColumn, ...], directions: tuple[Column, ...]
+) -> tuple[Nulls, float]:
+    """36 recordings of six meshes and methods, projected on directions, then on terms; duration of
+    a segment [s]."""
     parts: list[Nulls] = []
     duration = 0.0
     for seed in range(KINDS):
@@ -103,7 +114,9 @@ def nulls(specimen: Specimen, columns: tuple[EffectColumn, ...], directions: tup
         ]
         calibrations = [cloth for cloth in cloths for _ in range(RECORDINGS // CLOTHS)]
         speeds = [float(u) for u in rng.uniform(3.2, 6.5, RECORDINGS)]
-        made, duration = evaluate(simulated(specimen, calibrations, speeds, (), seed), seed, (*directions, *columns))
+        made, duration = evaluate(
+            simulated(specimen, calibrations, speeds, (), seed), seed, (*directions, *columns)
+        )
         shifted = replace(made.statistics, recording=made.statistics.recording + seed * RECORDINGS)
         parts.append(replace(made, statistics=shifted))
     whole = Nulls.joined(parts)
@@ -118,12 +131,15 @@ def bank(nulls: tuple[Nulls, float], directions: tuple[Column, ...]) -> NullBank
     own = whole.statistics
     cut = replace(own, r=own.r[:, :count], response=own.response[:, :count, :count])
     names = (*(name for name, _, _ in THETA), *(column.name for column in directions))
-    return NullBank(nulls=replace(whole, statistics=cut), columns=names, duration=duration, words="of the tests")
+    return NullBank(
+        nulls=replace(whole, statistics=cut), columns=names, duration=duration, words="of the tests"
+    )
 
 
 @pytest.fixture(scope="session")
 def pushed(specimen: Specimen) -> Experiment:
-    """Four winds with a push of 8 m/s²; fitted to nulls of this size, one across the wind scatters by 0.2 m/s²."""
+    """Four winds with a push of 8 m/s²; fitted to nulls of this size, one across the wind scatters
+    by 0.2 m/s²."""
     calibrations = (Calibration(area_weight=1.1, bending=0.7, damping=2e-3),) * len(SPEEDS)
     batch = simulated(specimen, calibrations, SPEEDS, (SidePush(acceleration=PUSH),), 97)
     return Experiment(specimen=specimen, recordings=tuple(batch.simulate()))

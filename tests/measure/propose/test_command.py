@@ -1,4 +1,5 @@
-"""`flagdata propose` as it is called, from a shell and from Python; the search itself is replaced."""
+"""`flagdata propose` as it is called, from a shell and from Python; the search itself is
+replaced."""
 
 from __future__ import annotations
 
@@ -20,18 +21,25 @@ from tests.program import invoke
 
 
 @pytest.fixture
-def search(pushed: Experiment, monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[..., ProposalOutcome]], None]:
-    """Lets any recipe name the recordings of `pushed`, 160 nulls to be simulated, and replaces the search."""
+def search(
+    pushed: Experiment, monkeypatch: pytest.MonkeyPatch
+) -> Callable[[Callable[..., ProposalOutcome]], None]:
+    """Lets any recipe name the recordings of `pushed`, 160 nulls to be simulated, and replaces the
+    search."""
 
     def replaced(seek: Callable[..., ProposalOutcome]) -> None:
         monkeypatch.setattr(recipes, "load", lambda _: SimpleNamespace(level=0.1, nulls=160))
-        monkeypatch.setattr(recipes, "read", lambda *_: SimpleNamespace(experiment=pushed, findings=()))
+        monkeypatch.setattr(
+            recipes, "read", lambda *_: SimpleNamespace(experiment=pushed, findings=())
+        )
         monkeypatch.setattr(term_search, "propose", seek)
 
     return replaced
 
 
-def test_how_long_it_takes_is_stated_before_it_begins(search: Any, pushed: Experiment, tmp_path: Path) -> None:
+def test_how_long_it_takes_is_stated_before_it_begins(
+    search: Any, pushed: Experiment, tmp_path: Path
+) -> None:
     def begun(*_: Any, **__: Any) -> None:
         raise InputError("the search began", fix="none")
 
@@ -44,7 +52,9 @@ def test_how_long_it_takes_is_stated_before_it_begins(search: Any, pushed: Exper
     assert "the search began" in second
 
 
-def test_the_call_searches_as_the_command_does_and_adds_to_the_same_log(search: Any, tmp_path: Path) -> None:
+def test_the_call_searches_as_the_command_does_and_adds_to_the_same_log(
+    search: Any, tmp_path: Path
+) -> None:
     searches: list[tuple[tuple[str, ...], NullOptions]] = []
 
     def seek(*_: Any, acting_columns: Any, options: NullOptions, **__: Any) -> ProposalOutcome:
@@ -68,8 +78,24 @@ def test_the_call_searches_as_the_command_does_and_adds_to_the_same_log(search: 
     search(seek)
     recipe, known, seed = tmp_path / "flag.toml", "lift.coefficient", 4
     called = flagdata.propose(recipe, known=(known,), seed=seed, workers=2, out=tmp_path)
-    typed = invoke("propose", recipe, "--known", known, "--seed", seed, "--workers", 2, "--out", tmp_path, "--json")
-    assert searches[0] == searches[1] == ((known,), NullOptions(nulls=160, level=0.1, seed=seed, workers=2))
+    typed = invoke(
+        "propose",
+        recipe,
+        "--known",
+        known,
+        "--seed",
+        seed,
+        "--workers",
+        2,
+        "--out",
+        tmp_path,
+        "--json",
+    )
+    assert (
+        searches[0]
+        == searches[1]
+        == ((known,), NullOptions(nulls=160, level=0.1, seed=seed, workers=2))
+    )
     printed = json.loads(typed.out)
     assert {key: printed[key] for key in called} == json.loads(json.dumps(called))
     assert (called["decision"], called["effect"], called["seed"]) == ("rejected", "", seed)

@@ -1,4 +1,5 @@
-"""Errors as nulls have them are called significant as rarely as the level says, however many terms are tried."""
+"""Errors as nulls have them are called significant as rarely as the level says, however many terms
+are tried."""
 
 from __future__ import annotations
 
@@ -17,17 +18,25 @@ DIRECTIONS, TERMS, KINDS, RECORDINGS, SEGMENTS = 12, 20, 30, 8, 2
 
 
 def drawn(rng: np.random.Generator) -> tuple[Nulls, Statistics]:
-    """Nulls of a covariance and of shifts from kind to kind, and projected responses to terms; calibrated parameters
-    move the first three directions."""
+    """Nulls of a covariance and of shifts from kind to kind, and projected responses to terms;
+    calibrated parameters move the first three directions."""
     count = KINDS * RECORDINGS * SEGMENTS
     numerics = np.repeat(np.arange(KINDS), RECORDINGS * SEGMENTS)
     recording = np.repeat(np.arange(KINDS * RECORDINGS), SEGMENTS)
     mixing = rng.normal(size=(DIRECTIONS, DIRECTIONS)) / 3 + np.eye(DIRECTIONS)
-    offsets = (rng.normal(size=(KINDS * 2, 3)) * PRIOR / 2)[np.repeat(np.arange(KINDS * 2), count // KINDS // 2)]
+    offsets = (rng.normal(size=(KINDS * 2, 3)) * PRIOR / 2)[
+        np.repeat(np.arange(KINDS * 2), count // KINDS // 2)
+    ]
     square = np.tile(np.eye(DIRECTIONS), (count, 1, 1))
     shifts = rng.normal(size=(KINDS, DIRECTIONS)) * np.linspace(1, 0, DIRECTIONS)
     r = shifts[numerics] + rng.normal(size=(count, DIRECTIONS)) @ mixing.T
-    own = Statistics(recording=recording, r=r, response=square, error=np.ones(count), marker_error=np.ones((count, 1)))
+    own = Statistics(
+        recording=recording,
+        r=r,
+        response=square,
+        error=np.ones(count),
+        marker_error=np.ones((count, 1)),
+    )
     nulls = Nulls(
         statistics=own,
         speeds=rng.uniform(3, 6, count),
@@ -63,10 +72,13 @@ def test_nulls_of_numerics_never_seen_reach_the_level_as_often_as_it_says(level:
         others = nulls.select(~inside)
         for index in range(int(others.experiment.max()) + 1):
             chosen = np.flatnonzero(others.experiment == index)[:4]
-            own = evidence(replace(seen, r=others.statistics.r[chosen]), others.speeds[chosen], model)
+            own = evidence(
+                replace(seen, r=others.statistics.r[chosen]), others.speeds[chosen], model
+            )
             largest = float(family.statistics(own)[pool].max())
             below.append(family.p_value(largest, pool) <= level)
-    # 80 experiments, of which those of one kind are alike: three standard deviations of 40 independent ones.
+    # 80 experiments, of which those of one kind are alike: three standard deviations of 40
+    # independent ones.
     assert len(below) == 80
     assert np.mean(below) <= level + 3 * np.sqrt(level * (1 - level) / 40)
 

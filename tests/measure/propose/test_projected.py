@@ -1,5 +1,5 @@
-"""Terms in one batch move the predictions as each alone does; their projected statistics are parts of all
-statistics."""
+"""Terms in one batch move the predictions as each alone does; their projected statistics are parts
+of all statistics."""
 
 from __future__ import annotations
 
@@ -37,8 +37,11 @@ def test_terms_side_by_side_are_what_each_is_alone(two: tuple[Forecaster, Segmen
     together = of_columns(forecaster, segments, base, TERMS)
     for column in TERMS:
         alone = forecaster.sensitivity(column, segments, nominal, base)
-        # The implicit solver stops at a tolerance of 1e-4, at other bits in a batch of another size.
-        assert torch.linalg.vector_norm(together[column.name] - alone) < 0.02 * torch.linalg.vector_norm(alone)
+        # The implicit solver stops at a tolerance of 1e-4, at other bits in a batch of another
+        # size.
+        assert torch.linalg.vector_norm(
+            together[column.name] - alone
+        ) < 0.02 * torch.linalg.vector_norm(alone)
 
 
 def test_projected_statistics_are_the_rows_and_columns_of_all_statistics(
@@ -52,12 +55,18 @@ def test_projected_statistics_are_the_rows_and_columns_of_all_statistics(
     rows = len(THETA) + len(weighed)
     kept = [*range(len(THETA)), *range(rows, rows + len(TERMS))]
     size = np.abs(whole.response).max()
-    np.testing.assert_allclose(seen.r, whole.r[:, :rows], rtol=1e-4, atol=1e-4 * np.abs(whole.r).max())
+    np.testing.assert_allclose(
+        seen.r, whole.r[:, :rows], rtol=1e-4, atol=1e-4 * np.abs(whole.r).max()
+    )
     # As above: 2 % of the largest.
-    np.testing.assert_allclose(seen.response, whole.response[:, :rows][:, :, kept], atol=0.02 * size)
+    np.testing.assert_allclose(
+        seen.response, whole.response[:, :rows][:, :, kept], atol=0.02 * size
+    )
 
 
-@pytest.mark.parametrize("name", ["across_squared_lower_fly", "mass_near_72_30", "to_pole_hoist", "mass_stripe_60"])
+@pytest.mark.parametrize(
+    "name", ["across_squared_lower_fly", "mass_near_72_30", "to_pole_hoist", "mass_stripe_60"]
+)
 def test_a_term_is_known_by_its_name(name: str) -> None:
     assert Term.named(name).name == name
 

@@ -1,4 +1,5 @@
-"""A line in the course of an amplitude is found at its frequency; noise shows lines no more often than it says."""
+"""A line in the course of an amplitude is found at its frequency; noise shows lines no more often
+than it says."""
 
 from __future__ import annotations
 
@@ -25,7 +26,9 @@ def test_white_noise_shows_rare_lines_as_rarely_as_they_say() -> None:
     values = np.array([line(rng.standard_normal(200), PERIOD).p_value for _ in range(1000)])
     for level in (0.01, 0.1, 0.5):
         # Three standard deviations of a share of 1000.
-        assert (values <= level).mean() == pytest.approx(level, abs=3 * np.sqrt(level * (1 - level) / 1000))
+        assert (values <= level).mean() == pytest.approx(
+            level, abs=3 * np.sqrt(level * (1 - level) / 1000)
+        )
 
 
 def test_a_trend_is_no_line() -> None:

@@ -1,4 +1,5 @@
-"""What a proposal sees and what tests it share no segment; entries of the proposal log are only added."""
+"""What a proposal sees and what tests it share no segment; entries of the proposal log are only
+added."""
 
 from __future__ import annotations
 
@@ -31,7 +32,9 @@ def recording(name: str, speed: float, *, seconds: float = 8.6) -> Trajectory:
 
 
 def of(*speeds: float, seconds: float = 8.6) -> tuple[Segments, np.ndarray]:
-    recordings = [recording("r" * (i + 1), speed, seconds=seconds) for i, speed in enumerate(speeds)]
+    recordings = [
+        recording("r" * (i + 1), speed, seconds=seconds) for i, speed in enumerate(speeds)
+    ]
     return Segments.of(recordings), np.array(speeds)
 
 
@@ -57,7 +60,9 @@ def test_too_few_segments_are_refused() -> None:
 def test_the_hash_is_of_positions_and_wind() -> None:
     segments, _ = of(3.0)
     stronger, _ = of(3.5)
-    moved = replace(segments, items=tuple(replace(s, positions=s.positions + 1e-9) for s in segments.items))
+    moved = replace(
+        segments, items=tuple(replace(s, positions=s.positions + 1e-9) for s in segments.items)
+    )
     assert data_hash(segments) == data_hash(of(3.0)[0])
     assert len({data_hash(s) for s in (segments, stronger, moved, segments.select([0]))}) == 4
 

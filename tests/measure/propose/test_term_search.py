@@ -29,7 +29,10 @@ def silent(what: str, done: int, total: int) -> None:
 
 @pytest.fixture(scope="module")
 def found(
-    pushed: Experiment, columns: tuple[EffectColumn, ...], bank: NullBank, directions: tuple[Column, ...]
+    pushed: Experiment,
+    columns: tuple[EffectColumn, ...],
+    bank: NullBank,
+    directions: tuple[Column, ...],
 ) -> ProposalOutcome:
     return weigh(made_ready(pushed), columns, bank, directions, options=NullOptions(), stage=silent)
 
@@ -54,7 +57,9 @@ def test_the_effect_of_the_file_is_the_planted_field(
     made = load(write(found, tmp_path).spec)
     effect = made(**{strength.name: strength.estimate.value for strength in found.strengths})
     assert isinstance(effect, FieldEffect)
-    system, state = assemble([flag(material=specimen.material, wind_speed=4.5, columns=6)], dtype=torch.float64)
+    system, state = assemble(
+        [flag(material=specimen.material, wind_speed=4.5, columns=6)], dtype=torch.float64
+    )
     seen = Seen(
         cloth=system.cloth,
         position=state.position,
@@ -65,7 +70,8 @@ def test_the_effect_of_the_file_is_the_planted_field(
     field = effect.acceleration(seen).expand(state.position.shape)[..., 0].numpy()
     share = system.cloth.mesh.rest[:, 1] / system.cloth.mesh.rest[:, 1].max()
     planted = PUSH / (1 + np.exp(-(0.5 - share) * 0.5 / 0.06))
-    # The wave of the terms and the edge of the push differ by 0.05 of its root mean square; errors of the fit add.
+    # The wave of the terms and the edge of the push differ by 0.05 of its root mean square; errors
+    # of the fit add.
     error = np.sqrt(np.mean((field[:, 1] - planted) ** 2))
     assert error < 0.3 * np.sqrt(np.mean(planted**2))
 
@@ -75,8 +81,9 @@ def test_a_steady_force_is_seen_to_be_steady(found: ProposalOutcome) -> None:
     course = strength.course
     assert len(course.by_recording) == 4
     means = [mean.value for mean in course.by_recording]
-    # A force that grew with the wind's square would differ by (6/3.5)² = 2.9 between the recordings; a steady one, by
-    # what the numerics leave in each: less than the square root of that.
+    # A force that grew with the wind's square would differ by (6/3.5)² = 2.9 between the
+    # recordings; a steady one, by what the numerics leave in each: less than the square root of
+    # that.
     assert max(means) / min(means) < 6 / 3.5
 
 
@@ -88,7 +95,8 @@ def test_a_recording_in_calm_air_is_refused(pushed: Experiment) -> None:
 
 
 def outcome_of(*, low: float, apart: tuple[float, float] | None) -> tuple[Decision, str]:
-    """The decision for a gain with a lower end, and a control with a difference and its lower end [nat]."""
+    """The decision for a gain with a lower end, and a control with a difference and its lower end
+    [nat]."""
     some = Estimate(value=0.01, low=0.009, high=0.011, unit="m")
     control = None if apart is None else Estimate(value=apart[0], low=apart[1], high=0.01, unit="1")
     return Retest(

@@ -43,7 +43,9 @@ def recipe() -> Recipe:
 
 @pytest.fixture(scope="session")
 def view() -> FixedView:
-    zeta = RenderParameters(texture="flag/france", background="sky/1", width=SIZE, height=SIZE, raster_samples=2)
+    zeta = RenderParameters(
+        texture="flag/france", background="sky/1", width=SIZE, height=SIZE, raster_samples=2
+    )
     return FixedView(zeta=zeta, camera=FilmCamera())
 
 

@@ -21,7 +21,8 @@ def _groups(covariance: np.ndarray, count: int, replicates: int) -> list[np.ndar
 def test_the_floor_of_gaussian_replicates_is_twice_the_median_of_chi_squared() -> None:
     covariance = np.array([[4.0, 1.5, 0.0], [1.5, 1.0, 0.0], [0.0, 0.0, 0.01]])
     metric = ReplicateMetric.of(_groups(covariance, 3000, 2))
-    # the difference of two draws has twice their covariance; 3,000 pairs know the median to 2 %, and shrinkage is small
+    # the difference of two draws has twice their covariance; 3,000 pairs know the median to 2 %,
+    # and shrinkage is small
     assert metric.floor == pytest.approx(2 * chi2(3).median(), rel=0.06)
 
 

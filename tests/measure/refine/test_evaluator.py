@@ -17,7 +17,9 @@ from sim.assets import Assets
 from sim.render import named_prior
 
 
-def test_an_evaluation_does_not_depend_on_what_is_evaluated_beside_it(evaluator: Evaluator, points: np.ndarray) -> None:
+def test_an_evaluation_does_not_depend_on_what_is_evaluated_beside_it(
+    evaluator: Evaluator, points: np.ndarray
+) -> None:
     together = evaluator.evaluate(points, 2)
     alone = replace(evaluator, folder=None, _kept={}).evaluate(points[[2]], 2)[0]
     np.testing.assert_array_equal(together[2].embedding, alone.embedding)
@@ -43,7 +45,9 @@ def test_what_was_kept_is_not_simulated_again(
         assert a.seconds == b.seconds
 
 
-def test_another_view_seed_or_model_is_another_evaluation(evaluator: Evaluator, estimator: Estimator) -> None:
+def test_another_view_seed_or_model_is_another_evaluation(
+    evaluator: Evaluator, estimator: Estimator
+) -> None:
     view = evaluator.simulator.view
     assert isinstance(view, FixedView)
     darker = replace(view, zeta=replace(view.zeta, exposure_bias=-1.0))
@@ -64,13 +68,18 @@ def test_what_was_kept_of_clips_conditioned_by_an_older_version_is_not_used(
     assert evaluator.identity != now
 
 
-def test_a_damaged_file_is_named_whichever_bit_of_it_changed(evaluator: Evaluator, points: np.ndarray) -> None:
+def test_a_damaged_file_is_named_whichever_bit_of_it_changed(
+    evaluator: Evaluator, points: np.ndarray
+) -> None:
     evaluator.evaluate(points[:1], 1)
     assert evaluator.folder is not None
     kept = next(evaluator.folder.rglob("*.npz"))
     whole = kept.read_bytes()
     places = np.linspace(0, len(whole) - 1, 40).astype(int).tolist()
-    for content in (whole[:40], *(whole[:k] + bytes([whole[k] ^ 1]) + whole[k + 1 :] for k in places)):
+    for content in (
+        whole[:40],
+        *(whole[:k] + bytes([whole[k] ^ 1]) + whole[k + 1 :] for k in places),
+    ):
         kept.write_bytes(content)
         with pytest.raises(CorruptError, match="damaged") as caught:
             replace(evaluator, _kept={}).evaluate(points[:1], 1)

@@ -22,7 +22,8 @@ def test_the_density_integrates_to_one() -> None:
 
 
 def test_the_density_of_a_mean_alone_is_students() -> None:
-    """Without slopes, n normal draws give a new one t_{n−1} about their mean, of scale s √(1 + 1/n)."""
+    """Without slopes, n normal draws give a new one t_{n−1} about their mean, of scale s √(1 +
+    1/n)."""
     rng = np.random.default_rng(1)
     y = rng.normal(2.0, 3.0, (9, 1))
     model = Metamodel.fit(np.zeros((9, 0)), y, np.arange(9))
@@ -31,7 +32,8 @@ def test_the_density_of_a_mean_alone_is_students() -> None:
 
 
 def test_new_rows_fall_into_the_predictive_distribution_as_often_as_it_says() -> None:
-    """The probability integral transform of a new row is uniform, however few rows the model is from."""
+    """The probability integral transform of a new row is uniform, however few rows the model is
+    from."""
     rng = np.random.default_rng(2)
     levels = []
     for _ in range(300):
@@ -50,7 +52,9 @@ def test_replicates_that_share_their_deviation_count_as_one() -> None:
     x = np.repeat(rng.normal(size=(200, 1)), 2, axis=0)
     shared = np.repeat(rng.normal(size=(200, 2)), 2, axis=0)
     model = Metamodel.fit(
-        x, x @ np.ones((1, 2)) + shared + 1e-3 * rng.normal(size=(400, 2)), np.repeat(np.arange(200), 2)
+        x,
+        x @ np.ones((1, 2)) + shared + 1e-3 * rng.normal(size=(400, 2)),
+        np.repeat(np.arange(200), 2),
     )
     assert model.correlation == pytest.approx(1.0, abs=0.02)
     assert model.rows == pytest.approx(200, rel=0.02)

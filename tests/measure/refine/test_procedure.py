@@ -36,13 +36,19 @@ WHOLE = replace(SETTINGS, to_floor=False)
 @pytest.fixture(scope="module")
 def target(recipe: Recipe, view: FixedView) -> Target:
     simulator = Simulator.of(recipe, view, frames=8, rate=25.0, batch=1)
-    clip = simulator.films([FilmRequest(point=(0.0,) * 16 + (0.2,), seed=child_seed(9, "target"))])[0].clip
+    clip = simulator.films([FilmRequest(point=(0.0,) * 16 + (0.2,), seed=child_seed(9, "target"))])[
+        0
+    ].clip
     assert clip is not None
-    return Target(name="known", clip=clip, view=view, truth={"wind_speed": 6.0, "area_weight": 0.135})
+    return Target(
+        name="known", clip=clip, view=view, truth={"wind_speed": 6.0, "area_weight": 0.135}
+    )
 
 
 @pytest.fixture(scope="module")
-def whole(recipe: Recipe, estimator: Estimator, target: Target, tmp_path_factory: pytest.TempPathFactory) -> Refinement:
+def whole(
+    recipe: Recipe, estimator: Estimator, target: Target, tmp_path_factory: pytest.TempPathFactory
+) -> Refinement:
     """All 36 evaluations."""
     return refine(target, estimator, recipe, settings=WHOLE, cache=tmp_path_factory.mktemp("whole"))
 
@@ -77,7 +83,9 @@ def test_killed_and_resumed_it_gives_the_same_result(
     assert resumed.intervals == whole.intervals
 
 
-def test_it_stops_at_the_noise_floor_and_says_so(recipe: Recipe, estimator: Estimator, target: Target) -> None:
+def test_it_stops_at_the_noise_floor_and_says_so(
+    recipe: Recipe, estimator: Estimator, target: Target
+) -> None:
     found = refine(target, estimator, recipe, settings=replace(SETTINGS, budget=200, settled=10.0))
     assert found.reached
     assert found.rounds[-1].distance <= found.floor
@@ -95,12 +103,22 @@ def test_what_no_simulation_looks_like_is_never_at_the_floor(
     assert {"above-noise-floor", "damping-assumed"} <= {finding.kind for finding in found.findings}
 
 
-def test_two_clips_share_a_cloth_and_have_a_wind_each(recipe: Recipe, estimator: Estimator, target: Target) -> None:
-    found = refine([target, replace(target, name="again")], estimator, recipe, settings=replace(SETTINGS, budget=28))
+def test_two_clips_share_a_cloth_and_have_a_wind_each(
+    recipe: Recipe, estimator: Estimator, target: Target
+) -> None:
+    found = refine(
+        [target, replace(target, name="again")],
+        estimator,
+        recipe,
+        settings=replace(SETTINGS, budget=28),
+    )
     a, b = (trace.points for trace in found.traces)
     np.testing.assert_array_equal(a[:, :16], b[:, :16])
     assert not np.array_equal(a[:, 16], b[:, 16])
-    assert [entry.name for entry in found.intervals] == [*(q.name for q in QUANTITIES), "wind_speed.1"]
+    assert [entry.name for entry in found.intervals] == [
+        *(q.name for q in QUANTITIES),
+        "wind_speed.1",
+    ]
 
 
 def test_the_section_shows_the_answer_the_steps_and_both_in_motion(whole: Refinement) -> None:
@@ -116,9 +134,13 @@ def test_the_section_shows_the_answer_the_steps_and_both_in_motion(whole: Refine
 def test_pictures_of_a_flag_four_times_as_large_have_twice_the_winds(
     whole: Refinement, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Wind goes with the root of the size at one Froude number: points, axis and captions alike, as the intervals."""
+    """Wind goes with the root of the size at one Froude number: points, axis and captions alike, as
+    the intervals."""
     drawn: list[Figure] = []
-    monkeypatch.setattr("measure.refine.refinement_section.figure_url", lambda figure, dpi: drawn.append(figure) or "")
+    monkeypatch.setattr(
+        "measure.refine.refinement_section.figure_url",
+        lambda figure, dpi: drawn.append(figure) or "",
+    )
     larger = scale_refinement(whole, 4.0)
     captions = [
         np.array(re.findall(r"step \d+: ([\d.]+) m/s", section(one, in_motion=False))).astype(float)
@@ -126,7 +148,9 @@ def test_pictures_of_a_flag_four_times_as_large_have_twice_the_winds(
     ]
     np.testing.assert_allclose(captions[1], 2 * captions[0], atol=0.015)
     before, after = (figure.axes[1] for figure in drawn)
-    np.testing.assert_allclose(after.lines[0].get_ydata(), 2 * np.asarray(before.lines[0].get_ydata()))
+    np.testing.assert_allclose(
+        after.lines[0].get_ydata(), 2 * np.asarray(before.lines[0].get_ydata())
+    )
     np.testing.assert_allclose(after.get_ylim(), 2 * np.array(before.get_ylim()))
 
 
@@ -137,7 +161,9 @@ def test_a_budget_too_small_for_an_interval_is_refused() -> None:
         Settings(replicates=1)
 
 
-def test_a_model_without_the_targets_is_refused(recipe: Recipe, estimator: Estimator, target: Target) -> None:
+def test_a_model_without_the_targets_is_refused(
+    recipe: Recipe, estimator: Estimator, target: Target
+) -> None:
     class Blind(Estimator):
         targets = ()
 

@@ -17,13 +17,21 @@ from measure.refine.refinement import intervals_of
 BOX = (Range(low=0.0, high=10.0), Range(low=0.05, high=0.40))
 
 
-def found(wind: tuple[float, float], area_weight: tuple[float, float], *, stated: bool = False) -> tuple[Interval, ...]:
+def found(
+    wind: tuple[float, float], area_weight: tuple[float, float], *, stated: bool = False
+) -> tuple[Interval, ...]:
     """Intervals of draws that are uniform between these ends."""
     rng = stream(1, "refinement")
-    draws = np.stack([rng.uniform(*wind, 2000), rng.uniform(*area_weight, 2000), rng.normal(size=2000)], axis=1)
-    prior = np.stack([rng.uniform(0, 10, 2000), rng.uniform(0.05, 0.4, 2000), rng.normal(size=2000)], axis=1)
+    draws = np.stack(
+        [rng.uniform(*wind, 2000), rng.uniform(*area_weight, 2000), rng.normal(size=2000)], axis=1
+    )
+    prior = np.stack(
+        [rng.uniform(0, 10, 2000), rng.uniform(0.05, 0.4, 2000), rng.normal(size=2000)], axis=1
+    )
     density_limits = (0.05, 0.40) if stated else limits_of("area_weight")
-    return intervals_of(draws, prior, 0.9, ranges=BOX, limits=(limits_of("wind_speed"), density_limits))
+    return intervals_of(
+        draws, prior, 0.9, ranges=BOX, limits=(limits_of("wind_speed"), density_limits)
+    )
 
 
 def test_winds_at_the_end_of_the_box_are_bounded_on_one_side_and_those_inside_are_not() -> None:

@@ -1,4 +1,5 @@
-"""A refinement starts from the network's estimates of the clip and from the given properties of the cloth."""
+"""A refinement starts from the network's estimates of the clip and from the given properties of the
+cloth."""
 
 from __future__ import annotations
 
@@ -23,16 +24,26 @@ def test_completed_points_have_the_given_wind_and_area_weight(recipe: Recipe) ->
     np.testing.assert_allclose(values[:, AREA_WEIGHT_COLUMN], given[:, 1])
 
 
-def test_an_area_weight_that_is_known_is_what_the_refinement_starts_from(estimator: Estimator, recipe: Recipe) -> None:
-    known = replace(recipe, material=replace(recipe.material, area_weight=Range(low=0.12, high=0.125)))
+def test_an_area_weight_that_is_known_is_what_the_refinement_starts_from(
+    estimator: Estimator, recipe: Recipe
+) -> None:
+    known = replace(
+        recipe, material=replace(recipe.material, area_weight=Range(low=0.12, high=0.125))
+    )
     clip = stream(0, "clip").integers(0, 255, (8, 48, 48), dtype=np.uint8)
-    draws = refinement_start.amortised_draws(estimator, clip, Space.of(known), aspect=1.5, seed=1, draws=200)
+    draws = refinement_start.amortised_draws(
+        estimator, clip, Space.of(known), aspect=1.5, seed=1, draws=200
+    )
     assert 0.12 <= draws[:, 1].min() <= draws[:, 1].max() <= 0.125 + 1e-6
-    free = refinement_start.amortised_draws(estimator, clip, Space.of(recipe), aspect=1.5, seed=1, draws=200)
+    free = refinement_start.amortised_draws(
+        estimator, clip, Space.of(recipe), aspect=1.5, seed=1, draws=200
+    )
     assert np.ptp(free[:, 1]) > 0.01
 
 
-def test_summaries_are_the_networks_own_estimates_as_shares_of_their_ranges(estimator: Estimator) -> None:
+def test_summaries_are_the_networks_own_estimates_as_shares_of_their_ranges(
+    estimator: Estimator,
+) -> None:
     """The logistic function of the posterior's mean logit, here from 20,000 of its draws."""
     clips = stream(0, "clips").integers(0, 255, (5, 8, 48, 48), dtype=np.uint8)
     embedded = estimator.embeddings(estimator.inputs(clips))

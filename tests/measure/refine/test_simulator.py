@@ -1,4 +1,5 @@
-"""Replicates take turns at scenes, and draw the damping that nobody knows; what is filmed is conditioned."""
+"""Replicates take turns at scenes, and draw the damping that nobody knows; what is filmed is
+conditioned."""
 
 from __future__ import annotations
 
@@ -32,7 +33,10 @@ def of(recipes: Recipe | list[Recipe], view: FixedView) -> Simulator:
 def test_each_request_draws_its_damping_over_the_whole_range(recipe: Recipe) -> None:
     scene = SimulatedScene(damped(recipe))
     found = np.array(
-        [scene.member(FilmRequest(point=HERE, seed=seed)).scene.material.damping for seed in range(400)],
+        [
+            scene.member(FilmRequest(point=HERE, seed=seed)).scene.material.damping
+            for seed in range(400)
+        ],
         dtype=np.float64,
     )
     shares = np.log(found / DAMPING.low) / np.log(DAMPING.high / DAMPING.low)
@@ -60,13 +64,17 @@ def test_replicates_take_turns_at_the_scenes(recipe: Recipe, view: FixedView) ->
 
 
 def test_scenes_of_different_spaces_are_refused(recipe: Recipe, view: FixedView) -> None:
-    heavier = replace(recipe, material=replace(recipe.material, area_weight=Range(low=0.2, high=0.4)))
+    heavier = replace(
+        recipe, material=replace(recipe.material, area_weight=Range(low=0.2, high=0.4))
+    )
     with pytest.raises(InputError, match="2 different search spaces"):
         of([recipe, heavier], view)
 
 
 @pytest.mark.parametrize("name", ["stretching", "area_weight_factor"])
-def test_a_range_that_nothing_would_draw_is_refused(recipe: Recipe, view: FixedView, name: str) -> None:
+def test_a_range_that_nothing_would_draw_is_refused(
+    recipe: Recipe, view: FixedView, name: str
+) -> None:
     ranged = replace(recipe, material=replace(recipe.material, **{name: Range(low=0.5, high=2.0)}))
     with pytest.raises(InputError, match="ranges of bending factors"):
         of(ranged, view)

@@ -35,7 +35,8 @@ def test_the_prior_is_uniform_in_the_factor_where_the_recipe_is(recipe: Recipe) 
         space.values(space.prior(np.random.default_rng(0), 20_000))[:, :15]
         / named_material("camel-ponte-roma").bending.ravel()
     )
-    # a uniform variable on [0.1, 10] has mean 5.05 and standard deviation 9.9/√12; 4 standard errors of 300,000 draws
+    # a uniform variable on [0.1, 10] has mean 5.05 and standard deviation 9.9/√12; 4 standard
+    # errors of 300,000 draws
     assert abs(drawn.mean() - 5.05) < 4 * 9.9 / np.sqrt(12 * drawn.size)
     assert abs(drawn.std() - 9.9 / np.sqrt(12)) < 0.02
 
@@ -46,13 +47,20 @@ def test_combinations_of_bending_follow_their_definitions(recipe: Recipe) -> Non
     table[0] *= 4  # along the warp
     table[:, 3:] *= 3  # at the two largest curvatures
     point = space.unit(np.array([[*table.ravel(), 0.12, 3.0]]))
-    reported = dict(zip((q.name for q in QUANTITIES), space.reported_quantities(point)[0], strict=True))
+    reported = dict(
+        zip((q.name for q in QUANTITIES), space.reported_quantities(point)[0], strict=True)
+    )
     inside = space.values(point)[0, :15].reshape(3, 5)
-    np.testing.assert_allclose(inside, table)  # within the box, so that nothing was moved to its edge
+    np.testing.assert_allclose(
+        inside, table
+    )  # within the box, so that nothing was moved to its edge
     assert reported["anisotropy"] == pytest.approx(np.log10(4))
     assert reported["nonlinearity"] == pytest.approx(np.log10(3))
     assert reported["bending_scale"] == pytest.approx(-5 + np.log10(4) / 3 + np.log10(3) * 2 / 5)
-    assert (reported["wind_speed"], reported["area_weight"]) == (pytest.approx(3.0), pytest.approx(0.12))
+    assert (reported["wind_speed"], reported["area_weight"]) == (
+        pytest.approx(3.0),
+        pytest.approx(0.12),
+    )
 
 
 def test_a_common_factor_widens_the_box_and_moves_all_coefficients_together() -> None:
@@ -63,7 +71,9 @@ def test_a_common_factor_widens_the_box_and_moves_all_coefficients_together() ->
     np.testing.assert_allclose(high, [*(bending * 4 * 10), 0.40, 10.0])
     logs = np.log(space.values(space.prior(np.random.default_rng(1), 20_000))[:, :15] / bending)
     # ln of a log-uniform factor from 0.125 to 4: variance (ln 32)²/12, shared by all coefficients
-    np.testing.assert_allclose(np.cov(logs[:, 0], logs[:, 1])[0, 1], np.log(32) ** 2 / 12, rtol=0.05)
+    np.testing.assert_allclose(
+        np.cov(logs[:, 0], logs[:, 1])[0, 1], np.log(32) ** 2 / 12, rtol=0.05
+    )
 
 
 def test_draws_of_the_prior_lie_within_the_start_ranges() -> None:
@@ -84,13 +94,16 @@ def test_a_recipe_without_ranges_is_refused() -> None:
 
 
 def test_a_prior_of_several_scenes_is_their_mixture_within_the_box() -> None:
-    """Shares and moments by the law of total probability; bending outside of the smaller box only from the larger."""
+    """Shares and moments by the law of total probability; bending outside of the smaller box only
+    from the larger."""
     box, usual = Space.of(load("flag-fabrics")), Space.of(load("flag-wide"))
     mixed = box.learned([(usual, 3.0), (box, 1.0)])
     drawn = mixed.values(mixed.prior(np.random.default_rng(4), 40_000))
     area_weight = drawn[:, 15]
     inside = np.log(0.17 / 0.10) / np.log(0.40 / 0.05)  # of a log-uniform area weight
-    assert ((area_weight >= 0.10) & (area_weight <= 0.17)).mean() == pytest.approx(0.75 + 0.25 * inside, abs=0.01)
+    assert ((area_weight >= 0.10) & (area_weight <= 0.17)).mean() == pytest.approx(
+        0.75 + 0.25 * inside, abs=0.01
+    )
     means = 0.135, (0.40 - 0.05) / np.log(0.40 / 0.05)
     assert area_weight.mean() == pytest.approx(0.75 * means[0] + 0.25 * means[1], abs=0.001)
     assert drawn[:, 16].mean() == pytest.approx(5.0, abs=0.06)

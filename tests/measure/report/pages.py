@@ -31,7 +31,11 @@ class Page(HTMLParser):
         super().__init__(convert_charrefs=True)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        element = Element(tag=tag, attributes={k: v or "" for k, v in attrs}, inside=tuple(e.tag for e in self.open))
+        element = Element(
+            tag=tag,
+            attributes={k: v or "" for k, v in attrs},
+            inside=tuple(e.tag for e in self.open),
+        )
         if len(element.attributes) != len(attrs):
             self.faults.append(f"{self.getpos()}: an attribute of <{tag}> stands twice")
         self.elements.append(element)
@@ -45,7 +49,9 @@ class Page(HTMLParser):
 
     def handle_endtag(self, tag: str) -> None:
         if not self.open or self.open[-1].tag != tag:
-            self.faults.append(f"{self.getpos()}: </{tag}> where {[e.tag for e in self.open[-3:]]} are open")
+            self.faults.append(
+                f"{self.getpos()}: </{tag}> where {[e.tag for e in self.open[-3:]]} are open"
+            )
         else:
             self.open.pop()
 

@@ -1,4 +1,5 @@
-"""The page in a browser: no error, no text over text, the cloth moves, and stands still for those who ask for it."""
+"""The page in a browser: no error, no text over text, the cloth moves, and stands still for those
+who ask for it."""
 
 from __future__ import annotations
 
@@ -14,10 +15,13 @@ from measure.report import page
 from measure.verdict import Conclusion
 from tests.measure.report.verdicts import FULL, verdict, with_holes
 
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+BROWSER = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+)
 pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium on the path")
 
-# A clock of its own, 16 ms a frame: how many animation frames a headless browser shows depends on the load.
+# A clock of its own, 16 ms a frame: how many animation frames a headless browser shows depends on
+# the load.
 FRAMES = """
 <script>
 let clock = 0, waiting = [];
@@ -99,22 +103,33 @@ def seen(html: str, folder: Path, *options: str) -> dict[str, object]:
     match = re.search(r'<pre id="probe">(.*?)</pre>', done.stdout, re.DOTALL)
     assert match, done.stderr
     text = match[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&")
-    return {**json.loads(text), "console": [line for line in done.stderr.splitlines() if "CONSOLE" in line]}
+    return {
+        **json.loads(text),
+        "console": [line for line in done.stderr.splitlines() if "CONSOLE" in line],
+    }
 
 
 @pytest.mark.parametrize(
     "whole",
-    [verdict(Conclusion.EFFECT, FULL), verdict(Conclusion.SUFFICIENT), with_holes(verdict(Conclusion.ONE_OF))],
+    [
+        verdict(Conclusion.EFFECT, FULL),
+        verdict(Conclusion.SUFFICIENT),
+        with_holes(verdict(Conclusion.ONE_OF)),
+    ],
     ids=["effect", "sufficient", "holes"],
 )
-def test_the_page_runs_without_an_error_and_no_text_lies_over_another(whole, tmp_path: Path) -> None:
+def test_the_page_runs_without_an_error_and_no_text_lies_over_another(
+    whole, tmp_path: Path
+) -> None:
     found = seen(page(whole), tmp_path)
     assert found["console"] == []
     assert found["touching"] == []
     assert found["outside"] == []
     assert found["wide"] == 0
     assert found["button"] == "Pause"
-    assert found["frame"] == 5  # 25 frames a second at a quarter of the speed, after 56 · 16 ms: 5.6
+    assert (
+        found["frame"] == 5
+    )  # 25 frames a second at a quarter of the speed, after 56 · 16 ms: 5.6
 
 
 def test_the_cloth_stands_still_for_those_who_want_less_motion(tmp_path: Path) -> None:

@@ -9,7 +9,14 @@ import re
 import numpy as np
 import pytest
 
-from measure.report.chart import Linear, Logarithmic, path_through, room_below, room_beside, thin_line
+from measure.report.chart import (
+    Linear,
+    Logarithmic,
+    path_through,
+    room_below,
+    room_beside,
+    thin_line,
+)
 
 
 def test_a_linear_axis_maps_its_ends_and_its_middle() -> None:
@@ -23,13 +30,19 @@ def test_a_logarithmic_axis_gives_equal_ratios_equal_lengths() -> None:
 
 
 @pytest.mark.parametrize("length", [40.0, 90.0, 240.0, 560.0])
-@pytest.mark.parametrize(("low", "high"), [(0.0, 1.0), (-3.2e-5, 7.7e-5), (0.0, 41.27), (1999.0, 2003.5), (-9e7, 4e7)])
-def test_labels_have_room_and_stand_at_round_values_within_the_axis(low: float, high: float, length: float) -> None:
+@pytest.mark.parametrize(
+    ("low", "high"), [(0.0, 1.0), (-3.2e-5, 7.7e-5), (0.0, 41.27), (1999.0, 2003.5), (-9e7, 4e7)]
+)
+def test_labels_have_room_and_stand_at_round_values_within_the_axis(
+    low: float, high: float, length: float
+) -> None:
     scale = Linear(low, high, 0.0, length)
     for room in (room_beside, room_below):
         ticks = scale.ticks(room)
         values = [v for v, _ in ticks]
-        assert all(low <= v <= high or math.isclose(v, low) or math.isclose(v, high) for v in values)
+        assert all(
+            low <= v <= high or math.isclose(v, low) or math.isclose(v, high) for v in values
+        )
         for (a, first), (b, second) in itertools.pairwise(ticks):
             assert scale(b) - scale(a) >= (room(first) + room(second)) / 2 - 1e-6
         steps = {f"{b - a:.6e}"[:3] for a, b in itertools.pairwise(values)}

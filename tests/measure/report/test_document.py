@@ -24,13 +24,27 @@ def written(whole: Verdict) -> dict[str, Any]:
 def differences(a: Any, b: Any, where: str = "") -> list[str]:
     """Where two verdicts differ; NaN equals NaN, and the cloth in motion is rounded to float32."""
     if dataclasses.is_dataclass(a) and type(a) is type(b):
-        return [d for f in dataclasses.fields(a) for d in differences(getattr(a, f.name), getattr(b, f.name), f.name)]
+        return [
+            d
+            for f in dataclasses.fields(a)
+            for d in differences(getattr(a, f.name), getattr(b, f.name), f.name)
+        ]
     if isinstance(a, list | tuple) and type(a) is type(b) and len(a) == len(b):
-        return [d for n, (x, y) in enumerate(zip(a, b, strict=True)) for d in differences(x, y, f"{where}[{n}]")]
-    if isinstance(a, float) and isinstance(b, float) and where.startswith(("observed", "before[", "after[")):
+        return [
+            d
+            for n, (x, y) in enumerate(zip(a, b, strict=True))
+            for d in differences(x, y, f"{where}[{n}]")
+        ]
+    if (
+        isinstance(a, float)
+        and isinstance(b, float)
+        and where.startswith(("observed", "before[", "after["))
+    ):
         same = math.isclose(a, b, rel_tol=2**-24) or (math.isnan(a) and math.isnan(b))
         return [] if same else [f"{where}: {a!r} ≠ {b!r}"]
-    same = a == b or (isinstance(a, float) and isinstance(b, float) and math.isnan(a) and math.isnan(b))
+    same = a == b or (
+        isinstance(a, float) and isinstance(b, float) and math.isnan(a) and math.isnan(b)
+    )
     return [] if same else [f"{where}: {a!r} ≠ {b!r}"]
 
 
@@ -41,7 +55,10 @@ def test_every_field_of_every_kind_of_verdict_comes_back(conclusion: Conclusion)
 
 
 def test_documents_are_what_they_were() -> None:
-    kinds, size = (Conclusion.EFFECT, Conclusion.UNDECIDED), Size(across=2, up=2, frames=3, stretch=2)
+    kinds, size = (
+        (Conclusion.EFFECT, Conclusion.UNDECIDED),
+        Size(across=2, up=2, frames=3, stretch=2),
+    )
     documents = {conclusion.value: as_document(verdict(conclusion, size)) for conclusion in kinds}
     assert changes("verdicts-of-markers", documents, relative=1e-9) == []
 
@@ -76,7 +93,9 @@ def test_missing_numbers_and_open_intervals_come_back() -> None:
     assert differences(from_document(document), whole) == []
 
 
-def test_a_document_that_does_not_state_whether_another_draw_could_decide_otherwise_is_read() -> None:
+def test_a_document_that_does_not_state_whether_another_draw_could_decide_otherwise_is_read() -> (
+    None
+):
     document = written(verdict(Conclusion.EFFECT))
     for name in ("open", "settling"):
         del document["test"][name]
@@ -110,10 +129,16 @@ def test_the_document_holds_every_field_by_its_name() -> None:
         ({"named": "lift"}, "verdict.named", "of type str, not a list"),
         ({"findings": [["kind"]]}, "verdict.findings[0]", "1 entries"),
         ({"colour": "blue"}, "verdict", "unknown field colour"),
-        ({"test": {"statistic": 1.0}}, "verdict.test", "lacks the field critical, kinds, level, null, nulls, p_value"),
+        (
+            {"test": {"statistic": 1.0}},
+            "verdict.test",
+            "lacks the field critical, kinds, level, null, nulls, p_value",
+        ),
     ],
 )
-def test_a_document_that_does_not_fit_is_refused_with_the_place(change: dict[str, Any], where: str, what: str) -> None:
+def test_a_document_that_does_not_fit_is_refused_with_the_place(
+    change: dict[str, Any], where: str, what: str
+) -> None:
     with pytest.raises(InputError) as refused:
         from_document({**written(verdict(Conclusion.SUFFICIENT)), **change})
     assert refused.value.where == where

@@ -98,11 +98,15 @@ def test_no_stretch_or_no_times_is_no_motion() -> None:
 
 def test_the_first_frame_is_projected_from_the_side_and_a_little_above() -> None:
     """Two markers one above the other project at the same place across, z cos(elevation) apart."""
-    given = residual("one", 5.0, held_out=True, with_after=False, seed=1, size_of=Size(across=1, up=2))
+    given = residual(
+        "one", 5.0, held_out=True, with_after=False, seed=1, size_of=Size(across=1, up=2)
+    )
     pole = [[[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]] * 2
     moved = motion(replace(given, observed=pole, before=pole, markers=[[0.0, 0.0], [0.0, 1.0]]))
     assert moved is not None
-    path = re.search(r'class="mesh observed" d="M([\d.]+) ([\d.]+)L([\d.]+) ([\d.]+)"', str(still(moved, "")))
+    path = re.search(
+        r'class="mesh observed" d="M([\d.]+) ([\d.]+)L([\d.]+) ([\d.]+)"', str(still(moved, ""))
+    )
     assert path
     left, low, right, high = map(float, path.groups())
     assert left == right

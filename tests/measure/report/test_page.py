@@ -63,13 +63,16 @@ def html(whole: Verdict) -> str:
 
 
 def rounds_to(value: float, text: str, factor: float) -> bool:
-    """Whether the first number of `text` is `value · factor`, to half of its last digit that is not a zero."""
+    """Whether the first number of `text` is `value · factor`, to half of its last digit that is not
+    a zero."""
     if math.isinf(value):
         return text.strip() == ("∞" if value > 0 else "−∞")
     found = NUMBER.search(text)
     assert found, text
     power = 10.0 ** int(found[3].translate(POWERS)) if found[3] else 1.0
-    zeros = len(found[1]) - len(found[1].rstrip("0"))  # of a whole number, which may have been rounded to hundreds
+    zeros = len(found[1]) - len(
+        found[1].rstrip("0")
+    )  # of a whole number, which may have been rounded to hundreds
     place = 10.0 ** (-len(found[2]) if found[2] else zeros)
     return abs(float(found[1].translate(POWERS)) * power - value * factor) <= 0.5001 * place * power
 
@@ -90,13 +93,19 @@ def test_every_interval_on_the_page_is_that_of_its_value(whole: Verdict, html: s
     elements = parsed(html).elements
     seen = 0
     for element, follower in itertools.pairwise(elements):
-        if element.tag != "data" or follower.attributes.get("class") != "ends" or not follower.text.startswith("["):
+        if (
+            element.tag != "data"
+            or follower.attributes.get("class") != "ends"
+            or not follower.text.startswith("[")
+        ):
             continue
         low, high = follower.text[1:].split("]")[0].split(", ")
         value = float(element.attributes["value"])
         factor = 1e3 if re.search(r"\bm[ms]$", element.text) else 1.0
         matching = [e for e in held if e.value == value]
-        assert any(rounds_to(e.low, low, factor) and rounds_to(e.high, high, factor) for e in matching)
+        assert any(
+            rounds_to(e.low, low, factor) and rounds_to(e.high, high, factor) for e in matching
+        )
         seen += 1
     assert seen > 10
 
@@ -119,7 +128,9 @@ def test_the_page_refers_to_no_other_file(whole: Verdict, html: str) -> None:
     assert not re.search(r"url\((?!\s*[\"']?data:)", html)
 
 
-def test_charts_tables_and_controls_have_labels_for_screen_readers(whole: Verdict, html: str) -> None:
+def test_charts_tables_and_controls_have_labels_for_screen_readers(
+    whole: Verdict, html: str
+) -> None:
     """Every chart has a name, every table's heads have a scope, every control a label."""
     read = parsed(html)
     for svg in read.all("svg"):
@@ -131,9 +142,17 @@ def test_charts_tables_and_controls_have_labels_for_screen_readers(whole: Verdic
     assert parsed(html).all("html")[0].attributes["lang"] == "en"
 
 
-def test_the_page_says_the_verdicts_words_assumptions_and_remarks(whole: Verdict, html: str) -> None:
+def test_the_page_says_the_verdicts_words_assumptions_and_remarks(
+    whole: Verdict, html: str
+) -> None:
     text = re.sub(r"\s+", " ", parsed(html).all("body")[0].text)
-    sentences = [whole.words, whole.separating, whole.proposal, whole.test.nulls, *whole.assumptions]
+    sentences = [
+        whole.words,
+        whole.separating,
+        whole.proposal,
+        whole.test.nulls,
+        *whole.assumptions,
+    ]
     sentences += [c.why_not for c in whole.ranking if c.effect not in whole.named]
     sentences += [part for finding in whole.findings for part in finding]
     for sentence in filter(None, sentences):
@@ -190,7 +209,8 @@ def test_three_recordings_of_twice_the_usual_size_fit_into_three_megabytes() -> 
     whole = verdict(Conclusion.EFFECT)
     large = Size(across=25, up=20, frames=600, stretch=100)
     recordings = tuple(
-        residual(f"{n}", 4.0 + n, held_out=n == 2, with_after=True, seed=n, size_of=large) for n in range(3)
+        residual(f"{n}", 4.0 + n, held_out=n == 2, with_after=True, seed=n, size_of=large)
+        for n in range(3)
     )
     assert len(page(replace(whole, residuals=recordings)).encode()) <= 3e6
 
@@ -200,7 +220,8 @@ def test_markers_on_a_line_are_shown_along_it() -> None:
     whole = verdict(Conclusion.EFFECT)
     edge = replace(Size(), up=1)
     recordings = tuple(
-        residual(f"{n}", 4.0 + n, held_out=n == 2, with_after=True, seed=n, size_of=edge) for n in range(3)
+        residual(f"{n}", 4.0 + n, held_out=n == 2, with_after=True, seed=n, size_of=edge)
+        for n in range(3)
     )
     html = page(replace(whole, residuals=recordings))
     assert parsed(html).faults == []

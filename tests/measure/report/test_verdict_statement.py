@@ -38,7 +38,9 @@ def test_a_strength_that_is_another_in_every_recording_is_reported_with_its_valu
     assert "the errors that remain are larger than those of simulations" in lead(partly)
     ranking = [replace(c, heterogeneity=None if c.why_not else 0.001) for c in partly.ranking]
     said = lead(replace(partly, ranking=tuple(ranking)))
-    each = ", ".join(f"{e.value:.2g}" for e in next(c for c in ranking if not c.why_not).by_recording)
+    each = ", ".join(
+        f"{e.value:.2g}" for e in next(c for c in ranking if not c.why_not).by_recording
+    )
     assert f"fitted to each recording alone it is {each}" in said
     assert "another dependence on the wind would fit better" in said
     assert "the errors that remain" not in said
@@ -52,13 +54,19 @@ def test_a_line_is_reported_as_a_cylinders_vortex_shedding() -> None:
 
 
 def test_a_course_that_is_not_turbulence_is_given_in_percent_of_the_wind() -> None:
-    said = blowing(Variation(total=np.array([0.0169, -0.0001, 0.03]), fast=np.array([0.0144, 0.0, 0.02])))
-    expected = "varies by 13 % of its mean along its own direction, by 12 % within two seconds, and by 0 % across it"
+    said = blowing(
+        Variation(total=np.array([0.0169, -0.0001, 0.03]), fast=np.array([0.0144, 0.0, 0.02]))
+    )
+    expected = (
+        "varies by 13 % of its mean along its own direction, by 12 % within two seconds, and by 0 "
+        "% across it"
+    )
     assert expected in said
 
 
 @pytest.mark.parametrize(
-    ("damping", "expected"), [(2.5e-3, ""), (60e-3, ""), (5.0, "bound of damping: its interval is not reliable")]
+    ("damping", "expected"),
+    [(2.5e-3, ""), (60e-3, ""), (5.0, "bound of damping: its interval is not reliable")],
 )
 def test_a_fit_that_ends_at_a_bound_says_so(damping: float, expected: str) -> None:
     ended = Calibration().moved((0.0, 0.0, float(np.log(damping / 2.5e-3))))
@@ -68,7 +76,9 @@ def test_a_fit_that_ends_at_a_bound_says_so(damping: float, expected: str) -> No
 
 def test_a_level_that_cannot_be_tested_says_what_is_needed() -> None:
     few = verdict(Conclusion.SUFFICIENT)
-    untested = replace(few, conclusion=Conclusion.UNTESTED, test=replace(few.test, kinds=20, level=0.03))
+    untested = replace(
+        few, conclusion=Conclusion.UNTESTED, test=replace(few.test, kinds=20, level=0.03)
+    )
     assert "no p is below 0.048; at least 33 are needed." in lead(untested)
 
 
@@ -76,7 +86,10 @@ def test_a_test_that_another_draw_could_decide_otherwise_says_so_and_what_would_
     test = replace(verdict(Conclusion.EFFECT).test, level=0.05, open=True, settling=59)
     test = replace(test, p_value=replace(test.p_value, value=0.024, low=0.0, high=0.072))
     (remark,) = by_draw(test)
-    assert remark == "The evidence is borderline; rerun with --nulls 236 (59 numerical set-ups) to decide."
+    assert (
+        remark
+        == "The evidence is borderline; rerun with --nulls 236 (59 numerical set-ups) to decide."
+    )
     assert "more than 1000 numerical set-ups" in by_draw(replace(test, settling=None))[0]
     assert by_draw(replace(test, open=False)) == ()
 
@@ -92,7 +105,13 @@ def outcome(specimen: Specimen) -> LoopOutcome:
         wind=WindTrack.constant((4.0, 0.0, 0.0)),
     )
     numbers = replace(
-        verdict(Conclusion.OUTSIDE), words="", proposal="", separating="", assumptions=(), ranking=(), named=()
+        verdict(Conclusion.OUTSIDE),
+        words="",
+        proposal="",
+        separating="",
+        assumptions=(),
+        ranking=(),
+        named=(),
     )
     return LoopOutcome(
         verdict=numbers,
@@ -111,7 +130,11 @@ def test_an_outcome_without_an_answer_is_stated_with_its_line_its_course_and_its
     said = with_sentences(outcome)
     assert said.words.startswith(lead(outcome.verdict))
     assert "at the bound of damping" in said.words
-    assert said.proposal.index("as vortices") < said.proposal.index("a wind that varies") < said.proposal.index("force")
+    assert (
+        said.proposal.index("as vortices")
+        < said.proposal.index("a wind that varies")
+        < said.proposal.index("force")
+    )
     assert "that fits the errors best" in said.proposal
     assert said.assumptions[-1].endswith("was moved: first by 0.50 s")
     numbers = replace(said, words="", proposal="", separating="", assumptions=())
@@ -137,7 +160,9 @@ def test_how_well_the_cloth_was_weighed_is_an_assumption(
 ) -> None:
     specimen = replace(outcome.experiment.specimen, area_weight_uncertainty=known)
     (said,) = (
-        text for text in assumptions(replace(outcome.experiment, specimen=specimen)) if "area weight is known" in text
+        text
+        for text in assumptions(replace(outcome.experiment, specimen=specimen))
+        if "area weight is known" in text
     )
     assert expected in said
     assert ("0.284±0.006" in said) == weigh
@@ -145,4 +170,7 @@ def test_how_well_the_cloth_was_weighed_is_an_assumption(
 
 def test_an_unweighed_cloths_density_is_not_listed_as_known(outcome: LoopOutcome) -> None:
     specimen = replace(outcome.experiment.specimen, mass_known=False)
-    assert not any("area weight is known" in t for t in assumptions(replace(outcome.experiment, specimen=specimen)))
+    assert not any(
+        "area weight is known" in t
+        for t in assumptions(replace(outcome.experiment, specimen=specimen))
+    )

@@ -1,4 +1,5 @@
-"""Made-up verdicts of every kind: shapes as a real one has, numbers from plain formulas and a fixed seed."""
+"""Made-up verdicts of every kind: shapes as a real one has, numbers from plain formulas and a fixed
+seed."""
 
 from __future__ import annotations
 
@@ -7,9 +8,26 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from measure.verdict import Candidate, Comparison, Conclusion, Estimate, NullTest, Parameter, Residual, Verdict
+from measure.verdict import (
+    Candidate,
+    Comparison,
+    Conclusion,
+    Estimate,
+    NullTest,
+    Parameter,
+    Residual,
+    Verdict,
+)
 
-EFFECTS = ("lift", "shear", "tangential-linear-drag", "internal-damping", "pole-wake", "hem-mass", "corrective-field")
+EFFECTS = (
+    "lift",
+    "shear",
+    "tangential-linear-drag",
+    "internal-damping",
+    "pole-wake",
+    "hem-mass",
+    "corrective-field",
+)
 
 
 def about(value: float, half: float, unit: str = "m") -> Estimate:
@@ -29,10 +47,15 @@ class Size:
 FULL = Size(across=15, up=10, frames=250, stretch=50)
 
 
-def residual(name: str, speed: float, *, held_out: bool, with_after: bool, seed: int, size_of: Size) -> Residual:
+def residual(
+    name: str, speed: float, *, held_out: bool, with_after: bool, seed: int, size_of: Size
+) -> Residual:
     """A flag of 1.2 × 0.8 m with a travelling wave."""
     rng = np.random.default_rng(seed)
-    u, v = (a.ravel() for a in np.meshgrid(np.linspace(0, 1.2, size_of.across), np.linspace(0, 0.8, size_of.up)))
+    u, v = (
+        a.ravel()
+        for a in np.meshgrid(np.linspace(0, 1.2, size_of.across), np.linspace(0, 0.8, size_of.up))
+    )
     frames = size_of.frames
     times = np.arange(frames) / 25
     size = 0.003 * (speed / 5) * (0.4 + u / 1.2)
@@ -50,7 +73,9 @@ def residual(name: str, speed: float, *, held_out: bool, with_after: bool, seed:
         held_out=held_out,
         times=times.tolist(),
         in_time=(0.003 * speed / 5 * (1 + 0.3 * np.abs(rng.normal(size=frames)))).tolist(),
-        in_time_after=(0.0012 * (1 + 0.3 * np.abs(rng.normal(size=frames)))).tolist() if with_after else [],
+        in_time_after=(0.0012 * (1 + 0.3 * np.abs(rng.normal(size=frames)))).tolist()
+        if with_after
+        else [],
         markers=np.stack([u, v], axis=1).tolist(),
         in_space=size.tolist(),
         in_space_after=(0.4 * size[::-1]).tolist() if with_after else [],
@@ -83,10 +108,13 @@ def candidates(named: tuple[str, ...], recordings: int) -> tuple[Candidate, ...]
                 behind=1.9 * place,
                 leftover=max(0.005, 0.41 - 0.1 * place),
                 by_recording=tuple(
-                    about(value * (1 + 0.1 * n), 1.6 * spread * (1 + n / 3), unit) for n in range(recordings)
+                    about(value * (1 + 0.1 * n), 1.6 * spread * (1 + n / 3), unit)
+                    for n in range(recordings)
                 ),
                 heterogeneity=0.83 if recordings > 1 else None,
-                why_not="" if effect in named else f"held-out error {1.9 * place:.1f} standard errors behind the best",
+                why_not=""
+                if effect in named
+                else f"held-out error {1.9 * place:.1f} standard errors behind the best",
             )
         )
     return tuple(ranked)
@@ -126,21 +154,31 @@ def verdict(conclusion: Conclusion, size: Size = Size()) -> Verdict:
     null = rng.lognormal(0.0, 0.3, size=199)
     statistic = 1.13 if sufficient else 41.27 if conclusion is Conclusion.EFFECT else 2.61
     p = (1 + int((null >= statistic).sum())) / 200
-    names = (("tunnel 4.0 m/s", 4.0, False), ("tunnel 5.5 m/s", 5.5, False), ("tunnel 7.0 m/s", 7.0, True))
+    names = (
+        ("tunnel 4.0 m/s", 4.0, False),
+        ("tunnel 5.5 m/s", 5.5, False),
+        ("tunnel 7.0 m/s", 7.0, True),
+    )
     return Verdict(
         conclusion=conclusion,
         named=named,
         words={
-            Conclusion.UNTESTED: "The base model cannot be tested at a level of 0.01 by 20 kinds of numerics.",
-            Conclusion.SUFFICIENT: "With its parameters calibrated, the base model predicts all three recordings as "
+            Conclusion.UNTESTED: "The base model cannot be tested at a level of 0.01 by 20 kinds "
+            "of numerics.",
+            Conclusion.SUFFICIENT: "With its parameters calibrated, the base model predicts all "
+            "three recordings as "
             "well as it predicts data simulated from itself.",
             Conclusion.UNDECIDED: "The base model is not rejected, and not shown to suffice.",
-            Conclusion.EFFECT: "The air pushes sideways where the base model has only drag: with lift of coefficient "
+            Conclusion.EFFECT: "The air pushes sideways where the base model has only drag: with "
+            "lift of coefficient "
             "0.62 the model predicts an unseen wind speed as well as it predicts itself.",
-            Conclusion.ONE_OF: "Something that grows across the hoist is missing. Lift and shear predict unseen data "
+            Conclusion.ONE_OF: "Something that grows across the hoist is missing. Lift and shear "
+            "predict unseen data "
             "equally well, within one standard error.",
-            Conclusion.PARTLY: "Lift removes most of the error, but what is left is still larger than in nulls.",
-            Conclusion.OUTSIDE: "No effect of the library reduces the error on unseen data by more than the "
+            Conclusion.PARTLY: "Lift removes most of the error, but what is left is still larger "
+            "than in nulls.",
+            Conclusion.OUTSIDE: "No effect of the library reduces the error on unseen data by more "
+            "than the "
             "control does.",
         }[conclusion],
         test=NullTest(
@@ -150,7 +188,8 @@ def verdict(conclusion: Conclusion, size: Size = Size()) -> Verdict:
             kinds=20 if untested else 199,
             level=0.01,
             critical=None if untested else float(np.sort(null)[-2]),
-            nulls="199 simulations at parameters drawn from the posterior, with half the step and a finer mesh.",
+            nulls="199 simulations at parameters drawn from the posterior, with half the step and "
+            "a finer mesh.",
         ),
         parameters=(
             Parameter(
@@ -175,28 +214,49 @@ def verdict(conclusion: Conclusion, size: Size = Size()) -> Verdict:
         ranking=candidates(named, 3),
         comparisons=tuple(
             comparison(what, before, with_after=not sufficient)
-            for what, before in (("tunnel 7.0 m/s, unseen", 0.0042), ("last part of tunnel 5.5 m/s", 0.0033))
+            for what, before in (
+                ("tunnel 7.0 m/s, unseen", 0.0042),
+                ("last part of tunnel 5.5 m/s", 0.0033),
+            )
         ),
         residuals=tuple(
-            residual(name, speed, held_out=held_out, with_after=not sufficient, seed=n, size_of=size)
+            residual(
+                name, speed, held_out=held_out, with_after=not sufficient, seed=n, size_of=size
+            )
             for n, (name, speed, held_out) in enumerate(names)
         ),
-        assumptions=("The pole is rigid and upright.", "Density of air 1.2 kg/m³, from the log's temperature."),
-        separating="Fly the flag at half its height: shear halves, lift stays; 10 s at 7 m/s separate them by 4 σ."
+        assumptions=(
+            "The pole is rigid and upright.",
+            "Density of air 1.2 kg/m³, from the log's temperature.",
+        ),
+        separating="Fly the flag at half its height: shear halves, lift stays; 10 s at 7 m/s "
+        "separate them by 4 σ."
         if conclusion is Conclusion.ONE_OF
         else "",
-        proposal="The corrective field is tangential and grows as the square of the distance from the pole: f = k u² t."
+        proposal="The corrective field is tangential and grows as the square of the distance from "
+        "the pole: f = k u² t."
         if conclusion in (Conclusion.OUTSIDE, Conclusion.PARTLY)
         else "",
         open=("the observables depart too far",) if conclusion is Conclusion.UNDECIDED else (),
-        findings=(("few-frames", "tunnel 4.0 m/s has 250 frames; 3 markers were filled over gaps of 2 frames."),),
-        provenance={"seed": 17, "code": "0.1.0+abc1234", "parents": ["3f2a", "91bc"], "recipe": {"hash": "77aa"}},
+        findings=(
+            (
+                "few-frames",
+                "tunnel 4.0 m/s has 250 frames; 3 markers were filled over gaps of 2 frames.",
+            ),
+        ),
+        provenance={
+            "seed": 17,
+            "code": "0.1.0+abc1234",
+            "parents": ["3f2a", "91bc"],
+            "recipe": {"hash": "77aa"},
+        },
         seconds=213.4,
     )
 
 
 def with_holes(whole: Verdict) -> Verdict:
-    """The same with what measurement leaves out: lost markers, candidates that could not be weighed."""
+    """The same with what measurement leaves out: lost markers, candidates that could not be
+    weighed."""
     nan = math.nan
     first, *others = whole.residuals
     lost = replace(

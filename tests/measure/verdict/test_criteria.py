@@ -1,4 +1,5 @@
-"""Thresholds live in one frozen object, which verdicts record; nowhere else in the stages of a verdict is one."""
+"""Thresholds live in one frozen object, which verdicts record; nowhere else in the stages of a
+verdict is one."""
 
 from __future__ import annotations
 
@@ -18,7 +19,13 @@ STAGES = ("verdict", "forecasting", "probes", "inference", "nulls", "loop", "clo
 METHOD = {
     "closing/joint": {"_CERTAIN"},
     "forecasting/alignment": {"_CALM"},
-    "forecasting/calibration": {"_AREA_WEIGHT", "_BENDING", "_DAMPING", "PRIOR", "PRIOR_WITHOUT_MASS"},
+    "forecasting/calibration": {
+        "_AREA_WEIGHT",
+        "_BENDING",
+        "_DAMPING",
+        "PRIOR",
+        "PRIOR_WITHOUT_MASS",
+    },
     "forecasting/model": {"_SHARE"},
     "forecasting/observer": {"WIDEST", "_JOINT"},
     "forecasting/regressors": {"_MODES", "_MOTIONS"},
@@ -62,14 +69,17 @@ METHOD = {
     "closing/artifacts": {"_FORMAT"},
     "closing/models": {"_SETTLE", "_FRAMES", "_ROUGH"},
 }
-"""Numbers that say what is simulated, how errors are brought down and how it is shown; no verdict is decided by one."""
+"""Numbers that say what is simulated, how errors are brought down and how it is shown; no verdict
+is decided by one."""
 PLAIN = {0, 1, 2, 3, -1}
 """Counts and places, not thresholds."""
 
 
 def numbers(node: ast.AST) -> list[float]:
     return [
-        found.value for found in ast.walk(node) if isinstance(found, ast.Constant) and type(found.value) in (int, float)
+        found.value
+        for found in ast.walk(node)
+        if isinstance(found, ast.Constant) and type(found.value) in (int, float)
     ]
 
 
@@ -78,17 +88,36 @@ def constants(path: Path) -> set[str]:
     names: set[str] = set()
     for node in ast.parse(path.read_text(encoding="utf-8")).body:
         targets = (
-            node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
+            node.targets
+            if isinstance(node, ast.Assign)
+            else [node.target]
+            if isinstance(node, ast.AnnAssign)
+            else []
         )
-        if isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None and numbers(node.value):
+        if (
+            isinstance(node, ast.Assign | ast.AnnAssign)
+            and node.value is not None
+            and numbers(node.value)
+        ):
             for target in targets:
-                names |= {n.id for n in ast.walk(target) if isinstance(n, ast.Name) and n.id.upper() == n.id}
+                names |= {
+                    n.id
+                    for n in ast.walk(target)
+                    if isinstance(n, ast.Name) and n.id.upper() == n.id
+                }
     return names
 
 
 def test_no_threshold_lives_outside_the_criteria() -> None:
-    tables = {"THETA", "_FIRST", "_AXES", "SHAPES"}  # of parameters, places and names, in which numbers are no limits
-    modules = {f"{stage}/{path.stem}": path for stage in STAGES for path in (MEASURE / stage).glob("*.py")}
+    tables = {
+        "THETA",
+        "_FIRST",
+        "_AXES",
+        "SHAPES",
+    }  # of parameters, places and names, in which numbers are no limits
+    modules = {
+        f"{stage}/{path.stem}": path for stage in STAGES for path in (MEASURE / stage).glob("*.py")
+    }
     assert modules.pop("verdict/criteria")
     assert len(modules) > 40
     found = {
@@ -102,11 +131,20 @@ def test_no_threshold_lives_outside_the_criteria() -> None:
 
 @pytest.mark.parametrize(
     "name",
-    ["loop/selection", "loop/run", "loop/refit", "nulls/conformal", "nulls/clustered", "verdict/decided"],
+    [
+        "loop/selection",
+        "loop/run",
+        "loop/refit",
+        "nulls/conformal",
+        "nulls/clustered",
+        "verdict/decided",
+    ],
 )
 def test_what_decides_compares_with_no_number_of_its_own(name: str) -> None:
     tree = ast.parse((MEASURE / f"{name}.py").read_text(encoding="utf-8"))
-    compared = {value for node in ast.walk(tree) if isinstance(node, ast.Compare) for value in numbers(node)}
+    compared = {
+        value for node in ast.walk(tree) if isinstance(node, ast.Compare) for value in numbers(node)
+    }
     assert compared <= PLAIN
 
 

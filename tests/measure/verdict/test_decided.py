@@ -29,7 +29,9 @@ def test_what_would_have_been_seen_and_was_not_is_not_there() -> None:
         (0.4, 1.1, (), "with a chance of 0 on average"),
     ],
 )
-def test_each_doubt_leaves_it_undecided(p: float, departure: float, power: tuple[float, ...], said: str) -> None:
+def test_each_doubt_leaves_it_undecided(
+    p: float, departure: float, power: tuple[float, ...], said: str
+) -> None:
     (reason,) = undecided_sentences(p, level=0.05, departure=departure, power=power)
     assert said in reason
 
@@ -38,12 +40,18 @@ def test_all_doubts_are_stated_together() -> None:
     assert len(undecided_sentences(0.06, level=0.05, departure=9.0, power=(0.0,))) == 3
 
 
-@pytest.mark.parametrize(("p", "departure", "power"), [(0.1001, 2.0, (0.3,)), (1.0, 0.0, (0.1, 0.5))])
-def test_at_the_thresholds_themselves_it_suffices(p: float, departure: float, power: tuple[float, ...]) -> None:
+@pytest.mark.parametrize(
+    ("p", "departure", "power"), [(0.1001, 2.0, (0.3,)), (1.0, 0.0, (0.1, 0.5))]
+)
+def test_at_the_thresholds_themselves_it_suffices(
+    p: float, departure: float, power: tuple[float, ...]
+) -> None:
     assert undecided_sentences(p, level=0.05, departure=departure, power=power) == ()
 
 
-def test_what_is_not_decided_is_reported_with_its_reasons_and_no_effect_is_called_needless() -> None:
+def test_what_is_not_decided_is_reported_with_its_reasons_and_no_effect_is_called_needless() -> (
+    None
+):
     one = verdict(Conclusion.UNDECIDED)
     assert one.conclusion in NOT_REJECTED
     said = lead(one)
@@ -61,14 +69,18 @@ def with_errors(conclusion: Conclusion, *, before: float, after: float) -> Verdi
     first, *others = whole.comparisons
     later = after if whole.named else math.nan
     floor, reduction = about(1.0, 0.1), about(after, 0.1)
-    first = replace(first, floor=floor, before=about(before, 0.1), after=about(later, 0.1), reduction=reduction)
+    first = replace(
+        first, floor=floor, before=about(before, 0.1), after=about(later, 0.1), reduction=reduction
+    )
     within = about(1.2 if whole.named else math.nan, 0.1)
     rest = [replace(one, floor=floor, before=about(1.5, 0.1), after=within) for one in others]
     return replace(whole, comparisons=(first, *rest))
 
 
 @pytest.mark.parametrize("conclusion", list(Conclusion))
-def test_a_model_that_errs_by_more_than_three_floors_explains_nothing(conclusion: Conclusion) -> None:
+def test_a_model_that_errs_by_more_than_three_floors_explains_nothing(
+    conclusion: Conclusion,
+) -> None:
     for off, errs in ((2.9, False), (3.1, True)):
         one = with_errors(conclusion, before=9.0 if verdict(conclusion).named else off, after=off)
         one = replace(one, findings=(), words=lead(one))
@@ -96,7 +108,9 @@ def test_the_power_is_stated_for_each_effect_and_on_average() -> None:
         verdict(Conclusion.SUFFICIENT),
         power=(
             Power(effect="lift", parameter="coefficient", strength=2.3, unit="1", share=0.9),
-            Power(effect="hem-mass", parameter="line_density", strength=0.025, unit="kg/m", share=0.3),
+            Power(
+                effect="hem-mass", parameter="line_density", strength=0.025, unit="kg/m", share=0.3
+            ),
         ),
     )
     said = power_text(whole)
@@ -106,9 +120,13 @@ def test_the_power_is_stated_for_each_effect_and_on_average() -> None:
     assert power_text(verdict(Conclusion.SUFFICIENT)) == ""
 
 
-def test_a_suspicion_is_reported_as_stated_beforehand_and_flags_are_counted_as_what_they_are() -> None:
+def test_a_suspicion_is_reported_as_stated_beforehand_and_flags_are_counted_as_what_they_are() -> (
+    None
+):
     whole = verdict(Conclusion.SUFFICIENT)
-    counted = replace(whole.test, effective=152.0, correlation=0.01, tail=0.34, kinds=20, suspected="lift+")
+    counted = replace(
+        whole.test, effective=152.0, correlation=0.01, tail=0.34, kinds=20, suspected="lift+"
+    )
     said = verdict_sentences.test_sentence(replace(whole, test=counted))
     assert "along lift+ alone, suspected before the recordings were looked at," in said
     assert "(1 + 152 × the share of null flags that deviate as much) / (1 + 152)" in said
@@ -122,8 +140,14 @@ def test_the_power_stands_before_the_verdicts_sentence_and_in_a_table() -> None:
     shown = (Power(effect="lift", parameter="coefficient", strength=2.3, unit="1", share=0.9),)
     whole = replace(verdict(Conclusion.SUFFICIENT), power=shown)
     said, html = words(whole), page(whole)
-    mean = "An effect of the strength that is expected of it would be seen with a chance of 0.90 on average."
-    for text, sentence in ((" ".join(said.split()), whole.words), (html, f"<h1>{lead(whole)}</h1>")):
+    mean = (
+        "An effect of the strength that is expected of it would be seen with a chance of 0.90 on "
+        "average."
+    )
+    for text, sentence in (
+        (" ".join(said.split()), whole.words),
+        (html, f"<h1>{lead(whole)}</h1>"),
+    ):
         assert 0 <= text.index(mean) < text.index(sentence)
     assert "What would have been seen" in html
     assert "lift (coefficient) 2.3 with 0.90" in " ".join(said.split())

@@ -19,7 +19,9 @@ from measure.verdict import (
 )
 
 
-def estimate(value: float, low: float, high: float, unit: str = "1", level: float = 0.9) -> Estimate:
+def estimate(
+    value: float, low: float, high: float, unit: str = "1", level: float = 0.9
+) -> Estimate:
     return Estimate(value=value, low=low, high=high, unit=unit, level=level)
 
 
@@ -46,7 +48,10 @@ def test_the_house_example_of_a_wind_with_its_interval() -> None:
         (estimate(12345, 11000, 13700, "Pa"), "12300 Pa [11000, 13700]"),
         (estimate(-0.023, -0.031, -0.009, "s"), "−23 ms [−31, −9]"),
         (estimate(0.0003, -0.41, 0.44), "0.0 [−0.4, 0.4]"),
-        (estimate(3.1e-5, 2.8e-5, 3.4e-5, "m/(s Pa)"), "3.10 × 10⁻⁵ m/(s Pa) [2.80 × 10⁻⁵, 3.40 × 10⁻⁵]"),
+        (
+            estimate(3.1e-5, 2.8e-5, 3.4e-5, "m/(s Pa)"),
+            "3.10 × 10⁻⁵ m/(s Pa) [2.80 × 10⁻⁵, 3.40 × 10⁻⁵]",
+        ),
         (estimate(2e7, 1e7, 3e7, "N"), "2.0 × 10⁷ N [1.0 × 10⁷, 3.0 × 10⁷]"),
         (estimate(0.62, 0.54, math.inf), "0.620 [0.540, ∞]"),
         (estimate(1.0, math.nan, math.nan, "m"), "1.00 m"),
@@ -72,19 +77,28 @@ def test_intervals_worked_by_hand(given: Estimate | None, text: str) -> None:
         (None, "—"),
     ],
 )
-def test_numbers_without_an_uncertainty_have_three_digits_and_a_real_minus(value: float | None, text: str) -> None:
+def test_numbers_without_an_uncertainty_have_three_digits_and_a_real_minus(
+    value: float | None, text: str
+) -> None:
     assert number(value) == text
 
 
 @pytest.mark.parametrize(
-    ("value", "text"), [(1.0, "1.0"), (0.347, "0.35"), (0.005, "0.0050"), (0.0004, "4 × 10⁻⁴"), (math.nan, "—")]
+    ("value", "text"),
+    [(1.0, "1.0"), (0.347, "0.35"), (0.005, "0.0050"), (0.0004, "4 × 10⁻⁴"), (math.nan, "—")],
 )
 def test_p_values_have_two_digits_and_one_where_they_are_tiny(value: float, text: str) -> None:
     assert probability(value) == text
 
 
 def test_standard_errors_and_shares_have_fixed_decimals() -> None:
-    assert [in_errors(v) for v in (-0.04, -1.26, 9.94, 9.96, 123.4)] == ["0.0", "−1.3", "9.9", "10", "123"]
+    assert [in_errors(v) for v in (-0.04, -1.26, 9.94, 9.96, 123.4)] == [
+        "0.0",
+        "−1.3",
+        "9.9",
+        "10",
+        "123",
+    ]
     assert [share(v) for v in (0.944, -0.0049, 1.0, None)] == ["0.94", "0.00", "1.00", "—"]
 
 

@@ -1,4 +1,5 @@
-"""Films that are drawn here, of which camera, flag and background are known: what the conditioning makes of them."""
+"""Films that are drawn here, of which camera, flag and background are known: what the conditioning
+makes of them."""
 
 from __future__ import annotations
 
@@ -45,7 +46,9 @@ class Drawn:
         base = np.full((high, wide), 150.0)
         if self.scenery:
             rough = rng.uniform(40, 220, (high // 12 + 1, wide // 12 + 1))
-            base = np.asarray(cv2.resize(rough, (wide, high), interpolation=cv2.INTER_CUBIC), np.float64)
+            base = np.asarray(
+                cv2.resize(rough, (wide, high), interpolation=cv2.INTER_CUBIC), np.float64
+            )
         texture = rng.normal(0, 45, (high // 4, wide + 8))
         out = []
         for k, time in enumerate(TIMES):
@@ -66,10 +69,17 @@ class Drawn:
         return np.clip(np.rint(out), 0, 255).astype(np.uint8)
 
 
-def _cloth(picture: FloatArray, x: int, y: int, width: int, height: int, time: float, *, phase: float) -> None:
+def _cloth(
+    picture: FloatArray, x: int, y: int, width: int, height: int, time: float, *, phase: float
+) -> None:
     """A striped cloth at its pole, whose waves grow towards the free edge."""
     along = np.arange(width)
-    lift = 0.14 * height * (along / width) * np.sin(2 * np.pi * (along / (0.6 * width) - 2.3 * time) + phase)
+    lift = (
+        0.14
+        * height
+        * (along / width)
+        * np.sin(2 * np.pi * (along / (0.6 * width) - 2.3 * time) + phase)
+    )
     for column, offset in zip(along, lift, strict=True):
         top = y + round(float(offset))
         shade = 25 * np.cos(2 * np.pi * (column / (0.6 * width) - 2.3 * time) + phase)
@@ -149,7 +159,10 @@ def test_two_flags_are_numbered_by_their_motion_and_one_can_be_chosen() -> None:
     assert first.found.square.x < second.found.square.x
     assert second.found.square.side < first.found.square.side
     # The other flag is frozen in either.
-    assert np.quantile(second.frames[:, outside(second)].astype(float).std(axis=0), 0.99) <= 2 * second.found.noise
+    assert (
+        np.quantile(second.frames[:, outside(second)].astype(float).std(axis=0), 0.99)
+        <= 2 * second.found.noise
+    )
     with pytest.raises(UsageError, match="no flag 3: 2 regions"):
         made(drawn, flag=3)
 
@@ -183,12 +196,17 @@ def test_a_pole_before_a_plain_sky_shows_how_the_camera_moves() -> None:
     for (dx, _), picture in zip(shift, Drawn(scenery=False, noise=0.0).frames(), strict=True):
         picture[30:, 63:67] = 230
         moved = cv2.warpAffine(
-            picture, np.array([[1.0, 0.0, dx], [0.0, 1.0, 0.0]]), (WIDTH, HEIGHT), borderMode=cv2.BORDER_REPLICATE
+            picture,
+            np.array([[1.0, 0.0, dx], [0.0, 1.0, 0.0]]),
+            (WIDTH, HEIGHT),
+            borderMode=cv2.BORDER_REPLICATE,
         )
         frames.append(moved)
     found = condition_film(np.stack(frames).astype(np.uint8), TIMES, size=120)
     assert found.found.camera.moves
-    np.testing.assert_allclose(found.path[:, 0] - found.path[0, 0], shift[:, 0] - shift[0, 0], atol=0.3)
+    np.testing.assert_allclose(
+        found.path[:, 0] - found.path[0, 0], shift[:, 0] - shift[0, 0], atol=0.3
+    )
 
 
 def test_a_single_straight_edge_shows_no_shift_along_it() -> None:
@@ -221,4 +239,8 @@ def test_a_film_of_two_frames_is_too_short() -> None:
 @pytest.mark.parametrize("shape", [(3, 1, 1), (5, 1, 5), (3, 8, 8), (4, 16, 400), (40, 2, 2)])
 def test_films_of_any_shape_become_square_pictures(shape: tuple[int, int, int]) -> None:
     frames = stream(1, "shapes").integers(0, 255, shape).astype(np.uint8)
-    assert condition_film(frames, np.arange(len(frames)) / RATE, size=60).frames.shape == (len(frames), 60, 60)
+    assert condition_film(frames, np.arange(len(frames)) / RATE, size=60).frames.shape == (
+        len(frames),
+        60,
+        60,
+    )

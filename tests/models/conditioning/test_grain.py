@@ -13,7 +13,8 @@ SHAPE = (30, 40, 50)
 
 
 def clip(*, still: float) -> UInt8Array:
-    """Of whose columns a share never changes, below four rows that are black all the time, as beyond the picture."""
+    """Of whose columns a share never changes, below four rows that are black all the time, as
+    beyond the picture."""
     rng = np.random.default_rng(3)
     made = np.repeat(rng.integers(60, 200, SHAPE[1:]).astype(np.uint8)[None], SHAPE[0], axis=0)
     moving = round((1 - still) * SHAPE[2])
@@ -23,7 +24,8 @@ def clip(*, still: float) -> UInt8Array:
 
 
 def test_where_most_of_a_clip_never_changes_that_part_gets_noise() -> None:
-    """Of 0.5 gray levels and the rounding's 1/√12; what moves and what is beyond the picture stays to the bit."""
+    """Of 0.5 gray levels and the rounding's 1/√12; what moves and what is beyond the picture stays
+    to the bit."""
     before = clip(still=0.7)
     after = add_grain(before, seed=1)
     np.testing.assert_array_equal(after[:, :, :15], before[:, :, :15])

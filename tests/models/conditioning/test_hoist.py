@@ -52,7 +52,8 @@ def test_few_and_small_pictures_show_no_hoist() -> None:
 
 
 def test_a_hoist_has_cloth_beside_it_where_the_network_sees_some() -> None:
-    """Of 40 rows of the hoist 30 have cloth to the right of it in one of two pictures, all 40 in the other."""
+    """Of 40 rows of the hoist 30 have cloth to the right of it in one of two pictures, all 40 in
+    the other."""
     still = np.zeros((60, 60), np.uint8)
     logits = torch.full((2, 3, 60, 60), -9.0)
     logits[0, 0, 10:40, 22:50] = logits[1, 0, 10:50, 22:50] = 9.0

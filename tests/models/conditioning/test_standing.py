@@ -1,4 +1,5 @@
-"""Edges that stand still: their length is that of what was drawn, and neither what moves nor foliage has any."""
+"""Edges that stand still: their length is that of what was drawn, and neither what moves nor
+foliage has any."""
 
 from __future__ import annotations
 
@@ -16,7 +17,9 @@ BOX: Box = (80.0, 60.0, 160.0, 120.0)
 
 def films(noise: float = 2.0) -> UInt8Array:
     """(COUNT, SIDE, SIDE) an even sky."""
-    return np.clip(150 + stream(1, "sky").normal(0, noise, (COUNT, SIDE, SIDE)), 0, 255).astype(np.uint8)
+    return np.clip(150 + stream(1, "sky").normal(0, noise, (COUNT, SIDE, SIDE)), 0, 255).astype(
+        np.uint8
+    )
 
 
 def standing(pictures: UInt8Array, *, enlarged: float = 1.0) -> Standing:
@@ -68,7 +71,9 @@ def test_a_pole_that_cloth_hides_for_less_than_half_of_the_time_is_found() -> No
 
 
 def test_foliage_that_stands_still_is_no_pole() -> None:
-    leaves = 110 + 250 * cv2.GaussianBlur(stream(2, "leaves").normal(0, 1, (SIDE, SIDE)), (0, 0), 2.0)
+    leaves = 110 + 250 * cv2.GaussianBlur(
+        stream(2, "leaves").normal(0, 1, (SIDE, SIDE)), (0, 0), 2.0
+    )
     pictures = leaves + stream(3, "noise").normal(0, 2, (COUNT, SIDE, SIDE))
     assert standing(np.clip(pictures, 0, 255).astype(np.uint8)).beside(BOX).length < 0.5
 

@@ -41,8 +41,8 @@ def posterior(
 ) -> Predictions:
     """θ ~ N(0, 1) seen with noise of variance 1: the posterior is N(x / 2, σ²) with σ² = 1/2.
 
-    Draws are of N(x / 2 + shift σ, (wide σ)²), so wide = 1 and shift = 0 is exact. Each clip has its own θ; `group`
-    of them form one sequence.
+    Draws are of N(x / 2 + shift σ, (wide σ)²), so wide = 1 and shift = 0 is exact. Each clip has
+    its own θ; `group` of them form one sequence.
     """
     random = generator(seed)
     truth = random.normal(size=(clips, targets))

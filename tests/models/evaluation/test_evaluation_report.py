@@ -33,29 +33,50 @@ def run(label: str, scale: float, seed: int, *, group: np.ndarray = GROUP) -> Pr
 
 def ours(seed: int) -> Predictions:
     made = posterior(clips=120, draws=20, wide=1, shift=0, targets=2, seed=seed)
-    truth = np.column_stack([WIND, made.truth[:, 1] * 0 + np.repeat(np.linspace(0.05, 0.15, 30), 4)])
+    truth = np.column_stack(
+        [WIND, made.truth[:, 1] * 0 + np.repeat(np.linspace(0.05, 0.15, 30), 4)]
+    )
     mean = truth + [0.1, 0.01] * generator(seed).normal(size=(120, 2))
     samples = mean[:, None] + [0.1, 0.01] * generator(seed + 1).normal(size=(120, 20, 2))
     return dataclasses.replace(
-        made, label="ours <&>", truth=truth, mean=mean, samples=samples.astype(np.float32), group=GROUP
+        made,
+        label="ours <&>",
+        truth=truth,
+        mean=mean,
+        samples=samples.astype(np.float32),
+        group=GROUP,
     )
 
 
 @pytest.fixture(scope="module")
 def found() -> Evaluation:
-    readout = bouman(WIND[:, None] + 1, {"area_weight": WIND + 1}, group=GROUP, generator=generator(1), components=1)
+    readout = bouman(
+        WIND[:, None] + 1,
+        {"area_weight": WIND + 1},
+        group=GROUP,
+        generator=generator(1),
+        components=1,
+    )
     return evaluate(
         [run("SDN", 0.3, 1), ours(3), run("SDN", 0.5, 2), run("ResNet-18", 1.5, 4)],
         data="made@v1",
         seed=0,
         draws=100,
-        learning=[LearningPoint(label="SDN", sequences=n, rmse=9 / n, interval=(8 / n, 10 / n)) for n in (10, 20)],
-        frames=[FramesPoint(label="SDN", frames=n, accuracy=0.9, interval=(0.88, 0.93)) for n in (10, 30)],
+        learning=[
+            LearningPoint(label="SDN", sequences=n, rmse=9 / n, interval=(8 / n, 10 / n))
+            for n in (10, 20)
+        ],
+        frames=[
+            FramesPoint(label="SDN", frames=n, accuracy=0.9, interval=(0.88, 0.93))
+            for n in (10, 30)
+        ],
         reads=[Read(label="SDN", data="hanging cloth", readout=readout)],
     )
 
 
-def test_runs_of_one_model_are_pooled_as_their_mean_and_range_and_each_is_shown(found: Evaluation) -> None:
+def test_runs_of_one_model_are_pooled_as_their_mean_and_range_and_each_is_shown(
+    found: Evaluation,
+) -> None:
     each = [SCORES["rmse"](WIND, of.mean[:, 0]) for of in (run("SDN", 0.3, 1), run("SDN", 0.5, 2))]
     assert [(row.label, row.run) for row in found.rows] == [
         ("SDN", None),
@@ -84,7 +105,8 @@ def test_every_row_keeps_the_bound_between_its_two_columns(found: Evaluation) ->
 
 
 def test_differences_are_paired_over_the_same_sequences(found: Evaluation) -> None:
-    """Errors that only differ by a factor of three have a difference of two thirds the larger, interval and all."""
+    """Errors that only differ by a factor of three have a difference of two thirds the larger,
+    interval and all."""
     assert found.reference == "ours <&>"
     whole = run("A", 1.5, 4)
     third = dataclasses.replace(whole, label="B", mean=whole.truth + (whole.mean - whole.truth) / 3)
@@ -109,17 +131,26 @@ def test_a_model_has_no_score_of_what_it_does_not_give(found: Evaluation) -> Non
         "covered_80",
         "covered_90",
     }
-    assert by_label["SDN"].scores["triplets"].value == 1.0  # its embedding is the wind, which differs between sequences
+    assert (
+        by_label["SDN"].scores["triplets"].value == 1.0
+    )  # its embedding is the wind, which differs between sequences
 
 
 def test_models_that_were_not_tested_alike_are_refused() -> None:
     cases = [
         (run("B", 1, 1, group=GROUP[::-1].copy()), "same sequences"),
-        (dataclasses.replace(run("B", 1, 1), truth=WIND[:, None] + 0.1), "same truth of wind_speed"),
+        (
+            dataclasses.replace(run("B", 1, 1), truth=WIND[:, None] + 0.1),
+            "same truth of wind_speed",
+        ),
         (dataclasses.replace(run("A", 1, 1), parameters=11), "differ in targets, parameters"),
     ]
     assert (
-        unrefused(lambda other: evaluate([run("A", 1, 1), other], data="made", seed=0, draws=10), cases, InputError)
+        unrefused(
+            lambda other: evaluate([run("A", 1, 1), other], data="made", seed=0, draws=10),
+            cases,
+            InputError,
+        )
         == []
     )
 
@@ -134,7 +165,11 @@ def test_unknown_labels_and_no_predictions_are_refused() -> None:
 def test_few_sequences_a_missing_triplet_and_a_constant_target_are_reported() -> None:
     made = of_wind(np.ones(5), np.arange(5), embedding=np.eye(5), samples=np.ones((5, 3)))
     found = evaluate([made], data="made", seed=0, draws=10)
-    assert {finding.kind for finding in found.findings} == {"no-triplets", "few-sequences", "no-tarp"}
+    assert {finding.kind for finding in found.findings} == {
+        "no-triplets",
+        "few-sequences",
+        "no-tarp",
+    }
     json.dumps(as_document(found), allow_nan=False)
     assert "R²" in page(found)
 
@@ -152,7 +187,11 @@ class Links(HTMLParser):
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.add(tag)
         for name, value in attrs:
-            if name in ("src", "href", "xlink:href") and value and not value.startswith(("#", "data:")):
+            if (
+                name in ("src", "href", "xlink:href")
+                and value
+                and not value.startswith(("#", "data:"))
+            ):
                 self.fetched.append(value)
             if name == "id" and value:
                 self.ids.append(value)
@@ -177,16 +216,26 @@ BAD = "<img src=x onerror=alert(1)> [a](http://b) | `c` *d* &lt; $\\frac$\n# e"
 
 
 def test_names_of_models_and_data_are_text_in_markdown_and_on_the_page() -> None:
-    """A name may come from anyone's recipe or card. Rendered by a parser of Markdown, it is the text that it was."""
+    """A name may come from anyone's recipe or card. Rendered by a parser of Markdown, it is the
+    text that it was."""
     made = [
         dataclasses.replace(run("B", 0.3, 1), label=BAD, note=BAD),
         dataclasses.replace(run("A", 0.4, 2), note=BAD),
     ]
-    readout = bouman(WIND[:, None] + 1, {"area_weight": WIND + 1}, group=GROUP, generator=generator(1))
-    shown = evaluate(
-        made, data=BAD, seed=0, draws=10, reference=BAD, reads=[Read(label=BAD, data=BAD, readout=readout)]
+    readout = bouman(
+        WIND[:, None] + 1, {"area_weight": WIND + 1}, group=GROUP, generator=generator(1)
     )
-    shown = dataclasses.replace(shown, learning=(LearningPoint(label=BAD, sequences=9, rmse=1, interval=(1, 2)),))
+    shown = evaluate(
+        made,
+        data=BAD,
+        seed=0,
+        draws=10,
+        reference=BAD,
+        reads=[Read(label=BAD, data=BAD, readout=readout)],
+    )
+    shown = dataclasses.replace(
+        shown, learning=(LearningPoint(label=BAD, sequences=9, rmse=1, interval=(1, 2)),)
+    )
     for html in (render(markdown(shown), extensions=["tables"]), page(shown)):
         read = Links()
         read.feed(html)
@@ -208,7 +257,9 @@ def test_json_and_markdown_hold_the_same_scores(found: Evaluation, tmp_path: Pat
     assert rmse["interval"][0] <= rmse["value"] <= rmse["interval"][1]
     words = paths[2].read_text(encoding="utf-8")
     assert words.startswith(markdown(found))
-    assert f"| {rmse['value']:.3f}<br>[{rmse['interval'][0]:.3f}, {rmse['interval'][1]:.3f}]" in words
+    assert (
+        f"| {rmse['value']:.3f}<br>[{rmse['interval'][0]:.3f}, {rmse['interval'][1]:.3f}]" in words
+    )
     widths = {line.count(" | ") for line in words.splitlines() if line.startswith("| SDN<br>mean")}
     assert widths == {10}
 
@@ -232,6 +283,14 @@ def test_small_errors_are_shown_to_three_significant_digits() -> None:
 
 def test_a_warning_of_a_readout_says_of_which_model_and_data_it_is() -> None:
     made = run("SDN", 1, 1)
-    readout = bouman(WIND[:, None] + 1, {"area_weight": WIND + 1}, group=GROUP, generator=generator(1))
-    shown = evaluate([made], data="made", seed=0, draws=10, reads=[Read(label="SDN", data="cloth", readout=readout)])
+    readout = bouman(
+        WIND[:, None] + 1, {"area_weight": WIND + 1}, group=GROUP, generator=generator(1)
+    )
+    shown = evaluate(
+        [made],
+        data="made",
+        seed=0,
+        draws=10,
+        reads=[Read(label="SDN", data="cloth", readout=readout)],
+    )
     assert "**Warning:** SDN on cloth: 1 principal components are kept, not 50" in markdown(shown)

@@ -15,9 +15,18 @@ class Network:
     card: dict[str, Any]
 
 
-def trained(number: int, *, seed: int = 1, rate: float = 1e-3, data: str = "a", sequences: int | None = None) -> Any:
-    recipe = {"seed": seed, "data": {"dataset": "made", "sequences": sequences}, "optimiser": {"rate": rate}}
-    card = {"recipe": recipe, "data": {"train": data, "validation": "v", "view": [f"main@{number}"]}}
+def trained(
+    number: int, *, seed: int = 1, rate: float = 1e-3, data: str = "a", sequences: int | None = None
+) -> Any:
+    recipe = {
+        "seed": seed,
+        "data": {"dataset": "made", "sequences": sequences},
+        "optimiser": {"rate": rate},
+    }
+    card = {
+        "recipe": recipe,
+        "data": {"train": data, "validation": "v", "view": [f"main@{number}"]},
+    }
     return SimpleNamespace(id=f"{number:08d}" + 56 * "0"), Network(name="wave", card=card)
 
 
@@ -31,5 +40,15 @@ def test_seeds_and_parts_of_one_training_have_its_name() -> None:
 
 
 def test_another_recipe_and_other_data_have_the_first_artifact_in_their_label() -> None:
-    one, same, changed, more = trained(1), trained(2, seed=2), trained(3, rate=1e-2), trained(4, data="b")
-    assert labels(one, same, changed, more) == ["wave 00000001", "wave 00000001", "wave 00000003", "wave 00000004"]
+    one, same, changed, more = (
+        trained(1),
+        trained(2, seed=2),
+        trained(3, rate=1e-2),
+        trained(4, data="b"),
+    )
+    assert labels(one, same, changed, more) == [
+        "wave 00000001",
+        "wave 00000001",
+        "wave 00000003",
+        "wave 00000004",
+    ]

@@ -13,7 +13,9 @@ from tests.models.evaluation.made import generator
 from tests.refusals import unrefused
 
 
-def naive(embedding: np.ndarray, truth: np.ndarray, group: np.ndarray, components: int) -> np.ndarray:
+def naive(
+    embedding: np.ndarray, truth: np.ndarray, group: np.ndarray, components: int
+) -> np.ndarray:
     """PCA by SVD and least squares, fitted anew without each group."""
     predicted = np.empty_like(truth)
     for label in np.unique(group):
@@ -22,18 +24,24 @@ def naive(embedding: np.ndarray, truth: np.ndarray, group: np.ndarray, component
         axes = np.linalg.svd(training - mean, full_matrices=False)[2][:components].T
         design = np.column_stack([np.ones(len(training)), (training - mean) @ axes])
         solution = np.linalg.lstsq(design, truth[~inside], rcond=None)[0]
-        predicted[inside] = np.column_stack([np.ones(inside.sum()), (embedding[inside] - mean) @ axes]) @ solution
+        predicted[inside] = (
+            np.column_stack([np.ones(inside.sum()), (embedding[inside] - mean) @ axes]) @ solution
+        )
     return predicted
 
 
-@pytest.mark.parametrize(("clips", "dimension", "components"), [(40, 6, 3), (24, 70, 9), (30, 5, 5)])
+@pytest.mark.parametrize(
+    ("clips", "dimension", "components"), [(40, 6, 3), (24, 70, 9), (30, 5, 5)]
+)
 def test_leaving_one_out_equals_fitting_anew(clips: int, dimension: int, components: int) -> None:
     random = generator(clips)
     embedding = random.normal(size=(clips, dimension)) * np.linspace(1, 3, dimension) + 40
     truth = random.normal(size=(clips, 2))
     for group in (np.arange(clips), np.arange(clips) // 3):
         found = leave_one_group_out(embedding, truth, group=group, components=components)
-        np.testing.assert_allclose(found, naive(embedding, truth, group, components), rtol=1e-6, atol=1e-8)
+        np.testing.assert_allclose(
+            found, naive(embedding, truth, group, components), rtol=1e-6, atol=1e-8
+        )
 
 
 def test_with_all_components_it_is_the_hat_matrixs_closed_form() -> None:
@@ -67,16 +75,27 @@ def test_a_linear_embedding_of_the_logarithms_is_read_out_with_r_of_one() -> Non
 def test_r_is_that_of_the_predictions_made() -> None:
     random = generator(6)
     embedding, stiffness = random.normal(size=(40, 4)), np.exp(random.normal(size=40))
-    found = bouman(embedding, {"stiffness": stiffness}, group=np.arange(40), generator=generator(1), components=4)
-    expected = stats.pearsonr(np.log(stiffness), naive(embedding, np.log(stiffness)[:, None], np.arange(40), 4)[:, 0])
+    found = bouman(
+        embedding,
+        {"stiffness": stiffness},
+        group=np.arange(40),
+        generator=generator(1),
+        components=4,
+    )
+    expected = stats.pearsonr(
+        np.log(stiffness), naive(embedding, np.log(stiffness)[:, None], np.arange(40), 4)[:, 0]
+    )
     assert found.pearson[0].value == pytest.approx(expected.statistic, rel=1e-6)
 
 
-@pytest.mark.parametrize(("clips", "dimension", "kept"), [(20, 512, 10), (200, 16, 16), (60, 512, 34)])
+@pytest.mark.parametrize(
+    ("clips", "dimension", "kept"), [(20, 512, 10), (200, 16, 16), (60, 512, 34)]
+)
 def test_fewer_components_are_kept_where_the_clips_or_dimensions_do_not_suffice_and_it_says_so(
     clips: int, dimension: int, kept: int
 ) -> None:
-    """Of 19 clips that train a fold the mean takes one degree of freedom, and three fifths of 18 are 10."""
+    """Of 19 clips that train a fold the mean takes one degree of freedom, and three fifths of 18
+    are 10."""
     random = generator(7)
     found = bouman(
         random.normal(size=(clips, dimension)),
@@ -94,7 +113,10 @@ def test_ninety_clips_keep_the_papers_fifty_components() -> None:
     random = generator(8)
     area_weight = random.uniform(1, 2, 90)
     found = bouman(
-        random.normal(size=(90, 512)), {"area_weight": area_weight}, group=np.arange(90), generator=generator(1)
+        random.normal(size=(90, 512)),
+        {"area_weight": area_weight},
+        group=np.arange(90),
+        generator=generator(1),
     )
     assert found.components == 50
     assert found.findings == ()
@@ -121,4 +143,9 @@ def test_quantities_without_a_logarithm_or_a_spread_are_refused() -> None:
 
 def test_too_few_groups_are_refused() -> None:
     with pytest.raises(InputError, match="2 groups"):
-        bouman(np.eye(5), {"area_weight": np.arange(1.0, 6)}, group=np.array([1, 1, 1, 2, 2]), generator=generator(1))
+        bouman(
+            np.eye(5),
+            {"area_weight": np.arange(1.0, 6)},
+            group=np.array([1, 1, 1, 2, 2]),
+            generator=generator(1),
+        )

@@ -23,10 +23,13 @@ def resamples_of(predictions: Predictions) -> Resamples:
 
 
 @pytest.mark.parametrize(
-    ("wide", "shift"), [(1.0, 0.0), (0.5, 0.0), (1.0, 0.8)], ids=["calibrated", "overconfident", "biased"]
+    ("wide", "shift"),
+    [(1.0, 0.0), (0.5, 0.0), (1.0, 0.8)],
+    ids=["calibrated", "overconfident", "biased"],
 )
 def test_central_intervals_cover_as_the_gaussian_says(wide: float, shift: float) -> None:
-    """(θ - x/2)/σ is N(0, 1), the draws N(shift, wide²): a quantile z covers Φ(shift + wide z) - Φ(shift - wide z).
+    """(θ - x/2)/σ is N(0, 1), the draws N(shift, wide²): a quantile z covers Φ(shift + wide z) -
+    Φ(shift - wide z).
 
     With 400 draws their own quantiles are known to less than the noise of the clips."""
     made = posterior(clips=CLIPS, draws=400, wide=wide, shift=shift, targets=1, seed=1)
@@ -38,14 +41,16 @@ def test_central_intervals_cover_as_the_gaussian_says(wide: float, shift: float)
 
 
 def test_few_draws_do_not_bias_the_coverage_of_a_calibrated_model() -> None:
-    """Between the least and the greatest of 4 draws lie only 3/5 of the truths, whatever the nominal level."""
+    """Between the least and the greatest of 4 draws lie only 3/5 of the truths, whatever the
+    nominal level."""
     made = posterior(clips=CLIPS, draws=4, wide=1, shift=0, targets=1, seed=2)
     for found in coverage((made,), "wind_speed", resamples_of(made), levels=(0.1, *LEVELS)):
         assert found.share.value == pytest.approx(found.level, abs=NOISE)
 
 
 def test_cells_by_hand() -> None:
-    """Of three draws one is below 2 and one equal: the cell is [1/4, 3/4], which the central half holds whole."""
+    """Of three draws one is below 2 and one equal: the cell is [1/4, 3/4], which the central half
+    holds whole."""
     found = Cells.of(np.array([2.0, 0.0]), np.array([[1.0, 2.0, 3.0], [1.0, 2.0, 3.0]]))
     np.testing.assert_allclose([found.low, found.high], [[0.25, 0.0], [0.75, 0.25]])
     np.testing.assert_allclose(found.central(0.5), [1.0, 0.0])
@@ -53,7 +58,8 @@ def test_cells_by_hand() -> None:
 
 
 def pit(predictions: Predictions, target: str) -> np.ndarray:
-    """Probability integral transform (n,): the share of draws below the truth, at the middle of its cell."""
+    """Probability integral transform (n,): the share of draws below the truth, at the middle of its
+    cell."""
     found = cells(predictions, target)
     return (found.low + found.high) / 2
 
@@ -75,7 +81,8 @@ def test_pit_of_a_calibrated_model_is_uniform_and_of_others_is_not() -> None:
 
 
 def test_rank_histograms_are_flat_troughs_or_slopes() -> None:
-    """Shares of ten bins: differences of Φ(shift + wide Φ⁻¹(edge)); the noise is four binomial deviations."""
+    """Shares of ten bins: differences of Φ(shift + wide Φ⁻¹(edge)); the noise is four binomial
+    deviations."""
     inner = stats.norm.ppf(np.linspace(0, 1, 11))
     for wide, shift, outside in ((1.0, 0.0, False), (0.5, 0.0, True), (1.0, 0.8, True)):
         made = posterior(clips=CLIPS, draws=199, wide=wide, shift=shift, targets=1, seed=4)
@@ -94,7 +101,12 @@ def test_the_band_of_ranks_is_that_of_the_sequences_and_not_of_the_clips() -> No
 
 
 def test_every_sequence_weighs_the_same_in_the_ranks() -> None:
-    made = of_wind([0.0, 0.0, 0.0, 9.0], np.zeros(4), group=[1, 1, 1, 2], samples=np.tile([1.0, 2.0, 3.0], (4, 1)))
+    made = of_wind(
+        [0.0, 0.0, 0.0, 9.0],
+        np.zeros(4),
+        group=[1, 1, 1, 2],
+        samples=np.tile([1.0, 2.0, 3.0], (4, 1)),
+    )
     assert rank_histogram((made,), "wind_speed", bins=2).share == (0.5, 0.5)
 
 
@@ -104,9 +116,12 @@ def test_tarp_is_the_nominal_level_for_the_exact_posterior_in_three_dimensions()
         assert found.share.value == pytest.approx(found.level, abs=NOISE)
 
 
-@pytest.mark.parametrize(("wide", "shift"), [(0.4, 0.0), (1.0, 1.5)], ids=["overconfident", "biased"])
+@pytest.mark.parametrize(
+    ("wide", "shift"), [(0.4, 0.0), (1.0, 1.5)], ids=["overconfident", "biased"]
+)
 def test_tarp_agrees_with_quadrature_where_it_is_off(wide: float, shift: float) -> None:
-    """Of a Gaussian the share nearer to the reference r than θ is known: the mass between r - d and r + d."""
+    """Of a Gaussian the share nearer to the reference r than θ is known: the mass between r - d and
+    r + d."""
     made = posterior(clips=CLIPS, draws=400, wide=wide, shift=shift, targets=1, seed=8)
     low, high = made.truth.min(), made.truth.max()
     sigma = np.sqrt(0.5)
@@ -118,7 +133,9 @@ def test_tarp_agrees_with_quadrature_where_it_is_off(wide: float, shift: float) 
     draws = stats.norm(x / 2 + shift * sigma, wide * sigma)
     distance = np.abs(x / 2 + sigma * z - r)
     nearer = draws.cdf(r + distance) - draws.cdf(r - distance)
-    found = tarp((made,), resamples_of(made), generator=generator(10), levels=(0.1, 0.3, 0.5, 0.7, 0.9))
+    found = tarp(
+        (made,), resamples_of(made), generator=generator(10), levels=(0.1, 0.3, 0.5, 0.7, 0.9)
+    )
     expected = [float((nearer < point.level).mean()) for point in found]
     quadrature = 0.01  # of 60³ points
     assert [point.share.value for point in found] == pytest.approx(expected, abs=NOISE + quadrature)

@@ -20,15 +20,21 @@ def enumerated(embedding: np.ndarray, weight: dict[int, float]) -> float:
     hits = total = 0.0
     for a, p, n in product(range(len(GROUP)), repeat=3):
         if a != p and GROUP[a] == GROUP[p] and GROUP[a] != GROUP[n]:
-            near, far = ((embedding[a] - embedding[i]) @ (embedding[a] - embedding[i]) for i in (p, n))
+            near, far = (
+                (embedding[a] - embedding[i]) @ (embedding[a] - embedding[i]) for i in (p, n)
+            )
             own = weight[GROUP[a]] * weight[GROUP[n]]
             hits += own * (1.0 if near < far else 0.5 if near == far else 0.0)
             total += own
     return hits / total
 
 
-def test_every_triplet_once_gives_the_accuracy_of_the_enumeration_for_every_draw_of_groups() -> None:
-    embedding = generator(1).integers(0, 3, size=(7, 2)).astype(float)  # whole numbers, so that there are ties
+def test_every_triplet_once_gives_the_accuracy_of_the_enumeration_for_every_draw_of_groups() -> (
+    None
+):
+    embedding = (
+        generator(1).integers(0, 3, size=(7, 2)).astype(float)
+    )  # whole numbers, so that there are ties
     resamples = Resamples.of(GROUP, generator=generator(2), draws=8)
     every = [
         (a, p, n)
@@ -49,7 +55,11 @@ def test_a_tie_counts_half_and_a_perfect_embedding_has_one() -> None:
     resamples = Resamples.of(group, generator=generator(1), draws=2)
     triplets = draw(group, seed=3, count=50)
     crossed = [[0, 0], [1, 1], [0, 1], [1, 0]]
-    for points, expected in (([[0], [0], [0], [0]], 0.5), ([[0], [1], [5], [6]], 1.0), (crossed, 0.0)):
+    for points, expected in (
+        ([[0], [0], [0], [0]], 0.5),
+        ([[0], [1], [5], [6]], 1.0),
+        (crossed, 0.0),
+    ):
         embedding = np.array(points, dtype=np.float32)
         assert accuracy_values(embedding, triplets, resamples)[0] == expected
 

@@ -23,14 +23,17 @@ def test_a_crop_of_the_networks_size_is_the_pixels_themselves() -> None:
 def test_a_mirrored_crop_has_left_and_right_exchanged() -> None:
     cropping = Cropping(frames=10, size=16)
     plain, mirrored = (
-        cropping.cut(FILM, Crop(first=0, top=0, left=0, side=16, mirrored=mirrored)) for mirrored in (False, True)
+        cropping.cut(FILM, Crop(first=0, top=0, left=0, side=16, mirrored=mirrored))
+        for mirrored in (False, True)
     )
     assert torch.equal(mirrored, plain.flip(3))
 
 
 def test_resizing_keeps_the_mean_of_what_it_shrinks() -> None:
     film = np.random.default_rng(0).integers(0, 255, (10, 32, 32), dtype=np.uint8)
-    clip = Cropping(frames=10, size=16).cut(film, Crop(first=0, top=0, left=0, side=32, mirrored=False))
+    clip = Cropping(frames=10, size=16).cut(
+        film, Crop(first=0, top=0, left=0, side=32, mirrored=False)
+    )
     assert clip.shape == (1, 10, 16, 16)
     assert clip.mean().item() == pytest.approx(film.mean(), rel=0.01)
 

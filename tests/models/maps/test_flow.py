@@ -22,12 +22,15 @@ INNER = (slice(4, -4), slice(4, -4))  # of maps of 28 × 28: windows that do not
 
 def speckle(size: int, grain: float, *, seed: int = 3) -> FloatArray:
     """(size, size) of standard deviation 1, periodic."""
-    noise = ndimage.gaussian_filter(np.random.default_rng(seed).standard_normal((size, size)), grain, mode="wrap")
+    noise = ndimage.gaussian_filter(
+        np.random.default_rng(seed).standard_normal((size, size)), grain, mode="wrap"
+    )
     return (noise - noise.mean()) / noise.std()
 
 
 def warped(along_x: FloatArray, along_y: FloatArray, *, grain: float = 10.0) -> torch.Tensor:
-    """(time, SIZE, SIZE): speckle; what shows at (x, y) has moved there by so many pixels, each (time, y, x)."""
+    """(time, SIZE, SIZE): speckle; what shows at (x, y) has moved there by so many pixels, each
+    (time, y, x)."""
     picture = speckle(SIZE, grain)
     y, x = np.mgrid[:SIZE, :SIZE].astype(float)
     frames = [
@@ -44,7 +47,12 @@ def channel(maps: torch.Tensor, name: str) -> torch.Tensor:
 @pytest.mark.parametrize(("across", "down"), [(0.5, 0.0), (0.0, -0.6), (-0.4, 0.3), (0.0, 0.0)])
 def test_a_picture_that_moves_as_a_whole_has_that_displacement(across: float, down: float) -> None:
     picture = 5 * speckle(64, 5.0)  # steep, so that the ridge counts little
-    frames = np.stack([ndimage.shift(picture, (k * down, k * across), order=3, mode="grid-wrap") for k in range(5)])
+    frames = np.stack(
+        [
+            ndimage.shift(picture, (k * down, k * across), order=3, mode="grid-wrap")
+            for k in range(5)
+        ]
+    )
     found, slope = lucas_kanade(torch.from_numpy(frames))
     assert found.shape == (2, 4, 64, 64)
     assert slope.shape == (4, 64, 64)
@@ -76,9 +84,10 @@ def test_a_ramp_moves_along_its_slope_by_the_ridge_less() -> None:
 
 @pytest.mark.parametrize("bin_", [3, 6])
 def test_a_travelling_wave_has_its_frequency_and_its_phase_gradient(bin_: int) -> None:
-    """Points that move by a sin(kx − ωt) have a flow with exp(−ikx) at +ω: the phase falls along the way it travels, by
-    k times the 4 px from one place to the next; what else moves, by chance, draws the mean over frequencies towards 0
-    by up to a fifth. In 29 steps ω is bin/29 turns a step, of a Nyquist frequency of 1/2."""
+    """Points that move by a sin(kx − ωt) have a flow with exp(−ikx) at +ω: the phase falls along
+    the way it travels, by k times the 4 px from one place to the next; what else moves, by chance,
+    draws the mean over frequencies towards 0 by up to a fifth. In 29 steps ω is bin/29 turns a
+    step, of a Nyquist frequency of 1/2."""
     wavenumber, turn = 2 * math.pi * 2 / SIZE, 2 * math.pi * bin_ / (FRAMES - 1)
     x, time = np.arange(SIZE), np.arange(FRAMES)[:, None]
     course = 1.5 * np.sin(wavenumber * x - turn * time)
@@ -94,13 +103,16 @@ def test_a_travelling_wave_has_its_frequency_and_its_phase_gradient(bin_: int) -
 
 
 def test_powers_are_those_of_the_displacement_in_each_scales_pixels() -> None:
-    """A steady 1 px of the clip along y is 1/2 of the fine scale's, 1/4 of the coarse one's: log(1 + d²/0.02²)."""
+    """A steady 1 px of the clip along y is 1/2 of the fine scale's, 1/4 of the coarse one's: log(1
+    + d²/0.02²)."""
     down = np.broadcast_to(np.arange(FRAMES, dtype=float)[:, None, None], (FRAMES, SIZE, SIZE))
     maps = flow_maps(warped(np.zeros_like(down), down, grain=6.0))
     for scale, size in (("fine", 2), ("coarse", 4)):
         assert float(channel(maps, f"{scale}: mean y").median()) == pytest.approx(1 / size, rel=0.1)
         expected = math.log1p(1 / size**2 / 0.02**2)
-        assert float(channel(maps, f"{scale}: log power y").median()) == pytest.approx(expected, abs=0.2)
+        assert float(channel(maps, f"{scale}: log power y").median()) == pytest.approx(
+            expected, abs=0.2
+        )
         assert float(channel(maps, f"{scale}: log power x").median()) < expected - 3
         assert float(channel(maps, f"{scale}: log variance y").median()) < expected - 2
 
@@ -136,7 +148,9 @@ def test_the_front_end_gives_three_scales_of_clips_that_can_be_halved_thrice() -
 
 def test_the_front_end_gives_them_and_contrast_changes_nothing() -> None:
     front_end = FrontEnd(maps="flow-maps", size=SIZE)
-    clip = torch.from_numpy(np.random.default_rng(2).integers(0, 255, (1, 1, FRAMES, SIZE, SIZE), dtype=np.uint8))
+    clip = torch.from_numpy(
+        np.random.default_rng(2).integers(0, 255, (1, 1, FRAMES, SIZE, SIZE), dtype=np.uint8)
+    )
     found = front_end(clip)
     assert found.shape == (1, *front_end.shape) == (1, len(CHANNELS), SIZE // 4, SIZE // 4)
     torch.testing.assert_close(front_end(40.0 + 7.0 * clip.float()), found, rtol=1e-3, atol=1e-3)

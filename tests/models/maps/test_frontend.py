@@ -1,4 +1,5 @@
-"""The front end against its plain definition: SciPy's filters, torch's pooling, the periodogram layer, closed forms."""
+"""The front end against its plain definition: SciPy's filters, torch's pooling, the periodogram
+layer, closed forms."""
 
 from __future__ import annotations
 
@@ -25,7 +26,9 @@ from tests.refusals import unrefused
 SIZE, FRAMES, RATE = 48, 30, 25.0
 
 
-def noise(seed: int = 0, *, frames: int = FRAMES, height: int = SIZE, width: int = SIZE) -> torch.Tensor:
+def noise(
+    seed: int = 0, *, frames: int = FRAMES, height: int = SIZE, width: int = SIZE
+) -> torch.Tensor:
     generator = torch.Generator().manual_seed(seed)
     return torch.randn((frames, height, width), generator=generator)
 
@@ -50,8 +53,12 @@ def plain(frames: torch.Tensor) -> torch.Tensor:
 @pytest.mark.parametrize(("frames", "height", "width"), [(5, 48, 48), (7, 34, 70), (1, 20, 224)])
 def test_pooled_derivatives_are_scipys(frames: int, height: int, width: int) -> None:
     video = noise(frames=frames, height=height, width=width)
-    for found, (along, across) in zip(pooled_derivatives(video, sigma=2.0), ((2, 1), (1, 2)), strict=True):
-        slope = ndimage.gaussian_filter1d(video.double().numpy(), 2.0, axis=along, order=1, mode="nearest")
+    for found, (along, across) in zip(
+        pooled_derivatives(video, sigma=2.0), ((2, 1), (1, 2)), strict=True
+    ):
+        slope = ndimage.gaussian_filter1d(
+            video.double().numpy(), 2.0, axis=along, order=1, mode="nearest"
+        )
         slope = ndimage.gaussian_filter1d(slope, 2.0, axis=across, mode="nearest")
         expected = functional.max_pool2d(torch.from_numpy(slope), 2)
         np.testing.assert_allclose(found.numpy(), expected, atol=1e-6)
@@ -60,7 +67,9 @@ def test_pooled_derivatives_are_scipys(frames: int, height: int, width: int) -> 
 def test_a_ramp_has_its_slope_but_for_the_tails_that_are_cut_off() -> None:
     ramp = 3.0 * torch.arange(64, dtype=torch.float64).repeat(2, 40, 1)
     along_x, along_y = pooled_derivatives(ramp, sigma=2.0)
-    assert along_x[:, :, 10:20].sub(3.0).abs().max() < 3.0 * 2e-3  # ∫ beyond 4σ of i² g(i)/σ² is 1.1e-3
+    assert (
+        along_x[:, :, 10:20].sub(3.0).abs().max() < 3.0 * 2e-3
+    )  # ∫ beyond 4σ of i² g(i)/σ² is 1.1e-3
     assert along_y.abs().max() < 1e-12
 
 
@@ -106,18 +115,33 @@ def test_wave_maps_are_made_of_the_plain_definitions_periodogram() -> None:
     share = (frequency / (RATE / 2)).float()[:, None, None]
     centre = (power * share).sum(dim=1) / total
     for place, axis in enumerate("xy"):
-        own = maps[[WAVE_CHANNELS.index(f"d/d{axis}: {name}") for name in ("log power", "centre", "peak 1 frequency")]]
+        own = maps[
+            [
+                WAVE_CHANNELS.index(f"d/d{axis}: {name}")
+                for name in ("log power", "centre", "peak 1 frequency")
+            ]
+        ]
         torch.testing.assert_close(own[0], (total[place] / 1e-3).log1p(), rtol=1e-3, atol=1e-4)
         torch.testing.assert_close(own[1], centre[place], rtol=1e-3, atol=1e-4)
         expected = share.flatten()[power[place].argmax(dim=0)]
         assert (own[2] == expected).float().mean() > 0.999
 
 
-@pytest.mark.parametrize(("across", "down", "bin_"), [(0.3, 0.0, 3), (-0.2, 0.1, 6), (0.0, -0.25, 4)])
-def test_a_travelling_wave_has_its_frequency_and_its_phase_gradient(across: float, down: float, bin_: int) -> None:
-    """cos(k·x − ωt) has exp(−i k·x)/2 at +ω, so the phase falls along the way it travels: −2k a pooled pixel."""
-    maps = FrontEnd(maps="wave-maps", size=SIZE, rate=RATE)(wave(bin_ * RATE / FRAMES, across, down))[0]
-    inner = (slice(3, -3), slice(3, -3))  # the filters see the picture's edge within 8 px, 2 of the maps'
+@pytest.mark.parametrize(
+    ("across", "down", "bin_"), [(0.3, 0.0, 3), (-0.2, 0.1, 6), (0.0, -0.25, 4)]
+)
+def test_a_travelling_wave_has_its_frequency_and_its_phase_gradient(
+    across: float, down: float, bin_: int
+) -> None:
+    """cos(k·x − ωt) has exp(−i k·x)/2 at +ω, so the phase falls along the way it travels: −2k a
+    pooled pixel."""
+    maps = FrontEnd(maps="wave-maps", size=SIZE, rate=RATE)(
+        wave(bin_ * RATE / FRAMES, across, down)
+    )[0]
+    inner = (
+        slice(3, -3),
+        slice(3, -3),
+    )  # the filters see the picture's edge within 8 px, 2 of the maps'
     for axis, other in (("x", across), ("y", down)):
         if other == 0:
             continue
@@ -134,7 +158,9 @@ def test_brightness_and_contrast_change_nothing() -> None:
     clip = noise(3)[None, None]
     for maps in ("spectral-maps", "wave-maps", "flow-maps", "flow-maps-3"):
         front_end = FrontEnd(maps=maps, size=SIZE)
-        torch.testing.assert_close(front_end(40.0 + 7.0 * clip), front_end(clip), rtol=1e-3, atol=1e-4)
+        torch.testing.assert_close(
+            front_end(40.0 + 7.0 * clip), front_end(clip), rtol=1e-3, atol=1e-4
+        )
 
 
 def test_a_clip_without_contrast_is_still_finite() -> None:
@@ -155,7 +181,9 @@ def test_front_ends_are_distinguished_by_all_that_shapes_them() -> None:
     assert FrontEnd(maps="wave-maps").hash == ends[0].hash
 
 
-@pytest.mark.parametrize("values", [{"frames": 3}, {"size": 50}, {"rate": 0.0}, {"spatial_sigma": -1.0}])
+@pytest.mark.parametrize(
+    "values", [{"frames": 3}, {"size": 50}, {"rate": 0.0}, {"spatial_sigma": -1.0}]
+)
 def test_front_ends_that_cannot_be_are_refused(values: dict[str, float]) -> None:
     with pytest.raises(InputError):
         FrontEnd(maps="wave-maps", **values)  # pyright: ignore[reportArgumentType]

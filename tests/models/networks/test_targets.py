@@ -24,10 +24,14 @@ def test_bending_is_summed_up_by_its_mean_logarithm_and_by_warp_over_weft() -> N
 
 
 def test_logits_come_back_within_the_range_and_at_its_ends() -> None:
-    values = torch.tensor([[0.0, 0.10, -4.6, -1.8], [10.0, 0.17, -3.25, 1.8], [5.0, 0.135, -3.925, 0.0]])
+    values = torch.tensor(
+        [[0.0, 0.10, -4.6, -1.8], [10.0, 0.17, -3.25, 1.8], [5.0, 0.135, -3.925, 0.0]]
+    )
     scaling = Scaling(names=NAMES)
     assert scaling.learned(values).isfinite().all()
-    torch.testing.assert_close(scaling.values(scaling.learned(values)), values, rtol=1e-4, atol=1e-4)
+    torch.testing.assert_close(
+        scaling.values(scaling.learned(values)), values, rtol=1e-4, atol=1e-4
+    )
     middle = scaling.learned(values)[2]
     torch.testing.assert_close(middle, torch.zeros(4), rtol=0, atol=1e-5)
 
@@ -75,22 +79,29 @@ def test_the_truth_of_hanging_cloth_is_read_from_the_same_parameters() -> None:
 def test_no_weight_of_hanging_cloth_is_cut_to_the_range_of_flags() -> None:
     scaling = Scaling(names=("cloth_area_weight",))
     values = torch.tensor([[0.08], [0.30], [0.45]])
-    torch.testing.assert_close(scaling.values(scaling.learned(values)), values, rtol=1e-4, atol=1e-5)
+    torch.testing.assert_close(
+        scaling.values(scaling.learned(values)), values, rtol=1e-4, atol=1e-5
+    )
 
 
-@pytest.mark.parametrize("names", [("wind_speed", "cloth_area_weight"), ("area_weight", "area_weight")])
+@pytest.mark.parametrize(
+    "names", [("wind_speed", "cloth_area_weight"), ("area_weight", "area_weight")]
+)
 def test_targets_of_two_kinds_of_cloth_or_named_twice_are_refused(names: tuple[str, ...]) -> None:
     with pytest.raises(InputError, match=names[1]):
         Scaling(names=names)
 
 
 def test_the_ranges_of_hanging_cloth_hold_all_that_its_scene_can_draw() -> None:
-    """Ends of the factors times the tables of the ten materials, in log10 for the 15 bending coefficients."""
+    """Ends of the factors times the tables of the ten materials, in log10 for the 15 bending
+    coefficients."""
     from sim.run import load
 
     scene = load("hanging-cloth-wide")
     spec = scene.material
-    area_weight = [base.area_weight * factor for base in spec.bases for factor in ends(spec.area_weight_factor)]
+    area_weight = [
+        base.area_weight * factor for base in spec.bases for factor in ends(spec.area_weight_factor)
+    ]
     own = [float(np.log10(base.bending).mean()) for base in spec.bases]
     bending = [scale + math.log10(factor) for scale in own for factor in ends(spec.bending)]
     for name, drawn in (
@@ -101,30 +112,45 @@ def test_the_ranges_of_hanging_cloth_hold_all_that_its_scene_can_draw() -> None:
         target = TARGETS[name]
         assert target.low <= min(drawn)
         assert max(drawn) <= target.high
-        assert (max(drawn) - min(drawn)) / (target.high - target.low) > 0.9  # and hardly more than that
+        assert (max(drawn) - min(drawn)) / (
+            target.high - target.low
+        ) > 0.9  # and hardly more than that
 
 
 def test_values_beyond_a_range_are_counted_with_how_far_they_reach() -> None:
-    """Those within the range, or within the 0.5 % that it is widened by at each end, are learned as they are."""
+    """Those within the range, or within the 0.5 % that it is widened by at each end, are learned as
+    they are."""
     values = np.array([[0.0, 0.12], [10.04, 0.17], [10.06, 0.13], [15.9, np.nan]])
     (said,) = Scaling(names=("wind_speed", "area_weight")).beyond(values)
-    assert said == "2 of 4 clips lie beyond the range of the target wind_speed, 0 to 10 m/s: they reach from 0 to 15.9"
+    assert (
+        said
+        == "2 of 4 clips lie beyond the range of the target wind_speed, 0 to 10 m/s: they reach "
+        "from 0 to 15.9"
+    )
     Scaling(names=("wind_speed", "area_weight")).check(values[:2], where="here")
 
 
 def test_a_target_of_the_same_cloth_whose_range_is_wide_enough_is_offered() -> None:
     heavy = np.array([[0.2], [0.3]])
-    with pytest.raises(InputError, match=r"0\.1 to 0\.17 kg/m²: they reach from 0\.2 to 0\.3") as caught:
+    with pytest.raises(
+        InputError, match=r"0\.1 to 0\.17 kg/m²: they reach from 0\.2 to 0\.3"
+    ) as caught:
         Scaling(names=("area_weight",)).check(heavy, where="the training side")
     assert caught.value.where == "the training side"
-    assert caught.value.fix.startswith("name the target fabric_area_weight or world_area_weight in [loss] targets")
+    assert caught.value.fix.startswith(
+        "name the target fabric_area_weight or world_area_weight in [loss] targets"
+    )
     with pytest.raises(InputError) as caught:
         Scaling(names=("area_weight",)).check(10 * heavy, where="the training side")
     assert caught.value.fix.startswith("leave that target out, or train on a data set")
 
 
 def test_the_aspect_is_the_logarithm_of_length_over_height() -> None:
-    parameters = {"width": np.array([1.5, 2.0]), "height": np.array([1.0, 2.0]), "wind_speed": np.array([15.5, 3.0])}
+    parameters = {
+        "width": np.array([1.5, 2.0]),
+        "height": np.array([1.0, 2.0]),
+        "wind_speed": np.array([15.5, 3.0]),
+    }
     found = truth(parameters, ("outdoor_wind", "log_aspect"))
     assert found[:, 0].tolist() == [15.5, 3.0]
     assert found[:, 1] == pytest.approx([0.4054651, 0.0])
@@ -142,13 +168,18 @@ def test_the_aspect_is_the_logarithm_of_length_over_height() -> None:
         ("world-damped", "world_area_weight"),
     ],
 )
-def test_the_ranges_of_flags_outdoors_hold_all_that_their_data_sets_can_draw(dataset, weight) -> None:
+def test_the_ranges_of_flags_outdoors_hold_all_that_their_data_sets_can_draw(
+    dataset, weight
+) -> None:
     from sim.datasets import load
 
     recipe = load(dataset)
     assert recipe.groups is not None
     scene, material = recipe.simulation.scene, recipe.simulation.material
-    assert ends(recipe.simulation.wind.speed) == (TARGETS["outdoor_wind"].low, TARGETS["outdoor_wind"].high)
+    assert ends(recipe.simulation.wind.speed) == (
+        TARGETS["outdoor_wind"].low,
+        TARGETS["outdoor_wind"].high,
+    )
     assert material.area_weight is not None
     assert ends(material.area_weight) == (TARGETS[weight].low, TARGETS[weight].high)
     aspects = [math.log(scene.width / height) for height in ends(recipe.groups.height)]

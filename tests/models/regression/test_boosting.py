@@ -13,7 +13,8 @@ LEVELS = (0.1, 0.5, 0.9)
 
 
 def table(seed: int, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """A step and a deviation that depend on x: y = sign(x₀) + (0.2 + 0.3 [x₁ > 0]) ε, and its negative."""
+    """A step and a deviation that depend on x: y = sign(x₀) + (0.2 + 0.3 [x₁ > 0]) ε, and its
+    negative."""
     g = np.random.Generator(np.random.PCG64(seed))
     x = g.uniform(-1, 1, (n, 3))
     y = np.sign(x[:, 0]) + np.where(x[:, 1] > 0, 0.5, 0.2) * g.standard_normal(n)
@@ -37,7 +38,8 @@ def test_the_mean_is_that_of_the_law(boosting: Boosting) -> None:
 
 
 def test_quantiles_widen_where_the_noise_does_and_cover(boosting: Boosting) -> None:
-    """Of 4,000 clips 80 % lie between 10 and 90 %, within 0.05: the trees' own error beside chance's 0.006."""
+    """Of 4,000 clips 80 % lie between 10 and 90 %, within 0.05: the trees' own error beside
+    chance's 0.006."""
     x, y = table(4, 4000)
     quantiles = boosting.predict_quantiles(x)
     assert quantiles.shape == (4000, 3, 2)
@@ -57,12 +59,16 @@ def test_samples_have_the_fitted_quantiles(boosting: Boosting) -> None:
     assert samples.shape == (20, 1001, 2)
     assert samples.dtype == np.float32
     for level, row in zip(LEVELS, range(3), strict=True):
-        np.testing.assert_allclose(np.quantile(samples, level, axis=1), quantiles[:, row], atol=0.01)
+        np.testing.assert_allclose(
+            np.quantile(samples, level, axis=1), quantiles[:, row], atol=0.01
+        )
 
 
 def test_equal_seeds_give_equal_trees() -> None:
     x, y = table(6, 100)
-    first, second = (fit_boosting(x, y, seed=1, rounds=3, levels=LEVELS).predict(x) for _ in range(2))
+    first, second = (
+        fit_boosting(x, y, seed=1, rounds=3, levels=LEVELS).predict(x) for _ in range(2)
+    )
     np.testing.assert_array_equal(first, second)
 
 

@@ -45,11 +45,13 @@ def test_names_are_unique_and_fit_a_page() -> None:
 
 @pytest.mark.parametrize("cycles", [2, 6, 11])
 @pytest.mark.parametrize("along", ["x", "y"])
-def test_a_travelling_wave_has_its_own_frequency_wavenumber_and_speed(cycles: int, along: str) -> None:
+def test_a_travelling_wave_has_its_own_frequency_wavenumber_and_speed(
+    cycles: int, along: str
+) -> None:
     """f = c/λ. A wave travels coherently: neighbours differ by the phase 2π/λ, and ∂I/∂t = c ∂I/∂x everywhere.
 
-    Differences over Δ multiply a wave by sinc(…): of the change over one frame by sin(πf/r)/(πf/r), of the slope over
-    two pixels by sin(2π/λ)/(2π/λ); the ratio's error is what these two leave.
+    Differences over Δ multiply a wave by sinc(…): of the change over one frame by sin(πf/r)/(πf/r),
+    of the slope over two pixels by sin(2π/λ)/(2π/λ); the ratio's error is what these two leave.
     """
     wavelength = 16.0
     found = measured(wave(cycles=cycles, wavelength=wavelength, along=along))
@@ -72,7 +74,8 @@ def test_a_standing_wave_has_no_wavenumber() -> None:
 
 
 def test_the_image_moved_as_a_whole_has_the_flow_of_its_translation() -> None:
-    """A smooth texture moved by 0.5 px a frame to the right: 12.5 px/s, over the side of 112; none downward."""
+    """A smooth texture moved by 0.5 px a frame to the right: 12.5 px/s, over the side of 112; none
+    downward."""
     t, y, x = grid()
     moved = x - 0.5 * t
     clip = torch.sin(2 * math.pi * moved / 40) + torch.cos(2 * math.pi * (y / 37 + moved / 53))
@@ -83,7 +86,8 @@ def test_the_image_moved_as_a_whole_has_the_flow_of_its_translation() -> None:
 
 
 def test_band_powers_add_up_to_the_variance_of_the_slope() -> None:
-    """Parseval: of a stationary slope, all frequencies but the mean. Waves: the bands hold all of a²/2."""
+    """Parseval: of a stationary slope, all frequencies but the mean. Waves: the bands hold all of
+    a²/2."""
     clip = wave(cycles=4, wavelength=16.0)
     found = measured(clip)
     total = sum(10 ** found[name] for name in FEATURES if name.startswith("log_power_slope_x"))
@@ -93,15 +97,19 @@ def test_band_powers_add_up_to_the_variance_of_the_slope() -> None:
 
 @pytest.mark.parametrize(("low", "high", "cycles"), [(1.25, 2.1, 2), (5.0, 7.5, 8)])
 def test_power_lies_in_the_band_of_its_frequency(low: float, high: float, cycles: int) -> None:
-    """A Hann window spreads a line over three bins, of which the middle one has 2/3 of the power."""
+    """A Hann window spreads a line over three bins, of which the middle one has 2/3 of the
+    power."""
     found = measured(wave(cycles=cycles, wavelength=16.0))
-    bands = {name: 10**value for name, value in found.items() if name.startswith("log_power_slope_x")}
+    bands = {
+        name: 10**value for name, value in found.items() if name.startswith("log_power_slope_x")
+    }
     assert max(bands, key=lambda name: bands[name]) == f"log_power_slope_x_{low:g}_{high:g}hz"
     assert low < cycles * RATE / T < high
 
 
 def test_coverage_and_place_are_those_of_what_flickers() -> None:
-    """A fifth of the width, from 0.7 to 0.9, flickers: coverage 0.2, centre 0.3 right of the middle."""
+    """A fifth of the width, from 0.7 to 0.9, flickers: coverage 0.2, centre 0.3 right of the
+    middle."""
     t, y, x = grid()
     texture = speckle(1, SIDE, SIDE)
     where = (x >= 0.7 * SIDE) & (x < 0.9 * SIDE)
@@ -119,13 +127,18 @@ def test_a_mirrored_clip_has_the_same_features() -> None:
     clip = speckle(2, T, SIDE, SIDE) + 2 * wave(cycles=5, wavelength=20.0)
     clip[:, :, :40] *= 0.3
     torch.testing.assert_close(
-        features(clip[None, None], rate=RATE), features(clip.flip(2)[None, None], rate=RATE), rtol=1e-3, atol=1e-4
+        features(clip[None, None], rate=RATE),
+        features(clip.flip(2)[None, None], rate=RATE),
+        rtol=1e-3,
+        atol=1e-4,
     )
 
 
 def test_brightness_and_contrast_change_nothing() -> None:
     clip = speckle(3, 1, 1, T, 32, 40)
-    torch.testing.assert_close(features(clip, rate=RATE), features(40 * clip + 120, rate=RATE), rtol=1e-3, atol=1e-3)
+    torch.testing.assert_close(
+        features(clip, rate=RATE), features(40 * clip + 120, rate=RATE), rtol=1e-3, atol=1e-3
+    )
 
 
 def test_a_clip_does_not_depend_on_its_batch() -> None:
@@ -134,10 +147,13 @@ def test_a_clip_does_not_depend_on_its_batch() -> None:
 
 
 def test_a_clip_of_twice_the_size_has_nearly_the_features_of_its_average() -> None:
-    """Each pixel doubled: the average over blocks gives the small clip back, so all features are equal."""
+    """Each pixel doubled: the average over blocks gives the small clip back, so all features are
+    equal."""
     clip = speckle(5, 1, 1, T, SIDE, SIDE)
     large = clip.repeat_interleave(2, dim=3).repeat_interleave(2, dim=4)
-    torch.testing.assert_close(features(large, rate=RATE), features(clip, rate=RATE), rtol=1e-4, atol=1e-5)
+    torch.testing.assert_close(
+        features(large, rate=RATE), features(clip, rate=RATE), rtol=1e-4, atol=1e-5
+    )
 
 
 def test_still_clips_have_finite_features_and_no_motion() -> None:

@@ -35,7 +35,8 @@ def test_weights_solve_the_normal_equations_of_the_chosen_penalty() -> None:
 
 
 def test_targets_that_are_noise_are_shrunk_to_their_mean() -> None:
-    """A weight of noise costs on sequences left out: the largest penalty wins, and little of the spread is left."""
+    """A weight of noise costs on sequences left out: the largest penalty wins, and little of the
+    spread is left."""
     x, _, group = table(4, 80, 0.0)
     y = np.random.Generator(np.random.PCG64(5)).standard_normal((80, 1))
     ridge = fit_ridge(x, y, group=group)
@@ -43,9 +44,11 @@ def test_targets_that_are_noise_are_shrunk_to_their_mean() -> None:
 
 
 def test_the_penalty_is_judged_on_sequences_not_on_clips() -> None:
-    """Features by which a sequence is recognised predict its other clips, and nothing of sequences never seen.
+    """Features by which a sequence is recognised predict its other clips, and nothing of sequences
+    never seen.
 
-    15 random numbers identify 20 sequences. By clips left out they are taken at full weight; by sequences, shrunk.
+    15 random numbers identify 20 sequences. By clips left out they are taken at full weight; by
+    sequences, shrunk.
     """
     g = np.random.Generator(np.random.PCG64(6))
     sequence = np.repeat(np.arange(20), 10)

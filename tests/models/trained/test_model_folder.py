@@ -1,4 +1,5 @@
-"""A model is used only if its files are as they were written; cards that are no cards are refused."""
+"""A model is used only if its files are as they were written; cards that are no cards are
+refused."""
 
 from __future__ import annotations
 
@@ -33,7 +34,9 @@ def shipped(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("name", FILES)
 @pytest.mark.parametrize("share", [0.3, 0.999])
-def test_one_bit_in_any_file_of_a_model_is_found_before_it_is_used(shipped: Path, name: str, share: float) -> None:
+def test_one_bit_in_any_file_of_a_model_is_found_before_it_is_used(
+    shipped: Path, name: str, share: float
+) -> None:
     assert estimator.load(shipped).name == "wave-cloth"
     flip(shipped / name, share=share)
     with pytest.raises(CorruptError):
@@ -50,7 +53,10 @@ def test_a_models_distribution_in_closed_form_is_the_one_that_it_draws_from(name
     model = estimator.load_shipped(name)
     generator = torch.Generator().manual_seed(0)
     embeddings = [torch.randn((3, 32), generator=generator) for _ in model.learners]
-    drawn, posterior = model.logits(embeddings, seed=1, draws=100_000).double(), model.posterior(embeddings)
+    drawn, posterior = (
+        model.logits(embeddings, seed=1, draws=100_000).double(),
+        model.posterior(embeddings),
+    )
     spread = posterior.covariance().diagonal(dim1=-2, dim2=-1).sqrt()
     difference = (drawn.mean(dim=1) - posterior.mean()) / spread
     assert float(difference.abs().max()) < 4 / 100_000**0.5
@@ -60,8 +66,13 @@ def test_a_models_distribution_in_closed_form_is_the_one_that_it_draws_from(name
 def test_a_model_of_a_lake_is_held_to_the_hash_in_its_name(shipped: Path) -> None:
     """As lakes hold models that were trained before models had checksums of their own."""
     (shipped / SUMS).unlink()
-    lines = "".join(f"{hashlib.sha256((shipped / n).read_bytes()).hexdigest()}  {n}\n" for n in sorted(FILES[:4]))
-    stored = shipped.rename(shipped.with_name(f"{hashlib.sha256(lines.encode()).hexdigest()}.model"))
+    lines = "".join(
+        f"{hashlib.sha256((shipped / n).read_bytes()).hexdigest()}  {n}\n"
+        for n in sorted(FILES[:4])
+    )
+    stored = shipped.rename(
+        shipped.with_name(f"{hashlib.sha256(lines.encode()).hexdigest()}.model")
+    )
     assert content_hash(stored) == stored.stem
     assert estimator.load(stored).name == "wave-cloth"
     flip(stored / WEIGHTS, share=0.5)
@@ -85,7 +96,9 @@ def test_renewing_one_file_states_no_other_anew(shipped: Path) -> None:
     assert caught.value.where == str(shipped / WEIGHTS)
 
 
-def test_a_file_that_cannot_be_renewed_stays_whole(shipped: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_cannot_be_renewed_stays_whole(
+    shipped: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     before = {path.name: path.read_bytes() for path in shipped.iterdir()}
 
     def full(path: Path, data: bytes) -> int:

@@ -38,7 +38,9 @@ def test_the_distance_is_mahalanobiss() -> None:
     np.testing.assert_allclose(Familiarity.of(training, draws(5, 10)).distance(x), expected)
 
 
-def test_whitened_points_have_no_covariance_but_unity_and_narrow_directions_are_widened_no_further() -> None:
+def test_whitened_points_have_no_covariance_but_unity_and_narrow_directions_are_widened_no_further() -> (
+    None
+):
     covariance, _ = shrunk_covariance(draws(15, 60))
     white = whitening(covariance, least=1e-9)
     np.testing.assert_allclose(white @ covariance @ white.T, np.eye(5), atol=1e-12)
@@ -53,12 +55,15 @@ def test_a_conformal_p_of_exchangeable_scores_is_uniform_on_its_steps() -> None:
 
 
 def test_false_alarms_are_as_rare_as_stated() -> None:
-    """Familiar clips: of 20,000, the share beyond the threshold is Beta(e, n + 1 − e), e = ⌊α(n + 1)⌋.
+    """Familiar clips: of 20,000, the share beyond the threshold is Beta(e, n + 1 − e), e = ⌊α(n +
+    1)⌋.
 
     With 999 validation clips and α = 0.05 its deviation is 0.0069; four of these are allowed.
     """
     familiarity = Familiarity.of(draws(6, 500), draws(7, 999))
-    assert familiarity.unfamiliar(draws(8, 20_000), false_alarm=0.05).mean() == pytest.approx(0.05, abs=4 * 0.0069)
+    assert familiarity.unfamiliar(draws(8, 20_000), false_alarm=0.05).mean() == pytest.approx(
+        0.05, abs=4 * 0.0069
+    )
 
 
 def test_unfamiliar_clips_are_detected() -> None:
@@ -74,13 +79,20 @@ def test_p_values_and_threshold_agree_also_at_ties() -> None:
         assert (p >= 1 / 100).all()
         assert (p <= 1).all()
         for rate in (0.01, 0.05, 0.125, 0.5):
-            np.testing.assert_array_equal(familiarity.unfamiliar(x, false_alarm=rate), p <= rate + 1e-12)
+            np.testing.assert_array_equal(
+                familiarity.unfamiliar(x, false_alarm=rate), p <= rate + 1e-12
+            )
 
 
 def test_p_counts_the_clips_at_least_as_far() -> None:
-    """With reference distances 1, 2, 3: at 2 two are at least as far, p = 3/4; beyond all, 1/4; at the centre, 1."""
-    familiarity = Familiarity(centre=np.zeros(1), whitening=np.eye(1), reference=np.array([1.0, 2.0, 3.0]))
-    np.testing.assert_allclose(familiarity.p_value(np.array([[2.0], [-4.0], [0.0]])), [0.75, 0.25, 1.0])
+    """With reference distances 1, 2, 3: at 2 two are at least as far, p = 3/4; beyond all, 1/4; at
+    the centre, 1."""
+    familiarity = Familiarity(
+        centre=np.zeros(1), whitening=np.eye(1), reference=np.array([1.0, 2.0, 3.0])
+    )
+    np.testing.assert_allclose(
+        familiarity.p_value(np.array([[2.0], [-4.0], [0.0]])), [0.75, 0.25, 1.0]
+    )
     assert familiarity.threshold(0.25) == 3.0
     assert familiarity.threshold(0.5) == 2.0
 

@@ -1,4 +1,5 @@
-"""A posterior given what is known is Bayes' rule's: beside closed forms, and beside rejection of many draws."""
+"""A posterior given what is known is Bayes' rule's: beside closed forms, and beside rejection of
+many draws."""
 
 from __future__ import annotations
 
@@ -24,9 +25,16 @@ def _mixture(*, components: int = 3, clips: int = 2) -> Mixture:
     generator = torch.Generator().manual_seed(5)
     weight = torch.rand((clips, components), generator=generator, dtype=torch.float64) + 0.2
     location = 0.8 * torch.randn((clips, components, 3), generator=generator, dtype=torch.float64)
-    factor = 0.4 * torch.randn((clips, components, 3, 3), generator=generator, dtype=torch.float64).tril()
+    factor = (
+        0.4
+        * torch.randn((clips, components, 3, 3), generator=generator, dtype=torch.float64).tril()
+    )
     factor.diagonal(dim1=-2, dim2=-1).abs_().add_(0.3)
-    return Mixture(log_weight=(weight / weight.sum(dim=1, keepdim=True)).log(), location=location, factor=factor)
+    return Mixture(
+        log_weight=(weight / weight.sum(dim=1, keepdim=True)).log(),
+        location=location,
+        factor=factor,
+    )
 
 
 def _given(mixture: Mixture, *known: Known, draws: int = DRAWS):
@@ -45,7 +53,9 @@ def _logit(value: float, column: int) -> float:
 
 
 @pytest.mark.parametrize("text", ["0.12:0.20", "0.30:0.40", "0.16±0.03"])
-def test_draws_given_a_range_or_a_deviation_are_those_of_many_weighed_by_the_statement(text: str) -> None:
+def test_draws_given_a_range_or_a_deviation_are_those_of_many_weighed_by_the_statement(
+    text: str,
+) -> None:
     mixture, stated = _mixture(), parse(text)
     values, log_mass = _given(mixture, _weighed(text))
     many = SCALING.values(mixture.sample(400_000, torch.Generator().manual_seed(2))).numpy()
@@ -55,7 +65,8 @@ def test_draws_given_a_range_or_a_deviation_are_those_of_many_weighed_by_the_sta
         if stated.sigma
         else ((own >= stated.low) & (own <= stated.high)).astype(float)
     )
-    # Standard errors of the rejection, of at least 10,000 effective draws, and of 20,000: 2 % of a deviation.
+    # Standard errors of the rejection, of at least 10,000 effective draws, and of 20,000: 2 % of a
+    # deviation.
     np.testing.assert_allclose(np.exp(log_mass[:, 0]), likelihood.mean(axis=1), rtol=0.03)
     share = likelihood / likelihood.sum(axis=1, keepdims=True)
     assert (1 / np.square(share).sum(axis=1)).min() > 10_000
@@ -68,14 +79,21 @@ def test_draws_given_a_range_or_a_deviation_are_those_of_many_weighed_by_the_sta
         assert values[..., 1].max() <= stated.high
 
 
-def test_one_gaussian_given_an_exact_value_is_the_conditional_gaussian_far_outside_as_well() -> None:
-    """Mean m + c (y − m_y)/v and variance s² − c²/v; the log area weight of the value is the normal one's."""
+def test_one_gaussian_given_an_exact_value_is_the_conditional_gaussian_far_outside_as_well() -> (
+    None
+):
+    """Mean m + c (y − m_y)/v and variance s² − c²/v; the log area weight of the value is the normal
+    one's."""
     mixture = _mixture(components=1, clips=1)
     covariance = (mixture.factor @ mixture.factor.mT)[0, 0].numpy()
     location = mixture.location[0, 0].numpy()
     for value in (0.15, 0.06):
         found = restrict_mixtures(
-            mixture, SCALING, [_weighed(f"{value}", clips=1)], draws=DRAWS, generator=torch.Generator().manual_seed(3)
+            mixture,
+            SCALING,
+            [_weighed(f"{value}", clips=1)],
+            draws=DRAWS,
+            generator=torch.Generator().manual_seed(3),
         )
         y = _logit(value, 1)
         rest = [0, 2]
@@ -83,20 +101,27 @@ def test_one_gaussian_given_an_exact_value_is_the_conditional_gaussian_far_outsi
         mean = location[rest] + gain * (y - location[1])
         spread = np.sqrt(covariance[rest, rest] - gain * covariance[rest, 1])
         logits = found.logits[0].numpy()
-        np.testing.assert_allclose((logits[:, rest].mean(axis=0) - mean) / spread, 0.0, atol=4 / math.sqrt(DRAWS))
+        np.testing.assert_allclose(
+            (logits[:, rest].mean(axis=0) - mean) / spread, 0.0, atol=4 / math.sqrt(DRAWS)
+        )
         np.testing.assert_allclose(logits[:, rest].std(axis=0) / spread, 1.0, atol=0.02)
         np.testing.assert_allclose(logits[:, 1], y, atol=1e-9)
         deviation = (y - location[1]) / math.sqrt(covariance[1, 1])
         low, high = (float(bound[1]) for bound in SCALING.bounds)
         slope = (high - low) / ((value - low) * (high - value))  # of the logit
-        area_weight = math.exp(-0.5 * deviation**2) / math.sqrt(2 * math.pi * covariance[1, 1]) * slope
+        area_weight = (
+            math.exp(-0.5 * deviation**2) / math.sqrt(2 * math.pi * covariance[1, 1]) * slope
+        )
         assert math.exp(found.log_mass[0, 0]) == pytest.approx(area_weight, rel=1e-9)
 
 
 def test_components_are_as_probable_as_the_value_makes_them() -> None:
-    """Two components a logit of 6 apart in the weight, winds of 2 and 8 m/s: the weight says which it is."""
+    """Two components a logit of 6 apart in the weight, winds of 2 and 8 m/s: the weight says which
+    it is."""
     wind = torch.tensor([_logit(2.0, 0), _logit(8.0, 0)], dtype=torch.float64)
-    location = torch.stack([wind, torch.tensor([-3.0, 3.0], dtype=torch.float64), torch.zeros(2).double()], dim=1)
+    location = torch.stack(
+        [wind, torch.tensor([-3.0, 3.0], dtype=torch.float64), torch.zeros(2).double()], dim=1
+    )
     mixture = Mixture(
         log_weight=torch.tensor([[0.9, 0.1]]).double().log(),
         location=location[None],
@@ -112,8 +137,12 @@ def test_a_statement_that_says_nothing_changes_nothing() -> None:
     mixture = _mixture()
     values, log_mass = _given(mixture, _weighed("0.05:0.40"))
     free = SCALING.values(mixture.sample(DRAWS, torch.Generator().manual_seed(4))).numpy()
-    np.testing.assert_allclose(np.exp(log_mass), 1.0, atol=0.03)  # but for the margin of the widened range
-    np.testing.assert_allclose((values.mean(axis=1) - free.mean(axis=1)) / free.std(axis=1), 0.0, atol=0.05)
+    np.testing.assert_allclose(
+        np.exp(log_mass), 1.0, atol=0.03
+    )  # but for the margin of the widened range
+    np.testing.assert_allclose(
+        (values.mean(axis=1) - free.mean(axis=1)) / free.std(axis=1), 0.0, atol=0.05
+    )
 
 
 def test_a_small_deviation_is_an_exact_value_and_so_is_a_small_range() -> None:
@@ -121,7 +150,9 @@ def test_a_small_deviation_is_an_exact_value_and_so_is_a_small_range() -> None:
     exact, _ = _given(mixture, _weighed("0.2"))
     for text in ("0.2±0.0002", "0.1998:0.2002"):
         near, _ = _given(mixture, _weighed(text))
-        np.testing.assert_allclose((near.mean(axis=1) - exact.mean(axis=1))[:, [0, 2]], 0.0, atol=0.06)
+        np.testing.assert_allclose(
+            (near.mean(axis=1) - exact.mean(axis=1))[:, [0, 2]], 0.0, atol=0.06
+        )
 
 
 def test_two_quantities_that_are_known_are_conditioned_on_together_in_any_order() -> None:
@@ -148,13 +179,18 @@ def test_two_quantities_that_are_known_are_conditioned_on_together_in_any_order(
         wind = (share * many[..., 0]).sum(axis=1) / share.sum(axis=1)
         spread = many[..., 0].std(axis=1)
         for found in (one, other):
-            np.testing.assert_allclose((found[..., 0].mean(axis=1) - wind) / spread, 0.0, atol=tolerance)
+            np.testing.assert_allclose(
+                (found[..., 0].mean(axis=1) - wind) / spread, 0.0, atol=tolerance
+            )
 
 
 def test_of_a_flag_that_was_measured_and_weighed_both_restrict_the_wind() -> None:
-    """A Gaussian of wind, weight and aspect, all on logits: the wind's variance falls with each that is known."""
+    """A Gaussian of wind, weight and aspect, all on logits: the wind's variance falls with each
+    that is known."""
     scaling = Scaling(names=("outdoor_wind", "fabric_area_weight", "log_aspect"))
-    covariance = torch.tensor([[1.0, 0.7, 0.6], [0.7, 1.0, 0.1], [0.6, 0.1, 1.0]], dtype=torch.float64)
+    covariance = torch.tensor(
+        [[1.0, 0.7, 0.6], [0.7, 1.0, 0.1], [0.6, 0.1, 1.0]], dtype=torch.float64
+    )
     mixture = Mixture(
         log_weight=torch.zeros((1, 1), dtype=torch.float64),
         location=torch.zeros((1, 1, 3), dtype=torch.float64),
@@ -162,16 +198,23 @@ def test_of_a_flag_that_was_measured_and_weighed_both_restrict_the_wind() -> Non
     )
     weighed, measured = _weighed("0.2", clips=1), Known.of_aspect(3.0, 2.0, count=1)
     both = restrict_mixtures(
-        mixture, scaling, [weighed, measured], draws=DRAWS, generator=torch.Generator().manual_seed(1)
+        mixture,
+        scaling,
+        [weighed, measured],
+        draws=DRAWS,
+        generator=torch.Generator().manual_seed(1),
     )
     values = scaling.values(both.logits)[0].numpy()
     np.testing.assert_allclose(values[:, 1], 0.2, rtol=1e-9)
     assert np.abs(values[:, 2] - math.log(1.5)).max() <= ASPECT_SLACK + 1e-9
-    # 1 − cᵀ C⁻¹ c of the conditional; the aspect's range adds its own width, a tenth of a deviation either way.
+    # 1 − cᵀ C⁻¹ c of the conditional; the aspect's range adds its own width, a tenth of a deviation
+    # either way.
     gain = np.linalg.solve(covariance[1:, 1:].numpy(), covariance[0, 1:].numpy())
     variance = 1 - gain @ covariance[0, 1:].numpy()
     assert both.logits[0, :, 0].var().item() == pytest.approx(variance, rel=0.06)
-    alone = restrict_mixtures(mixture, scaling, [weighed], draws=DRAWS, generator=torch.Generator().manual_seed(1))
+    alone = restrict_mixtures(
+        mixture, scaling, [weighed], draws=DRAWS, generator=torch.Generator().manual_seed(1)
+    )
     assert alone.logits[0, :, 0].var().item() == pytest.approx(1 - 0.7**2, rel=0.04)
 
 
@@ -180,13 +223,17 @@ def test_each_draw_has_its_own_statement_and_one_that_is_impossible_has_no_mass(
     scale = np.tile([0.5, 1.0, 2.0, 4.0], (2, 2_500))
     for text, impossible in (("0.2", {0.5: False, 4.0: False, 2.0: False}), ("0.36", {0.5: True})):
         stated = parse(text)
-        values, log_mass = _given(mixture, Known.stated("area_weight", stated, scale=scale), draws=10_000)
+        values, log_mass = _given(
+            mixture, Known.stated("area_weight", stated, scale=scale), draws=10_000
+        )
         for factor in (0.5, 1.0, 2.0, 4.0):
             chosen = scale == factor
             assert np.isneginf(log_mass[chosen]).all() == impossible.get(factor, False)
             if not impossible.get(factor, False):
                 np.testing.assert_allclose(values[..., 1][chosen], stated.low / factor, rtol=1e-9)
-    ranged, mass = _given(mixture, Known.stated("area_weight", parse("0.2:0.3"), scale=scale), draws=10_000)
+    ranged, mass = _given(
+        mixture, Known.stated("area_weight", parse("0.2:0.3"), scale=scale), draws=10_000
+    )
     own = ranged[..., 1] * scale
     assert (own[scale > 0.5].min(), own[scale > 0.5].max()) == pytest.approx((0.2, 0.3), abs=0.002)
     assert np.isneginf(mass[scale == 0.5]).all()  # 0.4 to 0.6 kg/m² of 0.05 to 0.40
@@ -210,7 +257,9 @@ def test_a_statement_that_the_model_cannot_use_is_refused() -> None:
 
 def test_ends_that_are_not_in_order_and_mixed_statements_are_refused() -> None:
     def known(low: list[float], high: list[float], sigma: list[float]) -> Known:
-        return Known(name="area_weight", low=np.array([low]), high=np.array([high]), sigma=np.array([sigma]))
+        return Known(
+            name="area_weight", low=np.array([low]), high=np.array([high]), sigma=np.array([sigma])
+        )
 
     assert known([0.1], [0.2], [0.0]).exact is False
     cases = [

@@ -1,4 +1,5 @@
-"""Films that are made fit before networks learn from them: at the network's instants, whatever the film's rate."""
+"""Films that are made fit before networks learn from them: at the network's instants, whatever the
+film's rate."""
 
 from __future__ import annotations
 
@@ -12,7 +13,15 @@ import flagdata
 from flagdata.core.arrays import FloatArray, UInt8Array
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.lake import Lake
-from models.training import FitFilm, Prepared, TrainingRecipe, parse, prepare_clips, prepare_films, sides_of
+from models.training import (
+    FitFilm,
+    Prepared,
+    TrainingRecipe,
+    parse,
+    prepare_clips,
+    prepare_films,
+    sides_of,
+)
 from models.training.stated_films import StatedFilms
 from tests.models.conftest import fill
 from tests.small import TRAINING
@@ -23,7 +32,8 @@ DUSK = "[input.augment.dusk]\nshare = 1.0\nlow = 0.3\nhigh = 0.6\n"
 
 
 def swinging(times: FloatArray) -> UInt8Array:
-    """(n, 64, 64) a bright patch on a still background, whose place across swings by 6 px in one second."""
+    """(n, 64, 64) a bright patch on a still background, whose place across swings by 6 px in one
+    second."""
     y, x = np.mgrid[:SIDE, :SIDE]
     background = 60 + 25 * np.sin(0.7 * x) * np.cos(0.9 * y)
     place = _place(times)[:, None, None]
@@ -38,13 +48,16 @@ def _place(times: FloatArray) -> FloatArray:
 @pytest.mark.parametrize("rate", [24.0, 30.0, 50.0, 60.0])
 def test_a_film_of_any_rate_is_shown_at_the_networks_instants(rate: float) -> None:
     times = np.arange(round(1.7 * rate)) / rate
-    film = replace(FitFilm.of(swinging(times), times, size=SIDE), frames=swinging(times))  # nothing frozen
+    film = replace(
+        FitFilm.of(swinging(times), times, size=SIDE), frames=swinging(times)
+    )  # nothing frozen
     first = int(film.starts(30, 25.0)[-1])
     clip, instants = film.clip(first, 30, 25.0)
     assert np.diff(instants) == pytest.approx(np.full(29, 0.04))
     weight = (clip[:, SIDE // 2] > 150).astype(float)
     centre = (weight * np.arange(SIDE)).sum(axis=1) / weight.sum(axis=1)
-    # Shown by the nearer frame up to 0.25 of its period (0.4 at 24 Hz): 2π · 6 px/s times that, and half a pixel.
+    # Shown by the nearer frame up to 0.25 of its period (0.4 at 24 Hz): 2π · 6 px/s times that, and
+    # half a pixel.
     late = 2 * np.pi * 6 * (0.4 if rate < 25 else 0.25) / rate
     assert np.abs(centre - _place(instants)).max() <= late + 0.5
 
@@ -98,37 +111,60 @@ def films(path: Path, folder: Path, of: TrainingRecipe) -> Prepared:
     )
 
 
-def test_films_of_another_rate_are_learned_from_once_they_are_conditioned(fast: Path, tmp_path: Path) -> None:
+def test_films_of_another_rate_are_learned_from_once_they_are_conditioned(
+    fast: Path, tmp_path: Path
+) -> None:
     plain, source = recipe(extra="variants = 2\n"), flagdata.open(fast)
     stated = StatedFilms.of(source.lake, sides_of(source, plain, "train", at=None), at=None)
     with pytest.raises(InputError, match="another rate than the recipe's 25 Hz"):
         stated.check_learned(plain.front_end, plain.cropping)
     conditioned = recipe(extra=CONDITIONED.replace("2", "2\nrate = 25.0", 1))
-    with pytest.raises(InputError, match=r"the film of 14 frames at 30 Hz cannot give clips of 12 at 25 Hz"):
+    with pytest.raises(
+        InputError, match=r"the film of 14 frames at 30 Hz cannot give clips of 12 at 25 Hz"
+    ):
         films(fast, tmp_path, conditioned)  # 0.43 s of film, 0.44 s of clip
     shorter = parse(
-        TRAINING.replace("variants = 2\n", CONDITIONED).replace("frames = 12", "frames = 10"), name="s", where="s.toml"
+        TRAINING.replace("variants = 2\n", CONDITIONED).replace("frames = 12", "frames = 10"),
+        name="s",
+        where="s.toml",
     )
     found = films(fast, tmp_path, shorter)
     assert found.maps.shape[:2] == (6, 2)
     pairs = sides_of(flagdata.open(fast), shorter, "validation", at=None)
     judged = prepare_clips(
-        pairs, shorter.front_end, shorter.cropping, folder=tmp_path, workers=1, advance=lambda count: None
+        pairs,
+        shorter.front_end,
+        shorter.cropping,
+        folder=tmp_path,
+        workers=1,
+        advance=lambda count: None,
     )
     assert len(judged) == len(pairs)
     assert np.isfinite(judged.batch(np.arange(2), np.zeros(2, dtype=np.int64)).numpy()).all()
 
 
-def test_what_happens_to_films_shapes_their_inputs_and_the_recipes_hash(lake_path: Path, tmp_path: Path) -> None:
+def test_what_happens_to_films_shapes_their_inputs_and_the_recipes_hash(
+    lake_path: Path, tmp_path: Path
+) -> None:
     plain, dusky = recipe(), recipe(DUSK)
     assert (
-        len({recipe(extra="variants = 2\n").hash, plain.hash, dusky.hash, recipe(DUSK.replace("0.6", "0.5")).hash}) == 4
+        len(
+            {
+                recipe(extra="variants = 2\n").hash,
+                plain.hash,
+                dusky.hash,
+                recipe(DUSK.replace("0.6", "0.5")).hash,
+            }
+        )
+        == 4
     )
     assert dusky.identity()["augment"] == {"dusk": {"share": 1.0, "low": 0.3, "high": 0.6}}
     assert "augment" not in recipe(extra="variants = 2\n").identity()
     assert "conditioned" not in recipe(extra="variants = 2\n").cropping.as_dict()
     entries, variant = np.arange(6), np.zeros(6, dtype=np.int64)
-    one, other = (films(lake_path, tmp_path, of).batch(entries, variant).numpy() for of in (plain, dusky))
+    one, other = (
+        films(lake_path, tmp_path, of).batch(entries, variant).numpy() for of in (plain, dusky)
+    )
     assert np.abs(one - other).max() > 0
     again = films(lake_path, tmp_path, dusky).batch(entries, variant).numpy()
     assert (again == other).all()

@@ -1,4 +1,5 @@
-"""What is learned from, and what is judged: sides by the catalog's columns; nothing is on two of them."""
+"""What is learned from, and what is judged: sides by the catalog's columns; nothing is on two of
+them."""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ from tests.refusals import unrefused
 
 SIDES = ("train", "validation", "test")
 RECIPE = (
-    '[data]\ndataset = {}\n[input]\nmaps = "wave-maps"\n[network]\nname = "wave"\n[loss]\ntargets = ["wind_speed"]\n'
+    '[data]\ndataset = {}\n[input]\nmaps = "wave-maps"\n[network]\nname = "wave"\n[loss]\ntargets '
+    '= ["wind_speed"]\n'
 )
 
 
@@ -57,11 +59,21 @@ def names(table: pa.Table, clips: Collection[str]) -> list[str]:
 
 @pytest.mark.parametrize(
     ("dataset", "other"),
-    [("X", "X-train"), ("X-train", "X"), ("o'brien", "o'brien-test"), ("100%", "1000"), ("a_b", "a-b")],
+    [
+        ("X", "X-train"),
+        ("X-train", "X"),
+        ("o'brien", "o'brien-test"),
+        ("100%", "1000"),
+        ("a_b", "a-b"),
+    ],
 )
-def test_a_side_is_that_of_its_own_data_set_alone_whatever_another_is_called(dataset: str, other: str) -> None:
+def test_a_side_is_that_of_its_own_data_set_alone_whatever_another_is_called(
+    dataset: str, other: str
+) -> None:
     table = catalog(*films(dataset, seed=0), *films(other, seed=100))
-    division = divide(table, clips_of(table, DataSpec(datasets=(dataset,)).rows), hashed=HashedSplit())
+    division = divide(
+        table, clips_of(table, DataSpec(datasets=(dataset,)).rows), hashed=HashedSplit()
+    )
     taken = {side: names(table, division.on(side)) for side in SIDES}
     assert taken == {
         "train": [f"{dataset}-train-{k:05d}" for k in range(4)],
@@ -77,7 +89,8 @@ def test_two_data_sets_are_learned_from_together() -> None:
 
 
 def shared(tie: str) -> list[Artifact]:
-    """Two data sets that share one sequence, or one session, across sides, under different names and seeds."""
+    """Two data sets that share one sequence, or one session, across sides, under different names
+    and seeds."""
     ours, theirs = films("ours", seed=0), films("theirs", seed=100, sides={"test": 1})
     sequence, film, clip = theirs
     if tie == "meshes":
@@ -100,10 +113,17 @@ def test_sides_that_share_a_sequence_are_refused_in_training_and_in_judging(tie:
         refuse_learned(table, [DataSpec(datasets=("ours",))], dataset="theirs", side="test")
 
 
-def test_a_network_is_judged_by_films_that_it_did_not_learn_from_and_by_its_training_side_as_such() -> None:
+def test_a_network_is_judged_by_films_that_it_did_not_learn_from_and_by_its_training_side_as_such() -> (
+    None
+):
     table = catalog(*films("ours", seed=0), *films("theirs", seed=100))
     ours = DataSpec(datasets=("ours",), sequences=2)
-    for dataset, side in (("ours", "test"), ("ours", "validation"), ("ours", "train"), ("theirs", "test")):
+    for dataset, side in (
+        ("ours", "test"),
+        ("ours", "validation"),
+        ("ours", "train"),
+        ("theirs", "test"),
+    ):
         refuse_learned(table, [ours], dataset=dataset, side=side)
 
 

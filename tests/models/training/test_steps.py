@@ -1,4 +1,5 @@
-"""Steps that can be taken up again: the same weights whether a training ran through or was stopped; ranks; errors."""
+"""Steps that can be taken up again: the same weights whether a training ran through or was stopped;
+ranks; errors."""
 
 from __future__ import annotations
 
@@ -16,15 +17,35 @@ import numpy as np
 import pytest
 import torch
 
-from flagdata.errors import ConflictError, CorruptError, FlagdataError, InputError, RefusedError, UsageError
+from flagdata.errors import (
+    ConflictError,
+    CorruptError,
+    FlagdataError,
+    InputError,
+    RefusedError,
+    UsageError,
+)
 from models.evaluation.predict import predict
 from models.maps.crops import Cropping
 from models.maps.frontend import FrontEnd
 from models.networks.learner import Learner, Loss, contrastive_loss
 from models.trained.estimator import Estimator
 from models.training import Augment, DataSpec, Prepared, TrainingRecipe, checkpoint
-from models.training.steps import Batches, Trained, Training, TrainingDivergedError, learning_rate, validation_batches
-from models.training.training_recipe import LossSpec, NetworkSpec, OptimiserSpec, Precision, Schedule
+from models.training.steps import (
+    Batches,
+    Trained,
+    Training,
+    TrainingDivergedError,
+    learning_rate,
+    validation_batches,
+)
+from models.training.training_recipe import (
+    LossSpec,
+    NetworkSpec,
+    OptimiserSpec,
+    Precision,
+    Schedule,
+)
 
 SIZE = 24
 FRONT_END = FrontEnd(maps="wave-maps", size=SIZE)
@@ -47,7 +68,9 @@ def prepared(count: int, *, seed: int) -> Prepared:
 
 
 def recipe(loss: Loss = Loss.POSTERIOR, **optimiser: object) -> TrainingRecipe:
-    spec = OptimiserSpec(rate=5e-3, decay=1e-4, batch=8, epochs=4, schedule=Schedule.COSINE, patience=9)
+    spec = OptimiserSpec(
+        rate=5e-3, decay=1e-4, batch=8, epochs=4, schedule=Schedule.COSINE, patience=9
+    )
     targets = () if loss is Loss.CONTRASTIVE else ("wind_speed",)
     return TrainingRecipe(
         name="small",
@@ -100,7 +123,9 @@ def training(run: Path, own: TrainingRecipe, **changes: object) -> Training:
     return replace(given, **changes)  # pyright: ignore[reportArgumentType]
 
 
-@pytest.fixture(scope="module", autouse=True)  # weights are compared between tests, and depend on the threads
+@pytest.fixture(
+    scope="module", autouse=True
+)  # weights are compared between tests, and depend on the threads
 def one_thread() -> Iterator[None]:
     before = torch.get_num_threads()
     torch.set_num_threads(1)
@@ -111,7 +136,9 @@ def one_thread() -> Iterator[None]:
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory, one_thread: None) -> Callable[[Loss], Trained]:
     """Trainings that ran through, one a loss."""
-    return cache(lambda loss: training(tmp_path_factory.mktemp("whole") / "run", recipe(loss)).complete())
+    return cache(
+        lambda loss: training(tmp_path_factory.mktemp("whole") / "run", recipe(loss)).complete()
+    )
 
 
 @pytest.mark.parametrize("loss", list(Loss))
@@ -134,7 +161,8 @@ def test_other_seeds_give_other_weights_and_the_same_seed_the_same(
 ) -> None:
     first = whole(Loss.POSTERIOR).learner.state_dict()
     second, other = (
-        training(tmp_path / str(seed), replace(recipe(), seed=seed)).complete().learner.state_dict() for seed in (3, 4)
+        training(tmp_path / str(seed), replace(recipe(), seed=seed)).complete().learner.state_dict()
+        for seed in (3, 4)
     )
     assert all(torch.equal(first[name], second[name]) for name in first)
     assert not torch.equal(first["network.summary.0.weight"], other["network.summary.0.weight"])
@@ -165,7 +193,9 @@ def test_a_loss_that_is_no_number_is_an_error_and_the_last_checkpoint_stays(tmp_
     assert (tmp_path / "last" / "card.json").read_bytes() == before
 
 
-def test_a_full_disk_leaves_the_last_checkpoint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_leaves_the_last_checkpoint(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with pytest.raises(KeyboardInterrupt):
         training(tmp_path, recipe(), bars=stopped_after(30)).complete()
     before = (tmp_path / "last" / "card.json").read_bytes()
@@ -221,7 +251,8 @@ def test_a_damaged_checkpoint_is_passed_over_for_the_one_before_and_the_weights_
     run = Path(shutil.copytree(stopped, tmp_path / "run"))
     spoil(run / "last" / name, damage)
     taken_up, unbroken = (
-        done.learner.state_dict() for done in (training(run, recipe()).complete(), whole(Loss.POSTERIOR))
+        done.learner.state_dict()
+        for done in (training(run, recipe()).complete(), whole(Loss.POSTERIOR))
     )
     assert all(torch.equal(value, taken_up[key]) for key, value in unbroken.items())
     (warning,) = caplog.messages
@@ -237,7 +268,9 @@ def spoil(path: Path, damage: str) -> None:
     path.write_bytes(content if damage == "changed" else content[:-40])
 
 
-def test_checkpoints_that_are_all_damaged_are_an_error_with_the_file_and_the_fix(tmp_path: Path) -> None:
+def test_checkpoints_that_are_all_damaged_are_an_error_with_the_file_and_the_fix(
+    tmp_path: Path,
+) -> None:
     training(tmp_path, recipe(epochs=1)).complete()
     for kept in ("last", "before"):
         spoil(tmp_path / kept / "weights.safetensors", "changed")
@@ -247,14 +280,17 @@ def test_checkpoints_that_are_all_damaged_are_an_error_with_the_file_and_the_fix
     assert "delete all checkpoints" in caught.value.fix
 
 
-def test_a_kill_between_the_two_renames_loses_nothing(tmp_path: Path, whole: Callable[[Loss], Trained]) -> None:
+def test_a_kill_between_the_two_renames_loses_nothing(
+    tmp_path: Path, whole: Callable[[Loss], Trained]
+) -> None:
     with pytest.raises(KeyboardInterrupt):
         training(tmp_path / "broken", recipe(), bars=stopped_after(50)).complete()
     shutil.rmtree(tmp_path / "broken" / "before")
     (tmp_path / "broken" / "last").rename(tmp_path / "broken" / "before")
     taken_up = training(tmp_path / "broken", recipe()).complete()
     assert all(
-        torch.equal(v, taken_up.learner.state_dict()[n]) for n, v in whole(Loss.POSTERIOR).learner.state_dict().items()
+        torch.equal(v, taken_up.learner.state_dict()[n])
+        for n, v in whole(Loss.POSTERIOR).learner.state_dict().items()
     )
 
 
@@ -266,10 +302,14 @@ def test_a_target_that_clips_do_not_state_is_an_error(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("side", ["train", "validation"])
-def test_a_wind_beyond_the_range_is_refused_and_not_learned_as_its_end(tmp_path: Path, side: str) -> None:
+def test_a_wind_beyond_the_range_is_refused_and_not_learned_as_its_end(
+    tmp_path: Path, side: str
+) -> None:
     strong = prepared(40, seed=1)
     strong.parameters["wind_speed"][7] = 14.0
-    with pytest.raises(InputError, match="1 of 40 clips lie beyond the range of the target wind_speed, 0 to 10 m/s"):
+    with pytest.raises(
+        InputError, match="1 of 40 clips lie beyond the range of the target wind_speed, 0 to 10 m/s"
+    ):
         training(tmp_path, recipe(), **{side: strong}).complete()
     assert not (tmp_path / "last").exists()
 
@@ -288,14 +328,21 @@ def test_an_evaluation_says_how_many_truths_the_network_cannot_state() -> None:
         card={},
     )
     found = predict(judged, strong, label="small", note="seed 3", milliseconds=1.0, seed=1)
-    assert found.note.startswith("seed 3; 3 of 40 clips lie beyond the range of the target wind_speed, 0 to 10 m/s")
+    assert found.note.startswith(
+        "seed 3; 3 of 40 clips lie beyond the range of the target wind_speed, 0 to 10 m/s"
+    )
     strong.parameters["wind_speed"][7:10] = 10.0
-    assert predict(judged, strong, label="small", note="seed 3", milliseconds=1.0, seed=1).note == "seed 3"
+    assert (
+        predict(judged, strong, label="small", note="seed 3", milliseconds=1.0, seed=1).note
+        == "seed 3"
+    )
 
 
 def test_rates_fall_by_a_tenth_after_the_epochs_that_were_named() -> None:
     spec = OptimiserSpec(rate=1e-2, epochs=40, drop_after=20)
-    assert [learning_rate(spec, step * 10, 10) for step in (0, 19, 20, 39)] == pytest.approx([1e-2, 1e-2, 1e-3, 1e-3])
+    assert [learning_rate(spec, step * 10, 10) for step in (0, 19, 20, 39)] == pytest.approx(
+        [1e-2, 1e-2, 1e-3, 1e-3]
+    )
 
 
 def test_the_cosine_rises_and_falls() -> None:
@@ -310,7 +357,10 @@ def test_the_cosine_rises_and_falls() -> None:
 
 def test_bfloat16_trains_to_nearly_the_same_loss(tmp_path: Path) -> None:
     plain, rounded = (
-        training(tmp_path / kind.value, recipe(Loss.REGRESSION, precision=kind)).complete().course.epochs[-1].train
+        training(tmp_path / kind.value, recipe(Loss.REGRESSION, precision=kind))
+        .complete()
+        .course.epochs[-1]
+        .train
         for kind in (Precision.FLOAT32, Precision.BFLOAT16)
     )
     assert rounded == pytest.approx(plain, rel=0.1)
@@ -334,12 +384,17 @@ class TestBatches:
         data = prepared(40, seed=1)
         whole = [batch.entries.tolist() for batch in Batches(prepared=data, size=8, seed=5)]
         parts = [
-            [batch.entries.tolist() for batch in Batches(prepared=data, size=8, seed=5, share=(rank, 2))]
+            [
+                batch.entries.tolist()
+                for batch in Batches(prepared=data, size=8, seed=5, share=(rank, 2))
+            ]
             for rank in (0, 1)
         ]
         assert whole == [one + other for one, other in zip(*parts, strict=True)]
 
-    def test_the_hash_of_the_order_is_that_of_all_ranks_and_differs_with_epoch_seed_and_data(self) -> None:
+    def test_the_hash_of_the_order_is_that_of_all_ranks_and_differs_with_epoch_seed_and_data(
+        self,
+    ) -> None:
         data, other = prepared(40, seed=1), prepared(40, seed=2)
         batches = Batches(prepared=data, size=8, seed=5)
         before = batches.order_hash(1)
@@ -417,7 +472,9 @@ def test_a_contrastive_loss_is_validated_on_batches_of_whole_sequences_that_it_c
 
 
 def test_other_losses_are_validated_on_every_clip() -> None:
-    assert [len(entries) for entries in validation_batches(np.zeros(129, np.int64), whole=False)] == [64, 64, 1]
+    assert [
+        len(entries) for entries in validation_batches(np.zeros(129, np.int64), whole=False)
+    ] == [64, 64, 1]
 
 
 def test_two_ranks_take_the_steps_of_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -428,19 +485,27 @@ def test_two_ranks_take_the_steps_of_one(tmp_path: Path, monkeypatch: pytest.Mon
 
     def started(rank: int) -> subprocess.Popen[bytes]:
         command = [sys.executable, str(script), str(rank), str(tmp_path)]
-        return subprocess.Popen(command, cwd=root, env={"PYTHONPATH": root, "PATH": "/usr/bin:/bin"})
+        return subprocess.Popen(
+            command, cwd=root, env={"PYTHONPATH": root, "PATH": "/usr/bin:/bin"}
+        )
 
     with monkeypatch.context() as patch:
         patch.setattr(TrainingRecipe, "learner", small_learner)
         own = recipe(Loss.REGRESSION, epochs=2)
-        alone = training(tmp_path / "run-1", own, checkpoint_seconds=1e9).complete().learner.state_dict()
+        alone = (
+            training(tmp_path / "run-1", own, checkpoint_seconds=1e9)
+            .complete()
+            .learner.state_dict()
+        )
     assert [process.wait(timeout=500) for process in [started(rank) for rank in range(2)]] == [0, 0]
     shared = json.loads((tmp_path / "weights.json").read_text())
     for name, values in alone.items():
         np.testing.assert_allclose(shared[name], values.numpy(), rtol=1e-5, atol=1e-6, err_msg=name)
 
 
-@pytest.mark.parametrize("theirs", ["notes.txt", "next/thesis.tex", "before/last/a", "last/card.json/b"])
+@pytest.mark.parametrize(
+    "theirs", ["notes.txt", "next/thesis.tex", "before/last/a", "last/card.json/b"]
+)
 def test_a_run_folder_with_anything_else_in_it_is_refused(theirs: str, tmp_path: Path) -> None:
     """Checkpoints replace the folders next, last and before: none of them may be a user's."""
     checkpoint.check_folder(tmp_path / "new")
@@ -451,7 +516,9 @@ def test_a_run_folder_with_anything_else_in_it_is_refused(theirs: str, tmp_path:
         checkpoint.check_folder(tmp_path / "run")
 
 
-def test_the_length_of_a_training_is_in_proportion_to_its_epochs_and_trying_it_changes_no_draw(tmp_path: Path) -> None:
+def test_the_length_of_a_training_is_in_proportion_to_its_epochs_and_trying_it_changes_no_draw(
+    tmp_path: Path,
+) -> None:
     few, many = (training(tmp_path / str(n), recipe(epochs=n)) for n in (2, 2000))
     before = torch.random.get_rng_state()
     short, long = few.length(2), many.length(2000)

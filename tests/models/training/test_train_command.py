@@ -1,4 +1,5 @@
-"""`flagdata train` and `flagdata evaluate` on a small lake: artifacts, provenance, what is refused."""
+"""`flagdata train` and `flagdata evaluate` on a small lake: artifacts, provenance, what is
+refused."""
 
 from __future__ import annotations
 
@@ -32,7 +33,15 @@ from flagdata.lake import Catalog, Lake
 from models.networks.targets import Cloth
 from models.trained import estimator
 from models.trained.model_folder import WEIGHTS, read_card
-from models.training import inputs, load, parse, prepare_clips, prepare_films, sides_of, train_command
+from models.training import (
+    inputs,
+    load,
+    parse,
+    prepare_clips,
+    prepare_films,
+    sides_of,
+    train_command,
+)
 from models.training.inputs import clip_as_taken
 from models.training.stated_films import StatedFilms
 from models.training.training_recipe import TRAININGS
@@ -57,10 +66,23 @@ def lake(lake_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     for seed in (1, 2):
         done = CliRunner().invoke(
             root,
-            ["train", str(recipe), "--at", "v1", "--seed", str(seed), "--lake", str(path), "--workers", "1"],
+            [
+                "train",
+                str(recipe),
+                "--at",
+                "v1",
+                "--seed",
+                str(seed),
+                "--lake",
+                str(path),
+                "--workers",
+                "1",
+            ],
             catch_exceptions=False,
         )
-        orders |= set(re.findall(r"^order of the first epoch: ([0-9a-f]{64})$", done.stderr, re.MULTILINE))
+        orders |= set(
+            re.findall(r"^order of the first epoch: ([0-9a-f]{64})$", done.stderr, re.MULTILINE)
+        )
     assert len(orders) == 2
     return path
 
@@ -79,11 +101,15 @@ def test_a_model_is_an_artifact_with_what_it_came_from(lake: Path) -> None:
     assert not list(Lake.open(lake).object_path(rows[0]["object"]).glob("*.pt"))
 
 
-def test_a_model_was_made_from_the_recordings_of_both_sides(lake: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_model_was_made_from_the_recordings_of_both_sides(
+    lake: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     opened = Lake.open(lake)
     recipe = load(str(lake.parent / "small.toml"))
     source = flagdata.open(lake)
-    train, validation = (sides_of(source, recipe, side, at="v1") for side in ("train", "validation"))
+    train, validation = (
+        sides_of(source, recipe, side, at="v1") for side in ("train", "validation")
+    )
     clips = {*train.table.artifact.tolist(), *validation.table.artifact.tolist()}
     catalog = opened.rows(at="v1", columns=["artifact", "recording"]).to_pylist()
     made_from = {row["recording"] for row in catalog if row["artifact"] in clips}
@@ -92,7 +118,11 @@ def test_a_model_was_made_from_the_recordings_of_both_sides(lake: Path, monkeypa
     monkeypatch.setattr(train_command, "PARENTS", 2)
     data = train_command.data_identity(opened, train, validation, at="v1")
     bounded = train_command.network_artifact(
-        opened, recipe, data, [*train_command.recordings_of(train, validation), "f" * 32], branch="main"
+        opened,
+        recipe,
+        data,
+        [*train_command.recordings_of(train, validation), "f" * 32],
+        branch="main",
     )
     assert bounded.parents == tuple(sorted(made_from)[:2])
     assert bounded.recipe["recordings"] == len(made_from) + 1
@@ -121,7 +151,9 @@ def test_a_model_that_is_committed_is_reported_without_reading_the_lake_again(
         raise CorruptError("the catalog cannot be read", fix="check the disk")
 
     monkeypatch.setattr(Catalog, "append", then_unreadable)
-    report = run("train", str(lake.parent / "small.toml"), "--at", "v1", "--seed", "3", "--lake", str(lake))
+    report = run(
+        "train", str(lake.parent / "small.toml"), "--at", "v1", "--seed", "3", "--lake", str(lake)
+    )
     monkeypatch.undo()
     row = Lake.open(lake).artifact(report["artifact"])
     assert (row.seed, row.object) == (3, report["object"])
@@ -129,21 +161,47 @@ def test_a_model_that_is_committed_is_reported_without_reading_the_lake_again(
 
 
 def test_models_are_judged_with_intervals_over_simulations(lake: Path, tmp_path: Path) -> None:
-    found = run("evaluate", "small", "--dataset", "made", "--at", "main", "--lake", str(lake), "--out", str(tmp_path))
+    found = run(
+        "evaluate",
+        "small",
+        "--dataset",
+        "made",
+        "--at",
+        "main",
+        "--lake",
+        str(lake),
+        "--out",
+        str(tmp_path),
+    )
     assert (tmp_path / "evaluation.html").stat().st_size > 1000
     text = json.dumps(found)
     assert '"small"' in text
     assert '"rmse"' in text
 
 
-def test_networks_are_of_today_and_the_clips_of_a_version_that_is_older(lake: Path, tmp_path: Path) -> None:
-    found = run("evaluate", "small", "--dataset", "made", "--at", "v1", "--lake", str(lake), "--out", str(tmp_path))
+def test_networks_are_of_today_and_the_clips_of_a_version_that_is_older(
+    lake: Path, tmp_path: Path
+) -> None:
+    found = run(
+        "evaluate",
+        "small",
+        "--dataset",
+        "made",
+        "--at",
+        "v1",
+        "--lake",
+        str(lake),
+        "--out",
+        str(tmp_path),
+    )
     assert not Lake.open(lake).rows("kind = 'network'", at="v1").num_rows
     assert [row["label"] for row in found["models"] if row["run"] is not None] == ["small", "small"]
     assert found["data"] == "made, test side, at v1"
 
 
-def test_a_network_of_the_branch_that_is_judged_is_found_at_its_head(lake: Path, tmp_path: Path) -> None:
+def test_a_network_of_the_branch_that_is_judged_is_found_at_its_head(
+    lake: Path, tmp_path: Path
+) -> None:
     copy = tmp_path / "lake"
     shutil.copytree(lake, copy)
     opened = Lake.open(copy)
@@ -155,11 +213,21 @@ def test_a_network_of_the_branch_that_is_judged_is_found_at_its_head(lake: Path,
     where = ["--dataset", "made", "--lake", str(copy)]
     with pytest.raises(UnknownNameError, match="small"):
         run("evaluate", "small", "--at", "v1", *where, "--out", str(tmp_path / "main"))
-    found = run("evaluate", trained["artifact"][:8], "--at", "other", *where, "--out", str(tmp_path / "other"))
+    found = run(
+        "evaluate",
+        trained["artifact"][:8],
+        "--at",
+        "other",
+        *where,
+        "--out",
+        str(tmp_path / "other"),
+    )
     assert [row["label"] for row in found["models"]] == ["small"]
 
 
-def test_a_clip_is_cut_to_what_a_network_takes_and_a_short_one_goes_on_in_its_film(lake: Path) -> None:
+def test_a_clip_is_cut_to_what_a_network_takes_and_a_short_one_goes_on_in_its_film(
+    lake: Path,
+) -> None:
     recipe = load(str(lake.parent / "small.toml"))
     pairs = sides_of(flagdata.open(lake), recipe, "test", at="v1")
     stored, film = pairs[3].clip[0].numpy(), pairs.film(3)
@@ -202,7 +270,10 @@ def test_triplets_are_scored_on_clips_of_other_lengths_and_cloth_is_read_from_em
         "12",
         "--linear",
     )
-    assert [(point["label"], point["frames"]) for point in found["frames"]] == [("small", 8), ("small", 12)]
+    assert [(point["label"], point["frames"]) for point in found["frames"]] == [
+        ("small", 8),
+        ("small", 12),
+    ]
     assert all(0 <= point["accuracy"] <= 1 for point in found["frames"])
     assert found["frames"][0]["accuracy"] != found["frames"][1]["accuracy"]
     assert set(found["linear"][0]["pearson"]) == {"log area_weight", "log stiffness"}
@@ -212,26 +283,54 @@ def test_triplets_are_scored_on_clips_of_other_lengths_and_cloth_is_read_from_em
 
 
 def test_clips_longer_than_the_films_are_refused(lake: Path, tmp_path: Path) -> None:
-    longer = ["evaluate", "small", "--dataset", "made", "--lake", str(lake), "--out", str(tmp_path), "--frames", "90"]
+    longer = [
+        "evaluate",
+        "small",
+        "--dataset",
+        "made",
+        "--lake",
+        str(lake),
+        "--out",
+        str(tmp_path),
+        "--frames",
+        "90",
+    ]
     done = CliRunner().invoke(root, longer)
     assert isinstance(done.exception, InputError)
     assert "film has 14 frames" in str(done.exception)
 
 
-def test_a_shipped_ensemble_estimates_clips_and_knows_what_is_unlike_them(lake: Path, tmp_path: Path) -> None:
+def test_a_shipped_ensemble_estimates_clips_and_knows_what_is_unlike_them(
+    lake: Path, tmp_path: Path
+) -> None:
     recipe = load(str(lake.parent / "small.toml"))
     source = flagdata.open(lake)
-    train, validation, test = (sides_of(source, recipe, side, at="v1") for side in ("train", "validation", "test"))
+    train, validation, test = (
+        sides_of(source, recipe, side, at="v1") for side in ("train", "validation", "test")
+    )
     cache = tmp_path / "cache"
     known = prepare_films(
-        train, recipe.front_end, recipe.cropping, variants=2, folder=cache, workers=1, advance=lambda count: None
+        train,
+        recipe.front_end,
+        recipe.cropping,
+        variants=2,
+        folder=cache,
+        workers=1,
+        advance=lambda count: None,
     )
     judged = prepare_clips(
-        validation, recipe.front_end, recipe.cropping, folder=cache, workers=1, advance=lambda count: None
+        validation,
+        recipe.front_end,
+        recipe.cropping,
+        folder=cache,
+        workers=1,
+        advance=lambda count: None,
     )
     rows = source.lake.rows("kind = 'network'", columns=["object"]).to_pylist()
     members = [source.lake.object_path(row["object"]) for row in rows]
-    shipped = shipping.write(tmp_path / "small", members, train=known, validation=judged, name="small")
+    shipped = shipping.write(
+        tmp_path / "small", members, train=known, validation=judged, name="small"
+    )
     assert len(shipped.learners) == 2
     clips = np.stack([test[index].clip[0].numpy() for index in range(4)])
     found = shipped.estimate(shipped.inputs(clips), seed=1, draws=200)
@@ -256,12 +355,22 @@ def test_clips_beyond_the_range_of_their_target_are_refused_before_anything_is_p
     path = tmp_path / "small-cloth.toml"
     path.write_text(TRAINING.replace('["wind_speed"]', '["cloth_wind"]'))
     strong = [seed for seed in range(10) if np.random.default_rng(seed).uniform(0, 10) > 6.03]
-    arguments = ["train", str(path), "--at", "v1", "--lake", str(lake), "--cache", str(tmp_path / "cache")]
+    arguments = [
+        "train",
+        str(path),
+        "--at",
+        "v1",
+        "--lake",
+        str(lake),
+        "--cache",
+        str(tmp_path / "cache"),
+    ]
     done = CliRunner().invoke(root, arguments)
     assert isinstance(done.exception, InputError)
     assert done.exception.where == "the training side"
-    assert f"{2 * len(strong)} of 20 clips lie beyond the range of the target cloth_wind, 0 to 6 m/s" in str(
-        done.exception
+    assert (
+        f"{2 * len(strong)} of 20 clips lie beyond the range of the target cloth_wind, 0 to 6 m/s"
+        in str(done.exception)
     )
     assert not (tmp_path / "cache").exists()
 
@@ -269,7 +378,8 @@ def test_clips_beyond_the_range_of_their_target_are_refused_before_anything_is_p
 def test_a_model_of_hanging_cloth_estimates_the_same_quantities_in_its_own_ranges(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Trained on a part of the sequences, shipped and judged by the commands that are there for flags."""
+    """Trained on a part of the sequences, shipped and judged by the commands that are there for
+    flags."""
     from tests.models.conftest import fill
 
     lake = tmp_path / "lake"
@@ -278,7 +388,9 @@ def test_a_model_of_hanging_cloth_estimates_the_same_quantities_in_its_own_range
     path = tmp_path / "small-cloth.toml"
     part = TRAINING.replace("[data]\n", "[data]\nsequences = 8\n")
     path.write_text(part.replace('["wind_speed"]', '["cloth_wind", "cloth_area_weight"]'))
-    trained = run("train", str(path), "--at", "v1", "--lake", str(lake), "--workers", "1", "--branch", "main")
+    trained = run(
+        "train", str(path), "--at", "v1", "--lake", str(lake), "--workers", "1", "--branch", "main"
+    )
     options = ["--lake", str(lake), "--at", "v1", "--out", str(tmp_path / "shipped")]
     done = CliRunner().invoke(shipping.main, [str(path), *options], catch_exceptions=False)
     assert done.exit_code == 0, done.output
@@ -287,9 +399,19 @@ def test_a_model_of_hanging_cloth_estimates_the_same_quantities_in_its_own_range
     assert trained["name"] == model.name == "small-cloth"
     assert model.cloth is Cloth.HANGING
     assert model.card["trained"]["sequences"] == 8
-    assert [(target.name, target.high) for target in model.targets] == [("wind_speed", 6.0), ("area_weight", 0.454)]
+    assert [(target.name, target.high) for target in model.targets] == [
+        ("wind_speed", 6.0),
+        ("area_weight", 0.454),
+    ]
     found = run(
-        "evaluate", "shipped/small-cloth", "--dataset", "made", "--lake", str(lake), "--out", str(tmp_path / "page")
+        "evaluate",
+        "shipped/small-cloth",
+        "--dataset",
+        "made",
+        "--lake",
+        str(lake),
+        "--out",
+        str(tmp_path / "page"),
     )
     assert {row["target"] for row in found["targets"]} == {"wind_speed", "area_weight"}
 
@@ -307,14 +429,22 @@ def test_a_model_that_was_cut_off_is_an_error_with_its_place(lake: Path, tmp_pat
         estimator.load(tmp_path)
 
 
-def test_inputs_that_were_prepared_are_used_again_and_damage_is_found(lake: Path, tmp_path: Path) -> None:
+def test_inputs_that_were_prepared_are_used_again_and_damage_is_found(
+    lake: Path, tmp_path: Path
+) -> None:
     recipe = load(str(lake.parent / "small.toml"))
     pairs = sides_of(flagdata.open(lake), recipe, "train", at="v1")
 
     def prepared() -> tuple[object, list[int]]:
         counts: list[int] = []
         found = prepare_films(
-            pairs, recipe.front_end, recipe.cropping, variants=2, folder=tmp_path, workers=2, advance=counts.append
+            pairs,
+            recipe.front_end,
+            recipe.cropping,
+            variants=2,
+            folder=tmp_path,
+            workers=2,
+            advance=counts.append,
         )
         return found, counts
 
@@ -336,7 +466,14 @@ def test_one_bit_in_a_prepared_input_is_found_and_the_input_made_anew(
     pairs = sides_of(flagdata.open(lake), recipe, "validation", at="v1")
 
     def prepared() -> dict[Path, bytes]:
-        prepare_clips(pairs, recipe.front_end, recipe.cropping, folder=tmp_path, workers=2, advance=lambda count: None)
+        prepare_clips(
+            pairs,
+            recipe.front_end,
+            recipe.cropping,
+            folder=tmp_path,
+            workers=2,
+            advance=lambda count: None,
+        )
         return {path: path.read_bytes() for path in tmp_path.rglob("*.npy")}
 
     whole = prepared()
@@ -359,12 +496,21 @@ def test_a_process_that_prepares_waits_for_another_and_then_makes_nothing_twice(
 
     def prepared() -> list[int]:
         counts: list[int] = []
-        prepare_clips(pairs, recipe.front_end, recipe.cropping, folder=tmp_path, workers=1, advance=counts.append)
+        prepare_clips(
+            pairs,
+            recipe.front_end,
+            recipe.cropping,
+            folder=tmp_path,
+            workers=1,
+            advance=counts.append,
+        )
         return counts
 
     written: list[Path] = []
     write = inputs._write
-    monkeypatch.setattr(inputs, "_write", lambda path, *rest: (written.append(path), write(path, *rest)))
+    monkeypatch.setattr(
+        inputs, "_write", lambda path, *rest: (written.append(path), write(path, *rest))
+    )
     (own,) = {path.parent.parent for path in tmp_path.rglob("*.npy")} if prepared() else ()
     made = list(written)
     for path in made:
@@ -384,11 +530,24 @@ def test_a_process_that_prepares_waits_for_another_and_then_makes_nothing_twice(
     assert "another process prepares inputs" in caplog.messages[0]
 
 
-def test_a_second_training_in_a_run_folder_is_refused_before_it_does_anything(lake: Path, tmp_path: Path) -> None:
+def test_a_second_training_in_a_run_folder_is_refused_before_it_does_anything(
+    lake: Path, tmp_path: Path
+) -> None:
     run_folder, cache = tmp_path / "run", tmp_path / "cache"
-    arguments = ["train", str(lake.parent / "small.toml"), "--seed", "7", "--lake", str(lake), "--at", "v1"]
+    arguments = [
+        "train",
+        str(lake.parent / "small.toml"),
+        "--seed",
+        "7",
+        "--lake",
+        str(lake),
+        "--at",
+        "v1",
+    ]
     with alone_in(run_folder, occupied=pytest.fail):
-        done = CliRunner().invoke(root, [*arguments, "--run", str(run_folder), "--cache", str(cache)])
+        done = CliRunner().invoke(
+            root, [*arguments, "--run", str(run_folder), "--cache", str(cache)]
+        )
     assert isinstance(done.exception, ConflictError)
     assert done.exception.where == str(run_folder)
     assert "--run" in done.exception.fix
@@ -433,8 +592,18 @@ def test_a_part_of_the_sequences_is_the_beginning_of_one_order(lake: Path, tmp_p
             "another rate than the recipe's 30 Hz",
             "write rate = 25 in [input]",
         ),
-        ("size = 24", "size = 56", "pictures of 56 px, and the films have 40 px", "write size = 40 in [input]"),
-        ("batch = 4", "batch = 24", "20 films do not make a batch of 24", "write batch = 20 in [optimiser]"),
+        (
+            "size = 24",
+            "size = 56",
+            "pictures of 56 px, and the films have 40 px",
+            "write size = 40 in [input]",
+        ),
+        (
+            "batch = 4",
+            "batch = 24",
+            "20 films do not make a batch of 24",
+            "write batch = 20 in [optimiser]",
+        ),
         ('"wind_speed"', '"log_aspect"', "no clip states its width", "leave the target out"),
     ],
 )
@@ -444,18 +613,33 @@ def test_a_recipe_that_does_not_fit_the_clips_is_refused_before_anything_is_prep
     assert old in TRAINING
     (tmp_path / "small.toml").write_text(TRAINING.replace(old, new))
     recipe, cache = str(tmp_path / "small.toml"), tmp_path / "cache"
-    done = CliRunner().invoke(root, ["train", recipe, "--at", "v1", "--lake", str(lake), "--cache", str(cache)])
+    done = CliRunner().invoke(
+        root, ["train", recipe, "--at", "v1", "--lake", str(lake), "--cache", str(cache)]
+    )
     assert isinstance(done.exception, FlagdataError)
     assert told in done.exception.what
     assert fix in done.exception.fix
     assert not cache.exists()
 
 
-def test_clips_that_the_network_does_not_take_are_refused_before_they_are_prepared(lake: Path, tmp_path: Path) -> None:
-    small = TRAINING.replace('maps = "wave-maps"', 'maps = "frames"').replace('name = "wave"', 'name = "cardona"')
+def test_clips_that_the_network_does_not_take_are_refused_before_they_are_prepared(
+    lake: Path, tmp_path: Path
+) -> None:
+    small = TRAINING.replace('maps = "wave-maps"', 'maps = "frames"').replace(
+        'name = "wave"', 'name = "cardona"'
+    )
     recipe = tmp_path / "small.toml"
     recipe.write_text(small.replace("dimension = 4\nwidths = [6, 6, 6]\n", ""))
-    arguments = ["train", str(recipe), "--at", "v1", "--lake", str(lake), "--cache", str(tmp_path / "cache")]
+    arguments = [
+        "train",
+        str(recipe),
+        "--at",
+        "v1",
+        "--lake",
+        str(lake),
+        "--cache",
+        str(tmp_path / "cache"),
+    ]
     done = CliRunner().invoke(root, arguments)
     assert done.exit_code != 0
     assert "at least 64×64" in str(done.output) + str(done.exception)
@@ -484,13 +668,17 @@ def test_every_recipe_of_the_catalog_is_read_and_makes_its_network(name: str) ->
         ('dataset = "made"', 'dataset = " "', InputError, "data set"),
     ],
 )
-def test_a_recipe_that_does_not_fit_says_what_and_how(old: str, new: str, error: type[Exception], named: str) -> None:
+def test_a_recipe_that_does_not_fit_says_what_and_how(
+    old: str, new: str, error: type[Exception], named: str
+) -> None:
     with pytest.raises(error) as caught:
         parse(TRAINING.replace(old, new), name="small", where="test").learner()
     assert named in f"{caught.value} {getattr(caught.value, 'fix', '')}"
 
 
-def test_a_network_that_is_not_there_is_an_error_with_those_that_are(lake: Path, tmp_path: Path) -> None:
+def test_a_network_that_is_not_there_is_an_error_with_those_that_are(
+    lake: Path, tmp_path: Path
+) -> None:
     with pytest.raises(UnknownNameError, match="smal"):
         CliRunner().invoke(
             root,
@@ -500,7 +688,11 @@ def test_a_network_that_is_not_there_is_an_error_with_those_that_are(lake: Path,
 
 
 def test_a_data_set_that_is_not_there_is_an_error(lake: Path) -> None:
-    recipe = parse((lake.parent / "small.toml").read_text().replace('"made"', '"nothing"'), name="x", where="test")
+    recipe = parse(
+        (lake.parent / "small.toml").read_text().replace('"made"', '"nothing"'),
+        name="x",
+        where="test",
+    )
     with pytest.raises(UnknownNameError, match="unknown data set 'nothing'; known: made"):
         sides_of(flagdata.open(lake), recipe, "train", at="v1")
 

@@ -41,20 +41,32 @@ def test_a_layout_draws_its_proportions_anew(name: str) -> None:
 def test_all_layouts_are_drawn_and_the_contrast_reaches_none_and_full() -> None:
     found = [drawn(stream(seed, "banners")) for seed in range(1000)]
     layouts = [banner.layout for banner in found]
-    assert layouts.count("plain") == pytest.approx(150, abs=57)  # five standard deviations of a binomial
+    assert layouts.count("plain") == pytest.approx(
+        150, abs=57
+    )  # five standard deviations of a binomial
     for name in LAYOUTS.keys() - {"plain"}:
         assert layouts.count(name) == pytest.approx(850 / 11, abs=43)
     contrasts = np.array([banner.contrast for banner in found])
     for end in (0.0, 1.0):
         assert (contrasts == end).sum() == pytest.approx(1000 * 0.15 / 1.3, abs=51)
     between = contrasts[(contrasts > 0) & (contrasts < 1)]
-    assert np.histogram(between, bins=4, range=(0, 1))[0] == pytest.approx(np.full(4, between.size / 4), abs=60)
+    assert np.histogram(between, bins=4, range=(0, 1))[0] == pytest.approx(
+        np.full(4, between.size / 4), abs=60
+    )
 
 
-def test_parts_of_a_full_contrast_differ_from_their_field_in_gray_and_those_of_none_are_the_field() -> None:
+def test_parts_of_a_full_contrast_differ_from_their_field_in_gray_and_those_of_none_are_the_field() -> (
+    None
+):
     found = [drawn(stream(seed, "banners")) for seed in range(300)]
     apart = {
-        end: np.array([np.abs((one.colours[1:] - one.colours[0]) @ GRAY) for one in found if one.contrast == end])
+        end: np.array(
+            [
+                np.abs((one.colours[1:] - one.colours[0]) @ GRAY)
+                for one in found
+                if one.contrast == end
+            ]
+        )
         for end in (0.0, 1.0)
     }
     assert apart[0.0].max() == 0
@@ -66,7 +78,10 @@ def test_pictures_reach_from_one_colour_white_among_them_to_black_on_white() -> 
     found = {seed: drawn(stream(seed, "assets", "banner")) for seed in range(300)}
     field = {seed: float(one.colours[0] @ GRAY) for seed, one in found.items()}
     one_colour = [seed for seed, one in found.items() if one.contrast == 0]
-    white, dark = grays(max(one_colour, key=field.__getitem__)), grays(min(one_colour, key=field.__getitem__))
+    white, dark = (
+        grays(max(one_colour, key=field.__getitem__)),
+        grays(min(one_colour, key=field.__getitem__)),
+    )
     assert np.ptp(white) == np.ptp(dark) == 0
     assert white.min() > 0.95
     assert dark.max() < 0.1

@@ -1,4 +1,5 @@
-"""Flags at points of their construction sheets: height 1, x to the right, y downwards from the upper hoist corner."""
+"""Flags at points of their construction sheets: height 1, x to the right, y downwards from the
+upper hoist corner."""
 
 from __future__ import annotations
 
@@ -46,7 +47,8 @@ POINTS: dict[str, list[tuple[float, float, str]]] = {
         (0.6, 0.2, "#ffff00"),
         (0.6, 0.35, "#ffff00"),
         (0.5, 0.45, "#ffff00"),
-        # One point of each small star towards the middle of the large one, its notch on the other side.
+        # One point of each small star towards the middle of the large one, its notch on the other
+        # side.
         (0.5 - 0.035 * 0.857, 0.1 + 0.035 * 0.515, "#ffff00"),
         (0.5 + 0.04 * 0.857, 0.1 - 0.04 * 0.515, "#ee1c25"),
     ],
@@ -59,7 +61,12 @@ POINTS: dict[str, list[tuple[float, float, str]]] = {
         (0.375, 0.26, "#11457e"),
         (0.375, 0.76, "#d7141a"),
     ],
-    "france": [(0.49, 0.5, "#000091"), (0.51, 0.5, WHITE), (0.99, 0.5, WHITE), (1.01, 0.5, "#e1000f")],
+    "france": [
+        (0.49, 0.5, "#000091"),
+        (0.51, 0.5, WHITE),
+        (0.99, 0.5, WHITE),
+        (1.01, 0.5, "#e1000f"),
+    ],
     "greece": [
         (1.0, 0.05, "#0d5eaf"),
         (1.0, 0.15, WHITE),
@@ -96,7 +103,8 @@ POINTS: dict[str, list[tuple[float, float, str]]] = {
         (1.2, 0.675, "#001489"),
         (0.05, 0.5, BLACK),
         (0.3, 0.2, "#007749"),
-        # Across the arm from its line (0, 0) – (3/4, 1/2): green to 1/10, then gold or white to 1/6.
+        # Across the arm from its line (0, 0) – (3/4, 1/2): green to 1/10, then gold or white to
+        # 1/6.
         (0.3 - 0.13 * 0.5547, 0.2 + 0.13 * 0.8321, "#ffb81c"),
         (0.3 + 0.13 * 0.5547, 0.2 - 0.13 * 0.8321, WHITE),
         (0.3 - 0.18 * 0.5547, 0.2 + 0.18 * 0.8321, BLACK),
@@ -111,8 +119,13 @@ POINTS: dict[str, list[tuple[float, float, str]]] = {
         (0.75 + 0.125 * math.cos(DIAGONAL), 0.5 + 0.125 * math.sin(DIAGONAL) - 0.06, "#0047a0"),
     ]
     + [
-        # Bars at 9.5, 11 and 12.5 twenty-fourths of the height from the middle; in their middles broken ones are white.
-        (0.75 + sx * r / 24 * math.cos(DIAGONAL), 0.5 + sy * r / 24 * math.sin(DIAGONAL), BLACK if whole else WHITE)
+        # Bars at 9.5, 11 and 12.5 twenty-fourths of the height from the middle; in their middles
+        # broken ones are white.
+        (
+            0.75 + sx * r / 24 * math.cos(DIAGONAL),
+            0.5 + sy * r / 24 * math.sin(DIAGONAL),
+            BLACK if whole else WHITE,
+        )
         for sx, sy, bars in (
             (-1, -1, (True, True, True)),
             (1, 1, (False, False, False)),
@@ -167,7 +180,9 @@ def test_areas_of_colours_are_those_of_the_shapes(name, areas) -> None:
     image = Assets().texture(f"flag/{name}")
     for colour, area in areas.items():
         share = (image == np.rint(of_hex(colour) * 255)).all(axis=2).sum() / image.shape[0] ** 2
-        assert share == pytest.approx(area, abs=0.008)  # pixels on a shape's edge, up to 3 heights of it, are mixed
+        assert share == pytest.approx(
+            area, abs=0.008
+        )  # pixels on a shape's edge, up to 3 heights of it, are mixed
 
 
 def test_edges_are_mixed_in_proportion() -> None:

@@ -29,10 +29,15 @@ def test_a_seed_is_one_picture_and_another_seed_another(kind) -> None:
 
 def test_backgrounds_vary_in_brightness_colour_and_detail() -> None:
     rng = stream(1, "variety")
-    drawn = [Assets().background(Assets().draw_background(list(BACKGROUNDS), rng)).astype(float) for _ in range(16)]
+    drawn = [
+        Assets().background(Assets().draw_background(list(BACKGROUNDS), rng)).astype(float)
+        for _ in range(16)
+    ]
     mean = np.array([picture.mean(axis=(0, 1)) for picture in drawn])
     detail = np.array([np.abs(np.diff(picture, axis=1)).mean() for picture in drawn])
-    assert mean.mean(axis=1).std() > 20  # bytes; a photograph's mean differs from the next one's by 30 or so
+    assert (
+        mean.mean(axis=1).std() > 20
+    )  # bytes; a photograph's mean differs from the next one's by 30 or so
     assert (mean[:, 0] - mean[:, 2]).std() > 10
     assert detail.max() / detail.min() > 5
 
@@ -48,7 +53,10 @@ def test_clouds_are_broken_bright_and_gray_before_a_sky_that_is_blue() -> None:
 
 
 def test_a_fractal_field_has_the_spectrum_it_is_asked_for() -> None:
-    field = np.mean([np.abs(np.fft.fft2(fractal(stream(s, "f"), 256, 256, slope=1.5))) ** 2 for s in range(8)], axis=0)
+    field = np.mean(
+        [np.abs(np.fft.fft2(fractal(stream(s, "f"), 256, 256, slope=1.5))) ** 2 for s in range(8)],
+        axis=0,
+    )
     f = np.hypot(*np.meshgrid(np.fft.fftfreq(256), np.fft.fftfreq(256)))
     band = (f > 0.02) & (f < 0.4)
     slope = np.polyfit(np.log(f[band]), np.log(field[band]), 1)[0]
@@ -57,9 +65,13 @@ def test_a_fractal_field_has_the_spectrum_it_is_asked_for() -> None:
 
 def test_draws_take_each_kind_equally_often() -> None:
     rng = stream(2, "kinds")
-    kinds = [Assets().draw_texture(["flag", "weave", "print"], rng).split("/")[0] for _ in range(600)]
+    kinds = [
+        Assets().draw_texture(["flag", "weave", "print"], rng).split("/")[0] for _ in range(600)
+    ]
     for kind in ("flag", "weave", "print"):
-        assert kinds.count(kind) == pytest.approx(200, abs=60)  # five standard deviations of a binomial
+        assert kinds.count(kind) == pytest.approx(
+            200, abs=60
+        )  # five standard deviations of a binomial
 
 
 @pytest.fixture

@@ -2,8 +2,8 @@
 
     fake_worker.py COUNTER MODE AT
 
-COUNTER is a file with the number of requests ever answered; at request AT (once, or always where AT ends in "+") the
-worker crashes, hangs, or speaks nonsense, by MODE.
+COUNTER is a file with the number of requests ever answered; at request AT (once, or always where AT
+ends in "+") the worker crashes, hangs, or speaks nonsense, by MODE.
 """
 
 import os
@@ -45,7 +45,11 @@ def main() -> None:
             if mode == "refuse":
                 send(Message(kind="error", fields={"what": "no such thing"}))
                 continue
-        send(Message(kind="echo", fields={**message.fields, "kind": message.kind}, arrays=message.arrays))
+        send(
+            Message(
+                kind="echo", fields={**message.fields, "kind": message.kind}, arrays=message.arrays
+            )
+        )
 
 
 main()

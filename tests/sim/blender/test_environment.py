@@ -32,7 +32,10 @@ def interpreter(path: Path, *, out: str = "", err: str = "", code: int = 0) -> P
     path.parent.mkdir(parents=True, exist_ok=True)
     path.with_suffix(".out").write_text(out)
     path.with_suffix(".err").write_text(err)
-    path.write_text(f'#!/bin/sh\ncat "{path.with_suffix(".out")}"\ncat "{path.with_suffix(".err")}" >&2\nexit {code}\n')
+    path.write_text(
+        f'#!/bin/sh\ncat "{path.with_suffix(".out")}"\ncat "{path.with_suffix(".err")}" >&2\nexit '
+        f"{code}\n"
+    )
     path.chmod(0o755)
     return path
 
@@ -43,12 +46,18 @@ def wheel(folder: Path, name: str, version: str, source: str, *needs: str) -> No
         info = f"{name}-{version}.dist-info"
         archive.writestr(f"{name}/__init__.py", source)
         needed = "".join(f"Requires-Dist: {need}\n" for need in needs)
-        archive.writestr(f"{info}/METADATA", f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n{needed}")
-        archive.writestr(f"{info}/WHEEL", "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n")
+        archive.writestr(
+            f"{info}/METADATA", f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n{needed}"
+        )
+        archive.writestr(
+            f"{info}/WHEEL", "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
+        )
         archive.writestr(f"{info}/RECORD", "")
 
 
-def test_the_setting_goes_before_the_default_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_setting_goes_before_the_default_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     default = interpreter(tmp_path / "cache" / "blender" / "bin" / "python")
     assert environment.find() == default
     chosen = interpreter(tmp_path / "other")
@@ -66,7 +75,9 @@ def test_a_setting_that_names_no_file_is_refused_and_not_replaced(
 
 
 def test_what_blender_prints_before_its_version_is_passed_over(tmp_path: Path) -> None:
-    python = interpreter(tmp_path / "python", out="Read prefs: userpref.blend\n\n" + json.dumps(WORKING) + "\n")
+    python = interpreter(
+        tmp_path / "python", out="Read prefs: userpref.blend\n\n" + json.dumps(WORKING) + "\n"
+    )
     found = environment.check(python)
     assert (found.python, found.blender, found.numpy) == (python, "4.5.15 LTS", "1.26.4")
 
@@ -81,12 +92,22 @@ def test_another_series_of_blender_is_refused_by_its_version(tmp_path: Path) -> 
     ("said", "fix"),
     [
         ("ModuleNotFoundError: No module named 'bpy'", "flagdata blender-setup"),
-        ("ImportError: libXi.so.6: cannot open shared object file: No such file or directory", " libxi6 "),
-        ("ImportError: libnew.so.1: cannot open shared object file: No such file or directory", "library libnew.so.1"),
+        (
+            "ImportError: libXi.so.6: cannot open shared object file: No such file or directory",
+            " libxi6 ",
+        ),
+        (
+            "ImportError: libnew.so.1: cannot open shared object file: No such file or directory",
+            "library libnew.so.1",
+        ),
     ],
 )
-def test_a_module_that_does_not_import_is_an_error_with_its_reason(tmp_path: Path, said: str, fix: str) -> None:
-    python = interpreter(tmp_path / "python", err=f"Traceback (most recent call last):\n{said}\n", code=1)
+def test_a_module_that_does_not_import_is_an_error_with_its_reason(
+    tmp_path: Path, said: str, fix: str
+) -> None:
+    python = interpreter(
+        tmp_path / "python", err=f"Traceback (most recent call last):\n{said}\n", code=1
+    )
     with pytest.raises(BlenderError) as error:
         environment.check(python)
     assert said in error.value.what
@@ -100,7 +121,9 @@ def test_a_file_that_is_no_program_is_an_error(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["mine.txt", "pyvenv.cfg"])
-def test_a_folder_of_other_files_and_an_environment_for_other_work_are_left_alone(name: str, tmp_path: Path) -> None:
+def test_a_folder_of_other_files_and_an_environment_for_other_work_are_left_alone(
+    name: str, tmp_path: Path
+) -> None:
     (tmp_path / name).write_text("mine")
     with pytest.raises(ConflictError, match="exists"):
         environment.create(tmp_path, say=print)
@@ -124,11 +147,21 @@ def test_blender_is_made_with_no_other_python_than_its_own(tmp_path: Path) -> No
     assert not (tmp_path / "made").exists()
 
 
-@pytest.mark.skipif(sys.version_info[:2] != environment.PYTHON, reason="needs Python 3.11, as Blender's module does")
-def test_the_command_makes_an_environment_that_is_then_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.skipif(
+    sys.version_info[:2] != environment.PYTHON, reason="needs Python 3.11, as Blender's module does"
+)
+def test_the_command_makes_an_environment_that_is_then_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     shelf = tmp_path / "shelf"
     shelf.mkdir()
-    wheel(shelf, "bpy", "4.5.15", "import numpy\nclass app:\n    version_string = '4.5.15 LTS'\n", "numpy")
+    wheel(
+        shelf,
+        "bpy",
+        "4.5.15",
+        "import numpy\nclass app:\n    version_string = '4.5.15 LTS'\n",
+        "numpy",
+    )
     wheel(shelf, "numpy", "1.26.4", "__version__ = '1.26.4'\n")
     monkeypatch.setenv("PIP_CONFIG_FILE", os.devnull)
     monkeypatch.setenv("PIP_NO_INDEX", "1")
@@ -142,9 +175,13 @@ def test_the_command_makes_an_environment_that_is_then_found(tmp_path: Path, mon
 
 
 def test_a_step_that_fails_reports_pips_message(tmp_path: Path) -> None:
-    pip = interpreter(tmp_path / "pip", err="ERROR: No matching distribution found for bpy==4.5.15\n", code=1)
+    pip = interpreter(
+        tmp_path / "pip", err="ERROR: No matching distribution found for bpy==4.5.15\n", code=1
+    )
     base = tmp_path / "python"
-    base.write_text(f'#!/bin/sh\n[ "$2" = venv ] && mkdir -p "$3/bin" && cp {pip} "$3/bin/python"\necho 3 11\n')
+    base.write_text(
+        f'#!/bin/sh\n[ "$2" = venv ] && mkdir -p "$3/bin" && cp {pip} "$3/bin/python"\necho 3 11\n'
+    )
     base.chmod(0o755)
     with pytest.raises(BlenderError, match=r"No matching distribution found for bpy==4\.5\.15"):
         environment.create(tmp_path / "made", python=str(base), say=print)
@@ -162,8 +199,12 @@ import sim.blender.worker
 loaded = {{name.partition(".")[0] for name in set(sys.modules) - before}}
 print(*sorted(loaded - sys.stdlib_module_names))
 """
-    done = subprocess.run((sys.executable, "-I", "-c", code), capture_output=True, text=True, check=True)
-    cython = {"cython_runtime"} | {name for name in done.stdout.split() if name.startswith("_cython_")}  # numpy 1's own
+    done = subprocess.run(
+        (sys.executable, "-I", "-c", code), capture_output=True, text=True, check=True
+    )
+    cython = {"cython_runtime"} | {
+        name for name in done.stdout.split() if name.startswith("_cython_")
+    }  # numpy 1's own
     assert set(done.stdout.split()) - cython == {"flagdata", "numpy", "sim"}
 
 
@@ -180,5 +221,7 @@ launch.expose("wanted", __import__("pathlib").Path({str(tmp_path)!r}))
 import wanted.inner
 print(wanted.inner.VALUE, importlib.util.find_spec("beside"))
 """
-    done = subprocess.run((sys.executable, "-I", "-c", code), capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        (sys.executable, "-I", "-c", code), capture_output=True, text=True, check=True
+    )
     assert done.stdout.split() == ["7", "None"]

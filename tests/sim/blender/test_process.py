@@ -1,4 +1,5 @@
-"""The worker's protocol and life: what is sent comes back, lost workers are replaced, nothing is left behind."""
+"""The worker's protocol and life: what is sent comes back, lost workers are replaced, nothing is
+left behind."""
 
 import io
 import os
@@ -16,7 +17,9 @@ FAKE = Path(__file__).with_name("fake_worker.py")
 
 
 def worker(folder: Path, mode: str = "none", at: str = "0", *, attempts: int = 3) -> WorkerProcess:
-    return WorkerProcess((sys.executable, str(FAKE), str(folder / "count"), mode, at), attempts=attempts)
+    return WorkerProcess(
+        (sys.executable, str(FAKE), str(folder / "count"), mode, at), attempts=attempts
+    )
 
 
 def reader(data: bytes):
@@ -32,7 +35,10 @@ def reader(data: bytes):
 
 
 def frames(count: int) -> list[Message]:
-    return [Message(kind="frame", fields={"index": i}, arrays={"a": np.full(3, i)}) for i in range(count)]
+    return [
+        Message(kind="frame", fields={"index": i}, arrays={"a": np.full(3, i)})
+        for i in range(count)
+    ]
 
 
 def alive(pid: int) -> bool:
@@ -96,11 +102,16 @@ def test_a_lost_worker_is_replaced_and_its_frame_redone(tmp_path, mode, timeout)
         answers = process.request(frames(4), timeout=timeout, setup=setup)
         assert process.restarts == 1
     assert [answer.fields["index"] for answer in answers] == [0, 1, 2, 3]
-    assert (tmp_path / "count").read_text() == "7"  # 5 asked once, frame 1 twice, the scene sent again
+    assert (
+        tmp_path / "count"
+    ).read_text() == "7"  # 5 asked once, frame 1 twice, the scene sent again
 
 
 def test_a_worker_that_keeps_crashing_is_given_up_with_its_last_words(tmp_path):
-    with worker(tmp_path, "crash", "2+") as process, pytest.raises(RenderError, match="something went wrong in C"):
+    with (
+        worker(tmp_path, "crash", "2+") as process,
+        pytest.raises(RenderError, match="something went wrong in C"),
+    ):
         process.request(frames(3), timeout=300)
     assert process.restarts == 3
     assert process.pid is None
@@ -127,7 +138,9 @@ def test_closing_ends_the_process_and_asking_again_starts_another(tmp_path):
 
 
 def test_a_hung_worker_is_killed_when_it_is_given_up(tmp_path, monkeypatch):
-    monkeypatch.setattr("sim.blender.process.EXIT_TIMEOUT", 3600.0)  # a hung worker's end is not waited for
+    monkeypatch.setattr(
+        "sim.blender.process.EXIT_TIMEOUT", 3600.0
+    )  # a hung worker's end is not waited for
     process = worker(tmp_path, "hang", "2", attempts=1)
     process.request(frames(1), timeout=300)
     pid = process.pid

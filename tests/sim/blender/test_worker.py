@@ -1,4 +1,5 @@
-"""Blender's light and camera against theory: radiances of planes, silhouettes by geometry, bytes that repeat."""
+"""Blender's light and camera against theory: radiances of planes, silhouettes by geometry, bytes
+that repeat."""
 
 from __future__ import annotations
 
@@ -29,7 +30,9 @@ def worker(blender: Environment) -> Iterator[WorkerProcess]:
         yield process
 
 
-def scene(*, toward=(0.0, -1.0, 0.0), irradiance=math.pi, angle=0.005, sky=0.0, translucency=0.0, **other) -> Message:
+def scene(
+    *, toward=(0.0, -1.0, 0.0), irradiance=math.pi, angle=0.005, sky=0.0, translucency=0.0, **other
+) -> Message:
     """Seen from 5 m in front of the origin, along +y; a pixel is 1/10 m there."""
     matrix = [[1, 0, 0, 0], [0, 0, -1, -5], [0, 1, 0, 0], [0, 0, 0, 1]]
     fields = {
@@ -45,10 +48,16 @@ def scene(*, toward=(0.0, -1.0, 0.0), irradiance=math.pi, angle=0.005, sky=0.0, 
         "objects": [{"name": "cloth", "albedo": [0.8, 0.5, 0.2], "translucency": translucency}],
     }
     texture = other.pop("texture", None)
-    return Message(kind="scene", fields=fields | other, arrays={} if texture is None else {"texture/cloth": texture})
+    return Message(
+        kind="scene",
+        fields=fields | other,
+        arrays={} if texture is None else {"texture/cloth": texture},
+    )
 
 
-def frame(positions: np.ndarray = WALL, faces: np.ndarray = FACES, uv: np.ndarray = UV, seed: int = 0) -> Message:
+def frame(
+    positions: np.ndarray = WALL, faces: np.ndarray = FACES, uv: np.ndarray = UV, seed: int = 0
+) -> Message:
     arrays = {"positions/cloth": positions.astype(np.float32), "faces/cloth": faces, "uv/cloth": uv}
     return Message(kind="frame", fields={"seed": seed}, arrays=arrays)
 
@@ -64,29 +73,42 @@ def test_a_plane_in_the_sun_has_the_radiance_of_lambert(worker: WorkerProcess, t
     toward = (0.0, -math.cos(math.radians(tilt)), math.sin(math.radians(tilt)))
     seen = picture(worker, scene(toward=toward))[0].reshape(-1, 4).mean(0)
     # E cos θ albedo / π, with E = π; the sun's disc of 0.3° moves the cosine by less than 1 %.
-    np.testing.assert_allclose(seen[:3], np.array([0.8, 0.5, 0.2]) * math.cos(math.radians(tilt)), rtol=0.01)
+    np.testing.assert_allclose(
+        seen[:3], np.array([0.8, 0.5, 0.2]) * math.cos(math.radians(tilt)), rtol=0.01
+    )
     assert seen[3] == 1.0
 
 
 @pytest.mark.parametrize("softness", [0.5, 2.0, 10.0])
-def test_a_soft_sun_gives_a_surface_that_faces_it_the_same_irradiance(worker: WorkerProcess, softness: float) -> None:
+def test_a_soft_sun_gives_a_surface_that_faces_it_the_same_irradiance(
+    worker: WorkerProcess, softness: float
+) -> None:
     seen = picture(worker, scene(angle=math.atan(softness)))[0].reshape(-1, 4).mean(0)
     np.testing.assert_allclose(seen[:3], [0.8, 0.5, 0.2], rtol=0.01)
 
 
-def test_a_plane_under_a_uniform_sky_has_the_skys_radiance_times_its_albedo(worker: WorkerProcess) -> None:
+def test_a_plane_under_a_uniform_sky_has_the_skys_radiance_times_its_albedo(
+    worker: WorkerProcess,
+) -> None:
     seen = picture(worker, scene(irradiance=0.0, sky=0.7))[0].reshape(-1, 4).mean(0)
     np.testing.assert_allclose(seen[:3], 0.7 * np.array([0.8, 0.5, 0.2]), rtol=0.02)
 
 
 def test_a_sheet_lit_from_behind_shows_the_share_it_transmits(worker: WorkerProcess) -> None:
     for translucency in (0.0, 0.3):
-        seen = picture(worker, scene(toward=(0.0, 1.0, 0.0), translucency=translucency))[0].reshape(-1, 4).mean(0)
-        np.testing.assert_allclose(seen[:3], translucency * np.array([0.8, 0.5, 0.2]), rtol=0.01, atol=1e-6)
+        seen = (
+            picture(worker, scene(toward=(0.0, 1.0, 0.0), translucency=translucency))[0]
+            .reshape(-1, 4)
+            .mean(0)
+        )
+        np.testing.assert_allclose(
+            seen[:3], translucency * np.array([0.8, 0.5, 0.2]), rtol=0.01, atol=1e-6
+        )
 
 
 def test_a_rectangle_covers_the_pixels_that_geometry_says(worker: WorkerProcess) -> None:
-    # 50 px focal length at 5 m: 10 px a metre. x from −1.2 to 0.4 m, z from −0.5 to 0.75 m, image y down.
+    # 50 px focal length at 5 m: 10 px a metre. x from −1.2 to 0.4 m, z from −0.5 to 0.75 m, image y
+    # down.
     corners = np.array([[-1.2, 0, -0.5], [0.4, 0, -0.5], [0.4, 0, 0.75], [-1.2, 0, 0.75]])
     coverage = picture(worker, scene(), frame(corners))[0][..., 3]
     rows, columns = coverage.sum(1), coverage.sum(0)
@@ -109,7 +131,9 @@ def test_texture_row_0_is_on_top_and_its_bytes_are_srgb(worker: WorkerProcess) -
     corners = np.array([[-1.6, 0, -1.6], [1.6, 0, -1.6], [1.6, 0, 1.6], [-1.6, 0, 1.6]])
     seen = picture(worker, scene(texture=texture), frame(corners))[0]
     np.testing.assert_allclose(seen[4, 4, :3], [1.0, 0.0, 0.0], atol=0.01)
-    np.testing.assert_allclose(seen[27, 27, :3], [0.0, 0.0, 0.5029], atol=0.01)  # (188/255 + 0.055)/1.055, ^2.4
+    np.testing.assert_allclose(
+        seen[27, 27, :3], [0.0, 0.0, 0.5029], atol=0.01
+    )  # (188/255 + 0.055)/1.055, ^2.4
     np.testing.assert_allclose(seen[4, 27, :3], 0.0, atol=0.01)
 
 
@@ -143,7 +167,9 @@ def test_what_blender_refuses_is_reported_and_the_worker_lives_on(worker: Worker
 @pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="needs /proc")
 def test_nothing_of_this_pythons_environment_is_in_blenders_process(worker: WorkerProcess) -> None:
     picture(worker, scene())
-    libraries = {line.split()[-1] for line in Path(f"/proc/{worker.pid}/maps").read_text().splitlines()}
+    libraries = {
+        line.split()[-1] for line in Path(f"/proc/{worker.pid}/maps").read_text().splitlines()
+    }
     assert any("bpy" in path for path in libraries)
     assert any("numpy" in path for path in libraries)
     assert not [path for path in libraries if path.startswith(f"{sys.prefix}{os.sep}")]

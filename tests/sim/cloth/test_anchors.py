@@ -22,18 +22,25 @@ from sim.integrate import BackwardEuler, JointBatch, SplitEuler, Symplectic
 
 MESH = grid(width=0.3, height=0.3, columns=4, rows=4)
 STEP = 0.1
-INTEGRATORS = (BackwardEuler(tolerance=1e-10), Symplectic(), SplitEuler(base=BackwardEuler(tolerance=1e-10)))
+INTEGRATORS = (
+    BackwardEuler(tolerance=1e-10),
+    Symplectic(),
+    SplitEuler(base=BackwardEuler(tolerance=1e-10)),
+)
 
 
 def _hung(*, stiffness: float = 1e3, offsets: float = 0.0) -> tuple[System, State]:
-    """A cloth held at its two upper corners; with handles that move along x by so much in a tenth of a second."""
+    """A cloth held at its two upper corners; with handles that move along x by so much in a tenth
+    of a second."""
     held = Handles(
         vertices=handles.top_corners(MESH.rest),
         stiffness=stiffness,
         times=(0.0, STEP),
         offsets=((0.0, 0.0, 0.0), (offsets, 0.0, 0.0)),
     )
-    scene = Scene(mesh=MESH, position=upright(MESH), material=named_material("camel-ponte-roma"), handles=held)
+    scene = Scene(
+        mesh=MESH, position=upright(MESH), material=named_material("camel-ponte-roma"), handles=held
+    )
     return assemble([scene], dtype=torch.float64)
 
 
@@ -53,7 +60,9 @@ def test_anchors_that_all_move_alike_are_handles_that_move(
     tracked = replace(system, motion=_tracks([[0.02, 0.0, 0.0]] * 2))
     expected = integrator.advance(moving, same, STEP).position
     # To rounding and the tolerance of the solves.
-    torch.testing.assert_close(integrator.advance(tracked, state, STEP).position, expected, rtol=0, atol=1e-9)
+    torch.testing.assert_close(
+        integrator.advance(tracked, state, STEP).position, expected, rtol=0, atol=1e-9
+    )
     assert (expected - integrator.advance(system, state, STEP).position).abs().max() > 0.01
 
 
@@ -84,7 +93,9 @@ def test_tracks_are_constant_beyond_their_ends_and_linear_between() -> None:
     tracks = _tracks([[0.02, 0.0, -0.04]])
     for time, share in ((-1.0, 0.0), (0.0, 0.0), (STEP / 4, 0.25), (STEP, 1.0), (5.0, 1.0)):
         np.testing.assert_allclose(
-            tracks.displacement(time)[0, :, 0].numpy(), [0.02 * share, 0.0, -0.04 * share], atol=1e-15
+            tracks.displacement(time)[0, :, 0].numpy(),
+            [0.02 * share, 0.0, -0.04 * share],
+            atol=1e-15,
         )
 
 

@@ -12,7 +12,11 @@ from sim.cloth.mesh import Mesh, grid
 
 @pytest.fixture(params=["grid", "distorted"])
 def mesh(request: pytest.FixtureRequest, distorted: Mesh) -> Mesh:
-    return distorted if request.param == "distorted" else grid(width=1.5, height=1.0, columns=6, rows=4)
+    return (
+        distorted
+        if request.param == "distorted"
+        else grid(width=1.5, height=1.0, columns=6, rows=4)
+    )
 
 
 def test_parabolas_are_continued_exactly(mesh: Mesh) -> None:

@@ -26,7 +26,8 @@ G = 9.81
 
 
 def pleated(system, state, *, noise: float = 1e-3):
-    """The sheet folded like an accordion, layers 4 mm apart and crossing here and there, in motion."""
+    """The sheet folded like an accordion, layers 4 mm apart and crossing here and there, in
+    motion."""
     u, v = system.cloth.mesh.rest.T
     layer, share = np.divmod(u, 0.2)
     along = np.where(layer % 2 == 0, share, 0.2 - share)
@@ -42,7 +43,12 @@ def pleated(system, state, *, noise: float = 1e-3):
 def folded():
     mesh = grid(width=0.8, height=0.3, columns=16, rows=6)
     system, state = make_system(
-        mesh, [named_material("camel-ponte-roma"), named_material("gray-interlock"), named_material("royal-target")]
+        mesh,
+        [
+            named_material("camel-ponte-roma"),
+            named_material("gray-interlock"),
+            named_material("royal-target"),
+        ],
     )
     system = replace(system, contact=Contact())
     return system, pleated(system, state)
@@ -56,11 +62,15 @@ def test_repulsion_is_minus_the_gradient_of_its_energy(folded) -> None:
     system, state = folded
     smooth = replace(system, contact=Contact(friction=0.0))
     position = state.position.clone().requires_grad_()
-    energy = contact.energy(smooth.cloth, smooth.contact, position, pairs_of(smooth, state.position))
+    energy = contact.energy(
+        smooth.cloth, smooth.contact, position, pairs_of(smooth, state.position)
+    )
     assert bool((energy > 0).all())
     (gradient,) = torch.autograd.grad(energy.sum(), position)
     still = torch.zeros_like(state.velocity)
-    force = contact.force(smooth.cloth, smooth.contact, state.position, still, pairs_of(smooth, state.position))
+    force = contact.force(
+        smooth.cloth, smooth.contact, state.position, still, pairs_of(smooth, state.position)
+    )
     torch.testing.assert_close(force, -gradient, rtol=1e-8, atol=1e-10)
 
 
@@ -75,7 +85,9 @@ def test_contact_keeps_momentum(folded) -> None:
 def test_contact_takes_energy_from_sliding_layers(folded) -> None:
     system, state = folded
     pairs = pairs_of(system, state.position)
-    still = contact.force(system.cloth, system.contact, state.position, torch.zeros_like(state.velocity), pairs)
+    still = contact.force(
+        system.cloth, system.contact, state.position, torch.zeros_like(state.velocity), pairs
+    )
     force = contact.force(system.cloth, system.contact, state.position, state.velocity, pairs)
     assert bool((((force - still) * state.velocity).sum((0, 1)) < 0).all())
 
@@ -88,8 +100,12 @@ def test_kernel_finds_and_pushes_what_the_definition_does(folded) -> None:
     expected = system.force(drive, 0.0, 0.0, state.position, state.velocity)
     computed = kernel.forces(drive, 0.0, state.position, state.velocity)
     assert float((computed - expected).abs().max()) < 1e-9 * float(expected.abs().max())
-    # Over many steps the kernel keeps candidates while vertices move; the definition looks at all pairs every time.
-    results = [advance(system, state, 6e-3, steps=40, backend=b).position for b in (Backend.TORCH, Backend.KERNEL)]
+    # Over many steps the kernel keeps candidates while vertices move; the definition looks at all
+    # pairs every time.
+    results = [
+        advance(system, state, 6e-3, steps=40, backend=b).position
+        for b in (Backend.TORCH, Backend.KERNEL)
+    ]
     torch.testing.assert_close(results[1], results[0], rtol=0, atol=1e-6)
 
 
@@ -99,7 +115,12 @@ def test_what_the_kernel_remembers_of_other_states_changes_nothing_to_the_bit(dt
     system, state = make_system(mesh, [named_material("camel-ponte-roma")] * 3, dtype=dtype)
     used, fresh = replace(system, contact=Contact()), replace(system, contact=Contact())
     start = pleated(used, state)
-    for other in (start, state, pleated(used, state, noise=5e-3), replace(start, position=start.position * torch.nan)):
+    for other in (
+        start,
+        state,
+        pleated(used, state, noise=5e-3),
+        replace(start, position=start.position * torch.nan),
+    ):
         advance(used, other, 6e-3, steps=40)
     first, second = (advance(chosen, start, 6e-3, steps=40) for chosen in (used, fresh))
     assert torch.equal(first.position, second.position)
@@ -113,18 +134,28 @@ def test_flat_cloth_and_its_neighbouring_faces_do_not_touch() -> None:
     system, state = make_system(mesh, [named_material("gray-interlock")])
     system = replace(system, contact=Contact())
     # Faces of 25 mm, thickness 10 mm: only what is far in the cloth can touch.
-    assert float(contact.energy(system.cloth, system.contact, state.position, pairs_of(system, state.position))) == 0.0
+    assert (
+        float(
+            contact.energy(
+                system.cloth, system.contact, state.position, pairs_of(system, state.position)
+            )
+        )
+        == 0.0
+    )
 
 
 def test_a_patch_slides_to_rest_as_coulomb_says() -> None:
-    # A patch on a level, rigidly held sheet: deceleration μ g, from 0.6 m/s to rest after v²/(2 μ g).
+    # A patch on a level, rigidly held sheet: deceleration μ g, from 0.6 m/s to rest after v²/(2 μ
+    # g).
     base = grid(width=1.0, height=0.3, columns=20, rows=6)
     patch = grid(width=0.1, height=0.1, columns=2, rows=2)
     mesh = Mesh(
         rest=np.concatenate([base.rest, patch.rest + np.array([5.0, 0.0])]),
         faces=np.concatenate([base.faces, patch.faces + base.vertex_count]),
     )
-    material = isotropic(name="stiff", area_weight=0.3, stretching=2000.0, shear=2000.0, bending=1e-3, damping=2e-4)
+    material = isotropic(
+        name="stiff", area_weight=0.3, stretching=2000.0, shear=2000.0, bending=1e-3, damping=2e-4
+    )
     handles = Handles(vertices=tuple(range(base.vertex_count)), stiffness=math.inf)
     friction = 0.5
     system, state = make_system(mesh, [material], handles=handles, gravity=(0.0, 0.0, -G))
@@ -140,7 +171,8 @@ def test_a_patch_slides_to_rest_as_coulomb_says() -> None:
     state = replace(state, velocity=velocity)
     start = state.position[base.vertex_count :, 0].mean()
     half = Symplectic().advance(system, state, 0.06)
-    # Edges of the patch ride on faces one after the other: pressure and so friction ripple by some per cent.
+    # Edges of the patch ride on faces one after the other: pressure and so friction ripple by some
+    # per cent.
     speed = float(half.velocity[base.vertex_count :, 0].mean())
     assert speed == pytest.approx(0.6 - friction * G * 0.06, rel=0.06)
     end = Symplectic().advance(system, half, 0.4)
@@ -150,10 +182,17 @@ def test_a_patch_slides_to_rest_as_coulomb_says() -> None:
 
 
 # With steps of 5 ms a layer moves a fifth of the thickness in a step before it is pushed back.
-@pytest.mark.parametrize(("method", "frames", "gap"), [(Symplectic(), 50, 4e-3), (BackwardEuler(), 30, 2e-3)])
-def test_layers_of_a_calm_flag_stay_apart_with_contact_and_cross_without(method, frames, gap) -> None:
+@pytest.mark.parametrize(
+    ("method", "frames", "gap"), [(Symplectic(), 50, 4e-3), (BackwardEuler(), 30, 2e-3)]
+)
+def test_layers_of_a_calm_flag_stay_apart_with_contact_and_cross_without(
+    method, frames, gap
+) -> None:
     scene = flag(material=named_material("camel-ponte-roma"), wind_speed=0.5, columns=12)
-    scene = replace(scene, position=scene.position + np.random.default_rng(1).normal(0, 1e-4, scene.position.shape))
+    scene = replace(
+        scene,
+        position=scene.position + np.random.default_rng(1).normal(0, 1e-4, scene.position.shape),
+    )
     closest = {}
     for setting in (None, Contact()):
         system, state = assemble([replace(scene, contact=setting)], dtype=torch.float64)
@@ -161,7 +200,9 @@ def test_layers_of_a_calm_flag_stay_apart_with_contact_and_cross_without(method,
         least = math.inf
         for _ in range(frames):
             state = method.advance(system, state, 0.04)
-            touch = contact.touching(judge.cloth, judge.contact, state.position, pairs_of(judge, state.position))
+            touch = contact.touching(
+                judge.cloth, judge.contact, state.position, pairs_of(judge, state.position)
+            )
             if len(touch.violation):
                 least = min(least, judge.contact.thickness - float(touch.violation.max()))
         assert bool(state.healthy().all())
@@ -171,17 +212,21 @@ def test_layers_of_a_calm_flag_stay_apart_with_contact_and_cross_without(method,
 
 
 def test_the_automatic_step_stays_stable_over_ten_seconds_of_layers_on_one_another() -> None:
-    # An unstable step feeds the fastest vibrations without end. A flag that hangs keeps less than a tenth of the
-    # kinetic energy of its fall: the weak wind moves it a little.
+    # An unstable step feeds the fastest vibrations without end. A flag that hangs keeps less than a
+    # tenth of the kinetic energy of its fall: the weak wind moves it a little.
     winds = np.linspace(0.0, 1.0, 16)
-    scenes = [flag(material=named_material("camel-ponte-roma"), wind_speed=w, columns=15) for w in winds]
+    scenes = [
+        flag(material=named_material("camel-ponte-roma"), wind_speed=w, columns=15) for w in winds
+    ]
     system, state = assemble([replace(scene, contact=Contact()) for scene in scenes])
     energies, touches = [], 0
     for frame in range(250):
         state = Symplectic().advance(system, state, 0.04)
         energies.append((system.cloth.mass * (state.velocity**2).sum(1)).sum(0) / 2)
         if frame % 50 == 49:
-            touch = contact.touching(system.cloth, system.contact, state.position, pairs_of(system, state.position))
+            touch = contact.touching(
+                system.cloth, system.contact, state.position, pairs_of(system, state.position)
+            )
             touches += len(touch.violation)
     kinetic = torch.stack(energies)
     assert bool(state.healthy().all())

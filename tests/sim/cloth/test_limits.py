@@ -52,10 +52,12 @@ def test_a_correction_keeps_the_centre_of_mass_and_turns_with_the_cloth(distorte
 
 
 @pytest.mark.parametrize(
-    ("method", "limits"), [(Symplectic(step=3e-4), StrainLimits()), (BackwardEuler(), StrainLimits(sweeps=50))]
+    ("method", "limits"),
+    [(Symplectic(step=3e-4), StrainLimits()), (BackwardEuler(), StrainLimits(sweeps=50))],
 )
 def test_a_heavy_hanging_cloth_stretches_to_the_limit_and_not_beyond(method, limits) -> None:
-    # A fiftieth of the measured stiffness, at most 10.7 N/m: its weight, 2.8 N/m, stretches it by a quarter and more.
+    # A fiftieth of the measured stiffness, at most 10.7 N/m: its weight, 2.8 N/m, stretches it by a
+    # quarter and more.
     mesh = grid(width=0.2, height=1.0, columns=4, rows=20)
     top = tuple(int(i) for i in np.flatnonzero(mesh.rest[:, 1] > 1 - 1e-9))
     handles = Handles(vertices=top, stiffness=math.inf)
@@ -72,8 +74,8 @@ def test_a_heavy_hanging_cloth_stretches_to_the_limit_and_not_beyond(method, lim
 
 
 def test_accelerated_sweeps_keep_the_momentum_and_come_closer(distorted) -> None:
-    # By the distance from the limits that is left, root mean square over the faces: 30 plain sweeps against 30 of which
-    # 22 are accelerated.
+    # By the distance from the limits that is left, root mean square over the faces: 30 plain sweeps
+    # against 30 of which 22 are accelerated.
     system, state = make_system(distorted, [named_material("camel-ponte-roma")])
     start = state.position * torch.tensor([1.0, 1.3, 1.2], dtype=torch.float64)[:, None]
     bounds = StrainLimits(sweeps=30)
@@ -81,7 +83,9 @@ def test_accelerated_sweeps_keep_the_momentum_and_come_closer(distorted) -> None
     plain = start
     for _ in range(bounds.sweeps):
         plain = plain + correction(system.cloth, bounds, plain)
-    after, velocity = limit_strains(system.cloth, bounds, start, torch.zeros_like(start), 0.01, free)
+    after, velocity = limit_strains(
+        system.cloth, bounds, start, torch.zeros_like(start), 0.01, free
+    )
 
     def left(position: torch.Tensor) -> float:
         large, _ = stretches(system.cloth, position)
@@ -96,14 +100,17 @@ def test_accelerated_sweeps_keep_the_momentum_and_come_closer(distorted) -> None
 @pytest.mark.parametrize("backend", [Backend.TORCH, Backend.KERNEL])
 @pytest.mark.parametrize("stiffness", [math.inf, 1e3])
 def test_what_handles_hold_is_not_moved_by_the_limits(backend, stiffness, distorted) -> None:
-    # The start is beyond the limits, and forces have no time: membranes that pull a gram with 10 N move it by 5 nm.
+    # The start is beyond the limits, and forces have no time: membranes that pull a gram with 10 N
+    # move it by 5 nm.
     handles = Handles(vertices=(0, 4), stiffness=stiffness)
     system, state = make_system(distorted, [named_material("camel-ponte-roma")], handles=handles)
     start = State(position=state.position * 1.2, velocity=torch.zeros_like(state.position))
     if math.isfinite(stiffness):
         system = replace(system, anchors=start.position[system.held])
     system = replace(system, limits=StrainLimits(sweeps=20))
-    moved = (advance(system, start, 1e-6, steps=1, backend=backend).position - start.position)[..., 0].norm(dim=1)
+    moved = (advance(system, start, 1e-6, steps=1, backend=backend).position - start.position)[
+        ..., 0
+    ].norm(dim=1)
     assert float(moved[[0, 4]].max()) < 1e-8
     others = [i for i in range(len(moved)) if i not in (0, 4)]
     assert float(moved[others].min()) > 1e-3
@@ -123,12 +130,18 @@ def test_kernel_and_torch_limit_alike(dtype, tolerance, sweeps, stiffness, disto
     )
     system = replace(system, limits=StrainLimits(sweeps=sweeps))
     start = State(position=state.position * 1.1, velocity=torch.cos(9 * state.position.roll(1, 1)))
-    results = [advance(system, start, 2e-3, steps=20, backend=b) for b in (Backend.TORCH, Backend.KERNEL)]
+    results = [
+        advance(system, start, 2e-3, steps=20, backend=b) for b in (Backend.TORCH, Backend.KERNEL)
+    ]
     torch.testing.assert_close(results[1].position, results[0].position, rtol=0, atol=tolerance)
-    torch.testing.assert_close(results[1].velocity, results[0].velocity, rtol=0, atol=1e3 * tolerance)
+    torch.testing.assert_close(
+        results[1].velocity, results[0].velocity, rtol=0, atol=1e3 * tolerance
+    )
 
 
-@pytest.mark.parametrize("fields", [{"low": 1.0}, {"high": 1.0}, {"low": -0.1}, {"high": math.nan}, {"sweeps": 0}])
+@pytest.mark.parametrize(
+    "fields", [{"low": 1.0}, {"high": 1.0}, {"low": -0.1}, {"high": math.nan}, {"sweeps": 0}]
+)
 def test_impossible_limits_are_refused(fields: dict[str, float]) -> None:
     with pytest.raises(InputError, match="strain limits"):
         StrainLimits(**fields)  # type: ignore[arg-type]

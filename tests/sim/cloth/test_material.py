@@ -27,11 +27,15 @@ def test_catalog_has_ten_cloths_with_tables_four_with_drapes_paper_and_aluminium
 
 
 def test_camel_ponte_roma_has_the_published_numbers() -> None:
-    # Runia et al. 2020, supplement, listing of the material file (cut to 1e-10 N·m); area weight as measured.
+    # Runia et al. 2020, supplement, listing of the material file (cut to 1e-10 N·m); area weight as
+    # measured.
     cloth = material.named_material("camel-ponte-roma")
     assert cloth.area_weight == 0.284
     np.testing.assert_allclose(
-        cloth.bending[0], [36.3483e-6, 49.5855e-6, 45.7440e-6, 47.4133e-6, 20.7266e-6], rtol=0, atol=1e-10
+        cloth.bending[0],
+        [36.3483e-6, 49.5855e-6, 45.7440e-6, 47.4133e-6, 20.7266e-6],
+        rtol=0,
+        atol=1e-10,
     )
     np.testing.assert_allclose(cloth.stretching[2], [67.368431, 77.767944, 182.273407, -14.661531])
 
@@ -84,11 +88,18 @@ def test_impossible_materials_are_refused_with_the_reason() -> None:
         ({"stretching": -np.ones((6, 4))}, "stiffness"),
         ({"stretching": [["a"] * 4] * 6}, "numbers"),
     ]
-    assert not unrefused(lambda change: replace(material.named_material("paper"), **change), cases, InputError)
+    assert not unrefused(
+        lambda change: replace(material.named_material("paper"), **change), cases, InputError
+    )
 
 
 def test_unknown_and_missing_keys_are_named() -> None:
-    content = {"source": "x", "area-weight": 0.1, "stretching": np.ones((6, 4)), "bending": np.ones((3, 5))}
+    content = {
+        "source": "x",
+        "area-weight": 0.1,
+        "stretching": np.ones((6, 4)),
+        "bending": np.ones((3, 5)),
+    }
     with pytest.raises(InputError, match="colour"):
         Material.from_mapping({**content, "colour": "red"}, name="x")
     with pytest.raises(InputError, match="area-weight"):

@@ -16,7 +16,8 @@ def test_grid_covers_the_rectangle_and_has_the_counts_of_a_triangulated_disc() -
     assert len(mesh.faces) == 1200
     assert mesh.areas.sum() == pytest.approx(1.5)
     assert mesh.vertex_areas.sum() == pytest.approx(1.5)
-    # Euler: V − E + F = 1 for a disc; every edge is inner or on the boundary, which has as many edges as vertices.
+    # Euler: V − E + F = 1 for a disc; every edge is inner or on the boundary, which has as many
+    # edges as vertices.
     assert mesh.vertex_count - (len(mesh.hinges) + len(mesh.boundary)) + len(mesh.faces) == 1
     assert len(mesh.boundary) == 2 * (30 + 20)
 
@@ -33,7 +34,9 @@ def test_hinges_of_two_triangles_by_hand() -> None:
 def test_gradients_differentiate_a_linear_field_exactly(distorted: Mesh) -> None:
     field = 3 * distorted.rest[:, 0] - 2 * distorted.rest[:, 1] + 5
     derivative = np.einsum("fic,fc->fi", distorted.gradients, field[distorted.faces])
-    np.testing.assert_allclose(derivative, np.tile([3.0, -2.0], (len(distorted.faces), 1)), atol=1e-12)
+    np.testing.assert_allclose(
+        derivative, np.tile([3.0, -2.0], (len(distorted.faces), 1)), atol=1e-12
+    )
 
 
 def test_impossible_meshes_are_refused_with_the_reason() -> None:
@@ -52,7 +55,10 @@ def test_impossible_grids_are_refused() -> None:
     cases = [(0.0, 3), (-1.0, 3), (1.0, 0), (float("nan"), 2)]
     assert (
         unrefused(
-            lambda width, columns: grid(width=width, height=1.0, columns=columns, rows=2), cases, InputError, "grid"
+            lambda width, columns: grid(width=width, height=1.0, columns=columns, rows=2),
+            cases,
+            InputError,
+            "grid",
         )
         == []
     )

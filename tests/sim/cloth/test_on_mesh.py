@@ -19,13 +19,18 @@ BATCHES = (1, 3, 8, 20)
 
 @pytest.fixture(params=BATCHES)
 def cloth(request: pytest.FixtureRequest, distorted) -> Cloth:
-    return Cloth.build(distorted, [named_material("camel-ponte-roma")] * request.param, dtype=torch.float64)
+    return Cloth.build(
+        distorted, [named_material("camel-ponte-roma")] * request.param, dtype=torch.float64
+    )
 
 
 def field(cloth: Cloth, seed: int, *, size: float = 1.0) -> Tensor:
-    """At the vertices, its members a part of a longer row of them, as those of a joint batch are."""
+    """At the vertices, its members a part of a longer row of them, as those of a joint batch
+    are."""
     rng = torch.Generator().manual_seed(seed)
-    wide = torch.randn((cloth.mesh.vertex_count, 3, cloth.batch + 5), generator=rng, dtype=torch.float64)
+    wide = torch.randn(
+        (cloth.mesh.vertex_count, 3, cloth.batch + 5), generator=rng, dtype=torch.float64
+    )
     return size * wide[..., 2 : 2 + cloth.batch]
 
 
@@ -49,9 +54,14 @@ def test_it_is_left_alone_where_gradients_are_wanted_or_the_type_is_another(clot
 def test_face_winds_are_those_of_torch(cloth: Cloth, everywhere: bool) -> None:
     x, v, wind = position(cloth), field(cloth, 2), field(cloth, 3, size=5.0)
     wind = wind[0] if everywhere else wind
-    compiled, defined = face_wind(cloth, x, v, wind), face_wind(cloth, x.clone().requires_grad_(), v, wind)
+    compiled, defined = (
+        face_wind(cloth, x, v, wind),
+        face_wind(cloth, x.clone().requires_grad_(), v, wind),
+    )
     for name in ("normal", "relative", "across"):
-        torch.testing.assert_close(getattr(compiled, name), getattr(defined, name).detach(), rtol=0, atol=1e-12)
+        torch.testing.assert_close(
+            getattr(compiled, name), getattr(defined, name).detach(), rtol=0, atol=1e-12
+        )
 
 
 def test_a_face_without_an_area_has_no_normal_and_no_nan(cloth: Cloth) -> None:
@@ -62,7 +72,10 @@ def test_a_face_without_an_area_has_no_normal_and_no_nan(cloth: Cloth) -> None:
 
 def test_sums_at_the_vertices_are_those_of_torch_to_the_bit(cloth: Cloth) -> None:
     for parts in (1, 3):
-        corners = [field(cloth, seed)[:1, :parts].repeat(len(cloth.hinges), 1, 1) * (1 + seed) for seed in range(4)]
+        corners = [
+            field(cloth, seed)[:1, :parts].repeat(len(cloth.hinges), 1, 1) * (1 + seed)
+            for seed in range(4)
+        ]
         corners = [c * torch.linspace(-1, 1, len(c), dtype=c.dtype)[:, None, None] for c in corners]
         stacked = torch.cat([*corners, torch.zeros_like(corners[0][:1])])
         expected = torch.zeros((cloth.mesh.vertex_count, parts, cloth.batch), dtype=torch.float64)
@@ -75,10 +88,16 @@ def test_mean_normals_and_their_rates_are_those_of_torch(cloth: Cloth) -> None:
     x, v = position(cloth), field(cloth, 2)
     wanted = x.clone().requires_grad_()
     torch.testing.assert_close(
-        inertia.mean_normals(cloth, x), inertia.mean_normals(cloth, wanted).detach(), rtol=0, atol=1e-12
+        inertia.mean_normals(cloth, x),
+        inertia.mean_normals(cloth, wanted).detach(),
+        rtol=0,
+        atol=1e-12,
     )
     torch.testing.assert_close(
-        inertia.mean_normal_rates(cloth, x, v), inertia.mean_normal_rates(cloth, wanted, v).detach(), rtol=0, atol=1e-12
+        inertia.mean_normal_rates(cloth, x, v),
+        inertia.mean_normal_rates(cloth, wanted, v).detach(),
+        rtol=0,
+        atol=1e-12,
     )
 
 
@@ -87,7 +106,9 @@ def test_folds_are_those_of_torch(cloth: Cloth) -> None:
     compiled, defined = bending.fold(cloth, x), bending.fold(cloth, x.clone().requires_grad_())
     torch.testing.assert_close(compiled.angle, defined.angle.detach(), rtol=0, atol=1e-12)
     for own, expected in zip(compiled.gradient, defined.gradient, strict=True):
-        torch.testing.assert_close(own, expected.detach(), rtol=0, atol=1e-12 * float(expected.detach().abs().max()))
+        torch.testing.assert_close(
+            own, expected.detach(), rtol=0, atol=1e-12 * float(expected.detach().abs().max())
+        )
     assert torch.equal(bending.fold_angle(cloth, x), compiled.angle)
 
 
@@ -122,4 +143,6 @@ def test_factors_on_the_pressure_multiply_the_normal_force_alone(distorted) -> N
     factor = power.factor(1.2, seen.across) * porous.factor(1.2, seen.across)
     third = (cloth.areas / 3)[:, None, None]
     push = third * (1.2 * factor * seen.across.abs() * seen.across * seen.normal + 0.1 * seen.along)
-    torch.testing.assert_close(system.air.force(cloth, x, v, wind), cloth.shared_out(push), rtol=1e-12, atol=1e-14)
+    torch.testing.assert_close(
+        system.air.force(cloth, x, v, wind), cloth.shared_out(push), rtol=1e-12, atol=1e-14
+    )

@@ -28,12 +28,15 @@ def test_a_flag_is_held_at_its_two_hoist_corners_and_a_cloth_at_its_top_ones() -
     cloth = hanging_cloth(material=CAMEL, wind=(1, 2), columns=4)
     assert cloth.mesh.rest[list(cloth.handles.vertices)].tolist() == [[0, 1], [1, 1]]
     assert cloth.wind == (1, 2, 0)
-    assert [scene.mesh.rest[v].tolist() for v in held.full_hoist(scene.mesh.rest)] == [[0, j / 4] for j in range(5)]
+    assert [scene.mesh.rest[v].tolist() for v in held.full_hoist(scene.mesh.rest)] == [
+        [0, j / 4] for j in range(5)
+    ]
 
 
 def test_members_differ_in_material_and_wind_but_not_in_mesh() -> None:
     scenes = [
-        flag(material=named_material(n), wind_speed=u, columns=6) for n, u in (("paper", 1.0), ("gray-interlock", 7.0))
+        flag(material=named_material(n), wind_speed=u, columns=6)
+        for n, u in (("paper", 1.0), ("gray-interlock", 7.0))
     ]
     system, state = assemble(scenes, dtype=torch.float64)
     assert state.position.shape == (35, 3, 2)
@@ -55,14 +58,21 @@ def test_impossible_scenes_are_refused_with_the_reason() -> None:
         ({"handles": Handles(vertices=(35,))}, "held vertex 35"),
     ]
     assert (
-        unrefused(lambda change: replace(flag(material=CAMEL, wind_speed=4, columns=6), **change), cases, InputError)
+        unrefused(
+            lambda change: replace(flag(material=CAMEL, wind_speed=4, columns=6), **change),
+            cases,
+            InputError,
+        )
         == []
     )
 
 
 def test_a_second_piece_that_nothing_holds_is_refused() -> None:
     one = grid(width=1, height=1, columns=2, rows=2)
-    two = Mesh(rest=np.concatenate([one.rest, one.rest + 5]), faces=np.concatenate([one.faces, one.faces + 9]))
+    two = Mesh(
+        rest=np.concatenate([one.rest, one.rest + 5]),
+        faces=np.concatenate([one.faces, one.faces + 9]),
+    )
     with pytest.raises(InputError, match="not held anywhere"):
         Scene(mesh=two, position=upright(two), material=CAMEL, handles=Handles(vertices=(0,)))
 
@@ -91,7 +101,9 @@ def test_offsets_are_linear_between_key_frames_and_constant_outside() -> None:
 
 def test_rigid_handles_follow_their_motion_exactly() -> None:
     scene = flag(material=CAMEL, wind_speed=4, columns=6)
-    moving = replace(scene.handles, stiffness=float("inf"), times=(0.0, 0.2), offsets=((0, 0, 0), (0.3, 0.1, 0)))
+    moving = replace(
+        scene.handles, stiffness=float("inf"), times=(0.0, 0.2), offsets=((0, 0, 0), (0.3, 0.1, 0))
+    )
     system, state = assemble([replace(scene, handles=moving)], dtype=torch.float64)
     for _ in range(5):
         state = advance(system, state, 0.04, steps=60)
@@ -109,7 +121,10 @@ def test_uniform_wind_refuses_what_is_not_finite() -> None:
 @pytest.mark.parametrize("evaluation", list(Evaluation))
 def test_every_measured_cloth_flies_in_strong_wind(evaluation: Evaluation) -> None:
     cloths = [name for name in MATERIALS.names() if name not in ("paper", "aluminium")]
-    scenes = [flag(material=named_material(name), wind_speed=10.0, columns=9, evaluation=evaluation) for name in cloths]
+    scenes = [
+        flag(material=named_material(name), wind_speed=10.0, columns=9, evaluation=evaluation)
+        for name in cloths
+    ]
     system, state = assemble(scenes)
     state = Symplectic().advance(system, state, 2.0)
     assert bool(state.healthy().all())

@@ -1,4 +1,5 @@
-"""Verification 6: the stretching and bending tables at their nodes, saturations and sign changes."""
+"""Verification 6: the stretching and bending tables at their nodes, saturations and sign
+changes."""
 
 from __future__ import annotations
 
@@ -20,7 +21,9 @@ from sim.cloth.stiffness_tables import (
 CAMEL = named_material("camel-ponte-roma")
 
 
-def look_up(g00: float, g11: float, g01: float, evaluation: Evaluation = Evaluation.ARCSIM) -> np.ndarray:
+def look_up(
+    g00: float, g11: float, g01: float, evaluation: Evaluation = Evaluation.ARCSIM
+) -> np.ndarray:
     samples = torch.tensor(sample_stretching(CAMEL.stretching, evaluation)[None])
     strain = [torch.tensor([[value]], dtype=torch.float64) for value in (g00, g11, g01)]
     result = stretching_stiffness(*strain, samples, torch.tensor([0]), GRIDS[evaluation])
@@ -52,8 +55,9 @@ def test_negative_entries_are_cut_to_zero_before_use() -> None:
 
 
 def test_zero_strain_is_a_mixture_of_the_neighbouring_nodes() -> None:
-    # ArcSim's nodes lie at ±1/60 around zero. By hand for k0, G = 0: of the four neighbours one is compressed both ways
-    # (row 0), one stretched along u, one along v and one both ways (direction 0°, since c00 ≥ c11 on the tie).
+    # ArcSim's nodes lie at ±1/60 around zero. By hand for k0, G = 0: of the four neighbours one is
+    # compressed both ways (row 0), one stretched along u, one along v and one both ways (direction
+    # 0°, since c00 ≥ c11 on the tie).
     weight = 6 * (np.sqrt(1 + 2 / 60) - 1)
     k0 = CAMEL.stretching[:, 0]
     along_u = k0[0] * (1 - weight) + k0[1] * weight
@@ -62,7 +66,9 @@ def test_zero_strain_is_a_mixture_of_the_neighbouring_nodes() -> None:
     assert look_up(0, 0, 0)[0] == pytest.approx(expected, rel=1e-6)
 
 
-def test_corrected_evaluation_gives_row_zero_at_zero_strain_and_keeps_the_coupling_positive_definite() -> None:
+def test_corrected_evaluation_gives_row_zero_at_zero_strain_and_keeps_the_coupling_positive_definite() -> (
+    None
+):
     k0, k1, k2, k3 = look_up(0, 0, 0, Evaluation.CORRECTED)
     np.testing.assert_allclose([k0, k1, k2, k3], 2 * CAMEL.stretching[0], rtol=1e-12)
     for name in ("camel-ponte-roma", "paper", "white-swim-solid", "ivory-rib-knit"):
@@ -111,5 +117,7 @@ def test_negative_folds_continue_the_first_segment_and_stop_at_zero() -> None:
 
 def test_corrected_bending_does_not_depend_on_the_side() -> None:
     for curvature in (2.0, 9.0, 31.0):
-        assert bend(-curvature, 30, Evaluation.CORRECTED) == bend(curvature, 30, Evaluation.CORRECTED)
+        assert bend(-curvature, 30, Evaluation.CORRECTED) == bend(
+            curvature, 30, Evaluation.CORRECTED
+        )
         assert bend(curvature, 30, Evaluation.CORRECTED) == bend(curvature, 30)

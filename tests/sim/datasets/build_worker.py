@@ -1,8 +1,10 @@
-"""The command line with small commits, for builds that are killed, and little patience with workers that are gone.
+"""The command line with small commits, for builds that are killed, and little patience with workers
+that are gone.
 
     python build_worker.py ARTIFACTS build RECIPE …
 
-Once the lake has that many artifacts it pauses with another object that it has stored and not committed, once.
+Once the lake has that many artifacts it pauses with another object that it has stored and not
+committed, once.
 """
 
 import sys

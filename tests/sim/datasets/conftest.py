@@ -1,4 +1,5 @@
-"""A tiny data set: five sequences of a coarse flag, ten films of 32 × 32 pixels; and where it is built."""
+"""A tiny data set: five sequences of a coarse flag, ten films of 32 × 32 pixels; and where it is
+built."""
 
 from __future__ import annotations
 
@@ -36,7 +37,9 @@ def recipe_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def make(recipe_file: Path) -> Callable[..., DatasetRecipe]:
     """The tiny recipe with pieces of its text replaced: old → new."""
 
-    def made(replaced: dict[str, str] | None = None, *, scene: dict[str, str] | None = None) -> DatasetRecipe:
+    def made(
+        replaced: dict[str, str] | None = None, *, scene: dict[str, str] | None = None
+    ) -> DatasetRecipe:
         text = _replaced(DATA_SET, replaced or {})
         folder = recipe_file.parent
         if scene:
@@ -65,14 +68,16 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
 
 
 class Builds:
-    """Builds through the cluster: in this process, or in processes of their own, which may be killed."""
+    """Builds through the cluster: in this process, or in processes of their own, which may be
+    killed."""
 
     def __init__(self, cluster: Cluster, said: Path) -> None:
         self._cluster = cluster
         self._said = said
 
     def start(self, recipe: Path, lake: Path, *, pause: int) -> subprocess.Popen[str]:
-        """`flagdata build`, which commits every two films; it waits in the first commit from `pause` artifacts on."""
+        """`flagdata build`, which commits every two films; it waits in the first commit from
+        `pause` artifacts on."""
         command = ["build", recipe, "--lake", lake, "--scheduler", self._cluster.address]
         # What it says goes to a file: nobody reads a pipe while it runs.
         with self._said.open("wb") as said:
@@ -105,7 +110,17 @@ class Builds:
 
     def rows(self, lake: Path | str) -> Rows:
         """Artifact → all of its row that does not say when it was committed, and by which code."""
-        columns = ["artifact", "kind", "name", "object", "recipe_hash", "seed", "start", "parameters", "wind"]
+        columns = [
+            "artifact",
+            "kind",
+            "name",
+            "object",
+            "recipe_hash",
+            "seed",
+            "start",
+            "parameters",
+            "wind",
+        ]
         rows = Lake.open(lake).rows(columns=columns).to_pylist()
         assert len({row["artifact"] for row in rows}) == len(rows)
         return {row["artifact"]: tuple(str(row[column]) for column in columns) for row in rows}
@@ -118,7 +133,8 @@ def builds(cluster: Cluster, tmp_path_factory: pytest.TempPathFactory) -> Builds
 
 @pytest.fixture(scope="session")
 def report(recipe_file: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
-    """What `flagdata build` says of the tiny data set, built without interruption by a process of this machine."""
+    """What `flagdata build` says of the tiny data set, built without interruption by a process of
+    this machine."""
     lake = tmp_path_factory.mktemp("built") / "lake"
     return invoke("build", recipe_file, "--lake", lake, "--workers", 1, "--json").document
 

@@ -1,4 +1,5 @@
-"""What surrounds the pictures of a data set, and how well simple classifiers guess parameters from it alone."""
+"""What surrounds the pictures of a data set, and how well simple classifiers guess parameters from
+it alone."""
 
 from __future__ import annotations
 
@@ -33,7 +34,8 @@ FEATURES = (
 
 @dataclass(frozen=True, kw_only=True)
 class Surroundings:
-    """Of all films: features (n, k) as in `FEATURES`, sequence (n,), and the parameters that must not be guessed."""
+    """Of all films: features (n, k) as in `FEATURES`, sequence (n,), and the parameters that must
+    not be guessed."""
 
     features: FloatArray
     sequence: IntArray
@@ -54,7 +56,10 @@ def features_of(name: str, record: Record, *, order: int, size: int) -> list[flo
     """
     jpegs = record.jpegs(0, len(record.frame_times))
     lengths = np.array([len(jpeg) for jpeg in jpegs], dtype=float)
-    start, end = jpegs[0].index(b"\xff\xdb"), jpegs[0].index(b"\xff\xda")  # quantisation tables; start of scan
+    start, end = (
+        jpegs[0].index(b"\xff\xdb"),
+        jpegs[0].index(b"\xff\xda"),
+    )  # quantisation tables; start of scan
     header = np.frombuffer(jpegs[0][start:end], dtype=np.uint8)
     series = record.wind()
     first = int(record.frame_times[0])
@@ -79,11 +84,15 @@ def features_of(name: str, record: Record, *, order: int, size: int) -> list[flo
     ]
 
 
-def accuracies(features: FloatArray, labels: FloatArray, sequence: IntArray) -> dict[str, FloatArray]:
-    """Share of right guesses (target,) of labels ±1 (film, target), on films of sequences that were not fitted to.
+def accuracies(
+    features: FloatArray, labels: FloatArray, sequence: IntArray
+) -> dict[str, FloatArray]:
+    """Share of right guesses (target,) of labels ±1 (film, target), on films of sequences that were
+    not fitted to.
 
-    Both labels weigh the same, so that a blind guess is right in half of the cases however often each occurs.
-    "ridge" is linear in the features and their squares, "neighbours" the majority of the nearest films.
+    Both labels weigh the same, so that a blind guess is right in half of the cases however often
+    each occurs. "ridge" is linear in the features and their squares, "neighbours" the majority of
+    the nearest films.
     """
     spread = features.std(axis=0)
     x = (features - features.mean(axis=0))[:, spread > 0] / spread[spread > 0]
@@ -102,12 +111,15 @@ def accuracies(features: FloatArray, labels: FloatArray, sequence: IntArray) -> 
 
 def _right(guesses: FloatArray, labels: FloatArray) -> FloatArray:
     hits = np.sign(guesses) == labels
-    shares = [(hits & (labels == label)).sum(axis=0) / (labels == label).sum(axis=0) for label in (-1, 1)]
+    shares = [
+        (hits & (labels == label)).sum(axis=0) / (labels == label).sum(axis=0) for label in (-1, 1)
+    ]
     return (shares[0] + shares[1]) / 2
 
 
 def dealt_anew(sequence: IntArray, rng: np.random.Generator) -> IntArray:
-    """(n,) which film each film's parameters are taken from, when sequences change places with one another."""
+    """(n,) which film each film's parameters are taken from, when sequences change places with one
+    another."""
     films = [np.flatnonzero(sequence == own) for own in np.unique(sequence)]
     taken = np.empty(len(sequence), dtype=np.int64)
     for own, other in enumerate(rng.permutation(len(films)).tolist()):

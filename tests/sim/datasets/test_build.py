@@ -36,18 +36,32 @@ SEQUENCES, FILMS = 5, 10
 
 def test_a_build_holds_what_its_recipe_says(built: Path, report: dict[str, Any]) -> None:
     assert report["schema"] == "flagdata.build/1"
-    assert (report["new_sequences"], report["new_films"], report["clips"]) == (SEQUENCES, FILMS, FILMS)
+    assert (report["new_sequences"], report["new_films"], report["clips"]) == (
+        SEQUENCES,
+        FILMS,
+        FILMS,
+    )
     assert Path(report["card"]).parent == built / "cards"
     lake = Lake.open(built)
     rows = lake.rows().to_pylist()
-    assert Counter(row["kind"] for row in rows) == {"meshes": SEQUENCES, "recording": FILMS, "clip": FILMS}
+    assert Counter(row["kind"] for row in rows) == {
+        "meshes": SEQUENCES,
+        "recording": FILMS,
+        "clip": FILMS,
+    }
     for side, sequences, films in (("train", 3, 7), ("test", 2, 3)):
-        own = [row for row in rows if row["kind"] == "recording" and row["name"].startswith(f"tiny-{side}-")]
+        own = [
+            row
+            for row in rows
+            if row["kind"] == "recording" and row["name"].startswith(f"tiny-{side}-")
+        ]
         often = Counter(row["seed"] for row in own)
         assert len(own) == films
         assert len(often) == sequences
         assert max(often.values()) - min(often.values()) <= 1
-        assert sorted(row["name"] for row in own) == [f"tiny-{side}-{place:05d}" for place in range(films)]
+        assert sorted(row["name"] for row in own) == [
+            f"tiny-{side}-{place:05d}" for place in range(films)
+        ]
     assert [finding for finding in doctor(lake) if finding.severity != "note"] == []
     assert verify(lake, object_names(lake)) == ()
 
@@ -85,10 +99,13 @@ def test_a_films_anemometer_is_a_log_of_its_wind_at_1_hz(built: Path) -> None:
         assert series.time[-1] <= record.frame_times[-1]
         assert record.frame_times[0] - series.time[0] > 60 * 10**9
         expected = truth["wind_speed"] * truth["anemometer-gain.gain"]
-        # Noise of 0.1 m/s over some 75 samples: 5 standard errors and half a step; near 0, readings are cut off.
+        # Noise of 0.1 m/s over some 75 samples: 5 standard errors and half a step; near 0, readings
+        # are cut off.
         assert np.mean(series.channels["wind_speed"]) == pytest.approx(expected, abs=0.06 + 0.05)
         parameters = json.loads(row["parameters"])
-        assert {name: value for name, value in parameters.items() if not isinstance(value, str)} == truth
+        assert {
+            name: value for name, value in parameters.items() if not isinstance(value, str)
+        } == truth
         assert parameters["material"] == "camel-ponte-roma"
 
 
@@ -136,7 +153,8 @@ def test_a_build_into_a_bucket_of_which_a_worker_is_preempted_makes_the_rows_of_
     assert verify(lake, object_names(lake)) == ()
     stored = sum(one.size for one in lake.objects)
     assert len(passed) >= 2 * (FILMS + 3)
-    # Jobs and rows have the recipe's length: 20 kB a film, of which one of flagsim-small has 2.8 MB and these 0.1.
+    # Jobs and rows have the recipe's length: 20 kB a film, of which one of flagsim-small has 2.8 MB
+    # and these 0.1.
     assert sum(passed) < min(stored / 2, 20_000 * len(passed))
 
 
@@ -191,10 +209,17 @@ def test_shards_of_which_each_replaces_a_sequence_that_failed_are_the_whole_buil
 
     def build(lake: Lake, branch: str = "main", shard: Shard | None = None) -> BuildReport:
         return Build(
-            lake=lake, recipe=recipe, workers=FirstFails(), bars=without_bars, branch=branch, shard=shard
+            lake=lake,
+            recipe=recipe,
+            workers=FirstFails(),
+            bars=without_bars,
+            branch=branch,
+            shard=shard,
         ).run()
 
-    parts, together, whole = (Lake.create(tmp_path / name) for name in ("parts", "together", "whole"))
+    parts, together, whole = (
+        Lake.create(tmp_path / name) for name in ("parts", "together", "whole")
+    )
     for number in (1, 2):
         parts.branch(f"part-{number}")
         assert build(parts, f"part-{number}", Shard(number=number, of=2)).failed
@@ -222,7 +247,10 @@ def test_a_build_given_again_knows_what_failed_and_simulates_nothing(
     assert len(first.failed) == 2
     meshes = lake.rows("kind = 'meshes'", columns=["name", "report"]).to_pylist()
     named = {row["name"]: json.loads(row["report"]).get("in_place_of") for row in meshes}
-    assert {name for name, members in named.items() if members} == {"tiny-train-00003", "tiny-test-00002"}
+    assert {name for name, members in named.items() if members} == {
+        "tiny-train-00003",
+        "tiny-test-00002",
+    }
     assert named["tiny-test-00002"] == {"0": "it crumpled"}
 
 
@@ -234,7 +262,10 @@ def test_a_shard_heals_an_object_beside_a_sequence_that_was_replaced_before(
     for row in lake.rows("kind = 'meshes'", columns=["object"]).to_pylist():
         shutil.rmtree(lake.object_path(row["object"]))
     shards = (Shard(number=number, of=2) for number in (1, 2))
-    made = [Build(lake=lake, recipe=recipe, workers=FirstFails(), bars=without_bars, shard=one).run() for one in shards]
+    made = [
+        Build(lake=lake, recipe=recipe, workers=FirstFails(), bars=without_bars, shard=one).run()
+        for one in shards
+    ]
     assert sum(report.healed for report in made) == SEQUENCES
 
 
@@ -244,17 +275,37 @@ def test_shards_of_two_recipes_of_one_name_are_not_mixed_where_they_film_one_fla
     lake = Lake.create(tmp_path / "lake")
     grouped = {"[sides.train]": GROUPS + "[sides.train]"}
     first, second = make(grouped), make({**grouped, "read-noise = 1.0": "read-noise = 2.0"})
-    Build(lake=lake, recipe=first, workers=FirstFails(), bars=without_bars, shard=Shard(number=1, of=2)).run()
+    Build(
+        lake=lake,
+        recipe=first,
+        workers=FirstFails(),
+        bars=without_bars,
+        shard=Shard(number=1, of=2),
+    ).run()
     with pytest.raises(ConflictError, match="are of another recipe"):
-        Build(lake=lake, recipe=second, workers=FirstFails(), bars=without_bars, shard=Shard(number=2, of=2)).run()
+        Build(
+            lake=lake,
+            recipe=second,
+            workers=FirstFails(),
+            bars=without_bars,
+            shard=Shard(number=2, of=2),
+        ).run()
 
 
 def test_a_shard_refuses_to_replace_a_sequence_where_that_changes_films_of_other_shards(
     make: Callable[..., DatasetRecipe], tmp_path: Path
 ) -> None:
     lake = Lake.create(tmp_path / "lake")
-    with pytest.raises(RefusedError, match="sequence 0 failed, and a shard cannot choose another: it crumpled"):
-        Build(lake=lake, recipe=make(), workers=FirstFails(), bars=without_bars, shard=Shard(number=1, of=2)).run()
+    with pytest.raises(
+        RefusedError, match="sequence 0 failed, and a shard cannot choose another: it crumpled"
+    ):
+        Build(
+            lake=lake,
+            recipe=make(),
+            workers=FirstFails(),
+            bars=without_bars,
+            shard=Shard(number=1, of=2),
+        ).run()
 
 
 def test_the_card_says_what_was_built(built: Path, make: Callable[..., DatasetRecipe]) -> None:
@@ -271,8 +322,11 @@ def test_the_card_says_what_was_built(built: Path, make: Callable[..., DatasetRe
     assert "The same in all films: " in text
 
 
-def test_two_recipes_of_one_name_are_not_mixed(recipe_file: Path, builds: Any, built: Path, tmp_path: Path) -> None:
-    # A side is what the catalog states of it: a changed recipe must have another name, or a branch of its own.
+def test_two_recipes_of_one_name_are_not_mixed(
+    recipe_file: Path, builds: Any, built: Path, tmp_path: Path
+) -> None:
+    # A side is what the catalog states of it: a changed recipe must have another name, or a branch
+    # of its own.
     (tmp_path / "scene.toml").write_text((recipe_file.parent / "scene.toml").read_text())
     changed = tmp_path / "tiny.toml"
     changed.write_text(recipe_file.read_text().replace("read-noise = 1.0", "read-noise = 2.0"))
@@ -286,7 +340,8 @@ def test_two_recipes_of_one_name_are_not_mixed(recipe_file: Path, builds: Any, b
 def test_a_build_that_is_killed_twice_and_loses_a_worker_ends_as_an_unbroken_one(
     recipe_file: Path, builds: Any, cluster: Any, built: Path, tmp_path: Path
 ) -> None:
-    """Killed among its sequences and among its films; then the other worker does a killed one's jobs."""
+    """Killed among its sequences and among its films; then the other worker does a killed one's
+    jobs."""
     lake = tmp_path / "lake"
     for artifacts in (2, SEQUENCES + 4):
         builds.kill(builds.start(recipe_file, lake, pause=artifacts))

@@ -21,7 +21,9 @@ def said(*arguments: object) -> Ended:
     return invoke("build", *arguments)
 
 
-def test_a_plan_states_counts_bytes_and_hours_and_makes_nothing(recipe_file: Path, tmp_path: Path) -> None:
+def test_a_plan_states_counts_bytes_and_hours_and_makes_nothing(
+    recipe_file: Path, tmp_path: Path
+) -> None:
     lake = tmp_path / "lake"
     code, out, _ = said(recipe_file, "--lake", lake, "--plan", "--workers", 2, "--json")
     assert code == 0
@@ -29,33 +31,45 @@ def test_a_plan_states_counts_bytes_and_hours_and_makes_nothing(recipe_file: Pat
     plan = json.loads(out)
     assert plan["schema"] == "flagdata.build-plan/1"
     assert plan["sequences"] == {"train": 3, "test": 2}
-    assert plan["films"] == plan["clips"] == {"train": 7, "test": 3}  # 30 frames a film are one clip
+    assert (
+        plan["films"] == plan["clips"] == {"train": 7, "test": 3}
+    )  # 30 frames a film are one clip
     assert plan["missing"] == {"sequences": 5, "films": 10}
     rates = plan["rates"]
     work = 5 * rates["sequence_seconds"] + 10 * rates["film_seconds"]
     assert plan["hours"] == pytest.approx(work / 2 / 3600)
-    assert plan["bytes"] == pytest.approx(5 * rates["sequence_bytes"] + 10 * rates["film_bytes"], abs=1)
-    # 30 frames of one slot each; the log, the schemas and the parameters take some 45 kB beside them.
+    assert plan["bytes"] == pytest.approx(
+        5 * rates["sequence_bytes"] + 10 * rates["film_bytes"], abs=1
+    )
+    # 30 frames of one slot each; the log, the schemas and the parameters take some 45 kB beside
+    # them.
     assert 30 * 2048 <= rates["film_bytes"] < 30 * 2048 + 60_000
 
 
-def test_a_plan_of_other_counts_is_of_a_data_set_that_says_them(recipe_file: Path, tmp_path: Path) -> None:
+def test_a_plan_of_other_counts_is_of_a_data_set_that_says_them(
+    recipe_file: Path, tmp_path: Path
+) -> None:
     counts = "--sequences", 10, "--films", 12
-    planned = said(recipe_file, *counts, "--lake", tmp_path / "lake", "--plan", "--workers", 1, "--json").document
+    planned = said(
+        recipe_file, *counts, "--lake", tmp_path / "lake", "--plan", "--workers", 1, "--json"
+    ).document
     assert planned["recipe"] == "tiny-10x12"
     assert planned["sequences"] == {"train": 6, "test": 4}
     assert planned["films"] == {"train": 8, "test": 4}
     rates = Rates(sequence_seconds=1.0, film_seconds=1.0, sequence_bytes=1.0, film_bytes=1.0)
     recipe = with_counts(load(str(recipe_file)), sequences=10, films=12)
     shards = [
-        build_plan.plan(recipe, None, workers=1, rates=rates, shard=Shard(number=number, of=3)) for number in (1, 2, 3)
+        build_plan.plan(recipe, None, workers=1, rates=rates, shard=Shard(number=number, of=3))
+        for number in (1, 2, 3)
     ]
     assert sum(shard.missing_sequences for shard in shards) == 10
     assert sum(shard.missing_films for shard in shards) == 12
     assert all(shard.missing_sequences for shard in shards)
 
 
-def test_the_planned_size_of_a_sequence_is_near_the_real_one(recipe_file: Path, tmp_path: Path) -> None:
+def test_the_planned_size_of_a_sequence_is_near_the_real_one(
+    recipe_file: Path, tmp_path: Path
+) -> None:
     from flagdata.lake import write_meshes
 
     _, out, _ = said(recipe_file, "--lake", tmp_path / "lake", "--plan", "--json")
@@ -87,10 +101,16 @@ def test_a_plan_for_people_has_a_line_a_side(recipe_file: Path, tmp_path: Path) 
         (["flagsim", "--renderer", "rastre"], 2, "did you mean 'raster'"),
         (["flagsim", "--shard", "5/4"], 2, "'5/4' is no shard"),
         (["flagsim", "--sequences", "2"], 2, "2 sequences cannot be on 3 sides"),
-        (["flagsim", "--scheduler", "tcp://127.0.0.1:1", "--workers", "2"], 2, "--workers with --scheduler"),
+        (
+            ["flagsim", "--scheduler", "tcp://127.0.0.1:1", "--workers", "2"],
+            2,
+            "--workers with --scheduler",
+        ),
     ],
 )
-def test_what_cannot_be_built_is_refused(tmp_path: Path, options: list[str], code: int, says: str) -> None:
+def test_what_cannot_be_built_is_refused(
+    tmp_path: Path, options: list[str], code: int, says: str
+) -> None:
     found, _, err = said(*options, "--lake", tmp_path / "lake")
     assert found == code
     assert says in err
@@ -109,7 +129,14 @@ def test_a_data_set_that_is_built_is_reported_although_its_card_cannot_be_writte
     recipe_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     report = BuildReport(
-        sequences=6, films=15, new_sequences=6, new_films=15, healed=0, clips=15, failed=(), seconds=1.0
+        sequences=6,
+        films=15,
+        new_sequences=6,
+        new_films=15,
+        healed=0,
+        clips=15,
+        failed=(),
+        seconds=1.0,
     )
 
     def refused(*_: object, **__: object) -> NoReturn:
@@ -129,10 +156,16 @@ def test_a_small_build_states_its_length_by_usual_paces_and_a_long_one_by_measur
     recipe, lake = load(str(recipe_file)), Lake.create(tmp_path / "lake")
     rates = Rates(sequence_seconds=600.0, film_seconds=60.0, sequence_bytes=0.0, film_bytes=0.0)
     measured = []
-    monkeypatch.setattr(build_plan, "measure", lambda *given, **options: measured.append(given) or rates)
+    monkeypatch.setattr(
+        build_plan, "measure", lambda *given, **options: measured.append(given) or rates
+    )
     made = "building 5 sequences and 10 films takes"
-    assert str(build_plan.length(recipe, lake, workers=2)).startswith(f"{made} a minute or two on 2 idle cores")
+    assert str(build_plan.length(recipe, lake, workers=2)).startswith(
+        f"{made} a minute or two on 2 idle cores"
+    )
     assert not measured
     monkeypatch.setattr(build_plan, "_BRIEF", 0.0)
     said = build_plan.length(recipe, lake, workers=2)
-    assert str(said).startswith(f"{made} about 30 minutes on 2 idle cores")  # (5 · 600 s + 10 · 60 s) / 2
+    assert str(said).startswith(
+        f"{made} about 30 minutes on 2 idle cores"
+    )  # (5 · 600 s + 10 · 60 s) / 2

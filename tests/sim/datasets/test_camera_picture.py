@@ -48,7 +48,8 @@ def test_noise_has_the_variance_of_reading_and_light(level: int, variance: float
     frames = np.full((1, 256, 256, 3), level, dtype=np.uint8)
     drawn = {**EXACT, "camera.read_noise": 2.0, "camera.shot_noise": 3.0}
     ((jpeg,), _) = jpegs(frames, drawn, slot=2 * SLOT, seed=3)
-    # 1/12 of rounding and about as much of the JPEG at quality 100; 65,536 pixels: 0.6 % of the variance is one σ.
+    # 1/12 of rounding and about as much of the JPEG at quality 100; 65,536 pixels: 0.6 % of the
+    # variance is one σ.
     assert decoded(jpeg).astype(float).var() == pytest.approx(variance + 1 / 12, rel=0.05)
 
 
@@ -66,7 +67,10 @@ def test_a_film_with_a_frame_too_long_has_the_best_quality_at_which_all_fit() ->
     busy = np.random.default_rng(0).integers(0, 256, (32, 32, 3), dtype=np.uint8)
     drawn = {**EXACT, "camera.jpeg_quality": 90.0}
     gray = np.asarray(Image.fromarray(busy).convert("L"))[..., None]
-    lengths = [len(simplejpeg.encode_jpeg(gray, quality=quality, colorspace="GRAY")) for quality in range(101)]
+    lengths = [
+        len(simplejpeg.encode_jpeg(gray, quality=quality, colorspace="GRAY"))
+        for quality in range(101)
+    ]
     slot = lengths[70]
     (first, second), quality = jpegs(np.stack([flat, busy]), drawn, slot=slot, seed=1)
     assert len(first) == len(second) == slot
@@ -87,9 +91,13 @@ def test_each_setting_has_a_stream_of_its_own() -> None:
     )
     fixed = replace(spec, jpeg_quality=80)
     video = replace(spec, coding=Coding.H264, rate_factor=Range(low=18, high=24))
-    assert settings(video, seed=5)["camera.read_noise"] == settings(spec, seed=5)["camera.read_noise"]
+    assert (
+        settings(video, seed=5)["camera.read_noise"] == settings(spec, seed=5)["camera.read_noise"]
+    )
     assert 18 <= settings(video, seed=5)["camera.rate_factor"] <= 24
-    assert settings(spec, seed=5)["camera.read_noise"] == settings(fixed, seed=5)["camera.read_noise"]
+    assert (
+        settings(spec, seed=5)["camera.read_noise"] == settings(fixed, seed=5)["camera.read_noise"]
+    )
     drawn = [settings(spec, seed=seed)["camera.jpeg_quality"] for seed in range(40)]
     assert all(70 <= value <= 90 and value == round(value) for value in drawn)
     assert len(set(drawn)) > 10

@@ -27,12 +27,20 @@ def test_flagsim_has_the_papers_counts_size_and_search_space() -> None:
         ("validation", 150, 3800),
         ("test", 85, 3500),
     ]
-    time, wind, material = recipe.simulation.time, recipe.simulation.wind, recipe.simulation.material
+    time, wind, material = (
+        recipe.simulation.time,
+        recipe.simulation.wind,
+        recipe.simulation.material,
+    )
     assert (time.frames, time.rate) == (60, 25.0)
     assert ends(wind.speed) == (0.0, 10.0)
     assert material.area_weight == Range(low=0.10, high=0.17)
     assert ends(material.bending_each) == (0.1, 10.0)
-    assert ends(recipe.prior.quantities["width"]) == ends(recipe.prior.quantities["height"]) == (300, 300)
+    assert (
+        ends(recipe.prior.quantities["width"])
+        == ends(recipe.prior.quantities["height"])
+        == (300, 300)
+    )
 
 
 def test_clothsim_draws_from_all_ten_measured_cloths() -> None:
@@ -64,7 +72,9 @@ def test_a_field_campaign_has_one_flag_a_session_and_believes_its_anemometer() -
     assert len({simulation.material.bases[0].area_weight for simulation in drawn}) == 14
 
 
-def test_what_does_not_shape_the_data_leaves_the_hash_alone_and_what_does_changes_it(make: Make) -> None:
+def test_what_does_not_shape_the_data_leaves_the_hash_alone_and_what_does_changes_it(
+    make: Make,
+) -> None:
     base = make().hash
     assert make({"A tiny data set": "Another title"}).hash == base
     for old, new in (
@@ -88,12 +98,27 @@ def test_what_makes_no_data_set_is_refused(make: Make) -> None:
         ("noise = 0.1", "nose = 0.1", UnknownNameError, "did you mean 'noise'"),
         ("anemometer-gain", "clock-drift", UnknownNameError, "effect of an anemometer"),
         ("gain = { low = 0.95,", "gain = { low = -0.95,", InputError, "gain"),
-        ("jpeg-quality = { low = 70, high = 90 }", "jpeg-quality = 101", InputError, "jpeg-quality"),
+        (
+            "jpeg-quality = { low = 70, high = 90 }",
+            "jpeg-quality = 101",
+            InputError,
+            "jpeg-quality",
+        ),
         ('scene = "scene.toml"', 'scene = "absent.toml"', NotFoundError, "no such recipe file"),
-        ("noise = 0.1", 'noise = 0.1\ntruth = "measured"\nbefore = 30.0', UsageError, "30 s of wind"),
+        (
+            "noise = 0.1",
+            'noise = 0.1\ntruth = "measured"\nbefore = 30.0',
+            UsageError,
+            "30 s of wind",
+        ),
         ("width = 32", 'width = 32\nrenderer = "povray"', UnknownNameError, "renderer"),
         ("[camera]", "[groups]\nrates = [0.0]\n[camera]", InputError, "a rate of 0 Hz"),
-        ("[camera]", '[groups]\nattachments = ["hoists"]\n[camera]', UnknownNameError, "did you mean 'hoist'"),
+        (
+            "[camera]",
+            '[groups]\nattachments = ["hoists"]\n[camera]',
+            UnknownNameError,
+            "did you mean 'hoist'",
+        ),
         ("[camera]", "[groups]\nheigth = 1.0\n[camera]", UnknownNameError, "did you mean 'height'"),
         ("[camera]", "[sessions]\n[groups]\n[camera]", UsageError, "both sessions and groups"),
     ]
@@ -101,11 +126,15 @@ def test_what_makes_no_data_set_is_refused(make: Make) -> None:
 
 
 def test_the_scene_of_a_data_set_may_name_the_airs_inertia(make: Make) -> None:
-    shared = make(scene={"[time]": "[effects.finite-span-loading]\nshare = { low = 0.1, high = 0.3 }\n[time]"})
+    shared = make(
+        scene={"[time]": "[effects.finite-span-loading]\nshare = { low = 0.1, high = 0.3 }\n[time]"}
+    )
     assert shared.hash != make().hash
     crew = Crew(next(casts(shared)).simulation)
     members = [crew.member(0), crew.member(1)]
-    shares = np.array([member.parameters["finite-span-loading.share"] for member in members], dtype=np.float64)
+    shares = np.array(
+        [member.parameters["finite-span-loading.share"] for member in members], dtype=np.float64
+    )
     assert 0.1 <= shares.min() < shares.max() <= 0.3
     system, _ = crew.assemble(members)
     (load,) = system.loads
@@ -134,8 +163,13 @@ def test_counts_are_dealt_to_the_sides_in_the_recipes_shares(name: str) -> None:
     recipe = load(name)
     wanted = 101, 505
     other = with_counts(recipe, sequences=wanted[0], films=wanted[1])
-    assert (sum(side.sequences for side in other.sides), sum(side.renders for side in other.sides)) == wanted
-    totals = [sum(getattr(side, what) for side in recipe.sides) for what in ("sequences", "renders")]
+    assert (
+        sum(side.sequences for side in other.sides),
+        sum(side.renders for side in other.sides),
+    ) == wanted
+    totals = [
+        sum(getattr(side, what) for side in recipe.sides) for what in ("sequences", "renders")
+    ]
     for side, before in zip(other.sides, recipe.sides, strict=True):
         assert abs(side.sequences - wanted[0] * before.sequences / totals[0]) < 1
         assert abs(side.renders - wanted[1] * before.renders / totals[1]) < 1
@@ -152,7 +186,9 @@ def test_films_follow_the_sequences_and_counts_that_cannot_be_are_refused() -> N
     assert with_counts(recipe, sequences=None, films=None) is recipe
     assert with_counts(recipe, sequences=400, films=2000) is recipe
     assert sum(side.renders for side in with_counts(recipe, sequences=40, films=None).sides) == 200
-    assert sum(side.sequences for side in with_counts(recipe, sequences=None, films=800).sides) == 400
+    assert (
+        sum(side.sequences for side in with_counts(recipe, sequences=None, films=800).sides) == 400
+    )
     assert [side.sequences for side in with_counts(recipe, sequences=3, films=3).sides] == [1, 1, 1]
     with pytest.raises(UsageError, match="2 sequences cannot be on 3 sides"):
         with_counts(recipe, sequences=2, films=None)

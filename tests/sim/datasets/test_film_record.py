@@ -37,7 +37,8 @@ def gusty(make: Callable[..., DatasetRecipe], tmp_path_factory: pytest.TempPathF
             "speed = { low = 0.0, high = 10.0 }": "speed = 6.0",
             "columns = 6": "columns = 3",
             "[time]\nsettle = 0.2\nframes = 30": (
-                "[effects.gusts]\nintensity = 0.15\nlength = 20.0\n[time]\nsettle = 62.0\nframes = 60"
+                "[effects.gusts]\nintensity = 0.15\nlength = 20.0\n[time]\nsettle = 62.0\nframes = "
+                "60"
             ),
         },
     )
@@ -63,7 +64,9 @@ def test_ground_truth_is_the_anemometers_minute_with_its_uncertainty(gusty: Show
         inside = (series.time > clip.end - 60 * 10**9) & (series.time <= clip.end)
         assert clip.wind == pytest.approx(series.channels["wind_speed"][inside].mean(), abs=1e-9)
         assert clip.wind_sigma is not None
-        assert clip.wind_sigma > 0.2  # what the instrument's data sheet states, and the standard error of gusts
+        assert (
+            clip.wind_sigma > 0.2
+        )  # what the instrument's data sheet states, and the standard error of gusts
         assert clip.wind_coverage is not None
         assert clip.wind_coverage > 0.98
         assert clip.wind_staleness is not None
@@ -71,7 +74,8 @@ def test_ground_truth_is_the_anemometers_minute_with_its_uncertainty(gusty: Show
 
 
 def test_the_air_that_was_simulated_is_within_three_sigma_of_it(gusty: Shown) -> None:
-    # Gain within 5 %, lag, noise of 0.1 m/s on 60 samples: all within what the stated 0.2 m/s allows.
+    # Gain within 5 %, lag, noise of 0.1 m/s on 60 samples: all within what the stated 0.2 m/s
+    # allows.
     time, velocity = anemometer.air(gusty.recipe.anemometer, gusty.crew, gusty.crew.member(0))
     for clip in gusty.clips:
         assert clip.end is not None
@@ -95,7 +99,11 @@ def test_a_record_says_what_it_was_made_from(gusty: Shown) -> None:
     assert provenance["meshes"] == gusty.film.sequence
     assert json.loads(provenance["recipe"])["renderer"] == "raster"
     assert provenance["recipe_hash"] == gusty.film.artifact().recipe_hash
-    assert (camera["width"], camera["height"], float(camera["true_rate"])) == ("32", "32", pytest.approx(25.0))
+    assert (camera["width"], camera["height"], float(camera["true_rate"])) == (
+        "32",
+        "32",
+        pytest.approx(25.0),
+    )
 
 
 def test_the_same_film_is_the_same_bytes(gusty: Shown, tmp_path: Path) -> None:
@@ -106,7 +114,9 @@ def test_the_same_film_is_the_same_bytes(gusty: Shown, tmp_path: Path) -> None:
     assert again.data == gusty.record.path.read_bytes()
 
 
-def test_films_of_a_session_have_the_same_camera_and_anemometer(make: Callable[..., DatasetRecipe]) -> None:
+def test_films_of_a_session_have_the_same_camera_and_anemometer(
+    make: Callable[..., DatasetRecipe],
+) -> None:
     recipe = make(
         {
             "[sides.train]\nsequences = 3\nrenders = 7": (
@@ -116,13 +126,26 @@ def test_films_of_a_session_have_the_same_camera_and_anemometer(make: Callable[.
         }
     )
     cast = next(casts(recipe))
-    films = list(Sequences(recipe=recipe, side="train", members=((cast, 0, "0" * 32), (cast, 1, "1" * 32))).films())
+    films = list(
+        Sequences(
+            recipe=recipe, side="train", members=((cast, 0, "0" * 32), (cast, 1, "1" * 32))
+        ).films()
+    )
     with one_thread():
         outcomes = build_jobs.simulate(cast.simulation, 0, [0, 1], "cpu").outcomes
-        meshes = {outcome.member.index: outcome.sequence for outcome in outcomes if outcome.sequence is not None}
+        meshes = {
+            outcome.member.index: outcome.sequence
+            for outcome in outcomes
+            if outcome.sequence is not None
+        }
         made = [build_jobs.film(recipe, film, meshes[film.index], "cpu") for film in films]
     one, other = (json.loads(film.parameters) for film in made)
-    for name in ("camera.jpeg_quality", "anemometer-lag.distance", "anemometer-gain.gain", "render.camera_radius"):
+    for name in (
+        "camera.jpeg_quality",
+        "anemometer-lag.distance",
+        "anemometer-gain.gain",
+        "render.camera_radius",
+    ):
         assert one[name] == other[name]
     assert one["wind_speed"] != other["wind_speed"]
     assert made[0].film.seed != made[1].film.seed

@@ -1,4 +1,5 @@
-"""Wind, θ and ζ cannot be read off what surrounds the pictures: order, names, sizes, JPEG headers, instants."""
+"""Wind, θ and ζ cannot be read off what surrounds the pictures: order, names, sizes, JPEG headers,
+instants."""
 
 from __future__ import annotations
 
@@ -32,12 +33,16 @@ TARGETS = (
 
 
 @pytest.fixture(scope="module")
-def around(make: Callable[..., DatasetRecipe], tmp_path_factory: pytest.TempPathFactory) -> Surroundings:
+def around(
+    make: Callable[..., DatasetRecipe], tmp_path_factory: pytest.TempPathFactory
+) -> Surroundings:
     with one_thread():
         return films(make, tmp_path_factory)
 
 
-def films(make: Callable[..., DatasetRecipe], tmp_path_factory: pytest.TempPathFactory) -> Surroundings:
+def films(
+    make: Callable[..., DatasetRecipe], tmp_path_factory: pytest.TempPathFactory
+) -> Surroundings:
     recipe = make({"sequences = 3\nrenders = 7": f"sequences = {SEQUENCES}\nrenders = {FILMS}"})
     cast = next(casts(recipe))
     roll = Roll(cast=cast)
@@ -55,8 +60,12 @@ def films(make: Callable[..., DatasetRecipe], tmp_path_factory: pytest.TempPathF
         record = Record.open(path)
         features.append(features_of(film.name, record, order=place, size=len(done.data)))
         owners.append(film.index)
-        parameters.append({k: v for k, v in json.loads(done.parameters).items() if not isinstance(v, str)})
-    return Surroundings(features=np.array(features, dtype=float), sequence=np.array(owners), parameters=parameters)
+        parameters.append(
+            {k: v for k, v in json.loads(done.parameters).items() if not isinstance(v, str)}
+        )
+    return Surroundings(
+        features=np.array(features, dtype=float), sequence=np.array(owners), parameters=parameters
+    )
 
 
 def test_all_films_have_the_same_size_and_so_have_their_frames(around: Surroundings) -> None:
@@ -68,9 +77,13 @@ def test_all_films_have_the_same_size_and_so_have_their_frames(around: Surroundi
 @pytest.mark.parametrize("guess", ["ridge", "neighbours"])
 def test_a_classifier_of_the_surroundings_is_at_chance(around: Surroundings, guess: str) -> None:
     found = accuracies(around.features, around.labels(TARGETS), around.sequence)[guess]
-    # Parameters of the simulation are those of 40 sequences, others of 80 films; 3 σ of a fair coin. Two classifiers
-    # and eleven targets: one in some 35 seeds would exceed it, and the seed is fixed.
-    counts = [FILMS if "." in target and not target.startswith("bending") else SEQUENCES for target in TARGETS]
+    # Parameters of the simulation are those of 40 sequences, others of 80 films; 3 σ of a fair
+    # coin. Two classifiers and eleven targets: one in some 35 seeds would exceed it, and the seed
+    # is fixed.
+    counts = [
+        FILMS if "." in target and not target.startswith("bending") else SEQUENCES
+        for target in TARGETS
+    ]
     assert (found < 0.5 + 3 * 0.5 / np.sqrt(counts)).all(), dict(zip(TARGETS, found, strict=True))
 
 

@@ -1,4 +1,5 @@
-"""What a data set may be called, and that it is itself by that name, in the catalog and on its card."""
+"""What a data set may be called, and that it is itself by that name, in the catalog and on its
+card."""
 
 from __future__ import annotations
 
@@ -25,7 +26,9 @@ Make = Callable[..., DatasetRecipe]
 def build_of(lake: Lake, recipe: DatasetRecipe) -> Build:
     """A build without workers: what it asks of them fails."""
     nobody: Any = None
-    return Build(lake=lake, recipe=recipe, workers=nobody, bars=lambda *_: nullcontext(lambda _: None))
+    return Build(
+        lake=lake, recipe=recipe, workers=nobody, bars=lambda *_: nullcontext(lambda _: None)
+    )
 
 
 def films(lake: Lake, recipe: DatasetRecipe) -> list[PlannedFilm]:
@@ -64,4 +67,6 @@ def test_a_recipe_whose_films_are_there_under_another_name_is_refused_before_any
 
 def test_what_no_artifact_can_be_called_is_refused_before_the_recipe_is_read() -> None:
     cases = ["a\tb", " ", "a" * 101, "a\udcffb"]
-    assert not unrefused(lambda name: load(f"{name}.toml"), zip(cases), InputError, "a data set cannot be called")
+    assert not unrefused(
+        lambda name: load(f"{name}.toml"), zip(cases), InputError, "a data set cannot be called"
+    )

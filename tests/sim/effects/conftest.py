@@ -32,7 +32,9 @@ def inclined():
 def total_force():
     """The force on all the cloth in a wind, effects included: (3, batch) [N]."""
 
-    def total(system: System, state, *effects: Effect, wind: tuple[float, float, float]) -> torch.Tensor:
+    def total(
+        system: System, state, *effects: Effect, wind: tuple[float, float, float]
+    ) -> torch.Tensor:
         system, state = apply(effects, system, state)
         air = torch.tensor(wind, dtype=torch.float64)[:, None]
         return system.external(air, 0.0, state.position, state.velocity, memory=state.memory).sum(0)

@@ -1,4 +1,5 @@
-"""Effects inside the cloth: masses that add up, hems that count by their width, friction loops with known areas."""
+"""Effects inside the cloth: masses that add up, hems that count by their width, friction loops with
+known areas."""
 
 from __future__ import annotations
 
@@ -27,7 +28,9 @@ WetMass = EFFECTS["wet-mass"]
 
 def rolled(mesh: Mesh, curvature: float) -> torch.Tensor:
     u, v = mesh.rest.T
-    position = np.stack([np.sin(curvature * u) / curvature, v, (1 - np.cos(curvature * u)) / curvature], axis=1)
+    position = np.stack(
+        [np.sin(curvature * u) / curvature, v, (1 - np.cos(curvature * u)) / curvature], axis=1
+    )
     return torch.tensor(position)[..., None]
 
 
@@ -44,16 +47,20 @@ def test_a_hem_adds_its_line_density_times_the_perimeter() -> None:
 def test_wet_cloth_falls_as_fast_and_is_blown_less(square) -> None:
     system, state = make_system(square, [PLAIN], gravity=(0.0, 0.0, -9.81), wind=(5.0, 0.0, 0.0))
     wet, _ = apply([WetMass(uptake=0.6)], system, state)
-    dry_push, wet_push = (s.external(s.wind.velocity(0.0), 0.0, state.position, state.velocity) for s in (system, wet))
-    dry, soaked = (push / s.cloth.mass.unsqueeze(1) for push, s in ((dry_push, system), (wet_push, wet)))
+    dry_push, wet_push = (
+        s.external(s.wind.velocity(0.0), 0.0, state.position, state.velocity) for s in (system, wet)
+    )
+    dry, soaked = (
+        push / s.cloth.mass.unsqueeze(1) for push, s in ((dry_push, system), (wet_push, wet))
+    )
     torch.testing.assert_close(soaked[:, 2], dry[:, 2], rtol=1e-12, atol=0)
     torch.testing.assert_close(soaked[:, 0], dry[:, 0] / 1.6, rtol=1e-12, atol=0)
 
 
 @pytest.mark.parametrize("columns", [4, 8])
 def test_a_hem_stiffens_a_rolled_cloth_by_its_width_on_any_mesh(columns) -> None:
-    """Rolled along u, only the creases along v bend; hems of width w at both their ends, r times stiffer on top, add
-    2 r w/H to the energy."""
+    """Rolled along u, only the creases along v bend; hems of width w at both their ends, r times
+    stiffer on top, add 2 r w/H to the energy."""
     mesh = grid(width=1.0, height=0.8, columns=columns, rows=columns)
     system, state = make_system(mesh, [PLAIN])
     hemmed, _ = apply([HemStiffness(ratio=10.0, width=0.02)], system, state)
@@ -84,12 +91,16 @@ def test_cloth_rolled_at_its_rest_curvature_does_not_bend() -> None:
 
 
 def test_damping_lets_a_vibration_decay_as_stated() -> None:
-    """Stiffness-proportional damping d: ẍ + d ω² ẋ + ω² x = 0, so that the amplitude falls by e^(−d ω² t/2); ω is
-    that of the undamped member of the same batch, a patch held at one edge and stretched along itself."""
+    """Stiffness-proportional damping d: ẍ + d ω² ẋ + ω² x = 0, so that the amplitude falls by e^(−d
+    ω² t/2); ω is that of the undamped member of the same batch, a patch held at one edge and
+    stretched along itself."""
     sheet = isotropic(name="sheet", area_weight=0.2, stretching=50.0, shear=40.0, bending=1e-4)
     mesh = grid(width=0.2, height=0.2, columns=1, rows=1)
     system, state = make_system(
-        mesh, [sheet, sheet], air=QuadraticNormal(density=0.0), handles=Handles(vertices=(0, 1), stiffness=float("inf"))
+        mesh,
+        [sheet, sheet],
+        air=QuadraticNormal(density=0.0),
+        handles=Handles(vertices=(0, 1), stiffness=float("inf")),
     )
     damping = torch.tensor([0.0, 2e-3], dtype=torch.float64)
     system, state = apply([InternalDamping(time=damping)], system, state)
@@ -103,7 +114,8 @@ def test_damping_lets_a_vibration_decay_as_stated() -> None:
     free, damped = np.array(stretch).T
     crossings = np.flatnonzero(np.diff(np.sign(free)) != 0)
     omega = np.pi / (np.mean(np.diff(crossings)) * 1e-3)
-    # The envelope at the peaks; leapfrog sees the damping half a step late, and peaks are sampled: O(ω h) = 3e-2.
+    # The envelope at the peaks; leapfrog sees the damping half a step late, and peaks are sampled:
+    # O(ω h) = 3e-2.
     peaks = np.flatnonzero((damped[1:-1] > damped[:-2]) & (damped[1:-1] > damped[2:])) + 1
     peaks = peaks[damped[peaks] > 1e-2]
     rate = -np.polyfit(peaks * 1e-3, np.log(damped[peaks]), 1)[0]
@@ -111,9 +123,12 @@ def test_damping_lets_a_vibration_decay_as_stated() -> None:
 
 
 def folded(angle: float) -> torch.Tensor:
-    """Two triangles on the edge from (0, 0) to (0, 1), the second turned up by an angle: (4, 3, 1)."""
+    """Two triangles on the edge from (0, 0) to (0, 1), the second turned up by an angle: (4, 3,
+    1)."""
     c, s = np.cos(angle), np.sin(angle)
-    return torch.tensor([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.5, 0.0], [c, 0.5, s]])[..., None].double()
+    return torch.tensor([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.5, 0.0], [c, 0.5, s]])[
+        ..., None
+    ].double()
 
 
 @pytest.fixture
@@ -141,7 +156,8 @@ def work_of_cycle(hinge, friction: Hysteresis, amplitude: float, steps: int) -> 
 
 @pytest.mark.parametrize("turned", [0.5, 2.0, 5.0])
 def test_a_friction_cycle_takes_the_closed_form_of_work(hinge, turned) -> None:
-    """Per area 4 H (A − α₀ tanh(A/α₀)), with α = ½ θ l/(a0 + a1): here l = 1, a0 + a1 = 1, so that α = θ/2."""
+    """Per area 4 H (A − α₀ tanh(A/α₀)), with α = ½ θ l/(a0 + a1): here l = 1, a0 + a1 = 1, so that
+    α = θ/2."""
     friction = Hysteresis(couple=2e-3, curvature=0.1 / turned)
     expected = 4 * 2e-3 * (0.1 - 0.1 / turned * np.tanh(turned))
     assert work_of_cycle(hinge, friction, 0.2, 400) == pytest.approx(expected, rel=2e-3)

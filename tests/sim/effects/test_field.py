@@ -1,4 +1,5 @@
-"""The pieces of force fields: at the corners of a flag, and in winds where they can be worked out by hand."""
+"""The pieces of force fields: at the corners of a flag, and in winds where they can be worked out
+by hand."""
 
 from __future__ import annotations
 
@@ -48,7 +49,8 @@ def seen(
 ) -> Seen:
     """A flag near the plane of x and z, turned about z with its wind and its velocity."""
     system, _ = assemble(
-        [flag(material=named_material("camel-ponte-roma"), wind_speed=4.0, columns=6)], dtype=torch.float64
+        [flag(material=named_material("camel-ponte-roma"), wind_speed=4.0, columns=6)],
+        dtype=torch.float64,
     )
     rest = torch.tensor(system.cloth.mesh.rest)
     c, s = np.cos(turn), np.sin(turn)
@@ -100,7 +102,9 @@ def test_shapes_are_0_or_1_at_the_corners(name: str, corners: tuple[int, ...]) -
 )
 def test_pushes_follow_the_horizontal_wind(name: str, expected: tuple[float, ...]) -> None:
     """A wind of (3, 4, 1) m/s: 5 m/s horizontally."""
-    np.testing.assert_allclose(getattr(seen(wind=(3, 4, 1)), name)[0, :, 0].numpy(), expected, atol=1e-12)
+    np.testing.assert_allclose(
+        getattr(seen(wind=(3, 4, 1)), name)[0, :, 0].numpy(), expected, atol=1e-12
+    )
 
 
 def test_springs_pull_to_the_axis_and_to_the_height_of_the_attachments() -> None:
@@ -141,7 +145,9 @@ def test_local_shapes_fall_with_the_distance_to_their_place() -> None:
 def test_a_heavier_cloth_has_that_share_more_mass() -> None:
     cloth = seen(wind=(4, 0, 0)).cloth
     share = Flat(cloth=cloth).lower
-    torch.testing.assert_close(heavier(cloth, 0.5 * share).mass, cloth.mass * (1 + 0.5 * share[:, :, 0]))
+    torch.testing.assert_close(
+        heavier(cloth, 0.5 * share).mass, cloth.mass * (1 + 0.5 * share[:, :, 0])
+    )
 
 
 def test_the_pull_to_the_pole_points_to_it_and_is_one_far_away() -> None:
@@ -161,7 +167,8 @@ def test_an_even_pressure_does_not_turn_with_the_wind() -> None:
 
 
 def test_a_wind_upward_presses_on_what_leans() -> None:
-    """On a sheet that leans by 0.4: the derivative of |w·n| (w·n) n in a wind along z is 2 |w·n| (z·n) n."""
+    """On a sheet that leans by 0.4: the derivative of |w·n| (w·n) n in a wind along z is 2 |w·n|
+    (z·n) n."""
     own = seen(wind=(0, 3, 0), bulge=0.0)
     lean = own.position.clone()
     lean[:, 1] = 0.4 * lean[:, 2]
@@ -171,7 +178,9 @@ def test_a_wind_upward_presses_on_what_leans() -> None:
         return replace(own, position=lean, wind=air).across_squared
 
     difference = (pressed(1e-5) - pressed(-1e-5)) / 2e-5
-    torch.testing.assert_close(2 * replace(own, position=lean).rising, difference, rtol=1e-6, atol=1e-8)
+    torch.testing.assert_close(
+        2 * replace(own, position=lean).rising, difference, rtol=1e-6, atol=1e-8
+    )
 
 
 def test_friction_along_the_threads_is_that_along_width_and_height() -> None:
@@ -205,7 +214,9 @@ def test_turning_flag_and_wind_turns_the_field(name: str) -> None:
         own = seen(wind=(4, 1, 0.5), velocity=(0.5, 1, -2), turn=turn)
         return getattr(own, name).expand(len(own.position), 3, 1)
 
-    torch.testing.assert_close(of(angle), torch.einsum("ij,vjb->vib", about, of(0.0)), rtol=0, atol=1e-12)
+    torch.testing.assert_close(
+        of(angle), torch.einsum("ij,vjb->vib", about, of(0.0)), rtol=0, atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("name", FIELDS)

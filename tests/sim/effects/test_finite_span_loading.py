@@ -1,4 +1,5 @@
-"""The inertia of the air of a finite span, against the potential flow of a strip and against its limits."""
+"""The inertia of the air of a finite span, against the potential flow of a strip and against its
+limits."""
 
 from __future__ import annotations
 
@@ -16,23 +17,34 @@ from sim.cloth.mesh import grid
 from sim.cloth.scene import assemble, flag
 from sim.cloth.system import InapplicableError
 from sim.effects import FiniteSpanLoading, apply
-from sim.effects.finite_span_loading import cosines, profile_over_height, relative_masses, strip_mass
+from sim.effects.finite_span_loading import (
+    cosines,
+    profile_over_height,
+    relative_masses,
+    strip_mass,
+)
 
 
 def potential_flow(wavenumber: float, *, panels: int = 80) -> tuple[float, FloatArray, FloatArray]:
-    """m/ρ of a wave e^(ikx) on a strip of height 1 in potential flow, mean over it; and where, and the load there.
+    """m/ρ of a wave e^(ikx) on a strip of height 1 in potential flow, mean over it; and where, and
+    the load there.
 
-    Doublets of constant strength g on panels between ζ₁ and ζ₂, in air that obeys (∂yy + ∂zz − k²) φ = 0: the velocity
-    across the strip is (∂zz − k²) ∫ K₀(k|z − z′|) g dz′ / 2π.
+    Doublets of constant strength g on panels between ζ₁ and ζ₂, in air that obeys (∂yy + ∂zz − k²)
+    φ = 0: the velocity across the strip is (∂zz − k²) ∫ K₀(k|z − z′|) g dz′ / 2π.
     """
     ends = -np.cos(np.linspace(0, np.pi, panels + 1)) / 2
     middles = (ends[1:] + ends[:-1]) / 2
     nodes, weights = np.polynomial.legendre.leggauss(40)
     below, above = middles[:, None] - ends[:-1], middles[:, None] - ends[1:]
-    slope = wavenumber * (np.sign(below) * k1(wavenumber * abs(below)) - np.sign(above) * k1(wavenumber * abs(above)))
+    slope = wavenumber * (
+        np.sign(below) * k1(wavenumber * abs(below)) - np.sign(above) * k1(wavenumber * abs(above))
+    )
     inside = np.zeros_like(slope)
     for column, (low, high) in enumerate(pairwise(ends)):
-        for first, last in ((low, middles[column]), (middles[column], high)):  # the logarithm is at the middle
+        for first, last in (
+            (low, middles[column]),
+            (middles[column], high),
+        ):  # the logarithm is at the middle
             places = (first + last) / 2 + (last - first) / 2 * nodes
             distance = wavenumber * abs(middles[:, None] - places)
             inside[:, column] += (k0(distance) * weights).sum(1) * (last - first) / 2
@@ -51,7 +63,8 @@ def test_the_load_of_long_waves_over_the_height_is_an_elongated_bodys() -> None:
     mesh = grid(width=1.0, height=1.0, columns=2, rows=40)
     column = np.argsort(mesh.rest[:, 1])[mesh.rest[np.argsort(mesh.rest[:, 1]), 0] < 1e-9]
     expected = np.interp(mesh.rest[column, 1] - 0.5, middles, jump / exact, left=0, right=0)
-    # A panel's width at the edges, and the mean of the profile over cells instead of over the height.
+    # A panel's width at the edges, and the mean of the profile over cells instead of over the
+    # height.
     assert np.abs(profile_over_height(mesh)[column] - expected)[2:-2].max() < 0.03
 
 
@@ -75,12 +88,14 @@ U, SHARE, DENSITY, AMPLITUDE = 6.0, 0.5, 1.2, 1e-5
 def errors_at_the_ends(columns: int, *, still: float = 1.0, celerity: float = 0.0) -> FloatArray:
     """(hoist, fly) of the load per area in the two outer rows of vertices, over the largest.
 
-    A wave η = A cos(k u − ω t + φ) of half the cloth's length, ω = c U k: D V without the acceleration's term is
-    2 U η_xt + U² η_xx = (2 c − 1) U² k² η, whose load the effect's masses of its cosines give. Root mean square over
-    φ of 0 and π/2, so that no zero of the error is taken for its size.
+    A wave η = A cos(k u − ω t + φ) of half the cloth's length, ω = c U k: D V without the
+    acceleration's term is 2 U η_xt + U² η_xx = (2 c − 1) U² k² η, whose load the effect's masses of
+    its cosines give. Root mean square over φ of 0 and π/2, so that no zero of the error is taken
+    for its size.
 
     Args:
-        still: factor on the shape η, and so on U² η_xx; at 0 there is the rate of a flat cloth alone, 2 U η_xt.
+        still: factor on the shape η, and so on U² η_xx; at 0 there is the rate of a flat cloth
+            alone, 2 U η_xt.
     """
     mesh = grid(width=1.5, height=1.0, columns=columns, rows=2 * columns // 3)
     cloth = Cloth.build(mesh, [named_material("camel-ponte-roma")], dtype=torch.float64)
@@ -97,9 +112,13 @@ def errors_at_the_ends(columns: int, *, still: float = 1.0, celerity: float = 0.
         rate = celerity * U * k * AMPLITUDE * np.sin(k * u + shift)
         position = torch.tensor(np.stack([u, v, still * height], axis=1))[..., None]
         velocity = torch.tensor(np.stack([0 * u, 0 * u, rate], axis=1))[..., None]
-        load = effect.force(cloth, 0.0, position, velocity, wind)[:, 2, 0].numpy() / mesh.vertex_areas
+        load = (
+            effect.force(cloth, 0.0, position, velocity, wind)[:, 2, 0].numpy() / mesh.vertex_areas
+        )
         exact = (2 * celerity - still) * (U * k) ** 2 * height
-        expected = -longest * root * (modes @ (gains * (modes.T @ (root * exact * mesh.vertex_areas))))
+        expected = (
+            -longest * root * (modes @ (gains * (modes.T @ (root * exact * mesh.vertex_areas))))
+        )
         squares += (load - expected) ** 2 / 2
         largest = max(largest, float(np.abs(expected).max()))
     error = np.sqrt(squares) / largest
@@ -107,13 +126,18 @@ def errors_at_the_ends(columns: int, *, still: float = 1.0, celerity: float = 0.
 
 
 @pytest.mark.parametrize(("still", "celerity"), [(1.0, 0.0), (0.0, 0.6)])
-def test_each_term_of_the_load_converges_at_second_order_at_hoist_and_fly(still: float, celerity: float) -> None:
-    errors = np.array([errors_at_the_ends(columns, still=still, celerity=celerity) for columns in (20, 40, 80)])
+def test_each_term_of_the_load_converges_at_second_order_at_hoist_and_fly(
+    still: float, celerity: float
+) -> None:
+    errors = np.array(
+        [errors_at_the_ends(columns, still=still, celerity=celerity) for columns in (20, 40, 80)]
+    )
     assert np.log2(errors[:-1] / errors[1:]).min() >= 1.8
 
 
 def test_a_wave_that_travels_at_six_tenths_of_the_stream_has_its_load_at_both_ends() -> None:
-    """Terms of −1 and 1.2 cancel to 0.2, so that means over half of what is there have errors of 1.4, 0.72 and 0.36."""
+    """Terms of −1 and 1.2 cancel to 0.2, so that means over half of what is there have errors of
+    1.4, 0.72 and 0.36."""
     errors = np.array([errors_at_the_ends(columns, celerity=0.6) for columns in (20, 40, 80)])
     assert (errors.max(1) < [0.08, 0.045, 0.015]).all()
 

@@ -14,7 +14,8 @@ U, K, OMEGA, AMPLITUDE, MASS = 6.0, 9.0, 100.0, 1e-4, 0.4
 
 
 def convective_error(make_system, plain, columns: int) -> float:
-    """Largest error of the convective load per area of a travelling wave, over its size, away from the edges."""
+    """Largest error of the convective load per area of a travelling wave, over its size, away from
+    the edges."""
     mesh = grid(width=1.0, height=0.3, columns=columns, rows=max(3, columns // 4))
     system, _ = make_system(mesh, [plain])
     u, v = mesh.rest.T
@@ -58,7 +59,9 @@ def test_a_pitching_plate_feels_the_coriolis_load(square) -> None:
     velocity = torch.tensor(np.stack([0 * u, 0 * u, rate * u], axis=1))[..., None]
     wind = torch.tensor([U, 0.0, 0.0], dtype=torch.float64)[:, None]
     force = ReactiveLoading(mass=MASS).force(system.cloth, 0.0, position, velocity, wind)
-    np.testing.assert_allclose(force[:, 2, 0], -MASS * 2 * U * rate * square.vertex_areas, rtol=1e-10)
+    np.testing.assert_allclose(
+        force[:, 2, 0], -MASS * 2 * U * rate * square.vertex_areas, rtol=1e-10
+    )
 
 
 def test_a_still_curved_sheet_in_a_stream_is_pushed_away_from_its_centre() -> None:
@@ -68,19 +71,23 @@ def test_a_still_curved_sheet_in_a_stream_is_pushed_away_from_its_centre() -> No
     u, v = mesh.rest.T
     position = torch.tensor(np.stack([u, v, 0.01 * u**2 / 2], axis=1))[..., None]
     wind = torch.tensor([U, 0.0, 0.0], dtype=torch.float64)[:, None]
-    force = ReactiveLoading(mass=MASS).force(system.cloth, 0.0, position, torch.zeros_like(position), wind)
+    force = ReactiveLoading(mass=MASS).force(
+        system.cloth, 0.0, position, torch.zeros_like(position), wind
+    )
     inner = (u > 0.1) & (u < 0.9) & (v > 0.05) & (v < 0.25)
-    # Slopes reach 0.01: their squares are left out of the closed form. The total, because a patch of a quadratic is not
-    # exact vertex by vertex on diagonals that alternate.
+    # Slopes reach 0.01: their squares are left out of the closed form. The total, because a patch
+    # of a quadratic is not exact vertex by vertex on diagonals that alternate.
     total = force[inner, 2, 0].sum() / mesh.vertex_areas[inner].sum()
     assert float(total) == pytest.approx(-MASS * U**2 * 0.01, rel=0.01)
 
 
 def test_a_curved_sheet_in_steady_translation_sheds_the_energy_it_gives() -> None:
-    """A gutter of radius R from φ = −φ₀ to φ₀ moves at c along its axis of symmetry through still air.
+    """A gutter of radius R from φ = −φ₀ to φ₀ moves at c along its axis of symmetry through still
+    air.
 
-    There V = c cos φ, s = c sin φ e_φ, and nothing changes in time: D V = c²/R (½ cos² φ − sin² φ). The work on the
-    air, ∫ m_a V (D V) R dφ, is what leaves at the edges φ = ±φ₀, ½ m_a V² s at each: m_a c³ cos² φ₀ sin φ₀.
+    There V = c cos φ, s = c sin φ e_φ, and nothing changes in time: D V = c²/R (½ cos² φ − sin² φ).
+    The work on the air, ∫ m_a V (D V) R dφ, is what leaves at the edges φ = ±φ₀, ½ m_a V² s at
+    each: m_a c³ cos² φ₀ sin φ₀.
     """
     radius, speed, half = 0.4, 3.0, 1.2
     mesh = grid(width=2 * half * radius, height=0.2, columns=96, rows=8)
@@ -96,7 +103,8 @@ def test_a_curved_sheet_in_steady_translation_sheds_the_energy_it_gives() -> Non
     for value in np.unique(rows)[4:-4]:
         row = rows == value
         outwards = np.array([np.cos(value), np.sin(value), 0.0])
-        # Second order in the cell, 0.025 rad; by rows, since alternating diagonals share a row's areas unevenly.
+        # Second order in the cell, 0.025 rad; by rows, since alternating diagonals share a row's
+        # areas unevenly.
         density = (force[row] @ outwards).sum() / mesh.vertex_areas[row].sum()
         assert density == pytest.approx(load[row][0], abs=5e-3 * np.abs(load).max())
     shed = MASS * speed**3 * np.cos(half) ** 2 * np.sin(half) * 0.2

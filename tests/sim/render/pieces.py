@@ -37,16 +37,29 @@ class Given(Assets):
 
 
 def sheet(
-    *, side: float = 1.0, middle: tuple[float, float, float] = (0.0, 0.0, 0.0), cells: int = 1, turn: float = 0.0
+    *,
+    side: float = 1.0,
+    middle: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    cells: int = 1,
+    turn: float = 0.0,
 ) -> Piece:
-    """A flat upright square whose front faces −y, turned about the vertical: positions, faces, texture places."""
+    """A flat upright square whose front faces −y, turned about the vertical: positions, faces,
+    texture places."""
     n = cells + 1
-    u, v = (index.ravel() / cells for index in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
+    u, v = (
+        index.ravel() / cells for index in np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
+    )
     across = (u - 0.5) * side
-    position = np.stack([across * math.cos(turn), across * math.sin(turn), (v - 0.5) * side], axis=1)
-    i, j = (index.ravel() for index in np.meshgrid(np.arange(cells), np.arange(cells), indexing="ij"))
+    position = np.stack(
+        [across * math.cos(turn), across * math.sin(turn), (v - 0.5) * side], axis=1
+    )
+    i, j = (
+        index.ravel() for index in np.meshgrid(np.arange(cells), np.arange(cells), indexing="ij")
+    )
     a = i * n + j
-    faces = np.concatenate([np.stack([a, a + n, a + n + 1], axis=1), np.stack([a, a + n + 1, a + 1], axis=1)])
+    faces = np.concatenate(
+        [np.stack([a, a + n, a + n + 1], axis=1), np.stack([a, a + n + 1, a + 1], axis=1)]
+    )
     return position + np.array(middle), faces, np.stack([u, v], axis=1)
 
 
@@ -54,7 +67,11 @@ def together(*parts: Piece) -> Piece:
     """Several pieces as one mesh."""
     starts = np.cumsum([0, *(len(part[0]) for part in parts)])
     faces = [part[1] + start for part, start in zip(parts, starts[:-1], strict=True)]
-    return np.concatenate([part[0] for part in parts]), np.concatenate(faces), np.concatenate([p[2] for p in parts])
+    return (
+        np.concatenate([part[0] for part in parts]),
+        np.concatenate(faces),
+        np.concatenate([p[2] for p in parts]),
+    )
 
 
 def meshes(

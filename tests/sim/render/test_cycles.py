@@ -14,7 +14,16 @@ from flagdata.errors import NotFoundError
 from sim.assets import Assets
 from sim.blender import Environment
 from sim.blender.environment import SETTING
-from sim.render import RENDERERS, Cycles, Meshes, RenderParameters, Workbench, named_prior, plate, to_linear
+from sim.render import (
+    RENDERERS,
+    Cycles,
+    Meshes,
+    RenderParameters,
+    Workbench,
+    named_prior,
+    plate,
+    to_linear,
+)
 
 needs_blender = pytest.mark.usefixtures("blender")
 SIZE = 96
@@ -52,7 +61,9 @@ def zeta(seed: int, **changes: object) -> RenderParameters:
 
 def black(parameters: RenderParameters) -> RenderParameters:
     """Without light: what is darker than the background is cloth or pole."""
-    return replace(parameters, sun_strength=0.0, sky_strength=0.0, exposure_time=0.0, background="sky/1")
+    return replace(
+        parameters, sun_strength=0.0, sky_strength=0.0, exposure_time=0.0, background="sky/1"
+    )
 
 
 def covered(frames: torch.Tensor) -> torch.Tensor:
@@ -61,12 +72,17 @@ def covered(frames: torch.Tensor) -> torch.Tensor:
 
 @needs_blender
 @pytest.mark.parametrize("seed", [1, 2, 5])
-def test_cycles_and_the_rasteriser_see_the_same_silhouette_and_nearly_the_same_light(cycles: Cycles, seed: int) -> None:
+def test_cycles_and_the_rasteriser_see_the_same_silhouette_and_nearly_the_same_light(
+    cycles: Cycles, seed: int
+) -> None:
     meshes, parameters = flag(), zeta(seed, exposure_time=0.0)
     raster = RENDERERS["raster"](assets=Assets())
-    one, other = (covered(renderer.render(meshes, black(parameters))) for renderer in (cycles, raster))
+    one, other = (
+        covered(renderer.render(meshes, black(parameters))) for renderer in (cycles, raster)
+    )
     assert bool(one.any())
-    # The project's aim is 0.97 at 300 pixels; at 96 the rim, where half-covered pixels fall either way, weighs more.
+    # The project's aim is 0.97 at 300 pixels; at 96 the rim, where half-covered pixels fall either
+    # way, weighs more.
     assert float((one & other).sum() / (one | other).sum()) > 0.97
     seen, drawn = (renderer.render(meshes, parameters).float() for renderer in (cycles, raster))
     inside = one & other
@@ -87,8 +103,8 @@ def test_the_same_arguments_give_the_same_bytes_also_after_a_restart(cycles: Cyc
 
 @needs_blender
 def test_an_exposure_blurs_along_the_motion(cycles: Cycles) -> None:
-    # 10 m/s upwards for 20 ms are 0.2 m, at 5 m and 200 px of focal length some 8 px: an edge that one pixel held is
-    # spread over eight.
+    # 10 m/s upwards for 20 ms are 0.2 m, at 5 m and 200 px of focal length some 8 px: an edge that
+    # one pixel held is spread over eight.
     meshes = flag(frames=3, speed=10.0)
     still = RenderParameters(
         background="sky/1",
@@ -110,7 +126,9 @@ def test_an_exposure_blurs_along_the_motion(cycles: Cycles) -> None:
         assert int(crossed.sum()) > SIZE // 3
         steepest.append(float((cover[1:] - cover[:-1]).abs().amax(0)[crossed].median()))
     assert steepest[0] > 0.5
-    assert steepest[1] < 0.3  # an eighth for each of the eight pictures, of which two may fall into a row
+    assert (
+        steepest[1] < 0.3
+    )  # an eighth for each of the eight pictures, of which two may fall into a row
 
 
 @needs_blender
@@ -122,12 +140,16 @@ def test_workbench_sees_the_same_silhouette() -> None:
     other = covered(raster.render(meshes, black(parameters)))
     plain = raster.render(meshes, replace(parameters, sun_strength=0.0, sky_strength=0.0))
     # Outside of the silhouette both show the background; a pixel of rim is left aside.
-    outside = torch.nn.functional.max_pool2d(other[:, None].float(), 5, stride=1, padding=2)[:, 0] == 0
+    outside = (
+        torch.nn.functional.max_pool2d(other[:, None].float(), 5, stride=1, padding=2)[:, 0] == 0
+    )
     assert float((seen[outside].float() - plain[outside].float()).abs().max()) <= 1
     assert float((seen.float() - plain.float()).abs().mean()) > 1
 
 
-def test_without_blender_the_error_says_what_to_do(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_without_blender_the_error_says_what_to_do(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.delenv(SETTING, raising=False)
     monkeypatch.setenv("FLAGDATA_CACHE", str(tmp_path))
     with pytest.raises(NotFoundError, match="flagdata blender-setup"):

@@ -13,7 +13,8 @@ from tests.sim.render.conftest import look
 
 
 def test_the_published_points_of_srgb() -> None:
-    # IEC 61966-2-1: the linear part ends at code 0.04045; code 188 is half of white's light to a byte's width.
+    # IEC 61966-2-1: the linear part ends at code 0.04045; code 188 is half of white's light to a
+    # byte's width.
     assert to_linear(np.array([0, 10, 188, 255], dtype=np.uint8)) == pytest.approx(
         [0.0, 10 / 255 / 12.92, ((188 / 255 + 0.055) / 1.055) ** 2.4, 1.0]
     )
@@ -55,13 +56,21 @@ def test_at_scale_0_6_the_shorter_side_fills_the_frame() -> None:
 
 def test_at_scale_1_pixels_are_its_own_and_offsets_move_it() -> None:
     shown = plate(grid_picture(), look(background_scale=1.0))
-    assert cell(shown, 125, 125) == (6, 4)  # px (325, 225) of 700 × 500: the frame begins at (200, 100)
-    moved = plate(grid_picture(), look(background_scale=1.0, background_offset_x=50.0, background_offset_y=-50.0))
+    assert cell(shown, 125, 125) == (
+        6,
+        4,
+    )  # px (325, 225) of 700 × 500: the frame begins at (200, 100)
+    moved = plate(
+        grid_picture(),
+        look(background_scale=1.0, background_offset_x=50.0, background_offset_y=-50.0),
+    )
     assert cell(moved, 125, 125) == (5, 5)
 
 
 def test_beyond_its_edges_a_background_is_its_reflection() -> None:
-    shown = plate(grid_picture(), look(background_scale=0.6, background_offset_y=60.0))  # 100 px of the picture
+    shown = plate(
+        grid_picture(), look(background_scale=0.6, background_offset_y=60.0)
+    )  # 100 px of the picture
     assert cell(shown, 45, 150) == cell(shown, 75, 150) == (7, 0)
     assert cell(shown, 15, 150) == cell(shown, 105, 150) == (7, 1)
 

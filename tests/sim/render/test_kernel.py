@@ -37,8 +37,22 @@ def crumpled(seed: int, *, cells: int = 9):
     [
         (1, 9, {"sun_softness": 0.0, "pole_radius": 0.05}),
         (2, 9, {"sun_softness": 4.0, "exposure_time": 0.02, "translucency": 0.4}),
-        (3, 9, {"width": 213, "height": 97, "camera_angle": -0.7, "camera_height": 1.5, "pole_radius": 0.05}),
-        (4, 2, {"width": 300, "height": 300, "camera_radius": 2.5}),  # faces too large for narrow arithmetic
+        (
+            3,
+            9,
+            {
+                "width": 213,
+                "height": 97,
+                "camera_angle": -0.7,
+                "camera_height": 1.5,
+                "pole_radius": 0.05,
+            },
+        ),
+        (
+            4,
+            2,
+            {"width": 300, "height": 300, "camera_radius": 2.5},
+        ),  # faces too large for narrow arithmetic
     ],
 )
 def test_the_kernel_makes_the_bytes_that_torch_makes(monkeypatch, seed, cells, changes) -> None:
@@ -46,15 +60,21 @@ def test_the_kernel_makes_the_bytes_that_torch_makes(monkeypatch, seed, cells, c
         pytest.skip("no C++ compiler")
     rng = np.random.default_rng(seed)
     picture = rng.integers(0, 256, (40, 60, 3), dtype=np.uint8)
-    small = {"width": 120, "height": 120, "raster_samples": 2, "texture": "noise", "background": "noise"}
+    small = {
+        "width": 120,
+        "height": 120,
+        "raster_samples": 2,
+        "texture": "noise",
+        "background": "noise",
+    }
     zeta = look(**small | {"sun_strength": 4.0, "sun_radius": 2.0, "sun_height": 3.0} | changes)
     renderer, scene = camera_of(noise=picture), crumpled(seed, cells=cells)
     compiled = renderer.render(scene, zeta)
     monkeypatch.setattr("sim.render.raster.library", lambda: None)
     defined = renderer.render(scene, zeta)
     apart = (compiled.int() - defined.int()).abs()
-    # The same operations in float32, some fused: bytes differ by rounding, and samples where two surfaces cross or a
-    # shadow's edge lies may go the other way.
+    # The same operations in float32, some fused: bytes differ by rounding, and samples where two
+    # surfaces cross or a shadow's edge lies may go the other way.
     assert float((apart > 1).float().mean()) < 1e-3
 
 
@@ -62,12 +82,22 @@ def test_the_kernel_encodes_every_value_as_torch_does() -> None:
     code = raster_kernel.library()
     if code is None:
         pytest.skip("no C++ compiler")
-    ramp, cover = torch.linspace(0, 1.2, 120_000).view(1, 200, 600), torch.linspace(0, 1, 600).expand(1, 200, 600)
-    scene = torch.stack([ramp * cover, ramp * cover / 2, ramp * cover * 2, cover], dim=3).contiguous()
+    ramp, cover = (
+        torch.linspace(0, 1.2, 120_000).view(1, 200, 600),
+        torch.linspace(0, 1, 600).expand(1, 200, 600),
+    )
+    scene = torch.stack(
+        [ramp * cover, ramp * cover / 2, ramp * cover * 2, cover], dim=3
+    ).contiguous()
     behind = torch.rand((200, 600, 3), generator=torch.Generator().manual_seed(1))
-    apart = raster_kernel.develop(code, scene, behind, gain=0.9).int() - develop(scene, behind, gain=0.9).int()
+    apart = (
+        raster_kernel.develop(code, scene, behind, gain=0.9).int()
+        - develop(scene, behind, gain=0.9).int()
+    )
     assert int(apart.abs().max()) <= 1
-    assert float((apart != 0).float().mean()) < 1e-4  # values within rounding of the bound between two bytes
+    assert (
+        float((apart != 0).float().mean()) < 1e-4
+    )  # values within rounding of the bound between two bytes
 
 
 @pytest.mark.usefixtures("no_compiler")

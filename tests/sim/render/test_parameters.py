@@ -57,7 +57,8 @@ def test_draws_fill_the_papers_ranges(name) -> None:
     for parameter, (low, high) in PAPER[name].items():
         values = np.array([getattr(zeta, parameter) for zeta in drawn])
         assert low <= values.min() <= values.max() <= high
-        # The extremes of 150 uniform draws are within 5 % of the ends but with probability 5e-4 each; seeds are fixed.
+        # The extremes of 150 uniform draws are within 5 % of the ends but with probability 5e-4
+        # each; seeds are fixed.
         assert values.min() <= low + 0.05 * (high - low)
         assert values.max() >= high - 0.05 * (high - low)
 
@@ -83,7 +84,9 @@ def test_a_seed_gives_one_draw_and_a_changed_range_moves_no_other_parameter() ->
     prior = priors.named_prior("flags")
     assert prior.draw(7, Assets()) == prior.draw(7, Assets())
     assert prior.draw(7, Assets()) != prior.draw(8, Assets())
-    changed = prior.with_quantities({"sun_height": Range(low=1.0, high=2.0)}, source="a test").draw(7, Assets())
+    changed = prior.with_quantities({"sun_height": Range(low=1.0, high=2.0)}, source="a test").draw(
+        7, Assets()
+    )
     before, after = prior.draw(7, Assets()).as_dict(), changed.as_dict()
     assert {name for name in before if before[name] != after[name]} == {"sun_height"}
 
@@ -108,7 +111,9 @@ def test_a_value_that_makes_no_sense_is_refused_by_name() -> None:
     ]
     good = {"background": "a", "texture": "b"}
     named = [(name, value, name) for name, value in cases]
-    assert not unrefused(lambda name, value: RenderParameters(**{**good, name: value}), named, InputError)
+    assert not unrefused(
+        lambda name, value: RenderParameters(**{**good, name: value}), named, InputError
+    )
 
 
 def content(**changes: object) -> dict[str, object]:
@@ -123,7 +128,11 @@ def test_a_prior_file_that_is_wrong_says_where() -> None:
         ({"mine": {"source": "me", "sun-height": 3.0}}, InputError, "given twice"),
         ({"textures": []}, InputError, "no textures"),
         ({"least-angle-deg": 90.0}, InputError, "from the heading"),
-        ({"chosen": {"source": "me", "translucency": {"low": 0.5, "high": 1.5}}}, InputError, "translucency"),
+        (
+            {"chosen": {"source": "me", "translucency": {"low": 0.5, "high": 1.5}}},
+            InputError,
+            "translucency",
+        ),
         ({"sun": 3.0}, InputError, "not a table"),
     ]
     assert not unrefused(lambda changes: priors.read(content(**changes), name="test"), cases)

@@ -17,7 +17,9 @@ from tests.sim.render.pieces import linear
 
 
 @pytest.mark.reference
-def test_a_remeshed_flag_is_seen_where_its_vertices_project_and_moves_between_frames(reference_data: Path) -> None:
+def test_a_remeshed_flag_is_seen_where_its_vertices_project_and_moves_between_frames(
+    reference_data: Path,
+) -> None:
     sequence = read_folder(reference_data / "arcsim" / "raw_remeshed")
     assert isinstance(sequence, RaggedMeshSequence)
     meshes = Meshes.flag(sequence, heading=0.0)
@@ -30,9 +32,21 @@ def test_a_remeshed_flag_is_seen_where_its_vertices_project_and_moves_between_fr
         covered = linear(image[index])[..., 0] > 0.02
         ys, xs = np.nonzero(covered)
         low, high = _bounds(meshes, index, placed.shift, placed.camera)
-        # A vertex on the outline has light on at most half a pixel beside it; the exposure moves it by a pixel or two.
-        assert np.abs([xs.min() - low[0], ys.min() - low[1], xs.max() + 1 - high[0], ys.max() + 1 - high[1]]).max() < 4
-    # At 6 m/s of wind no part of it moves faster than the wind does, nor does material jump where the mesh is cut anew.
+        # A vertex on the outline has light on at most half a pixel beside it; the exposure moves it
+        # by a pixel or two.
+        assert (
+            np.abs(
+                [
+                    xs.min() - low[0],
+                    ys.min() - low[1],
+                    xs.max() + 1 - high[0],
+                    ys.max() + 1 - high[1],
+                ]
+            ).max()
+            < 4
+        )
+    # At 6 m/s of wind no part of it moves faster than the wind does, nor does material jump where
+    # the mesh is cut anew.
     motion = VertexMotion.of(meshes)
     fastest = float(motion.forth.norm(dim=1).max()) * meshes.rate
     assert 0.5 < fastest < 12.0

@@ -77,7 +77,11 @@ def test_what_is_no_mesh_sequence_is_refused() -> None:
         ("positions", torch.zeros(4, 2), "positions have shape"),
         ("positions", torch.zeros(4, 3, dtype=torch.float64), "float64"),
         ("positions", torch.full((4, 3), torch.nan), "not finite"),
-        ("faces", torch.tensor([[0, 1, 4], [0, 1, 2]]), "faces of frame 0 name vertices outside 0 to 3"),
+        (
+            "faces",
+            torch.tensor([[0, 1, 4], [0, 1, 2]]),
+            "faces of frame 0 name vertices outside 0 to 3",
+        ),
         ("faces", torch.tensor([[0, 1, -1], [0, 1, 2]]), "outside"),
         ("uv", torch.zeros(3, 2), "3 texture places for 4 vertices"),
         ("vertex_offset", (0, 3), "vertex_offset does not fit"),

@@ -1,4 +1,5 @@
-"""A recipe's wind from samples or a log: what blows is what was given, and what does not cover the run is refused."""
+"""A recipe's wind from samples or a log: what blows is what was given, and what does not cover the
+run is refused."""
 
 from __future__ import annotations
 
@@ -20,7 +21,9 @@ from tests.refusals import unrefused
 
 TIME = {"settle": 0.2, "frames": 6, "rate": 25.0}
 SMALL = {"scene": {"columns": 4}, "time": TIME}
-GUST = np.array([[-0.3, 2.0, 0.0, 0.0], [0.0, 4.0, 1.0, 0.0], [0.1, 8.0, 0.0, 0.5], [0.5, 4.0, 0.0, 0.0]])
+GUST = np.array(
+    [[-0.3, 2.0, 0.0, 0.0], [0.0, 4.0, 1.0, 0.0], [0.1, 8.0, 0.0, 0.5], [0.5, 4.0, 0.0, 0.0]]
+)
 FRAMES = np.arange(6) / 25
 
 
@@ -42,14 +45,19 @@ def test_an_array_blows_as_it_is_in_every_member_and_is_read_back() -> None:
 
 def test_samples_that_do_not_vary_move_the_cloth_as_the_steady_wind_does() -> None:
     still = [[-1.0, 3.0, 0.0, 0.0], [0.1, 3.0, 0.0, 0.0], [1.0, 3.0, 0.0, 0.0]]
-    steady, sampled = (flagdata.simulate(**SMALL, wind=wind, seed=4) for wind in ({"speed": 3.0}, {"samples": still}))
+    steady, sampled = (
+        flagdata.simulate(**SMALL, wind=wind, seed=4)
+        for wind in ({"speed": 3.0}, {"samples": still})
+    )
     np.testing.assert_array_equal(sampled.positions, steady.positions)
     np.testing.assert_array_equal(sampled.wind, steady.wind)
     assert "wind" not in steady[0].attributes
 
 
 def test_a_gust_that_is_drawn_is_read_back_as_well() -> None:
-    flags = flagdata.simulate(**SMALL, wind={"speed": 5.0}, effects={"gusts": {"intensity": 0.3}}, count=2, seed=1)
+    flags = flagdata.simulate(
+        **SMALL, wind={"speed": 5.0}, effects={"gusts": {"intensity": 0.3}}, count=2, seed=1
+    )
     assert np.ptp(flags.wind[:, :, 0], axis=1).min() > 0
     assert not np.array_equal(flags.wind[0], flags.wind[1])
 
@@ -99,7 +107,11 @@ def lake(tmp_path: Path) -> Lake:
         staged = transaction.staging(".mcap")
         with RecordWriter(staged, metadata={}) as writer:
             writer.wind(log())
-        transaction.add(Artifact(kind=Kind.WIND, name="mast", object=transaction.put(staged), recipe={"of": "log"}))
+        transaction.add(
+            Artifact(
+                kind=Kind.WIND, name="mast", object=transaction.put(staged), recipe={"of": "log"}
+            )
+        )
     return made
 
 
@@ -163,8 +175,16 @@ def test_what_makes_no_wind_is_refused_and_says_why() -> None:
     cases = [
         ({"speed": 3.0, "samples": GUST}, UsageError, "speed and samples are given; keep one"),
         ({"log": "mast", "samples": GUST}, UsageError, "log and samples"),
-        ({"log": "mast"}, UsageError, "'mast' is looked for in a lake.*as flagdata.wind returns it"),
-        ({"samples": GUST[1:]}, InputError, r'from 0 to 0\.5 s and the run lasts from -0\.2 .*beyond = "hold"'),
+        (
+            {"log": "mast"},
+            UsageError,
+            "'mast' is looked for in a lake.*as flagdata.wind returns it",
+        ),
+        (
+            {"samples": GUST[1:]},
+            InputError,
+            r'from 0 to 0\.5 s and the run lasts from -0\.2 .*beyond = "hold"',
+        ),
         ({"samples": GUST[:3]}, InputError, "give a longer series"),
         ({"samples": GUST[::-1]}, InputError, "sort the rows by time"),
         ({"samples": GUST[:, :3]}, InputError, r"\[\[time, x, y, z\], …\]"),

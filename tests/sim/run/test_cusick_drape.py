@@ -22,20 +22,30 @@ def _cloth(bending_length: float, *, area_weight: float = 0.2) -> Material:
     # plate of rigidity B stores as B/2 κ²; for a sphere it is k/6 κ², so that Poisson's ratio is −1/3.
     rigidity = bending_length**3 * area_weight * _G
     return isotropic(
-        name="test", area_weight=area_weight, stretching=300.0, shear=100.0, bending=4 * rigidity, damping=0.01
+        name="test",
+        area_weight=area_weight,
+        stretching=300.0,
+        shear=100.0,
+        bending=4 * rigidity,
+        damping=0.01,
     )
 
 
-def _at_rest(mesh: Mesh, materials: list[Material], *, sigma: float = 1e-3, seed: int = 0) -> FloatArray:
+def _at_rest(
+    mesh: Mesh, materials: list[Material], *, sigma: float = 1e-3, seed: int = 0
+) -> FloatArray:
     rng = np.random.default_rng(seed)
-    system, state = assemble([drape_scene(mesh, m, rng, sigma=sigma) for m in materials], dtype=torch.float64)
+    system, state = assemble(
+        [drape_scene(mesh, m, rng, sigma=sigma) for m in materials], dtype=torch.float64
+    )
     state = at_rest(system, state)
     assert float(state.velocity.abs().max()) < 0.1
     return state.position.numpy()
 
 
 def _projected(mesh: Mesh, position: FloatArray) -> float:
-    """Computes the area of the rim's projection over that of the flat border, as drape coefficients are defined."""
+    """Computes the area of the rim's projection over that of the flat border, as drape coefficients
+    are defined."""
     radius = np.hypot(mesh.rest[:, 0], mesh.rest[:, 1])
     rim = np.flatnonzero(radius > DISC - 1e-6)
     x, y, _ = position[rim[np.argsort(np.arctan2(mesh.rest[rim, 1], mesh.rest[rim, 0]))]].T
@@ -44,7 +54,8 @@ def _projected(mesh: Mesh, position: FloatArray) -> float:
 
 
 def _plate_droop(bending_length: float, poisson: float) -> float:
-    """Computes the droop of the free rim of an annular plate that is clamped inside, under its own weight [m].
+    """Computes the droop of the free rim of an annular plate that is clamped inside, under its own
+    weight [m].
 
     w = A + B r² + C ln r + D r² ln r + q r⁴/64 with q = weight/rigidity; w = w' = 0 inside, no moment and no shear at
     the rim (Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, 2nd ed., section 17).
@@ -78,7 +89,8 @@ def test_a_stiff_disc_droops_as_an_annular_plate() -> None:
     mesh = disc(np.random.default_rng(0), rows=7)
     droop = -_at_rest(mesh, [_cloth(0.14)], sigma=0.0)[..., 0]
     rim = np.hypot(mesh.rest[:, 0], mesh.rest[:, 1]) > DISC - 1e-6
-    # Second order in the width of a row, an eighth of the border; the membrane adds (droop/border)², < 0.1 %.
+    # Second order in the width of a row, an eighth of the border; the membrane adds
+    # (droop/border)², < 0.1 %.
     assert droop[rim, 2].mean() == pytest.approx(_plate_droop(0.14, -1 / 3), rel=0.04)
 
 
@@ -113,7 +125,9 @@ def test_what_lies_on_the_pedestal_is_clamped_half_a_row_around_its_edge() -> No
     assert np.delete(radius, held).min() == pytest.approx(PEDESTAL + 1.5 * height)
 
 
-@pytest.mark.parametrize(("arguments", "match"), [({"pedestal": 0.2}, "under a cloth"), ({"rows": 2}, "2 rows")])
+@pytest.mark.parametrize(
+    ("arguments", "match"), [({"pedestal": 0.2}, "under a cloth"), ({"rows": 2}, "2 rows")]
+)
 def test_a_disc_without_a_border_is_refused(arguments: dict[str, float], match: str) -> None:
     with pytest.raises(InputError, match=match):
         disc(np.random.default_rng(0), **arguments)  # pyright: ignore[reportArgumentType]

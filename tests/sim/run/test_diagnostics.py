@@ -28,9 +28,13 @@ CONSTANT = isotropic(
 
 
 def falling(material: Material, *, finer: int) -> tuple[float, float]:
-    """Late compression, and the energy after 2 s, of an undamped flag let go without air, in so much finer steps."""
+    """Late compression, and the energy after 2 s, of an undamped flag let go without air, in so
+    much finer steps."""
     scene = replace(flag(material=material, wind_speed=0.0, columns=12), air=NO_AIR)
-    scene = replace(scene, position=scene.position + np.random.default_rng(0).normal(0, 1e-4, scene.position.shape))
+    scene = replace(
+        scene,
+        position=scene.position + np.random.default_rng(0).normal(0, 1e-4, scene.position.shape),
+    )
     system, state = assemble([scene], dtype=torch.float64)
     steps = finer * Symplectic().steps(system, 0.04)
     monitor = Monitor()
@@ -43,8 +47,11 @@ def falling(material: Material, *, finer: int) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("finer", [2, 4])
-def test_without_damping_the_tables_make_energy_whatever_the_step_and_constant_stiffness_does_not(finer: int) -> None:
-    # At the start the flag is at rest 0.5 m, on the average, above its lowest handle: at most 2.1 J to be had.
+def test_without_damping_the_tables_make_energy_whatever_the_step_and_constant_stiffness_does_not(
+    finer: int,
+) -> None:
+    # At the start the flag is at rest 0.5 m, on the average, above its lowest handle: at most 2.1 J
+    # to be had.
     weight = 1.5 * PONTE_ROMA.area_weight * 9.81
     compression, energy = falling(PONTE_ROMA, finer=finer)
     assert compression > CRUMPLED

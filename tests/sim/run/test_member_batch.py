@@ -1,4 +1,5 @@
-"""Batches: a member's result is its own, whatever else is simulated with it; what fails is reported and kept apart."""
+"""Batches: a member's result is its own, whatever else is simulated with it; what fails is reported
+and kept apart."""
 
 from __future__ import annotations
 
@@ -61,16 +62,25 @@ def test_a_backend_that_cannot_run_a_recipe_is_refused_before_the_first_step() -
 @pytest.mark.parametrize(
     ("contact", "steps"), [("", 50), ("[contact]\nthickness = 0.02", 150)], ids=["plain", "contact"]
 )
-def test_members_that_diverge_are_reported_and_leave_the_others_unharmed(contact: str, steps: int) -> None:
+def test_members_that_diverge_are_reported_and_leave_the_others_unharmed(
+    contact: str, steps: int
+) -> None:
     # Steps that soft members bear and stiff ones, up to a thousand times as stiff, do not.
     stiff = 'stretching-factor = { low = 1.0, high = 1e3, scale = "log" }'
     recipe = make_recipe(material=stiff, more=contact)
     crew = Crew(recipe)
     stepper = Stepper(recipe=recipe, method=None, steps=steps)
-    members = sorted((crew.member(index) for index in range(8)), key=lambda m: m.scene.material.stretching[1, 0])
+    members = sorted(
+        (crew.member(index) for index in range(8)), key=lambda m: m.scene.material.stretching[1, 0]
+    )
     members = [members[0], members[-1], members[1], members[-2]]
     outcomes = run(crew, stepper, members, size=SIZE)
-    assert [o.failure[0] if o.failure else None for o in outcomes] == [None, "diverged", None, "diverged"]
+    assert [o.failure[0] if o.failure else None for o in outcomes] == [
+        None,
+        "diverged",
+        None,
+        "diverged",
+    ]
     assert outcomes[1].failure is not None
     assert "before 0.0" in outcomes[1].failure[1]  # within the first frames
     without = run(crew, stepper, [members[0], members[2]], size=SIZE)
@@ -78,15 +88,23 @@ def test_members_that_diverge_are_reported_and_leave_the_others_unharmed(contact
 
 
 def test_a_solve_that_does_not_converge_is_a_divergence_of_that_member() -> None:
-    # As many iterations as soft members need, and stiff ones, whose systems are worse conditioned, do not get by with.
+    # As many iterations as soft members need, and stiff ones, whose systems are worse conditioned,
+    # do not get by with.
     stiff = 'stretching-factor = { low = 1.0, high = 1e5, scale = "log" }'
     recipe = make_recipe(material=stiff)
     crew = Crew(recipe)
     stepper = Stepper(recipe=recipe, method=BackwardEuler(iterations=60), steps=8)
-    members = sorted((crew.member(index) for index in range(8)), key=lambda m: m.scene.material.stretching[1, 0])
+    members = sorted(
+        (crew.member(index) for index in range(8)), key=lambda m: m.scene.material.stretching[1, 0]
+    )
     chosen = [members[0], members[-1], members[1], members[-2]]
     outcomes = run(crew, stepper, chosen, size=SIZE)
-    assert [o.failure[0] if o.failure else None for o in outcomes] == [None, "diverged", None, "diverged"]
+    assert [o.failure[0] if o.failure else None for o in outcomes] == [
+        None,
+        "diverged",
+        None,
+        "diverged",
+    ]
     without = run(crew, stepper, [chosen[0], chosen[2]], size=SIZE)
     assert all_bits(without) == [bits(outcomes[0]), bits(outcomes[2])]
 
@@ -117,7 +135,10 @@ def test_a_forced_step_beyond_the_limit_is_refused_with_it() -> None:
     with pytest.raises(UsageError, match=r"a step of 0\.02 s is unstable: the limit"):
         Stepper.of(Crew(make_recipe(more="[integrator]\nstep = 0.02")))
     assert Stepper.of(Crew(make_recipe(more="[integrator]\nstep = 5e-4"))).steps == 80
-    assert Stepper.of(Crew(make_recipe(more='[integrator]\nname = "implicit"\nstep = 0.02'))).steps == 2
+    assert (
+        Stepper.of(Crew(make_recipe(more='[integrator]\nname = "implicit"\nstep = 0.02'))).steps
+        == 2
+    )
 
 
 UNDAMPED = """
@@ -137,12 +158,15 @@ frames = 8
 
 
 @pytest.mark.parametrize(
-    ("damping", "settle", "failure"), [(0.0, 1.6, "crumpled"), (0.25e-3, 1.6, None), (0.25e-3, 0.0, None)]
+    ("damping", "settle", "failure"),
+    [(0.0, 1.6, "crumpled"), (0.25e-3, 1.6, None), (0.25e-3, 0.0, None)],
 )
 def test_an_undamped_flag_crumples_which_is_reported_and_not_stored(
     damping: float, settle: float, failure: str | None
 ) -> None:
-    recipe = parse(UNDAMPED.format(damping=damping, settle=settle), name="r", folder=Path(), where="r")
+    recipe = parse(
+        UNDAMPED.format(damping=damping, settle=settle), name="r", folder=Path(), where="r"
+    )
     crew = Crew(recipe)
     outcomes = run(crew, Stepper.of(crew), [crew.member(0), crew.member(1)], size=2)
     for outcome in outcomes:
@@ -152,11 +176,14 @@ def test_an_undamped_flag_crumples_which_is_reported_and_not_stored(
 
 def test_principal_strains_are_those_of_a_known_deformation() -> None:
     system, state = assemble(
-        [flag(material=named_material("camel-ponte-roma"), wind_speed=0, columns=4)], dtype=torch.float64
+        [flag(material=named_material("camel-ponte-roma"), wind_speed=0, columns=4)],
+        dtype=torch.float64,
     )
     rest = torch.tensor(system.cloth.mesh.rest)
     # x = F X: stretched by 1.2 and 0.7 along axes turned by 0.4.
-    turn = torch.tensor([[math.cos(0.4), -math.sin(0.4)], [math.sin(0.4), math.cos(0.4)]], dtype=torch.float64)
+    turn = torch.tensor(
+        [[math.cos(0.4), -math.sin(0.4)], [math.sin(0.4), math.cos(0.4)]], dtype=torch.float64
+    )
     plane = rest @ (turn @ torch.diag(torch.tensor([1.2, 0.7], dtype=torch.float64)) @ turn.T).T
     position = torch.nn.functional.pad(plane, (0, 1)).unsqueeze(-1)
     strains = principal_strains(system.cloth, position)
@@ -193,7 +220,9 @@ def test_a_run_without_settling_begins_with_the_start() -> None:
     crew = Crew(parse(text, name="r", folder=Path(), where="r"))
     outcome = run(crew, Stepper.of(crew), [crew.member(0)], size=1)[0]
     assert outcome.sequence is not None
-    np.testing.assert_array_equal(outcome.sequence.positions[0], outcome.member.scene.position.astype(np.float32))
+    np.testing.assert_array_equal(
+        outcome.sequence.positions[0], outcome.member.scene.position.astype(np.float32)
+    )
 
 
 @pytest.mark.parametrize("attachment", ["corners", "hoist"])
@@ -220,12 +249,15 @@ def test_recipes_of_all_shapes_run(attachment: str) -> None:
     outcomes = [
         outcome
         for base in (0, 1)
-        for outcome in run(crew, Stepper.of(crew, base), [m for m in members if m.base == base], size=6)
+        for outcome in run(
+            crew, Stepper.of(crew, base), [m for m in members if m.base == base], size=6
+        )
     ]
     assert len(outcomes) == 6
     for outcome in outcomes:
         assert outcome.failure is None
         assert outcome.sequence is not None
         held = outcome.sequence.positions[:, list(crew.handles.vertices)]
-        # Springs of 1e3 N/m that carry at most 0.3 kg and the wind's few newtons give way by millimetres.
+        # Springs of 1e3 N/m that carry at most 0.3 kg and the wind's few newtons give way by
+        # millimetres.
         assert np.abs(held - held[:1]).max() < 0.03

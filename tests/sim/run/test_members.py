@@ -23,18 +23,22 @@ def test_draws_cover_the_search_space_uniformly() -> None:
     speed = np.array([m.parameters["wind_speed"] for m in members])
     area_weight = np.array([m.parameters["area_weight"] for m in members])
     factors = np.array([m.scene.material.bending / CAMEL.bending for m in members])
-    # A uniform distribution's mean over n draws has a standard deviation of width/√(12 n): four of them.
+    # A uniform distribution's mean over n draws has a standard deviation of width/√(12 n): four of
+    # them.
     for values, low, high in ((speed, 0, 10), (area_weight, 0.10, 0.17), (factors, 0.1, 10)):
         assert low <= values.min()
         assert values.max() <= high
         assert abs(values.mean() - (low + high) / 2) < 4 * (high - low) / np.sqrt(12 * values.size)
-    # The fifteen coefficients are drawn apart: correlations are those of chance (four standard deviations of 1/√n).
+    # The fifteen coefficients are drawn apart: correlations are those of chance (four standard
+    # deviations of 1/√n).
     correlation = np.corrcoef(factors.reshape(400, 15).T) - np.eye(15)
     assert np.abs(correlation).max() < 4 / np.sqrt(400)
 
 
 def test_materials_are_drawn_alike_often() -> None:
-    text = small().replace('name = "camel-ponte-roma"', 'names = ["paper", "gray-interlock", "camel-ponte-roma"]')
+    text = small().replace(
+        'name = "camel-ponte-roma"', 'names = ["paper", "gray-interlock", "camel-ponte-roma"]'
+    )
     crew = Crew(parse(text, name="r", folder=Path(), where="r"))
     drawn = [crew.member(index) for index in range(300)]
     counts = np.unique([m.parameters["material"] for m in drawn], return_counts=True)[1]
@@ -47,7 +51,8 @@ def test_materials_are_drawn_alike_often() -> None:
 
 
 def test_an_area_weight_factor_multiplies_each_materials_own_area_weight() -> None:
-    """Log-uniform from 0.7 to 1.4: the mean logarithm of n draws has a standard deviation of ln 2/√(12 n)."""
+    """Log-uniform from 0.7 to 1.4: the mean logarithm of n draws has a standard deviation of ln
+    2/√(12 n)."""
     text = small(material="area-weight-factor = { low = 0.7, high = 1.4, scale = 'log' }")
     text = text.replace('name = "camel-ponte-roma"', 'names = ["paper", "gray-interlock"]')
     text = text.replace("area-weight = { low = 0.10, high = 0.17 }\n", "")
@@ -104,7 +109,9 @@ def test_handles_start_where_they_are_held() -> None:
 
 
 def test_wind_blows_towards_its_angle_from_x_to_y() -> None:
-    text = small().replace("speed = { low = 0.0, high = 10.0 }", "speed = 2.0\ntoward = 1.5707963267948966")
+    text = small().replace(
+        "speed = { low = 0.0, high = 10.0 }", "speed = 2.0\ntoward = 1.5707963267948966"
+    )
     scene = Crew(parse(text, name="r", folder=Path(), where="r")).member(0).scene
     np.testing.assert_allclose(scene.wind, [0, 2, 0], atol=1e-12)
 
@@ -133,9 +140,13 @@ def test_seeds_of_members_are_theirs_alone() -> None:
     assert all(0 <= seed < 2**63 for seed in seeds)
 
 
-@pytest.mark.parametrize("effect", ["porosity", "shear", "hem-mass", "wagner-lag", "finite-span-loading", "pole-wake"])
+@pytest.mark.parametrize(
+    "effect", ["porosity", "shear", "hem-mass", "wagner-lag", "finite-span-loading", "pole-wake"]
+)
 def test_effects_are_named_by_their_registry(effect: str) -> None:
-    parameters = "\n".join(f'{key.replace("_", "-")} = "prior"' for key in EFFECTS[effect].parameters())
+    parameters = "\n".join(
+        f'{key.replace("_", "-")} = "prior"' for key in EFFECTS[effect].parameters()
+    )
     crew = Crew(make_recipe(more=f"[effects.{effect}]\n{parameters}"))
     member = crew.member(0)
     for key, described in EFFECTS[effect].parameters().items():

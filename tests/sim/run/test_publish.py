@@ -1,4 +1,5 @@
-"""Members in a lake: each once, whatever was interrupted; parameters, seeds and energies beside the meshes."""
+"""Members in a lake: each once, whatever was interrupted; parameters, seeds and energies beside the
+meshes."""
 
 from __future__ import annotations
 
@@ -65,7 +66,9 @@ def test_running_again_makes_nothing_and_more_members_only_the_new_ones(lake: La
 
 
 def test_members_of_several_materials_are_all_there(lake: Lake) -> None:
-    text = small().replace('name = "camel-ponte-roma"', 'names = ["camel-ponte-roma", "gray-interlock", "paper"]')
+    text = small().replace(
+        'name = "camel-ponte-roma"', 'names = ["camel-ponte-roma", "gray-interlock", "paper"]'
+    )
     recipe = replace(parse(text, name="mixed", folder=Path(), where="r"), count=9)
     report = simulate(lake, recipe, workers=2)
     assert (len(report.added), len(report.failed)) == (9, 0)
@@ -88,7 +91,9 @@ def test_a_member_is_the_same_in_any_company(tmp_path: Path) -> None:
     assert objects(parts) == objects(whole)
 
 
-@pytest.mark.parametrize("more", ["", '[integrator]\nname = "implicit"', "[effects.hysteresis]\ncouple = 1e-3"])
+@pytest.mark.parametrize(
+    "more", ["", '[integrator]\nname = "implicit"', "[effects.hysteresis]\ncouple = 1e-3"]
+)
 def test_workers_side_by_side_make_the_same_members(tmp_path: Path, more: str) -> None:
     recipe = replace(make_recipe(more=more), count=8, batch=2)
     one, four = Lake.create(tmp_path / "one"), Lake.create(tmp_path / "four")
@@ -126,7 +131,9 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path: Path) -> None:
         process.kill()
     assert process.returncode == -signal.SIGKILL
     before = objects(killed)
-    assert 4 <= len(before) < 8  # it paused in the third batch of four, or in the fourth while the third was committed
+    assert (
+        4 <= len(before) < 8
+    )  # it paused in the third batch of four, or in the fourth while the third was committed
     simulate(killed, load(str(recipe)))
     assert len(objects(killed)) == 8
     assert {seed: stored for seed, stored in objects(killed).items() if seed in before} == before
@@ -134,7 +141,8 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path: Path) -> None:
 
 
 def test_what_fails_is_reported_and_not_stored(lake: Lake) -> None:
-    # With a hundredth of the declared damping a sheet crumples where there is wind (`sim.run.member_batch.CRUMPLED`).
+    # With a hundredth of the declared damping a sheet crumples where there is wind
+    # (`sim.run.member_batch.CRUMPLED`).
     recipe = make_recipe(material='damping = { low = 1e-9, high = 1e-3, scale = "log" }')
     recipe = replace(recipe, count=8, time=replace(recipe.time, settle=2.4))
     report = simulate(lake, recipe)
@@ -142,7 +150,9 @@ def test_what_fails_is_reported_and_not_stored(lake: Lake) -> None:
     assert len(report.added) + len(report.failed) == 8
     crew = Crew(recipe)
     assert {failure["kind"] for failure in report.failed} == {"crumpled"}
-    assert max(crew.member(failure["index"]).parameters["damping"] for failure in report.failed) < 1e-5
+    assert (
+        max(crew.member(failure["index"]).parameters["damping"] for failure in report.failed) < 1e-5
+    )
     assert not {failure["seed"] for failure in report.failed} & set(objects(lake))
 
 

@@ -1,4 +1,5 @@
-"""Members whose mesh follows the cloth: stored as ragged sequences, and read by what reads such sequences."""
+"""Members whose mesh follows the cloth: stored as ragged sequences, and read by what reads such
+sequences."""
 
 from __future__ import annotations
 
@@ -132,24 +133,38 @@ def test_a_recipe_says_how_finely_and_that_is_part_of_what_a_member_is() -> None
         ("size-min = 0.08", "size-min = 0.001", LimitError, "vertices"),
     ],
 )
-def test_what_cannot_be_remeshed_is_refused(old: str, new: str, kind: type[Exception], word: str) -> None:
+def test_what_cannot_be_remeshed_is_refused(
+    old: str, new: str, kind: type[Exception], word: str
+) -> None:
     with pytest.raises(kind, match=word):
         read(TEXT.replace(old, new))
 
 
 @pytest.mark.reference
-def test_the_papers_scene_is_a_recipe_with_its_remeshing(reference_data: Path, tmp_path: Path) -> None:
+def test_the_papers_scene_is_a_recipe_with_its_remeshing(
+    reference_data: Path, tmp_path: Path
+) -> None:
     folder = reference_data / "arcsim" / "raw_remeshed"
     (tmp_path / "meshes").mkdir()
     (tmp_path / "materials").mkdir()
     (tmp_path / "meshes" / "flag.obj").write_bytes((folder / "flag.obj").read_bytes())
     material = "camel-ponte-roma.json"
-    (tmp_path / "materials" / material).write_bytes((reference_data / "materials" / material).read_bytes())
+    (tmp_path / "materials" / material).write_bytes(
+        (reference_data / "materials" / material).read_bytes()
+    )
     (tmp_path / "conf.json").write_bytes((folder / "conf.json").read_bytes())
-    text = '[scene]\nshape = "arcsim"\nfile = "conf.json"\naccept = ["collision", "separation", "popfilter"]\n'
+    text = (
+        '[scene]\nshape = "arcsim"\nfile = "conf.json"\naccept = ["collision", "separation", '
+        '"popfilter"]\n'
+    )
     (tmp_path / "r.toml").write_text(text + '[integrator]\nname = "implicit"\n')
     recipe = load(str(tmp_path / "r.toml"))
     # The listing of the paper's appendix.
     assert recipe.remeshing == Remeshing(
-        refine_angle=0.3, refine_compression=0.01, refine_velocity=1.0, size_min=0.02, size_max=0.5, aspect_min=0.2
+        refine_angle=0.3,
+        refine_compression=0.01,
+        refine_velocity=1.0,
+        size_min=0.02,
+        size_max=0.5,
+        aspect_min=0.2,
     )

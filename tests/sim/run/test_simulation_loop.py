@@ -1,4 +1,5 @@
-"""Batches through time: which instants are looked at, and what a divergence leads to, are the caller's words."""
+"""Batches through time: which instants are looked at, and what a divergence leads to, are the
+caller's words."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ RATE = 4.0
 
 @dataclass(frozen=True)
 class Climbing:
-    """An integrator in whose hands cloths climb at 1 m/s; one of them is lost at an instant [s], in one way."""
+    """An integrator in whose hands cloths climb at 1 m/s; one of them is lost at an instant [s], in
+    one way."""
 
     lost: int | None = None
     at: float = 0.75
@@ -39,9 +41,18 @@ class Climbing:
 
 
 def batch(method: Climbing, divergence: Divergence, *, speed_limit: float = SPEED_LIMIT) -> Batch:
-    scenes = [flag(material=named_material("camel-ponte-roma"), wind_speed=2.0, columns=3) for _ in range(3)]
+    scenes = [
+        flag(material=named_material("camel-ponte-roma"), wind_speed=2.0, columns=3)
+        for _ in range(3)
+    ]
     system, state = assemble(scenes, dtype=torch.float64)
-    return Batch(system=system, state=state, integrator=method, divergence=divergence, speed_limit=speed_limit)
+    return Batch(
+        system=system,
+        state=state,
+        integrator=method,
+        divergence=divergence,
+        speed_limit=speed_limit,
+    )
 
 
 def climbed(run: np.ndarray) -> np.ndarray:
@@ -58,13 +69,18 @@ def test_a_recording_begins_a_period_after_the_time_to_settle() -> None:
     numbers = after(1.0, 0.75, RATE)
     assert list(numbers) == [5, 6, 7]
     looked: list[float] = []
-    run = batch(Climbing(), Divergence.KEEP).positions(numbers, RATE, look=lambda state: looked.append(state.time))
+    run = batch(Climbing(), Divergence.KEEP).positions(
+        numbers, RATE, look=lambda state: looked.append(state.time)
+    )
     assert looked == [1.25, 1.5, 1.75]
     assert len(run) == 3
 
 
 def test_instants_that_are_apart_are_one_call_each() -> None:
-    assert [state.time for state in batch(Climbing(), Divergence.KEEP).states([1, 6], RATE)] == [0.25, 1.5]
+    assert [state.time for state in batch(Climbing(), Divergence.KEEP).states([1, 6], RATE)] == [
+        0.25,
+        1.5,
+    ]
 
 
 @pytest.mark.parametrize("speed", [math.nan, 301.0])

@@ -1,4 +1,5 @@
-"""Recipes are read strictly: what is not understood is refused with the place and the nearest that is."""
+"""Recipes are read strictly: what is not understood is refused with the place and the nearest that
+is."""
 
 from __future__ import annotations
 
@@ -47,7 +48,10 @@ def test_the_search_space_is_the_papers() -> None:
 def test_what_is_left_out_has_its_default_in_the_identity() -> None:
     recipe = read(MINIMAL)
     assert recipe.scene.shape is Shape.FLAG
-    assert recipe.identity() == read(MINIMAL + "[time]\nsettle = 4.0\nframes = 60\nrate = 25.0\n").identity()
+    assert (
+        recipe.identity()
+        == read(MINIMAL + "[time]\nsettle = 4.0\nframes = 60\nrate = 25.0\n").identity()
+    )
     assert recipe.identity() == read("count = 9\nbatch = 2\n" + MINIMAL).identity()
     for change in ("seed = 1\n", 'precision = "float64"\n'):
         assert read(change + MINIMAL).identity() != recipe.identity()
@@ -75,7 +79,9 @@ def test_an_angle_is_in_radians_or_in_degrees_where_its_key_says_so() -> None:
         ("toward = 1.0\ntoward-deg = 57.3", "given twice", "keep"),
     ],
 )
-def test_an_angle_that_is_clearly_in_degrees_is_refused_with_the_key_for_it(line: str, what: str, fix: str) -> None:
+def test_an_angle_that_is_clearly_in_degrees_is_refused_with_the_key_for_it(
+    line: str, what: str, fix: str
+) -> None:
     with pytest.raises(InputError, match=what) as caught:
         read(f"{MINIMAL}{line}\n")
     assert "[wind]" in (caught.value.where or "")
@@ -88,15 +94,31 @@ def test_what_is_wrong_is_refused_with_its_place() -> None:
     cases = [
         (MINIMAL + "[tme]\nframes = 3\n", UnknownNameError, "did you mean 'time'"),
         (MINIMAL + "[time]\nframse = 3\n", UnknownNameError, "did you mean 'frames'"),
-        (MINIMAL.replace("camel-ponte-roma", "camel-ponte-romo"), UnknownNameError, "camel-ponte-roma"),
+        (
+            MINIMAL.replace("camel-ponte-roma", "camel-ponte-romo"),
+            UnknownNameError,
+            "camel-ponte-roma",
+        ),
         (MINIMAL + "[scene]\nshape = 'flga'\n", UnknownNameError, "did you mean 'flag'"),
-        (MINIMAL + "[integrator]\nname = 'implicti'\n", UnknownNameError, "did you mean 'implicit'"),
+        (
+            MINIMAL + "[integrator]\nname = 'implicti'\n",
+            UnknownNameError,
+            "did you mean 'implicit'",
+        ),
         (MINIMAL + "[integrator]\nair-shape = 'previous'\n", UnknownNameError, "air-shape"),
         (MINIMAL + "[effects.gust]\nintensity = 0.1\n", UnknownNameError, "did you mean 'gusts'"),
-        (MINIMAL + "[effects.gusts]\nintensty = 0.1\n", UnknownNameError, "did you mean 'intensity'"),
+        (
+            MINIMAL + "[effects.gusts]\nintensty = 0.1\n",
+            UnknownNameError,
+            "did you mean 'intensity'",
+        ),
         (MINIMAL + "[effects.gusts]\nintensity = -0.1\n", InputError, "at least 0"),
         (MINIMAL + "[effects.logged-gusts]\n", UsageError, "need a log"),
-        (MINIMAL + "[scene]\nshape = 'hanging-cloth'\nattachment = 'hoist'\n", UsageError, "no hoist"),
+        (
+            MINIMAL + "[scene]\nshape = 'hanging-cloth'\nattachment = 'hoist'\n",
+            UsageError,
+            "no hoist",
+        ),
         (MINIMAL + "[scene]\ncolumns = 0\n", InputError, "columns is 0"),
         (MINIMAL + "[scene]\nwidth = -1.0\n", InputError, "width is -1"),
         (MINIMAL + "[time]\nrate = 0\n", InputError, "rate is 0"),
@@ -106,15 +128,27 @@ def test_what_is_wrong_is_refused_with_its_place() -> None:
         (MINIMAL.replace("4.0", "nan"), InputError, "finite"),
         (MINIMAL.replace("4.0", "-4.0"), InputError, "at least 0"),
         (MINIMAL.replace("4.0", "{ low = 5.0, high = 4.0 }"), InputError, "low ≤ high"),
-        (MINIMAL.replace("4.0", "{ low = 0.0, high = 4.0, scale = 'log' }"), InputError, "begin above 0"),
+        (
+            MINIMAL.replace("4.0", "{ low = 0.0, high = 4.0, scale = 'log' }"),
+            InputError,
+            "begin above 0",
+        ),
         (MINIMAL.replace("4.0", "{ low = 0.0 }"), InputError, "speed: the key high is missing"),
-        (MINIMAL.replace("4.0", "{ low = 0.0, hihg = 1.0, high = 2.0 }"), UnknownNameError, "did you mean 'high'"),
+        (
+            MINIMAL.replace("4.0", "{ low = 0.0, hihg = 1.0, high = 2.0 }"),
+            UnknownNameError,
+            "did you mean 'high'",
+        ),
         (MINIMAL.replace("speed = 4.0", ""), InputError, "no wind speed"),
         (MINIMAL.replace("speed", "sped"), UnknownNameError, "did you mean 'speed'"),
         ("[wind]\nspeed = 4.0\n", InputError, "no material"),
         (MINIMAL.replace("[wind]", "area-weight = 0.0\n[wind]"), InputError, "above 0"),
         (MINIMAL.replace("[wind]", "file = 'x.toml'\n[wind]"), UsageError, "more than one of name"),
-        (MINIMAL.replace("[wind]", "names = ['paper']\n[wind]"), UsageError, "more than one of name"),
+        (
+            MINIMAL.replace("[wind]", "names = ['paper']\n[wind]"),
+            UsageError,
+            "more than one of name",
+        ),
         ("[scene]\nshape = 'arcsim'\n" + MINIMAL, InputError, "the key file is missing"),
         ("scene = 3\n" + MINIMAL, InputError, "not a table"),
         ("[wind\n", InputError, "not TOML"),
@@ -147,11 +181,17 @@ def test_winds_force_is_named() -> None:
 
 
 def test_materials_of_a_users_own_files_are_read(tmp_path: Path) -> None:
-    tables = {"area-weight": 0.2, "stretching": [[50.0, 0, 50, 40]] * 6, "bending": [[1e-5] * 5] * 3}
+    tables = {
+        "area-weight": 0.2,
+        "stretching": [[50.0, 0, 50, 40]] * 6,
+        "bending": [[1e-5] * 5] * 3,
+    }
     of_arcsim = {"density" if key == "area-weight" else key: value for key, value in tables.items()}
     (tmp_path / "mine.json").write_text(json.dumps(of_arcsim))
     lines = [f"{key} = {json.dumps(value)}" for key, value in tables.items()]
-    (tmp_path / "mine.toml").write_text("\n".join([*lines, 'source = "measured"', "damping = 1e-3"]))
+    (tmp_path / "mine.toml").write_text(
+        "\n".join([*lines, 'source = "measured"', "damping = 1e-3"])
+    )
     for name, damping in (("mine.json", 0.0), ("mine.toml", 1e-3)):
         (base,) = read(f'[material]\nfile = "{name}"\n[wind]\nspeed = 1\n', tmp_path).material.bases
         assert (base.area_weight, base.damping) == (0.2, damping)
@@ -161,25 +201,33 @@ def test_materials_of_a_users_own_files_are_read(tmp_path: Path) -> None:
 
 
 def test_an_effects_prior_may_be_asked_for_by_name() -> None:
-    effect = make_recipe(more='[effects.gusts]\nintensity = "prior"\nlength = 40.0').effects["gusts"]
+    effect = make_recipe(more='[effects.gusts]\nintensity = "prior"\nlength = 40.0').effects[
+        "gusts"
+    ]
     low, high = EFFECTS["gusts"].parameters()["intensity"].prior
     assert effect.parameters["intensity"] == Range(low=low, high=high)
     assert effect.length == 40.0
 
 
-SQUARE = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nv 0 0 0\nv 0 1 0\nv 0 1 1\nv 0 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
+SQUARE = (
+    "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nv 0 0 0\nv 0 1 0\nv 0 1 1\nv 0 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 "
+    "4/4\n"
+)
 
 
 @pytest.fixture
 def scene_folder(tmp_path: Path) -> Path:
-    """An ArcSim scene of a square metre in two triangles, that runs with contact and strain limits."""
+    """An ArcSim scene of a square metre in two triangles, that runs with contact and strain
+    limits."""
     material = {"density": 0.2, "stretching": [[50.0, 0, 50, 40]] * 6, "bending": [[1e-5] * 5] * 3}
     scene = {
         "frame_time": 0.04,
         "frame_steps": 8,
         "duration": 1,
         "gravity": [0, 0, -9.8],
-        "cloths": [{"mesh": "square.obj", "materials": [{"data": "m.json", "strain_limits": [0.95, 1.05]}]}],
+        "cloths": [
+            {"mesh": "square.obj", "materials": [{"data": "m.json", "strain_limits": [0.95, 1.05]}]}
+        ],
         "handles": [{"nodes": [0, 3]}],
         "wind": {"velocity": [0, 3, 1], "density": 1.2},
         "friction": 0.2,
@@ -191,7 +239,9 @@ def scene_folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-ARCSIM = '[scene]\nshape = "arcsim"\nfile = "scene.json"\naccept = ["strainlimiting", "proximity"]\n'
+ARCSIM = (
+    '[scene]\nshape = "arcsim"\nfile = "scene.json"\naccept = ["strainlimiting", "proximity"]\n'
+)
 
 
 def test_an_arcsim_scene_may_be_the_start_of_a_recipe(scene_folder: Path) -> None:
@@ -220,12 +270,18 @@ def test_a_scene_file_by_itself_runs_with_arcsims_steps(scene_folder: Path) -> N
     content = json.loads((scene_folder / "scene.json").read_text())
     (scene_folder / "plain.json").write_text(json.dumps({**content, "disable": [*STAGES]}))
     recipe = load(str(scene_folder / "plain.json"))
-    assert (recipe.integrator.name, recipe.integrator.step, recipe.time.settle) == ("implicit", 0.005, 0.0)
+    assert (recipe.integrator.name, recipe.integrator.step, recipe.time.settle) == (
+        "implicit",
+        0.005,
+        0.0,
+    )
     assert (recipe.time.frames, recipe.time.rate) == (26, 25.0)
     assert (recipe.contact, recipe.limits) == (None, None)
 
 
-def test_a_scenes_contact_and_limits_are_the_recipes_unless_it_says_otherwise(scene_folder: Path) -> None:
+def test_a_scenes_contact_and_limits_are_the_recipes_unless_it_says_otherwise(
+    scene_folder: Path,
+) -> None:
     whole = load(str(scene_folder / "scene.json"))
     # ArcSim's defaults: 1 mm, 1e9 N/m³; the scene's own friction.
     assert whole.contact == Contact(thickness=1e-3, stiffness=1e9, friction=0.2)
@@ -248,7 +304,9 @@ def test_limits_may_be_given_to_any_recipe() -> None:
     implicit = '[integrator]\nname = "implicit"\n[limits]\nlow = 0.9\n'
     assert read(MINIMAL + implicit).limits == StrainLimits(low=0.9, high=1.05, sweeps=50)
     assert read(MINIMAL + "[limits]\n").identity() != read(MINIMAL).identity()
-    assert "limits" not in read(MINIMAL).identity()  # members of before limits were known keep their names
+    assert (
+        "limits" not in read(MINIMAL).identity()
+    )  # members of before limits were known keep their names
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,9 @@ def test_a_wind_is_that_of_its_samples_the_last_included_and_linear_between(time
     wind = blown(times)
     for time, sample in zip(UNEVEN, SAMPLES, strict=True):
         torch.testing.assert_close(wind.velocity(time), sample, rtol=0, atol=0)
-    expected = [np.interp(0.3, UNEVEN, SAMPLES[:, axis, member]) for axis in range(3) for member in range(2)]
+    expected = [
+        np.interp(0.3, UNEVEN, SAMPLES[:, axis, member]) for axis in range(3) for member in range(2)
+    ]
     np.testing.assert_allclose(wind.velocity(0.3).ravel(), expected, rtol=1e-14)
 
 
@@ -36,7 +38,9 @@ def test_beyond_its_samples_a_wind_holds_or_is_refused(times: Times) -> None:
     for time in (-1.1, 0.6):
         with pytest.raises(UsageError, match=r"known from -1 to 0\.5 s"):
             blown(times, Beyond.REFUSE).velocity(time)
-    torch.testing.assert_close(blown(times, Beyond.REFUSE).velocity(0.5), SAMPLES[3], rtol=0, atol=0)
+    torch.testing.assert_close(
+        blown(times, Beyond.REFUSE).velocity(0.5), SAMPLES[3], rtol=0, atol=0
+    )
 
 
 def test_samples_that_make_no_wind_are_refused() -> None:
@@ -47,5 +51,7 @@ def test_samples_that_make_no_wind_are_refused() -> None:
         (EVEN, SAMPLES * torch.nan, "not finite"),
     ]
     assert not unrefused(
-        lambda times, samples: SampledWind(times=times, samples=samples, beyond=Beyond.HOLD), cases, InputError
+        lambda times, samples: SampledWind(times=times, samples=samples, beyond=Beyond.HOLD),
+        cases,
+        InputError,
     )

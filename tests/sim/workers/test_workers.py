@@ -1,4 +1,5 @@
-"""What the processes that compute jobs find in their environment, and what becomes of their results."""
+"""What the processes that compute jobs find in their environment, and what becomes of their
+results."""
 
 from __future__ import annotations
 
@@ -43,7 +44,10 @@ def test_one_worker_is_this_process_whose_threads_are_as_many_afterwards() -> No
     torch.set_num_threads(2)
     try:
         with connect_workers(None, workers=1) as workers:
-            assert list(workers.results([(os.getpid, []), (torch.get_num_threads, [])])) == [os.getpid(), 1]
+            assert list(workers.results([(os.getpid, []), (torch.get_num_threads, [])])) == [
+                os.getpid(),
+                1,
+            ]
         assert torch.get_num_threads() == 2
     finally:
         torch.set_num_threads(before)
@@ -80,9 +84,15 @@ def test_a_worker_that_dies_over_sending_its_result_keeps_nobody_waiting(
 def test_what_dask_gives_for_a_job_that_was_lost_with_the_scheduler_is_no_result(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    client: Any = SimpleNamespace(status="running", nthreads=lambda: {"a": 1}, submit=lambda *_, **__: None, loop=None)
-    running = SimpleNamespace(count=lambda: 0, add=print, is_empty=lambda: False, clear=lambda: None)
+    client: Any = SimpleNamespace(
+        status="running", nthreads=lambda: {"a": 1}, submit=lambda *_, **__: None, loop=None
+    )
+    running = SimpleNamespace(
+        count=lambda: 0, add=print, is_empty=lambda: False, clear=lambda: None
+    )
     monkeypatch.setattr(scheduled, "as_completed", lambda **_: running)
-    monkeypatch.setattr(Scheduled, "_next", lambda *_: (SimpleNamespace(release=print), CancelledError("a job")))
+    monkeypatch.setattr(
+        Scheduled, "_next", lambda *_: (SimpleNamespace(release=print), CancelledError("a job"))
+    )
     with pytest.raises(WorkerError, match="the scheduler is gone"):
         next(Scheduled(client, say=print).results([(sum, [[1]])]))

@@ -1,8 +1,10 @@
-"""A catalog of a million rows, and commits as versions add up: each figure of a fresh process, beside others' stores.
+"""A catalog of a million rows, and commits as versions add up: each figure of a fresh process,
+beside others' stores.
 
-The rows are written in ten commits, and the versions one row a commit, without waiting for the disk; what is timed
-afterwards does wait. Peers of a query: DuckDB's own file, SQLite, and the Delta library's reader with Arrow, each asked
-for the same groups. Peers of a commit: the Delta library's append and SQLite, see `bench-lake.json`.
+The rows are written in ten commits, and the versions one row a commit, without waiting for the
+disk; what is timed afterwards does wait. Peers of a query: DuckDB's own file, SQLite, and the Delta
+library's reader with Arrow, each asked for the same groups. Peers of a commit: the Delta library's
+append and SQLite, see `bench-lake.json`.
 """
 
 from __future__ import annotations
@@ -39,10 +41,17 @@ from flagdata.view import Media, Site, answer
 ROWS = int(os.environ.get("FLAGDATA_BENCH_ROWS", "1_000_000"))
 BATCHES = 10
 VIEWED = 10_000  # artifacts
-VERSIONS = tuple(n for n in (10, 100, 1_000, 10_000) if n <= int(os.environ.get("FLAGDATA_BENCH_VERSIONS", "10_000")))
+VERSIONS = tuple(
+    n
+    for n in (10, 100, 1_000, 10_000)
+    if n <= int(os.environ.get("FLAGDATA_BENCH_VERSIONS", "10_000"))
+)
 TIDY = 32  # versions; as commits do it
 COMMITS = 20
-SQL = "select session, count(*) n, avg(wind) wind from catalog where wind between 3 and 6 group by session"
+SQL = (
+    "select session, count(*) n, avg(wind) wind from catalog where wind between 3 and 6 group by "
+    "session"
+)
 _LAP = """
 import json, sys, time
 def lap():
@@ -145,7 +154,9 @@ def fill(lake: Lake, rows: int, seed: int) -> None:
     with unflushed():
         for first in range(0, rows, rows // BATCHES):
             info = {"message": "a batch", "branch": "main", "commit": f"c{secrets.token_hex(8)}"}
-            lake.catalog.append(clips(first, rows // BATCHES, draws), base=lake.catalog.head(), info=info)
+            lake.catalog.append(
+                clips(first, rows // BATCHES, draws), base=lake.catalog.head(), info=info
+            )
 
 
 def clips(first: int, count: int, draws: np.random.Generator) -> pa.Table:
@@ -166,7 +177,9 @@ def clips(first: int, count: int, draws: np.random.Generator) -> pa.Table:
         recipe={"window": 60.0},
     )
     row = replace(one, created=datetime.now(UTC)).row()
-    rows = pa.Table.from_pylist([row], schema=catalog_schema()).take(pa.array(np.zeros(count, dtype=np.int64)))
+    rows = pa.Table.from_pylist([row], schema=catalog_schema()).take(
+        pa.array(np.zeros(count, dtype=np.int64))
+    )
     k = np.arange(first, first + count)
     own = {
         "artifact": [draws.bytes(16).hex() for _ in range(count)],
@@ -179,7 +192,9 @@ def clips(first: int, count: int, draws: np.random.Generator) -> pa.Table:
     }
     for name, values in own.items():
         number = rows.schema.get_field_index(name)
-        rows = rows.set_column(number, rows.schema.field(number), pa.array(values, rows.schema.field(number).type))
+        rows = rows.set_column(
+            number, rows.schema.field(number), pa.array(values, rows.schema.field(number).type)
+        )
     return rows
 
 
@@ -189,7 +204,11 @@ def _million(folder: Path, seed: int) -> dict[str, Any]:
     whole = {name: _whole(lake.path, work) for name, work in _WHOLE.items()}
     ours = _fresh(lake.path, "first")
     table = lake.rows()
-    asked = table.filter((pc.field("wind") >= 3) & (pc.field("wind") <= 6)).group_by("session").aggregate([])
+    asked = (
+        table.filter((pc.field("wind") >= 3) & (pc.field("wind") <= 6))
+        .group_by("session")
+        .aggregate([])
+    )
     assert ours["open, filter and group"]["groups"] == asked.num_rows
     return {"flagdata": ours, "of all rows": whole, **_peers(folder, table)}
 
@@ -206,7 +225,9 @@ def _whole(lake: Any, work: str) -> dict[str, Any]:
 
 
 def _in_a_process(program: str, *arguments: str) -> dict[str, Any]:
-    done = subprocess.run([sys.executable, "-c", program, *arguments], check=True, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", program, *arguments], check=True, capture_output=True, text=True
+    )
     return json.loads(done.stdout.splitlines()[-1])
 
 
@@ -222,7 +243,8 @@ def _peers(folder: Path, table: pa.Table) -> dict[str, Any]:
     with sqlite3.connect(lite) as connection:
         connection.execute(f"CREATE TABLE catalog ({', '.join(few.column_names)})")
         columns = [
-            column.cast(pa.string()) if str(column.type).startswith("time") else column for column in few.columns
+            column.cast(pa.string()) if str(column.type).startswith("time") else column
+            for column in few.columns
         ]
         connection.executemany(
             f"INSERT INTO catalog VALUES ({', '.join('?' * few.num_columns)})",
@@ -253,11 +275,16 @@ def _peers(folder: Path, table: pa.Table) -> dict[str, Any]:
 def _seconds(ask: Callable[[], int]) -> dict[str, Any]:
     wall, cpu = time.perf_counter(), time.process_time()
     groups = ask()
-    return {"wall_s": time.perf_counter() - wall, "cpu_s": time.process_time() - cpu, "groups": groups}
+    return {
+        "wall_s": time.perf_counter() - wall,
+        "cpu_s": time.process_time() - cpu,
+        "groups": groups,
+    }
 
 
 def _growth(path: Path) -> dict[str, Any]:
-    """Of a lake of so many versions: what a fresh process takes, and the median commit of one that goes on [ms]."""
+    """Of a lake of so many versions: what a fresh process takes, and the median commit of one that
+    goes on [ms]."""
     lake = Lake.create(path)
     found: dict[str, Any] = {}
     for versions in VERSIONS:
@@ -272,27 +299,44 @@ def _growth(path: Path) -> dict[str, Any]:
             _one(lake, number + 1)
             took.append((time.perf_counter() - wall, time.process_time() - cpu))
         wall, cpu = np.median(took, axis=0) * 1e3
-        found[f"{versions}"] = {"median_ms": float(wall), "median_cpu_ms": float(cpu), "fresh process": fresh}
+        found[f"{versions}"] = {
+            "median_ms": float(wall),
+            "median_cpu_ms": float(cpu),
+            "fresh process": fresh,
+        }
     return found
 
 
 def _one(lake: Lake, number: int) -> None:
     with lake.transaction("one row") as tx:
-        tx.add(Artifact(kind=Kind.MEASUREMENT, name="m", recipe={"at": lake.catalog.head(), "number": number}))
+        tx.add(
+            Artifact(
+                kind=Kind.MEASUREMENT,
+                name="m",
+                recipe={"at": lake.catalog.head(), "number": number},
+            )
+        )
 
 
 def _commit_up_to(lake: Lake, versions: int) -> None:
-    """Commits of one row each, until the lake has so many versions; the catalog alone is used, so that it is quick."""
+    """Commits of one row each, until the lake has so many versions; the catalog alone is used, so
+    that it is quick."""
     catalog, head = lake.catalog, lake.catalog.head()
     while head < versions:
         if head % TIDY == 0:
             catalog.tidy()
             head = catalog.head()
         artifact = replace(
-            Artifact(kind=Kind.MEASUREMENT, name="m", recipe={"version": head}), created=datetime.now(UTC)
+            Artifact(kind=Kind.MEASUREMENT, name="m", recipe={"version": head}),
+            created=datetime.now(UTC),
         )
         rows = pa.Table.from_pylist([artifact.row()], schema=catalog_schema())
-        info = {"commit": f"c{secrets.token_hex(8)}", "message": "one row", "branch": "main", "rows": "1"}
+        info = {
+            "commit": f"c{secrets.token_hex(8)}",
+            "message": "one row",
+            "branch": "main",
+            "rows": "1",
+        }
         head = catalog.append(rows, base=head, info=info)
 
 

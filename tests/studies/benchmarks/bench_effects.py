@@ -1,9 +1,11 @@
-"""What every effect on the cloth costs: time of a batch with it over that of the base model, on one core.
+"""What every effect on the cloth costs: time of a batch with it over that of the base model, on one
+core.
 
-Flags of 651 vertices in 4 to 5.5 m/s, batch 16, float32; the effect as drawn from its prior. Each run with the effect
-follows one of the base model from the same state over the same steps; given are medians of the ratios of processor
-time. Four methods: leapfrog, the same with layers kept apart by contact, backward Euler in steps of 5 ms, and the split
-method of forecasts. The last row is Stokes' air, which has no C++.
+Flags of 651 vertices in 4 to 5.5 m/s, batch 16, float32; the effect as drawn from its prior. Each
+run with the effect follows one of the base model from the same state over the same steps; given are
+medians of the ratios of processor time. Four methods: leapfrog, the same with layers kept apart by
+contact, backward Euler in steps of 5 ms, and the split method of forecasts. The last row is Stokes'
+air, which has no C++.
 """
 
 from __future__ import annotations
@@ -37,7 +39,8 @@ Method = Callable[[System, State], State]
 
 
 def run(*, seed: int, out: object) -> dict[str, Any]:
-    """Ratios to the base model by effect and method, and the base model's own times [µs a flag and step].
+    """Ratios to the base model by effect and method, and the base model's own times [µs a flag and
+    step].
 
     Args:
         seed: of the effects' values.
@@ -56,7 +59,10 @@ def run(*, seed: int, out: object) -> dict[str, Any]:
 def _ratios(seed: int) -> dict[str, Any]:
     speeds = [4.0 + 0.1 * b for b in range(BATCH)]
     system, state = assemble(
-        [flag(material=named_material("camel-ponte-roma"), wind_speed=s, columns=30) for s in speeds]
+        [
+            flag(material=named_material("camel-ponte-roma"), wind_speed=s, columns=30)
+            for s in speeds
+        ]
     )
     state = Symplectic().advance(system, state, 0.4)
     whole = Symplectic().steps(system, 0.04)
@@ -67,9 +73,14 @@ def _ratios(seed: int) -> dict[str, Any]:
         "backward-euler": (lambda s, x: BackwardEuler(tolerance=1e-4).advance(s, x, LENGTH), 4),
         "split": (lambda s, x: SplitEuler().advance(s, x, LENGTH), 4),
     }
-    result: dict[str, Any] = {"batch": BATCH, "vertices": system.cloth.mesh.vertex_count, "pairs": PAIRS}
+    result: dict[str, Any] = {
+        "batch": BATCH,
+        "vertices": system.cloth.mesh.vertex_count,
+        "pairs": PAIRS,
+    }
     bases = {
-        method: replace(system, contact=Contact()) if method == "leapfrog-contact" else system for method in methods
+        method: replace(system, contact=Contact()) if method == "leapfrog-contact" else system
+        for method in methods
     }
     for method, (work, steps) in methods.items():
         base = statistics.median(_seconds(work, bases[method], state) for _ in range(PAIRS))
@@ -80,7 +91,9 @@ def _ratios(seed: int) -> dict[str, Any]:
         for method, (work, _) in methods.items():
             base = bases[method], state
             changed = _changed(name, seed, *base)
-            if work(*changed).healthy().all():  # more damping needs shorter steps than the base model's
+            if (
+                work(*changed).healthy().all()
+            ):  # more damping needs shorter steps than the base model's
                 row[method] = _ratio(work, base, changed)
         rows.append(row)
     return result | {"effects": rows}

@@ -1,7 +1,9 @@
-"""How long a fresh process takes from a lake of 100,000 clips to its first batch, on a disk and from a bucket.
+"""How long a fresh process takes from a lake of 100,000 clips to its first batch, on a disk and
+from a bucket.
 
-The bucket is moto's server on loopback, the cache of objects empty: requests are answered by a Python program beside
-the process that is timed. The clips are slices of one short recording; their rows differ, as those of as many would.
+The bucket is moto's server on loopback, the cache of objects empty: requests are answered by a
+Python program beside the process that is timed. The clips are slices of one short recording; their
+rows differ, as those of as many would.
 """
 
 from __future__ import annotations
@@ -34,7 +36,8 @@ class Hidden:
             raise ModuleNotFoundError(name)
 sys.meta_path.insert(0, Hidden())
 """
-"""As an installation without pandas, which is none of the requirements; Arrow's data sets load it where it is."""
+"""As an installation without pandas, which is none of the requirements; Arrow's data sets load it
+where it is."""
 _FRESH = """
 import json, sys, time
 wall, cpu, found = time.perf_counter(), time.process_time(), {}
@@ -70,7 +73,8 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         remote = f"s3://{BUCKET}/lake"
         environment = {**bucket, "FLAGDATA_CACHE": str(folder / "cache")}
         _python(
-            f"from tests.studies.benchmarks.bench_first_batch import *; fill(Lake.create({remote!r}), {seed})",
+            "from tests.studies.benchmarks.bench_first_batch import *; "
+            f"fill(Lake.create({remote!r}), {seed})",
             environment,
         )
         found["bucket, cold"] = _fresh(remote, {**bucket, "FLAGDATA_CACHE": str(folder / "empty")})

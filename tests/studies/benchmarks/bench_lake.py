@@ -1,7 +1,8 @@
 """Commits, catalog reads and mesh sequences, beside what others take for the same.
 
-Wall time. Peers of a commit: the Delta library's own append (which neither flushes to the disk nor checks identities)
-and SQLite with full synchronisation. Peers of a mesh read: a memory-mapped .npy, and Zarr with its defaults.
+Wall time. Peers of a commit: the Delta library's own append (which neither flushes to the disk nor
+checks identities) and SQLite with full synchronisation. Peers of a mesh read: a memory-mapped .npy,
+and Zarr with its defaults.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ MESH_FRAMES, MESH_ROWS, MESH_COLUMNS = 500, 41, 61
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
-    """Median milliseconds of commits and reads over a catalog of `ROWS` rows; size and speed of a mesh sequence."""
+    """Median milliseconds of commits and reads over a catalog of `ROWS` rows; size and speed of a
+    mesh sequence."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         return {"rows": ROWS, **_catalog(folder), "meshes": _meshes(folder, seed)}
@@ -52,7 +54,9 @@ def _catalog(folder: Path) -> dict[str, Any]:
         "one artifact": _milliseconds(lambda _: lake.artifact(_clip(77).id)),
     }
     winds = lake.rows()["wind"].to_pylist()
-    assert lake.rows(selected).num_rows == sum(wind is not None and 3 <= wind <= 6 for wind in winds)
+    assert lake.rows(selected).num_rows == sum(
+        wind is not None and 3 <= wind <= 6 for wind in winds
+    )
     return {
         "commit_ms": {
             "on an empty catalog": empty,
@@ -118,24 +122,33 @@ def _meshes(folder: Path, seed: int) -> dict[str, Any]:
     ours, plain, mapped = folder / "ours.zarr", folder / "plain.zarr", folder / "mapped.npy"
     write = {
         "flagdata": _milliseconds(lambda _: write_meshes(ours, sequence), times=1),
-        "zarr, defaults": _milliseconds(lambda _: zarr.save_array(plain, sequence.positions), times=1),
+        "zarr, defaults": _milliseconds(
+            lambda _: zarr.save_array(plain, sequence.positions), times=1
+        ),
         "numpy .npy": _milliseconds(lambda _: np.save(mapped, sequence.positions), times=1),
     }
     starts = stream(seed, "starts").integers(0, len(sequence) - CLIP_FRAMES, COMMITS).tolist()
     readers: dict[str, Callable[[int], np.ndarray]] = {
         "flagdata": lambda first: read_meshes(ours, first=first, count=CLIP_FRAMES).positions,
-        "zarr, defaults": lambda first: np.asarray(zarr.open_array(plain, mode="r")[first : first + CLIP_FRAMES]),
-        "numpy .npy, mapped": lambda first: np.load(mapped, mmap_mode="r")[first : first + CLIP_FRAMES].copy(),
+        "zarr, defaults": lambda first: np.asarray(
+            zarr.open_array(plain, mode="r")[first : first + CLIP_FRAMES]
+        ),
+        "numpy .npy, mapped": lambda first: np.load(mapped, mmap_mode="r")[
+            first : first + CLIP_FRAMES
+        ].copy(),
     }
     for read in readers.values():
-        np.testing.assert_array_equal(read(starts[0]), sequence.positions[starts[0] : starts[0] + CLIP_FRAMES])
+        np.testing.assert_array_equal(
+            read(starts[0]), sequence.positions[starts[0] : starts[0] + CLIP_FRAMES]
+        )
     raw = sequence.positions.nbytes
     return {
         "shape": list(sequence.positions.shape),
         "bytes_over_raw": {"flagdata": size_of(ours) / raw, "zarr, defaults": size_of(plain) / raw},
         "write_ms": write,
         f"read_{CLIP_FRAMES}_frames_ms": {
-            name: _milliseconds(lambda i, read=read: read(starts[i])) for name, read in readers.items()
+            name: _milliseconds(lambda i, read=read: read(starts[i]))
+            for name, read in readers.items()
         },
     }
 

@@ -1,8 +1,9 @@
-"""Ingesting a day of a 20 Hz sonic (TOA5, 1.7 million rows), and a small log: columns against row by row, in one run.
+"""Ingesting a day of a 20 Hz sonic (TOA5, 1.7 million rows), and a small log: columns against row
+by row, in one run.
 
-Each is a process of its own, as a user starts it, and Python keeps the package's bytecode, as where it is installed;
-both ways must give the same samples. Wall time is of a machine that may have other work, processor time and memory are
-the process's.
+Each is a process of its own, as a user starts it, and Python keeps the package's bytecode, as where
+it is installed; both ways must give the same samples. Wall time is of a machine that may have other
+work, processor time and memory are the process's.
 """
 
 from __future__ import annotations
@@ -30,14 +31,16 @@ _HEADER = (
 )
 _WAYS = {
     "columns": "",
-    "rows": "from flagdata.ingest.anemometer.text.cut_lines import RowReader; RowReader.blocks = RowReader.rows; ",
+    "rows": "from flagdata.ingest.anemometer.text.cut_lines import RowReader; RowReader.blocks = "
+    "RowReader.rows; ",
 }
 _PEAK = """
 import atexit, sys
 status = "/proc/self/status"
 atexit.register(lambda: print(next(x.split()[1] for x in open(status) if x.startswith("VmHWM")), file=sys.stderr))
 """
-"""The kernel's high-water mark of this program alone; `ru_maxrss` is inherited from the process that started it."""
+"""The kernel's high-water mark of this program alone; `ru_maxrss` is inherited from the process
+that started it."""
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
@@ -62,10 +65,22 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
 
 def _ingest(path: Path, lake: Lake, before: str) -> dict[str, float]:
     program = f"{_PEAK}{before}from flagdata.cli import main; main(sys.argv[1:])"
-    installed = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    installed = {
+        name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"
+    }
     began = time.perf_counter()
     child = subprocess.Popen(
-        [sys.executable, "-c", program, "ingest", "--lake", str(lake.path), "--zone", "UTC", str(path)],
+        [
+            sys.executable,
+            "-c",
+            program,
+            "ingest",
+            "--lake",
+            str(lake.path),
+            "--zone",
+            "UTC",
+            str(path),
+        ],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
@@ -86,11 +101,19 @@ def _write(path: Path, rows: int, seed: int) -> None:
     generator = stream(seed, "log")
     wind = generator.normal(4, 1, (rows, 3))
     other = generator.normal([21, 690, 7.1], [0.3, 3, 0.2], (rows, 3))
-    stamps = (np.datetime64("2021-05-14T00:00:00.000") + np.arange(rows) * np.timedelta64(50, "ms")).astype(str)
+    stamps = (
+        np.datetime64("2021-05-14T00:00:00.000") + np.arange(rows) * np.timedelta64(50, "ms")
+    ).astype(str)
     with path.open("w", newline="\r\n") as out:
         out.writelines(f"{line}\n" for line in _HEADER)
-        for i, (stamp, (x, y, z), (t, c, h)) in enumerate(zip(stamps, wind.tolist(), other.tolist(), strict=True)):
-            text = stamp.replace("T", " ").rstrip("0").rstrip(".") if "." in stamp else stamp.replace("T", " ")
+        for i, (stamp, (x, y, z), (t, c, h)) in enumerate(
+            zip(stamps, wind.tolist(), other.tolist(), strict=True)
+        ):
+            text = (
+                stamp.replace("T", " ").rstrip("0").rstrip(".")
+                if "." in stamp
+                else stamp.replace("T", " ")
+            )
             first = '"NAN"' if i % 5000 == 77 else f"{x:.5f}"
             pressure = 98.7 + 1e-3 * (i % 100)
             winds = f"{first},{y:.5f},{z / 10:.5f}"

@@ -1,8 +1,10 @@
-"""What an answer costs on two cores: `flagdata measure` on a video file, by stage, and a refinement by 50 clips.
+"""What an answer costs on two cores: `flagdata measure` on a video file, by stage, and a refinement
+by 50 clips.
 
-The film is of a simulated flag, 7.2 s at 25 Hz and 300 × 300, six windows of the shipped network. The command is timed
-as a user runs it, from its start to its end, the fastest and the median of several; the stages are timed in one process
-that has begun already. The refinement is that of the film's first 1.2 s, with all simulations made anew.
+The film is of a simulated flag, 7.2 s at 25 Hz and 300 × 300, six windows of the shipped network.
+The command is timed as a user runs it, from its start to its end, the fastest and the median of
+several; the stages are timed in one process that has begun already. The refinement is that of the
+film's first 1.2 s, with all simulations made anew.
 """
 
 from __future__ import annotations
@@ -40,7 +42,13 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     """Seconds of the command, of its stages and of a refinement; nothing is written into `out`."""
     del out
     shipped = network(None, lake=None, at=None)
-    film = next(iter(simulated(shipped.estimator, count=1, windows=_WINDOWS, seed=child_seed(seed, "bench-measure"))))
+    film = next(
+        iter(
+            simulated(
+                shipped.estimator, count=1, windows=_WINDOWS, seed=child_seed(seed, "bench-measure")
+            )
+        )
+    )
     frames = film.windows.reshape(-1, *film.windows.shape[2:])
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "flag.mp4"
@@ -48,14 +56,28 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         begun = time.perf_counter()
         (subject,) = subjects(str(path), query=None, lake=None, at=None, reading=FilmReading())
         opened = time.perf_counter() - begun
-        command = [sys.executable, "-m", "flagdata.cli", "measure", str(path), "--flag-size", "1.5x1.0"]
+        command = [
+            sys.executable,
+            "-m",
+            "flagdata.cli",
+            "measure",
+            str(path),
+            "--flag-size",
+            "1.5x1.0",
+        ]
         return {
-            "film": {"seconds": len(frames) / _RATE, "size": list(frames.shape[1:]), "windows": _WINDOWS},
+            "film": {
+                "seconds": len(frames) / _RATE,
+                "size": list(frames.shape[1:]),
+                "windows": _WINDOWS,
+            },
             "command": _spread(lambda: _called([*command, "--anyway"])),
             "command_with_page": _spread(
                 lambda: _called([*command, "--anyway", "--report", str(Path(folder) / "flag.html")])
             ),
-            "program_start": _spread(lambda: _called([sys.executable, "-m", "flagdata.cli", "--version"])),
+            "program_start": _spread(
+                lambda: _called([sys.executable, "-m", "flagdata.cli", "--version"])
+            ),
             "stages": {"open_film": opened, **_stages(subject.film, shipped)},
             "refinement": _refinement(_first_clip(subject.film, shipped), shipped, seed=seed),
         }
@@ -90,7 +112,8 @@ def _spread(work: Callable[[], None]) -> dict[str, float]:
 
 
 def _stages(film: Film, shipped: Network) -> dict[str, float]:
-    """Seconds of the gate's preparation and of all six windows; of one window, of its maps, network and checks."""
+    """Seconds of the gate's preparation and of all six windows; of one window, of its maps, network
+    and checks."""
     model, options = shipped.estimator, Options(size=_SIZE)
     begun = time.perf_counter()
     gate = gate_beside(shipped, false_alarm=options.false_alarm)
@@ -117,18 +140,26 @@ def _stages(film: Film, shipped: Network) -> dict[str, float]:
 
 def _first_clip(film: Film, shipped: Network) -> UInt8Array:
     """(frame, height, width) conditioned, from the film's first frame on."""
-    return np.stack([frame for _, frame in film.frames(0.0, film.duration)])[: shipped.estimator.front_end.frames]
+    return np.stack([frame for _, frame in film.frames(0.0, film.duration)])[
+        : shipped.estimator.front_end.frames
+    ]
 
 
 def _refinement(clip: UInt8Array, shipped: Network, *, seed: int) -> dict[str, Any]:
     begun = time.perf_counter()
     found = refine(
-        [Clip(name="flag", frames=clip)], shipped.estimator, budget=_BUDGET, seed=seed, level=Options().level
+        [Clip(name="flag", frames=clip)],
+        shipped.estimator,
+        budget=_BUDGET,
+        seed=seed,
+        level=Options().level,
     )
     wall = time.perf_counter() - begun
     return {
         "evaluations": found.evaluations,
         "wall": wall,
         "by_stage": dict(found.seconds),
-        "an_evaluation": {stage: spent / found.evaluations for stage, spent in found.seconds.items()},
+        "an_evaluation": {
+            stage: spent / found.evaluations for stage, spent in found.seconds.items()
+        },
     }

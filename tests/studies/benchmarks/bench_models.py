@@ -1,7 +1,8 @@
-"""What a clip costs: the front end from pixels, a step of training, an estimate; medians of one thread's time.
+"""What a clip costs: the front end from pixels, a step of training, an estimate; medians of one
+thread's time.
 
-The plain front end is the definition that tests hold the fast one to: SciPy's filters, torch's pooling and the
-periodogram layer.
+The plain front end is the definition that tests hold the fast one to: SciPy's filters, torch's
+pooling and the periodogram layer.
 """
 
 from __future__ import annotations
@@ -23,7 +24,17 @@ from models.training import load
 
 _RUNS = 31
 _BATCH = 8
-_RECIPES = ("flow", "wave", "sdn", "sdn-112", "resnet18-1", "resnet18-10", "resnet18-20", "cardona", "yang")
+_RECIPES = (
+    "flow",
+    "wave",
+    "sdn",
+    "sdn-112",
+    "resnet18-1",
+    "resnet18-10",
+    "resnet18-20",
+    "cardona",
+    "yang",
+)
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
@@ -31,7 +42,14 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     torch.set_num_threads(1)
     generator = torch.Generator().manual_seed(seed)
     clip = (torch.rand((1, 1, 30, 224, 224), generator=generator) * 255).to(torch.uint8)
-    kinds: tuple[Maps, ...] = ("frames", "spectral-maps", "wave-maps", "flow-maps", "flow-maps-3", "handmade")
+    kinds: tuple[Maps, ...] = (
+        "frames",
+        "spectral-maps",
+        "wave-maps",
+        "flow-maps",
+        "flow-maps-3",
+        "handmade",
+    )
     ends = {maps: _milliseconds(lambda maps=maps: FrontEnd(maps=maps)(clip)) for maps in kinds}
     model = estimator.load_shipped()
     film = (torch.rand((1, 30, 300, 300), generator=generator) * 255).to(torch.uint8).numpy()

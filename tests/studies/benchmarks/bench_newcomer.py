@@ -1,13 +1,15 @@
 """What a newcomer's first answer takes: from a clean clone to a right wind on the terminal.
 
-For each Python that is on the path, once with the plain installation and once with the physics: the commands of
-docs/install.md in a new environment, the minutes that each takes, what pip downloads, and the disk that the environment
-takes. The plain installation reads the wind off the example's log, the physics off its film; an answer is right where
-the true wind lies in the interval, or within the log's own resolution of the truth.
+For each Python that is on the path, once with the plain installation and once with the physics: the
+commands of docs/install.md in a new environment, the minutes that each takes, what pip downloads,
+and the disk that the environment takes. The plain installation reads the wind off the example's
+log, the physics off its film; an answer is right where the true wind lies in the interval, or
+within the log's own resolution of the truth.
 
-Two of the README's lines differ here: the clone is of this checkout, and the build of torch is what the configured
-index offers for `torch==2.13.0` or, for a Python that it has none for, what the extra resolves to; the sheet names it.
-pip's cache is off. Packages that a local index holds count as downloaded, since a newcomer downloads them.
+Two of the README's lines differ here: the clone is of this checkout, and the build of torch is what
+the configured index offers for `torch==2.13.0` or, for a Python that it has none for, what the
+extra resolves to; the sheet names it. pip's cache is off. Packages that a local index holds count
+as downloaded, since a newcomer downloads them.
 """
 
 from __future__ import annotations
@@ -39,7 +41,8 @@ _RESOLUTION = 0.5  # m/s; the cup and the flag are seconds apart, and the log ha
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
-    """Commands, minutes and bytes of every Python and installation; nothing is written into `out`."""
+    """Commands, minutes and bytes of every Python and installation; nothing is written into
+    `out`."""
     del seed, out
     return {
         python: {"light": _tried(_light, python), "physics": _tried(_physics, python)}
@@ -50,7 +53,8 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
 
 
 def _tried(install: Callable[[str], dict[str, Any]], python: str) -> dict[str, Any]:
-    """What an installation came to, or the message of the command that failed: that is a result, too."""
+    """What an installation came to, or the message of the command that failed: that is a result,
+    too."""
     try:
         return install(python)
     except RuntimeError as error:
@@ -59,7 +63,10 @@ def _tried(install: Callable[[str], dict[str, Any]], python: str) -> dict[str, A
 
 def _runs(python: str) -> bool:
     found = shutil.which(python)
-    return found is not None and subprocess.run([found, "--version"], capture_output=True, check=False).returncode == 0
+    return (
+        found is not None
+        and subprocess.run([found, "--version"], capture_output=True, check=False).returncode == 0
+    )
 
 
 class _Newcomer:
@@ -76,7 +83,11 @@ class _Newcomer:
 
     def step(self, *command: str, within: Path | None = None) -> str:
         """Run a command as it is typed; what it prints."""
-        clean = {name: value for name, value in os.environ.items() if name not in {"PYTHONPATH", "VIRTUAL_ENV"}}
+        clean = {
+            name: value
+            for name, value in os.environ.items()
+            if name not in {"PYTHONPATH", "VIRTUAL_ENV"}
+        }
         path = os.pathsep.join([str(self.environment / "bin"), os.environ["PATH"]])
         begun = time.perf_counter()
         done = subprocess.run(
@@ -98,9 +109,14 @@ class _Newcomer:
         report = self.clone / "installed.json"
         said = self.step("pip", "install", "--report", str(report), *what)
         fetched = sum(float(number) * _UNITS[unit] for number, unit in _DOWNLOADED.findall(said))
-        places = [urlparse(one["download_info"]["url"]) for one in json.loads(report.read_text())["install"]]
+        places = [
+            urlparse(one["download_info"]["url"])
+            for one in json.loads(report.read_text())["install"]
+        ]
         local = [Path(unquote(place.path)) for place in places if place.scheme == "file"]
-        self.steps[-1]["megabytes"] = (fetched + sum(one.stat().st_size for one in local if one.is_file())) / 1e6
+        self.steps[-1]["megabytes"] = (
+            fetched + sum(one.stat().st_size for one in local if one.is_file())
+        ) / 1e6
         self.steps[-1]["command"] = f"pip install {' '.join(what)}"
 
     def done(self, answer: dict[str, Any], *, right: bool) -> dict[str, Any]:
@@ -108,7 +124,9 @@ class _Newcomer:
         packages = json.loads(self.step("pip", "list", "--format", "json"))
         self.steps.pop()
         found = {one["name"]: one["version"] for one in packages}
-        used = subprocess.run(["du", "-sB1", str(self.environment)], capture_output=True, text=True, check=True)
+        used = subprocess.run(
+            ["du", "-sB1", str(self.environment)], capture_output=True, text=True, check=True
+        )
         return {
             "commands": len(self.steps),
             "minutes": sum(one["minutes"] for one in self.steps),

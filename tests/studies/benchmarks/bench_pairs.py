@@ -1,7 +1,8 @@
-"""Clips a second out of a lake, decoded and from the decoded cache, beside WebDataset on the same pictures.
+"""Clips a second out of a lake, decoded and from the decoded cache, beside WebDataset on the same
+pictures.
 
-Clips of 30 gray frames of 300×300, JPEG. The lake is read in random order, WebDataset, which cannot do otherwise, in
-the order of its shards. Every way must give the same pixels.
+Clips of 30 gray frames of 300×300, JPEG. The lake is read in random order, WebDataset, which cannot
+do otherwise, in the order of its shards. Every way must give the same pixels.
 """
 
 from __future__ import annotations
@@ -34,16 +35,20 @@ START = 1_777_636_800 * NANOSECONDS  # 2026-05-01T12:00:00Z
 CLIPS = 120
 SHARDS = 4
 SECONDS = 4.0  # each way is measured for at least this long
-ROUNDS = 3  # interleaved, the best of each way is kept: other work on the machine only ever slows down
+ROUNDS = (
+    3  # interleaved, the best of each way is kept: other work on the machine only ever slows down
+)
 WORKERS = 2
 BATCH = 10
-# clips/s, lowest and highest, of prototypes measured on a two-core machine before the lake was built.
+# clips/s, lowest and highest, of prototypes measured on a two-core machine before the lake was
+# built.
 TO_BEAT = {"record": (132, 184), "cache": (427, 1121), "webdataset": (132, 137)}
 TO_BEAT_WORKERS = {"record": (86, 92), "cache": (152, 226), "webdataset": (77, 82)}
 
 
 def pictures(seed: int, count: int) -> Iterator[np.ndarray]:
-    """Frames of a waving, textured cloth before a still background: about what a filmed flag costs in JPEG."""
+    """Frames of a waving, textured cloth before a still background: about what a filmed flag costs
+    in JPEG."""
     generator = stream(seed, "bench", "pictures")
     size = FRAME_SIZE
     background = gaussian_filter(generator.normal(size=(size, size)), 2) * 120 + 150
@@ -53,8 +58,12 @@ def pictures(seed: int, count: int) -> Iterator[np.ndarray]:
         phase = 2 * np.pi * (x / 80 - k / 9)
         column = (x + 12 * np.sin(phase)).astype(int) % (2 * size)
         row = (y + 9 * np.cos(phase)).astype(int) % size
-        inside = (y > 60 + 14 * np.sin(phase)) & (y < 230 + 14 * np.sin(phase)) & (x > 30) & (x < 270)
-        image = np.where(inside, cloth[row, column], background) + generator.normal(size=(size, size))
+        inside = (
+            (y > 60 + 14 * np.sin(phase)) & (y < 230 + 14 * np.sin(phase)) & (x > 30) & (x < 270)
+        )
+        image = np.where(inside, cloth[row, column], background) + generator.normal(
+            size=(size, size)
+        )
         yield np.clip(image, 0, 255).astype(np.uint8)
 
 
@@ -113,12 +122,17 @@ def make_shards(folder: Path, lake: Lake, pairs: Pairs) -> list[str]:
 
 
 def decode_sample(sample: dict[str, Any]) -> torch.Tensor:
-    frames = [simplejpeg.decode_jpeg(sample[f"{k:02d}.jpg"], colorspace="GRAY")[..., 0] for k in range(CLIP_FRAMES)]
+    frames = [
+        simplejpeg.decode_jpeg(sample[f"{k:02d}.jpg"], colorspace="GRAY")[..., 0]
+        for k in range(CLIP_FRAMES)
+    ]
     return torch.from_numpy(np.stack(frames)).unsqueeze(0)
 
 
 def shards_reader(shards: list[str]) -> webdataset.WebDataset:
-    return webdataset.WebDataset(shards, shardshuffle=False, nodesplitter=None, empty_check=False).map(decode_sample)
+    return webdataset.WebDataset(
+        shards, shardshuffle=False, nodesplitter=None, empty_check=False
+    ).map(decode_sample)
 
 
 def stack(clips: list[torch.Tensor]) -> torch.Tensor:
@@ -131,8 +145,9 @@ def in_random_order(pairs: Pairs, epoch: int) -> Iterator[torch.Tensor]:
 
 
 def rate(epoch: Callable[[int], Iterable[int]]) -> tuple[float, float]:
-    """Clips a second, and clips a second of this process's CPU time, over whole epochs, after the first clip or batch
-    has been seen (workers have then started). The second is fair on a busy machine, but sees no worker processes."""
+    """Clips a second, and clips a second of this process's CPU time, over whole epochs, after the
+    first clip or batch has been seen (workers have then started). The second is fair on a busy
+    machine, but sees no worker processes."""
     clips, number, began, cpu = 0, 0, None, 0.0
     while True:
         for count in epoch(number):
@@ -169,9 +184,13 @@ def measure(folder: Path, seed: int) -> dict[str, Any]:
     decoded = [pairs[index].clip for index in range(len(pairs))]
     agree = {
         "cache": all(
-            torch.equal(cached[k].clip, clip) and torch.equal(cached[k].clip, clip) for k, clip in enumerate(decoded)
+            torch.equal(cached[k].clip, clip) and torch.equal(cached[k].clip, clip)
+            for k, clip in enumerate(decoded)
         ),
-        "webdataset": all(torch.equal(clip, other) for clip, other in zip(decoded, shards_reader(shards), strict=True)),
+        "webdataset": all(
+            torch.equal(clip, other)
+            for clip, other in zip(decoded, shards_reader(shards), strict=True)
+        ),
     }
     del decoded
 
@@ -181,7 +200,11 @@ def measure(folder: Path, seed: int) -> dict[str, Any]:
         for run_in in ("threads", "fork")
     }
     sequential = torch.utils.data.DataLoader(
-        shards_reader(shards), batch_size=BATCH, num_workers=WORKERS, collate_fn=stack, persistent_workers=True
+        shards_reader(shards),
+        batch_size=BATCH,
+        num_workers=WORKERS,
+        collate_fn=stack,
+        persistent_workers=True,
     )
     single = {
         "record": lambda epoch: (1 for _ in in_random_order(pairs, epoch)),
@@ -189,7 +212,10 @@ def measure(folder: Path, seed: int) -> dict[str, Any]:
         "webdataset": lambda _: (1 for _ in shards_reader(shards)),
     }
     parallel = {
-        **{way: lambda _, loader=loader: (len(batch) for batch in loader) for way, loader in loaders.items()},
+        **{
+            way: lambda _, loader=loader: (len(batch) for batch in loader)
+            for way, loader in loaders.items()
+        },
         "webdataset fork": lambda _: (len(batch) for batch in sequential),
     }
     rates: dict[str, dict[str, list[tuple[float, float]]]] = {"one thread": {}, "two workers": {}}
@@ -209,7 +235,11 @@ def measure(folder: Path, seed: int) -> dict[str, Any]:
             for title, ways in rates.items()
         },
         "clips_per_cpu_second": {
-            title: {way: round(max(cpu for _, cpu in seen), 1) for way, seen in ways.items() if "fork" not in way}
+            title: {
+                way: round(max(cpu for _, cpu in seen), 1)
+                for way, seen in ways.items()
+                if "fork" not in way
+            }
             for title, ways in rates.items()
         },
         "to_beat": {"one thread": TO_BEAT, "two workers": TO_BEAT_WORKERS},

@@ -1,9 +1,11 @@
-"""The same clips read by flagdata and by other programs, each in a process, and an environment, of its own.
+"""The same clips read by flagdata and by other programs, each in a process, and an environment, of
+its own.
 
-Clips of 30 gray frames of 300×300. flagdata, plain files, WebDataset, Lance and Rerun hold the same JPEG bytes; LeRobot
-holds films in AV1. Cold means that the system was asked to forget the files before; other reads are of a second pass.
-Every process decodes with one thread, by simplejpeg where its environment has it, else by Pillow. A peer that is not
-installed, and what a peer does not offer, is left out with the reason.
+Clips of 30 gray frames of 300×300. flagdata, plain files, WebDataset, Lance and Rerun hold the same
+JPEG bytes; LeRobot holds films in AV1. Cold means that the system was asked to forget the files
+before; other reads are of a second pass. Every process decodes with one thread, by simplejpeg where
+its environment has it, else by Pillow. A peer that is not installed, and what a peer does not
+offer, is left out with the reason.
 """
 
 from __future__ import annotations
@@ -197,7 +199,9 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         frames = _write_files(lake, folder / "files")
         found["bytes a frame"] = round(frames / CLIPS / CLIP_FRAMES)
         found["a disk"] = {peer.title: _measured(peer, folder) for peer in _on_disk(lake, folder)}
-        found["a bucket on loopback"] = {peer.title: _measured(peer, folder) for peer in _in_bucket(folder, address)}
+        found["a bucket on loopback"] = {
+            peer.title: _measured(peer, folder) for peer in _in_bucket(folder, address)
+        }
     return found
 
 
@@ -219,7 +223,9 @@ def _on_disk(lake: Lake, folder: Path) -> Iterator[Peer]:
     yield Peer(title="flagdata, decoded cache", program=_CACHED, place=str(lake.path))
     yield Peer(title="plain files", program=_FILES, place=str(folder / "files"))
     shards = {"random": "left out: WebDataset reads shards in their order"}
-    yield Peer(title="WebDataset", program=_WEBDATASET, place=str(folder / "shards"), remarks=shards)
+    yield Peer(
+        title="WebDataset", program=_WEBDATASET, place=str(folder / "shards"), remarks=shards
+    )
     if _is_there(LANCE):
         _write_lance(folder, str(folder / "lance"), {})
     yield Peer(title="Lance", program=_LANCE, place=str(folder / "lance"), environment=LANCE)
@@ -235,10 +241,23 @@ def _on_disk(lake: Lake, folder: Path) -> Iterator[Peer]:
         variables={"HOME": str(folder)},
     )
     if _is_there(LEROBOT):
-        export(lake, Export(format="lerobot", where=_CLIPS_ONLY, options={"frames": "av1"}), folder / "lerobot")
-    home = {"HF_HUB_OFFLINE": "1", "HF_DATASETS_OFFLINE": "1", "HOME": str(folder), "HF_HOME": str(folder / "hf")}
+        export(
+            lake,
+            Export(format="lerobot", where=_CLIPS_ONLY, options={"frames": "av1"}),
+            folder / "lerobot",
+        )
+    home = {
+        "HF_HUB_OFFLINE": "1",
+        "HF_DATASETS_OFFLINE": "1",
+        "HOME": str(folder),
+        "HF_HOME": str(folder / "hf"),
+    }
     yield Peer(
-        title="LeRobot, AV1", program=_LEROBOT, place=str(folder / "lerobot"), environment=LEROBOT, variables=home
+        title="LeRobot, AV1",
+        program=_LEROBOT,
+        place=str(folder / "lerobot"),
+        environment=LEROBOT,
+        variables=home,
     )
 
 
@@ -255,7 +274,13 @@ def _in_bucket(folder: Path, address: str) -> Iterator[Peer]:
     said = {"BENCH_LANCE": json.dumps(options)}
     if _is_there(LANCE):
         _write_lance(folder, f"s3://{BUCKET}/lance", said)
-    yield Peer(title="Lance", program=_LANCE, place=f"s3://{BUCKET}/lance", environment=LANCE, variables=said)
+    yield Peer(
+        title="Lance",
+        program=_LANCE,
+        place=f"s3://{BUCKET}/lance",
+        environment=LANCE,
+        variables=said,
+    )
 
 
 def _is_there(environment: Environment) -> bool:
@@ -278,7 +303,12 @@ def _measured(peer: Peer, folder: Path) -> dict[str, Any] | str:
         return f"left out: {error.what}"
     _forget(folder)
     workers = ",".join(map(str, WORKERS)) if "random" not in peer.remarks else "0"
-    command = [python, *([] if peer.environment is None else ["-I"]), "-c", _MEASURE.replace("{program}", peer.program)]
+    command = [
+        python,
+        *([] if peer.environment is None else ["-I"]),
+        "-c",
+        _MEASURE.replace("{program}", peer.program),
+    ]
     done = subprocess.run(
         [*command, peer.place, str(CLIPS), workers, "sequential" if peer.remarks else "random"],
         capture_output=True,

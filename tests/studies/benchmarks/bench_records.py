@@ -1,6 +1,8 @@
-"""Random clips of 30 frames out of one record: reading by offset against the mcap package, and JPEG against H.264.
+"""Random clips of 30 frames out of one record: reading by offset against the mcap package, and JPEG
+against H.264.
 
-Frames are a travelling wave seen through sensor noise, 300×300 gray; all readers must return the same pixels.
+Frames are a travelling wave seen through sensor noise, 300×300 gray; all readers must return the
+same pixels.
 """
 
 from __future__ import annotations
@@ -31,7 +33,8 @@ Reader = Callable[[int], UInt8Array]
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
-    """Clips a second on one thread (CPU time, median of `CLIPS`), and how exact each reader and coding is."""
+    """Clips a second on one thread (CPU time, median of `CLIPS`), and how exact each reader and
+    coding is."""
     result: dict[str, Any] = {"clip": f"{CLIP_FRAMES} frames of {FRAME_SIZE}×{FRAME_SIZE}"}
     with tempfile.TemporaryDirectory() as folder:
         pictures = _pictures(seed)
@@ -40,7 +43,11 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
             began = time.process_time()
             _write(path, pictures, count, coding)
             written = time.process_time() - began
-            starts = stream(seed, "starts", coding.value).integers(0, count - CLIP_FRAMES, CLIPS).tolist()
+            starts = (
+                stream(seed, "starts", coding.value)
+                .integers(0, count - CLIP_FRAMES, CLIPS)
+                .tolist()
+            )
             record = Record.open(path)
             index = _seconds(lambda record=record: record.frame_count)
             result[coding.value] = {
@@ -52,9 +59,14 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
                 "clips_per_second": {"flagdata": _speed(_by_offset(record), starts)},
             }
             if coding is Coding.JPEG:
-                peers = {"mcap, summary cached": _by_mcap(path), "mcap, opened for each clip": _by_mcap_anew(path)}
+                peers = {
+                    "mcap, summary cached": _by_mcap(path),
+                    "mcap, opened for each clip": _by_mcap_anew(path),
+                }
                 for name, peer in peers.items():
-                    np.testing.assert_array_equal(peer(starts[0]), record.frames(starts[0], CLIP_FRAMES))
+                    np.testing.assert_array_equal(
+                        peer(starts[0]), record.frames(starts[0], CLIP_FRAMES)
+                    )
                     result[coding.value]["clips_per_second"][name] = _speed(peer, starts)
                 result[coding.value]["decoding_share"] = _decoding_share(record, starts)
     return result
@@ -64,7 +76,10 @@ def _pictures(seed: int) -> UInt8Array:
     """(50, 300, 300): two seconds that repeat."""
     rng = stream(seed, "pictures")
     row, column = np.mgrid[:FRAME_SIZE, :FRAME_SIZE]
-    waves = [120 + 70 * np.sin((column + 30 * np.sin(row / 80)) / 20 - 2 * np.pi * k / 25) for k in range(50)]
+    waves = [
+        120 + 70 * np.sin((column + 30 * np.sin(row / 80)) / 20 - 2 * np.pi * k / 25)
+        for k in range(50)
+    ]
     noisy = np.array(waves) + rng.normal(0, NOISE, (50, FRAME_SIZE, FRAME_SIZE))
     return np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
 
@@ -73,7 +88,12 @@ def _write(path: Path, pictures: UInt8Array, count: int, coding: Coding) -> None
     with RecordWriter(path, metadata={}, coding=coding) as record:
         for k in range(count):
             time_ = START + k * PERIOD
-            record.frame(log_time=time_, publish_time=time_, timestamp=time_, image=pictures[k % len(pictures)])
+            record.frame(
+                log_time=time_,
+                publish_time=time_,
+                timestamp=time_,
+                image=pictures[k % len(pictures)],
+            )
 
 
 def _psnr(record: Record, pictures: UInt8Array) -> float:
@@ -101,8 +121,12 @@ def _by_mcap_anew(path: Path) -> Reader:
 
 def _clip(reader: Any, first: int) -> UInt8Array:
     start = START + first * PERIOD
-    found = reader.iter_decoded_messages([TOPIC_IMAGE], starting_at=start, ending_before=start + CLIP_FRAMES * PERIOD)
-    return np.stack([simplejpeg.decode_jpeg(image.data, colorspace="GRAY")[..., 0] for *_, image in found])
+    found = reader.iter_decoded_messages(
+        [TOPIC_IMAGE], starting_at=start, ending_before=start + CLIP_FRAMES * PERIOD
+    )
+    return np.stack(
+        [simplejpeg.decode_jpeg(image.data, colorspace="GRAY")[..., 0] for *_, image in found]
+    )
 
 
 def _speed(reader: Reader, starts: list[int]) -> float:
@@ -118,7 +142,9 @@ def _seconds(action: Callable[[], object]) -> float:
 
 def _decoding_share(record: Record, starts: list[int]) -> float:
     """Part of a clip's time that is JPEG decoding alone."""
-    pictures = {first: [record.jpeg(k) for k in range(first, first + CLIP_FRAMES)] for first in starts}
+    pictures = {
+        first: [record.jpeg(k) for k in range(first, first + CLIP_FRAMES)] for first in starts
+    }
 
     def decode(first: int) -> list[UInt8Array]:
         return [simplejpeg.decode_jpeg(picture, colorspace="GRAY") for picture in pictures[first]]

@@ -1,8 +1,9 @@
 """Speed of the renderers on one core, with the rasteriser's error at that speed beside it.
 
-300 × 300, a simulated flag of 2,501 vertices and 4,800 faces, shadows, exposure; ζ is drawn, so that the flag takes as
-much of the frame as in a data set. Peers in the same run, where Blender is there: Cycles at the paper's 50 samples, and
-Blender's Workbench, which draws neither shadows nor sky.
+300 × 300, a simulated flag of 2,501 vertices and 4,800 faces, shadows, exposure; ζ is drawn, so
+that the flag takes as much of the frame as in a data set. Peers in the same run, where Blender is
+there: Cycles at the paper's 50 samples, and Blender's Workbench, which draws neither shadows nor
+sky.
 """
 
 from __future__ import annotations
@@ -63,7 +64,9 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
 
 
 def _flag() -> Meshes:
-    scene = flag(material=material("camel-ponte-roma").scaled(area_weight=0.5), wind_speed=5.0, columns=60)
+    scene = flag(
+        material=material("camel-ponte-roma").scaled(area_weight=0.5), wind_speed=5.0, columns=60
+    )
     kept = []
     with torch.no_grad():
         system, state = assemble([scene])
@@ -81,7 +84,9 @@ def _flag() -> Meshes:
     return Meshes.flag(sequence, heading=0.0)
 
 
-def _raster(meshes: Meshes, zetas: list[RenderParameters], samples: int, exact: list[torch.Tensor]) -> dict[str, float]:
+def _raster(
+    meshes: Meshes, zetas: list[RenderParameters], samples: int, exact: list[torch.Tensor]
+) -> dict[str, float]:
     """Over all ζ; the background and the texture are made anew for each clip, as in a build."""
     renderer = Raster()
     chosen = [replace(zeta, raster_samples=samples) for zeta in zetas]
@@ -106,7 +111,10 @@ def _raster(meshes: Meshes, zetas: list[RenderParameters], samples: int, exact: 
 
 def _exact(meshes: Meshes, zetas: list[RenderParameters]) -> list[torch.Tensor]:
     """Two frames with so many samples that more change nothing."""
-    return [Raster().render(meshes.part(0, 2), replace(zeta, raster_samples=EXACT)).double() for zeta in zetas]
+    return [
+        Raster().render(meshes.part(0, 2), replace(zeta, raster_samples=EXACT)).double()
+        for zeta in zetas
+    ]
 
 
 def _peer(name: str, meshes: Meshes, zeta: RenderParameters) -> dict[str, Any]:

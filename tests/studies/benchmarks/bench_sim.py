@@ -1,8 +1,8 @@
 """Speed of the simulator on one core, with the distance to the reference run beside it.
 
-Float32, batch 16, tables and damping included, from flags in 4.0 to 5.5 m/s; contact off, and by itself. The peer is
-ArcSim 0.2.1 on the same mesh, material and wind, by the wall times stored with its runs (another run of this machine
-class).
+Float32, batch 16, tables and damping included, from flags in 4.0 to 5.5 m/s; contact off, and by
+itself. The peer is ArcSim 0.2.1 on the same mesh, material and wind, by the wall times stored with
+its runs (another run of this machine class).
 """
 
 from __future__ import annotations
@@ -39,9 +39,15 @@ WINDS = {"calm": (0.2, 1.0), "flapping": (4.0, 5.5)}
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
-    """Times of one 40 ms frame a flag [ms]; the scenes are fixed, so that `seed` and `out` change nothing."""
+    """Times of one 40 ms frame a flag [ms]; the scenes are fixed, so that `seed` and `out` change
+    nothing."""
     torch.set_num_threads(1)
-    result: dict[str, Any] = {"batch": BATCH, "dtype": "float32", "machine": platform.machine(), "meshes": []}
+    result: dict[str, Any] = {
+        "batch": BATCH,
+        "dtype": "float32",
+        "machine": platform.machine(),
+        "meshes": [],
+    }
     if hasattr(os, "sched_setaffinity"):
         allowed = os.sched_getaffinity(0)
         os.sched_setaffinity(0, {max(allowed)})
@@ -67,7 +73,10 @@ def _mesh(columns: int) -> dict[str, Any]:
     steps = Symplectic().steps(system, FRAME)
     for _ in range(10):
         state = advance(system, state, FRAME, steps=steps, backend=Backend.KERNEL)
-    frame = _median(lambda: advance(system, state, FRAME, steps=steps, backend=Backend.KERNEL), 7) / BATCH
+    frame = (
+        _median(lambda: advance(system, state, FRAME, steps=steps, backend=Backend.KERNEL), 7)
+        / BATCH
+    )
     vertices = system.cloth.mesh.vertex_count
     fine, coarse = PEER[vertices]
     report = {
@@ -85,12 +94,16 @@ def _mesh(columns: int) -> dict[str, Any]:
         / 2,
     }
     implicit = BackwardEuler(tolerance=1e-4)
-    report["implicit_5_ms_ms_a_flag_frame"] = 1e3 * _median(lambda: implicit.advance(system, state, FRAME), 3) / BATCH
+    report["implicit_5_ms_ms_a_flag_frame"] = (
+        1e3 * _median(lambda: implicit.advance(system, state, FRAME), 3) / BATCH
+    )
     report["profile"] = _profile(system, state, steps)
     if columns == 30:
         limited = replace(system, limits=StrainLimits())
         count = Symplectic().steps(limited, FRAME)
-        seconds = _median(lambda: advance(limited, state, FRAME, steps=count, backend=Backend.KERNEL), 7)
+        seconds = _median(
+            lambda: advance(limited, state, FRAME, steps=count, backend=Backend.KERNEL), 7
+        )
         report["ms_a_flag_frame_with_strain_limits"] = 1e3 * seconds / BATCH
         report["steps_a_frame_with_strain_limits"] = count
     report["contact"] = [_contact(columns, name, *winds) for name, winds in WINDS.items()]
@@ -98,9 +111,13 @@ def _mesh(columns: int) -> dict[str, Any]:
 
 
 def _contact(columns: int, name: str, low: float, high: float) -> dict[str, Any]:
-    """What contact costs after a second in winds of a range [m/s]: over a frame, and over equally many steps."""
+    """What contact costs after a second in winds of a range [m/s]: over a frame, and over equally
+    many steps."""
     speeds = np.linspace(low, high, BATCH).tolist()
-    scenes = [flag(material=named_material("camel-ponte-roma"), wind_speed=speed, columns=columns) for speed in speeds]
+    scenes = [
+        flag(material=named_material("camel-ponte-roma"), wind_speed=speed, columns=columns)
+        for speed in speeds
+    ]
     system, state = assemble(scenes)
     touching = replace(system, contact=Contact())
     fewer, steps = Symplectic().steps(system, FRAME), Symplectic().steps(touching, FRAME)
@@ -108,9 +125,15 @@ def _contact(columns: int, name: str, low: float, high: float) -> dict[str, Any]
         state = advance(touching, state, FRAME, steps=steps, backend=Backend.KERNEL)
 
     def seconds(chosen: System, count: int) -> float:
-        return _median(lambda: advance(chosen, state, FRAME, steps=count, backend=Backend.KERNEL), 5)
+        return _median(
+            lambda: advance(chosen, state, FRAME, steps=count, backend=Backend.KERNEL), 5
+        )
 
-    without, same, with_contact = seconds(system, fewer), seconds(system, steps), seconds(touching, steps)
+    without, same, with_contact = (
+        seconds(system, fewer),
+        seconds(system, steps),
+        seconds(touching, steps),
+    )
     return {
         "winds": name,
         "steps_a_frame": steps,
@@ -124,10 +147,10 @@ def _contact(columns: int, name: str, low: float, high: float) -> dict[str, Any]
 def _profile(system: System, state: State, steps: int) -> dict[str, float]:
     """Where a step's time goes, by leaving parts of the kernel's work out [µs a flag].
 
-    The arithmetic bound counts some 200 vector operations a face and 180 a hinge (read off the source), two a cycle,
-    on a unit of 16 lanes. Above it: the look-up of the stretching table, some 400 narrow operations a face for all
-    lanes; divisions and roots; and traffic with the level-2 cache, since positions, velocities and forces take 36 B a
-    vertex and member.
+    The arithmetic bound counts some 200 vector operations a face and 180 a hinge (read off the
+    source), two a cycle, on a unit of 16 lanes. Above it: the look-up of the stretching table, some
+    400 narrow operations a face for all lanes; divisions and roots; and traffic with the level-2
+    cache, since positions, velocities and forces take 36 B a vertex and member.
     """
     kernel = Kernel.of(system)
     assert kernel is not None
@@ -137,13 +160,20 @@ def _profile(system: System, state: State, steps: int) -> dict[str, float]:
         kernel.problem.faces, kernel.problem.hinges = faces, hinges
         try:
             seconds = _median(
-                lambda: kernel.advance(system.drive(0.0, 1e-9), state.position, state.velocity, 1e-12, steps), 5
+                lambda: kernel.advance(
+                    system.drive(0.0, 1e-9), state.position, state.velocity, 1e-12, steps
+                ),
+                5,
             )
         finally:
             kernel.problem.faces, kernel.problem.hinges = full
         return 1e6 * seconds / BATCH / (steps + 1)
 
-    rest, with_faces, with_hinges = microseconds(0, 0), microseconds(full[0], 0), microseconds(0, full[1])
+    rest, with_faces, with_hinges = (
+        microseconds(0, 0),
+        microseconds(full[0], 0),
+        microseconds(0, full[1]),
+    )
     cycles = (200 * full[0] + 180 * full[1]) / 2 / BATCH
     return {
         "faces_us": with_faces - rest,
@@ -155,17 +185,23 @@ def _profile(system: System, state: State, steps: int) -> dict[str, float]:
 
 
 def _batches() -> list[dict[str, float]]:
-    """Time of a frame against the batch, with one flag's worth of steps: linear beyond one block of 16 lanes."""
+    """Time of a frame against the batch, with one flag's worth of steps: linear beyond one block of
+    16 lanes."""
     rows = []
     for batch in (16, 32, 64):
-        system, state = assemble([flag(material=named_material("camel-ponte-roma"), wind_speed=4.0)] * batch)
-        seconds = _median(lambda s=system, x=state: advance(s, x, FRAME, steps=60, backend=Backend.KERNEL), 3)
+        system, state = assemble(
+            [flag(material=named_material("camel-ponte-roma"), wind_speed=4.0)] * batch
+        )
+        seconds = _median(
+            lambda s=system, x=state: advance(s, x, FRAME, steps=60, backend=Backend.KERNEL), 3
+        )
         rows.append({"batch": batch, "us_a_flag_step": 1e6 * seconds / 61 / batch})
     return rows
 
 
 def _accuracy() -> dict[str, Any]:
-    """Mean vertex distance to the reference's 0.5 ms run after 1, 5 and 10 frames [mm], float32, as timed."""
+    """Mean vertex distance to the reference's 0.5 ms run after 1, 5 and 10 frames [mm], float32, as
+    timed."""
     path = REFERENCE / "arcsim" / "flag_w4_dt05.npz"
     if not path.is_file():
         return {"skipped": f"no reference data at {path.name}"}

@@ -1,9 +1,11 @@
-"""What the simulator's time and memory grow with, and how far a step is from the limits of the core.
+"""What the simulator's time and memory grow with, and how far a step is from the limits of the
+core.
 
-One core, float32, the compiled kernel, flags in 4 m/s, contact off; processor time, the least of several runs. The
-exponents are slopes of log time (for a whole batch) against log size: 1 where the cost is linear. The limits of the
-core are measured in the same run by a small program of the kernel's compiler: independent fused multiply-adds in
-registers at the full width of its vectors, and copying between arrays larger than all caches.
+One core, float32, the compiled kernel, flags in 4 m/s, contact off; processor time, the least of
+several runs. The exponents are slopes of log time (for a whole batch) against log size: 1 where the
+cost is linear. The limits of the core are measured in the same run by a small program of the
+kernel's compiler: independent fused multiply-adds in registers at the full width of its vectors,
+and copying between arrays larger than all caches.
 """
 
 from __future__ import annotations
@@ -34,14 +36,17 @@ COLUMNS = (15, 30, 60, 90)
 STEP_COUNTS = (30, 60, 120, 240, 480)
 BATCHES = (16, 32, 64, 128, 256)
 MEMORY = ((30, 16), (30, 256), (60, 16), (60, 256))
-# Vector operations a face and a hinge, read off the kernel's source; additions, multiplications and fused ones alike.
+# Vector operations a face and a hinge, read off the kernel's source; additions, multiplications and
+# fused ones alike.
 FACE_OPERATIONS, HINGE_OPERATIONS = 200, 180
-# Positions and velocities, read and written, and forces, written and read: 6 × 3 × 4 B a vertex and member.
+# Positions and velocities, read and written, and forces, written and read: 6 × 3 × 4 B a vertex and
+# member.
 STATE_BYTES = 72
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
-    """Times [µs], memory [MB] and limits; the scenes are fixed, so that `seed` and `out` change nothing."""
+    """Times [µs], memory [MB] and limits; the scenes are fixed, so that `seed` and `out` change
+    nothing."""
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     allowed = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()
@@ -77,7 +82,9 @@ def _made(columns: int, batch: int) -> tuple[System, State, float]:
 
 def _timed(*, columns: int = 30, steps: int = STEPS, batch: int = BATCH) -> dict[str, float]:
     system, state, step = _made(columns, batch)
-    seconds = _least(lambda: advance(system, state, steps * step, steps=steps, backend=Backend.KERNEL), 9)
+    seconds = _least(
+        lambda: advance(system, state, steps * step, steps=steps, backend=Backend.KERNEL), 9
+    )
     vertices = system.cloth.mesh.vertex_count
     return {
         "vertices": vertices,
@@ -144,9 +151,12 @@ def _limits() -> dict[str, float]:
 
 
 def _share(columns: int, limits: dict[str, float]) -> dict[str, float]:
-    """A step's time against what its arithmetic and its traffic would take at the limits [µs a flag]."""
+    """A step's time against what its arithmetic and its traffic would take at the limits [µs a
+    flag]."""
     system, state, step = _made(columns, BATCH)
-    seconds = _least(lambda: advance(system, state, STEPS * step, steps=STEPS, backend=Backend.KERNEL), 9)
+    seconds = _least(
+        lambda: advance(system, state, STEPS * step, steps=STEPS, backend=Backend.KERNEL), 9
+    )
     measured = 1e6 * seconds / BATCH / (STEPS + 1)
     mesh = system.cloth.mesh
     operations = FACE_OPERATIONS * len(mesh.faces) + HINGE_OPERATIONS * len(system.cloth.hinges)
@@ -187,7 +197,8 @@ with torch.no_grad():
 
 
 def _memory(columns: int, batch: int) -> dict[str, float]:
-    """Largest resident memory of a process that simulates one frame [MB], and what of it the program itself takes."""
+    """Largest resident memory of a process that simulates one frame [MB], and what of it the
+    program itself takes."""
     done = subprocess.run(
         [sys.executable, "-c", _MEASURE, str(columns), str(batch)],
         capture_output=True,
@@ -200,7 +211,8 @@ def _memory(columns: int, batch: int) -> dict[str, float]:
 
 
 def _least(work: Callable[[], object], repeats: int) -> float:
-    """Processor time of the quickest run [s]: what other programs do meanwhile adds to the others."""
+    """Processor time of the quickest run [s]: what other programs do meanwhile adds to the
+    others."""
     times = []
     for _ in range(repeats):
         start = time.process_time()

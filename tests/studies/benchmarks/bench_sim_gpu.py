@@ -1,8 +1,10 @@
-"""Speed of the Warp kernel on a graphics processor, with the distance to the compiled kernel beside it.
+"""Speed of the Warp kernel on a graphics processor, with the distance to the compiled kernel beside
+it.
 
-Apart from `make bench`, which runs where there is none: `python -m tests.studies sim-gpu --out docs/results`.
-Flags of 651 vertices in 4.0 to 5.5 m/s, float32, contact off, 40 ms frames. The peer is the compiled kernel on one core
-and on all of them. Beside it, steps of training a second of the network `flow`, on inputs of random numbers.
+Apart from `make bench`, which runs where there is none: `python -m tests.studies sim-gpu --out
+docs/results`. Flags of 651 vertices in 4.0 to 5.5 m/s, float32, contact off, 40 ms frames. The peer
+is the compiled kernel on one core and on all of them. Beside it, steps of training a second of the
+network `flow`, on inputs of random numbers.
 """
 
 from __future__ import annotations
@@ -56,7 +58,11 @@ def run(
     result: dict[str, Any] = {"device": _named(device), "frame_s": FRAME, "vertices": None}
     with torch.no_grad():
         scenes = [
-            flag(material=named_material("camel-ponte-roma"), wind_speed=4.0 + 1.5 * i / _DISTINCT, columns=columns)
+            flag(
+                material=named_material("camel-ponte-roma"),
+                wind_speed=4.0 + 1.5 * i / _DISTINCT,
+                columns=columns,
+            )
             for i in range(_DISTINCT)
         ]
         few, start = assemble(scenes[:: _DISTINCT // 16])
@@ -64,7 +70,10 @@ def run(
         result |= {"vertices": few.cloth.mesh.vertex_count, "steps_a_frame": steps}
         result["compiled_kernel"] = _compiled(few, start, steps)
         _say(result)
-        result["agreement"] = {"fine_mesh": _agreement(device, columns), "coarse_mesh": _agreement(device, 6)}
+        result["agreement"] = {
+            "fine_mesh": _agreement(device, columns),
+            "coarse_mesh": _agreement(device, 6),
+        }
         _say(result["agreement"])
 
         system, state = assemble(scenes, device=device)
@@ -78,7 +87,9 @@ def run(
         for threads, blocks, fast in VARIANTS:
             _choose(threads, blocks, fast)
             found = rate(flags[min(2, len(flags) - 1)])
-            result["variants"].append({"threads": threads, "blocks": blocks, "fast_math": fast, **found})
+            result["variants"].append(
+                {"threads": threads, "blocks": blocks, "fast_math": fast, **found}
+            )
             _say(result["variants"][-1])
         result["rates"] = {}
         for fast in (False, True):
@@ -87,7 +98,11 @@ def run(
             _choose(best["threads"], best["blocks"], fast)
             rows = [rate(count) for count in flags]
             kind = "approximate" if fast else "ieee"
-            result["rates"][kind] = {"threads": best["threads"], "blocks": best["blocks"], "by_flags": rows}
+            result["rates"][kind] = {
+                "threads": best["threads"],
+                "blocks": best["blocks"],
+                "by_flags": rows,
+            }
             _say(result["rates"][kind])
     result["training_of_flow"] = [_training(batch, device) for batch in BATCHES]
     return result
@@ -146,7 +161,12 @@ def _compiled(system: System, start: State, steps: int) -> dict[str, float]:
     alone = _seconds(lambda: frame(0), "cpu") / system.cloth.batch
     cores = len(os.sched_getaffinity(0))
     with ThreadPoolExecutor(cores) as pool:
-        together = _seconds(lambda: list(pool.map(frame, range(4 * cores))), "cpu") / system.cloth.batch / 4 / cores
+        together = (
+            _seconds(lambda: list(pool.map(frame, range(4 * cores))), "cpu")
+            / system.cloth.batch
+            / 4
+            / cores
+        )
     return {
         "cores": cores,
         "flag_frames_a_second_on_one_core": round(1 / alone, 1),
@@ -154,7 +174,9 @@ def _compiled(system: System, start: State, steps: int) -> dict[str, float]:
     }
 
 
-def _rate(scenes: Sequence[Any], state: State, steps: int, count: int, device: str) -> dict[str, Any]:
+def _rate(
+    scenes: Sequence[Any], state: State, steps: int, count: int, device: str
+) -> dict[str, Any]:
     system, _ = assemble([scenes[i % _DISTINCT] for i in range(count)], device=device)
     repeats = max(1, count // _DISTINCT)
     many = State(
@@ -163,18 +185,23 @@ def _rate(scenes: Sequence[Any], state: State, steps: int, count: int, device: s
     )
     if device.startswith("cuda"):
         torch.cuda.reset_peak_memory_stats()
-    seconds = _seconds(lambda: advance(system, many, FRAME, steps=steps, backend=Backend.WARP), device)
+    seconds = _seconds(
+        lambda: advance(system, many, FRAME, steps=steps, backend=Backend.WARP), device
+    )
     after = advance(system, many, FRAME, steps=steps, backend=Backend.WARP)
     return {
         "flags": count,
         "flag_frames_a_second": round(count / seconds),
         "healthy": round(float(after.healthy().float().mean()), 4),
-        "peak_memory_mib": round(torch.cuda.max_memory_allocated() / 2**20) if device.startswith("cuda") else None,
+        "peak_memory_mib": round(torch.cuda.max_memory_allocated() / 2**20)
+        if device.startswith("cuda")
+        else None,
     }
 
 
 def _agreement(device: str, columns: int) -> dict[str, Any]:
-    """Largest distance of a vertex from where the compiled kernel has it, float32, and float64 of the latter [m]."""
+    """Largest distance of a vertex from where the compiled kernel has it, float32, and float64 of
+    the latter [m]."""
     scenes = [
         flag(material=named_material("camel-ponte-roma"), wind_speed=speed, columns=columns)
         for speed in (1.0, 2.0, 3.0)
@@ -211,9 +238,9 @@ def _training(batch: int, device: str) -> dict[str, Any]:
         "fabric_bending",
         "anisotropy",
     )  # as catalogs/training/flow.toml has it
-    learner = build("flow", {"dimension": 32}, loss=Loss.POSTERIOR, targets=targets, components=6, margin=1.0).to(
-        device
-    )
+    learner = build(
+        "flow", {"dimension": 32}, loss=Loss.POSTERIOR, targets=targets, components=6, margin=1.0
+    ).to(device)
     optimiser = torch.optim.Adam(learner.parameters())
     inputs = torch.randn((batch, *FrontEnd(maps="flow-maps", size=112).shape), device=device)
     values = torch.full((batch, len(targets)), 5.0, device=device)
@@ -225,4 +252,8 @@ def _training(batch: int, device: str) -> dict[str, Any]:
         optimiser.step()
 
     seconds = _seconds(step, device, repeats=20)
-    return {"batch": batch, "steps_a_second": round(1 / seconds, 1), "clips_a_second": round(batch / seconds)}
+    return {
+        "batch": batch,
+        "steps_a_second": round(1 / seconds, 1),
+        "clips_a_second": round(batch / seconds),
+    }

@@ -1,11 +1,12 @@
 """What the program takes before its work: seconds of the processor, and the size of the wheel.
 
-`ls` of a lake of two artifacts from its start to its end, `flagdata.open` of that lake, `flagdata measure` of the
-package's example from its start to the first window, and `import torch` alone, which is part of the third. Each run is
-a fresh process; the processor's time changes little with other work on the machine.
+`ls` of a lake of two artifacts from its start to its end, `flagdata.open` of that lake, `flagdata
+measure` of the package's example from its start to the first window, and `import torch` alone,
+which is part of the third. Each run is a fresh process; the processor's time changes little with
+other work on the machine.
 
-FLAGDATA_BEFORE names another checkout to compare with: its runs alternate with this one's, so that both meet the same
-machine, and the change is the median over pairs.
+FLAGDATA_BEFORE names another checkout to compare with: its runs alternate with this one's, so that
+both meet the same machine, and the change is the median over pairs.
 """
 
 from __future__ import annotations
@@ -52,16 +53,23 @@ except Begun:
 """,
     "import torch": "import torch\n",
 }
-_TIMED = "import sys, time\n{program}\nprint(f'\\n{{time.process_time():.3f}}', file=sys.__stdout__)\n"
+_TIMED = (
+    "import sys, time\n{program}\nprint(f'\\n{{time.process_time():.3f}}', file=sys.__stdout__)\n"
+)
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
-    """Seconds of the processor of each start, and megabytes of the wheel; nothing is written into `out`."""
+    """Seconds of the processor of each start, and megabytes of the wheel; nothing is written into
+    `out`."""
     del seed, out
     before = os.environ.get("FLAGDATA_BEFORE")
     with tempfile.TemporaryDirectory() as folder:
         lake = Path(folder) / "lake"
-        for arguments in (["init"], ["ingest", str(_FLAG / "anemometer.csv")], ["ingest", str(_FLAG / "flag.mp4")]):
+        for arguments in (
+            ["init"],
+            ["ingest", str(_FLAG / "anemometer.csv")],
+            ["ingest", str(_FLAG / "flag.mp4")],
+        ):
             command = [sys.executable, "-m", "flagdata.cli", *arguments, "--lake", str(lake)]
             subprocess.run(command, cwd=_ROOT, check=True, capture_output=True)
         return {
@@ -88,7 +96,13 @@ def _paired(name: str, lake: Path, before: str | None) -> Mapping[str, float]:
 
 def _seconds(name: str, lake: Path, place: Path) -> float:
     done = subprocess.run(
-        [sys.executable, "-c", _TIMED.format(program=_PROGRAMS[name]), str(lake), str(_FLAG / "flag.mp4")],
+        [
+            sys.executable,
+            "-c",
+            _TIMED.format(program=_PROGRAMS[name]),
+            str(lake),
+            str(_FLAG / "flag.mp4"),
+        ],
         cwd=place,
         env={**os.environ, "PYTHONPATH": str(place)},
         check=True,
@@ -102,7 +116,17 @@ def _wheel(folder: Path) -> float:
     """Of the committed files [MB]."""
     source = folder / "source"
     subprocess.run(["git", "clone", "--quiet", str(_ROOT), str(source)], check=True)
-    command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation", "-w", str(folder)]
+    command = [
+        sys.executable,
+        "-m",
+        "pip",
+        "wheel",
+        "--quiet",
+        "--no-deps",
+        "--no-build-isolation",
+        "-w",
+        str(folder),
+    ]
     subprocess.run([*command, str(source)], check=True, capture_output=True)
     (built,) = folder.glob("*.whl")
     return built.stat().st_size / 1e6

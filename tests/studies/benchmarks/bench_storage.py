@@ -1,6 +1,8 @@
-"""Records in a bucket: bytes and requests of one clip out of a long recording, by its parts and by the whole object.
+"""Records in a bucket: bytes and requests of one clip out of a long recording, by its parts and by
+the whole object.
 
-The server is moto's on loopback; requests and bytes are what a distant store would be asked for, the seconds are not.
+The server is moto's on loopback; requests and bytes are what a distant store would be asked for,
+the seconds are not.
 """
 
 from __future__ import annotations
@@ -32,7 +34,8 @@ _START = 1_767_225_600_000_000_000
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
-    """Requests, bytes and seconds of one clip, of a second one of the same record, and of the whole object before."""
+    """Requests, bytes and seconds of one clip, of a second one of the same record, and of the whole
+    object before."""
     with tempfile.TemporaryDirectory() as folder, moto() as address:
         for name in [name for name in os.environ if name.startswith("AWS_")]:
             del os.environ[name]
@@ -44,8 +47,13 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         objects = RemoteObjects(RemotePath(BUCKET, "bench"))
         objects.path(name).upload(path)
         count = SIZE // _FRAME
-        one, two = (int(first) for first in stream(seed, "clips").integers(0, count - CLIP_FRAMES, 2))
-        result: dict[str, Any] = {"record": {"bytes": len(data), "frames": count}, "clip frames": CLIP_FRAMES}
+        one, two = (
+            int(first) for first in stream(seed, "clips").integers(0, count - CLIP_FRAMES, 2)
+        )
+        result: dict[str, Any] = {
+            "record": {"bytes": len(data), "frames": count},
+            "clip frames": CLIP_FRAMES,
+        }
         os.environ["FLAGDATA_CACHE"] = f"{folder}/whole"
         with _counted() as tally:
             whole, result["whole object, a clip"] = _timed(
@@ -59,7 +67,9 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
             assert parts == whole
             record = Record.open(objects.readable(name))
             _, result["parts, another clip"] = _timed(lambda: record.jpegs(two, CLIP_FRAMES), tally)
-            _, result["parts, the first clip again"] = _timed(lambda: record.jpegs(one, CLIP_FRAMES), tally)
+            _, result["parts, the first clip again"] = _timed(
+                lambda: record.jpegs(one, CLIP_FRAMES), tally
+            )
     return result
 
 
@@ -73,7 +83,9 @@ def _write(path: Path, seed: int) -> None:
             writer.frame(log_time=time_ns, publish_time=time_ns, timestamp=time_ns, image=image)
 
 
-def _timed(read: Callable[[], list[bytes]], tally: dict[str, int]) -> tuple[list[bytes], dict[str, Any]]:
+def _timed(
+    read: Callable[[], list[bytes]], tally: dict[str, int]
+) -> tuple[list[bytes], dict[str, Any]]:
     tally.update(requests=0, bytes=0)
     began = time.perf_counter()
     found = read()

@@ -1,8 +1,9 @@
-"""What a verdict costs on this machine's cores: three recordings of 9 s, with a bank of nulls and without one.
+"""What a verdict costs on this machine's cores: three recordings of 9 s, with a bank of nulls and
+without one.
 
-The recordings are nulls of `tests.studies.validation.stressors`, at 25 Hz in winds that fluctuate, with 70, 204 and 513
-markers. The time with a bank is that of the verdict alone, the median of several; without one the bank is simulated
-before.
+The recordings are nulls of `tests.studies.validation.stressors`, at 25 Hz in winds that fluctuate,
+with 70, 204 and 513 markers. The time with a bank is that of the verdict alone, the median of
+several; without one the bank is simulated before.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ _RUNS = 3
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
-    """Seconds of verdicts by the number of markers, and of the bank's simulation; nothing is written into `out`."""
+    """Seconds of verdicts by the number of markers, and of the bank's simulation; nothing is
+    written into `out`."""
     del out
     return {
         "cores": _cores(),
@@ -44,13 +46,15 @@ def _cores() -> int:
 
 
 def _timed(across: int, seed: int) -> dict[str, Any]:
-    """Seconds with a bank, least and median, and of simulating it: all, or the kinds that end the simulation where the
-    base model is sufficient."""
+    """Seconds with a bank, least and median, and of simulating it: all, or the kinds that end the
+    simulation where the base model is sufficient."""
     truth = stressors.simulated("", 0, seed, across=across)
     experiment = stressors.experiment(truth, "none", seed, across=across)
     with tempfile.TemporaryDirectory() as folder:
         began = time.perf_counter()
-        wanted = batches(Setting.of(experiment), kinds=CRITERIA.simulated_kinds, seed=child_seed(seed, "bank"))
+        wanted = batches(
+            Setting.of(experiment), kinds=CRITERIA.simulated_kinds, seed=child_seed(seed, "bank")
+        )
         banks.build(Path(folder), wanted[: CRITERIA.first_kinds], workers=_cores())
         first = time.perf_counter() - began
         banks.build(Path(folder), wanted, workers=_cores())

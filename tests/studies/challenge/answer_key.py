@@ -1,4 +1,5 @@
-"""Keys: what is undeclared in a set, and how it was made. Sealed by a hash until the verdict is filed."""
+"""Keys: what is undeclared in a set, and how it was made. Sealed by a hash until the verdict is
+filed."""
 
 from __future__ import annotations
 
@@ -36,9 +37,9 @@ class AnswerKey:
         name: of the set.
         kind: of what is undeclared.
         effects: that act.
-        impact: root mean square displacement of the cloth, over its vertices and six instants of each recording, that
-            the effects make within 0.1 s of a common state [m]; 0 where there are none. The one measure of strength
-            that all effects share.
+        impact: root mean square displacement of the cloth, over its vertices and six instants of
+            each recording, that the effects make within 0.1 s of a common state [m]; 0 where there
+            are none. The one measure of strength that all effects share.
         material: nominal.
         density, bending: factors on it.
         damping: [s].
@@ -82,7 +83,8 @@ class AnswerKey:
 
 
 def seal(key: AnswerKey, salt: str) -> str:
-    """What is published of a key: the SHA-256 of its canonical JSON with a salt, so that it cannot be guessed."""
+    """What is published of a key: the SHA-256 of its canonical JSON with a salt, so that it cannot
+    be guessed."""
     return digest(canonical({"key": key.as_dict(), "salt": salt}))
 
 
@@ -96,9 +98,13 @@ def opened(content: Mapping[str, Any], commitment: str, *, where: str) -> Answer
         key = AnswerKey.from_dict(content["key"])
         found = seal(key, str(content["salt"]))
     except (KeyError, TypeError, ValueError) as error:
-        raise CorruptError(f"not a sealed key: {error}", where=where, fix="restore the file") from error
+        raise CorruptError(
+            f"not a sealed key: {error}", where=where, fix="restore the file"
+        ) from error
     if found != commitment:
         raise CorruptError(
-            "the key is not the one whose hash was published", where=where, fix="restore the sealed file as it was made"
+            "the key is not the one whose hash was published",
+            where=where,
+            fix="restore the sealed file as it was made",
         )
     return key

@@ -55,7 +55,12 @@ def acting(effect: str, value: float = 1.0, parameter: str = "coefficient") -> A
 
 
 def key(
-    name: str, kind: Kind, *effects: Acting, impact: float = 0.01, noise: float = 0.001, rate: int = 25
+    name: str,
+    kind: Kind,
+    *effects: Acting,
+    impact: float = 0.01,
+    noise: float = 0.001,
+    rate: int = 25,
 ) -> AnswerKey:
     return AnswerKey(
         name=name,
@@ -95,7 +100,9 @@ def candidate(effect: str, *, strength: float = 1.0, half: float = 0.1) -> Candi
     )
 
 
-def comparison(*, share: float | None = 0.9, after: float = 1e-3, control: float | None = 4e-3) -> Comparison:
+def comparison(
+    *, share: float | None = 0.9, after: float = 1e-3, control: float | None = 4e-3
+) -> Comparison:
     """Errors in metres; the reduction's interval is 1 mm to either side."""
     return Comparison(
         what="unseen",
@@ -117,7 +124,15 @@ def verdict(conclusion: Conclusion, *named: str, **options: Any) -> Verdict:
         named=named,
         words="",
         parameters=(),
-        test=NullTest(statistic=1.0, null=[], p_value=estimate(0.5), kinds=40, level=0.05, critical=None, nulls=""),
+        test=NullTest(
+            statistic=1.0,
+            null=[],
+            p_value=estimate(0.5),
+            kinds=40,
+            level=0.05,
+            critical=None,
+            nulls="",
+        ),
         ranking=options.get("ranking", tuple(candidate(name) for name in named)),
         comparisons=options.get("comparisons", (comparison(),) if named else ()),
         residuals=(),
@@ -131,6 +146,8 @@ def filing(name: str, said: Verdict | None, *, seconds: float = 1.0) -> Filing:
         data="",
         seed=1,
         verdict=None if said is None else verdict_json(said),
-        refusal=None if said is not None else {"kind": "bad-input", "what": "", "where": None, "fix": ""},
+        refusal=None
+        if said is not None
+        else {"kind": "bad-input", "what": "", "where": None, "fix": ""},
         seconds=seconds,
     )

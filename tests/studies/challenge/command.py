@@ -16,15 +16,17 @@ if TYPE_CHECKING:
 
 _FOLDER = click.argument("folder", metavar="DIR", type=LocalPath())
 json_option = click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout.")
-_ONLY = click.option("--only", multiple=True, metavar="SET", help="Take this set only; may be repeated.")
+_ONLY = click.option(
+    "--only", multiple=True, metavar="SET", help="Take this set only; may be repeated."
+)
 
 
 @click.group()
 def challenge() -> None:
     """Benchmark close-loop on recordings whose true effect is hidden.
 
-    Keys are opened by `score` alone, and only of sets whose verdict is filed. Until then `challenge.json` holds a hash
-    of each.
+    Keys are opened by `score` alone, and only of sets whose verdict is filed. Until then
+    `challenge.json` holds a hash of each.
 
     \b
       python -m tests.studies challenge make out/challenge --seed 7 --sets 60 --workers 2
@@ -37,17 +39,37 @@ def challenge() -> None:
 
 @challenge.command()
 @_FOLDER
-@click.option("--recipe", default="standard", show_default=True, help="Recipe: a name of the catalog, or a .toml file.")
 @click.option(
-    "--seed", type=click.IntRange(min=0), required=True, help="Seed of everything that is drawn; keep it secret."
+    "--recipe",
+    default="standard",
+    show_default=True,
+    help="Recipe: a name of the catalog, or a .toml file.",
 )
-@click.option("--sets", "count", type=click.IntRange(min=1), default=60, show_default=True, help="Number of sets.")
 @click.option(
-    "--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Number of processes that simulate."
+    "--seed",
+    type=click.IntRange(min=0),
+    required=True,
+    help="Seed of everything that is drawn; keep it secret.",
+)
+@click.option(
+    "--sets",
+    "count",
+    type=click.IntRange(min=1),
+    default=60,
+    show_default=True,
+    help="Number of sets.",
+)
+@click.option(
+    "--workers",
+    type=click.IntRange(min=1),
+    default=1,
+    show_default=True,
+    help="Number of processes that simulate.",
 )
 @json_option
 def make(folder: Path, recipe: str, seed: int, count: int, workers: int, as_json: bool) -> None:
-    """Draw keys, simulate, and write sealed data sets into a new folder; one that was stopped goes on."""
+    """Draw keys, simulate, and write sealed data sets into a new folder; one that was stopped goes
+    on."""
     from flagdata.core.workload import announce_work
     from tests.studies.challenge.make import make as make_challenge
     from tests.studies.challenge.make import workload
@@ -56,7 +78,9 @@ def make(folder: Path, recipe: str, seed: int, count: int, workers: int, as_json
     loaded = load(recipe)
     say(announce_work(f"simulating {count} sets", workload(loaded, count), workers=workers))
     with progress(count, label=loaded.title, unit="set") as advance:
-        made = make_challenge(folder, loaded, seed=seed, count=count, workers=workers, progress=advance)
+        made = make_challenge(
+            folder, loaded, seed=seed, count=count, workers=workers, progress=advance
+        )
     if as_json:
         document("challenge-made", {"folder": str(made.path), "sets": made.manifest()["sets"]})
     else:
@@ -69,7 +93,8 @@ def make(folder: Path, recipe: str, seed: int, count: int, workers: int, as_json
     "--recipe",
     default="standard",
     show_default=True,
-    help="Recipe of a challenge: a name of the catalog, or a .toml file; or a recipe of close-loop, for nulls of its "
+    help="Recipe of a challenge: a name of the catalog, or a .toml file; or a recipe of "
+    "close-loop, for nulls of its "
     "cloth, markers and winds.",
 )
 @click.option(
@@ -93,9 +118,16 @@ def make(folder: Path, recipe: str, seed: int, count: int, workers: int, as_json
     help="Number of kinds of numerics (meshes and methods).",
 )
 @click.option(
-    "--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Number of processes that simulate."
+    "--workers",
+    type=click.IntRange(min=1),
+    default=1,
+    show_default=True,
+    help="Number of processes that simulate.",
 )
-@click.option("--scheduler", help="Dask scheduler whose workers simulate, tcp://HOST:PORT; without it, this machine.")
+@click.option(
+    "--scheduler",
+    help="Dask scheduler whose workers simulate, tcp://HOST:PORT; without it, this machine.",
+)
 @json_option
 def bank(
     folder: Path,
@@ -107,7 +139,8 @@ def bank(
     scheduler: str | None,
     as_json: bool,
 ) -> None:
-    """Simulate nulls that all sets of a recipe share, by what participants know; a build that was stopped goes on."""
+    """Simulate nulls that all sets of a recipe share, by what participants know; a build that was
+    stopped goes on."""
     from flagdata.lake import Lake
     from measure.nulls import bank as banks
     from measure.nulls.null_workload import of_batches
@@ -120,7 +153,10 @@ def bank(
     with progress(kinds, label="null recordings", unit="kind") as advance:
         banks.build(folder, batches, workers=workers, scheduler=scheduler, progress=advance)
     if as_json:
-        document("challenge-bank", {"folder": str(folder), "kinds": kinds, "recordings": kinds * banks.WINDS})
+        document(
+            "challenge-bank",
+            {"folder": str(folder), "kinds": kinds, "recordings": kinds * banks.WINDS},
+        )
     else:
         echo(str(folder))
 
@@ -128,21 +164,27 @@ def bank(
 @challenge.command()
 @_FOLDER
 @_ONLY
-@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Seed of the fitter.")
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Seed of the fitter."
+)
 @click.option(
     "--workers",
     type=click.IntRange(min=1),
     default=1,
     show_default=True,
-    help="Number of sets that are judged at a time; of films, processes that simulate the first one too.",
+    help="Number of sets that are judged at a time; of films, processes that simulate the first "
+    "one too.",
 )
 @click.option(
     "--bank",
     type=LocalPath(),
-    help="Folder of simulated nulls that the sets share; of films, where their simulations are kept.",
+    help="Folder of simulated nulls that the sets share; of films, where their simulations are "
+    "kept.",
 )
 @json_option
-def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path | None, as_json: bool) -> None:
+def run(
+    folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path | None, as_json: bool
+) -> None:
     """Judge the sets that have no verdict yet, and file the verdicts with their hashes."""
     from flagdata.core.files.caches import user_cache
     from measure.cloth import announce_simulations
@@ -180,13 +222,18 @@ def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path
         def report(filing: Filing) -> None:
             advance(1)
             # What it says stays in the file: who watches a run should not learn to read it.
-            say(f"{filing.name} filed after {filing.seconds:.0f} s{' (refused)' if filing.verdict is None else ''}")
+            say(
+                f"{filing.name} filed after {filing.seconds:.0f} "
+                f"s{' (refused)' if filing.verdict is None else ''}"
+            )
 
         if target.filmed:
             filings = run_films(target, films, seed=seed, only=only, progress=report)
         else:
             bound = ClosingTheLoop(bank=bank)
-            filings = run_challenge(target, bound, seed=seed, only=only, workers=workers, progress=report)
+            filings = run_challenge(
+                target, bound, seed=seed, only=only, workers=workers, progress=report
+            )
     if as_json:
         rows = [{"set": f.name, "seconds": f.seconds, "refusal": f.refusal} for f in filings]
         document("challenge-run", {"folder": str(folder), "filed": rows})
@@ -198,7 +245,11 @@ def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path
 @challenge.command()
 @_FOLDER
 @_ONLY
-@click.option("--out", type=LocalPath(), help="Folder to which the sheet is also written, as .json, .md and .png.")
+@click.option(
+    "--out",
+    type=LocalPath(),
+    help="Folder to which the sheet is also written, as .json, .md and .png.",
+)
 @click.option(
     "--history",
     type=LocalPath(),
@@ -208,7 +259,8 @@ def run(folder: Path, only: tuple[str, ...], seed: int, workers: int, bank: Path
 @click.option(
     "--against",
     type=click.Choice(["true-model", "floor"]),
-    help="Error against which E_red is measured: that of the true model, which is computed, or the verdict's floor. By "
+    help="Error against which E_red is measured: that of the true model, which is computed, or the "
+    "verdict's floor. By "
     "default the true model's, and of films the floor.",
 )
 @json_option
@@ -235,9 +287,13 @@ def score(
     target, name = ChallengeFolder(folder), folder.resolve().name
     if out is not None:
         sheets.check(out)
-    before = [] if history is None else histories.without(history, name)  # refused before any key is opened
+    before = (
+        [] if history is None else histories.without(history, name)
+    )  # refused before any key is opened
     if target.filmed and against == "true-model":
-        raise UsageError("no true model's error is computed of films", where="--against", fix="give floor")
+        raise UsageError(
+            "no true model's error is computed of films", where="--against", fix="give floor"
+        )
     reference = None if target.filmed or against == "floor" else true_model_errors
     with progress(len(target.chosen(only)), label="grading", unit="set") as advance:
         sheet = score_challenge(target, only=only, reference=reference, progress=advance)

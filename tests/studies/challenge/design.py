@@ -33,16 +33,19 @@ def composition(recipe: ChallengeRecipe, count: int) -> dict[Kind, int]:
 
 
 def draw(recipe: ChallengeRecipe, *, seed: int, count: int) -> tuple[AnswerKey, ...]:
-    """The keys of `count` sets, in the order of their names, which says nothing; impacts are not known yet.
+    """The keys of `count` sets, in the order of their names, which says nothing; impacts are not
+    known yet.
 
-    Effects, noises, rates and strengths that are fixed beforehand are dealt out evenly, everything else is drawn for
-    each set.
+    Effects, noises, rates and strengths that are fixed beforehand are dealt out evenly, everything
+    else is drawn for each set.
 
     Raises:
         UsageError: fewer than one set.
     """
     if count < 1:
-        raise UsageError(f"a challenge of {count} sets", where="challenge", fix="ask for one or more")
+        raise UsageError(
+            f"a challenge of {count} sets", where="challenge", fix="ask for one or more"
+        )
     number = composition(recipe, count)
 
     def deal(what: str, cards: Sequence[T], wanted: int) -> list[T]:
@@ -51,7 +54,10 @@ def draw(recipe: ChallengeRecipe, *, seed: int, count: int) -> tuple[AnswerKey, 
     groups: list[tuple[Kind, tuple[str, ...]]] = [(Kind.NULL, ())] * number[Kind.NULL]
     groups += [(Kind.ONE, (name,)) for name in deal("one", list(recipe.effects), number[Kind.ONE])]
     groups += [(Kind.PAIR, pair) for pair in deal("pair", _pairs(recipe), number[Kind.PAIR])]
-    groups += [(Kind.OUTSIDE, (name,)) for name in deal("outside", list(recipe.outside), number[Kind.OUTSIDE])]
+    groups += [
+        (Kind.OUTSIDE, (name,))
+        for name in deal("outside", list(recipe.outside), number[Kind.OUTSIDE])
+    ]
 
     nulls = iter(deal("numerics of nulls", list(recipe.numerics), number[Kind.NULL]))
     rates, noises = deal("rate", recipe.rates, count), deal("noise", recipe.noises, count)
@@ -90,13 +96,20 @@ def _deal(rng: np.random.Generator, cards: Sequence[T], wanted: int) -> list[T]:
 
 def _pairs(recipe: ChallengeRecipe) -> list[tuple[str, ...]]:
     """Two effects that are not of one class."""
-    return [pair for pair in combinations(recipe.effects, 2) if class_of(pair[0]) != class_of(pair[1])]
+    return [
+        pair for pair in combinations(recipe.effects, 2) if class_of(pair[0]) != class_of(pair[1])
+    ]
 
 
 def _numerics(recipe: ChallengeRecipe, seed: int, kind: Kind, effects: tuple[str, ...]) -> str:
-    """The same for all sets with the same effects, which are simulated together. Only a changed cloth takes implicit
+    """The same for all sets with the same effects, which are simulated together. Only a changed
+    cloth takes implicit
     steps: forces beside the base model are too dear in them."""
-    explicit = [name for name, numerics in recipe.numerics.items() if numerics.integrator is Method.SYMPLECTIC]
+    explicit = [
+        name
+        for name, numerics in recipe.numerics.items()
+        if numerics.integrator is Method.SYMPLECTIC
+    ]
     of_cloth = all(issubclass(effect_type(name), ClothEffect) for name in effects)
     allowed = list(recipe.numerics) if of_cloth or not explicit else explicit
     return allowed[int(stream(seed, "numerics", kind.value, *effects).integers(len(allowed)))]
@@ -144,7 +157,9 @@ def _key(
     return replace(key, toward=0.0, speeds=_speeds(recipe, shared), intensity=intensity)
 
 
-def _acting(effect: str, strengths: Strengths, turn: int | None, uniform: Callable[[], float]) -> Acting:
+def _acting(
+    effect: str, strengths: Strengths, turn: int | None, uniform: Callable[[], float]
+) -> Acting:
     size = strengths.size(turn, uniform())
     value = -size if uniform() < strengths.negative else size
     unit = effect_type(effect).parameters()[strengths.parameter].unit
@@ -154,5 +169,9 @@ def _acting(effect: str, strengths: Strengths, turn: int | None, uniform: Callab
 def _speeds(recipe: ChallengeRecipe, rng: np.random.Generator) -> tuple[float, ...]:
     """Uniform among all that are far enough apart, in any order."""
     spare = recipe.speed.high - recipe.speed.low - (recipe.count - 1) * recipe.apart
-    ordered = recipe.speed.low + np.sort(rng.uniform(0, spare, recipe.count)) + recipe.apart * np.arange(recipe.count)
+    ordered = (
+        recipe.speed.low
+        + np.sort(rng.uniform(0, spare, recipe.count))
+        + recipe.apart * np.arange(recipe.count)
+    )
     return tuple(float(value) for value in rng.permutation(ordered))

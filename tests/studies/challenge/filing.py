@@ -89,14 +89,22 @@ def read(folder: ChallengeFolder, name: str) -> Filing:
     found = file_hash(path)
     kept = opened(folder).get(name, found)
     if folder.verdict_hash(name).read_text(encoding="utf-8").strip() != found or kept != found:
-        raise CorruptError("the verdict is not as it was filed", where=str(path), fix="restore it; nothing is scored")
+        raise CorruptError(
+            "the verdict is not as it was filed",
+            where=str(path),
+            fix="restore it; nothing is scored",
+        )
     content = read_json(path, noun="verdict")
     try:
         filing = Filing(**{key: value for key, value in content.items() if key != "schema"})
     except TypeError as error:
-        raise CorruptError(f"not a filed verdict: {error}", where=str(path), fix="restore it") from None
+        raise CorruptError(
+            f"not a filed verdict: {error}", where=str(path), fix="restore it"
+        ) from None
     if filing.name != name or filing.data != folder.manifest()["sets"][name]["data"]:
-        raise CorruptError("the verdict is about other data", where=str(path), fix="restore it; nothing is scored")
+        raise CorruptError(
+            "the verdict is about other data", where=str(path), fix="restore it; nothing is scored"
+        )
     return filing
 
 
@@ -106,7 +114,9 @@ def opened(folder: ChallengeFolder) -> Mapping[str, str]:
         return {}
     verdicts = read_json(folder.opened, noun="record of openings").get("verdicts")
     if not isinstance(verdicts, dict):
-        raise CorruptError("the record of openings states no verdicts", where=str(folder.opened), fix="restore it")
+        raise CorruptError(
+            "the record of openings states no verdicts", where=str(folder.opened), fix="restore it"
+        )
     return verdicts
 
 

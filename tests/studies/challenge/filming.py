@@ -31,7 +31,12 @@ _CUP = 2.3
 
 
 def films_of(
-    folder: Path, recipe: ChallengeRecipe, filming: Filming, seed: int, key: AnswerKey, made: SimulatedSet
+    folder: Path,
+    recipe: ChallengeRecipe,
+    filming: Filming,
+    seed: int,
+    key: AnswerKey,
+    made: SimulatedSet,
 ) -> dict[str, Any]:
     """Write a set's films; what is stated beside them.
 
@@ -104,12 +109,16 @@ def films_of(
 
 
 def logged(recipe: ChallengeRecipe, wind: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """What a cup logs once a second of a wind (sample, 3) from the first frame on: the middles of its seconds [s], and
-    means over them [m/s]."""
+    """What a cup logs once a second of a wind (sample, 3) from the first frame on: the middles of
+    its seconds [s], and means over them [m/s]."""
     rate = recipe.log_rate
     times = np.arange(len(wind)) / rate
     speed = np.hypot(wind[:, 0], wind[:, 1])[:, None]
-    lagged = AnemometerLag(distance=_CUP).read(torch.from_numpy(times), torch.from_numpy(speed)).numpy()[:, 0]
+    lagged = (
+        AnemometerLag(distance=_CUP)
+        .read(torch.from_numpy(times), torch.from_numpy(speed))
+        .numpy()[:, 0]
+    )
     whole = len(lagged) // rate
     means = lagged[: whole * rate].reshape(whole, rate).mean(axis=1)
     return times[: whole * rate].reshape(whole, rate).mean(axis=1), means

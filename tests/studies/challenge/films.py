@@ -1,8 +1,8 @@
 """Sets that are films with a log of the wind, as a participant reads them.
 
-All sets of a challenge share the winds and what is stated of the camera's place, as experiments in one tunnel do, so
-that a participant simulates once for all of them. Where the camera really stood differs from what is stated within the
-stated uncertainty.
+All sets of a challenge share the winds and what is stated of the camera's place, as experiments in
+one tunnel do, so that a participant simulates once for all of them. Where the camera really stood
+differs from what is stated within the stated uncertainty.
 
 sets/set-001/set.json     the flag's size, where the camera stood, and the log beside each recording
 sets/set-001/a.mp4, …     the films
@@ -34,7 +34,8 @@ class Filmed:
         flag: its size; it is held at the corners of its hoist.
         azimuth, elevation: of the camera's axis to the wind, as they are stated.
         distance: of the camera [m].
-        area_weight: mean and standard deviation, of a cloth that was weighed [kg/m²]; None where it was not.
+        area_weight: mean and standard deviation, of a cloth that was weighed [kg/m²]; None where it
+            was not.
         recordings: name → film and log beside it.
     """
 
@@ -46,8 +47,8 @@ class Filmed:
     recordings: Mapping[str, tuple[Path, Log]]
 
     def observed(self) -> tuple[tuple[Observed, ...], tuple[Finding, ...]]:
-        """What its films show, in the order of the recordings, and a warning for each that is left out, as `flagdata
-        close-loop` leaves it out.
+        """What its films show, in the order of the recordings, and a warning for each that is left
+        out, as `flagdata close-loop` leaves it out.
 
         Raises:
             FlagdataError: in none of the films a flag is found.
@@ -60,7 +61,9 @@ class Filmed:
 
         def read(name: str) -> Observed:
             path, log = self.recordings[name]
-            return Part.of(ConditionedFilm(CameraFilm(path), aspect=size.aspect), log, source=name).read(size)
+            return Part.of(
+                ConditionedFilm(CameraFilm(path), aspect=size.aspect), log, source=name
+            ).read(size)
 
         shown, left_out = usable(list(self.recordings), read, name=str)
         return tuple(shown), left_out
@@ -82,14 +85,18 @@ def read_films(folder: Path) -> Filmed:
 
         def angle(known: Uncertain, stated: Any) -> Uncertain:
             mean, sigma = (math.radians(float(value)) for value in stated)
-            return Uncertain(name=known.name, unit="rad", prior=Normal(mean=mean, sigma=sigma), source="stated")
+            return Uncertain(
+                name=known.name, unit="rad", prior=Normal(mean=mean, sigma=sigma), source="stated"
+            )
 
         return Filmed(
             flag=Flag(length=float(flag["length"]), height=float(flag["height"])),
             azimuth=angle(AZIMUTH, camera["azimuth"]),
             elevation=angle(ELEVATION, camera["elevation"]),
             distance=float(camera["distance"]),
-            area_weight=None if weighed is None else (float(weighed[0]), float(weighed[0]) * float(weighed[1])),
+            area_weight=None
+            if weighed is None
+            else (float(weighed[0]), float(weighed[0]) * float(weighed[1])),
             recordings={
                 entry["name"]: (
                     beside[f"{entry['name']}.mp4"],
@@ -103,5 +110,15 @@ def read_films(folder: Path) -> Filmed:
                 for entry in about["recordings"]
             },
         )
-    except (KeyError, IndexError, TypeError, ValueError, OverflowError, AttributeError, OSError) as error:
-        raise InputError(f"not a set of films: {error!r}", where=str(folder), fix="restore the folder") from error
+    except (
+        KeyError,
+        IndexError,
+        TypeError,
+        ValueError,
+        OverflowError,
+        AttributeError,
+        OSError,
+    ) as error:
+        raise InputError(
+            f"not a set of films: {error!r}", where=str(folder), fix="restore the folder"
+        ) from error

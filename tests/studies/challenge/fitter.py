@@ -19,7 +19,8 @@ class ClosingTheLoop:
     """`flagdata close-loop`, as a user runs it.
 
     Attributes:
-        bank: folder of simulated nulls that several experiments share; None to simulate them anew for each.
+        bank: folder of simulated nulls that several experiments share; None to simulate them anew
+            for each.
     """
 
     bank: Path | None = None
@@ -53,7 +54,8 @@ class ClosingTheLoopOnFilms:
     workers: int = 1
 
     def __call__(self, given: Filmed, seed: int) -> Verdict:
-        """The verdict. Simulations are drawn from one seed for all sets, so that they share them, and not from `seed`.
+        """The verdict. Simulations are drawn from one seed for all sets, so that they share them,
+        and not from `seed`.
 
         Raises:
             FlagdataError: films that do not do.
@@ -76,4 +78,6 @@ class ClosingTheLoopOnFilms:
             distance=given.distance,
             simulations=self.simulations or simulations_of(len(given.recordings)),
         )
-        return FilmLoopOptions(calibration=calibration, kinds=self.kinds, area_weight=given.area_weight)
+        return FilmLoopOptions(
+            calibration=calibration, kinds=self.kinds, area_weight=given.area_weight
+        )

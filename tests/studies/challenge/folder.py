@@ -1,12 +1,12 @@
 """The folder of a challenge.
 
-challenge.json            title, versions, and of every set the hashes of its data and of its sealed key
-sets/set-001/set.json     what a user would know: cloth, pins, rate, noise, wind beside each recording
-sets/set-001/*.npy        markers.npy (marker, 2) [m]; a.npy, b.npy, … (frame, marker, 3) [m] float32
-sets/set-001/*.mp4        in their place, where sets are films: a.mp4, b.mp4, …
-sealed/set-001.json       key and salt; seed.json
-verdicts/set-001.json     as filed, with set-001.sha256
-opened.json               once the keys were opened: hashes of the verdicts that were filed before
+challenge.json            title, versions, and of every set the hashes of its data and of its sealed
+key sets/set-001/set.json     what a user would know: cloth, pins, rate, noise, wind beside each
+recording sets/set-001/*.npy        markers.npy (marker, 2) [m]; a.npy, b.npy, … (frame, marker, 3)
+[m] float32 sets/set-001/*.mp4        in their place, where sets are films: a.mp4, b.mp4, …
+sealed/set-001.json       key and salt; seed.json verdicts/set-001.json     as filed, with
+set-001.sha256 opened.json               once the keys were opened: hashes of the verdicts that were
+filed before
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ from sim.cloth.material import named_material
 from sim.cloth.mesh import grid
 from tests.studies.challenge.films import Filmed, read_films
 
-_EPOCH = 1_600_000_000  # of every file of a set: the time of writing would show which sets were simulated together
+# of every file of a set: the time of writing would show which sets were simulated together
+_EPOCH = 1_600_000_000
 MODEL_COLUMNS, MODEL_ROWS = 15, 10
 """Cells of the participant's mesh: 176 vertices."""
 HEIGHT = 2.0
@@ -132,7 +133,9 @@ class ChallengeFolder:
         """
         path = self.sealed(name)
         if not path.is_file():
-            raise NotFoundError("no sealed key", where=str(path), fix="bring it from where the challenge was made")
+            raise NotFoundError(
+                "no sealed key", where=str(path), fix="bring it from where the challenge was made"
+            )
         return read_json(path, noun="sealed key")
 
     def checked(self, name: str) -> None:
@@ -189,7 +192,11 @@ def write_json(path: Path, content: Mapping[str, Any]) -> str:
 
 
 def write_set(
-    folder: Path, *, about: Mapping[str, Any], markers: FloatArray, positions: Mapping[str, Float32Array]
+    folder: Path,
+    *,
+    about: Mapping[str, Any],
+    markers: FloatArray,
+    positions: Mapping[str, Float32Array],
 ) -> str:
     """Write a set's files, all with one time of change; the hash over them."""
     folder.mkdir(parents=True)
@@ -200,7 +207,8 @@ def write_set(
 
 
 def finish(folder: Path, about: Mapping[str, Any]) -> str:
-    """Write what is stated beside a set's other files, and give all one time of change; the hash over them."""
+    """Write what is stated beside a set's other files, and give all one time of change; the hash
+    over them."""
     write_json(folder / "set.json", about)
     for path in (*folder.iterdir(), folder):
         os.utime(path, (_EPOCH, _EPOCH))
@@ -219,7 +227,9 @@ def read_set(folder: Path) -> Experiment:
     try:
         about = read_json(folder / "set.json", noun="set")
         flag = about["flag"]
-        mesh = grid(width=flag["width"], height=flag["height"], columns=MODEL_COLUMNS, rows=MODEL_ROWS)
+        mesh = grid(
+            width=flag["width"], height=flag["height"], columns=MODEL_COLUMNS, rows=MODEL_ROWS
+        )
         beside = {path.name: path for path in folder.iterdir()}
         markers = _array(beside["markers.npy"])
         specimen = Specimen(
@@ -238,12 +248,26 @@ def read_set(folder: Path) -> Experiment:
                 positions=_array(beside[f"{entry['name']}.npy"]),
                 rate=about["rate"],
                 noise=about["noise"],
-                wind=WindTrack(times=np.array(entry["wind"]["times"]), velocity=np.array(entry["wind"]["velocity"])),
+                wind=WindTrack(
+                    times=np.array(entry["wind"]["times"]),
+                    velocity=np.array(entry["wind"]["velocity"]),
+                ),
             )
             for entry in about["recordings"]
         )
-    except (KeyError, IndexError, TypeError, ValueError, OverflowError, AttributeError, EOFError, OSError) as error:
-        raise InputError(f"not a set: {error!r}", where=str(folder), fix="restore the folder as it was made") from error
+    except (
+        KeyError,
+        IndexError,
+        TypeError,
+        ValueError,
+        OverflowError,
+        AttributeError,
+        EOFError,
+        OSError,
+    ) as error:
+        raise InputError(
+            f"not a set: {error!r}", where=str(folder), fix="restore the folder as it was made"
+        ) from error
     return Experiment(specimen=as_seen(specimen, recordings), recordings=recordings)
 
 
@@ -256,11 +280,21 @@ def _array(path: Path) -> FloatArray:
     with path.open("rb") as stream:
         try:
             first = np.lib.format.read_magic(stream) == (1, 0)
-            header = np.lib.format.read_array_header_1_0 if first else np.lib.format.read_array_header_2_0
+            header = (
+                np.lib.format.read_array_header_1_0
+                if first
+                else np.lib.format.read_array_header_2_0
+            )
             shape, _, kind = header(stream)
-        except Exception as error:  # NumPy reads headers as Python, whose tokenizer raises errors of its own
+        except (
+            Exception
+        ) as error:  # NumPy reads headers as Python, whose tokenizer raises errors of its own
             raise ValueError(f"{path.name} has no header of NumPy: {error}") from error
         size = path.stat().st_size - stream.tell()
-    if kind.kind not in "fiu" or min(shape, default=0) < 0 or math.prod(shape) * kind.itemsize != size:
+    if (
+        kind.kind not in "fiu"
+        or min(shape, default=0) < 0
+        or math.prod(shape) * kind.itemsize != size
+    ):
         raise ValueError(f"{path.name} states {shape} of {kind}, and holds {size} bytes")
     return np.load(path, allow_pickle=False).astype(np.float64)

@@ -1,4 +1,5 @@
-"""All challenges that were graded, a row each in one CSV file: by which code and criteria, and every share with bounds.
+"""All challenges that were graded, a row each in one CSV file: by which code and criteria, and
+every share with bounds.
 
 A row is made of the sheet's JSON document, so that it can be made again of any sheet that was kept.
 """
@@ -15,12 +16,14 @@ from flagdata.core.files.outputs import check_rewrite, rewrite
 from flagdata.errors import ConflictError, CorruptError
 
 KEYS = ("challenge", "title", "code_version", "criteria", "sets")
-"""Columns before the shares: the folder's name, its title, the grader's code, hashes of the verdicts' criteria divided
-by blanks (empty in sheets from before they were kept), and how many sets were graded."""
+"""Columns before the shares: the folder's name, its title, the grader's code, hashes of the
+verdicts' criteria divided by blanks (empty in sheets from before they were kept), and how many sets
+were graded."""
 
 
 def row(name: str, sheet: Mapping[str, Any]) -> dict[str, str]:
-    """The row of a sheet as `tests.studies.challenge.sheet.as_dict` gives it; shares are "hits/count [low, high]"."""
+    """The row of a sheet as `tests.studies.challenge.sheet.as_dict` gives it; shares are
+    "hits/count [low, high]"."""
     shares = {what: _share_text(share) for what, share in sheet["shares"].items()}
     return {
         "challenge": name,
@@ -60,7 +63,9 @@ def without(path: Path, name: str) -> list[dict[str, str]]:
     known = rows(path)
     if any(one["challenge"] == name for one in known):
         fix = "keep the history as it is, or give the challenge's folder another name"
-        raise ConflictError(f"the challenge {name} is in the history already", where=str(path), fix=fix)
+        raise ConflictError(
+            f"the challenge {name} is in the history already", where=str(path), fix=fix
+        )
     return known
 
 

@@ -1,4 +1,5 @@
-"""Makes a challenge: draws the keys, simulates, writes what a user would have, and publishes hashes of both."""
+"""Makes a challenge: draws the keys, simulates, writes what a user would have, and publishes hashes
+of both."""
 
 from __future__ import annotations
 
@@ -31,8 +32,8 @@ from tests.studies.challenge.recipe import ChallengeRecipe
 from tests.studies.challenge.simulation import SimulatedSet, batches, simulate
 
 _PACE = 1000.0
-"""Cells times seconds of a recording that one core simulates in a second: five sets of three recordings of 13 s on
-meshes of some 350 took 65 s."""
+"""Cells times seconds of a recording that one core simulates in a second: five sets of three
+recordings of 13 s on meshes of some 350 took 65 s."""
 _FILMED = 20.0
 """Frames that one core films and encodes in a second."""
 _NAMES = "abcdefghijklmnopqrstuvwxyz"
@@ -41,7 +42,9 @@ _AROUND = 2.0  # m: how far from the origin a pole stands
 
 def workload(recipe: ChallengeRecipe, count: int) -> float:
     """Seconds that one core takes for so many sets."""
-    cells = sum(numerics.columns * numerics.rows for numerics in recipe.numerics.values()) / len(recipe.numerics)
+    cells = sum(numerics.columns * numerics.rows for numerics in recipe.numerics.values()) / len(
+        recipe.numerics
+    )
     films = 0.0 if recipe.films is None else recipe.duration * recipe.films.rate / _FILMED
     return count * recipe.count * ((recipe.settle + recipe.duration) * cells / _PACE + films)
 
@@ -55,10 +58,11 @@ def make(
     workers: int = 1,
     progress: Callable[[int], object] | None = None,
 ) -> ChallengeFolder:
-    """A challenge in a new folder, which appears whole; the same recipe and seed give the same bytes on one machine.
+    """A challenge in a new folder, which appears whole; the same recipe and seed give the same
+    bytes on one machine.
 
-    One that was stopped goes on when the same is asked for again: until it is whole it lies beside the folder, in
-    `.flagdata-HASH.making`, set by set.
+    One that was stopped goes on when the same is asked for again: until it is whole it lies beside
+    the folder, in `.flagdata-HASH.making`, set by set.
 
     Args:
         count: of sets.
@@ -69,18 +73,34 @@ def make(
         ConflictError: something is there.
         FlagdataError: a flag diverged, with weak effects too.
     """
-    asked = {"recipe": asdict(recipe), "seed": seed, "sets": count, "code": code_version(), "folder": path.name}
-    with _resumed_folder(path, key=recipe_hash(asked), parts=("sets", "sealed", "challenge.json")) as making:
-        _make(ChallengeFolder(making), recipe, seed=seed, count=count, workers=workers, progress=progress)
+    asked = {
+        "recipe": asdict(recipe),
+        "seed": seed,
+        "sets": count,
+        "code": code_version(),
+        "folder": path.name,
+    }
+    with _resumed_folder(
+        path, key=recipe_hash(asked), parts=("sets", "sealed", "challenge.json")
+    ) as making:
+        _make(
+            ChallengeFolder(making),
+            recipe,
+            seed=seed,
+            count=count,
+            workers=workers,
+            progress=progress,
+        )
     return ChallengeFolder(path)
 
 
 @contextmanager
 def _resumed_folder(path: Path, *, key: str, parts: Iterable[str]) -> Iterator[Path]:
-    """A scratch folder beside a new one, `.flagdata-KEY.making`, that outlives a process that is stopped.
+    """A scratch folder beside a new one, `.flagdata-KEY.making`, that outlives a process that is
+    stopped.
 
-    It is taken up where the same key is given again; at the end its parts make the new folder, and it is removed, as it
-    is where a FlagdataError says that it can never be whole.
+    It is taken up where the same key is given again; at the end its parts make the new folder, and
+    it is removed, as it is where a FlagdataError says that it can never be whole.
 
     Args:
         key: hash of all that shapes it.
@@ -129,10 +149,16 @@ def _make(
         for group in waiting:
             keep(_made(target, recipe, seed, group))
     else:
-        with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=single_threaded) as pool:
-            for done in as_completed([pool.submit(_made, target, recipe, seed, group) for group in waiting]):
+        with ProcessPoolExecutor(
+            workers, mp_context=get_context("spawn"), initializer=single_threaded
+        ) as pool:
+            for done in as_completed(
+                [pool.submit(_made, target, recipe, seed, group) for group in waiting]
+            ):
                 keep(done.result())
-    files.write_json(target.path / "sealed" / "seed.json", {"seed": seed, "title": recipe.title, "sets": count})
+    files.write_json(
+        target.path / "sealed" / "seed.json", {"seed": seed, "title": recipe.title, "sets": count}
+    )
     files.write_json(
         target.public,
         {
@@ -212,7 +238,8 @@ def _write_markers(
         "rate": key.rate,
         "noise": key.noise,
         "recordings": [
-            {"name": name, "wind": _log(recipe, wind)} for name, wind in zip(names, made.winds, strict=True)
+            {"name": name, "wind": _log(recipe, wind)}
+            for name, wind in zip(names, made.winds, strict=True)
         ],
     }
     return files.write_set(target.data(key.name), about=about, markers=markers, positions=positions)

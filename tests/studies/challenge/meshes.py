@@ -15,7 +15,10 @@ def mesh_of(numerics: Numerics, *, width: float, height: float) -> Mesh:
     mesh = grid(width=width, height=height, columns=numerics.columns, rows=numerics.rows)
     if numerics.diagonals is Diagonals.ALTERNATE:
         return mesh
-    column, row = (i.ravel() for i in np.meshgrid(np.arange(numerics.columns), np.arange(numerics.rows), indexing="ij"))
+    column, row = (
+        i.ravel()
+        for i in np.meshgrid(np.arange(numerics.columns), np.arange(numerics.rows), indexing="ij")
+    )
     a = column * (numerics.rows + 1) + row
     b, c, d = a + numerics.rows + 1, a + numerics.rows + 2, a + 1
     faces = np.stack([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)], axis=1)
@@ -23,8 +26,8 @@ def mesh_of(numerics: Numerics, *, width: float, height: float) -> Mesh:
 
 
 def layout(recipe: ChallengeRecipe, rng: np.random.Generator) -> FloatArray:
-    """(marker, 2) rest coordinates [m]: an uneven grid, each marker moved by up to `jitter` of the spacing, those on
-    the edges along them only, in random order."""
+    """(marker, 2) rest coordinates [m]: an uneven grid, each marker moved by up to `jitter` of the
+    spacing, those on the edges along them only, in random order."""
     shape = (recipe.marker_columns, recipe.marker_rows)
     size = np.array([recipe.width, recipe.height])
     places = np.stack(np.meshgrid(*(np.linspace(0, 1, n) for n in shape), indexing="ij"), axis=-1)
@@ -35,9 +38,11 @@ def layout(recipe: ChallengeRecipe, rng: np.random.Generator) -> FloatArray:
 
 
 def seen(numerics: Numerics, markers: FloatArray, *, width: float, height: float) -> FloatArray:
-    """(marker, vertex) weights of the surface through the vertices: cubic splines along u and v (not-a-knot).
+    """(marker, vertex) weights of the surface through the vertices: cubic splines along u and v
+    (not-a-knot).
 
-    The fitter interpolates otherwise; facets would add an error of a few millimetres that no cloth has.
+    The fitter interpolates otherwise; facets would add an error of a few millimetres that no cloth
+    has.
     """
     along_u = _spline(numerics.columns, width, markers[:, 0])
     along_v = _spline(numerics.rows, height, markers[:, 1])

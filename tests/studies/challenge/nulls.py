@@ -29,9 +29,11 @@ from tests.studies.challenge.recipe import ChallengeRecipe, load
 
 
 def null_batches(recipe: ChallengeRecipe, *, seed: int, kinds: int) -> list[NullBatch]:
-    """For an amortised null: so many meshes and methods, each with its cloth, rate, noise and layout of markers.
+    """For an amortised null: so many meshes and methods, each with its cloth, rate, noise and
+    layout of markers.
 
-    Of the recipe its cloths, markers, rates, noises and winds are used. Its numerics are not: those are the truth's.
+    Of the recipe its cloths, markers, rates, noises and winds are used. Its numerics are not: those
+    are the truth's.
 
     Args:
         seed: of all that is drawn; not the challenge's.
@@ -53,7 +55,9 @@ def null_batches(recipe: ChallengeRecipe, *, seed: int, kinds: int) -> list[Null
         cut = Cut.of(rate, frames)
         if not cut.enough:
             raise InputError(
-                f"recordings of {recipe.duration:g} s are too short", where=recipe.title, fix="let them last for 10 s"
+                f"recordings of {recipe.duration:g} s are too short",
+                where=recipe.title,
+                fix="let them last for 10 s",
             )
         specimen = Specimen(
             mesh=mesh,
@@ -85,7 +89,9 @@ class Origin:
     recipe: str
 
 
-def nulls_of(recipe: str, *, seed: int, kinds: int, lake: Lake | None) -> tuple[Origin, list[NullBatch]]:
+def nulls_of(
+    recipe: str, *, seed: int, kinds: int, lake: Lake | None
+) -> tuple[Origin, list[NullBatch]]:
     """The nulls of a challenge's recipe, or of the recordings that a recipe of close-loop names.
 
     Args:
@@ -102,7 +108,8 @@ def nulls_of(recipe: str, *, seed: int, kinds: int, lake: Lake | None) -> tuple[
             raise UsageError(
                 "films need no bank: their simulations are kept as the first set is judged",
                 where=f"--recipe {recipe}",
-                fix="run `python -m tests.studies challenge run` with --bank, the folder to keep them in",
+                fix="run `python -m tests.studies challenge run` with --bank, the folder to keep "
+                "them in",
             )
         made = null_batches(loaded, seed=seed, kinds=kinds)
         return Origin(title=loaded.title, recipe=recipe_hash(_content(loaded))), made
@@ -113,12 +120,14 @@ def nulls_of(recipe: str, *, seed: int, kinds: int, lake: Lake | None) -> tuple[
 
 
 def _content(recipe: ChallengeRecipe) -> dict[str, Any]:
-    """What nulls of markers are made from: as before there were films, so that older folders are known again."""
+    """What nulls of markers are made from: as before there were films, so that older folders are
+    known again."""
     return {name: value for name, value in asdict(recipe).items() if name != "films"}
 
 
 def _of_recordings(path: Path) -> bool:
-    """Whether a recipe names recordings, as those of close-loop do and those of challenges do not."""
+    """Whether a recipe names recordings, as those of close-loop do and those of challenges do
+    not."""
     try:
         return isinstance(tomllib.loads(path.read_text(encoding="utf-8")).get("recording"), list)
     except (tomllib.TOMLDecodeError, UnicodeDecodeError):
@@ -126,10 +135,12 @@ def _of_recordings(path: Path) -> bool:
 
 
 def claim(folder: Path, origin: Origin, *, seed: int) -> None:
-    """Note what the nulls of a folder are made from, so that a build that was stopped goes on with the same.
+    """Note what the nulls of a folder are made from, so that a build that was stopped goes on with
+    the same.
 
     Raises:
-        ConflictError: the folder's are of another recipe or seed, or the folder holds something else.
+        ConflictError: the folder's are of another recipe or seed, or the folder holds something
+            else.
     """
     made = {"recipe": origin.recipe, "title": origin.title, "seed": seed}
     path = folder / "bank.json"

@@ -44,7 +44,14 @@ class Outcome:
     def of(cls, key: AnswerKey, filing: Filing) -> Outcome:
         """From what was sealed and what was filed."""
         if filing.verdict is None:
-            return cls(key=key, conclusion=None, named=(), ranking=(), comparisons=(), seconds=filing.seconds)
+            return cls(
+                key=key,
+                conclusion=None,
+                named=(),
+                ranking=(),
+                comparisons=(),
+                seconds=filing.seconds,
+            )
         verdict = filing.verdict
         rank = [candidate["effect"] for candidate in verdict["ranking"]]
         named = [name for name in verdict["named"] if name != FIELD]
@@ -71,7 +78,11 @@ class Outcome:
     @property
     def true(self) -> tuple[str, ...]:
         """Effects of the library that acted."""
-        return () if self.key.kind is Kind.OUTSIDE else tuple(acting.effect for acting in self.key.effects)
+        return (
+            ()
+            if self.key.kind is Kind.OUTSIDE
+            else tuple(acting.effect for acting in self.key.effects)
+        )
 
     @property
     def true_classes(self) -> frozenset[str]:
@@ -99,7 +110,8 @@ class Outcome:
 
     @property
     def class_among_named(self) -> bool:
-        """Whether an effect of a class that acted is among those named, alone or as one of several."""
+        """Whether an effect of a class that acted is among those named, alone or as one of
+        several."""
         return bool(self.true_classes & {class_of(name) for name in self.named})
 
     @property
@@ -119,7 +131,8 @@ class Outcome:
 
     @property
     def claims(self) -> tuple[bool, ...]:
-        """For each claim that an effect of some class acts, whether one does. "One of" is a single claim."""
+        """For each claim that an effect of some class acts, whether one does. "One of" is a single
+        claim."""
         named = dict.fromkeys(class_of(name) for name in self.named)
         if self.conclusion is Conclusion.ONE_OF:
             return (any(name in self.true_classes for name in named),) if named else ()
@@ -127,8 +140,8 @@ class Outcome:
 
     @property
     def reduction(self) -> float | None:
-        """E_red: the median over the comparisons on unseen data, against the true model's error where that is known,
-        else as the verdict states it."""
+        """E_red: the median over the comparisons on unseen data, against the true model's error
+        where that is known, else as the verdict states it."""
         shares = [share for share in map(self._share, self.comparisons) if share is not None]
         return median(shares) if shares and self.named else None
 
@@ -141,23 +154,33 @@ class Outcome:
 
     @property
     def separated(self) -> bool | None:
-        """Whether the wrong-effect control is worse than what was named on what was left out, by an interval that does
-        not reach zero, and not one of several was named; None where none was, or no control was run, or one that acts:
-        of two effects the control may be the other, which is none that is wrong."""
+        """Whether the wrong-effect control is worse than what was named on what was left out, by an
+        interval that does not reach zero, and not one of several was named; None where none was, or
+        no control was run, or one that acts: of two effects the control may be the other, which is
+        none that is wrong."""
         acting = {effect.effect for effect in self.key.effects}
-        if not self.named or self.apart is None or any(entry["control_name"] in acting for entry in self.comparisons):
+        if (
+            not self.named
+            or self.apart is None
+            or any(entry["control_name"] in acting for entry in self.comparisons)
+        ):
             return None
         return self.conclusion is not Conclusion.ONE_OF and self.apart["low"] > 0
 
     @property
     def control_gap(self) -> float | None:
-        """By how much the wrong-effect control is worse than the effect, in half-widths of the interval of their paired
-        difference; means over the comparisons. None where one effect was not named or there is no control."""
+        """By how much the wrong-effect control is worse than the effect, in half-widths of the
+        interval of their paired difference; means over the comparisons. None where one effect was
+        not named or there is no control."""
         if len(self.named) < 1 or self.conclusion is Conclusion.ONE_OF:
             return None
         entries = [entry["apart"] for entry in self.comparisons if entry["apart"] is not None]
         widths = [(entry["high"] - entry["low"]) / 2 for entry in entries]
-        return fmean(entry["value"] for entry in entries) / fmean(widths) if entries and fmean(widths) > 0 else None
+        return (
+            fmean(entry["value"] for entry in entries) / fmean(widths)
+            if entries and fmean(widths) > 0
+            else None
+        )
 
     def strength(self, acting: Acting) -> Mapping[str, Any] | None:
         """The estimate of an effect's strength, where it was weighed with that parameter."""
@@ -165,7 +188,8 @@ class Outcome:
             (
                 candidate["strength"]
                 for candidate in self.ranking
-                if candidate["effect"] == acting.effect and candidate["parameter"] == acting.parameter
+                if candidate["effect"] == acting.effect
+                and candidate["parameter"] == acting.parameter
             ),
             None,
         )

@@ -13,8 +13,9 @@ from scipy.special import expit
 from flagdata.core.arrays import FloatArray
 from flagdata.errors import InputError
 
-# Priors of the power curve, so that it exists where all or none were detected. The slope on ln strength: a threshold on
-# a statistic that grows as strength and has unit scatter at a threshold of 2 to 4 gives 2 to 6 (Gaussian ogive × 1.7).
+# Priors of the power curve, so that it exists where all or none were detected. The slope on ln
+# strength: a threshold on a statistic that grows as strength and has unit scatter at a threshold of
+# 2 to 4 gives 2 to 6 (Gaussian ogive × 1.7).
 _SLOPE, _SLOPE_SPREAD = 4.0, 0.5
 _GROUP_SPREAD = 0.7
 _STEP = 1e-3
@@ -40,9 +41,12 @@ class Power:
         return expit(self.slope * np.log(np.asarray(strength) / half))
 
     @classmethod
-    def fitted(cls, strength: Sequence[float], group: Sequence[str], detected: Sequence[bool]) -> Power:
-        """The most probable curve: logistic in ln strength, with groups scattered by a factor e^0.7 about a common s½,
-        and a slope of 4 within a factor e^0.5. With few cases a group's s½ leans on the others'.
+    def fitted(
+        cls, strength: Sequence[float], group: Sequence[str], detected: Sequence[bool]
+    ) -> Power:
+        """The most probable curve: logistic in ln strength, with groups scattered by a factor e^0.7
+        about a common s½, and a slope of 4 within a factor e^0.5. With few cases a group's s½ leans
+        on the others'.
 
         Raises:
             InputError: no cases, lengths that differ, or a strength that is not positive.
@@ -62,7 +66,9 @@ class Power:
             slope, common, offsets = math.exp(p[0]), p[1], p[2:]
             margin = slope * (x - common - offsets[index])
             fit = np.logaddexp(0.0, np.where(hit > 0, -margin, margin)).sum()
-            prior = ((p[0] - math.log(_SLOPE)) / _SLOPE_SPREAD) ** 2 + (offsets**2).sum() / _GROUP_SPREAD**2
+            prior = ((p[0] - math.log(_SLOPE)) / _SLOPE_SPREAD) ** 2 + (
+                offsets**2
+            ).sum() / _GROUP_SPREAD**2
             return float(fit + prior / 2 + ((common - middle) / spread) ** 2 / 2)
 
         start = np.concatenate([[math.log(_SLOPE), middle], np.zeros(len(names))])
@@ -70,7 +76,10 @@ class Power:
         covariance = np.linalg.inv(_hessian(loss, best))
 
         def bounds(direction: FloatArray) -> tuple[float, float, float]:
-            value, error = float(direction @ best), math.sqrt(float(direction @ covariance @ direction))
+            value, error = (
+                float(direction @ best),
+                math.sqrt(float(direction @ covariance @ direction)),
+            )
             return math.exp(value), math.exp(value - 1.645 * error), math.exp(value + 1.645 * error)
 
         unit = np.eye(len(best))
@@ -81,5 +90,8 @@ class Power:
 def _hessian(loss: Callable[[FloatArray], float], at: FloatArray) -> FloatArray:
     """By central differences, whose error of h² is far below the parameters' own uncertainty."""
     steps = _STEP * np.eye(len(at))
-    rows = [[loss(at + a + b) - loss(at + a - b) - loss(at - a + b) + loss(at - a - b) for b in steps] for a in steps]
+    rows = [
+        [loss(at + a + b) - loss(at + a - b) - loss(at - a + b) + loss(at - a - b) for b in steps]
+        for a in steps
+    ]
     return np.array(rows) / (4 * _STEP**2)

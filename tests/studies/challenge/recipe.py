@@ -1,4 +1,5 @@
-"""What a challenge consists of, as TOML (`recipes` beside it). Parsed here and nowhere else; unknown keys refused.
+"""What a challenge consists of, as TOML (`recipes` beside it). Parsed here and nowhere else;
+unknown keys refused.
 
 All values are SI. A *range* is `{ low = …, high = …, scale = "linear" | "log" }`.
 
@@ -36,7 +37,15 @@ from flagdata.errors import InputError, LimitError
 from flagdata.recipes import typed_tables
 from flagdata.recipes.registry import Registry
 from flagdata.recipes.shelves import Shelf, parse_recipe
-from flagdata.recipes.typed_tables import POSITIVE, WHOLE_LIMIT, Count, Named, NotNegative, Positive, Range
+from flagdata.recipes.typed_tables import (
+    POSITIVE,
+    WHOLE_LIMIT,
+    Count,
+    Named,
+    NotNegative,
+    Positive,
+    Range,
+)
 from sim.cloth import material
 
 
@@ -132,7 +141,8 @@ class Strengths:
         parameter: which strength is drawn; everything else stays at its usual value.
         range: of its magnitude.
         negative: share of the sets in which it is negative.
-        values: magnitudes that were fixed beforehand; none where the magnitude is drawn from the range.
+        values: magnitudes that were fixed beforehand; none where the magnitude is drawn from the
+            range.
     """
 
     parameter: str
@@ -141,10 +151,12 @@ class Strengths:
     values: tuple[float, ...] = ()
 
     def size(self, turn: int | None, uniform: float) -> float:
-        """The magnitude in a set: of fixed values that whose turn it is, or any where none has; else from the range.
+        """The magnitude in a set: of fixed values that whose turn it is, or any where none has;
+        else from the range.
 
         Args:
-            turn: how many sets of this effect alone come before; `None` of an effect beside another.
+            turn: how many sets of this effect alone come before; `None` of an effect beside
+                another.
             uniform: a draw from 0 to 1.
         """
         if not self.values:
@@ -186,19 +198,30 @@ class ChallengeRecipe:
     def __post_init__(self) -> None:
         if not self.materials or not self.rates or not self.noises or not self.numerics:
             raise InputError(
-                "materials, rates, noises or numerics are missing", where=self.title, fix="give at least one of each"
+                "materials, rates, noises or numerics are missing",
+                where=self.title,
+                fix="give at least one of each",
             )
         if (self.count - 1) * self.apart > self.speed.high - self.speed.low:
             raise InputError(
-                f"{self.count} speeds {self.apart:g} m/s apart do not fit between {self.speed.low:g} and "
+                f"{self.count} speeds {self.apart:g} m/s apart do not fit between "
+                f"{self.speed.low:g} and "
                 f"{self.speed.high:g} m/s",
                 where=self.title,
                 fix="widen the range, or bring them nearer",
             )
-        needed = {Kind.ONE: (self.effects, 1), Kind.PAIR: (self.effects, 2), Kind.OUTSIDE: (self.outside, 1)}
+        needed = {
+            Kind.ONE: (self.effects, 1),
+            Kind.PAIR: (self.effects, 2),
+            Kind.OUTSIDE: (self.outside, 1),
+        }
         for kind, (table, least) in needed.items():
             if self.composition[kind] > 0 and len(table) < least:
-                raise InputError(f"too few effects for sets of kind {kind.value}", where=self.title, fix="add some")
+                raise InputError(
+                    f"too few effects for sets of kind {kind.value}",
+                    where=self.title,
+                    fix="add some",
+                )
         if not sum(self.composition.values()) > 0:
             raise InputError("every share is zero", where=self.title, fix="give a share above 0")
         cells = max(numerics.columns * numerics.rows for numerics in self.numerics.values())
@@ -209,7 +232,9 @@ class ChallengeRecipe:
             ("instants of a recording, at the rate that all rates divide", ticks, TICKS_LIMIT),
         ):
             if number > most:
-                raise LimitError(f"{number:.3g} {what}", where=self.title, fix=f"have at most {most}")
+                raise LimitError(
+                    f"{number:.3g} {what}", where=self.title, fix=f"have at most {most}"
+                )
 
     @property
     def ticks(self) -> int:
@@ -244,7 +269,10 @@ def parse(text: str, *, where: str) -> ChallengeRecipe:
         material.named_material(name, where=f"{where} [flag]")
     if films is None:
         run = marked = typed_tables.read(_MarkerRecordings, form.recordings, where=inside)
-        rates, noises = tuple(_whole("rates", rate, where=inside) for rate in marked.rates), marked.noises
+        rates, noises = (
+            tuple(_whole("rates", rate, where=inside) for rate in marked.rates),
+            marked.noises,
+        )
     else:
         run = typed_tables.read(_Recordings, form.recordings, where=inside)
         rates, noises = (films.rate,), (0.0,)
@@ -344,20 +372,28 @@ class _Markers:
 
 def _whole(key: str, value: float, *, where: str) -> int:
     if value < 1 or value != int(value):
-        raise InputError(f"{key} has {value!r}", where=where, fix="give whole numbers of at least 1")
+        raise InputError(
+            f"{key} has {value!r}", where=where, fix="give whole numbers of at least 1"
+        )
     return int(value)
 
 
 def _check(numerics: Numerics, *, where: str) -> None:
     if numerics.integrator is Method.IMPLICIT and not numerics.step:
-        raise InputError("the implicit integrator has no step", where=where, fix="give step in seconds")
+        raise InputError(
+            "the implicit integrator has no step", where=where, fix="give step in seconds"
+        )
     if numerics.integrator is Method.SYMPLECTIC and numerics.step:
         raise InputError(
-            "a step stands beside the symplectic integrator, which finds its own", where=where, fix="leave it out"
+            "a step stands beside the symplectic integrator, which finds its own",
+            where=where,
+            fix="leave it out",
         )
 
 
-def _strengths(effects: Mapping[str, Mapping[str, Any]], known: Registry, *, where: str) -> dict[str, Strengths]:
+def _strengths(
+    effects: Mapping[str, Mapping[str, Any]], known: Registry, *, where: str
+) -> dict[str, Strengths]:
     found: dict[str, Strengths] = {}
     for name, content in effects.items():
         strengths: tuple[str, ...] = known[name].strengths()
@@ -372,7 +408,9 @@ def _strengths(effects: Mapping[str, Mapping[str, Any]], known: Registry, *, whe
         made = Strengths(**{**usual, **typed_tables.entries(types, content, where=inside)})
         if any(value <= 0 for value in made.values):
             raise InputError(
-                "values has magnitudes that are not above 0", where=inside, fix="say by negative which sets differ"
+                "values has magnitudes that are not above 0",
+                where=inside,
+                fix="say by negative which sets differ",
             )
         if made.values and "range" in content:
             raise InputError("values and a range are given", where=inside, fix="give one of them")

@@ -35,7 +35,8 @@ _APART = (
 
 
 class Fitter(Protocol):
-    """Judges a set of a challenge. With workers it is sent to other processes, so it must be picklable."""
+    """Judges a set of a challenge. With workers it is sent to other processes, so it must be
+    picklable."""
 
     def __call__(self, given: Any, seed: int, /) -> Verdict:
         """The verdict; the same for the same seed.
@@ -63,7 +64,8 @@ def run(
     Args:
         seed: each set gets its own from it.
         only: names of sets; none for all.
-        workers: processes of one thread each, in which what makes challenges cannot be imported; or IN_THIS_PROCESS.
+        workers: processes of one thread each, in which what makes challenges cannot be imported; or
+            IN_THIS_PROCESS.
         progress: called with each verdict once it is filed.
 
     Raises:
@@ -84,7 +86,9 @@ def run(
             keep(_judge(folder, fitter, name, child_seed(seed, name)))
         return done
     failures: list[Future[Filing]] = []
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_prepare) as pool:
+    with ProcessPoolExecutor(
+        workers, mp_context=get_context("spawn"), initializer=_prepare
+    ) as pool:
         for future in as_completed(
             [pool.submit(_judge, folder, fitter, name, child_seed(seed, name)) for name in waiting]
         ):
@@ -105,15 +109,18 @@ def run_films(
     only: Sequence[str] = (),
     progress: Callable[[Filing], object] | None = None,
 ) -> list[Filing]:
-    """As `run`, of films: by all of the fitter's workers the first set that is answered, whose simulations all others
-    take, then as many sets at a time, each read and judged by one process."""
+    """As `run`, of films: by all of the fitter's workers the first set that is answered, whose
+    simulations all others take, then as many sets at a time, each read and judged by one
+    process."""
     waiting = [name for name in folder.chosen(tuple(only)) if not filed(folder, name)]
     done: list[Filing] = []
     while waiting and not any(one.verdict for one in done):
         done += run(folder, fitter, seed=seed, only=(waiting.pop(0),), progress=progress)
     if waiting:
         single = replace(fitter, workers=1)
-        done += run(folder, single, seed=seed, only=waiting, workers=fitter.workers, progress=progress)
+        done += run(
+            folder, single, seed=seed, only=waiting, workers=fitter.workers, progress=progress
+        )
     return done
 
 
@@ -125,9 +132,18 @@ def _judge(folder: ChallengeFolder, fitter: Fitter, name: str, seed: int) -> Fil
         verdict = fitter(given, seed)
     except FlagdataError as error:
         seconds = time.monotonic() - began
-        return Filing(name=name, data=data, seed=seed, verdict=None, refusal=error.as_dict(), seconds=seconds)
+        return Filing(
+            name=name, data=data, seed=seed, verdict=None, refusal=error.as_dict(), seconds=seconds
+        )
     seconds = time.monotonic() - began
-    return Filing(name=name, data=data, seed=seed, verdict=verdict_json(verdict), refusal=None, seconds=seconds)
+    return Filing(
+        name=name,
+        data=data,
+        seed=seed,
+        verdict=verdict_json(verdict),
+        refusal=None,
+        seconds=seconds,
+    )
 
 
 class Barrier(MetaPathFinder):

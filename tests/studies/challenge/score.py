@@ -2,20 +2,24 @@
 
 Definitions, in the words of the sheet:
 
-- *False positive*: a null whose base model was not found sufficient. A refusal of the data counts as one.
-- *Half-detection strength*: the impact (see `AnswerKey.impact`) at which half are detected, of a class of effects (see
-  `rates.Power`). Identification is graded on sets of one effect at twice that or more; effects from outside the
-  library are called strong by twice that of any other class.
-- *Top-1*: the effect named, or the best ranked of those named, acted; *class-level*: one of its class did.
-- *False discovery*: a claim that an effect of some class acts where none does. "One of" makes a single claim.
+- *False positive*: a null whose base model was not found sufficient. A refusal of the data counts
+  as one.
+- *Half-detection strength*: the impact (see `AnswerKey.impact`) at which half are detected, of a
+  class of effects (see `rates.Power`). Identification is graded on sets of one effect at twice that
+  or more; effects from outside the library are called strong by twice that of any other class.
+- *Top-1*: the effect named, or the best ranked of those named, acted; *class-level*: one of its
+  class did.
+- *False discovery*: a claim that an effect of some class acts where none does. "One of" makes a
+  single claim.
 - *None of the library*: the verdict says so, or that the library explains only a part.
-- *E_red*: (before − after)/(before − least), with the error of the true model, by the fitter's numerics, as the least;
-  the median over a set's comparisons, where an effect was named.
-- *Control separated*: the same freedom spent on the best wrong effect leaves a larger misfit on the recordings left out
-  in turn, by an interval of the paired difference that does not reach zero. Of all sets with an effect of the library
-  where effects were named and a control was run, that does not act itself (of two effects it may be the other); "one
-  of" counts as not separated. *By a single recording*: the mean difference is larger than the mean half-width of the
-  single comparisons' intervals.
+- *E_red*: (before − after)/(before − least), with the error of the true model, by the fitter's
+  numerics, as the least; the median over a set's comparisons, where an effect was named.
+- *Control separated*: the same freedom spent on the best wrong effect leaves a larger misfit on the
+  recordings left out in turn, by an interval of the paired difference that does not reach zero. Of
+  all sets with an effect of the library where effects were named and a control was run, that does
+  not act itself (of two effects it may be the other); "one of" counts as not separated. *By a
+  single recording*: the mean difference is larger than the mean half-width of the single
+  comparisons' intervals.
 """
 
 from __future__ import annotations
@@ -44,7 +48,8 @@ ENOUGH = 2.0
 
 @dataclass(frozen=True, kw_only=True)
 class Gate:
-    """What a good challenge reaches: `value` at least (or at most) `wanted`; None where there were no cases."""
+    """What a good challenge reaches: `value` at least (or at most) `wanted`; None where there were
+    no cases."""
 
     name: str
     value: float | None
@@ -102,9 +107,10 @@ class Sheet:
         title: of the challenge.
         outcomes: of all sets, in the order of their names.
         power: against impact, by class; None where no library effect acted alone.
-        by_noise, by_rate: the same, with groups by marker noise in millimetres and by frame rate, over every set in
-            which something acted.
-        criteria: hashes of the thresholds that the verdicts were made by, sorted; one where all were made alike.
+        by_noise, by_rate: the same, with groups by marker noise in millimetres and by frame rate,
+            over every set in which something acted.
+        criteria: hashes of the thresholds that the verdicts were made by, sorted; one where all
+            were made alike.
         filmed: whether the sets were films.
     """
 
@@ -126,12 +132,14 @@ class Sheet:
         power = self.power
         if power is None:
             return []
-        return [o for o in self.of_kind(Kind.ONE) if o.key.impact >= ENOUGH * power.half[_class(o)][0]]
+        return [
+            o for o in self.of_kind(Kind.ONE) if o.key.impact >= ENOUGH * power.half[_class(o)][0]
+        ]
 
     @property
     def strong_outside(self) -> list[Outcome]:
-        """Outcomes of sets with an effect from outside the library, at twice the half-detection strength of a class of
-        effects outside those graded, or more."""
+        """Outcomes of sets with an effect from outside the library, at twice the half-detection
+        strength of a class of effects outside those graded, or more."""
         power = self.power
         if power is None:
             return []
@@ -139,16 +147,23 @@ class Sheet:
 
     @property
     def half_strengths(self) -> dict[str, HalfStrength]:
-        """Effect → the strength that is detected half of the time: that of its class as an impact, times the median of
-        strength over impact in its own sets, which are proportional while effects are weak."""
+        """Effect → the strength that is detected half of the time: that of its class as an impact,
+        times the median of strength over impact in its own sets, which are proportional while
+        effects are weak."""
         found: dict[str, HalfStrength] = {}
         for effect in sorted({o.key.effects[0].effect for o in self.of_kind(Kind.ONE)}):
-            own = [o for o in self.of_kind(Kind.ONE) if o.key.effects[0].effect == effect and o.key.impact > 0]
+            own = [
+                o
+                for o in self.of_kind(Kind.ONE)
+                if o.key.effects[0].effect == effect and o.key.impact > 0
+            ]
             if self.power is not None and own:
                 half, low, high = self.power.half[class_of(effect)]
                 scale = float(np.median([abs(o.key.effects[0].value) / o.key.impact for o in own]))
                 unit = own[0].key.effects[0].unit
-                found[effect] = HalfStrength(value=half * scale, low=low * scale, high=high * scale, unit=unit)
+                found[effect] = HalfStrength(
+                    value=half * scale, low=low * scale, high=high * scale, unit=unit
+                )
         return found
 
     def share(self, cases: Sequence[Outcome], happened: Callable[[Outcome], bool]) -> Share:
@@ -196,14 +211,22 @@ class Sheet:
                         errors.append((strength["value"] - acting.value) / abs(acting.value))
                     covered.append(_within(acting.value, strength))
                     levels.append(strength["level"])
-        return Coefficients(errors=tuple(errors), covered=Share.of(covered), levels=tuple(sorted(set(levels))))
+        return Coefficients(
+            errors=tuple(errors), covered=Share.of(covered), levels=tuple(sorted(set(levels)))
+        )
 
     def _gates_of_films(self) -> tuple[Gate, ...]:
-        """What is asked of verdicts on films, whose effects are set at strengths that a film shows."""
+        """What is asked of verdicts on films, whose effects are set at strengths that a film
+        shows."""
         seen = [o for o in self.of_kind(Kind.OUTSIDE) if o.detected]
         reductions = self.reductions
         return (
-            Gate(name="false positives on nulls", value=self.false_positives.value, wanted=0.05, at_most=True),
+            Gate(
+                name="false positives on nulls",
+                value=self.false_positives.value,
+                wanted=0.05,
+                at_most=True,
+            ),
             Gate(
                 name="class among those named, of one effect",
                 wanted=0.6,
@@ -220,7 +243,11 @@ class Sheet:
                 wanted=0.5,
                 value=self.share(seen, lambda o: o.outside_said).value,
             ),
-            Gate(name="median E_red", value=float(np.median(reductions)) if reductions else None, wanted=0.5),
+            Gate(
+                name="median E_red",
+                value=float(np.median(reductions)) if reductions else None,
+                wanted=0.5,
+            ),
         )
 
     @property
@@ -230,7 +257,12 @@ class Sheet:
         if self.filmed:
             return self._gates_of_films()
         return (
-            Gate(name="false positives on nulls", value=self.false_positives.value, wanted=0.05, at_most=True),
+            Gate(
+                name="false positives on nulls",
+                value=self.false_positives.value,
+                wanted=0.05,
+                at_most=True,
+            ),
             Gate(
                 name="class-level identification of strong effects",
                 wanted=0.9,
@@ -242,7 +274,11 @@ class Sheet:
                 value=self.share(self.strong, lambda o: o.first_right).value,
             ),
             Gate(name="recall of none of the library", value=self.outside_recall.value, wanted=0.7),
-            Gate(name="median E_red", value=float(np.median(reductions)) if reductions else None, wanted=0.7),
+            Gate(
+                name="median E_red",
+                value=float(np.median(reductions)) if reductions else None,
+                wanted=0.7,
+            ),
             Gate(name="control separated", value=self.separated.value, wanted=0.9),
         )
 
@@ -261,21 +297,33 @@ class Sheet:
             "class-level, all of one effect": self.share(one, lambda o: o.class_right),
             "top-1, all of one effect": self.share(one, lambda o: o.first_right),
             "true effect among those named": self.share(one, lambda o: o.among_named),
-            "several named as one of, of one effect": self.share(one, lambda o: o.conclusion is Conclusion.ONE_OF),
+            "several named as one of, of one effect": self.share(
+                one, lambda o: o.conclusion is Conclusion.ONE_OF
+            ),
             "pairs: one class found": self.share(pairs, lambda o: o.found_classes >= 1),
-            "pairs: both classes found": self.share(pairs, lambda o: o.found_classes == len(o.true_classes)),
+            "pairs: both classes found": self.share(
+                pairs, lambda o: o.found_classes == len(o.true_classes)
+            ),
             "pairs: incompleteness said or both found": self.share(
                 pairs, lambda o: o.outside_said or o.found_classes == len(o.true_classes)
             ),
             "false discoveries among claims": self.false_discoveries,
             "recall of none of the library": self.outside_recall,
-            "recall of none of the library, strong": self.share(self.strong_outside, lambda o: o.outside_said),
-            "none of the library, said wrongly of one effect": self.share(one, lambda o: o.outside_said),
+            "recall of none of the library, strong": self.share(
+                self.strong_outside, lambda o: o.outside_said
+            ),
+            "none of the library, said wrongly of one effect": self.share(
+                one, lambda o: o.outside_said
+            ),
             "control separated": self.separated,
             "control separated by a single recording": self.separated_singly,
             "interval covers the true strength": self.coefficients.covered,
-            "not decided": self.share(self.outcomes, lambda o: o.conclusion is Conclusion.UNDECIDED),
-            "not decided, of one effect": self.share(one, lambda o: o.conclusion is Conclusion.UNDECIDED),
+            "not decided": self.share(
+                self.outcomes, lambda o: o.conclusion is Conclusion.UNDECIDED
+            ),
+            "not decided, of one effect": self.share(
+                one, lambda o: o.conclusion is Conclusion.UNDECIDED
+            ),
             "data refused": self.share(self.outcomes, lambda o: o.refused),
         }
 
@@ -287,12 +335,13 @@ def score(
     reference: ReferenceErrors | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> Sheet:
-    """Open the keys and grade. What had been filed by then is kept on record, and no verdict can be filed afterwards.
+    """Open the keys and grade. What had been filed by then is kept on record, and no verdict can be
+    filed afterwards.
 
     Args:
         only: names of sets; none for all.
-        reference: errors against which E_red is measured where an effect of the library was named; None for the
-            verdict's own floor.
+        reference: errors against which E_red is measured where an effect of the library was named;
+            None for the verdict's own floor.
         progress: called with 1 for each set.
 
     Raises:
@@ -345,7 +394,8 @@ def graded(title: str, outcomes: Sequence[Outcome]) -> Sheet:
 
 
 def _within(value: float, interval: Mapping[str, Any]) -> bool:
-    """Decides whether an interval contains a value; a filed end that is None is infinite (`filing`)."""
+    """Decides whether an interval contains a value; a filed end that is None is infinite
+    (`filing`)."""
     low, high = interval["low"], interval["high"]
     return (low is None or low <= value) and (high is None or value <= high)
 
@@ -357,4 +407,6 @@ def _class(outcome: Outcome) -> str:
 def _power(cases: Sequence[Outcome], group: Callable[[Outcome], str]) -> Power | None:
     if not cases:
         return None
-    return Power.fitted([o.key.impact for o in cases], [group(o) for o in cases], [o.detected for o in cases])
+    return Power.fitted(
+        [o.key.impact for o in cases], [group(o) for o in cases], [o.detected for o in cases]
+    )

@@ -32,7 +32,10 @@ _COMMAND = "challenge score"
 
 def as_dict(sheet: Sheet) -> dict[str, Any]:
     """Everything of the sheet as JSON values."""
-    coefficients, gaps = sheet.coefficients, [o.control_gap for o in sheet.outcomes if o.control_gap is not None]
+    coefficients, gaps = (
+        sheet.coefficients,
+        [o.control_gap for o in sheet.outcomes if o.control_gap is not None],
+    )
     return {
         "schema": "flagdata.score/1",
         "title": sheet.title,
@@ -74,13 +77,22 @@ def markdown(sheet: Sheet, *, picture: str | None = None) -> str:
     kinds = ", ".join(f"{len(sheet.of_kind(kind))} {kind.value}" for kind in Kind)
     levels = ", ".join(f"{100 * level:g} %" for level in sheet.coefficients.levels)
     acted = [o for o in sheet.outcomes if o.key.impact > 0]
-    half = _half_rows("class", sheet.power, Counter(_class_name(o) for o in sheet.of_kind(Kind.ONE)))
+    half = _half_rows(
+        "class", sheet.power, Counter(_class_name(o) for o in sheet.of_kind(Kind.ONE))
+    )
     if sheet.power is not None:
         half.append(_half_row("class: any other", sheet.power.overall, "–"))
-    half += _half_rows("noise, mm", sheet.by_noise, Counter(f"{_MILLI * o.key.noise:g}" for o in acted))
+    half += _half_rows(
+        "noise, mm", sheet.by_noise, Counter(f"{_MILLI * o.key.noise:g}" for o in acted)
+    )
     half += _half_rows("frames a second", sheet.by_rate, Counter(str(o.key.rate) for o in acted))
     gates = [
-        (g.name, _number(g.value), f"{'≤' if g.at_most else '≥'} {g.wanted:g}", "yes" if g.met else "no")
+        (
+            g.name,
+            _number(g.value),
+            f"{'≤' if g.at_most else '≥'} {g.wanted:g}",
+            "yes" if g.met else "no",
+        )
         for g in sheet.gates
     ]
     shares = [
@@ -106,15 +118,20 @@ def markdown(sheet: Sheet, *, picture: str | None = None) -> str:
         )
         for o in sheet.outcomes
     ]
-    said = [(true, name, str(n)) for true, row in confusion(sheet).items() for name, n in row.items()]
+    said = [
+        (true, name, str(n)) for true, row in confusion(sheet).items() for name, n in row.items()
+    ]
     spreads = (
         f"E_red: {_words(sheet.reductions, 0.1, 'worst decile')}.\n"
-        f"Relative error of the strength: {_words([abs(e) for e in sheet.coefficients.errors], 0.9, 'worst decile')}.\n"
+        "Relative error of the strength: "
+        f"{_words([abs(e) for e in sheet.coefficients.errors], 0.9, 'worst decile')}.\n"
         f"Time for a set: {_words([o.seconds for o in sheet.outcomes], 0.9, 'slowest decile')} s."
     )
     strong = (
-        "Half-detection strength, as displacement within 0.1 s, with 90 % bounds; strong effects are those of "
-        f"{ENOUGH:g} times that, {len(sheet.strong)} sets; from outside the library {len(sheet.strong_outside)}, by "
+        "Half-detection strength, as displacement within 0.1 s, with 90 % bounds; strong effects "
+        "are those of "
+        f"{ENOUGH:g} times that, {len(sheet.strong)} sets; from outside the library "
+        f"{len(sheet.strong_outside)}, by "
         "that of any other class."
     )
     parts = [
@@ -130,7 +147,19 @@ def markdown(sheet: Sheet, *, picture: str | None = None) -> str:
         f"![Power curves]({picture})" if picture is not None else "",
         table(("true", "said", "sets"), said),
         table(
-            ("set", "true", "impact, mm", "noise, mm", "rate", "numerics", "said", "E_red", "control gap", "s"), sets
+            (
+                "set",
+                "true",
+                "impact, mm",
+                "noise, mm",
+                "rate",
+                "numerics",
+                "said",
+                "E_red",
+                "control gap",
+                "s",
+            ),
+            sets,
         ),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
@@ -143,19 +172,24 @@ def write(sheet: Sheet, folder: Path) -> tuple[Path, ...]:
         ConflictError: one of them is there and was not written by a score, or was changed since.
     """
     document, page, picture = _FILES
-    content = json.dumps(as_dict(sheet), indent=1, sort_keys=True, allow_nan=False, ensure_ascii=False) + "\n"
+    content = (
+        json.dumps(as_dict(sheet), indent=1, sort_keys=True, allow_nan=False, ensure_ascii=False)
+        + "\n"
+    )
     files = {document: content, page: markdown(sheet, picture=picture), picture: plot(sheet)}
     write_files(folder, files, command=_COMMAND)
     return tuple(folder / name for name in _FILES)
 
 
 def check(folder: Path) -> None:
-    """Refuse a folder in which `write` cannot write, before any key is opened; raises as `write`."""
+    """Refuse a folder in which `write` cannot write, before any key is opened; raises as
+    `write`."""
     check_files(folder, *_FILES, command=_COMMAND)
 
 
 def plot(sheet: Sheet) -> bytes:
-    """PNG of power curves by class, noise and frame rate; cases above (detected) and below (not)."""
+    """PNG of power curves by class, noise and frame rate; cases above (detected) and below
+    (not)."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(13, 5.0), layout="constrained")
@@ -164,14 +198,24 @@ def plot(sheet: Sheet) -> bytes:
     acted = [o for o in sheet.outcomes if o.key.impact > 0]
     _panel(panels[0], "one effect, by class", sheet.power, [(_class_name(o), o) for o in one])
     _panel(
-        panels[1], "any effect, by marker noise [mm]", sheet.by_noise, [(f"{_MILLI * o.key.noise:g}", o) for o in acted]
+        panels[1],
+        "any effect, by marker noise [mm]",
+        sheet.by_noise,
+        [(f"{_MILLI * o.key.noise:g}", o) for o in acted],
     )
-    _panel(panels[2], "any effect, by frames a second", sheet.by_rate, [(str(o.key.rate), o) for o in acted])
+    _panel(
+        panels[2],
+        "any effect, by frames a second",
+        sheet.by_rate,
+        [(str(o.key.rate), o) for o in acted],
+    )
     panels[0].set_ylabel("chance of detection")
     return png(figure)
 
 
-def _panel(axes: Axes, title: str, power: Power | None, cases: Sequence[tuple[str, Outcome]]) -> None:
+def _panel(
+    axes: Axes, title: str, power: Power | None, cases: Sequence[tuple[str, Outcome]]
+) -> None:
     from matplotlib import colormaps
 
     axes.set_title(title, fontsize=10)
@@ -189,14 +233,18 @@ def _panel(axes: Axes, title: str, power: Power | None, cases: Sequence[tuple[st
             if group == name:
                 height = 1.05 + 0.004 * index if outcome.detected else -0.05 - 0.004 * index
                 axes.plot(_MILLI * outcome.key.impact, height, "o", color=colour, ms=4)
-    axes.semilogx(_MILLI * grid, power.at(grid), color="black", lw=2, label="any other group", ls="--")
+    axes.semilogx(
+        _MILLI * grid, power.at(grid), color="black", lw=2, label="any other group", ls="--"
+    )
     axes.legend(fontsize=7, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.16), frameon=False)
     axes.grid(alpha=0.3)
 
 
 def _half_rows(what: str, power: Power | None, counts: Counter[str]) -> list[tuple[str, str, str]]:
     half = {} if power is None else power.half
-    return [_half_row(f"{what}: {name}", bounds, str(counts[name])) for name, bounds in half.items()]
+    return [
+        _half_row(f"{what}: {name}", bounds, str(counts[name])) for name, bounds in half.items()
+    ]
 
 
 def _half_row(group: str, bounds: tuple[float, float, float], count: str) -> tuple[str, str, str]:
@@ -207,7 +255,10 @@ def _half_row(group: str, bounds: tuple[float, float, float], count: str) -> tup
 def _curve(power: Power | None) -> dict[str, Any] | None:
     if power is None:
         return None
-    bounds = {name: dict(zip(("half", "low", "high"), values, strict=True)) for name, values in power.half.items()}
+    bounds = {
+        name: dict(zip(("half", "low", "high"), values, strict=True))
+        for name, values in power.half.items()
+    }
     return {"slope": power.slope, "unit": "m", "groups": bounds, "level": 0.9}
 
 
@@ -255,7 +306,9 @@ def _class_name(outcome: Outcome) -> str:
 def _truth(outcome: Outcome, *, strengths: bool = False) -> str:
     if not outcome.key.effects:
         return "nothing"
-    names = [f"{a.effect} {a.value:.2g} {a.unit}" if strengths else a.effect for a in outcome.key.effects]
+    names = [
+        f"{a.effect} {a.value:.2g} {a.unit}" if strengths else a.effect for a in outcome.key.effects
+    ]
     return " + ".join(names) + (" (outside)" if outcome.key.kind is Kind.OUTSIDE else "")
 
 

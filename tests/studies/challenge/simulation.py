@@ -1,4 +1,5 @@
-"""Simulates recordings of sets that share their numerics, as one batch: effects are at null where they do not act."""
+"""Simulates recordings of sets that share their numerics, as one batch: effects are at null where
+they do not act."""
 
 from __future__ import annotations
 
@@ -43,8 +44,10 @@ class SimulatedSet:
     """What a set's cloth did.
 
     Attributes:
-        positions: one (frame, vertex, 3) for each recording, the lower attachment at the origin [m].
-        winds: one (sample, 3) for each recording: one sample where it is steady, else at the log's rate [m/s].
+        positions: one (frame, vertex, 3) for each recording, the lower attachment at the origin
+            [m].
+        winds: one (sample, 3) for each recording: one sample where it is steady, else at the log's
+            rate [m/s].
         effects: what acted, with the strengths that were simulated.
         impact: see `AnswerKey`.
     """
@@ -56,19 +59,25 @@ class SimulatedSet:
 
 
 def batches(keys: Sequence[AnswerKey], recordings: int) -> list[tuple[AnswerKey, ...]]:
-    """Sets that are simulated together: one mesh, as many recordings as fit, and few different effects."""
+    """Sets that are simulated together: one mesh, as many recordings as fit, and few different
+    effects."""
     groups: dict[str, list[AnswerKey]] = {}
     for key in sorted(keys, key=lambda key: [acting.effect for acting in key.effects]):
         groups.setdefault(key.numerics, []).append(key)
     each = max(1, WIDEST // recordings)
-    return [tuple(group[i : i + each]) for group in groups.values() for i in range(0, len(group), each)]
+    return [
+        tuple(group[i : i + each]) for group in groups.values() for i in range(0, len(group), each)
+    ]
 
 
-def simulate(recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey]) -> dict[str, SimulatedSet]:
-    """Set → what its cloth did. The clock of the effects starts with the run, `settle` before the first frame.
+def simulate(
+    recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey]
+) -> dict[str, SimulatedSet]:
+    """Set → what its cloth did. The clock of the effects starts with the run, `settle` before the
+    first frame.
 
-    Some effects feed the cloth with energy and, at some strengths, tear it apart. The strengths of a set that diverges
-    are halved, three times at most.
+    Some effects feed the cloth with energy and, at some strengths, tear it apart. The strengths of
+    a set that diverges are halved, three times at most.
 
     Raises:
         FlagdataError: a flag diverged all the same.
@@ -76,7 +85,9 @@ def simulate(recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey]) -> d
     return _tried(recipe, seed, keys, _HALVINGS)
 
 
-def _tried(recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey], halvings: int) -> dict[str, SimulatedSet]:
+def _tried(
+    recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey], halvings: int
+) -> dict[str, SimulatedSet]:
     try:
         return _simulated(recipe, seed, keys)
     except DivergedError as error:
@@ -97,7 +108,9 @@ def _halved(acting: Acting) -> Acting:
     return replace(acting, value=null + (acting.value - null) / 2)
 
 
-def _simulated(recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey]) -> dict[str, SimulatedSet]:
+def _simulated(
+    recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey]
+) -> dict[str, SimulatedSet]:
     numerics = recipe.numerics[keys[0].numerics]
     winds = {key.name: _winds(recipe, seed, key) for key in keys}
     base, start = _base(recipe, seed, numerics, keys, winds)
@@ -107,14 +120,19 @@ def _simulated(recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey]) ->
         system, state = apply(effects, base, start)
         stepper = _Stepper.of(numerics)
         frames, snapshots = _run(recipe, keys, stepper, system, state)
-        impact = _impacts(stepper, system, base, snapshots) if effects else torch.zeros(base.cloth.batch)
+        impact = (
+            _impacts(stepper, system, base, snapshots) if effects else torch.zeros(base.cloth.batch)
+        )
     result: dict[str, SimulatedSet] = {}
     for place, key in enumerate(keys):
         members = range(place * recipe.count, (place + 1) * recipe.count)
         ticks = recipe.ticks // key.rate * np.arange(_frames(recipe, key))
-        positions = tuple(np.stack([frames[int(tick)][:, :, member] for tick in ticks]) for member in members)
+        positions = tuple(
+            np.stack([frames[int(tick)][:, :, member] for tick in ticks]) for member in members
+        )
         settled = tuple(
-            wind[round(recipe.settle * recipe.log_rate) :] if len(wind) > 1 else wind for wind in winds[key.name]
+            wind[round(recipe.settle * recipe.log_rate) :] if len(wind) > 1 else wind
+            for wind in winds[key.name]
         )
         square = float((impact[list(members)] ** 2).mean())
         result[key.name] = SimulatedSet(
@@ -126,7 +144,8 @@ def _simulated(recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey]) ->
 def material_of(key: AnswerKey) -> Material:
     """The set's true cloth."""
     return replace(
-        named_material(key.material).scaled(area_weight=key.density, bending=key.bending), damping=key.damping
+        named_material(key.material).scaled(area_weight=key.density, bending=key.bending),
+        damping=key.damping,
     )
 
 
@@ -143,11 +162,14 @@ def _winds(recipe: ChallengeRecipe, seed: int, key: AnswerKey) -> tuple[FloatArr
     count = round(duration * recipe.log_rate) + 1
     if recipe.films is not None:
         return tuple(
-            _turbulent(recipe, key, count, stream(seed, "wind", index), speed) for index, speed in enumerate(key.speeds)
+            _turbulent(recipe, key, count, stream(seed, "wind", index), speed)
+            for index, speed in enumerate(key.speeds)
         )
     series = [
         VonKarman(mean=speed, intensity=key.intensity, length=recipe.length).series(
-            stream(seed, key.name, "wind", index), duration=count / recipe.log_rate, rate=recipe.log_rate
+            stream(seed, key.name, "wind", index),
+            duration=count / recipe.log_rate,
+            rate=recipe.log_rate,
         )
         for index, speed in enumerate(key.speeds)
     ]
@@ -157,7 +179,8 @@ def _winds(recipe: ChallengeRecipe, seed: int, key: AnswerKey) -> tuple[FloatArr
 def _turbulent(
     recipe: ChallengeRecipe, key: AnswerKey, count: int, rng: np.random.Generator, speed: float
 ) -> FloatArray:
-    """(sample, 3) of a wind along +x that is turbulent across and upwards as well, the same in all sets [m/s]."""
+    """(sample, 3) of a wind along +x that is turbulent across and upwards as well, the same in all
+    sets [m/s]."""
     gusts = Gusts(intensity=key.intensity)
     series = (
         gusts.with_series(
@@ -172,7 +195,12 @@ def _turbulent(
         .numpy()
         .T
     )
-    parts = np.array([1.0, float(gusts.lateral), float(gusts.vertical)])[:, None] * key.intensity * speed * series
+    parts = (
+        np.array([1.0, float(gusts.lateral), float(gusts.vertical)])[:, None]
+        * key.intensity
+        * speed
+        * series
+    )
     return parts.T + np.array([speed, 0.0, 0.0])
 
 
@@ -205,7 +233,9 @@ def _base(
     each = [np.broadcast_to(wind, (count, 3)) for key in keys for wind in winds[key.name]]
     samples = torch.as_tensor(np.stack(each, axis=-1), dtype=system.cloth.dtype)
     times = Even(start=0.0, period=1 / recipe.log_rate, count=count)
-    return replace(system, wind=SampledWind(times=times, samples=samples, beyond=Beyond.HOLD)), state
+    return replace(
+        system, wind=SampledWind(times=times, samples=samples, beyond=Beyond.HOLD)
+    ), state
 
 
 def heading(key: AnswerKey) -> FloatArray:
@@ -214,7 +244,9 @@ def heading(key: AnswerKey) -> FloatArray:
     return np.array([math.cos(angle), math.sin(angle), 0.0])
 
 
-def _start(rest: FloatArray, key: AnswerKey, rng: np.random.Generator, handles: Handles) -> FloatArray:
+def _start(
+    rest: FloatArray, key: AnswerKey, rng: np.random.Generator, handles: Handles
+) -> FloatArray:
     flat = rest[:, :1] * heading(key) + rest[:, 1:] * np.array([0.0, 0.0, 1.0])
     return roughen_start(flat, handles, rng, _START_NOISE)
 
@@ -242,12 +274,15 @@ def _effect(recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey], name:
         for key in keys
         for index, speed in enumerate(key.speeds)
     ]
-    return replace(effect, times=series[0].times, samples=torch.cat([s.samples for s in series], dim=-1))
+    return replace(
+        effect, times=series[0].times, samples=torch.cat([s.samples for s in series], dim=-1)
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Stepper:
-    """Advances systems, with shorter outer steps where what acts beside the base model asks for them."""
+    """Advances systems, with shorter outer steps where what acts beside the base model asks for
+    them."""
 
     method: BackwardEuler | Symplectic
 
@@ -263,24 +298,38 @@ class _Stepper:
             try:
                 return method.advance(system, state, duration)
             except UsageError:
-                if not isinstance(method, Symplectic) or method.outer is None or method.outer < _SHORTEST_OUTER:
+                if (
+                    not isinstance(method, Symplectic)
+                    or method.outer is None
+                    or method.outer < _SHORTEST_OUTER
+                ):
                     raise
                 method = replace(method, outer=method.outer / 2)
 
 
 def _run(
-    recipe: ChallengeRecipe, keys: Sequence[AnswerKey], stepper: _Stepper, system: System, state: State
+    recipe: ChallengeRecipe,
+    keys: Sequence[AnswerKey],
+    stepper: _Stepper,
+    system: System,
+    state: State,
 ) -> tuple[dict[int, Float32Array], list[State]]:
     """Tick → positions (vertex, 3, batch), and states at some instants."""
     ticks, settle = recipe.ticks, round(recipe.settle * recipe.ticks)
     wanted = {ticks // key.rate * frame for key in keys for frame in range(_frames(recipe, key))}
     span = round(recipe.duration * ticks)
     instants = {round(span * (i + 0.5) / INSTANTS) for i in range(INSTANTS)}
-    stops = {ticks // recipe.log_rate * i - settle for i in range(1, (settle + span) * recipe.log_rate // ticks)}
+    stops = {
+        ticks // recipe.log_rate * i - settle
+        for i in range(1, (settle + span) * recipe.log_rate // ticks)
+    }
     frames: dict[int, Float32Array] = {}
     snapshots: list[State] = []
     batch = Batch(system=system, state=state, integrator=stepper, divergence=Divergence.REFUSE)
-    numbers = [tick + settle for tick in sorted(wanted | instants | {stop for stop in stops if stop < span})]
+    numbers = [
+        tick + settle
+        for tick in sorted(wanted | instants | {stop for stop in stops if stop < span})
+    ]
     for number, at in zip(numbers, batch.states(numbers, ticks), strict=True):
         if number - settle in wanted:
             frames[number - settle] = at.position.numpy().copy()

@@ -32,15 +32,24 @@ def test_what_is_made_can_be_judged_and_graded(invoke, tmp_path: Path) -> None:
     torch.set_num_threads(1)
     recipe, folder = tmp_path / "tiny.toml", tmp_path / "made"
     recipe.write_text(cases.TINY)
-    made = invoke("make", str(folder), "--recipe", str(recipe), "--seed", "3", "--sets", "2", "--json")
+    made = invoke(
+        "make", str(folder), "--recipe", str(recipe), "--seed", "3", "--sets", "2", "--json"
+    )
     assert made.exit_code == 0
     assert set(json.loads(made.stdout)["sets"]) == {"set-001", "set-002"}
-    run(ChallengeFolder(folder), lambda e, s: cases.verdict(Conclusion.SUFFICIENT), seed=1, workers=IN_THIS_PROCESS)
+    run(
+        ChallengeFolder(folder),
+        lambda e, s: cases.verdict(Conclusion.SUFFICIENT),
+        seed=1,
+        workers=IN_THIS_PROCESS,
+    )
     # All are judged: nothing is left to do, and no fitter is asked.
     again = invoke("run", str(folder), "--json")
     assert json.loads(again.stdout)["filed"] == []
     kept = tmp_path / "history.csv"
-    graded = invoke("score", str(folder), "--json", "--out", str(tmp_path / "sheet"), "--history", str(kept))
+    graded = invoke(
+        "score", str(folder), "--json", "--out", str(tmp_path / "sheet"), "--history", str(kept)
+    )
     # Who finds nothing does not meet the gates.
     assert graded.exit_code == 3
     assert json.loads(graded.stdout)["schema"] == "flagdata.score/1"
@@ -48,7 +57,9 @@ def test_what_is_made_can_be_judged_and_graded(invoke, tmp_path: Path) -> None:
     assert [(row["challenge"], row["sets"]) for row in history.rows(kept)] == [("made", "2")]
 
 
-def test_the_page_on_stdout_is_the_one_that_is_written(invoke, tiny: ChallengeFolder, tmp_path: Path) -> None:
+def test_the_page_on_stdout_is_the_one_that_is_written(
+    invoke, tiny: ChallengeFolder, tmp_path: Path
+) -> None:
     run(tiny, lambda e, s: cases.verdict(Conclusion.SUFFICIENT), seed=1, workers=IN_THIS_PROCESS)
     shown = invoke("score", str(tiny.path), "--out", str(tmp_path)).stdout
     page = tmp_path / "challenge-score.md"
@@ -102,7 +113,11 @@ def test_a_taken_output_is_refused_first_and_kept(
     (out / taken).write_text("mine")
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as ended:
-        main(["challenge", *(word.format(out=out) for word in arguments), "--json"], command=studies, name="studies")
+        main(
+            ["challenge", *(word.format(out=out) for word in arguments), "--json"],
+            command=studies,
+            name="studies",
+        )
     error = json.loads(capsys.readouterr().out)
     assert (ended.value.code, error["kind"]) == (1, kind)
     assert str(out) in f"{error['what']} {error['where']}"

@@ -27,7 +27,9 @@ from tests.studies.challenge.recipe import ChallengeRecipe, Kind, load, parse
 from tests.studies.challenge.score import graded
 
 FILMED = (
-    TINY.replace("rates = [25, 60]\nnoises = [0.0, 0.001]\n", "").replace("duration = 0.2", "duration = 4.2")
+    TINY.replace("rates = [25, 60]\nnoises = [0.0, 0.001]\n", "").replace(
+        "duration = 0.2", "duration = 4.2"
+    )
     + '[films]\nwidth = 96\npixels-high = 72\nsamples = 1\nbackgrounds = ["sky"]\n'
 )
 
@@ -37,7 +39,9 @@ def recipe() -> ChallengeRecipe:
     return parse(FILMED, where="filmed")
 
 
-def test_sets_are_films_with_what_is_stated_beside_them(recipe: ChallengeRecipe, tmp_path: Path) -> None:
+def test_sets_are_films_with_what_is_stated_beside_them(
+    recipe: ChallengeRecipe, tmp_path: Path
+) -> None:
     made = make(tmp_path / "films", recipe, seed=3, count=1)
     assert made.filmed
     given = made.films("set-001")
@@ -110,7 +114,9 @@ def test_what_films_have_no_use_for_is_refused() -> None:
 
 
 def test_a_set_that_is_no_set_of_films_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "set.json").write_text('{"schema": "flagdata.challenge-films/1", "flag": {"length": 1.5}}')
+    (tmp_path / "set.json").write_text(
+        '{"schema": "flagdata.challenge-films/1", "flag": {"length": 1.5}}'
+    )
     with pytest.raises(InputError, match="not a set of films"):
         read_films(tmp_path)
 
@@ -119,7 +125,9 @@ def test_the_recipe_of_the_catalog_has_the_sets_that_are_asked_for() -> None:
     keys = draw(load("films"), seed=1, count=40)
     kinds = [one.kind for one in keys]
     assert [kinds.count(kind) for kind in (Kind.NULL, Kind.ONE, Kind.OUTSIDE)] == [14, 16, 10]
-    alone = [(one.effects[0].effect, abs(one.effects[0].value)) for one in keys if one.kind is Kind.ONE]
+    alone = [
+        (one.effects[0].effect, abs(one.effects[0].value)) for one in keys if one.kind is Kind.ONE
+    ]
     assert len(set(alone)) == 16  # each effect at both of its strengths
 
 
@@ -128,7 +136,9 @@ def test_sheets_that_are_to_come_have_what_films_show(name: str, nulls: int, one
     keys = draw(load(name), seed=1, count=nulls + ones)
     kinds = [one.kind for one in keys]
     assert [kinds.count(kind) for kind in (Kind.NULL, Kind.ONE)] == [nulls, ones]
-    acting = [(one.effects[0].effect, abs(one.effects[0].value)) for one in keys if one.kind is Kind.ONE]
+    acting = [
+        (one.effects[0].effect, abs(one.effects[0].value)) for one in keys if one.kind is Kind.ONE
+    ]
     assert len(set(acting)) == 11  # of six effects, added mass at its strong one alone
     assert not {"full-hoist", "shear"} & {effect for effect, _ in acting}
     assert ("added-mass", 0.15) not in acting
@@ -144,7 +154,9 @@ def test_sheets_that_are_to_come_have_what_films_show(name: str, nulls: int, one
         (verdict(Conclusion.OUTSIDE), False, False),
     ],
 )
-def test_one_of_several_counts_as_right_and_only_a_name_given_alone_as_wrong(said, among: bool, wrong: bool) -> None:
+def test_one_of_several_counts_as_right_and_only_a_name_given_alone_as_wrong(
+    said, among: bool, wrong: bool
+) -> None:
     outcome = Outcome.of(key("o", Kind.ONE, acting("lift")), filing("o", said))
     assert (outcome.class_among_named, outcome.wrong_alone) == (among, wrong)
 
@@ -156,11 +168,20 @@ def test_films_have_gates_of_their_own() -> None:
         (key("x", Kind.OUTSIDE, acting("tether")), verdict(Conclusion.PARTLY, "lift")),
         (key("y", Kind.OUTSIDE, acting("tether")), verdict(Conclusion.SUFFICIENT)),
     ]
-    sheet = replace(graded("films", [Outcome.of(k, filing(k.name, said)) for k, said in sets]), filmed=True)
-    assert [(gate.value, gate.met) for gate in sheet.gates[:4]] == [(0.0, True), (1.0, True), (0.0, True), (1.0, True)]
+    sheet = replace(
+        graded("films", [Outcome.of(k, filing(k.name, said)) for k, said in sets]), filmed=True
+    )
+    assert [(gate.value, gate.met) for gate in sheet.gates[:4]] == [
+        (0.0, True),
+        (1.0, True),
+        (0.0, True),
+        (1.0, True),
+    ]
 
 
-def test_a_set_that_names_a_film_outside_its_folder_is_refused(recipe: ChallengeRecipe, tmp_path: Path) -> None:
+def test_a_set_that_names_a_film_outside_its_folder_is_refused(
+    recipe: ChallengeRecipe, tmp_path: Path
+) -> None:
     folder = make(tmp_path / "films", recipe, seed=3, count=1).data("set-001")
     (tmp_path / "mine.mp4").write_bytes(b"not of the set")
     stated = folder / "set.json"

@@ -1,4 +1,5 @@
-"""The history of challenges: a row for each, graded once; the newest row's criteria beside today's."""
+"""The history of challenges: a row for each, graded once; the newest row's criteria beside
+today's."""
 
 from __future__ import annotations
 
@@ -11,11 +12,22 @@ from measure.verdict import CRITERIA
 from tests.studies.challenge import history
 
 RESULTS = Path(__file__).resolve().parents[3] / "docs" / "results"
-SHARES = {"top-1": {"hits": 3, "count": 4, "low": 0.249, "high": 0.987}, "of none": {"hits": 0, "count": 0}}
-SHEET = {"title": "made", "code_version": "1+abc", "criteria": ["f00"], "sets": {"null": 2, "one": 4}, "shares": SHARES}
+SHARES = {
+    "top-1": {"hits": 3, "count": 4, "low": 0.249, "high": 0.987},
+    "of none": {"hits": 0, "count": 0},
+}
+SHEET = {
+    "title": "made",
+    "code_version": "1+abc",
+    "criteria": ["f00"],
+    "sets": {"null": 2, "one": 4},
+    "shares": SHARES,
+}
 
 
-def test_rows_come_back_as_they_were_written_and_other_shares_get_columns_of_their_own(tmp_path: Path) -> None:
+def test_rows_come_back_as_they_were_written_and_other_shares_get_columns_of_their_own(
+    tmp_path: Path,
+) -> None:
     path = tmp_path / "kept" / "history.csv"
     first = history.row("one", SHEET)
     second = history.row("two", SHEET | {"shares": {"another": SHARES["top-1"]}})
@@ -23,7 +35,12 @@ def test_rows_come_back_as_they_were_written_and_other_shares_get_columns_of_the
     read = history.rows(path)
     assert read[0] == first | {"another": ""}
     assert read[1]["another"] == read[0]["top-1"] == "3/4 [0.249, 0.987]"
-    assert (read[1]["top-1"], read[0]["of none"], read[0]["sets"], read[0]["criteria"]) == ("", "", "6", "f00")
+    assert (read[1]["top-1"], read[0]["of none"], read[0]["sets"], read[0]["criteria"]) == (
+        "",
+        "",
+        "6",
+        "f00",
+    )
 
 
 def test_a_challenge_is_in_the_history_once(tmp_path: Path) -> None:
@@ -50,9 +67,18 @@ def test_the_results_say_whether_the_newest_challenge_was_judged_by_todays_crite
     assert ("The newest challenge was judged by other criteria than today's." in text) is not today
 
 
-def test_the_sheets_that_are_kept_are_the_first_and_the_newest_of_markers_and_of_films_of_each_length() -> None:
+def test_the_sheets_that_are_kept_are_the_first_and_the_newest_of_markers_and_of_films_of_each_length() -> (
+    None
+):
     rows = history.rows(RESULTS / "challenge-history.csv")
-    newest = {(row["title"].split(" of ")[0], "three minutes" in row["title"]): row["challenge"] for row in rows}
+    newest = {
+        (row["title"].split(" of ")[0], "three minutes" in row["title"]): row["challenge"]
+        for row in rows
+    }
     assert set(newest) == {("Tracked markers", False), ("Films", False), ("Films", True)}
-    kept = {path.name for path in RESULTS.iterdir() if path.is_dir() and path.name.startswith("challenge-")}
+    kept = {
+        path.name
+        for path in RESULTS.iterdir()
+        if path.is_dir() and path.name.startswith("challenge-")
+    }
     assert kept == {rows[0]["challenge"], *newest.values()}

@@ -1,4 +1,5 @@
-"""Sets of a challenge whose files do not fit are refused before memory is taken, and name no file elsewhere."""
+"""Sets of a challenge whose files do not fit are refused before memory is taken, and name no file
+elsewhere."""
 
 from __future__ import annotations
 
@@ -18,7 +19,9 @@ from tests.studies.hostile.inputs import ABOUT, write_small_set
 
 def test_the_set_is_whole(tmp_path: Path) -> None:
     write_small_set(tmp_path / "set")
-    assert [recording.positions.shape for recording in read_set(tmp_path / "set").recordings] == [(10, 6, 3)]
+    assert [recording.positions.shape for recording in read_set(tmp_path / "set").recordings] == [
+        (10, 6, 3)
+    ]
 
 
 @pytest.mark.parametrize(
@@ -38,7 +41,9 @@ def test_the_set_is_whole(tmp_path: Path) -> None:
         (("recordings", 0, "name"), "b"),
     ],
 )
-def test_values_that_do_not_fit_are_refused(tmp_path: Path, path: tuple[Any, ...], value: Any) -> None:
+def test_values_that_do_not_fit_are_refused(
+    tmp_path: Path, path: tuple[Any, ...], value: Any
+) -> None:
     write_small_set(tmp_path / "set")
     np.save(tmp_path / "elsewhere.npy", np.zeros((10, 6, 3)))
     (tmp_path / "set" / "set.json").write_text(json.dumps(changed(ABOUT, path, value)))
@@ -46,9 +51,13 @@ def test_values_that_do_not_fit_are_refused(tmp_path: Path, path: tuple[Any, ...
         read_set(tmp_path / "set")
 
 
-@pytest.mark.parametrize("shape", ["(1000000000000,)", "(10, 6, 3000000)", "(4611686018427387904, 6, 3)"])
+@pytest.mark.parametrize(
+    "shape", ["(1000000000000,)", "(10, 6, 3000000)", "(4611686018427387904, 6, 3)"]
+)
 @pytest.mark.parametrize("kind", ["<f4", "|O"])
-def test_a_header_that_states_more_than_the_file_holds_is_refused(tmp_path: Path, shape: str, kind: str) -> None:
+def test_a_header_that_states_more_than_the_file_holds_is_refused(
+    tmp_path: Path, shape: str, kind: str
+) -> None:
     write_small_set(tmp_path / "set")
     text = f"{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}".ljust(117) + "\n"
     (tmp_path / "set" / "a.npy").write_bytes(b"\x93NUMPY\x01\x00v\x00" + text.encode() + bytes(720))
@@ -67,7 +76,9 @@ def test_a_header_that_states_more_than_the_file_holds_is_refused(tmp_path: Path
         {"title": "t", "sets": {"\0": {"data": "x", "commitment": "y"}}},
     ],
 )
-def test_a_challenge_that_does_not_state_its_sets_is_refused(tmp_path: Path, content: dict[str, Any]) -> None:
+def test_a_challenge_that_does_not_state_its_sets_is_refused(
+    tmp_path: Path, content: dict[str, Any]
+) -> None:
     (tmp_path / "challenge.json").write_text(json.dumps(content))
     with pytest.raises(CorruptError, match="title and its sets"):
         ChallengeFolder(tmp_path).names()

@@ -27,7 +27,9 @@ from tests.studies.challenge.simulation import SimulatedSet, batches
 
 
 def tree(folder: Path) -> dict[str, str]:
-    return {str(p.relative_to(folder)): file_hash(p) for p in sorted(folder.rglob("*")) if p.is_file()}
+    return {
+        str(p.relative_to(folder)): file_hash(p) for p in sorted(folder.rglob("*")) if p.is_file()
+    }
 
 
 def test_the_same_seed_gives_the_same_bytes(tiny_source: Path, make_tiny, tmp_path: Path) -> None:
@@ -42,7 +44,9 @@ def test_one_that_was_stopped_goes_on_with_the_batches_that_it_lacks(
     monkeypatch.setattr(making, "batches", one_by_one)
     plain = making.simulate
 
-    def counted(recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey]) -> dict[str, SimulatedSet]:
+    def counted(
+        recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey]
+    ) -> dict[str, SimulatedSet]:
         if len(simulated) == 2:
             raise KeyboardInterrupt
         simulated.append(len(keys))
@@ -54,7 +58,9 @@ def test_one_that_was_stopped_goes_on_with_the_batches_that_it_lacks(
         making.make(tmp_path / "tiny", recipe, seed=3, count=4)
     assert not (tmp_path / "tiny").exists()
     again: list[int] = []
-    monkeypatch.setattr(making, "simulate", lambda r, seed, keys: again.append(len(keys)) or plain(r, seed, keys))
+    monkeypatch.setattr(
+        making, "simulate", lambda r, seed, keys: again.append(len(keys)) or plain(r, seed, keys)
+    )
     found: list[int] = []
     made = making.make(tmp_path / "tiny", recipe, seed=3, count=4, progress=found.append)
     assert (simulated, again, sum(found)) == ([1, 1], [1, 1], 4)
@@ -64,8 +70,12 @@ def test_one_that_was_stopped_goes_on_with_the_batches_that_it_lacks(
         made.checked(name)
 
 
-def test_a_challenge_that_cannot_be_made_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def diverging(recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey]) -> dict[str, SimulatedSet]:
+def test_a_challenge_that_cannot_be_made_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def diverging(
+        recipe: ChallengeRecipe, seed: int, keys: Sequence[AnswerKey]
+    ) -> dict[str, SimulatedSet]:
         raise InputError("the cloth diverged", where="set-001", fix="narrow the recipe's ranges")
 
     monkeypatch.setattr(making, "simulate", diverging)
@@ -110,8 +120,22 @@ def test_data_that_were_changed_are_refused(tiny: ChallengeFolder) -> None:
 
 def test_a_set_does_not_state_what_acts_in_it(tiny: ChallengeFolder) -> None:
     """No word of the keys, the same files, sizes by frame rate alone, one time of change."""
-    public = "".join((tiny.data(name) / "set.json").read_text() for name in tiny.names()) + tiny.public.read_text()
-    for word in ("lift", "shear", "tether", "null", "pair", "outside", "only", "seed", "damping", "impact"):
+    public = (
+        "".join((tiny.data(name) / "set.json").read_text() for name in tiny.names())
+        + tiny.public.read_text()
+    )
+    for word in (
+        "lift",
+        "shear",
+        "tether",
+        "null",
+        "pair",
+        "outside",
+        "only",
+        "seed",
+        "damping",
+        "impact",
+    ):
         assert word not in public
     sizes: dict[int, set[int]] = {}
     for name in tiny.names():
@@ -131,7 +155,8 @@ def test_a_set_reads_as_an_experiment_on_the_fitters_own_mesh(tiny: ChallengeFol
     assert experiment.specimen.mesh.vertex_count == 16 * 11
     assert len(experiment.recordings) == 2
     for recording in experiment.recordings:
-        # Within 0.4 s from rest nothing has moved by more than the flag's length; pins are where markers start.
+        # Within 0.4 s from rest nothing has moved by more than the flag's length; pins are where
+        # markers start.
         distance = np.linalg.norm(recording.positions - experiment.specimen.anchors[0], axis=2)
         assert distance.max() < 2.0
         assert recording.positions.shape == (round(0.2 * recording.rate), 30, 3)
@@ -155,7 +180,9 @@ def test_the_standard_challenge_has_the_composition_it_is_to_have() -> None:
     assert {key.noise for key in keys} == {0.0, 0.001, 0.004}
     pairs = [[class_of(a.effect) for a in key.effects] for key in keys if key.kind is Kind.PAIR]
     assert all(first != second for first, second in pairs)
-    assert sorted(key.name for group in batches(keys, 3) for key in group) == [key.name for key in keys]
+    assert sorted(key.name for group in batches(keys, 3) for key in group) == [
+        key.name for key in keys
+    ]
 
 
 def test_names_are_in_no_order_of_kind() -> None:
@@ -173,7 +200,9 @@ def test_shares_are_dealt_out_to_within_one(count: int) -> None:
     dealt = composition(recipe, count)
     assert sum(dealt.values()) == count
     total = sum(recipe.composition.values())
-    assert all(abs(dealt[kind] - count * share / total) < 1 for kind, share in recipe.composition.items())
+    assert all(
+        abs(dealt[kind] - count * share / total) < 1 for kind, share in recipe.composition.items()
+    )
 
 
 def test_markers_follow_a_smooth_surface_to_the_order_of_cubic_splines() -> None:
@@ -186,14 +215,18 @@ def test_markers_follow_a_smooth_surface_to_the_order_of_cubic_splines() -> None
         mesh = mesh_of(numerics, width=1.5, height=1.0)
         field = np.cos(4 * mesh.rest[:, 0]) * np.sin(5 * mesh.rest[:, 1])
         weights = seen(numerics, markers, width=1.5, height=1.0)
-        return float(np.abs(weights @ field - np.cos(4 * markers[:, 0]) * np.sin(5 * markers[:, 1])).max())
+        return float(
+            np.abs(weights @ field - np.cos(4 * markers[:, 0]) * np.sin(5 * markers[:, 1])).max()
+        )
 
     # h⁴ f''''/384 with h = 75 mm and f'''' = 5⁴: 5e-5, five times that at not-a-knot ends.
     assert error("coarse") < 3e-4
     assert error("fine") < error("coarse")
     numerics = recipe.numerics["coarse"]
     mesh = mesh_of(numerics, width=1.5, height=1.0)
-    np.testing.assert_allclose(seen(numerics, mesh.rest, width=1.5, height=1.0), np.eye(len(mesh.rest)), atol=1e-12)
+    np.testing.assert_allclose(
+        seen(numerics, mesh.rest, width=1.5, height=1.0), np.eye(len(mesh.rest)), atol=1e-12
+    )
 
 
 def test_markers_lie_on_the_cloth_and_not_on_the_fitters_vertices(tiny: ChallengeFolder) -> None:
@@ -220,7 +253,11 @@ def test_markers_lie_on_the_cloth_and_not_on_the_fitters_vertices(tiny: Challeng
         ('diagonals = "forward"', 'integrator = "implicit"', InputError),
         ('diagonals = "forward"', "step = 0.001", InputError),
         ("[effects.shear]\nrange = 0.4", "", InputError),
-        ("[effects.shear]\nrange = 0.4", "[effects.shear]\nrange = 0.4\nvalues = [0.2]", InputError),
+        (
+            "[effects.shear]\nrange = 0.4",
+            "[effects.shear]\nrange = 0.4\nvalues = [0.2]",
+            InputError,
+        ),
         ("[effects.shear]\nrange = 0.4", "[effects.shear]\nvalues = [0.2, 0.0]", InputError),
     ],
 )
@@ -240,8 +277,12 @@ def test_strengths_that_are_fixed_beforehand_are_dealt_out_evenly() -> None:
     assert {name: sorted(values) for name, values in alone.items()} == {
         name: sorted(strengths.values) for name, strengths in recipe.effects.items()
     }
-    beside = {(a.effect, abs(a.value)) for key in keys if key.kind is Kind.PAIR for a in key.effects}
-    assert beside <= {(name, value) for name, strengths in recipe.effects.items() for value in strengths.values}
+    beside = {
+        (a.effect, abs(a.value)) for key in keys if key.kind is Kind.PAIR for a in key.effects
+    }
+    assert beside <= {
+        (name, value) for name, strengths in recipe.effects.items() for value in strengths.values
+    }
     assert len({value for _, value in beside}) > len(
         {name for name, _ in beside}
     )  # neither the first nor the last alone
@@ -251,5 +292,13 @@ def test_strengths_that_are_fixed_beforehand_are_dealt_out_evenly() -> None:
 
 
 def test_the_catalogs_recipes_parse() -> None:
-    assert CHALLENGES.names() == ("films", "films-3", "films-long", "inertia", "registered", "standard", "strong")
+    assert CHALLENGES.names() == (
+        "films",
+        "films-3",
+        "films-long",
+        "inertia",
+        "registered",
+        "standard",
+        "strong",
+    )
     assert [load(name).count for name in CHALLENGES.names()] == [3] * 7

@@ -42,7 +42,8 @@ def test_they_are_of_the_recipes_cloths_winds_rates_and_noises(recipe: Challenge
     for batch in batches:
         assert len(batch.markers) == 30
         assert all(2.7 <= speed <= 8.8 for speed in batch.speeds)
-        # Two recordings of 10 s hold four segments of 2 s each: as many, by four winds of one cloth.
+        # Two recordings of 10 s hold four segments of 2 s each: as many, by four winds of one
+        # cloth.
         frames = round(batch.duration * batch.rate)
         cut = Cut.of(batch.rate, frames)
         assert cut.length * cut.period == pytest.approx(2.0)
@@ -52,14 +53,22 @@ def test_they_are_of_the_recipes_cloths_winds_rates_and_noises(recipe: Challenge
 def test_more_kinds_add_to_those_that_are_there(recipe: ChallengeRecipe) -> None:
     few, more = (nulls.null_batches(recipe, seed=5, kinds=kinds) for kinds in (3, 5))
     for old, new in zip(few, more, strict=False):
-        assert (old.seed, old.rate, old.noise, old.speeds) == (new.seed, new.rate, new.noise, new.speeds)
+        assert (old.seed, old.rate, old.noise, old.speeds) == (
+            new.seed,
+            new.rate,
+            new.noise,
+            new.speeds,
+        )
         np.testing.assert_array_equal(old.markers, new.markers)
     assert nulls.null_batches(recipe, seed=6, kinds=1)[0].seed != few[0].seed
 
 
 def test_what_the_truth_computes_with_does_not_matter(recipe: ChallengeRecipe) -> None:
     other = replace(recipe, numerics={"only": replace(recipe.numerics["only"], columns=40)})
-    assert nulls.null_batches(recipe, seed=5, kinds=1)[0].speeds == nulls.null_batches(other, seed=5, kinds=1)[0].speeds
+    assert (
+        nulls.null_batches(recipe, seed=5, kinds=1)[0].speeds
+        == nulls.null_batches(other, seed=5, kinds=1)[0].speeds
+    )
 
 
 def test_recordings_too_short_for_a_segment_are_refused(recipe: ChallengeRecipe) -> None:
@@ -80,15 +89,31 @@ def test_the_verb_builds_them(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
     asked: list[tuple[Path, int, int, str | None]] = []
 
     def build(
-        folder: Path, batches: Sequence[NullBatch], *, workers: int, scheduler: str | None, progress: object
+        folder: Path,
+        batches: Sequence[NullBatch],
+        *,
+        workers: int,
+        scheduler: str | None,
+        progress: object,
     ) -> None:
         asked.append((folder, len(batches), workers, scheduler))
 
     monkeypatch.setattr(banks, "build", build)
     (tmp_path / "tiny.toml").write_text(TEN_SECONDS)
-    arguments = ["bank", str(tmp_path / "made"), "--recipe", str(tmp_path / "tiny.toml"), "--seed", "5", "--kinds", "6"]
+    arguments = [
+        "bank",
+        str(tmp_path / "made"),
+        "--recipe",
+        str(tmp_path / "tiny.toml"),
+        "--seed",
+        "5",
+        "--kinds",
+        "6",
+    ]
     result = CliRunner().invoke(
-        challenge, [*arguments, "--workers", "2", "--scheduler", "tcp://a:1", "--json"], catch_exceptions=False
+        challenge,
+        [*arguments, "--workers", "2", "--scheduler", "tcp://a:1", "--json"],
+        catch_exceptions=False,
     )
     assert json.loads(result.stdout)["recordings"] == 6 * banks.WINDS
     assert asked == [(tmp_path / "made", 6, 2, "tcp://a:1")]
@@ -97,14 +122,24 @@ def test_the_verb_builds_them(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -
 def test_the_verb_takes_a_recipe_of_close_loop(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, specimen: Specimen, own_recording: Trajectory
 ) -> None:
-    """Nulls of its cloth, markers and winds; a folder goes on with those of the same recordings alone."""
+    """Nulls of its cloth, markers and winds; a folder goes on with those of the same recordings
+    alone."""
     experiment = Experiment(specimen=specimen, recordings=(own_recording,))
     asked: list[NullBatch] = []
     monkeypatch.setattr(banks, "build", lambda folder, batches, **_: asked.extend(batches))
     monkeypatch.setattr(nulls.recipes, "load", lambda path: SimpleNamespace(title=path.stem))
-    monkeypatch.setattr(nulls.recipes, "read", lambda recipe, lake: SimpleNamespace(experiment=experiment))
+    monkeypatch.setattr(
+        nulls.recipes, "read", lambda recipe, lake: SimpleNamespace(experiment=experiment)
+    )
     (tmp_path / "tracked.toml").write_text('[[recording]]\nsource = "tracks.csv"\n')
-    arguments = ["bank", str(tmp_path / "made"), "--recipe", str(tmp_path / "tracked.toml"), "--kinds", "6"]
+    arguments = [
+        "bank",
+        str(tmp_path / "made"),
+        "--recipe",
+        str(tmp_path / "tracked.toml"),
+        "--kinds",
+        "6",
+    ]
     CliRunner().invoke(challenge, [*arguments, "--seed", "5"], catch_exceptions=False)
     assert len(asked) == 6
     assert all(np.array_equal(batch.markers, own_recording.markers) for batch in asked)

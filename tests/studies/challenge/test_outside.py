@@ -1,4 +1,5 @@
-"""Effects outside the library keep the library's contract, and each does what its description says."""
+"""Effects outside the library keep the library's contract, and each does what its description
+says."""
 
 from __future__ import annotations
 
@@ -46,12 +47,16 @@ BATCH = 2
 START = 2.5
 
 
-def flag(turn: np.ndarray | None = None, shift: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> tuple[System, State]:
+def flag(
+    turn: np.ndarray | None = None, shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
+) -> tuple[System, State]:
     """A folded, moving flag of full size, so that the cord from its lower corner is taut."""
     turn = np.eye(3) if turn is None else turn
     mesh = grid(width=1.5, height=1.0, columns=4, rows=3)
     u, v = mesh.rest.T
-    start = np.stack([0.98 * u, 0.15 * u + 0.03 * np.sin(9 * u) * np.cos(7 * v), v - 0.1 * u], axis=1)
+    start = np.stack(
+        [0.98 * u, 0.15 * u + 0.03 * np.sin(9 * u) * np.cos(7 * v), v - 0.1 * u], axis=1
+    )
     scenes = [
         Scene(
             mesh=mesh,
@@ -103,7 +108,9 @@ def test_every_parameter_has_unit_null_prior_and_source(name: str) -> None:
 def test_a_member_at_null_is_the_base_models_to_the_bit_whatever_the_other_has(name: str) -> None:
     effect: Any = drawn(name)
     values: dict[str, Any] = {
-        label: torch.tensor([effect.parameters()[label].null, float(getattr(effect, label)[1])], dtype=torch.float64)
+        label: torch.tensor(
+            [effect.parameters()[label].null, float(getattr(effect, label)[1])], dtype=torch.float64
+        )
         for label in effect.strengths()
     }
     changed, base = outcome(replace(effect, **values), flag()), outcome(None, flag())
@@ -115,16 +122,21 @@ def test_a_member_at_null_is_the_base_models_to_the_bit_whatever_the_other_has(n
 @pytest.mark.parametrize("name", NAMES)
 def test_turning_and_moving_everything_turns_and_moves_the_outcome(name: str) -> None:
     angle, shift = 0.7, (3.0, -2.0, 1.0)
-    turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+    turn = np.array(
+        [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
+    )
     turned, still = outcome(drawn(name), flag(turn, shift)), outcome(drawn(name), flag())
     expected = torch.einsum("ij,svjb->svib", torch.tensor(turn), still)
-    torch.testing.assert_close(turned[0] - torch.tensor(shift)[:, None], expected[0], rtol=0, atol=1e-10)
+    torch.testing.assert_close(
+        turned[0] - torch.tensor(shift)[:, None], expected[0], rtol=0, atol=1e-10
+    )
     # Strains lose digits to the shift, and stiff faces amplify that into velocities.
     torch.testing.assert_close(turned[1], expected[1], rtol=0, atol=1e-8)
 
 
 def sheet_across(cells: int = 4) -> tuple[System, State]:
-    """One square metre across a wind of 5 m/s in +x, at rest, its lower left corner at the origin."""
+    """One square metre across a wind of 5 m/s in +x, at rest, its lower left corner at the
+    origin."""
     mesh = grid(width=1.0, height=1.0, columns=cells, rows=cells)
     scene = Scene(
         mesh=mesh,
@@ -137,7 +149,8 @@ def sheet_across(cells: int = 4) -> tuple[System, State]:
 
 
 def added(effect: Effect, *, cells: int = 4, turn: Tensor | None = None) -> Tensor:
-    """(vertex, 3) what an effect adds to the external forces on that sheet, whose vectors may be turned [N]."""
+    """(vertex, 3) what an effect adds to the external forces on that sheet, whose vectors may be
+    turned [N]."""
     base, state = sheet_across(cells)
     if turn is not None:
         state = replace(state, position=torch.einsum("ij,vjb->vib", turn, state.position))
@@ -148,7 +161,8 @@ def added(effect: Effect, *, cells: int = 4, turn: Tensor | None = None) -> Tens
 
 
 def test_the_vortex_street_sheds_at_the_strouhal_number() -> None:
-    """At U = 5 m/s and D = 0.15 m with f = 0.2 U/D = 6.7 Hz; amplitude q U far behind the pole, on its axis."""
+    """At U = 5 m/s and D = 0.15 m with f = 0.2 U/D = 6.7 Hz; amplitude q U far behind the pole, on
+    its axis."""
     effect = VortexStreet(share=0.3)
     frequency = STROUHAL * 5 / 0.15
     place = torch.tensor([[[1.5], [0.0], [0.0]]], dtype=torch.float64)
@@ -162,10 +176,11 @@ def test_the_vortex_street_sheds_at_the_strouhal_number() -> None:
 
 
 def test_attraction_pulls_every_part_horizontally_to_the_axis() -> None:
-    """On a strip at distance r: p e^(−r/ℓ); over the sheet p ℓ (1 − e^(−1/ℓ)) = 0.432 p with ℓ = 0.5 m."""
+    """On a strip at distance r: p e^(−r/ℓ); over the sheet p ℓ (1 − e^(−1/ℓ)) = 0.432 p with ℓ =
+    0.5 m."""
     force = added(Attraction(pull=0.8), cells=16)
-    # Vertices on the axis, which stand for half a cell of h = 62.5 mm, have no direction to be pulled in. The sum over
-    # the others errs by the order of h²/ℓ² = 1.6 %.
+    # Vertices on the axis, which stand for half a cell of h = 62.5 mm, have no direction to be
+    # pulled in. The sum over the others errs by the order of h²/ℓ² = 1.6 %.
     expected = -0.8 * (0.5 * (1 - math.exp(-2)) - 0.0625 / 2)
     assert float(force[:, 1].sum()) == pytest.approx(expected, rel=0.016)
     assert float(force[:, [0, 2]].abs().max()) < 1e-15
@@ -190,13 +205,18 @@ def test_a_place_beyond_the_cloth_is_refused() -> None:
 
 def test_the_updraft_is_below_and_half_of_it_at_the_attachments_height() -> None:
     wind = torch.tensor([[5.0], [0.0], [0.0]], dtype=torch.float64)
-    offset = torch.tensor([[0.0, 0.0, -2.0], [0.0, 0.0, 0.0], [0.0, 0.0, 2.0]], dtype=torch.float64)[..., None]
+    offset = torch.tensor(
+        [[0.0, 0.0, -2.0], [0.0, 0.0, 0.0], [0.0, 0.0, 2.0]], dtype=torch.float64
+    )[..., None]
     up = Updraft(speed=1.2).field(0.0, offset, wind)[:, 2, 0]
     np.testing.assert_allclose(up, [1.2, 0.6, 0.0], atol=1e-5)
 
 
 def test_the_obstacle_passes_once_a_period_from_right_to_left() -> None:
-    effect, wind = PassingObstacle(share=0.5), torch.tensor([[5.0], [0.0], [0.0]], dtype=torch.float64)
+    effect, wind = (
+        PassingObstacle(share=0.5),
+        torch.tensor([[5.0], [0.0], [0.0]], dtype=torch.float64),
+    )
 
     def speed(y: float, time: float) -> float:
         offset = torch.tensor([[[0.0], [y], [-0.3]]], dtype=torch.float64)
@@ -210,7 +230,8 @@ def test_the_obstacle_passes_once_a_period_from_right_to_left() -> None:
 
 
 def test_friction_acts_along_the_weft_alone() -> None:
-    """Tilted by 30° about the horizontal, the weft has a slope of sin 30° along the wind: c A (w·t) t."""
+    """Tilted by 30° about the horizontal, the weft has a slope of sin 30° along the wind: c A (w·t)
+    t."""
     c, s = math.cos(math.pi / 6), math.sin(math.pi / 6)
     turn = torch.tensor([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]], dtype=torch.float64)
     force = added(WeftFriction(coefficient=0.1), turn=turn).sum(0)
@@ -228,18 +249,25 @@ def test_a_body_at_rest_outside_a_turning_frame_turns_backward_in_it() -> None:
     back = -rate * torch.stack([-arm[:, 1], arm[:, 0], torch.zeros_like(arm[:, 0])], dim=1)
     system, _ = apply([TurningPole(rate=rate)], base, state)
     (frame,) = system.effects
-    force = frame.force(base.cloth, 0.0, state.position, back, torch.zeros(3, 1, dtype=torch.float64))
+    force = frame.force(
+        base.cloth, 0.0, state.position, back, torch.zeros(3, 1, dtype=torch.float64)
+    )
     level = arm * torch.tensor([[1.0], [1.0], [0.0]])
-    torch.testing.assert_close(force, -(rate**2) * base.cloth.mass.unsqueeze(1) * level, rtol=1e-12, atol=1e-15)
+    torch.testing.assert_close(
+        force, -(rate**2) * base.cloth.mass.unsqueeze(1) * level, rtol=1e-12, atol=1e-15
+    )
 
 
 def test_the_cord_pulls_the_lower_fly_corner_beyond_its_length_only() -> None:
-    """The corner is at (0, 1, 0), the cord's end 1 m below the attachments' middle at (0, 0, −0.5): 1.118 m apart."""
+    """The corner is at (0, 1, 0), the cord's end 1 m below the attachments' middle at (0, 0, −0.5):
+    1.118 m apart."""
     pull = added(Tether(stiffness=4.0, length=1.0))
     distance = math.hypot(1.0, 0.5)
     corner = 4 * 5  # of a grid of 4 × 4 cells, u slowest
     expected = 4.0 * (distance - 1.0)
-    np.testing.assert_allclose(pull[corner], -expected * np.array([0.0, 1.0, 0.5]) / distance, atol=1e-12)
+    np.testing.assert_allclose(
+        pull[corner], -expected * np.array([0.0, 1.0, 0.5]) / distance, atol=1e-12
+    )
     assert int((pull.abs().sum(1) > 0).sum()) == 1
     assert float(added(Tether(stiffness=4.0, length=1.2)).abs().max()) == 0.0
     assert tether.DROP == 1.0
@@ -254,9 +282,12 @@ def test_the_two_sides_take_more_and_less_by_the_same_share() -> None:
 
 
 def air_at(effect: Any, *places_: tuple[float, float, float]) -> np.ndarray:
-    """(place, 3) the air at offsets from the middle of the attachments, in a wind of 5 m/s in +x [m/s]."""
+    """(place, 3) the air at offsets from the middle of the attachments, in a wind of 5 m/s in +x
+    [m/s]."""
     wind = torch.tensor([[5.0], [0.0], [0.0]], dtype=torch.float64)
-    return effect.field(0.0, torch.tensor(places_, dtype=torch.float64)[..., None], wind)[..., 0].numpy()
+    return effect.field(0.0, torch.tensor(places_, dtype=torch.float64)[..., None], wind)[
+        ..., 0
+    ].numpy()
 
 
 def test_the_wall_shelters_what_is_below_its_crest() -> None:
@@ -271,8 +302,13 @@ def test_a_veering_wind_turns_by_its_rate_times_the_height_and_keeps_its_speed()
 
 
 def test_the_air_around_a_whirl_has_its_circulation() -> None:
-    """Γ (1 − e^(−(r/c)²)) around a circle of radius r, counter-clockwise; none of it in the middle."""
-    effect, angles, radius = Whirl(circulation=3.0, core=0.3), np.linspace(0, 2 * np.pi, 24, endpoint=False), 0.45
+    """Γ (1 − e^(−(r/c)²)) around a circle of radius r, counter-clockwise; none of it in the
+    middle."""
+    effect, angles, radius = (
+        Whirl(circulation=3.0, core=0.3),
+        np.linspace(0, 2 * np.pi, 24, endpoint=False),
+        0.45,
+    )
     x, y = whirl.PLACE
     circle = [(x + radius * math.cos(a), y + radius * math.sin(a), 0.2) for a in angles]
     tangent = np.stack([-np.sin(angles), np.cos(angles)], axis=1)
@@ -282,7 +318,8 @@ def test_the_air_around_a_whirl_has_its_circulation() -> None:
 
 
 def test_a_swaying_pole_pushes_every_mass_as_its_acceleration_asks() -> None:
-    """m A ω² sin ω t, to the left of the wind: at a quarter of the period all of it, at a half none."""
+    """m A ω² sin ω t, to the left of the wind: at a quarter of the period all of it, at a half
+    none."""
     base, state = sheet_across()
     wind, effect = base.wind.velocity(0.0), SwayingPole(amplitude=0.05, frequency=2.0)
     mass = float(base.cloth.mass.sum())
@@ -293,14 +330,16 @@ def test_a_swaying_pole_pushes_every_mass_as_its_acceleration_asks() -> None:
 
 
 def test_drops_give_up_all_their_momentum() -> None:
-    """A sheet of 1 m² across the wind catches L U of water a second, which has the velocity (U, 0, −V)."""
+    """A sheet of 1 m² across the wind catches L U of water a second, which has the velocity (U, 0,
+    −V)."""
     caught = 0.01 * 5.0
     expected = caught * torch.tensor([5.0, 0.0, -7.0], dtype=torch.float64)
     torch.testing.assert_close(added(Spray(content=0.01)).sum(0), expected, rtol=1e-12, atol=1e-14)
 
 
 def test_fringes_drag_at_the_fly_alone() -> None:
-    """½ ρ b H U² = 0.5 · 1.225 · 0.2 · 1 · 25 N downwind, also on a cloth that lies along the wind."""
+    """½ ρ b H U² = 0.5 · 1.225 · 0.2 · 1 · 25 N downwind, also on a cloth that lies along the
+    wind."""
     along = torch.tensor([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], dtype=torch.float64)
     for turn in (None, along):
         force = added(Fringes(breadth=0.2), turn=turn)
@@ -325,8 +364,12 @@ def test_the_neighbour_swings_the_wind_at_its_own_frequency_and_the_wind_carries
         near, far = (torch.tensor([[[x], [0.4], [0.1]]], dtype=torch.float64) for x in (0.0, 1.0))
         for time, share in ((0.125, 1.0), (0.25, 0.0), (0.375, -1.0)):
             expected = [speed, share * 0.3 * speed, 0.0]
-            np.testing.assert_allclose(effect.field(time, near, wind)[0, :, 0], expected, atol=1e-12)
-            np.testing.assert_allclose(effect.field(time + 1 / speed, far, wind)[0, :, 0], expected, atol=1e-12)
+            np.testing.assert_allclose(
+                effect.field(time, near, wind)[0, :, 0], expected, atol=1e-12
+            )
+            np.testing.assert_allclose(
+                effect.field(time + 1 / speed, far, wind)[0, :, 0], expected, atol=1e-12
+            )
 
 
 def test_a_balloon_lifts_and_is_blown_at_the_upper_fly_corner() -> None:

@@ -1,4 +1,5 @@
-"""Verdicts are filed once, before keys are opened, and nothing filed, published or sealed can be changed unnoticed."""
+"""Verdicts are filed once, before keys are opened, and nothing filed, published or sealed can be
+changed unnoticed."""
 
 from __future__ import annotations
 
@@ -80,7 +81,9 @@ def test_the_first_set_of_films_that_is_answered_has_all_workers_and_others_one(
     assert run_films(tiny, fitter, seed=5) == []
 
 
-def test_the_seed_of_a_set_does_not_depend_on_which_others_are_judged(tiny: ChallengeFolder, satisfied) -> None:
+def test_the_seed_of_a_set_does_not_depend_on_which_others_are_judged(
+    tiny: ChallengeFolder, satisfied
+) -> None:
     run(tiny, satisfied, seed=5, workers=IN_THIS_PROCESS)
     all_together = satisfied.seeds[2]
     tiny.verdict_hash("set-003").unlink()
@@ -100,7 +103,12 @@ def test_a_refusal_is_filed_with_its_reason(tiny: ChallengeFolder) -> None:
 
     (filing,) = run(tiny, refuses, seed=5, only=("set-001",), workers=IN_THIS_PROCESS)
     assert filing.verdict is None
-    assert filing.refusal == {"kind": "bad-input", "what": "too short", "where": "a", "fix": "record longer"}
+    assert filing.refusal == {
+        "kind": "bad-input",
+        "what": "too short",
+        "where": "a",
+        "fix": "record longer",
+    }
     assert filings.read(tiny, "set-001") == filing
 
 
@@ -127,8 +135,12 @@ def test_keys_stay_sealed_until_the_verdict_is_filed(tiny: ChallengeFolder, sati
     assert len(score(tiny, only=("set-001",)).outcomes) == 1
 
 
-def test_the_true_models_error_is_computed_where_an_effect_of_the_library_was_named(tiny: ChallengeFolder) -> None:
-    run(tiny, lambda e, s: cases.verdict(Conclusion.EFFECT, "lift"), seed=5, workers=IN_THIS_PROCESS)
+def test_the_true_models_error_is_computed_where_an_effect_of_the_library_was_named(
+    tiny: ChallengeFolder,
+) -> None:
+    run(
+        tiny, lambda e, s: cases.verdict(Conclusion.EFFECT, "lift"), seed=5, workers=IN_THIS_PROCESS
+    )
     asked: list[Kind] = []
 
     def reference(folder: ChallengeFolder, key: AnswerKey) -> dict[str, float]:
@@ -178,7 +190,9 @@ def test_a_changed_key_is_noticed(tiny: ChallengeFolder, satisfied) -> None:
         score(tiny)
 
 
-def test_changed_data_are_noticed_before_and_after_they_are_judged(tiny: ChallengeFolder, satisfied) -> None:
+def test_changed_data_are_noticed_before_and_after_they_are_judged(
+    tiny: ChallengeFolder, satisfied
+) -> None:
     path = tiny.data("set-001") / "set.json"
     before = path.read_text()
     path.write_text(before.replace("1.5", "1.4"))
@@ -192,7 +206,9 @@ def test_changed_data_are_noticed_before_and_after_they_are_judged(tiny: Challen
 
 
 def test_what_is_not_finite_is_filed_as_null() -> None:
-    said = cases.verdict(Conclusion.EFFECT, "lift", ranking=(cases.candidate("lift", strength=float("nan")),))
+    said = cases.verdict(
+        Conclusion.EFFECT, "lift", ranking=(cases.candidate("lift", strength=float("nan")),)
+    )
     assert verdict_json(said)["ranking"][0]["strength"]["value"] is None
     json.dumps(verdict_json(said), allow_nan=False)
 
@@ -230,11 +246,19 @@ def judge(experiment, seed):
 """
 
 
-def test_a_worker_cannot_import_what_makes_challenges(tiny: ChallengeFolder, tmp_path: Path) -> None:
+def test_a_worker_cannot_import_what_makes_challenges(
+    tiny: ChallengeFolder, tmp_path: Path
+) -> None:
     (tmp_path / "judge.py").write_text(_JUDGE)
     script = tmp_path / "script.py"
     script.write_text(_WORKERS.format(folder=str(tmp_path), path=str(tiny.path)))
     done = subprocess.run(
-        [sys.executable, str(script)], capture_output=True, text=True, check=True, env=finding_tests()
+        [sys.executable, str(script)],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=finding_tests(),
     )
-    assert done.stdout.startswith("['kept apart: tests.studies.challenge.outside is not for fitters")
+    assert done.stdout.startswith(
+        "['kept apart: tests.studies.challenge.outside is not for fitters"
+    )

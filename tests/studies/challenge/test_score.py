@@ -15,7 +15,15 @@ from measure.verdict import Candidate, Conclusion, Estimate, Verdict
 from sim.effects import EFFECTS
 from tests.studies.challenge import sheet as sheets
 from tests.studies.challenge.answer_key import AnswerKey
-from tests.studies.challenge.cases import acting, candidate, comparison, estimate, filing, key, verdict
+from tests.studies.challenge.cases import (
+    acting,
+    candidate,
+    comparison,
+    estimate,
+    filing,
+    key,
+    verdict,
+)
 from tests.studies.challenge.classes import class_of, classes
 from tests.studies.challenge.outcome import Outcome
 from tests.studies.challenge.rates import Power
@@ -87,28 +95,39 @@ def test_what_is_not_decided_is_neither_detected_nor_a_false_positive_and_is_cou
     result = sheet(lambda k: verdict(Conclusion.UNDECIDED))
     assert result.false_positives.value == 0
     assert result.shares["detected: one effect"].value == 0
-    assert result.shares["not decided"].value == result.shares["not decided, of one effect"].value == 1
+    assert (
+        result.shares["not decided"].value == result.shares["not decided, of one effect"].value == 1
+    )
     assert sheet(lambda k: verdict(Conclusion.SUFFICIENT)).shares["not decided"].value == 0
 
 
 def test_who_guesses_scores_what_chance_gives() -> None:
-    """Always rejecting, with one of five effects at random: top-1 is 1/5, every null a false positive; of the claims,
-    right are 1/5 on one effect and 2/5 on pairs, none elsewhere: 0.6/4 of all."""
+    """Always rejecting, with one of five effects at random: top-1 is 1/5, every null a false
+    positive; of the claims, right are 1/5 on one effect and 2/5 on pairs, none elsewhere: 0.6/4 of
+    all."""
     rng = stream(1, "guess")
     many = keys(200)
     result = sheet(lambda k: verdict(Conclusion.EFFECT, LIBRARY[int(rng.integers(5))]), many)
     assert result.false_positives.value == 1
     # Three standard deviations of a share among 200, and among 800.
-    assert result.shares["top-1, all of one effect"].value == pytest.approx(0.2, abs=3 * math.sqrt(0.16 / 200))
-    assert result.false_discoveries.value == pytest.approx(0.85, abs=3 * math.sqrt(0.85 * 0.15 / 800))
+    assert result.shares["top-1, all of one effect"].value == pytest.approx(
+        0.2, abs=3 * math.sqrt(0.16 / 200)
+    )
+    assert result.false_discoveries.value == pytest.approx(
+        0.85, abs=3 * math.sqrt(0.85 * 0.15 / 800)
+    )
 
 
 def test_who_sees_from_a_threshold_on_has_the_half_detection_strength_there() -> None:
     """Detected from 3 mm on; identification is graded from 6 mm, where it is complete."""
-    result = sheet(lambda k: knowing(k) if k.impact >= 3e-3 else verdict(Conclusion.SUFFICIENT), keys(100))
+    result = sheet(
+        lambda k: knowing(k) if k.impact >= 3e-3 else verdict(Conclusion.SUFFICIENT), keys(100)
+    )
     assert result.power is not None
     for half, low, high in result.power.half.values():
-        assert half == pytest.approx(3e-3, rel=0.25)  # the spacing of a class's strengths is 5 %, of neighbours 26 %
+        assert half == pytest.approx(
+            3e-3, rel=0.25
+        )  # the spacing of a class's strengths is 5 %, of neighbours 26 %
         assert low < half < high
     assert all(o.key.impact > 5e-3 for o in result.strong)
     assert result.shares["top-1, strong"].value == 1
@@ -121,9 +140,12 @@ def test_who_sees_from_a_threshold_on_has_the_half_detection_strength_there() ->
 def test_half_strengths_are_in_the_effects_own_units() -> None:
     """Strengths of 100 an impact of a metre, detected from 3 mm on: half at 0.3."""
     sets = [
-        key(f"{i}", Kind.ONE, acting("lift", 100 * s), impact=s) for i, s in enumerate(np.geomspace(3e-4, 3e-2, 40))
+        key(f"{i}", Kind.ONE, acting("lift", 100 * s), impact=s)
+        for i, s in enumerate(np.geomspace(3e-4, 3e-2, 40))
     ]
-    result = sheet(lambda k: verdict(Conclusion.EFFECT if k.impact >= 3e-3 else Conclusion.SUFFICIENT), sets)
+    result = sheet(
+        lambda k: verdict(Conclusion.EFFECT if k.impact >= 3e-3 else Conclusion.SUFFICIENT), sets
+    )
     # The spacing is 12 %.
     assert result.half_strengths["lift"].value == pytest.approx(0.3, rel=0.12)
     assert result.half_strengths["lift"].unit == "1"
@@ -132,7 +154,12 @@ def test_half_strengths_are_in_the_effects_own_units() -> None:
 def test_power_separates_what_noise_hides() -> None:
     """A threshold of 1 mm without noise and of 10 mm with it."""
     result = sheet(
-        lambda k: knowing(k) if k.impact >= (1e-2 if k.noise else 1e-3) else verdict(Conclusion.SUFFICIENT), keys(100)
+        lambda k: (
+            knowing(k)
+            if k.impact >= (1e-2 if k.noise else 1e-3)
+            else verdict(Conclusion.SUFFICIENT)
+        ),
+        keys(100),
     )
     assert result.by_noise is not None
     assert result.by_noise.half["0"][0] == pytest.approx(1e-3, rel=0.4)
@@ -144,20 +171,31 @@ def test_power_separates_what_noise_hides() -> None:
 
 def test_another_effect_of_the_class_is_right_at_class_level_only() -> None:
     sets = [key("a", Kind.ONE, acting("tangential-linear-drag"))]
-    outcome = sheet(lambda k: verdict(Conclusion.EFFECT, "tangential-quadratic-drag"), sets).outcomes[0]
+    outcome = sheet(
+        lambda k: verdict(Conclusion.EFFECT, "tangential-quadratic-drag"), sets
+    ).outcomes[0]
     assert (outcome.first_right, outcome.class_right, outcome.claims) == (False, True, (True,))
 
 
 def test_equivalent_effects_are_one_claim() -> None:
     said = verdict(Conclusion.EFFECT, "air-density", "porosity")
-    assert Outcome.of(key("a", Kind.ONE, acting("permeability")), filing("a", said)).claims == (True,)
+    assert Outcome.of(key("a", Kind.ONE, acting("permeability")), filing("a", said)).claims == (
+        True,
+    )
     assert Outcome.of(key("a", Kind.ONE, acting("lift")), filing("a", said)).claims == (False,)
 
 
 def test_one_of_several_is_one_claim_and_its_best_ranked_is_the_first() -> None:
-    said = verdict(Conclusion.ONE_OF, "shear", "lift", ranking=(candidate("lift"), candidate("shear")))
+    said = verdict(
+        Conclusion.ONE_OF, "shear", "lift", ranking=(candidate("lift"), candidate("shear"))
+    )
     true = Outcome.of(key("a", Kind.ONE, acting("lift")), filing("a", said))
-    assert (true.first, true.first_right, true.among_named, true.claims) == ("lift", True, True, (True,))
+    assert (true.first, true.first_right, true.among_named, true.claims) == (
+        "lift",
+        True,
+        True,
+        (True,),
+    )
     false = Outcome.of(key("a", Kind.ONE, acting("pole-wake")), filing("a", said))
     assert (false.first_right, false.among_named, false.claims) == (False, False, (False,))
     assert true.control_gap is None
@@ -172,14 +210,17 @@ def test_a_refusal_is_a_false_positive_on_a_null_and_no_detection_elsewhere() ->
 
 
 def test_naming_an_effect_where_something_else_acts_is_a_false_discovery() -> None:
-    outcome = Outcome.of(key("x", Kind.OUTSIDE, acting("tether")), filing("x", verdict(Conclusion.PARTLY, "lift")))
+    outcome = Outcome.of(
+        key("x", Kind.OUTSIDE, acting("tether")), filing("x", verdict(Conclusion.PARTLY, "lift"))
+    )
     assert outcome.outside_said
     assert outcome.claims == (False,)
 
 
 def test_the_corrective_field_names_no_effect() -> None:
     outcome = Outcome.of(
-        key("x", Kind.OUTSIDE, acting("tether")), filing("x", verdict(Conclusion.OUTSIDE, "corrective-field"))
+        key("x", Kind.OUTSIDE, acting("tether")),
+        filing("x", verdict(Conclusion.OUTSIDE, "corrective-field")),
     )
     assert outcome.named == ()
     assert outcome.claims == ()
@@ -187,7 +228,11 @@ def test_the_corrective_field_names_no_effect() -> None:
 
 @pytest.mark.parametrize(
     ("conclusion", "half", "separated"),
-    [(Conclusion.EFFECT, 0.5, True), (Conclusion.EFFECT, 1.5, False), (Conclusion.ONE_OF, 0.5, False)],
+    [
+        (Conclusion.EFFECT, 0.5, True),
+        (Conclusion.EFFECT, 1.5, False),
+        (Conclusion.ONE_OF, 0.5, False),
+    ],
 )
 def test_the_control_is_separated_where_its_interval_does_not_reach_zero(
     conclusion: Conclusion, half: float, separated: bool
@@ -202,13 +247,16 @@ def test_the_control_is_separated_where_its_interval_does_not_reach_zero(
 def test_without_a_control_nothing_is_separated() -> None:
     alone = verdict(Conclusion.EFFECT, "lift", apart=None)
     assert Outcome.of(key("a", Kind.ONE, acting("lift")), filing("a", alone)).separated is None
-    none = Outcome.of(key("a", Kind.NULL), filing("a", verdict(Conclusion.SUFFICIENT, apart=estimate(1.0, 0.5))))
+    none = Outcome.of(
+        key("a", Kind.NULL), filing("a", verdict(Conclusion.SUFFICIENT, apart=estimate(1.0, 0.5)))
+    )
     assert none.separated is None
 
 
 @pytest.mark.parametrize("conclusion", [Conclusion.EFFECT, Conclusion.ONE_OF])
 def test_a_control_that_acts_is_none_that_is_wrong(conclusion: Conclusion) -> None:
-    """Of two effects, the control beside the one that is named may be the other, which has to help."""
+    """Of two effects, the control beside the one that is named may be the other, which has to
+    help."""
     beside = comparison(after=1e-3, control=2e-3)
     said = verdict(conclusion, "lift", apart=estimate(1.0, 0.5), comparisons=(beside,))
     wrong = acting("lift"), acting("full-hoist")
@@ -219,10 +267,13 @@ def test_a_control_that_acts_is_none_that_is_wrong(conclusion: Conclusion) -> No
 
 
 def test_by_a_single_recording_the_control_is_separated_beyond_half_the_width() -> None:
-    """The interval of the reduction is ± 1 mm: a control worse by 3 mm is separated, by 0.5 mm is not."""
+    """The interval of the reduction is ± 1 mm: a control worse by 3 mm is separated, by 0.5 mm is
+    not."""
 
     def gap(control: float | None) -> float | None:
-        said = verdict(Conclusion.EFFECT, "lift", comparisons=(comparison(after=1e-3, control=control),))
+        said = verdict(
+            Conclusion.EFFECT, "lift", comparisons=(comparison(after=1e-3, control=control),)
+        )
         return Outcome.of(key("a", Kind.ONE, acting("lift")), filing("a", said)).control_gap
 
     assert gap(4e-3) == pytest.approx(3.0)
@@ -234,7 +285,9 @@ def test_coefficient_errors_and_coverage_are_those_of_the_named_effect() -> None
     """Estimates 1.05 ± 0.1 and 1.5 ± 0.1 of a true 1: errors 5 % and 50 %, one of two covered."""
     estimates = iter((1.05, 1.5))
     result = sheet(
-        lambda k: verdict(Conclusion.EFFECT, "lift", ranking=(candidate("lift", strength=next(estimates)),)),
+        lambda k: verdict(
+            Conclusion.EFFECT, "lift", ranking=(candidate("lift", strength=next(estimates)),)
+        ),
         [key("a", Kind.ONE, acting("lift")), key("b", Kind.ONE, acting("lift"))],
     )
     assert result.coefficients.errors == pytest.approx((0.05, 0.5))
@@ -242,13 +295,15 @@ def test_coefficient_errors_and_coverage_are_those_of_the_named_effect() -> None
 
 
 def test_a_strength_that_is_a_bound_contains_the_truth_on_its_side_and_has_no_error() -> None:
-    """At least 0.8 contains a true 1, at least 1.3 does not; neither is an estimate that could err."""
+    """At least 0.8 contains a true 1, at least 1.3 does not; neither is an estimate that could
+    err."""
     bounds = iter((0.8, 1.3))
 
     def bounded() -> Candidate:
         bound = next(bounds)
         return replace(
-            candidate("lift"), strength=Estimate(value=bound, low=bound, high=math.inf, unit="1", bound="at-least")
+            candidate("lift"),
+            strength=Estimate(value=bound, low=bound, high=math.inf, unit="1", bound="at-least"),
         )
 
     result = sheet(
@@ -260,14 +315,21 @@ def test_a_strength_that_is_a_bound_contains_the_truth_on_its_side_and_has_no_er
 
 
 def test_reduction_is_the_median_over_unseen_data_and_only_where_an_effect_was_named() -> None:
-    said = verdict(Conclusion.EFFECT, "lift", comparisons=tuple(comparison(share=s) for s in (0.2, 0.8, None, 0.9)))
-    assert Outcome.of(key("a", Kind.ONE, acting("lift")), filing("a", said)).reduction == pytest.approx(0.8)
+    said = verdict(
+        Conclusion.EFFECT,
+        "lift",
+        comparisons=tuple(comparison(share=s) for s in (0.2, 0.8, None, 0.9)),
+    )
+    assert Outcome.of(
+        key("a", Kind.ONE, acting("lift")), filing("a", said)
+    ).reduction == pytest.approx(0.8)
     nothing = verdict(Conclusion.OUTSIDE, comparisons=(comparison(),))
     assert Outcome.of(key("a", Kind.ONE, acting("lift")), filing("a", nothing)).reduction is None
 
 
 def test_reduction_is_measured_against_the_true_model_where_it_is_known() -> None:
-    """From 5 mm to 2 mm where the true model has 1 mm: 3/4. None where the base model is no worse than the true one."""
+    """From 5 mm to 2 mm where the true model has 1 mm: 3/4. None where the base model is no worse
+    than the true one."""
     said = verdict(Conclusion.EFFECT, "lift", comparisons=(comparison(share=0.1, after=2e-3),))
     outcome = Outcome.of(key("a", Kind.ONE, acting("lift")), filing("a", said))
     assert replace(outcome, true_model_errors={"unseen": 1e-3}).reduction == pytest.approx(0.75)
@@ -281,20 +343,24 @@ def test_reduction_is_measured_against_the_true_model_where_it_is_known() -> Non
         # 0 of n: 1 − (α/2)^(1/n); n of n: (α/2)^(1/n), α = 0.1.
         (0, 20, 0.0, 1 - 0.05 ** (1 / 20)),
         (20, 20, 0.05 ** (1 / 20), 1.0),
-        # Tables of the exact 90 % limits of the binomial: 1 of 20 is 0.0026 to 0.2161, 10 of 20 is 0.3020 to 0.6980.
+        # Tables of the exact 90 % limits of the binomial: 1 of 20 is 0.0026 to 0.2161, 10 of 20 is
+        # 0.3020 to 0.6980.
         (1, 20, 0.00256, 0.21611),
         (10, 20, 0.30195, 0.69805),
         (0, 0, 0.0, 1.0),
     ],
 )
-def test_intervals_of_shares_are_clopper_and_pearsons(hits: int, count: int, low: float, high: float) -> None:
+def test_intervals_of_shares_are_clopper_and_pearsons(
+    hits: int, count: int, low: float, high: float
+) -> None:
     share = Share.of([True] * hits + [False] * (count - hits))
     assert (share.low, share.high) == (pytest.approx(low, abs=1e-5), pytest.approx(high, abs=1e-5))
     assert share.value == (hits / count if count else None)
 
 
 def test_a_power_curve_recovers_the_one_its_cases_are_drawn_from() -> None:
-    """Slope 5, half at 2, among 400 cases from 0.5 to 8: standard errors of 6 % and 3 %, of which three."""
+    """Slope 5, half at 2, among 400 cases from 0.5 to 8: standard errors of 6 % and 3 %, of which
+    three."""
     rng = stream(2, "power")
     strength = np.exp(rng.uniform(np.log(0.5), np.log(8), 400))
     detected = rng.random(400) < 1 / (1 + (strength / 2) ** -5.0)

@@ -1,4 +1,5 @@
-"""What tears a cloth apart is made weaker, until it does not; what is published is what was simulated."""
+"""What tears a cloth apart is made weaker, until it does not; what is published is what was
+simulated."""
 
 from __future__ import annotations
 
@@ -34,7 +35,9 @@ def reacting(name: str, mass: float) -> AnswerKey:
     return replace(cases.key(name, Kind.ONE, reactive(mass)), speeds=(7.0, 8.0))
 
 
-def test_a_strength_that_tears_the_cloth_apart_is_halved_until_it_does_not(recipe: ChallengeRecipe) -> None:
+def test_a_strength_that_tears_the_cloth_apart_is_halved_until_it_does_not(
+    recipe: ChallengeRecipe,
+) -> None:
     torn, whole = reacting("set-001", 3.0), reacting("set-002", 0.02)
     simulated = simulate(recipe, 1, [torn, whole])
     acted = simulated["set-001"].effects
@@ -44,6 +47,8 @@ def test_a_strength_that_tears_the_cloth_apart_is_halved_until_it_does_not(recip
     assert np.array_equal(again["set-001"].positions[0], simulated["set-001"].positions[0])
 
 
-def test_what_tears_the_cloth_apart_at_an_eighth_as_well_is_an_error(recipe: ChallengeRecipe) -> None:
+def test_what_tears_the_cloth_apart_at_an_eighth_as_well_is_an_error(
+    recipe: ChallengeRecipe,
+) -> None:
     with pytest.raises(FlagdataError, match=r"set-001.*diverged"):
         simulate(recipe, 1, [reacting("set-001", 30.0)])

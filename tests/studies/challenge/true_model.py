@@ -1,4 +1,5 @@
-"""Prediction errors of the true model with the fitter's own numerics, against which E_red is measured."""
+"""Prediction errors of the true model with the fitter's own numerics, against which E_red is
+measured."""
 
 from __future__ import annotations
 
@@ -21,12 +22,14 @@ class ReferenceErrors(Protocol):
     """Errors of the best attainable model of a set."""
 
     def __call__(self, folder: ChallengeFolder, key: AnswerKey, /) -> Mapping[str, float]:
-        """Comparison, in the verdict's words → root mean square prediction error [m]; empty where it has none."""
+        """Comparison, in the verdict's words → root mean square prediction error [m]; empty where
+        it has none."""
         ...
 
 
 def true_model_errors(folder: ChallengeFolder, key: AnswerKey) -> Mapping[str, float]:
-    """Errors of the true cloth and effects; empty with gusts, since no model holds their time series.
+    """Errors of the true cloth and effects; empty with gusts, since no model holds their time
+    series.
 
     Raises:
         InputError: recordings that the fitter cannot use.
@@ -42,7 +45,8 @@ def true_model_errors(folder: ChallengeFolder, key: AnswerKey) -> Mapping[str, f
 def prediction_errors(
     experiment: Experiment, calibration: Calibration, effects: Sequence[Effect]
 ) -> Mapping[str, float]:
-    """Root mean square prediction error [m] on each comparison of the verdict, by the comparison's words.
+    """Root mean square prediction error [m] on each comparison of the verdict, by the comparison's
+    words.
 
     Args:
         calibration: the true factors on the nominal material, and its true damping.
@@ -55,6 +59,8 @@ def prediction_errors(
     setting = Setting.of(experiment)
     segments, forecaster = setting.segments, setting.forecaster
     system, state = apply(effects, *forecaster.system(segments, [calibration] * len(segments)))
-    squared = (forecaster.errors(system, state, segments) ** 2).sum(2).mean((0, 1)).double().cpu().numpy()
+    squared = (
+        (forecaster.errors(system, state, segments) ** 2).sum(2).mean((0, 1)).double().cpu().numpy()
+    )
     left_out = folds(segments, [float(u) for u in setting.speeds])
     return {fold.words: float(np.sqrt(squared[fold.outside].mean())) for fold in left_out}

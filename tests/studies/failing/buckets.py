@@ -1,14 +1,14 @@
 """Commands on a lake in a bucket that are killed, while requests fail:
 `python -m tests.studies failing-buckets --out FILE`.
 
-Each verb that writes to a lake is killed at so many of its requests to the store, spread evenly, in turn before the
-store has the request and after it has done it. 5 % of the requests meet a fault: they are answered by an error, cut off
-before or after the store has acted or within the answer, or answered late. Then the command is given again, beside
-faults, and the lake is examined, collected and examined again: a copy on disk, and at every fifth point the lake in the
-bucket, too.
+Each verb that writes to a lake is killed at so many of its requests to the store, spread evenly, in
+turn before the store has the request and after it has done it. 5 % of the requests meet a fault:
+they are answered by an error, cut off before or after the store has acted or within the answer, or
+answered late. Then the command is given again, beside faults, and the lake is examined, collected
+and examined again: a copy on disk, and at every fifth point the lake in the bucket, too.
 
-Results stay in FILE, a JSON file, verb after verb, so that a campaign may be stopped and given again; beside it a page
-of the same name shows them.
+Results stay in FILE, a JSON file, verb after verb, so that a campaign may be stopped and given
+again; beside it a page of the same name shows them.
 """
 
 from __future__ import annotations
@@ -51,8 +51,9 @@ _ORPHAN = b"of an ingest that was given up"
 
 
 def copied(address: str, folder: Path) -> set[str]:
-    """Copy a lake's files out of the bucket, where they are looked at in a tenth of the time; the names of all that is
-    there. Of folders without their sums, which count as absent, nothing is copied, nor what lies in staging."""
+    """Copy a lake's files out of the bucket, where they are looked at in a tenth of the time; the
+    names of all that is there. Of folders without their sums, which count as absent, nothing is
+    copied, nor what lies in staging."""
     shutil.rmtree(folder, ignore_errors=True)
     place = RemotePath.parse(address)
     names = {name for name, _ in place.names()}
@@ -80,21 +81,36 @@ def examine(address: str, folder: Path, *, remotely: bool) -> dict[str, Any]:
     errors = [f"{one.kind}: {one.what}" for one in found if one.severity is Severity.ERROR]
     collected = collect(lake, grace=NOW)
     names = copied(address, folder)
-    left = [f"staging: {name}" for name in names if name.startswith("staging/") and name != "staging/made"]
-    left += [f"a folder without its sums: {name}" for name in names - _files(folder) if not name.startswith("staging/")]
+    left = [
+        f"staging: {name}"
+        for name in names
+        if name.startswith("staging/") and name != "staging/made"
+    ]
+    left += [
+        f"a folder without its sums: {name}"
+        for name in names - _files(folder)
+        if not name.startswith("staging/")
+    ]
     after = doctor(lake if remotely else Lake.open(folder), grace=NOW)
     left += [f"{one.kind}: {one.what}" for one in after if one.severity is not Severity.NOTE]
-    return {"errors": errors, "left": left, "collected": len(collected.objects) + len(collected.leftovers)}
+    return {
+        "errors": errors,
+        "left": left,
+        "collected": len(collected.objects) + len(collected.leftovers),
+    }
 
 
 def _files(folder: Path) -> set[str]:
     """Names of the files of a copied lake, with those of the sums that were not copied."""
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    return files | {f"{'/'.join(name.split('/')[:2])}/{SUMS}" for name in files if name[:4] in ("zarr", "mode")}
+    return files | {
+        f"{'/'.join(name.split('/')[:2])}/{SUMS}" for name in files if name[:4] in ("zarr", "mode")
+    }
 
 
 def damaged(whole: Path, hurt: Path) -> dict[str, bytes | None]:
-    """What differs between the files of a lake and those of the same lake with damage; `None` of what is missing."""
+    """What differs between the files of a lake and those of the same lake with damage; `None` of
+    what is missing."""
     found: dict[str, bytes | None] = {}
     for path in (one for one in whole.rglob("*") if one.is_file()):
         name = path.relative_to(whole)
@@ -118,7 +134,9 @@ class Bucket:
         client = boto3.client("s3", endpoint_url=f"http://{self._host}", region_name="us-east-1")
         listed = client.list_objects_v2(Bucket=BUCKET, Prefix=f"{prefix}/").get("Contents", [])
         self.template = {
-            one["Key"].removeprefix(prefix): client.get_object(Bucket=BUCKET, Key=one["Key"])["Body"].read()
+            one["Key"].removeprefix(prefix): client.get_object(Bucket=BUCKET, Key=one["Key"])[
+                "Body"
+            ].read()
             for one in listed
         }
 
@@ -173,11 +191,15 @@ class Trials:
         return self.verb.target.format(**self._places(prefix))
 
     def _put(self, prefix: str) -> None:
-        """A copy of the lake, at what the verb writes to with the damage of the scene's lake of that name."""
+        """A copy of the lake, at what the verb writes to with the damage of the scene's lake of
+        that name."""
         place = self.verb.target.strip("{}")
         if place == "new":
             place = "lake"
-        self.bucket.put(f"{prefix}/{place}", damage=damaged(self.scene.folder / "lake", self.scene.folder / place))
+        self.bucket.put(
+            f"{prefix}/{place}",
+            damage=damaged(self.scene.folder / "lake", self.scene.folder / place),
+        )
 
     def _state(self, target: str) -> State:
         copied(target, self.scratch / "copy")
@@ -186,7 +208,11 @@ class Trials:
     def _reports(self) -> bool:
         """Whether doctor reports of the copied lake what the verb leaves if it is cut off."""
         copy = self.scratch / "copy"
-        found = doctor(Lake.open(copy), grace=NOW) if self.verb.unfinished and (copy / "lake.json").exists() else ()
+        found = (
+            doctor(Lake.open(copy), grace=NOW)
+            if self.verb.unfinished and (copy / "lake.json").exists()
+            else ()
+        )
         return bool(self.verb.unfinished & {one.kind for one in found})
 
     def whole(self) -> tuple[State, State, int]:
@@ -232,27 +258,43 @@ class Trials:
             middle = self._state(target)
             reported = self._reports()
             planned(self.proxy, share=FAULTY, lost=LOST, seed=1000 * number + call + 1)
-            again = self.verb.again if self.verb.again and middle != frozenset({("no lake",)}) else None
+            again = (
+                self.verb.again if self.verb.again and middle != frozenset({("no lake",)}) else None
+            )
             code = invoked(self.given(prefix, again))
             faults = Counter(faults) + Counter(planned(self.proxy)["faults"])
             end = self._state(target)
             seen = examine(target, self.scratch / "copy", remotely=number % 5 == 0)
-            return {"faults": faults, "middle": middle, "reported": reported, "again": code, "end": end, **seen}
+            return {
+                "faults": faults,
+                "middle": middle,
+                "reported": reported,
+                "again": code,
+                "end": end,
+                **seen,
+            }
 
         code, ended, said = Child(first, self.scratch / prefix / "first").ended()
         failed, found, told = Child(second, self.scratch / prefix / "second").ended()
         self.bucket.remove(prefix)
         shutil.rmtree(self.scratch / prefix, ignore_errors=True)
         if failed:
-            return {"wrong": [f"the examination failed ({failed}): {told[-1500:]}"], "killed": code == _KILLED}
-        objects = {entry for entry in before | after if entry[0] == "object"}  # others are left by what was killed
+            return {
+                "wrong": [f"the examination failed ({failed}): {told[-1500:]}"],
+                "killed": code == _KILLED,
+            }
+        objects = {
+            entry for entry in before | after if entry[0] == "object"
+        }  # others are left by what was killed
 
         def own(seen: State) -> State:
             return frozenset(entry for entry in seen if entry[0] != "object" or entry in objects)
 
         middle, end = own(found["middle"]), own(found["end"])
         staying = before & after
-        wrong = [f"lost: {sorted(staying - seen)[:3]}" for seen in (middle, end) if not staying <= seen]
+        wrong = [
+            f"lost: {sorted(staying - seen)[:3]}" for seen in (middle, end) if not staying <= seen
+        ]
         if code == 0:
             wrong += _reported(ended, said, middle, before, after, one_step=self.verb.one_step)
         elif code != _KILLED:
@@ -265,7 +307,9 @@ class Trials:
             wrong.append(f"repeat: exit code {found['again']}: {told[-800:]}")
         if end != after:
             wrong.append(f"repeat: ends otherwise: {sorted(end ^ after)[:4]} {told[-500:]}")
-        wrong += [f"unhealthy: {error}" for error in found["errors"]] + [f"left: {one}" for one in found["left"]]
+        wrong += [f"unhealthy: {error}" for error in found["errors"]] + [
+            f"left: {one}" for one in found["left"]
+        ]
         return {
             "wrong": wrong,
             "killed": code == _KILLED,
@@ -276,7 +320,9 @@ class Trials:
         }
 
 
-def _reported(code: int, said: str, middle: State, before: State, after: State, *, one_step: bool) -> list[str]:
+def _reported(
+    code: int, said: str, middle: State, before: State, after: State, *, one_step: bool
+) -> list[str]:
     """What is wrong with the report of a command that ended."""
     wrong = []
     if code == 0 and middle != after:
@@ -287,7 +333,9 @@ def _reported(code: int, said: str, middle: State, before: State, after: State, 
         wrong.append(f"report: exit code {code}, and a part is published: {said[-800:]}")
     if code and "fix:" not in said:
         wrong.append(f"report: no fix is named: {said[-800:]}")
-    return wrong + [f"report: {word}: {said[-1500:]}" for word in ("Traceback", "unforeseen") if word in said]
+    return wrong + [
+        f"report: {word}: {said[-1500:]}" for word in ("Traceback", "unforeseen") if word in said
+    ]
 
 
 def tried(trials: Trials, *, points: int) -> dict[str, Any]:
@@ -298,7 +346,9 @@ def tried(trials: Trials, *, points: int) -> dict[str, Any]:
     faults: Counter[str] = Counter()
     kinds: Counter[str] = Counter()
     examples: list[str] = []
-    for number, call in enumerate((total - 1) * point // max(points - 1, 1) for point in range(points)):
+    for number, call in enumerate(
+        (total - 1) * point // max(points - 1, 1) for point in range(points)
+    ):
         found = trials.killed(number, call, before, after)
         counts.update(
             {
@@ -325,9 +375,14 @@ def tried(trials: Trials, *, points: int) -> dict[str, Any]:
 
 
 def campaign(names: Sequence[str], results: Path, *, points: int, scratch: Path) -> dict[str, Any]:
-    """Try verbs, those whose results are not known yet where none is named, and return all results."""
+    """Try verbs, those whose results are not known yet where none is named, and return all
+    results."""
     known: dict[str, Any] = json.loads(results.read_text()) if results.exists() else {}
-    for name, value in (*SECRETS.items(), ("AWS_REGION", "us-east-1"), ("FLAGDATA_CACHE", str(scratch / "cache"))):
+    for name, value in (
+        *SECRETS.items(),
+        ("AWS_REGION", "us-east-1"),
+        ("FLAGDATA_CACHE", str(scratch / "cache")),
+    ):
         os.environ[name] = value
     connection.REQUEST_TIMEOUT = PATIENCE
     with ExitStack() as stack:
@@ -340,7 +395,9 @@ def campaign(names: Sequence[str], results: Path, *, points: int, scratch: Path)
                 continue
             folder = scratch / group
             folder.mkdir()
-            code, scene, said = Child(partial(make, folder), scratch / "made", longest=MAKING).ended()
+            code, scene, said = Child(
+                partial(make, folder), scratch / "made", longest=MAKING
+            ).ended()
             assert code == 0, said
             bucket = Bucket(store)
             code, cloned, said = Child(
@@ -352,7 +409,9 @@ def campaign(names: Sequence[str], results: Path, *, points: int, scratch: Path)
             assert (code, cloned) == (0, 0), said
             bucket.take(f"template-{group}")
             bucket.template[f"/mcap/{hashlib.sha256(_ORPHAN).hexdigest()}.mcap"] = _ORPHAN
-            for path in (folder / "lake" / "mcap").iterdir():  # what was withdrawn, which a clone does not take
+            for path in (
+                folder / "lake" / "mcap"
+            ).iterdir():  # what was withdrawn, which a clone does not take
                 bucket.template.setdefault(f"/mcap/{path.name}", path.read_bytes())
             for name in wanted:
                 verb = verbs[name]
@@ -368,7 +427,11 @@ def campaign(names: Sequence[str], results: Path, *, points: int, scratch: Path)
                     continue
                 known[name] = {**found, "circumstances": circumstances(0)}
                 shutil.rmtree(place)
-                print(name, {key: value for key, value in known[name].items() if key != "circumstances"}, flush=True)  # noqa: T201
+                print(  # noqa: T201
+                    name,
+                    {key: value for key, value in known[name].items() if key != "circumstances"},
+                    flush=True,
+                )
                 results.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n")
                 results.with_suffix(".md").write_text(page(known))
     return known
@@ -417,14 +480,23 @@ def page(known: Mapping[str, Any]) -> str:
             else found.get(column, 0)
             for column in columns
         ]
-        lines.append(f"| {name} | {' | '.join(map(str, cells))} | {found['circumstances']['code_version']} |")
+        lines.append(
+            f"| {name} | {' | '.join(map(str, cells))} | {found['circumstances']['code_version']} |"
+        )
     faults: Counter[str] = Counter()
     for found in known.values():
         faults.update(found["faults"])
-    lines += ["", "Faults: " + ", ".join(f"{name} {count}" for name, count in sorted(faults.items())) + "."]
+    lines += [
+        "",
+        "Faults: " + ", ".join(f"{name} {count}" for name, count in sorted(faults.items())) + ".",
+    ]
     if known:
         where = next(iter(known.values()))["circumstances"]
-        lines += ["", f"{where['processor']}, {where['cores']} cores; Python {where['python']}; moto's server."]
+        lines += [
+            "",
+            f"{where['processor']}, {where['cores']} cores; Python {where['python']}; moto's "
+            "server.",
+        ]
     return "\n".join([*lines, ""])
 
 
@@ -432,7 +504,9 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help="verbs; those without a result if none is named")
     parser.add_argument("--out", type=Path, required=True, help="JSON file of the results")
-    parser.add_argument("--points", type=int, default=POINTS, help="points at which each verb is killed")
+    parser.add_argument(
+        "--points", type=int, default=POINTS, help="points at which each verb is killed"
+    )
     given = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="buckets-") as place:
         campaign(given.names, given.out, points=given.points, scratch=Path(place))

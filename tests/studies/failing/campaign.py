@@ -1,7 +1,8 @@
-"""Every call of every writing command fails in turn, or kills it: `python -m tests.studies failing --out FILE`.
+"""Every call of every writing command fails in turn, or kills it: `python -m tests.studies failing
+--out FILE`.
 
-Results of commands that were tried before stay in FILE, a JSON file, so that a campaign can be run in parts; beside it
-a page of the same name shows them.
+Results of commands that were tried before stay in FILE, a JSON file, so that a campaign can be run
+in parts; beside it a page of the same name shows them.
 """
 
 from __future__ import annotations
@@ -28,18 +29,30 @@ from tests.studies.failing.trial import Command, Trials
 from tests.studies.failing.verbs import COMMANDS
 
 _ABOUT = (
-    "One call on a file of the work folder (open, read, stat, map, write, flush, rename, link, remove, lock) fails, "
-    "alone or with all later calls, or the command is killed before it. Calls are alike where they are the same "
-    "function on files of one role (numbers, hashes and identities of a path aside) after a publication of one role. "
-    "Of each such kind the first call, the last one and every so many are tried, and every call after the last "
-    "publication; with 1 every call is. Where `drawn_of` is given, the trials were drawn at random from so many. "
-    "Threads make their calls in another order each time: counted is what did fail, and a kind whose every call was "
-    "made at another place is untried. The JSON file beside this page states of each kind how many calls there are "
-    "and how many failed. A report is right where exit code 0 means that all is published, and exit code 1, with a "
-    "fix, that it is not. Of every fourth failure the command is given once more, of every kill always, and must end "
-    "as an undisturbed one, once what it says that has to go is deleted. After each trial the lake is examined "
-    "(doctor, verify); silent is a command that has begun to erase, expire or delete, has not done it, and of which "
-    "doctor reports nothing. For close-loop, propose and build the computing was done once and its result taken; "
+    "One call on a file of the work folder (open, read, stat, map, write, flush, rename, link, "
+    "remove, lock) fails, "
+    "alone or with all later calls, or the command is killed before it. Calls are alike where they "
+    "are the same "
+    "function on files of one role (numbers, hashes and identities of a path aside) after a "
+    "publication of one role. "
+    "Of each such kind the first call, the last one and every so many are tried, and every call "
+    "after the last "
+    "publication; with 1 every call is. Where `drawn_of` is given, the trials were drawn at random "
+    "from so many. "
+    "Threads make their calls in another order each time: counted is what did fail, and a kind "
+    "whose every call was "
+    "made at another place is untried. The JSON file beside this page states of each kind how many "
+    "calls there are "
+    "and how many failed. A report is right where exit code 0 means that all is published, and "
+    "exit code 1, with a "
+    "fix, that it is not. Of every fourth failure the command is given once more, of every kill "
+    "always, and must end "
+    "as an undisturbed one, once what it says that has to go is deleted. After each trial the lake "
+    "is examined "
+    "(doctor, verify); silent is a command that has begun to erase, expire or delete, has not done "
+    "it, and of which "
+    "doctor reports nothing. For close-loop, propose and build the computing was done once and its "
+    "result taken; "
     "their reads and writes are their own."
 )
 _KINDS = ("silent", "unhealthy", "unforeseen")
@@ -78,7 +91,9 @@ def tried(
     total, published = trials.whole.done.calls, trials.whole.published
     groups = grouped(trials.whole.done.trace, every=every, last=published)
     calls = sorted(n for group in groups.values() for n in group.tried if n >= first)
-    faults = [Fault(call=n, stays=held) for n in calls for held in ((False, True) if stays else (False,))]
+    faults = [
+        Fault(call=n, stays=held) for n in calls for held in ((False, True) if stays else (False,))
+    ]
     planned = len(faults)
     if at_most is not None and planned > at_most:
         drawn = np.random.default_rng(seed).choice(planned, at_most, replace=False)
@@ -106,8 +121,11 @@ def tried(
     }
 
 
-def killed(command: Command, scene: Scene, injector: Injector, scratch: Path, *, points: int) -> dict[str, Any]:
-    """A command that is killed at so many of its calls, spread evenly, and given once more; what was wrong with any."""
+def killed(
+    command: Command, scene: Scene, injector: Injector, scratch: Path, *, points: int
+) -> dict[str, Any]:
+    """A command that is killed at so many of its calls, spread evenly, and given once more; what
+    was wrong with any."""
     begun = time.monotonic()
     trials = Trials(command, scene.folder, scene.ids, injector, scratch)
     total = trials.whole.done.calls
@@ -127,7 +145,9 @@ def killed(command: Command, scene: Scene, injector: Injector, scratch: Path, *,
 
 def _counted(wrong: Sequence[Mapping[str, Any]]) -> dict[str, int]:
     """How often each kind of problem was found."""
-    return dict(Counter(problem.partition(":")[0] for found in wrong for problem in found["problems"]))
+    return dict(
+        Counter(problem.partition(":")[0] for found in wrong for problem in found["problems"])
+    )
 
 
 def campaign(
@@ -168,7 +188,10 @@ def campaign(
                 place.mkdir()
                 command = replace(commands[name], stand_in=None) if real else commands[name]
                 if kills is not None:
-                    title, found = f"{name}, killed", killed(command, scene, injector, place, points=kills)
+                    title, found = (
+                        f"{name}, killed",
+                        killed(command, scene, injector, place, points=kills),
+                    )
                 else:
                     title = f"{name}, alone" if not stays else name
                     found = tried(
@@ -184,7 +207,11 @@ def campaign(
                     )
                 title = f"computing all: {title}" if real and commands[name].stand_in else title
                 known[title] = {**found, "circumstances": circumstances(seed)}
-                print(title, {name: value for name, value in found.items() if name != "groups"}, flush=True)  # noqa: T201
+                print(  # noqa: T201
+                    title,
+                    {name: value for name, value in found.items() if name != "groups"},
+                    flush=True,
+                )
                 results.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n")
                 results.with_suffix(".md").write_text(page(known))
     return known
@@ -214,12 +241,23 @@ def page(known: Mapping[str, Any]) -> str:
         _ABOUT,
     ]
     for title, columns in tables.items():
-        found = {name: result for name, result in known.items() if name.endswith(", killed") == ("points" in columns)}
-        lines += ["", f"## {title}", "", f"| command | {' | '.join(columns)} |", f"|---{'|---:' * len(columns)}|"]
+        found = {
+            name: result
+            for name, result in known.items()
+            if name.endswith(", killed") == ("points" in columns)
+        }
+        lines += [
+            "",
+            f"## {title}",
+            "",
+            f"| command | {' | '.join(columns)} |",
+            f"|---{'|---:' * len(columns)}|",
+        ]
         for name, result in found.items():
             own = {**result, "code": result["circumstances"]["code_version"]}
             shown = [
-                own.get("kinds", {}).get(column, 0) if column in _KINDS else own.get(column, "") for column in columns
+                own.get("kinds", {}).get(column, 0) if column in _KINDS else own.get(column, "")
+                for column in columns
             ]
             lines.append(f"| {name.removesuffix(', killed')} | {' | '.join(map(str, shown))} |")
     if known:
@@ -243,12 +281,20 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help="commands; all if none is named")
     parser.add_argument("--out", type=Path, required=True, help="JSON file of the results")
-    parser.add_argument("--scenes", type=Path, help="folder that scenes are kept in; some take minutes to make")
-    parser.add_argument("--every", type=int, default=1, help="of calls that are alike try every so many")
+    parser.add_argument(
+        "--scenes", type=Path, help="folder that scenes are kept in; some take minutes to make"
+    )
+    parser.add_argument(
+        "--every", type=int, default=1, help="of calls that are alike try every so many"
+    )
     parser.add_argument("--first", type=int, default=0, help="first call to try")
-    parser.add_argument("--at-most", type=int, metavar="N", help="of more trials make so many, drawn at random")
+    parser.add_argument(
+        "--at-most", type=int, metavar="N", help="of more trials make so many, drawn at random"
+    )
     parser.add_argument("--alone", action="store_true", help="only calls that fail alone")
-    parser.add_argument("--kill", type=int, metavar="N", help="kill commands at so many calls instead")
+    parser.add_argument(
+        "--kill", type=int, metavar="N", help="kill commands at so many calls instead"
+    )
     parser.add_argument("--real", action="store_true", help="let nothing stand in for computing")
     given = parser.parse_args()
     campaign(

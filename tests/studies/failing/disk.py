@@ -1,13 +1,17 @@
-"""What a disk may hold after a power cut: a model of files and folders, fed with the calls that a program made.
+"""What a disk may hold after a power cut: a model of files and folders, fed with the calls that a
+program made.
 
-Two promises of file systems are modelled. *Any order* is what POSIX has: a file's bytes and size are on the disk once
-the file is flushed, an entry (made, linked, renamed, removed) once its folder is. Of what is not flushed any part may
-be there: any of the entries, of a file any first part of what was written, half of a write, or zeros of the full size.
-*Ordered* is what ext4 does: each flush writes all entries that came before, and entries come in their order; a file's
-bytes may be missing all the same until it is flushed. What is ordered is possible in any order, too.
+Two promises of file systems are modelled. *Any order* is what POSIX has: a file's bytes and size
+are on the disk once the file is flushed, an entry (made, linked, renamed, removed) once its folder
+is. Of what is not flushed any part may
+be there: any of the entries, of a file any first part of what was written, half of a write, or
+zeros of the full size.
+*Ordered* is what ext4 does: each flush writes all entries that came before, and entries come in
+their order; a file's bytes may be missing all the same until it is flushed. What is ordered is
+possible in any order, too.
 
-An entry that is renamed takes its new name and gives up its old one in one step, in both. Where only the folder of the
-new name is flushed, both names may be there.
+An entry that is renamed takes its new name and gives up its old one in one step, in both. Where
+only the folder of the new name is flushed, both names may be there.
 """
 
 from __future__ import annotations
@@ -40,7 +44,8 @@ class File:
     waiting: list[tuple[int, bytes | None]] = field(default_factory=list)
 
     def content(self, count: int | None = None, *, torn: bool = False) -> bytes:
-        """The bytes after so many of the calls that wait, all if `None`; of the last one half if `torn`."""
+        """The bytes after so many of the calls that wait, all if `None`; of the last one half if
+        `torn`."""
         if not self.waiting or count == 0:
             return self.durable
         calls = self.waiting[:count]
@@ -65,7 +70,8 @@ class File:
 
 @dataclass(eq=False)
 class Folder:
-    """A folder, with the entries that are on the disk for certain, and those that the program sees."""
+    """A folder, with the entries that are on the disk for certain, and those that the program
+    sees."""
 
     durable: dict[str, Node] = field(default_factory=dict)
     seen: dict[str, Node] = field(default_factory=dict)
@@ -76,7 +82,8 @@ Node = File | Folder
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """Entries that change in one step, each with its folder, its name and what it leads to; `None` takes it away."""
+    """Entries that change in one step, each with its folder, its name and what it leads to; `None`
+    takes it away."""
 
     parts: tuple[tuple[Folder, str, Node | None], ...]
 
@@ -199,7 +206,8 @@ class Disk:
         return self._tree(self._waiting, {})
 
     def states(self, rng: np.random.Generator) -> Iterator[State]:
-        """States that a power cut now may leave: the extremes of both promises, and some that are drawn."""
+        """States that a power cut now may leave: the extremes of both promises, and some that are
+        drawn."""
         waiting, files = self._waiting, list(self._unflushed.values())
         certain = len(waiting) - min(self._since_flush, len(waiting))
         contents: dict[str, dict[int, bytes]] = {
@@ -209,30 +217,41 @@ class Disk:
             "zeros": {id(file): file.zeros() for file in files},
         }
         yield self._state("all is there", waiting, {}, ordered=True)
-        yield self._state("nothing that was not flushed", waiting[:certain], contents["none"], ordered=True)
+        yield self._state(
+            "nothing that was not flushed", waiting[:certain], contents["none"], ordered=True
+        )
         yield self._state("nothing that was not flushed", [], contents["none"], ordered=False)
         for name in ("none", "half", "zeros") if files else ():
             ordered = name != "zeros"
-            yield self._state(f"files with {name} of their bytes", waiting, contents[name], ordered=ordered)
+            yield self._state(
+                f"files with {name} of their bytes", waiting, contents[name], ordered=ordered
+            )
         additions = [change for change in waiting if not change.removes]
         yield self._state("removed entries are back", additions, {}, ordered=False)
-        yield self._state("removed without what was added", [c for c in waiting if c.removes], {}, ordered=False)
+        yield self._state(
+            "removed without what was added", [c for c in waiting if c.removes], {}, ordered=False
+        )
         for _ in range(_DRAWS):
             first = int(rng.integers(certain, len(waiting) + 1))
-            yield self._state("a first part", waiting[:first], self._drawn(files, rng), ordered=True)
+            yield self._state(
+                "a first part", waiting[:first], self._drawn(files, rng), ordered=True
+            )
             subset = [change for change in waiting if rng.random() < 0.5]
             yield self._state("any part", subset, {**self._drawn(files, rng)}, ordered=False)
 
     @staticmethod
     def _drawn(files: Sequence[File], rng: np.random.Generator) -> dict[int, bytes]:
-        """The bytes of each file: a first part of what was written, the last of it torn or whole."""
+        """The bytes of each file: a first part of what was written, the last of it torn or
+        whole."""
         drawn = {}
         for file in files:
             count = int(rng.integers(0, len(file.waiting) + 1))
             drawn[id(file)] = file.content(count, torn=count > 0 and rng.random() < 0.5)
         return drawn
 
-    def _state(self, kind: str, changes: Sequence[Change], contents: Mapping[int, bytes], *, ordered: bool) -> State:
+    def _state(
+        self, kind: str, changes: Sequence[Change], contents: Mapping[int, bytes], *, ordered: bool
+    ) -> State:
         return State(kind=kind, ordered=ordered, tree=self._tree(changes, contents))
 
     def _tree(self, changes: Sequence[Change], contents: Mapping[int, bytes]) -> Tree:
@@ -264,7 +283,8 @@ def _enter(entries: dict[str, Node], name: str, node: Node | None) -> None:
 def read(folder: Path) -> Tree:
     """What is in a folder."""
     return {
-        path.relative_to(folder).as_posix(): None if path.is_dir() else path.read_bytes() for path in folder.rglob("*")
+        path.relative_to(folder).as_posix(): None if path.is_dir() else path.read_bytes()
+        for path in folder.rglob("*")
     }
 
 

@@ -30,7 +30,8 @@ def invoked(arguments: Sequence[str]) -> int:
 
 
 def stand_in(function: str, kept: str) -> None:
-    """Put something in the place of what a command computes: "module:function", called with the scene's id "kept"."""
+    """Put something in the place of what a command computes: "module:function", called with the
+    scene's id "kept"."""
     module, _, name = function.partition(":")
     getattr(import_module(module), name)(kept)
 
@@ -57,7 +58,9 @@ class Child:
                 traceback.print_exc()
             sys.stdout.flush()
             sys.stderr.flush()
-            (folder / "modules").write_text("\n".join(n for n in sys.modules if n.partition(".")[0] in SHARED))
+            (folder / "modules").write_text(
+                "\n".join(n for n in sys.modules if n.partition(".")[0] in SHARED)
+            )
             os._exit(code)
 
     def ended(self) -> tuple[int, Any, str]:

@@ -1,8 +1,9 @@
-"""Calls that are alike, so that of thousands of calls each distinct one is tried and not each repetition.
+"""Calls that are alike, so that of thousands of calls each distinct one is tried and not each
+repetition.
 
-Two calls are alike where they are the same function on files of the same role, and what was published last before them
-has the same role too. A file's role is its path without what differs from run to run or from item to item: numbers,
-hashes and identities.
+Two calls are alike where they are the same function on files of the same role, and what was
+published last before them has the same role too. A file's role is its path without what differs
+from run to run or from item to item: numbers, hashes and identities.
 """
 
 from __future__ import annotations
@@ -31,14 +32,18 @@ class Group:
 
 
 def role(call: str) -> str:
-    """A call of a trace, function and path, with every number, hash and identity of the path as `*`."""
+    """A call of a trace, function and path, with every number, hash and identity of the path as
+    `*`."""
     function, _, path = call.partition(" ")
-    parts = ("*" if _HASHED.fullmatch(part) else _IDENTITY.sub("*", part) for part in path.split("/"))
+    parts = (
+        "*" if _HASHED.fullmatch(part) else _IDENTITY.sub("*", part) for part in path.split("/")
+    )
     return f"{function} {'/'.join(parts)}"
 
 
 def kinds(trace: Sequence[str]) -> list[str]:
-    """Of each call of a trace what it is: function and role, and what was published last before it."""
+    """Of each call of a trace what it is: function and role, and what was published last before
+    it."""
     found = []
     published = "nothing"
     for call in trace:
@@ -62,7 +67,9 @@ def grouped(trace: Sequence[str], *, every: int, last: int) -> dict[str, Group]:
     return {
         kind: Group(
             calls=tuple(calls),
-            tried=tuple(n for k, n in enumerate(calls) if k % every == 0 or k == len(calls) - 1 or n > last),
+            tried=tuple(
+                n for k, n in enumerate(calls) if k % every == 0 or k == len(calls) - 1 or n > last
+            ),
         )
         for kind, calls in members.items()
     }

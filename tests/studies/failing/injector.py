@@ -1,4 +1,5 @@
-"""Commands of flagdata in which one call to the disk fails: `calls.c` lets it fail, `worker.py` runs them."""
+"""Commands of flagdata in which one call to the disk fails: `calls.c` lets it fail, `worker.py`
+runs them."""
 
 from __future__ import annotations
 
@@ -33,8 +34,10 @@ class Fault:
 
     Attributes:
         call: its number, from 0.
-        stays: whether all later calls fail too, for want of space (reads: as a broken disk does); else it fails alone.
-        kills: whether the process is killed (SIGKILL) by that call instead, before the call is made.
+        stays: whether all later calls fail too, for want of space (reads: as a broken disk does);
+            else it fails alone.
+        kills: whether the process is killed (SIGKILL) by that call instead, before the call is
+            made.
     """
 
     call: int
@@ -87,7 +90,8 @@ class Injector:
         kinds: Kinds = Kinds.ALL,
         traced: bool = False,
     ) -> Done:
-        """Run a command; calls on files in `folder` count, all that the command reads and writes should lie there."""
+        """Run a command; calls on files in `folder` count, all that the command reads and writes
+        should lie there."""
         task = {
             "arguments": list(arguments),
             "folder": str(folder),
@@ -108,14 +112,17 @@ class Injector:
 
 @contextmanager
 def injecting(scratch: Path) -> Iterator[Injector | None]:
-    """An injector, which keeps its files in the folder `scratch`; None where there is no compiler of C, or no Linux."""
+    """An injector, which keeps its files in the folder `scratch`; None where there is no compiler
+    of C, or no Linux."""
     compiler = shutil.which("gcc") or shutil.which("cc")
     if compiler is None or not sys.platform.startswith("linux"):
         yield None
         return
     library, state = scratch / "calls.so", scratch / "calls"
     source = str(HERE / "calls.c")
-    subprocess.run([compiler, "-shared", "-fPIC", "-O1", "-o", str(library), source, "-ldl"], check=True)
+    subprocess.run(
+        [compiler, "-shared", "-fPIC", "-O1", "-o", str(library), source, "-ldl"], check=True
+    )
     state.write_bytes(bytes(_STATE_SIZE))
     Path(f"{state}.trace").touch()
     environment = {

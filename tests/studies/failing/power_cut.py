@@ -1,12 +1,14 @@
-"""Power cuts beside every verb that writes: `python -m tests.studies power-cut [VERB …] [--out FILE]`.
+"""Power cuts beside every verb that writes: `python -m tests.studies power-cut [VERB …] [--out
+FILE]`.
 
-Each verb runs once while its calls are recorded. From these follow the states in which a power cut at any moment may
-leave the disk (`disk.py`); of the distinct ones some are drawn. Each is examined in a folder of its own: what had been
-acknowledged before the verb began is there, and where the cut came after its answer all that it answered; what is
-damaged is named with a remedy, which is typed and heals; and the verb, given again, ends as if nothing had happened.
+Each verb runs once while its calls are recorded. From these follow the states in which a power cut
+at any moment may leave the disk (`disk.py`); of the distinct ones some are drawn. Each is examined
+in a folder of its own: what had been acknowledged before the verb began is there, and where the cut
+came after its answer all that it answered; what is damaged is named with a remedy, which is typed
+and heals; and the verb, given again, ends as if nothing had happened.
 
-Results stay in FILE, a JSON file, verb after verb, so that a run may be stopped and given again; beside it a page of
-the same name shows them.
+Results stay in FILE, a JSON file, verb after verb, so that a run may be stopped and given again;
+beside it a page of the same name shows them.
 """
 
 from __future__ import annotations
@@ -49,7 +51,8 @@ LONGEST = 600
 """Seconds after which an examination counts as hanging."""
 MAKING = 3600
 _ROUNDS = 4  # of looking at a lake and typing the remedies that are named
-_CUTS = 300  # calls of a verb at most before and after which the power is cut; of more so many are drawn
+# calls of a verb at most before and after which the power is cut; of more so many are drawn
+_CUTS = 300
 _ROOT = Path(__file__).parents[3]
 _OUT = "out"
 """With which all begins that a verb writes outside of a lake, caches aside."""
@@ -92,18 +95,31 @@ def look(path: Path) -> list[Finding]:
     try:
         lake = Lake.open(path)
         marked = read_refs(lake)
-        found = [*doctor(lake), *verify_catalog(lake, marked), *verify(lake, object_names(lake, marked), marked)]
+        found = [
+            *doctor(lake),
+            *verify_catalog(lake, marked),
+            *verify(lake, object_names(lake, marked), marked),
+        ]
     except FlagdataError as error:
         found = [
-            Finding(kind=error.kind, severity=Severity.ERROR, what=error.what, where=str(error.where), fix=error.fix)
+            Finding(
+                kind=error.kind,
+                severity=Severity.ERROR,
+                what=error.what,
+                where=str(error.where),
+                fix=error.fix,
+            )
         ]
     return [finding for finding in dict.fromkeys(found) if finding.severity is not Severity.NOTE]
 
 
 def typed(finding: Finding, path: Path, backup: Path) -> Iterator[tuple[str, ...]]:
-    """The commands that a finding's remedy names, in its order: "delete" stands for deleting what it is about."""
+    """The commands that a finding's remedy names, in its order: "delete" stands for deleting what
+    it is about."""
     fix = finding.fix or ""
-    for match in sorted([*_COMMAND.finditer(fix), *_DELETE.finditer(fix)], key=lambda match: match.start()):
+    for match in sorted(
+        [*_COMMAND.finditer(fix), *_DELETE.finditer(fix)], key=lambda match: match.start()
+    ):
         verb = match[1] if match.re is _COMMAND else "delete"
         if verb in ("heal", "pull"):
             yield verb, str(backup), "--lake", str(path)
@@ -114,11 +130,14 @@ def typed(finding: Finding, path: Path, backup: Path) -> Iterator[tuple[str, ...
 
 
 def heal(path: Path, backup: Path) -> tuple[list[Finding], list[str], list[Finding]]:
-    """What is found in a lake, the verbs that were typed since a remedy names them, and what is found then."""
+    """What is found in a lake, the verbs that were typed since a remedy names them, and what is
+    found then."""
     first = found = look(path)
     done: set[tuple[str, ...]] = set()
     for _ in range(_ROUNDS):
-        commands = [next((c for c in typed(one, path, backup) if c not in done), ()) for one in found]
+        commands = [
+            next((c for c in typed(one, path, backup) if c not in done), ()) for one in found
+        ]
         if not any(commands):
             break
         for command in dict.fromkeys(filter(None, commands)):
@@ -155,7 +174,9 @@ class Trials:
     cuts: Sequence[Cut]
 
     @classmethod
-    def of(cls, verb: Verb, scene: Scene, recorder: Recorder, scratch: Path, rng: np.random.Generator) -> Trials:
+    def of(
+        cls, verb: Verb, scene: Scene, recorder: Recorder, scratch: Path, rng: np.random.Generator
+    ) -> Trials:
         """Run a verb and enumerate the states.
 
         Raises:
@@ -179,7 +200,13 @@ class Trials:
             if number in chosen:
                 answered = number >= done.answered
                 for one in model.states(rng):
-                    cut = Cut(call=number, answered=answered, kind=one.kind, ordered=one.ordered, tree=one.tree)
+                    cut = Cut(
+                        call=number,
+                        answered=answered,
+                        kind=one.kind,
+                        ordered=one.ordered,
+                        tree=one.tree,
+                    )
                     key = hash(frozenset(one.tree.items()))
                     if key not in cuts or (answered and not cuts[key].answered):
                         cuts[key] = cut
@@ -214,13 +241,19 @@ class Trials:
         for place in rng.permutation(len(self.cuts)):
             cut = self.cuts[place]
             groups.setdefault((cut.answered, cut.kind), []).append(cut)
-        sides = [[group for (side, _), group in groups.items() if side is answered] for answered in (True, False)]
+        sides = [
+            [group for (side, _), group in groups.items() if side is answered]
+            for answered in (True, False)
+        ]
         order = [group for pair in zip_longest(*sides, fillvalue=[]) for group in pair]
-        turns = (group[turn] for turn in range(len(self.cuts)) for group in order if turn < len(group))
+        turns = (
+            group[turn] for turn in range(len(self.cuts)) for group in order if turn < len(group)
+        )
         return [cut for cut, _ in zip(turns, range(points), strict=False)]
 
     def examine(self, cut: Cut, folder: Path) -> dict[str, Any]:
-        """In a process of its own: a state, what was found in it, typed against it, and what is wrong with it."""
+        """In a process of its own: a state, what was found in it, typed against it, and what is
+        wrong with it."""
         write(cut.tree, folder)
         target = Path(self.verb.target.format(**places(folder)))
         backup = self.scene.folder / "lake"
@@ -232,7 +265,11 @@ class Trials:
         first, commands, left = heal(target, backup) if there else ([], [], [])
         wrong += [f"not healed: {one.kind}: {one.what} (fix: {one.fix})" for one in left]
         healed = self._own(state(target, deletes=self.verb.deletes))
-        if self.verb.unfinished and begun not in (UNREADABLE, self.before, self.after) and not first:
+        if (
+            self.verb.unfinished
+            and begun not in (UNREADABLE, self.before, self.after)
+            and not first
+        ):
             wrong.append("silent: it has begun what it has not done, and nothing is found")
         if cut.answered and (undone := self.verb.unfinished & {one.kind for one in first}):
             wrong.append(f"lost: answered, and not done: {sorted(undone)}")
@@ -264,23 +301,29 @@ class Trials:
         }
 
     def _own(self, seen: State) -> State:
-        """Without objects that no version before or after has: what is left of the verb that was cut off."""
+        """Without objects that no version before or after has: what is left of the verb that was
+        cut off."""
         known = self.before | self.after
         return frozenset(one for one in seen if one[0] != "object" or one in known)
 
     def _outside(self, cut: Cut) -> Iterator[str]:
-        """What is wrong with files outside of lakes: each is as before or as after, and as after once it answered."""
+        """What is wrong with files outside of lakes: each is as before or as after, and as after
+        once it answered."""
         for path in cut.tree.keys() | self.last.keys():
             parts = path.split("/")
             if not parts[0].startswith(_OUT) or any(part.startswith(".") for part in parts):
                 continue
             right = (
-                [self.last.get(path, b"")] if cut.answered else [self.first.get(path, b""), self.last.get(path, b"")]
+                [self.last.get(path, b"")]
+                if cut.answered
+                else [self.first.get(path, b""), self.last.get(path, b"")]
             )
             missing = path not in cut.tree
             if missing and (path in self.first or cut.answered) and path in self.last:
                 yield f"output: {path} is not there"
-            elif not missing and (cut.tree[path] not in right or (path not in self.first and path not in self.last)):
+            elif not missing and (
+                cut.tree[path] not in right or (path not in self.first and path not in self.last)
+            ):
                 yield f"output: {path} is cut off"
 
     def _back(self, cut: Cut) -> Iterator[str]:
@@ -290,7 +333,8 @@ class Trials:
                 yield f"erasure: {path} is back"
 
     def _again(self, folder: Path, healed: State) -> tuple[Ended, list[str]]:
-        """Give the verb again; where it says that what is there has to go, do that and give it once more."""
+        """Give the verb again; where it says that what is there has to go, do that and give it once
+        more."""
         again = self.verb.again if self.verb.again and healed != frozenset({("no lake",)}) else None
         command = given(again or self.verb.arguments, folder, self.scene)
         ended = invoke(*command)
@@ -302,7 +346,9 @@ class Trials:
     def _collected(self, target: Path) -> Iterator[str]:
         """What is wrong once all that no version needs was collected."""
         collect(Lake.open(target), grace=timedelta(0))
-        if state(target, deletes=False) != frozenset(one for one in self.after if one[0] != "object"):
+        if state(target, deletes=False) != frozenset(
+            one for one in self.after if one[0] != "object"
+        ):
             yield "collected: rows went"
         for one in doctor(Lake.open(target), grace=timedelta(0)):
             if one.severity is not Severity.NOTE:
@@ -338,14 +384,22 @@ def tried(trials: Trials, *, points: int, rng: np.random.Generator) -> dict[str,
                 (
                     cut,
                     folder,
-                    Child(partial(trials.examine, cut, folder), trials.scratch / f"child-{number}", longest=LONGEST),
+                    Child(
+                        partial(trials.examine, cut, folder),
+                        trials.scratch / f"child-{number}",
+                        longest=LONGEST,
+                    ),
                 )
             )
         for cut, folder, child in running:
             code, found, said = child.ended()
             shutil.rmtree(folder, ignore_errors=True)
             if code:
-                found = {"wrong": [f"the examination failed ({code}): {said[-1500:]}"], "found": [], "typed": []}
+                found = {
+                    "wrong": [f"the examination failed ({code}): {said[-1500:]}"],
+                    "found": [],
+                    "typed": [],
+                }
             counts.update(
                 {
                     "answered": cut.answered,
@@ -359,7 +413,9 @@ def tried(trials: Trials, *, points: int, rng: np.random.Generator) -> dict[str,
             commands.update(found["typed"])
             place = f"after call {cut.call} of {trials.calls}{', answered' if cut.answered else ''}"
             order = "ordered" if cut.ordered else "any order"
-            examples += [f"{place}, {cut.kind} ({order}): {' '.join(one.split())}" for one in found["wrong"]]
+            examples += [
+                f"{place}, {cut.kind} ({order}): {' '.join(one.split())}" for one in found["wrong"]
+            ]
     return {
         "calls": trials.calls,
         "states": len(trials.cuts),
@@ -374,7 +430,13 @@ def tried(trials: Trials, *, points: int, rng: np.random.Generator) -> dict[str,
 
 
 def campaign(
-    names: Sequence[str], results: Path | None, *, points: int, seed: int, scenes: Path | None, scratch: Path
+    names: Sequence[str],
+    results: Path | None,
+    *,
+    points: int,
+    seed: int,
+    scenes: Path | None,
+    scratch: Path,
 ) -> dict[str, Any]:
     """Try verbs, those whose results are not known yet where none is named, and return all results.
 
@@ -389,7 +451,9 @@ def campaign(
         if not wanted:
             continue
         code, scene, said = Child(
-            partial(kept_scene, scenes or scratch / "scenes", group, make), scratch / "made", longest=MAKING
+            partial(kept_scene, scenes or scratch / "scenes", group, make),
+            scratch / "made",
+            longest=MAKING,
         ).ended()
         assert code == 0, said
         for name in wanted:
@@ -400,9 +464,16 @@ def campaign(
             trials = Trials.of(verb, scene, recorder, place, rng)
             if verb.stand_in is not None:
                 stand_in(verb.stand_in, scene.ids["kept"])
-            known[name] = {**tried(trials, points=points, rng=rng), "circumstances": circumstances(seed)}
+            known[name] = {
+                **tried(trials, points=points, rng=rng),
+                "circumstances": circumstances(seed),
+            }
             shutil.rmtree(place)
-            print(name, {key: value for key, value in known[name].items() if key != "circumstances"}, flush=True)  # noqa: T201
+            print(  # noqa: T201
+                name,
+                {key: value for key, value in known[name].items() if key != "circumstances"},
+                flush=True,
+            )
             if results is not None:
                 results.write_text(json.dumps(known, indent=1, ensure_ascii=False) + "\n")
                 results.with_suffix(".md").write_text(page(known))
@@ -422,7 +493,15 @@ def page(known: Mapping[str, Any]) -> str:
         "left or lost by gc": ("left", "collected"),
         "other": ("the examination failed",),
     }
-    columns = ("calls", "states", "examined", "answered", "with findings", "wrong", "wrong in order")
+    columns = (
+        "calls",
+        "states",
+        "examined",
+        "answered",
+        "with findings",
+        "wrong",
+        "wrong in order",
+    )
     about = " ".join((__doc__ or "").split("\n\n")[1].split())
     model = " ".join("".join((disk.__doc__ or "").split("\n\n", 1)[1:]).split())
     lines = [
@@ -438,13 +517,25 @@ def page(known: Mapping[str, Any]) -> str:
     total: Counter[str] = Counter()
     for name, found in known.items():
         numbers = {column: found[column] for column in columns}
-        numbers |= {title: sum(found["kinds"].get(kind, 0) for kind in kinds) for title, kinds in shown_kinds.items()}
+        numbers |= {
+            title: sum(found["kinds"].get(kind, 0) for kind in kinds)
+            for title, kinds in shown_kinds.items()
+        }
         total.update(numbers)
-        typed_here = ", ".join(f"{command} {count}" for command, count in sorted(found["typed"].items()))
+        typed_here = ", ".join(
+            f"{command} {count}" for command, count in sorted(found["typed"].items())
+        )
         code = found["circumstances"]["code_version"]
-        lines.append(f"| {name} | {' | '.join(str(number) for number in numbers.values())} | {typed_here} | {code} |")
-    lines.append(f"| **all** | {' | '.join(str(total[title]) for title in (*columns, *shown_kinds))} | | |")
-    examples = [f"- {name}, {example}" for name, found in known.items() for example in found["examples"]]
+        lines.append(
+            f"| {name} | {' | '.join(str(number) for number in numbers.values())} | {typed_here} | "
+            f"{code} |"
+        )
+    lines.append(
+        f"| **all** | {' | '.join(str(total[title]) for title in (*columns, *shown_kinds))} | | |"
+    )
+    examples = [
+        f"- {name}, {example}" for name, found in known.items() for example in found["examples"]
+    ]
     lines += ["", "## What was wrong", "", *examples] if examples else []
     if known:
         where = next(iter(known.values()))["circumstances"]
@@ -458,8 +549,12 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help="verbs; those without a result if none is named")
     parser.add_argument("--out", type=Path, help="JSON file of the results; none is kept without")
-    parser.add_argument("--points", type=int, default=POINTS, help="states of each verb that are examined")
-    parser.add_argument("--scenes", type=Path, help="folder that scenes are kept in; some take minutes to make")
+    parser.add_argument(
+        "--points", type=int, default=POINTS, help="states of each verb that are examined"
+    )
+    parser.add_argument(
+        "--scenes", type=Path, help="folder that scenes are kept in; some take minutes to make"
+    )
     parser.add_argument("--seed", type=int, default=1, help="of the states that are drawn")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="power-cut-") as scratch_folder:

@@ -1,4 +1,5 @@
-"""The calls of a program that change files of one folder, in their order: `recorder.c` notes them."""
+"""The calls of a program that change files of one folder, in their order: `recorder.c` notes
+them."""
 
 from __future__ import annotations
 
@@ -39,7 +40,8 @@ class Call:
         act: what it does.
         file: inode of the file or folder that it makes, writes or flushes; 0 of others.
         at: place of the bytes that it writes, or size that it gives a file [B].
-        path: of the entry, from the folder on; empty where the call has a descriptor, or makes a file without a name.
+        path: of the entry, from the folder on; empty where the call has a descriptor, or makes a
+            file without a name.
         target: new name of what is linked or renamed.
         data: bytes that it writes.
     """
@@ -59,7 +61,8 @@ class Recording:
     Attributes:
         code: its exit code.
         stderr: what it said there.
-        calls: what it did to the folder, and `Act.SAY` for each time that it said something on standard output.
+        calls: what it did to the folder, and `Act.SAY` for each time that it said something on
+            standard output.
     """
 
     code: int
@@ -68,7 +71,8 @@ class Recording:
 
     @property
     def answered(self) -> int:
-        """The number of calls after which the program began its answer: what it said last, without a break."""
+        """The number of calls after which the program began its answer: what it said last, without
+        a break."""
         said = [call.act is Act.SAY for call in self.calls]
         if True not in said:
             return len(said)
@@ -87,10 +91,22 @@ class Recorder:
         if not can_record():
             raise RuntimeError("calls are recorded by a library of C that Linux loads first")
         self._library, self._record = scratch / "recorder.so", scratch / "calls"
-        command = [_compiler(), "-shared", "-fPIC", "-O1", "-o", str(self._library), str(SOURCE), "-ldl", "-lpthread"]
+        command = [
+            _compiler(),
+            "-shared",
+            "-fPIC",
+            "-O1",
+            "-o",
+            str(self._library),
+            str(SOURCE),
+            "-ldl",
+            "-lpthread",
+        ]
         subprocess.run(command, check=True)
 
-    def record(self, arguments: Sequence[str], folder: Path, *, cwd: Path | None = None) -> Recording:
+    def record(
+        self, arguments: Sequence[str], folder: Path, *, cwd: Path | None = None
+    ) -> Recording:
         """Run Python with some arguments, and return what it does to `folder`.
 
         Args:
@@ -107,7 +123,13 @@ class Recorder:
         }
         command = [sys.executable, *arguments]
         done = subprocess.run(
-            command, env=variables, cwd=cwd, capture_output=True, text=True, check=False, errors="replace"
+            command,
+            env=variables,
+            cwd=cwd,
+            capture_output=True,
+            text=True,
+            check=False,
+            errors="replace",
         )
         calls = tuple(_read(self._record.read_bytes(), os.fsencode(folder)))
         return Recording(code=done.returncode, stderr=done.stderr, calls=calls)
@@ -133,7 +155,12 @@ def _read(record: bytes, folder: bytes) -> Iterator[Call]:
             place += size
         path, target, data = parts
         yield Call(
-            act=Act(act), file=file, at=at, path=_inside(path, folder), target=_inside(target, folder), data=data
+            act=Act(act),
+            file=file,
+            at=at,
+            path=_inside(path, folder),
+            target=_inside(target, folder),
+            data=data,
         )
 
 

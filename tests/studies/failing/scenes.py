@@ -1,4 +1,5 @@
-"""The scene of the verbs of the core, small enough to try every call of each, and what commands change in it."""
+"""The scene of the verbs of the core, small enough to try every call of each, and what commands
+change in it."""
 
 from __future__ import annotations
 
@@ -28,9 +29,13 @@ class Scene:
     ids: dict[str, str] = field(default_factory=dict)
 
 
-def core_scene(folder: Path, *, video: Path, wind_log: Path, write_video: Callable[..., Path]) -> Scene:
-    """A lake with films, a log, a branch, a tag and garbage, the same with damage, and one that is ahead of it; beside
-    them what commands read: films, logs, markers, meshes, records, of which one is cut off, and recipes."""
+def core_scene(
+    folder: Path, *, video: Path, wind_log: Path, write_video: Callable[..., Path]
+) -> Scene:
+    """A lake with films, a log, a branch, a tag and garbage, the same with damage, and one that is
+    ahead of it; beside
+    them what commands read: films, logs, markers, meshes, records, of which one is cut off, and
+    recipes."""
     lake = Lake.create(folder / "lake")
     camera = ingest_camera(lake, write_video(folder / "first.mp4", frames=30)).artifact
     wind = ingest_wind(lake, wind_log).artifact
@@ -38,10 +43,22 @@ def core_scene(folder: Path, *, video: Path, wind_log: Path, write_video: Callab
     lake.tag("v0")
     (folder / "second.mp4").write_bytes(video.read_bytes())
     (folder / "second.csv").write_text(wind_log.read_text().replace("+02:00,5.", "+02:00,6."))
-    third = ingest_camera(lake, write_video(folder / "third.mp4", frames=28), branch="side").artifact
+    third = ingest_camera(
+        lake, write_video(folder / "third.mp4", frames=28), branch="side"
+    ).artifact
     write_video(folder / "fourth.mp4", frames=26)
     fifth = ingest_camera(lake, write_video(folder / "fifth.mp4", frames=32)).artifact
-    aligned = ["align", fifth.id, wind.id, "--by", "given", "--clock-offset", "0", "--offset-sigma", "0.1"]
+    aligned = [
+        "align",
+        fifth.id,
+        wind.id,
+        "--by",
+        "given",
+        "--clock-offset",
+        "0",
+        "--offset-sigma",
+        "0.1",
+    ]
     with suppress(SystemExit):
         main([*aligned, "--lake", str(lake.path)])
     (recording,) = lake.rows("kind = 'recording'")["artifact"].to_pylist()
@@ -105,9 +122,14 @@ def core(folder: Path) -> Scene:
         return path
 
     log = folder / "mast.csv"
-    lines = [f"2026-05-01T12:{k // 60:02d}:{k % 60:02d}+02:00,5.{k % 10},{200 + k % 9}" for k in range(120)]
+    lines = [
+        f"2026-05-01T12:{k // 60:02d}:{k % 60:02d}+02:00,5.{k % 10},{200 + k % 9}"
+        for k in range(120)
+    ]
     log.write_text("\n".join(["time,wind_speed (m/s),wind_direction (deg)", *lines, ""]))
-    return core_scene(folder, video=write_video(folder / "video.mp4"), wind_log=log, write_video=write_video)
+    return core_scene(
+        folder, video=write_video(folder / "video.mp4"), wind_log=log, write_video=write_video
+    )
 
 
 def rows(folder: Path) -> frozenset[object]:
@@ -123,12 +145,18 @@ def artifacts(folder: Path) -> frozenset[object]:
 
 
 def files(*places: str) -> Callable[[Path], frozenset[object]]:
-    """What is at these places of the folder and under them: folders, and files with their hashes; no scratch files."""
+    """What is at these places of the folder and under them: folders, and files with their hashes;
+    no scratch files."""
 
     def found(folder: Path) -> frozenset[object]:
-        every = [entry for place in places for entry in ((folder / place), *(folder / place).rglob("*"))]
+        every = [
+            entry for place in places for entry in ((folder / place), *(folder / place).rglob("*"))
+        ]
         return frozenset(
-            (str(path.relative_to(folder)), path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest())
+            (
+                str(path.relative_to(folder)),
+                path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest(),
+            )
             for path in every
             if path.exists() and not path.name.startswith(".")
         )

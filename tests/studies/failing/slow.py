@@ -1,8 +1,9 @@
-"""The commands that take long: each with a small scene, and what stands in for its computing once it was done.
+"""The commands that take long: each with a small scene, and what stands in for its computing once
+it was done.
 
-What is tried is what they read and write: for close-loop and propose a result that was computed once is taken, after
-the bank was read as it is; for build the jobs that workers do are done once and their results kept. Killed commands
-(`tests.studies.failing.killed`) compute all themselves.
+What is tried is what they read and write: for close-loop and propose a result that was computed
+once is taken, after the bank was read as it is; for build the jobs that workers do are done once
+and their results kept. Killed commands (`tests.studies.failing.killed`) compute all themselves.
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ from tests.studies.failing.trial import Command
 WIDTH, HEIGHT, RATE, SECONDS, NOISE = 0.75, 0.5, 25.0, 4.6, 5e-4
 SPEEDS = (3.5, 4.3, 5.1, 6.0)
 KINDS, LEVEL = 9, 0.25
-"""Kinds of numerics of the bank, the fewest that a bank may have; this level can be tested by them."""
+"""Kinds of numerics of the bank, the fewest that a bank may have; this level can be tested by
+them."""
 EXPERIMENT = """
 title = "tracks"
 [cloth]
@@ -59,7 +61,9 @@ noise = {noise}
 [recording.wind]
 velocity = [{speed}, 0.0, 0.0]
 """
-FEW = DATA_SET.replace("3\nrenders = 7", "2\nrenders = 2").replace("2\nrenders = 3", "1\nrenders = 1")
+FEW = DATA_SET.replace("3\nrenders = 7", "2\nrenders = 2").replace(
+    "2\nrenders = 3", "1\nrenders = 1"
+)
 _LAKE = ("--lake", "{folder}/lake")
 
 
@@ -70,7 +74,8 @@ def started(folder: Path) -> None:
 
 
 def loop_scene(folder: Path) -> Scene:
-    """Recordings with a lift that the base model lacks, a bank of nulls, a lake; beside the folder, results."""
+    """Recordings with a lift that the base model lacks, a bank of nulls, a lake; beside the folder,
+    results."""
     started(folder)
     mesh = grid(width=WIDTH, height=HEIGHT, columns=8, rows=6)
     cloth = Specimen(
@@ -95,7 +100,9 @@ def loop_scene(folder: Path) -> Scene:
     text = EXPERIMENT.format(width=WIDTH, height=HEIGHT) + "".join(parts)
     (folder / "tracks.toml").write_text(text)
     experiment = recipes.read(recipes.load(folder / "tracks.toml")).experiment
-    banks.build(folder / "bank", null_plan.batches(Setting.of(experiment), kinds=KINDS, seed=0), workers=2)
+    banks.build(
+        folder / "bank", null_plan.batches(Setting.of(experiment), kinds=KINDS, seed=0), workers=2
+    )
     kept = folder.with_name(f"{folder.name}.kept")
     kept.mkdir()
     verdict = close_loop(experiment, LoopOptions(bank=folder / "bank", level=LEVEL))
@@ -110,7 +117,9 @@ def _tracks(path: Path, markers: FloatArray, recordings: Sequence[FloatArray]) -
     for number, positions in enumerate(recordings):
         for frame, at in enumerate(positions):
             for marker, ((u, v), (x, y, z)) in enumerate(zip(markers, at, strict=True)):
-                lines.append(f"wind-{number},{frame / RATE:.3f},m{marker},{u:.6f},{v:.6f},{x:.7f},{y:.7f},{z:.7f}")
+                lines.append(
+                    f"wind-{number},{frame / RATE:.3f},m{marker},{u:.6f},{v:.6f},{x:.7f},{y:.7f},{z:.7f}"
+                )
     path.write_text("\n".join(lines) + "\n")
 
 
@@ -145,7 +154,8 @@ def measure_scene(folder: Path) -> Scene:
 
 
 def weigh_scene(folder: Path) -> Scene:
-    """A flag's film, and a table of observables of a known cloth; beside the folder, what is read off the film."""
+    """A flag's film, and a table of observables of a known cloth; beside the folder, what is read
+    off the film."""
     started(folder)
     (folder / "flag.mp4").write_bytes(example("flag").film.read_bytes())
     seconds = np.arange(24) * 2.5
@@ -155,14 +165,16 @@ def weigh_scene(folder: Path) -> Scene:
 
     shown = readings({**values, "azimuth": np.array([1.2])}, speed, seed=3)[0, :, :3]
     lines = [",".join(map(str, row)) for row in np.column_stack([seconds, speed, shown]).tolist()]
-    (folder / "table.csv").write_text("\n".join(["time,wind,droop,extension,middle-speed", *lines, ""]))
+    (folder / "table.csv").write_text(
+        "\n".join(["time,wind,droop,extension,middle-speed", *lines, ""])
+    )
     kept = folder.with_name(f"{folder.name}.kept")
     kept.mkdir()
     return Scene(folder=folder, ids={"kept": str(kept)})
 
 
-# What stands in for the computing. Each is called in the process from which commands are forked, with the folder of
-# what was kept.
+# What stands in for the computing. Each is called in the process from which commands are forked,
+# with the folder of what was kept.
 
 
 def kept_verdict(kept: str) -> None:
@@ -192,7 +204,8 @@ def kept_outcome(kept: str) -> None:
 
 
 def kept_jobs(kept: str) -> None:
-    """What jobs of a build compute is kept by the jobs' arguments; they put it into the lake as they do."""
+    """What jobs of a build compute is kept by the jobs' arguments; they put it into the lake as
+    they do."""
     from sim.datasets import build_jobs
 
     def keeping(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -236,7 +249,9 @@ def known_flags(kept: str) -> None:
 
 def _name(arguments: Sequence[object]) -> str:
     """Of a job: names of the recipe and the film, and the members that are simulated."""
-    named = [one if isinstance(one, list | int | str) else getattr(one, "name", "") for one in arguments]
+    named = [
+        one if isinstance(one, list | int | str) else getattr(one, "name", "") for one in arguments
+    ]
     return "".join(letter if letter.isalnum() else "-" for letter in str(named))
 
 
@@ -246,7 +261,8 @@ def _kept(path: str) -> object:
 
 
 def proposal(folder: Path) -> frozenset[object]:
-    """The effect's files, and the proposal log: a command that was killed after its entry adds it once more."""
+    """The effect's files, and the proposal log: a command that was killed after its entry adds it
+    once more."""
     log = folder / "out" / "proposal" / "proposals.json"
     entries = json.loads(log.read_text())["entries"] if log.exists() else []
     written = {entry for entry in files("out")(folder) if "proposals.json" not in str(entry)}
@@ -300,7 +316,9 @@ BUILD = {
     ),
 }
 TRAIN = {
-    "train": Command(arguments=("train", "{folder}/small.toml", "--workers", "1", *_LAKE), state=artifacts),
+    "train": Command(
+        arguments=("train", "{folder}/small.toml", "--workers", "1", *_LAKE), state=artifacts
+    ),
 }
 MEASURE = {
     "measure": Command(
@@ -328,7 +346,15 @@ WEIGH = {
         stand_in="tests.studies.failing.slow:kept_windows",
     ),
     "calibrate": Command(
-        arguments=("calibrate", "{folder}/table.csv", "--flag-size", "1.5x1.0", "--azimuth", "70±7", *_LAKE),
+        arguments=(
+            "calibrate",
+            "{folder}/table.csv",
+            "--flag-size",
+            "1.5x1.0",
+            "--azimuth",
+            "70±7",
+            *_LAKE,
+        ),
         state=artifacts,
         stand_in="tests.studies.failing.slow:known_flags",
     ),

@@ -1,8 +1,9 @@
 """A store that fails on purpose: a proxy before moto's server, in a process of its own.
 
-`python -m tests.studies.failing.store ADDRESS` prints its address. A share of the requests meets a fault, all answers
-are a little slow, and the process that a control request names is killed (SIGKILL, with all that it started) at its nth
-request, before the store has it or after the store has done it.
+`python -m tests.studies.failing.store ADDRESS` prints its address. A share of the requests meets a
+fault, all answers are a little slow, and the process that a control request names is killed
+(SIGKILL, with all that it started) at its nth request, before the store has it or after the store
+has done it.
 """
 
 from __future__ import annotations
@@ -34,7 +35,18 @@ HELD = 2.0
 """Seconds for which an answer is held that comes too late."""
 PATIENCE = 1.5
 """Seconds after which a request counts as failed, in place of the 30 s of the program."""
-FAULTS = ("500", "503", "503", "cut before", "cut before", "lost answer", "lost answer", "cut body", "slow", "too late")
+FAULTS = (
+    "500",
+    "503",
+    "503",
+    "cut before",
+    "cut before",
+    "lost answer",
+    "lost answer",
+    "cut body",
+    "slow",
+    "too late",
+)
 _OWN = ("content-length", "connection", "transfer-encoding")
 LOST = 0.2
 """Share of the conditional puts whose answer is lost."""
@@ -76,7 +88,13 @@ class Store:
             plan = cls.plan
             number, plan.count = plan.count, plan.count + 1
             lost = conditional and cls.draws.random() < plan.lost
-            fault = "lost answer" if lost else cls.draws.choice(FAULTS) if cls.draws.random() < plan.share else ""
+            fault = (
+                "lost answer"
+                if lost
+                else cls.draws.choice(FAULTS)
+                if cls.draws.random() < plan.share
+                else ""
+            )
             if fault:
                 plan.faults[f"{fault} of a conditional put" if lost else fault] += 1
             return number, fault
@@ -98,7 +116,11 @@ class Proxy(BaseHTTPRequestHandler):
             self._end(plan)
             return
         if fault in ("500", "503"):
-            self._answer(int(fault), {}, b"<Error><Code>InternalError</Code><Message>failed</Message></Error>")
+            self._answer(
+                int(fault),
+                {},
+                b"<Error><Code>InternalError</Code><Message>failed</Message></Error>",
+            )
             return
         if fault == "cut before":
             self.close_connection = True
@@ -124,13 +146,17 @@ class Proxy(BaseHTTPRequestHandler):
         connection.close()
         return answer.status, dict(answer.getheaders()), content
 
-    def _answer(self, status: int, headers: dict[str, str], content: bytes, *, cut: bool = False) -> None:
+    def _answer(
+        self, status: int, headers: dict[str, str], content: bytes, *, cut: bool = False
+    ) -> None:
         self.send_response_only(status)
         for name, value in headers.items():
             if name.lower() not in _OWN:
                 self.send_header(name, value)
         head = self.command == "HEAD"
-        self.send_header("Content-Length", headers.get("Content-Length", "0") if head else str(len(content)))
+        self.send_header(
+            "Content-Length", headers.get("Content-Length", "0") if head else str(len(content))
+        )
         self.end_headers()
         if not head:
             self.wfile.write(content[: len(content) // 2] if cut else content)
@@ -156,14 +182,18 @@ class Proxy(BaseHTTPRequestHandler):
 
 def planned(proxy: str, **plan: Any) -> dict[str, Any]:
     """Set what happens from now on; what has happened since this was done last."""
-    with urlopen(Request(f"{proxy}{CONTROL}", data=json.dumps(plan).encode(), method="POST")) as answer:
+    with urlopen(
+        Request(f"{proxy}{CONTROL}", data=json.dumps(plan).encode(), method="POST")
+    ) as answer:
         return json.load(answer)
 
 
 @contextmanager
 def failing(store: str) -> Iterator[str]:
     """The address of a proxy before a store."""
-    with process("from tests.studies.failing.store import run; run()", store.removeprefix("http://")) as address:
+    with process(
+        "from tests.studies.failing.store import run; run()", store.removeprefix("http://")
+    ) as address:
         yield address
 
 

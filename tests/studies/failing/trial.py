@@ -26,18 +26,22 @@ class Command:
     """A command that writes.
 
     Attributes:
-        arguments: {folder} stands for the folder that it works in, other names in braces for the scene's ids.
+        arguments: {folder} stands for the folder that it works in, other names in braces for the
+            scene's ids.
         state: what it changes in that folder; equal states have equal content.
         lake: the lake that must stay healthy, in that folder; it may be absent.
-        stand_in: "module:function" that puts something in the place of its computing, called with the scene's id "kept"
-            in the process that it is forked from.
-        again: what goes on where it was killed and that lake is there; `None` is the same once more.
-        one_step: whether it changes all or nothing; else what it has done before an error stays, and a repeat goes on.
-        deletes: whether data go; where the disk does not flush a folder of them, it must end in an error.
-        compares: whether it reads again all that it leaves: what the disk refuses then is an error though all is done,
-            or a finding and exit code 3.
-        unfinished: kinds of the findings by which doctor reports what it has not done yet; none where it begins
-            nothing that it would have to finish.
+        stand_in: "module:function" that puts something in the place of its computing, called with
+            the scene's id "kept" in the process that it is forked from.
+        again: what goes on where it was killed and that lake is there; `None` is the same once
+            more.
+        one_step: whether it changes all or nothing; else what it has done before an error stays,
+            and a repeat goes on.
+        deletes: whether data go; where the disk does not flush a folder of them, it must end in an
+            error.
+        compares: whether it reads again all that it leaves: what the disk refuses then is an error
+            though all is done, or a finding and exit code 3.
+        unfinished: kinds of the findings by which doctor reports what it has not done yet; none
+            where it begins nothing that it would have to finish.
     """
 
     arguments: tuple[str, ...]
@@ -55,7 +59,9 @@ class Command:
 
     def given_again(self, folder: Path, ids: Mapping[str, str]) -> list[str]:
         there = (folder / self.lake / "lake.json").exists()
-        return replace(self, arguments=self.again if self.again and there else self.arguments).given(folder, ids)
+        return replace(
+            self, arguments=self.again if self.again and there else self.arguments
+        ).given(folder, ids)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +75,9 @@ class Whole:
     @property
     def published(self) -> int:
         """The number of the call that published last."""
-        return max((n for n, call in enumerate(self.done.trace) if call.startswith(PUBLISHING)), default=0)
+        return max(
+            (n for n, call in enumerate(self.done.trace) if call.startswith(PUBLISHING)), default=0
+        )
 
 
 class Trials:
@@ -77,15 +85,21 @@ class Trials:
 
     Attributes:
         whole: the command without a fault.
-        failed: how many calls of each kind (`groups.kinds`) have failed. Threads do not make their calls
-            in the same order each time, so that a number may meet another call than in `whole`.
+        failed: how many calls of each kind (`groups.kinds`) have failed. Threads do not make their
+            calls in the same order each time, so that a number may meet another call than in
+            `whole`.
 
     Raises:
         AssertionError: the command fails or changes nothing without any fault.
     """
 
     def __init__(
-        self, command: Command, scene: Path, ids: Mapping[str, str], injector: Injector, scratch: Path
+        self,
+        command: Command,
+        scene: Path,
+        ids: Mapping[str, str],
+        injector: Injector,
+        scratch: Path,
     ) -> None:
         self._command, self._scene, self._ids = command, scene, ids
         self._injector, self._scratch = injector, scratch
@@ -109,20 +123,33 @@ class Trials:
         """
         command, folder = self._command, self._copy()
         done = self._injector.run(folder, command.given(folder, self._ids), fault, traced=True)
-        met = kinds(done.trace)[fault.call] if fault.call < len(done.trace) else "none: there were fewer"
+        met = (
+            kinds(done.trace)[fault.call]
+            if fault.call < len(done.trace)
+            else "none: there were fewer"
+        )
         self.failed[met] += 1
         state = command.state(folder)
-        problems = self._lost(done, state) if fault.kills else self._report_against(done, state, met)
+        problems = (
+            self._lost(done, state) if fault.kills else self._report_against(done, state, met)
+        )
         found = _health(folder / command.lake)
         problems += _unhealthy(found, right=command.unfinished if done.code else ())
         if command.unfinished and state not in (self.whole.before, self.whole.after):
             reported = command.unfinished & {finding.kind for finding in found}
-            problems += ["silent: it has begun what it has not done, and doctor reports nothing"] * (not reported)
+            problems += [
+                "silent: it has begun what it has not done, and doctor reports nothing"
+            ] * (not reported)
         if done.code and (repeated or fault.kills):
             again = self._repeat(folder)
-            if (again.code and state != self.whole.after) or command.state(folder) != self.whole.after:
+            if (again.code and state != self.whole.after) or command.state(
+                folder
+            ) != self.whole.after:
                 problems.append(f"the repeat fails or ends otherwise: {again.stderr}")
-            problems += [f"after the repeat: {problem}" for problem in _unhealthy(_health(folder / command.lake))]
+            problems += [
+                f"after the repeat: {problem}"
+                for problem in _unhealthy(_health(folder / command.lake))
+            ]
         shutil.rmtree(folder)
         if not problems:
             return None
@@ -138,7 +165,8 @@ class Trials:
         }
 
     def _repeat(self, folder: Path) -> Done:
-        """Give the command again; where it says that what is there has to go, do that and give it once more."""
+        """Give the command again; where it says that what is there has to go, do that and give it
+        once more."""
         again = self._injector.run(folder, self._command.given_again(folder, self._ids))
         if again.code and "delete what is there" in " ".join(again.stderr.split()):
             shutil.rmtree(folder / self._command.lake)
@@ -159,15 +187,22 @@ class Trials:
             problems.append(f"exit code {done.code}")
         if done.code and "fix:" not in done.stderr + done.stdout:
             problems.append("no fix is named")
-        return problems + [word for word in ("Traceback", "unforeseen", "interrupted") if word in done.stderr]
+        return problems + [
+            word for word in ("Traceback", "unforeseen", "interrupted") if word in done.stderr
+        ]
 
     def _lost(self, done: Done, state: object) -> list[str]:
-        """What is wrong with a command that was killed: what was there before must be there, if it does not go."""
+        """What is wrong with a command that was killed: what was there before must be there, if it
+        does not go."""
         problems = [] if done.code == -signal.SIGKILL else [f"exit code {done.code}, not killed"]
         if self._command.one_step and state not in (self.whole.before, self.whole.after):
             problems.append("a part is published")
         before, after = self.whole.before, self.whole.after
-        if isinstance(state, frozenset) and isinstance(before, frozenset) and isinstance(after, frozenset):
+        if (
+            isinstance(state, frozenset)
+            and isinstance(before, frozenset)
+            and isinstance(after, frozenset)
+        ):
             problems += ["something is lost"] * (not before & after <= state)
         return problems
 
@@ -192,7 +227,8 @@ def _health(path: Path) -> tuple[Finding, ...]:
 
 
 def _unhealthy(found: Iterable[Finding], *, right: Collection[str] = ()) -> list[str]:
-    """The errors among findings, but those of kinds that are right before the command is given once more."""
+    """The errors among findings, but those of kinds that are right before the command is given once
+    more."""
     return [
         f"unhealthy: {finding.kind}: {finding.what}"
         for finding in found

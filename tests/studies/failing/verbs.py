@@ -1,6 +1,7 @@
 """All verbs that write to a lake, each with a scene that is small enough to stop it at many places.
 
-A study gives the places: `{lake}`, `{hurt}`, `{new}` and `{out}` of a verb's arguments are in a folder or in a bucket.
+A study gives the places: `{lake}`, `{hurt}`, `{new}` and `{out}` of a verb's arguments are in a
+folder or in a bucket.
 """
 
 from __future__ import annotations
@@ -25,9 +26,9 @@ class Verb:
     """A command that writes to a lake.
 
     Attributes:
-        arguments: {lake} stands for the lake's address, {hurt} for that of the same lake with damage, {new} for one
-            where nothing is, {folder} for the scene's folder, {out} for one of the trial's own, other names in braces
-            for the scene's ids.
+        arguments: {lake} stands for the lake's address, {hurt} for that of the same lake with
+            damage, {new} for one where nothing is, {folder} for the scene's folder, {out} for one
+            of the trial's own, other names in braces for the scene's ids.
         one_step: whether it changes all or nothing.
         deletes: whether data go or come back, so that the state is of objects too.
         compares, stand_in, unfinished: as of `tests.studies.failing.trial.Command`.
@@ -76,10 +77,22 @@ CORE = {
         )
     ),
     "realign": Verb(
-        arguments=("realign", "{recording}", "--by", "given", "--clock-offset", "0", "--offset-sigma", "0.3", *_LAKE)
+        arguments=(
+            "realign",
+            "{recording}",
+            "--by",
+            "given",
+            "--clock-offset",
+            "0",
+            "--offset-sigma",
+            "0.3",
+            *_LAKE,
+        )
     ),
     "declare": Verb(arguments=("declare", "{camera}", "--speed", "3", "--sigma", "0.2", *_LAKE)),
-    "declare-cloths": Verb(arguments=("declare-cloths", "{folder}/cloths.csv", *_LAKE), one_step=False),
+    "declare-cloths": Verb(
+        arguments=("declare-cloths", "{folder}/cloths.csv", *_LAKE), one_step=False
+    ),
     "label": Verb(arguments=("label", "{camera}", "operator=me", *_LAKE)),
     "tag": Verb(arguments=("tag", "v1", *_LAKE)),
     "tag --delete": Verb(arguments=("tag", "v0", "--delete", *_LAKE)),
@@ -146,7 +159,9 @@ _OF_A_TRIAL = {
 }
 
 
-def _slow(make: Callable[[Path], Scene], names: Sequence[str]) -> tuple[Callable[[Path], Scene], dict[str, Verb]]:
+def _slow(
+    make: Callable[[Path], Scene], names: Sequence[str]
+) -> tuple[Callable[[Path], Scene], dict[str, Verb]]:
     """A scene of commands that take long, with those of them that write to its lake."""
     commands = next(found for scene, found in slow.SCENES.values() if scene is make)
     verbs = {}
@@ -154,7 +169,9 @@ def _slow(make: Callable[[Path], Scene], names: Sequence[str]) -> tuple[Callable
         given = commands[name].arguments
         for there, here in _OF_A_TRIAL.items():
             given = tuple(part.replace(there, here) for part in given)
-        verbs[name] = Verb(arguments=given, one_step=commands[name].one_step, stand_in=commands[name].stand_in)
+        verbs[name] = Verb(
+            arguments=given, one_step=commands[name].one_step, stand_in=commands[name].stand_in
+        )
     return make, verbs
 
 
@@ -169,7 +186,8 @@ SCENES: Mapping[str, tuple[Callable[[Path], Scene], Mapping[str, Verb]]] = {
 
 
 def state(folder: Path, *, deletes: bool) -> State:
-    """What a lake in a folder shows: rows by branch, with their labels, and by tag; and its objects."""
+    """What a lake in a folder shows: rows by branch, with their labels, and by tag; and its
+    objects."""
     if not (folder / "lake.json").exists():
         return frozenset({("no lake",)})
     try:
@@ -184,9 +202,14 @@ def _shown(lake: Lake, *, deletes: bool) -> State:
         found.add(("branch", branch))
         rows = lake.rows(at=branch)
         labels = labels_of(rows)
-        found |= {("row", branch, one, str(labels.get(one))) for one in rows["artifact"].to_pylist()}
+        found |= {
+            ("row", branch, one, str(labels.get(one))) for one in rows["artifact"].to_pylist()
+        }
     for tag in lake.refs.tags():
-        found |= {("tag", tag), *(("tagged", tag, one) for one in lake.rows(at=tag)["artifact"].to_pylist())}
+        found |= {
+            ("tag", tag),
+            *(("tagged", tag, one) for one in lake.rows(at=tag)["artifact"].to_pylist()),
+        }
     if deletes:
         found |= {("object", stored.name) for stored in lake.objects}
     return frozenset(found)
@@ -194,6 +217,9 @@ def _shown(lake: Lake, *, deletes: bool) -> State:
 
 COMMANDS = {
     **{name: command(verb) for name, verb in CORE.items()},
-    **{name: replace(command(verb), state=files("out", "out.mcap")) for name, verb in OUTSIDE.items()},
+    **{
+        name: replace(command(verb), state=files("out", "out.mcap"))
+        for name, verb in OUTSIDE.items()
+    },
 }
 """The verbs of the core, and those that write outside of a lake, in a folder."""

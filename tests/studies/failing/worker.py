@@ -1,9 +1,11 @@
-"""Runs commands of flagdata in children of its own, one failing call each; started with calls.c preloaded.
+"""Runs commands of flagdata in children of its own, one failing call each; started with calls.c
+preloaded.
 
-Each line on standard input is a JSON object: `prepare`, a "module:function" that is called here with `argument`, or
-`arguments` of the command, `call` that fails (negative for none), `error`
-(errno), `stays` (whether later calls fail too), `kinds` that are counted, `traced` (whether calls are noted), `folder`
-whose files are counted and which is worked in. The answer is one too: exit `code`, `calls` that there were, `trace` (a
+Each line on standard input is a JSON object: `prepare`, a "module:function" that is called here
+with `argument`, or `arguments` of the command, `call` that fails (negative for none), `error`
+(errno), `stays` (whether later calls fail too), `kinds` that are counted, `traced` (whether calls
+are noted), `folder` whose files are counted and which is worked in. The answer is one too: exit
+`code`, `calls` that there were, `trace` (a
 line for each: number, function, path), and what the command printed on `stdout` and `stderr`.
 """
 

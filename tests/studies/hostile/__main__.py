@@ -40,7 +40,9 @@ if __name__ == "__main__":
     options = parser.parse_args()
     counts = {kind: int(count) for kind, _, count in (one.partition("=") for one in options.counts)}
     outcomes: dict[str, Any] = {}
-    for kind in sorted(counts, key=lambda kind: len(PACKAGES.get(kind, ()))):  # the fewest modules first
+    for kind in sorted(
+        counts, key=lambda kind: len(PACKAGES.get(kind, ()))
+    ):  # the fewest modules first
         load(PACKAGES.get(kind, ("flagdata",)))
         subjects = import_module(f"tests.studies.hostile.{kind}").subjects()
         outcomes[kind] = run(subjects, count=counts[kind], start=options.seed)

@@ -1,4 +1,5 @@
-"""Small files that state, or unpack to, what no machine holds: each made by hand, read by the command that takes it."""
+"""Small files that state, or unpack to, what no machine holds: each made by hand, read by the
+command that takes it."""
 
 from __future__ import annotations
 
@@ -41,7 +42,11 @@ def _packed(size: int, *, wbits: int = 15) -> bytes:
 def _png(path: Path, *, side: int, depth: int = 8) -> None:
     """A black picture, whole."""
     rows = _packed((side * depth // 8 + 1) * side)
-    parts = [(b"IHDR", struct.pack(">IIBBBBB", side, side, depth, 0, 0, 0, 0)), (b"IDAT", rows), (b"IEND", b"")]
+    parts = [
+        (b"IHDR", struct.pack(">IIBBBBB", side, side, depth, 0, 0, 0, 0)),
+        (b"IDAT", rows),
+        (b"IEND", b""),
+    ]
     path.write_bytes(
         b"\x89PNG\r\n\x1a\n"
         + b"".join(
@@ -86,31 +91,41 @@ def _long_frames(path: Path) -> None:
 
 def _table(path: Path) -> None:
     """Sixty million rows of zeros, which Parquet packs to little."""
-    schema = pa.schema([(name, pa.int64()) for name in ("marker", "u", "v", "x", "y", "z", "frame")])
+    schema = pa.schema(
+        [(name, pa.int64()) for name in ("marker", "u", "v", "x", "y", "z", "frame")]
+    )
     with pq.ParquetWriter(path, schema, compression="zstd", use_dictionary=True) as writer:
-        block = pa.table({name: np.zeros(1_000_000, dtype=np.int64) for name in schema.names}, schema=schema)
+        block = pa.table(
+            {name: np.zeros(1_000_000, dtype=np.int64) for name in schema.names}, schema=schema
+        )
         for _ in range(60):
             writer.write_table(block)
 
 
 def _book(path: Path, rows: str, *, strings: str = "") -> None:
-    sheet = f'<worksheet xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"><sheetData>{rows}'
+    sheet = (
+        "<worksheet "
+        f'xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"><sheetData>{rows}'
+    )
     name = "http://schemas.openxmlformats.org"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr(
             "[Content_Types].xml",
-            f'<Types xmlns="{name}/package/2006/content-types"><Default Extension="xml" ContentType="application/xml"/>'
+            f'<Types xmlns="{name}/package/2006/content-types"><Default Extension="xml" '
+            'ContentType="application/xml"/>'
             "</Types>",
         )
         archive.writestr(
             "xl/workbook.xml",
-            f'<workbook xmlns="{name}/spreadsheetml/2006/main" xmlns:r="{name}/officeDocument/2006/relationships">'
+            f'<workbook xmlns="{name}/spreadsheetml/2006/main" '
+            f'xmlns:r="{name}/officeDocument/2006/relationships">'
             '<sheets><sheet name="a" sheetId="1" r:id="rId1"/></sheets></workbook>',
         )
         archive.writestr(
             "xl/_rels/workbook.xml.rels",
             f'<Relationships xmlns="{name}/package/2006/relationships"><Relationship Id="rId1" '
-            f'Type="{name}/officeDocument/2006/relationships/worksheet" Target="worksheets/sheet1.xml"/>'
+            f'Type="{name}/officeDocument/2006/relationships/worksheet" '
+            'Target="worksheets/sheet1.xml"/>'
             "</Relationships>",
         )
         archive.writestr("xl/worksheets/sheet1.xml", f"{sheet}</sheetData></worksheet>")
@@ -119,12 +134,18 @@ def _book(path: Path, rows: str, *, strings: str = "") -> None:
 
 
 def _far(path: Path) -> None:
-    _book(path, '<row r="1"><c r="A1"><v>1</v></c></row><row r="1048576"><c r="XFD1048576"><v>1</v></c></row>')
+    _book(
+        path,
+        '<row r="1"><c r="A1"><v>1</v></c></row><row r="1048576"><c '
+        'r="XFD1048576"><v>1</v></c></row>',
+    )
 
 
 def _blank(path: Path) -> None:
     """Many million empty cells."""
-    row = "".join(f'<row r="{k}"><c r="A{k}"/><c r="AZ{k}"><v>1</v></c></row>' for k in range(1, 400_000))
+    row = "".join(
+        f'<row r="{k}"><c r="A{k}"/><c r="AZ{k}"><v>1</v></c></row>' for k in range(1, 400_000)
+    )
     _book(path, row)
 
 
@@ -171,7 +192,12 @@ def _json_depth(path: Path) -> None:
 
 
 def _deep_lines(path: Path) -> None:
-    path.write_text('{"time": "2026-05-01T10:00:00Z", "wind_speed (m/s)": ' + "[" * 60_000 + "]" * 60_000 + "}\n")
+    path.write_text(
+        '{"time": "2026-05-01T10:00:00Z", "wind_speed (m/s)": '
+        + "[" * 60_000
+        + "]" * 60_000
+        + "}\n"
+    )
 
 
 def _long_line(path: Path) -> None:
@@ -185,7 +211,8 @@ def _wide_numbers(path: Path) -> None:
 
 def _years_apart(path: Path) -> None:
     path.write_text(
-        "time,wind_speed (m/s)\n0001-01-01T00:00:00Z,5.0\n2026-05-01T10:00:00Z,5.1\n2262-04-11T00:00:00Z,5.2\n"
+        "time,wind_speed "
+        "(m/s)\n0001-01-01T00:00:00Z,5.0\n2026-05-01T10:00:00Z,5.1\n2262-04-11T00:00:00Z,5.2\n"
     )
 
 
@@ -208,7 +235,9 @@ def _netcdf(path: Path) -> None:
     dims = struct.pack(">II", 10, 1) + name(b"time") + struct.pack(">I", 0x7FFF_FFFF)
     unit = struct.pack(">II", 12, 1) + name(b"units") + struct.pack(">I", 2)
     unit += name(b"seconds since 2026-01-01")
-    variable = name(b"time") + struct.pack(">II", 1, 0) + unit + struct.pack(">III", 6, 0xFFFF_FFF8, 200)
+    variable = (
+        name(b"time") + struct.pack(">II", 1, 0) + unit + struct.pack(">III", 6, 0xFFFF_FFF8, 200)
+    )
     path.write_bytes(head + dims + bytes(8) + struct.pack(">II", 11, 1) + variable + bytes(100))
 
 
@@ -217,7 +246,9 @@ def _obj(text: str) -> Callable[[Path], None]:
         folder.mkdir()
         for k in range(2):
             (folder / f"{k:04d}_00.obj").write_text(text)
-        (folder / "conf.json").write_text('{"frame_time": 0.04, "frame_steps": 8, "wind": {"velocity": [3, 4, 0]}}')
+        (folder / "conf.json").write_text(
+            '{"frame_time": 0.04, "frame_steps": 8, "wind": {"velocity": [3, 4, 0]}}'
+        )
 
     return write
 
@@ -247,7 +278,9 @@ def _lerobot(path: Path) -> None:
     )
 
 
-def _beside(name: str, write: Callable[[Path], object], *options: str, doctor: bool = False) -> Subject:
+def _beside(
+    name: str, write: Callable[[Path], object], *options: str, doctor: bool = False
+) -> Subject:
     """A file that `ingest` is given, with and without --sniff."""
 
     plain = name.replace(" ", "-")
@@ -260,7 +293,10 @@ def _beside(name: str, write: Callable[[Path], object], *options: str, doctor: b
             ["ingest", path, "--lake", folder / "lake", *options, "--json"],
         ]
         if doctor:
-            verbs += [["doctor", path], ["recover", path, folder / "new.mcap", "--lake", folder / "lake"]]
+            verbs += [
+                ["doctor", path],
+                ["recover", path, folder / "new.mcap", "--lake", folder / "lake"],
+            ]
         errors: list[Exception] = []
         for words in verbs:
             try:
@@ -268,7 +304,9 @@ def _beside(name: str, write: Callable[[Path], object], *options: str, doctor: b
             except Exception as error:  # noqa: BLE001  of several commands the worst is reported
                 errors.append(error)
         if errors:
-            raise max(errors, key=lambda error: getattr(error, "kind", "unforeseen") == "unforeseen")
+            raise max(
+                errors, key=lambda error: getattr(error, "kind", "unforeseen") == "unforeseen"
+            )
 
     return Subject(name=name, examples=places, act=act, prepare=lambda: sound(plain, write))
 
@@ -294,11 +332,15 @@ def _in_lake(name: str, harm: Callable[[Path], None]) -> Subject:
         for words in READERS:
             shutil.rmtree(folder / "out", ignore_errors=True)
             try:
-                command(*(folder / "out" if word == "out" else word for word in words), "--lake", lake)
+                command(
+                    *(folder / "out" if word == "out" else word for word in words), "--lake", lake
+                )
             except Exception as error:  # noqa: BLE001  of several commands the worst is reported
                 errors.append(error)
         if errors:
-            raise max(errors, key=lambda error: getattr(error, "kind", "unforeseen") == "unforeseen")
+            raise max(
+                errors, key=lambda error: getattr(error, "kind", "unforeseen") == "unforeseen"
+            )
 
     return Subject(name=name, examples=places, act=act, prepare=made)
 
@@ -347,7 +389,11 @@ def _recipes() -> list[Subject]:
         return Subject(name=f"{form}, all numbers {huge.decode()[:12]}", examples=places, act=act)
 
     huge = (b"100000000000000000000", b"1e308", b"nan", b"1000000000")
-    return [subject(form, value) for form in ("scene", "data set", "scene made ready", "training") for value in huge]
+    return [
+        subject(form, value)
+        for form in ("scene", "data set", "scene made ready", "training")
+        for value in huge
+    ]
 
 
 def subjects() -> list[Subject]:

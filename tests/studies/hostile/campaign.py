@@ -1,8 +1,10 @@
-"""One campaign of hostile examples: drawn from one seed, each read in bounded time and memory, every failure kept.
+"""One campaign of hostile examples: drawn from one seed, each read in bounded time and memory,
+every failure kept.
 
-An example fails where anything but an error of flagdata or of the command's usage comes out of it, where it takes
-longer than `SECONDS` or `WALL_SECONDS`, or where it takes more memory than `MEMORY`. Each is read in a process of its
-own, forked from one that has all modules loaded (`python -m tests.studies.hostile`), which is measured and may end.
+An example fails where anything but an error of flagdata or of the command's usage comes out of it,
+where it takes longer than `SECONDS` or `WALL_SECONDS`, or where it takes more memory than `MEMORY`.
+Each is read in a process of its own, forked from one that has all modules loaded (`python -m
+tests.studies.hostile`), which is measured and may end.
 """
 
 from __future__ import annotations
@@ -36,7 +38,8 @@ SECONDS = 60.0
 WALL_SECONDS = 240.0
 """Longest that an example may take where other work shares the processor [s]."""
 MEMORY = 1 << 30
-"""Most memory that an example may take, with all modules loaded; a process that it starts may take as much [B]."""
+"""Most memory that an example may take, with all modules loaded; a process that it starts may take
+as much [B]."""
 GUARD = 4 << 30
 """Memory beyond which an example is refused more, so that it does not take the machine's [B]."""
 REPOSITORY = Path(__file__).parents[3]
@@ -51,7 +54,8 @@ class Subject:
     Attributes:
         name: of what is read.
         examples: the damage, as values whose `repr` says all of it.
-        act: writes a damaged copy into an empty folder and reads it; raises whatever the reader raises.
+        act: writes a damaged copy into an empty folder and reads it; raises whatever the reader
+            raises.
         prepare: writes what is sound, in a process that is not measured; `None` where `act` does.
     """
 
@@ -65,13 +69,18 @@ def command(*arguments: object) -> str:
     """Run a command of flagdata in this process; what it printed on stdout.
 
     Raises:
-        FlagdataError: as the command line would report it; also for usage, and for a defect that it reported.
+        FlagdataError: as the command line would report it; also for usage, and for a defect that it
+            reported.
         MemoryError: there was not enough.
     """
     printed, said = io.StringIO(), io.StringIO()
     try:
         with redirect_stdout(printed), redirect_stderr(said):
-            root.main(args=[str(argument) for argument in arguments], prog_name="flagdata", standalone_mode=False)
+            root.main(
+                args=[str(argument) for argument in arguments],
+                prog_name="flagdata",
+                standalone_mode=False,
+            )
     except click.ClickException as error:
         raise FlagdataError(error.format_message(), fix="see the command's --help") from error
     except (MemoryError, FlagdataError):
@@ -94,8 +103,10 @@ def campaign(counts: Mapping[str, int], *, start: int) -> dict[str, dict[str, An
         start: seed that all of them are drawn from.
 
     Returns:
-        By class: `examples`, by subject; how many were `refused`; `slowest`, the most processor time of one [s];
-        `peak`, the most memory of one [B]; and the `failures`, each with its subject, its example and what came of it.
+        By class: `examples`, by subject; how many were `refused`; `slowest`, the most processor
+            time of one [s];
+        `peak`, the most memory of one [B]; and the `failures`, each with its subject, its example
+            and what came of it.
     """
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "outcome.json"
@@ -109,7 +120,16 @@ def campaign(counts: Mapping[str, int], *, start: int) -> dict[str, dict[str, An
         }
         drawn = [f"{kind}={count}" for kind, count in counts.items()]
         done = subprocess.run(
-            [sys.executable, "-m", "tests.studies.hostile", *drawn, "--seed", str(start), "--out", out],
+            [
+                sys.executable,
+                "-m",
+                "tests.studies.hostile",
+                *drawn,
+                "--seed",
+                str(start),
+                "--out",
+                out,
+            ],
             cwd=REPOSITORY,
             env=environment,
             stdin=subprocess.DEVNULL,
@@ -165,7 +185,8 @@ def prepare(subject: Subject) -> None:
 
 
 def _apart(subject: Subject, damage: Any) -> dict[str, Any]:
-    """What came of an example in a process of its own: `refused` or not, its `failure`, its `seconds` and `peak`."""
+    """What came of an example in a process of its own: `refused` or not, its `failure`, its
+    `seconds` and `peak`."""
     seen: dict[str, Any] = {"refused": False, "failure": None, "peak": 0}
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
         report = Path(name) / "report.json"
@@ -207,7 +228,8 @@ def _read(subject: Subject, damage: Any, report: Path) -> None:
 
 
 def _awaited(child: int) -> tuple[str | None, int, resource.struct_rusage]:
-    """Why a process was ended, if it was, its exit code and what it used; what it started ends with it."""
+    """Why a process was ended, if it was, its exit code and what it used; what it started ends with
+    it."""
     begun = time.monotonic()
     late = None
     while True:
@@ -228,7 +250,9 @@ def _over(child: int, waited: float) -> str | None:
         words = Path(f"/proc/{child}/stat").read_text().rpartition(")")[2].split()
     except (FileNotFoundError, ProcessLookupError):
         return None
-    used = sum(map(int, words[11:15])) / os.sysconf("SC_CLK_TCK")  # its own, and that of its children that ended
+    used = sum(map(int, words[11:15])) / os.sysconf(
+        "SC_CLK_TCK"
+    )  # its own, and that of its children that ended
     if used > SECONDS:
         return f"it took more than {SECONDS:g} s of processor time"
     return f"it took more than {WALL_SECONDS:g} s" if waited > WALL_SECONDS else None
@@ -243,7 +267,8 @@ def _kill(child: int) -> None:
 
 
 def _drawn(subject: Subject, *, count: int, start: int) -> list[Any]:
-    """Examples of a subject; the first that hypothesis draws is the simplest, which damages next to nothing."""
+    """Examples of a subject; the first that hypothesis draws is the simplest, which damages next to
+    nothing."""
     drawn: list[Any] = []
 
     @seed(f"{start} {subject.name}")
@@ -264,7 +289,11 @@ def _drawn(subject: Subject, *, count: int, start: int) -> list[Any]:
 
 def _memory(field: str) -> int:
     """A field of /proc/self/status [B]."""
-    (line,) = (line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith(f"{field}:"))
+    (line,) = (
+        line
+        for line in Path("/proc/self/status").read_text().splitlines()
+        if line.startswith(f"{field}:")
+    )
     return int(line.split()[1]) * 1024
 
 

@@ -1,4 +1,5 @@
-"""Mutated files of every kind that comes in: films, pictures, logs, workbooks, MCAP, bags, meshes, markers, LeRobot."""
+"""Mutated files of every kind that comes in: films, pictures, logs, workbooks, MCAP, bags, meshes,
+markers, LeRobot."""
 
 from __future__ import annotations
 
@@ -45,21 +46,39 @@ _FILMS = {
 }
 _STILLS = {"png": "PNG", "jpg": "JPEG", "tiff": "TIFF", "webp": "WEBP", "bmp": "BMP"}
 _ROWS = [[f"2026-05-01 12:00:{k:02d}", 5 + k % 7 / 10, 200 + k % 9] for k in range(60)]
-_CSV = "time,wind_speed (m/s),wind_direction (deg)\n" + "".join(f"{t}Z,{v},{d}\n" for t, v, d in _ROWS)
+_CSV = "time,wind_speed (m/s),wind_direction (deg)\n" + "".join(
+    f"{t}Z,{v},{d}\n" for t, v, d in _ROWS
+)
 _TEXTS = {
     "log.csv": _CSV,
-    "log.jsonl": "".join(json.dumps({"time": f"{t}Z", "wind_speed (m/s)": v}) + "\n" for t, v, _ in _ROWS),
-    "log.json": json.dumps([{"time": f"{t}Z", "wind_speed": v, "unit": "m/s"} for t, v, _ in _ROWS]),
-    "log.xml": "<log>" + "".join(f'<r time="{t}Z" speed_ms="{v}"/>' for t, v, _ in _ROWS) + "</log>",
-    "log.nmea": "\n".join(f"$GPZDA,1200{k:02d}.00,01,05,2026,00,00\n$WIMWV,{200 + k},T,5.1,M,A" for k in range(40)),
-    "log.html": "<html><table>" + "".join(f"<tr><td>{t}<td>{v}</tr>" for t, v, _ in _ROWS) + "</table></html>",
+    "log.jsonl": "".join(
+        json.dumps({"time": f"{t}Z", "wind_speed (m/s)": v}) + "\n" for t, v, _ in _ROWS
+    ),
+    "log.json": json.dumps(
+        [{"time": f"{t}Z", "wind_speed": v, "unit": "m/s"} for t, v, _ in _ROWS]
+    ),
+    "log.xml": "<log>"
+    + "".join(f'<r time="{t}Z" speed_ms="{v}"/>' for t, v, _ in _ROWS)
+    + "</log>",
+    "log.nmea": "\n".join(
+        f"$GPZDA,1200{k:02d}.00,01,05,2026,00,00\n$WIMWV,{200 + k},T,5.1,M,A" for k in range(40)
+    ),
+    "log.html": "<html><table>"
+    + "".join(f"<tr><td>{t}<td>{v}</tr>" for t, v, _ in _ROWS)
+    + "</table></html>",
     "log.rtf": "{\\rtf1 " + _CSV + "}",
     "markers.csv": "\n".join(
-        ["marker,u,v,x,y,z,frame", *(f"{m},{m % 3},{m // 3},0.1,0.2,0.3,{f}" for f in range(3) for m in range(9))]
+        [
+            "marker,u,v,x,y,z,frame",
+            *(f"{m},{m % 3},{m // 3},0.1,0.2,0.3,{f}" for f in range(3) for m in range(9)),
+        ]
     ),
-    "mesh.ply": "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-    "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
-    "mesh.stl": "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
+    "mesh.ply": "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float "
+    "y\nproperty float z\n"
+    "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 "
+    "1 2\n",
+    "mesh.stl": "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 "
+    "0\nendloop\nendfacet\n"
     "endsolid a\n",
     "drive.bag": "#ROSBAG V2.0\nE\x00\x00\x00",
 }
@@ -68,7 +87,9 @@ _TEXTS = {
 def _grays() -> list[np.ndarray]:
     column = np.arange(64)
     return [
-        (40 + 150 * (np.abs(column - 32 - 12 * np.sin(np.arange(48)[:, None] / 9 + k / 4)) < 4)).astype(np.uint8)
+        (
+            40 + 150 * (np.abs(column - 32 - 12 * np.sin(np.arange(48)[:, None] / 9 + k / 4)) < 4)
+        ).astype(np.uint8)
         for k in range(12)
     ]
 
@@ -82,11 +103,17 @@ def _film(path: Path) -> None:
 
 
 def _fragmented(path: Path) -> None:
-    with av.open(str(path), "w", format="mp4", options={"movflags": "frag_keyframe+empty_moov"}) as container:
+    with av.open(
+        str(path), "w", format="mp4", options={"movflags": "frag_keyframe+empty_moov"}
+    ) as container:
         stream: Any = container.add_stream("libx264", rate=25)
         stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
         for gray in _grays():
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(gray, format="gray").reformat(format="yuv420p")))
+            container.mux(
+                stream.encode(
+                    av.VideoFrame.from_ndarray(gray, format="gray").reformat(format="yuv420p")
+                )
+            )
         container.mux(stream.encode(None))
 
 
@@ -114,10 +141,15 @@ def _workbook(path: Path) -> None:
 
 
 def _opendocument(path: Path) -> None:
-    rows = "".join(f"<table:table-row><table:table-cell>{v}</table:table-cell></table:table-row>" for _, v, _ in _ROWS)
+    rows = "".join(
+        f"<table:table-row><table:table-cell>{v}</table:table-cell></table:table-row>"
+        for _, v, _ in _ROWS
+    )
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("mimetype", "application/vnd.oasis.opendocument.spreadsheet")
-        archive.writestr("content.xml", f"<office:document-content>{rows}</office:document-content>")
+        archive.writestr(
+            "content.xml", f"<office:document-content>{rows}</office:document-content>"
+        )
 
 
 def _netcdf(path: Path) -> None:
@@ -132,7 +164,13 @@ def _mcap(packing: CompressionType, *, chunked: bool = True) -> Callable[[Path],
 
     def write(path: Path) -> None:
         with path.open("wb") as stream:
-            writer = Writer(stream, compression=packing, enable_crcs=False, use_chunking=chunked, chunk_size=4096)
+            writer = Writer(
+                stream,
+                compression=packing,
+                enable_crcs=False,
+                use_chunking=chunked,
+                chunk_size=4096,
+            )
             writer.start()
             channels = {
                 name: writer.register_channel(
@@ -147,7 +185,11 @@ def _mcap(packing: CompressionType, *, chunked: bool = True) -> Callable[[Path],
                 coded = io.BytesIO()
                 Image.fromarray(gray).save(coded, "PNG")
                 stamp = {"sec": at // 10**9, "nsec": at % 10**9}
-                picture = {"timestamp": stamp, "format": "png", "data": base64.b64encode(coded.getvalue()).decode()}
+                picture = {
+                    "timestamp": stamp,
+                    "format": "png",
+                    "data": base64.b64encode(coded.getvalue()).decode(),
+                }
                 for name, message in (
                     ("foxglove.CompressedImage", picture),
                     ("own.Wind", {"timestamp": stamp, "speed": 5.0 + k}),
@@ -162,7 +204,8 @@ def _bag(folder: Path) -> None:
     folder.mkdir()
     _mcap(CompressionType.ZSTD)(folder / "bag_0.mcap")
     (folder / "metadata.yaml").write_text(
-        "rosbag2_bagfile_information:\n  version: 8\n  storage_identifier: mcap\n  relative_file_paths:\n"
+        "rosbag2_bagfile_information:\n  version: 8\n  storage_identifier: mcap\n  "
+        "relative_file_paths:\n"
         "    - bag_0.mcap\n"
     )
 
@@ -171,12 +214,16 @@ def _meshes(folder: Path) -> None:
     folder.mkdir()
     for k in range(3):
         (folder / f"{k:04d}_00.obj").write_text(SQUARE.replace("1", f"1.{k}", 2))
-    (folder / "conf.json").write_text(json.dumps({"frame_time": 0.04, "frame_steps": 8, "wind": {"velocity": [3, 4]}}))
+    (folder / "conf.json").write_text(
+        json.dumps({"frame_time": 0.04, "frame_steps": 8, "wind": {"velocity": [3, 4]}})
+    )
 
 
 def _exported(form: str) -> Callable[[Path], None]:
     def write(path: Path) -> None:
-        command("export", form, "--to", path, "--where", "kind = 'recording'", "--lake", sound_lake())
+        command(
+            "export", form, "--to", path, "--where", "kind = 'recording'", "--lake", sound_lake()
+        )
 
     return write
 
@@ -186,7 +233,11 @@ def _files(path: Path) -> list[Path]:
 
 
 def _subject(
-    name: str, write: Callable[[Path], object], commands: Sequence[Sequence[str]], *, title: str | None = None
+    name: str,
+    write: Callable[[Path], object],
+    commands: Sequence[Sequence[str]],
+    *,
+    title: str | None = None,
 ) -> Subject:
     """A file or folder, one file of which is mutated, and the commands that read it, each.
 
@@ -212,7 +263,9 @@ def _subject(
             except Exception as error:  # noqa: BLE001  of several commands the worst is reported
                 errors.append(error)
         if errors:
-            raise max(errors, key=lambda error: getattr(error, "kind", "unforeseen") == "unforeseen")
+            raise max(
+                errors, key=lambda error: getattr(error, "kind", "unforeseen") == "unforeseen"
+            )
 
     return Subject(
         name=title or name,
@@ -264,10 +317,20 @@ def subjects() -> list[Subject]:
         _subject(
             "ros2.mcap",
             lambda path: shutil.copy(_ROS2, path),
-            [sniffed, [*chosen, "/compressed"], ["doctor", "FILE"], ["recover", "FILE", "NEW", "--lake", "LAKE"]],
+            [
+                sniffed,
+                [*chosen, "/compressed"],
+                ["doctor", "FILE"],
+                ["recover", "FILE", "NEW", "--lake", "LAKE"],
+            ],
         ),
         _subject("bag", _bag, [sniffed, [*chosen, "/camera"], ["doctor", "FILE"]]),
         _subject("meshes", _meshes, [sniffed, ingested]),
         _subject("lerobot", _exported("lerobot"), [sniffed, ingested, ["doctor", "FILE"]]),
-        _subject("exported.mcap", _exported("mcap"), [sniffed, ingested, ["doctor", "FILE"]], title="exported MCAP"),
+        _subject(
+            "exported.mcap",
+            _exported("mcap"),
+            [sniffed, ingested, ["doctor", "FILE"]],
+            title="exported MCAP",
+        ),
     ]

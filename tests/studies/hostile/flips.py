@@ -1,8 +1,9 @@
-"""Single bits that flip in what flagdata keeps: files of a lake's catalog, banks, kept simulations, caches.
+"""Single bits that flip in what flagdata keeps: files of a lake's catalog, banks, kept simulations,
+caches.
 
-After each flip what reads the file is asked again. It refuses, or gives what it gave before: since the bit carries no
-meaning (a blank, a date in an archive), or since what is a cache was made anew. Another value without an error is a
-failure, and so is any exception but an error of flagdata.
+After each flip what reads the file is asked again. It refuses, or gives what it gave before: since
+the bit carries no meaning (a blank, a date in an archive), or since what is a cache was made anew.
+Another value without an error is a failure, and so is any exception but an error of flagdata.
 
     python -m tests.studies.hostile.flips --count 2000 --seed 1 --out flips.json
 """
@@ -43,7 +44,8 @@ class Kept:
 
     Attributes:
         files: in which a bit flips.
-        read: gives what they hold, as a process does that reads them first; anything that can be compared.
+        read: gives what they hold, as a process does that reads them first; anything that can be
+            compared.
     """
 
     files: Sequence[Path]
@@ -51,14 +53,19 @@ class Kept:
 
 
 def lake(folder: Path) -> Lake:
-    """A lake with all that its catalog can hold: checkpoints and summaries, tags, branches, labels, withdrawals."""
+    """A lake with all that its catalog can hold: checkpoints and summaries, tags, branches, labels,
+    withdrawals."""
     made = Lake.create(folder / "lake")
     every, catalog._TIDY_EVERY = catalog._TIDY_EVERY, 8
     try:
         added = []
         for number in range(20):
-            with made.transaction(f"measurement {number}", branch="side" if number % 5 == 4 else "main") as tx:
-                artifact = Artifact(kind=Kind.MEASUREMENT, name=f"m{number}", recipe={"of": number}, wind=number / 7)
+            with made.transaction(
+                f"measurement {number}", branch="side" if number % 5 == 4 else "main"
+            ) as tx:
+                artifact = Artifact(
+                    kind=Kind.MEASUREMENT, name=f"m{number}", recipe={"of": number}, wind=number / 7
+                )
                 tx.add(artifact)
             added.append(artifact.id)
             if number == 2:
@@ -78,12 +85,18 @@ def lake(folder: Path) -> Lake:
 
 
 def everything(path: Path) -> Any:
-    """What a process that opens a lake reads of it: rows of all refs and of old versions, the log, the branches."""
+    """What a process that opens a lake reads of it: rows of all refs and of old versions, the log,
+    the branches."""
     opened = Lake.open(path)
-    refs = {name: ref.view for name, ref in {**opened.refs.tags(), **opened.refs.branches()}.items()}
+    refs = {
+        name: ref.view for name, ref in {**opened.refs.tags(), **opened.refs.branches()}.items()
+    }
     rows = {at: opened.rows(at=at).to_pylist() for at in (None, *refs, "5", "18")}
     labels = opened.table(opened.view(None)).schema.metadata
-    history = [{key: one for key, one in entry.items() if key != "files"} for entry in opened.catalog.history()]
+    history = [
+        {key: one for key, one in entry.items() if key != "files"}
+        for entry in opened.catalog.history()
+    ]
     return rows, refs, labels, history
 
 
@@ -108,7 +121,11 @@ def of_a_bank(folder: Path) -> Kept:
     """A batch of nulls, with arrays of the right kinds."""
     draw = np.random.default_rng(1)
     arrays: dict[str, Any] = {name: draw.normal(size=(6, 5)) for name in bank._SEGMENTS}
-    arrays |= {"recording": np.arange(6), "cloth": np.array(["a" * 64] * 6), "columns": np.array(bank.names())}
+    arrays |= {
+        "recording": np.arange(6),
+        "cloth": np.array(["a" * 64] * 6),
+        "columns": np.array(bank.names()),
+    }
     path = folder / "nulls-0000.npz"
     np.savez(
         path,
@@ -118,7 +135,9 @@ def of_a_bank(folder: Path) -> Kept:
         carried=np.array(False),
         **arrays,
     )
-    return Kept(files=[path], read=lambda: {name: one.tolist() for name, one in bank._content(path).items()})
+    return Kept(
+        files=[path], read=lambda: {name: one.tolist() for name, one in bank._content(path).items()}
+    )
 
 
 @dataclass(frozen=True)
@@ -154,7 +173,11 @@ def of_evaluations(folder: Path) -> Kept:
 
     def read() -> Any:
         kept = evaluator._read(path)
-        return kept.embedding.tolist(), None if kept.frame is None else kept.frame.tolist(), kept.seconds
+        return (
+            kept.embedding.tolist(),
+            None if kept.frame is None else kept.frame.tolist(),
+            kept.seconds,
+        )
 
     return Kept(files=[path], read=read)
 
@@ -164,7 +187,11 @@ def of_decoded_clips(folder: Path) -> Kept:
     frames = np.random.default_rng(4).integers(0, 255, (5, 12, 12), np.uint8)
 
     def read() -> Any:
-        return DecodedCache(folder / "decoded", limit=10**6).frames("mcap/a", 0, 5, decode=lambda: frames).tolist()
+        return (
+            DecodedCache(folder / "decoded", limit=10**6)
+            .frames("mcap/a", 0, 5, decode=lambda: frames)
+            .tolist()
+        )
 
     read()
     return Kept(files=sorted((folder / "decoded").glob("*.clip")), read=read)
@@ -175,7 +202,9 @@ def of_blocks(folder: Path) -> Kept:
     os.environ["FLAGDATA_CACHE"] = str(folder / "cache")
     name, data = f"mcap/{'0' * 64}", random.Random(5).randbytes(3000)
     keep_blocks(name, {"0": data})
-    return Kept(files=[*(folder / "cache").rglob("*.blocks/0")], read=lambda: block_of(name, "0") or data)
+    return Kept(
+        files=[*(folder / "cache").rglob("*.blocks/0")], read=lambda: block_of(name, "0") or data
+    )
 
 
 KINDS: Mapping[str, Callable[[Path], Kept]] = {
@@ -188,7 +217,8 @@ KINDS: Mapping[str, Callable[[Path], Kept]] = {
 
 
 def flips(kept: Kept, *, count: int, draw: random.Random) -> dict[str, Any]:
-    """Flip one bit after the other: how many were refused or changed nothing, and each that did neither."""
+    """Flip one bit after the other: how many were refused or changed nothing, and each that did
+    neither."""
     right = kept.read()
     found: Counter[str] = Counter(dict.fromkeys(OUTCOMES, 0))
     failures: list[dict[str, Any]] = []
@@ -203,7 +233,9 @@ def flips(kept: Kept, *, count: int, draw: random.Random) -> dict[str, Any]:
             outcome = "same" if kept.read() == right else "another value"
         except Exception as error:  # noqa: BLE001  its class is what is counted
             known = foreseen(error)
-            outcome = f"unforeseen: {known.what}" if isinstance(known, UnforeseenError) else "refused"
+            outcome = (
+                f"unforeseen: {known.what}" if isinstance(known, UnforeseenError) else "refused"
+            )
         path.write_bytes(whole)
         path.chmod(mode)
         if outcome in OUTCOMES:
@@ -221,7 +253,8 @@ def campaign(*, count: int, seed: int) -> dict[str, Any]:
             folder = Path(name)
             kinds = {**of_the_lake(folder), **{kind: make(folder) for kind, make in KINDS.items()}}
             return {
-                kind: flips(kept, count=count, draw=random.Random(f"{seed} {kind}")) for kind, kept in kinds.items()
+                kind: flips(kept, count=count, draw=random.Random(f"{seed} {kind}"))
+                for kind, kept in kinds.items()
             }
     finally:
         os.environ.pop("FLAGDATA_CACHE", None)
@@ -235,4 +268,6 @@ if __name__ == "__main__":
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
-    options.out.write_text(json.dumps(campaign(count=options.count, seed=options.seed), indent=2) + "\n")
+    options.out.write_text(
+        json.dumps(campaign(count=options.count, seed=options.seed), indent=2) + "\n"
+    )

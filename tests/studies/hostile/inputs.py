@@ -1,4 +1,5 @@
-"""Hostile films, logs, meshes, marker tables, records and sets of a challenge, each read by what takes it."""
+"""Hostile films, logs, meshes, marker tables, records and sets of a challenge, each read by what
+takes it."""
 
 from __future__ import annotations
 
@@ -34,24 +35,33 @@ _LOGS = {
     "log.csv": _LOG,
     "log.tsv": _LOG.replace(",", "\t"),
     "log.nmea": "\n".join(
-        f"$GPZDA,1200{k:02d}.00,01,05,2026,00,00\n$WIMWV,{200 + k % 9},T,{5 + k % 7 / 10:.1f},M,A" for k in range(40)
+        f"$GPZDA,1200{k:02d}.00,01,05,2026,00,00\n$WIMWV,{200 + k % 9},T,{5 + k % 7 / 10:.1f},M,A"
+        for k in range(40)
     ),
     "log.json": json.dumps(
-        [{"time": f"2026-05-01T10:00:{k:02d}Z", "wind_speed": 5 + k % 7 / 10, "unit": "m/s"} for k in range(40)]
+        [
+            {"time": f"2026-05-01T10:00:{k:02d}Z", "wind_speed": 5 + k % 7 / 10, "unit": "m/s"}
+            for k in range(40)
+        ]
     ),
     "log.xml": "<log>"
-    + "".join(f'<r time="2026-05-01T10:00:{k:02d}Z" speed_ms="{5 + k % 7 / 10}"/>' for k in range(40))
+    + "".join(
+        f'<r time="2026-05-01T10:00:{k:02d}Z" speed_ms="{5 + k % 7 / 10}"/>' for k in range(40)
+    )
     + "</log>",
     "log.dat": '"TOA5","s","CR6","1","2","3","4","T"\n"TIMESTAMP","RECORD","WS_ms_Avg","WindDir"\n'
     '"TS","RN","meters/second","Deg"\n"","","Avg","Smp"\n'
-    + "".join(f'"2026-05-01 10:00:{k:02d}",{k},{5 + k % 7 / 10},{200 + k % 9}\n' for k in range(40)),
+    + "".join(
+        f'"2026-05-01 10:00:{k:02d}",{k},{5 + k % 7 / 10},{200 + k % 9}\n' for k in range(40)
+    ),
 }
 _MARKERS = "\n".join(
-    ["marker,u,v,x,y,z,frame", *(f"{m},{m % 3},{m // 3},0.1,0.2,0.3,{f}" for f in range(3) for m in range(9))]
+    [
+        "marker,u,v,x,y,z,frame",
+        *(f"{m},{m % 3},{m // 3},0.1,0.2,0.3,{f}" for f in range(3) for m in range(9)),
+    ]
 )
-_CLOTHS = (
-    "film,fabric,area_weight,bending_stiffness,wind_level,wind_speed,wind_sigma\nfilm.mp4,felt,0.24,3e-5,,2.4,0.3\n"
-)
+_CLOTHS = "film,fabric,area_weight,bending_stiffness,wind_level,wind_speed,wind_sigma\nfilm.mp4,felt,0.24,3e-5,,2.4,0.3\n"
 ABOUT: dict[str, Any] = {
     "flag": {
         "width": 1.5,
@@ -63,7 +73,9 @@ ABOUT: dict[str, Any] = {
     },
     "rate": 25.0,
     "noise": 0.001,
-    "recordings": [{"name": "a", "wind": {"times": [0.0, 0.4], "velocity": [[4.0, 0.0, 0.0], [4.0, 0.0, 0.0]]}}],
+    "recordings": [
+        {"name": "a", "wind": {"times": [0.0, 0.4], "velocity": [[4.0, 0.0, 0.0], [4.0, 0.0, 0.0]]}}
+    ],
 }
 
 _ARRAYS = ["markers.npy", "a.npy"]
@@ -106,11 +118,14 @@ WORDS = st.sampled_from(
 )
 PLACES = st.floats(0, 1, exclude_max=True)
 rewordings = st.lists(
-    st.tuples(st.sampled_from(("word", "line", "doubled", "before", "swapped")), PLACES, PLACES, WORDS),
+    st.tuples(
+        st.sampled_from(("word", "line", "doubled", "before", "swapped")), PLACES, PLACES, WORDS
+    ),
     min_size=1,
     max_size=4,
 )
-"""What is done to a text, one after another: a word or a line replaced, lines doubled, put before or swapped."""
+"""What is done to a text, one after another: a word or a line replaced, lines doubled, put before
+or swapped."""
 
 
 def reworded(text: str, changes: list[tuple[str, float, float, str]]) -> str:
@@ -142,7 +157,9 @@ def reencoded(example: Any, text: str) -> bytes:
 
 
 texts = st.tuples(
-    rewordings, st.sampled_from(["utf-8", "utf-8", "utf-8", "utf-16", "latin-1"]), st.one_of(*[st.none()] * 3, damages)
+    rewordings,
+    st.sampled_from(["utf-8", "utf-8", "utf-8", "utf-16", "latin-1"]),
+    st.one_of(*[st.none()] * 3, damages),
 )
 
 
@@ -160,7 +177,9 @@ def _write(path: Path) -> None:
     elif kind == "parquet":
         rows = [line.split(",") for line in _MARKERS.split("\n")]
         columns = dict(zip(rows[0], zip(*rows[1:], strict=True), strict=True))
-        arrays = {n: list(v) if n == "marker" else [int(float(x)) for x in v] for n, v in columns.items()}
+        arrays = {
+            n: list(v) if n == "marker" else [int(float(x)) for x in v] for n, v in columns.items()
+        }
         pyarrow.parquet.write_table(pa.table(arrays), path)
 
 
@@ -168,13 +187,19 @@ def write_film(path: Path, codec: str) -> None:
     with av.open(str(path), "w") as container:
         container.metadata["creation_time"] = "2026-05-01T10:00:00Z"
         stream = container.add_stream(codec, rate=25)
-        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuvj420p" if codec == "mjpeg" else "yuv420p"
+        stream.width, stream.height, stream.pix_fmt = (
+            64,
+            48,
+            "yuvj420p" if codec == "mjpeg" else "yuv420p",
+        )
         stream.codec_context.time_base = Fraction(1, 25)
         stream.codec_context.thread_count = 1
         column, row = np.meshgrid(np.arange(64), np.arange(48))
         for k in range(40):
             bar = np.abs(column - 32 - 12 * np.sin(row / 9 + k / 4)) < 4
-            frame = av.VideoFrame.from_ndarray((40 + row + 150 * bar).astype(np.uint8), format="gray")
+            frame = av.VideoFrame.from_ndarray(
+                (40 + row + 150 * bar).astype(np.uint8), format="gray"
+            )
             frame = frame.reformat(format=stream.pix_fmt, threads=1)
             frame.pts = k
             container.mux(stream.encode(frame))
@@ -225,7 +250,9 @@ def _meshes(example: Any, folder: Path) -> None:
     for k in range(3):
         (run / f"{k:04d}_00.obj").write_text(SQUARE.replace("1", f"1.{k}", 2))
     content: Any = {"frame_time": 0.04, "frame_steps": 8, "wind": {"velocity": [3, 4, 0]}}
-    (run / "conf.json").write_text(json.dumps(edited(content, configuration) if configuration else content))
+    (run / "conf.json").write_text(
+        json.dumps(edited(content, configuration) if configuration else content)
+    )
     victim = run / f"{int(place * 3):04d}_00.obj"
     victim.write_bytes(reencoded(change, victim.read_text()))
     _ingested(run)
@@ -257,7 +284,13 @@ def _replaced(kind: str) -> Callable[[Any, Path], None]:
 def _cloths(example: Any, folder: Path) -> None:
     (folder / "film.mp4").write_bytes(made("film.mp4"))
     (folder / "cloths.csv").write_bytes(reencoded(example, _CLOTHS))
-    command("declare-cloths", folder / "cloths.csv", "--lake", Lake.create(folder / "lake").path, "--json")
+    command(
+        "declare-cloths",
+        folder / "cloths.csv",
+        "--lake",
+        Lake.create(folder / "lake").path,
+        "--json",
+    )
 
 
 def _recovered(damage: Any, folder: Path) -> None:
@@ -286,14 +319,19 @@ def _set(example: Any, folder: Path) -> None:
 
 
 def _challenge(example: Any, folder: Path) -> None:
-    """A challenge of one set with a filed verdict, its public files with other values; the verdict's hash fits."""
+    """A challenge of one set with a filed verdict, its public files with other values; the
+    verdict's hash fits."""
     name, edit = example
     whole = ChallengeFolder(folder / "challenge")
     write_small_set(whole.data("set-001"))
     data = data_hash(whole.data("set-001"))
-    whole.public.write_text(json.dumps({"title": "t", "sets": {"set-001": {"data": data, "commitment": "0" * 64}}}))
+    whole.public.write_text(
+        json.dumps({"title": "t", "sets": {"set-001": {"data": data, "commitment": "0" * 64}}})
+    )
     refusal = {"kind": "bad-input", "what": "w", "where": None, "fix": "f"}
-    file(whole, Filing(name="set-001", data=data, seed=1, verdict=None, refusal=refusal, seconds=1.0))
+    file(
+        whole, Filing(name="set-001", data=data, seed=1, verdict=None, refusal=refusal, seconds=1.0)
+    )
     note_opening(whole, ["set-001"])
     path = whole.path / name
     path.write_text(json.dumps(edited(json.loads(path.read_text()), edit)))
@@ -315,7 +353,9 @@ def _npy(example: Any, folder: Path) -> None:
 
 
 HEADERS = st.builds(
-    lambda descr, order, shape: f"{{'descr': {descr!r}, 'fortran_order': {order}, 'shape': {shape}, }}",
+    lambda descr, order, shape: (
+        f"{{'descr': {descr!r}, 'fortran_order': {order}, 'shape': {shape}, }}"
+    ),
     st.sampled_from(["<f4", "<f8", "|O", "<U1000000", "<i8", "|V8", "<M8[ns]", "<c16", "|b1", "x"]),
     st.sampled_from(["False", "True", "None"]),
     st.sampled_from(
@@ -341,20 +381,36 @@ def subjects() -> list[Subject]:
         *(_file(f"film.{kind}") for kind in _CODECS),
         Subject(name="folder of pictures", examples=st.tuples(PLACES, damages), act=_pictures),
         *(_text(name, text) for name, text in _LOGS.items()),
-        Subject(name="folder of meshes", examples=st.tuples(PLACES, texts, st.one_of(st.none(), edits)), act=_meshes),
+        Subject(
+            name="folder of meshes",
+            examples=st.tuples(PLACES, texts, st.one_of(st.none(), edits)),
+            act=_meshes,
+        ),
         _text("markers.csv", _MARKERS, "--rate", "25"),
         _file("markers.parquet", "--rate", "25"),
         _file("record.mcap"),
         Subject(name="recover", examples=damages, act=_recovered),
         Subject(name="declare-cloths", examples=texts, act=_cloths),
-        Subject(name="set of a challenge", examples=st.tuples(st.one_of(st.none(), edits), members, damages), act=_set),
-        Subject(name="set of a challenge, other values", examples=st.tuples(edits, st.none(), st.none()), act=_set),
+        Subject(
+            name="set of a challenge",
+            examples=st.tuples(st.one_of(st.none(), edits), members, damages),
+            act=_set,
+        ),
+        Subject(
+            name="set of a challenge, other values",
+            examples=st.tuples(edits, st.none(), st.none()),
+            act=_set,
+        ),
         Subject(
             name="folder of a challenge",
             act=_challenge,
-            examples=st.tuples(st.sampled_from(["challenge.json", "opened.json", "verdicts/set-001.json"]), edits),
+            examples=st.tuples(
+                st.sampled_from(["challenge.json", "opened.json", "verdicts/set-001.json"]), edits
+            ),
         ),
-        Subject(name="header of NumPy", examples=st.tuples(HEADERS, st.sampled_from(_ARRAYS)), act=_npy),
+        Subject(
+            name="header of NumPy", examples=st.tuples(HEADERS, st.sampled_from(_ARRAYS)), act=_npy
+        ),
         *(
             Subject(
                 name=f"{kind} in place of a file",

@@ -1,4 +1,5 @@
-"""Hostile lakes: files of refs, log, catalog and objects damaged, emptied, lost, or replaced by what is no file."""
+"""Hostile lakes: files of refs, log, catalog and objects damaged, emptied, lost, or replaced by
+what is no file."""
 
 from __future__ import annotations
 
@@ -102,9 +103,14 @@ def harm(lake: Path, part: str, changes: list[Any]) -> None:
 
 
 def _other_values(path: Path, data: bytes, edit: Any) -> None:
-    """Other values in a file of JSON, or in one of its lines; other files get their bytes cut in half."""
+    """Other values in a file of JSON, or in one of its lines; other files get their bytes cut in
+    half."""
     try:
-        lines = [json.loads(line) for line in data.decode().splitlines()] if path.suffix == ".json" else []
+        lines = (
+            [json.loads(line) for line in data.decode().splitlines()]
+            if path.suffix == ".json"
+            else []
+        )
     except ValueError:
         try:
             lines = [json.loads(data)]
@@ -142,18 +148,24 @@ def _act(part: str) -> Any:
         changes, commands = example
         lake = folder / "lake"
         shutil.copytree(made(), lake)
-        (folder / "log.csv").write_text("time,wind_speed (m/s)\n2026-05-01T12:00:00Z,5.0\n2026-05-01T12:00:01Z,5.1\n")
+        (folder / "log.csv").write_text(
+            "time,wind_speed (m/s)\n2026-05-01T12:00:00Z,5.0\n2026-05-01T12:00:01Z,5.1\n"
+        )
         harm(lake, part, changes)
         errors: list[BaseException] = []
         for arguments in commands:
-            given = [folder / str(word) if word in ("out", "log.csv") else word for word in arguments]
+            given = [
+                folder / str(word) if word in ("out", "log.csv") else word for word in arguments
+            ]
             shutil.rmtree(folder / "out", ignore_errors=True)
             try:
                 command(*given, *([lake] if arguments == ["init"] else ["--lake", lake]))
             except Exception as error:  # noqa: BLE001  of several commands the worst is reported
                 errors.append(error)
         if errors:
-            raise max(errors, key=lambda error: getattr(error, "kind", "unforeseen") == "unforeseen")
+            raise max(
+                errors, key=lambda error: getattr(error, "kind", "unforeseen") == "unforeseen"
+            )
 
     return act
 

@@ -1,4 +1,5 @@
-"""Hostile models, checkpoints and banks of nulls: damaged files, other values in cards, tensors that do not fit."""
+"""Hostile models, checkpoints and banks of nulls: damaged files, other values in cards, tensors
+that do not fit."""
 
 from __future__ import annotations
 
@@ -46,23 +47,34 @@ IDENTITY = {"recipe": "small"}
 
 
 def small_learner() -> Learner:
-    return build("wave", OPTIONS, loss=Loss.POSTERIOR, targets=("wind_speed",), components=2, margin=1.0)
+    return build(
+        "wave", OPTIONS, loss=Loss.POSTERIOR, targets=("wind_speed",), components=2, margin=1.0
+    )
 
 
 def write_model(folder: Path) -> None:
     """A model of one member and its cloud, without checksums."""
     folder.mkdir()
     write_card(folder, WORDS)
-    write_tensors(folder / WEIGHTS, {f"0.{name}": value for name, value in small_learner().state_dict().items()})
+    write_tensors(
+        folder / WEIGHTS,
+        {f"0.{name}": value for name, value in small_learner().state_dict().items()},
+    )
     cloud = Familiarity(centre=np.zeros(4), whitening=np.eye(4), reference=np.array([1.0, 2.0]))
-    write_tensors(folder / CLOUD, {name: torch.from_numpy(value) for name, value in cloud.arrays().items()})
+    write_tensors(
+        folder / CLOUD, {name: torch.from_numpy(value) for name, value in cloud.arrays().items()}
+    )
 
 
 def standing() -> checkpoint.Standing:
     """A training that has not begun."""
     learner = small_learner()
     return checkpoint.Standing(
-        learner=learner, best=None, optimiser=torch.optim.Adam(learner.parameters()), course=LossCourse(), batches={}
+        learner=learner,
+        best=None,
+        optimiser=torch.optim.Adam(learner.parameters()),
+        course=LossCourse(),
+        batches={},
     )
 
 
@@ -76,7 +88,8 @@ def write_checkpoint(folder: Path) -> None:
 
 
 def arrays() -> dict[str, np.ndarray]:
-    """The arrays of a batch of two segments, by their names; of other columns than this version's."""
+    """The arrays of a batch of two segments, by their names; of other columns than this
+    version's."""
     rows = np.zeros((2, 3))
     return {
         **dict.fromkeys(bank._SEGMENTS, rows),
@@ -91,10 +104,18 @@ def arrays() -> dict[str, np.ndarray]:
 
 
 SHAPES = st.sampled_from([(), (0,), (1,), (4,), (4, 4), (1, 0), (2, 2, 2), (4096,)])
-TYPES = st.sampled_from([torch.float16, torch.float64, torch.int64, torch.bool, torch.uint8, torch.complex64])
+TYPES = st.sampled_from(
+    [torch.float16, torch.float64, torch.int64, torch.bool, torch.uint8, torch.complex64]
+)
 FILLS = st.sampled_from([0.0, -1.0, 1e30, float("nan")])
 retensored = st.lists(
-    st.tuples(st.floats(0, 1, exclude_max=True), st.sampled_from(("put", "drop", "add")), SHAPES, TYPES, FILLS),
+    st.tuples(
+        st.floats(0, 1, exclude_max=True),
+        st.sampled_from(("put", "drop", "add")),
+        SHAPES,
+        TYPES,
+        FILLS,
+    ),
     min_size=1,
     max_size=3,
 )
@@ -112,7 +133,9 @@ def _retensor(path: Path, changes: list[Any]) -> None:
                 del tensors[name]
             else:
                 whole = of_type not in (torch.float16, torch.float64, torch.complex64)
-                value = torch.full(shape, 0.0 if whole or (fill == 1e30 and of_type == torch.float16) else fill)
+                value = torch.full(
+                    shape, 0.0 if whole or (fill == 1e30 and of_type == torch.float16) else fill
+                )
                 tensors["9.x" if kind == "add" else name] = value.to(of_type)
     path.write_bytes(save(tensors))
 
@@ -129,7 +152,9 @@ def _card(path: Path, edit: Any) -> None:
 def _estimated(folder: Path) -> None:
     """What the model says of two small films."""
     model = estimator.load(folder)
-    clips = np.random.default_rng(0).integers(0, 255, (2, model.front_end.frames, 30, 40), dtype=np.uint8)
+    clips = np.random.default_rng(0).integers(
+        0, 255, (2, model.front_end.frames, 30, 40), dtype=np.uint8
+    )
     made = model.estimate(model.inputs(clips), draws=20)
     made.interval(0.9)
 
@@ -138,7 +163,9 @@ def _restored(folder: Path) -> None:
     checkpoint.restore(folder, standing(), identity=IDENTITY)
 
 
-def _model(name: str, examples: st.SearchStrategy[Any], file: str, change: Callable[[Path, Any], None]) -> Subject:
+def _model(
+    name: str, examples: st.SearchStrategy[Any], file: str, change: Callable[[Path, Any], None]
+) -> Subject:
     def act(example: Any, folder: Path) -> None:
         write_model(folder / "small")
         change(folder / "small" / file, example)
@@ -148,7 +175,9 @@ def _model(name: str, examples: st.SearchStrategy[Any], file: str, change: Calla
     return Subject(name=name, examples=examples, act=act)
 
 
-def _checkpoint(name: str, examples: st.SearchStrategy[Any], file: str, change: Callable[[Path, Any], None]) -> Subject:
+def _checkpoint(
+    name: str, examples: st.SearchStrategy[Any], file: str, change: Callable[[Path, Any], None]
+) -> Subject:
     def act(example: Any, folder: Path) -> None:
         write_checkpoint(folder / "run")
         change(folder / "run" / "last" / file, example)
@@ -193,7 +222,9 @@ def subjects() -> list[Subject]:
         _checkpoint("checkpoint's moments", retensored, "moments.safetensors", _retensor),
         _checkpoint("checkpoint's best", retensored, "best.safetensors", _retensor),
         Subject(
-            name="bytes beside checksums", examples=st.tuples(st.tuples(st.booleans(), share), damages), act=_unsigned
+            name="bytes beside checksums",
+            examples=st.tuples(st.tuples(st.booleans(), share), damages),
+            act=_unsigned,
         ),
         Subject(name="bank of nulls", examples=damages, act=_bank),
     ]

@@ -1,5 +1,5 @@
-"""Mutations of files: bits, lengths and numbers that no one wrote, parts missing, doubled or in another order; also
-within what is packed or has checksums, which then fit again."""
+"""Mutations of files: bits, lengths and numbers that no one wrote, parts missing, doubled or in
+another order; also within what is packed or has checksums, which then fit again."""
 
 from __future__ import annotations
 
@@ -19,7 +19,9 @@ _MOST = 20_000  # numbers of a file among which one is drawn
 _PNG = b"\x89PNG\r\n\x1a\n"
 
 places = st.floats(0, 1, exclude_max=True)
-lengths = st.sampled_from([0, 1, 255, 65_535, 2**31 - 1, 2**31, 2**32 - 1, 2**33, 2**40, 2**62, 2**63, 2**64 - 1])
+lengths = st.sampled_from(
+    [0, 1, 255, 65_535, 2**31 - 1, 2**31, 2**32 - 1, 2**33, 2**40, 2**62, 2**63, 2**64 - 1]
+)
 """Put in place of a length, an offset or a count."""
 numbers = st.sampled_from(
     [
@@ -45,8 +47,16 @@ mutations = st.lists(
     st.one_of(
         st.tuples(st.just("bit"), places, st.integers(0, 7)),
         st.tuples(st.just("cut"), places, st.none()),
-        st.tuples(st.just("length"), places, st.tuples(lengths, st.sampled_from("HIQ"), st.sampled_from("<>"))),
-        st.tuples(st.just("head"), places, st.tuples(lengths, st.sampled_from("HIQ"), st.sampled_from("<>"))),
+        st.tuples(
+            st.just("length"),
+            places,
+            st.tuples(lengths, st.sampled_from("HIQ"), st.sampled_from("<>")),
+        ),
+        st.tuples(
+            st.just("head"),
+            places,
+            st.tuples(lengths, st.sampled_from("HIQ"), st.sampled_from("<>")),
+        ),
         st.tuples(st.just("number"), places, numbers),
         st.tuples(st.just("number"), places, numbers),
         st.tuples(st.just("double"), places, st.tuples(places, st.integers(1, 200))),
@@ -68,7 +78,8 @@ def mutated(data: bytes, changes: list[Any]) -> bytes:
 
 
 def inside(name: str) -> Callable[[bytes, list[Any]], bytes]:
-    """What mutates a file of that name within: what is packed in it, or beside checksums, which are computed anew."""
+    """What mutates a file of that name within: what is packed in it, or beside checksums, which are
+    computed anew."""
     return _INSIDE.get(name.rpartition(".")[2], mutated)
 
 
@@ -112,7 +123,13 @@ def _swap(data: bytes, place: float, how: tuple[float, int]) -> bytes:
     other, size = how
     one, two = sorted((int(place * len(data)), int(other * len(data))))
     size = min(size, two - one)
-    return data[:one] + data[two : two + size] + data[one + size : two] + data[one : one + size] + data[two + size :]
+    return (
+        data[:one]
+        + data[two : two + size]
+        + data[one + size : two]
+        + data[one : one + size]
+        + data[two + size :]
+    )
 
 
 def _drop(data: bytes, place: float, size: int) -> bytes:
@@ -162,7 +179,9 @@ def _in_png(data: bytes, changes: list[Any]) -> bytes:
     out.seek(0, io.SEEK_END)
     for kind, content in parts:
         new = mutated(content, changes) if kind == victim else content
-        out.write(struct.pack(">I", len(new)) + kind + new + struct.pack(">I", zlib.crc32(kind + new)))
+        out.write(
+            struct.pack(">I", len(new)) + kind + new + struct.pack(">I", zlib.crc32(kind + new))
+        )
     return out.getvalue()
 
 

@@ -1,4 +1,5 @@
-"""Every form of recipe: a sound text of it, and how it is read; with the subjects that a campaign draws from them."""
+"""Every form of recipe: a sound text of it, and how it is read; with the subjects that a campaign
+draws from them."""
 
 from __future__ import annotations
 
@@ -38,7 +39,10 @@ SCENE_FILE = {
     "magic": {"repulsion_thickness": 5e-3},
 }
 MATERIAL_FILE = {"density": 0.2, "stretching": [[1, 0, 1, 1]] * 6, "bending": [[1e-5] * 5] * 3}
-SQUARE = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nv 0 0 0\nv 0 1 0\nv 0 1 1\nv 0 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
+SQUARE = (
+    "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nv 0 0 0\nv 0 1 0\nv 0 1 1\nv 0 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 "
+    "4/4\n"
+)
 
 
 LEARNED = {
@@ -76,20 +80,32 @@ def ready(text: str, folder: Path) -> None:
 
 FORMS: dict[str, tuple[str, Callable[[str, Path], object]]] = {
     "sensor": (first("sensors"), lambda text, _: parse_sensor(text, where="recipe")),
-    "scene": (first("scenes"), lambda text, folder: parse_scene(text, name="recipe", folder=folder, where="recipe")),
+    "scene": (
+        first("scenes"),
+        lambda text, folder: parse_scene(text, name="recipe", folder=folder, where="recipe"),
+    ),
     "data set": (
         first("datasets"),
         lambda text, folder: parse_dataset(text, name="recipe", folder=folder, where="recipe"),
     ),
-    "challenge": (CHALLENGES.named("films-3").text, lambda text, _: parse_challenge(text, where="recipe")),
+    "challenge": (
+        CHALLENGES.named("films-3").text,
+        lambda text, _: parse_challenge(text, where="recipe"),
+    ),
     "material": (
         first("materials"),
         lambda text, _: Material.from_mapping(parse_recipe(text, where="recipe"), name="recipe"),
     ),
-    "render prior": (first("renders"), lambda text, _: read_prior(parse_recipe(text, where="recipe"), name="recipe")),
+    "render prior": (
+        first("renders"),
+        lambda text, _: read_prior(parse_recipe(text, where="recipe"), name="recipe"),
+    ),
     "scene made ready": (SCENE, ready),
     "experiment": (EXPERIMENT, experiment),
-    "training": (training(), lambda text, _: parse_training(text, name="recipe", where="recipe").check()),
+    "training": (
+        training(),
+        lambda text, _: parse_training(text, name="recipe", where="recipe").check(),
+    ),
 }
 
 
@@ -100,9 +116,14 @@ def _toml(form: str) -> Subject:
     def act(example: Any, folder: Path) -> None:
         edit, damage = example
         data = as_toml(edited(content, edit))
-        read(data if damage is None else damaged(data.encode(), damage).decode(errors="replace"), folder)
+        read(
+            data if damage is None else damaged(data.encode(), damage).decode(errors="replace"),
+            folder,
+        )
 
-    return Subject(name=form, examples=st.tuples(edits, st.one_of(*[st.none()] * 4, damages)), act=act)
+    return Subject(
+        name=form, examples=st.tuples(edits, st.one_of(*[st.none()] * 4, damages)), act=act
+    )
 
 
 def _json(name: str, content: dict[str, Any], read: Callable[[Path], object]) -> Subject:
@@ -117,7 +138,13 @@ def _json(name: str, content: dict[str, Any], read: Callable[[Path], object]) ->
 
 def _plan(example: Any, folder: Path) -> None:
     path = folder / "own.toml"
-    path.write_text(as_toml(edited(tomllib.loads((CATALOGS / "datasets" / "flagsim-small.toml").read_text()), example)))
+    path.write_text(
+        as_toml(
+            edited(
+                tomllib.loads((CATALOGS / "datasets" / "flagsim-small.toml").read_text()), example
+            )
+        )
+    )
     command("init", "--lake", folder / "lake")
     command("build", path, "--plan", "--lake", folder / "lake")
 

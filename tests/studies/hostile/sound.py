@@ -1,4 +1,5 @@
-"""Sound files of a campaign, each written once: by the first example that needs it, for all that follow."""
+"""Sound files of a campaign, each written once: by the first example that needs it, for all that
+follow."""
 
 from __future__ import annotations
 

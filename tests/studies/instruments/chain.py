@@ -1,4 +1,5 @@
-"""An anemometer as a chain of the library's sensor effects, each with one strength, and its clock."""
+"""An anemometer as a chain of the library's sensor effects, each with one strength, and its
+clock."""
 
 from __future__ import annotations
 
@@ -12,8 +13,15 @@ from flagdata.errors import InputError
 from sim.effects import SENSOR_EFFECTS, AnemometerEffect, Parameter
 
 CLOCK = "clock-offset"
-ORDER = ("anemometer-lag", "overspeeding", "anemometer-gain", "anemometer-dead-zone", "anemometer-offset")
-"""As the wind passes them: what turns follows late and not below its threshold, then an amplifier has a wrong zero."""
+ORDER = (
+    "anemometer-lag",
+    "overspeeding",
+    "anemometer-gain",
+    "anemometer-dead-zone",
+    "anemometer-offset",
+)
+"""As the wind passes them: what turns follows late and not below its threshold, then an amplifier
+has a wrong zero."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,8 +29,8 @@ class Chain:
     """What acts on an anemometer's reading.
 
     Attributes:
-        strengths: name of an effect → its strength, in the effect's unit. The one of the clock is what the log's clock
-            is ahead of the table's [s].
+        strengths: name of an effect → its strength, in the effect's unit. The one of the clock is
+            what the log's clock is ahead of the table's [s].
 
     Raises:
         InputError: an effect that is neither a clock's offset nor one of `ORDER`.

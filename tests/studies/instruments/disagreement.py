@@ -1,18 +1,21 @@
-"""A table's observable against an anemometer's log: the flag's law and the anemometer's effects fitted together.
+"""A table's observable against an anemometer's log: the flag's law and the anemometer's effects
+fitted together.
 
-A flag's observable y follows the wind by a power law above its value at rest, u = c (y² − y₀²)^(p/2): y is a root mean
-square, to which what moves at rest adds in squares. The anemometer reads a chain of the library's sensor effects of u,
-and its clock may be off:
+A flag's observable y follows the wind by a power law above its value at rest, u = c (y² −
+y₀²)^(p/2): y is a root mean square, to which what moves at rest adds in squares. The anemometer
+reads a chain of the library's sensor effects of u, and its clock may be off:
 
     m(t + b) = chain(u)(t) + error,
 
-both as means over the spans of the table's rows. The error's variance is a² + (s u)²: a flag is read to a share of
-the wind, and in still air an anemometer shows its zero as often as it is asked. c, p, the strengths, a and s are
-those of the greatest likelihood; a strength that is known beforehand counts by its standard uncertainty. A gain of
+both as means over the spans of the table's rows. The error's variance is a² + (s u)²: a flag is
+read to a share of the wind, and in still air an anemometer shows its zero as often as it is asked.
+c, p, the strengths, a and s are those of the greatest likelihood; a strength that is known
+beforehand counts by its standard uncertainty. A gain of
 the anemometer and c are one number here: only a flag whose law is known separates them.
 
-Rows overlap and errors last: standard errors are of the fit without each block of time in turn (delete-a-block
-jackknife, Künsch 1989). An effect's share is what errors change by where it alone is taken away.
+Rows overlap and errors last: standard errors are of the fit without each block of time in turn
+(delete-a-block jackknife, Künsch 1989). An effect's share is what errors change by where it alone
+is taken away.
 """
 
 from __future__ import annotations
@@ -64,15 +67,25 @@ class Rows:
     rest: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.times.shape != self.values.shape or self.times.ndim != 1 or len(self.times) < _FEWEST:
+        if (
+            self.times.shape != self.values.shape
+            or self.times.ndim != 1
+            or len(self.times) < _FEWEST
+        ):
             raise InputError(
                 f"{self.times.shape} times and {self.values.shape} values",
                 where="rows",
                 fix=f"give (n,) each, {_FEWEST} or more",
             )
-        if not (np.diff(self.times) > 0).all() or not np.isfinite(self.values).all() or not self.span > 0:
+        if (
+            not (np.diff(self.times) > 0).all()
+            or not np.isfinite(self.values).all()
+            or not self.span > 0
+        ):
             raise InputError(
-                "times that do not ascend, or values that are not finite", where="rows", fix="leave such rows out"
+                "times that do not ascend, or values that are not finite",
+                where="rows",
+                fix="leave such rows out",
             )
 
     @property
@@ -99,9 +112,12 @@ class Readings:
         return np.concatenate([[0.0], np.cumsum(steps * (self.speed[1:] + self.speed[:-1]) / 2)])
 
     def means(self, middles: FloatArray, span: float) -> FloatArray:
-        """(n,) means over spans of its own clock, linear between samples; NaN where the log does not cover one."""
+        """(n,) means over spans of its own clock, linear between samples; NaN where the log does
+        not cover one."""
         low, high = middles - span / 2, middles + span / 2
-        mean = (np.interp(high, self.times, self._run) - np.interp(low, self.times, self._run)) / span
+        mean = (
+            np.interp(high, self.times, self._run) - np.interp(low, self.times, self._run)
+        ) / span
         return np.where((low >= self.times[0]) & (high <= self.times[-1]), mean, np.nan)
 
 
@@ -110,7 +126,8 @@ class Law:
     """What wind an observable stands for.
 
     Attributes:
-        scale: the wind at an excess of `reference` [m/s], so that it hardly depends on the exponent.
+        scale: the wind at an excess of `reference` [m/s], so that it hardly depends on the
+            exponent.
         exponent: p.
         reference: in the observable's unit.
     """
@@ -131,7 +148,8 @@ class Disagreement:
     Attributes:
         law: of the flag.
         chain: of the anemometer.
-        floor, share: standard deviation of an error in still air [m/s], and in wind as a share of it.
+        floor, share: standard deviation of an error in still air [m/s], and in wind as a share of
+            it.
     """
 
     law: Law
@@ -144,7 +162,8 @@ class Disagreement:
         return np.hypot(self.floor, self.share * self.law.wind(rows.excess))
 
     def errors(self, rows: Rows, log: Readings) -> FloatArray:
-        """(n,) reading that the flag stands for less the log's, over each row [m/s]; NaN where the log is silent."""
+        """(n,) reading that the flag stands for less the log's, over each row [m/s]; NaN where the
+        log is silent."""
         predicted = self.chain.read(rows.times, self.law.wind(rows.excess))
         return predicted - log.means(rows.times + self.chain.clock, rows.span)
 
@@ -164,8 +183,8 @@ def fit(
     Args:
         effects: names that are fitted; the others are absent.
         use: (n,) rows that are fitted; None for all.
-        known: effect → its strength as it is known beforehand, a value with its standard deviation; others lie in their
-            priors' ranges, or at the null.
+        known: effect → its strength as it is known beforehand, a value with its standard deviation;
+            others lie in their priors' ranges, or at the null.
         near: where to start; None to search.
         seed: of the search's starts.
 
@@ -174,22 +193,33 @@ def fit(
     """
     known = {name: own for name, own in (known or {}).items() if name in effects}
     if exact := [name for name, own in known.items() if not own.sigma > 0]:
-        raise InputError(f"{', '.join(exact)} without a deviation", where="known", fix="give it as in 0.3±0.1")
+        raise InputError(
+            f"{', '.join(exact)} without a deviation", where="known", fix="give it as in 0.3±0.1"
+        )
     readings = log.means(rows.times + _first_clock(known), rows.span)
     covered = np.isfinite(readings)
     own = covered if use is None else use & covered
     if own.sum() < _FEWEST:
-        raise InputError(f"{own.sum()} rows with a log beside them", where="fit", fix=f"give {_FEWEST} or more")
+        raise InputError(
+            f"{own.sum()} rows with a log beside them", where="fit", fix=f"give {_FEWEST} or more"
+        )
     free = float(own.sum()) * min(1.0, float(np.median(np.diff(rows.times))) / rows.span)
     speed = float(np.abs(readings[own]).max())
     reference = max(float(np.sqrt(np.square(rows.excess).mean())), 1e-9)
     middle = math.log(max(speed, _STILL))
-    bounds = [(middle - 4.0, middle + 2.0), _EXPONENTS, *_NOISE, *(_range(name, known.get(name)) for name in effects)]
+    bounds = [
+        (middle - 4.0, middle + 2.0),
+        _EXPONENTS,
+        *_NOISE,
+        *(_range(name, known.get(name)) for name in effects),
+    ]
 
     def made(vector: FloatArray) -> Disagreement:
         law = Law(scale=math.exp(vector[0]), exponent=float(vector[1]), reference=reference)
         chain = Chain(strengths=dict(zip(effects, vector[4:].tolist(), strict=True)))
-        return Disagreement(law=law, chain=chain, floor=math.exp(vector[2]), share=math.exp(vector[3]))
+        return Disagreement(
+            law=law, chain=chain, floor=math.exp(vector[2]), share=math.exp(vector[3])
+        )
 
     def objective(vector: FloatArray) -> float:
         tried = made(vector)
@@ -198,30 +228,48 @@ def fit(
         if there.sum() < _FEWEST:
             return math.inf
         terms = 2 * np.log(deviation[there]) + np.square(errors[there] / deviation[there])
-        penalty = sum(((vector[4 + effects.index(name)] - one.low) / one.sigma) ** 2 for name, one in known.items())
+        penalty = sum(
+            ((vector[4 + effects.index(name)] - one.low) / one.sigma) ** 2
+            for name, one in known.items()
+        )
         return free * float(terms.mean()) + penalty
 
     if near is None:
-        shares = qmc.Sobol(len(bounds), scramble=True, rng=stream(seed, "instruments", "starts")).random(_STARTS)
+        shares = qmc.Sobol(
+            len(bounds), scramble=True, rng=stream(seed, "instruments", "starts")
+        ).random(_STARTS)
         low, high = np.array(bounds).T
         starts = low + shares * (high - low)
         starts[:, 0], starts[:, 1] = middle - np.linspace(0.0, 1.5, _STARTS), 1.0
         starts[:, 2], starts[:, 3] = math.log(0.1), math.log(0.2)
     else:
         starts = np.clip([_vector(near, effects)], *np.array(bounds).T)
-    return made(min((_descended(objective, start, bounds) for start in starts), key=lambda one: one[1])[0])
+    return made(
+        min((_descended(objective, start, bounds) for start in starts), key=lambda one: one[1])[0]
+    )
 
 
 def _descended(
-    objective: Callable[[FloatArray], float], start: FloatArray, bounds: Sequence[tuple[float, float]]
+    objective: Callable[[FloatArray], float],
+    start: FloatArray,
+    bounds: Sequence[tuple[float, float]],
 ) -> tuple[FloatArray, float]:
-    """Where a search from `start` ends, and the objective there: by lines, then by a simplex, which follows valleys
-    between the axes, until neither gains anything."""
+    """Where a search from `start` ends, and the objective there: by lines, then by a simplex, which
+    follows valleys between the axes, until neither gains anything."""
     place, value = start, math.inf
     for _ in range(_ROUNDS):
         before = value
-        for method, tolerance in (("Powell", {"xtol": 1e-4, "ftol": 1e-7}), ("Nelder-Mead", {"fatol": 1e-5})):
-            found = minimize(objective, place, method=method, bounds=bounds, options={"maxfev": _STEPS, **tolerance})
+        for method, tolerance in (
+            ("Powell", {"xtol": 1e-4, "ftol": 1e-7}),
+            ("Nelder-Mead", {"fatol": 1e-5}),
+        ):
+            found = minimize(
+                objective,
+                place,
+                method=method,
+                bounds=bounds,
+                options={"maxfev": _STEPS, **tolerance},
+            )
             if found.fun <= value:
                 place, value = np.asarray(found.x), float(found.fun)
         if before - value < _GAIN:
@@ -239,8 +287,8 @@ def jackknife(
     use: BoolArray | None = None,
     known: Mapping[str, Stated] | None = None,
 ) -> tuple[Mapping[str, float], FloatArray]:
-    """Standard errors of scale, exponent and the strengths, and errors (n,) of each row by the fit without its block
-    [m/s]; NaN outside `use`.
+    """Standard errors of scale, exponent and the strengths, and errors (n,) of each row by the fit
+    without its block [m/s]; NaN outside `use`.
 
     Rows whose spans reach into a block are left out with it.
 
@@ -258,7 +306,9 @@ def jackknife(
         errors[out] = again.errors(rows, log)[out]
         vectors.append(_vector(again, effects))
     spread = np.std(np.array(vectors), axis=0) * math.sqrt(max(len(vectors) - 1, 0))
-    sigmas = dict(zip(("scale", "exponent", *effects), np.delete(spread, [2, 3]).tolist(), strict=True))
+    sigmas = dict(
+        zip(("scale", "exponent", *effects), np.delete(spread, [2, 3]).tolist(), strict=True)
+    )
     sigmas["scale"] *= found.law.scale  # of its logarithm
     return sigmas, errors
 

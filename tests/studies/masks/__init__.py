@@ -1,1 +1,2 @@
-"""How the network that finds the cloth in a film is made: films of simulated flags with known silhouettes, training."""
+"""How the network that finds the cloth in a film is made: films of simulated flags with known
+silhouettes, training."""

@@ -1,4 +1,5 @@
-"""Make the network of the cloth's mask that comes with the package: `python -m tests.studies masks --help`."""
+"""Make the network of the cloth's mask that comes with the package: `python -m tests.studies masks
+--help`."""
 
 from __future__ import annotations
 
@@ -22,7 +23,11 @@ from tests.studies.masks.training import Scores, train
 
 @click.command()
 @click.option(
-    "--lake", "lake_path", type=LocalPath(exists=True), required=True, help="Lake with the data sets' mesh sequences."
+    "--lake",
+    "lake_path",
+    type=LocalPath(exists=True),
+    required=True,
+    help="Lake with the data sets' mesh sequences.",
 )
 @click.option(
     "--dataset",
@@ -33,11 +38,19 @@ from tests.studies.masks.training import Scores, train
     help="Data set whose sequences are filmed.",
 )
 @click.option("--films", default=520, show_default=True, help="Number of films to train on.")
-@click.option("--judged", default=48, show_default=True, help="Films of the validation side that are judged.")
+@click.option(
+    "--judged", default=48, show_default=True, help="Films of the validation side that are judged."
+)
 @click.option("--epochs", default=12, show_default=True)
 @click.option("--seed", default=2127, show_default=True)
 @click.option("--workers", default=1, show_default=True, help="Processes that film.")
-@click.option("--examples", "kept", type=LocalPath(), required=True, help="Folder of the examples, kept between runs.")
+@click.option(
+    "--examples",
+    "kept",
+    type=LocalPath(),
+    required=True,
+    help="Folder of the examples, kept between runs.",
+)
 @click.option("--out", type=LocalPath(), default=FOLDER, help="Folder of the network; new.")
 def main(
     lake_path: Path,
@@ -50,17 +63,28 @@ def main(
     kept: Path,
     out: Path,
 ) -> None:
-    """Film simulated flags, train the network of the cloth's mask on them, and write it with its card."""
+    """Film simulated flags, train the network of the cloth's mask on them, and write it with its
+    card."""
     check_folder(out)
     lake = Lake.open(lake_path)
     for side, count in (("train", films), ("validation", judged)):
-        make(lake, batches(lake, datasets, side=side), kept / side, count=count, seed=seed, workers=workers)
+        make(
+            lake,
+            batches(lake, datasets, side=side),
+            kept / side,
+            count=count,
+            seed=seed,
+            workers=workers,
+        )
     sides = {side: list(read(kept / side)) for side in ("train", "validation")}
     reached: list[Scores] = []
 
     def advance(epoch: int, loss: float, scores: Scores) -> None:
         reached.append(scores)
-        say(f"epoch {epoch + 1} of {epochs}: loss {loss:.3f}, Dice {scores.dice:.3f}, ends {scores.ends:.2f} px")
+        say(
+            f"epoch {epoch + 1} of {epochs}: loss {loss:.3f}, Dice {scores.dice:.3f}, ends "
+            f"{scores.ends:.2f} px"
+        )
 
     torch.set_num_threads(max(1, workers))
     network = train(sides["train"], sides["validation"], epochs=epochs, seed=seed, advance=advance)
@@ -87,6 +111,8 @@ def main(
                 "scores": asdict(reached[-1]),
             },
         )
-        tensors = {k: v.half() if v.is_floating_point() else v for k, v in network.state_dict().items()}
+        tensors = {
+            k: v.half() if v.is_floating_point() else v for k, v in network.state_dict().items()
+        }
         write_tensors(scratch / WEIGHTS, tensors)
         write_sums(scratch)

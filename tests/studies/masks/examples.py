@@ -1,4 +1,5 @@
-"""Examples of all films, made once and kept: a file each, so that a run that was stopped goes on."""
+"""Examples of all films, made once and kept: a file each, so that a run that was stopped goes
+on."""
 
 from __future__ import annotations
 
@@ -27,8 +28,8 @@ _STILLS = ("usual", "least", "greatest")
 
 
 def batches(lake: Lake, datasets: Sequence[str], *, side: str) -> list[list[str]]:
-    """Mesh sequences of data sets, as objects of the lake, by the batch in which they were simulated: flags of one mesh
-    at one rate in winds of their own.
+    """Mesh sequences of data sets, as objects of the lake, by the batch in which they were
+    simulated: flags of one mesh at one rate in winds of their own.
 
     Raises:
         NotFoundError: there are none.
@@ -37,7 +38,9 @@ def batches(lake: Lake, datasets: Sequence[str], *, side: str) -> list[list[str]
     found: dict[str, list[tuple[str, str]]] = defaultdict(list)
     for row in table.to_pylist():
         batch = row["name"].rsplit("-", 1)[0]
-        if row["kind"] == Kind.MESHES and any(batch.rsplit("-", 1)[0] == f"{name}-{side}" for name in datasets):
+        if row["kind"] == Kind.MESHES and any(
+            batch.rsplit("-", 1)[0] == f"{name}-{side}" for name in datasets
+        ):
             found[batch].append((row["name"], row["object"]))
     if not found:
         raise NotFoundError(
@@ -48,22 +51,35 @@ def batches(lake: Lake, datasets: Sequence[str], *, side: str) -> list[list[str]
     return [[stored for _, stored in sorted(found[batch])] for batch in sorted(found)]
 
 
-def make(lake: Lake, chosen: Sequence[Sequence[str]], folder: Path, *, count: int, seed: int, workers: int) -> None:
-    """Make `count` examples as `NNNNN.npz` in a folder; an empty file stands for a film that shows no region."""
+def make(
+    lake: Lake,
+    chosen: Sequence[Sequence[str]],
+    folder: Path,
+    *,
+    count: int,
+    seed: int,
+    workers: int,
+) -> None:
+    """Make `count` examples as `NNNNN.npz` in a folder; an empty file stands for a film that shows
+    no region."""
     wanted = [k for k in range(count) if not (folder / f"{k:05}.npz").exists()]
     jobs = [(str(lake.path), list(chosen[k % len(chosen)]), folder, k, seed) for k in wanted]
     if workers == 1:
         for job in jobs:
             _one(*job)
         return
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=single_threaded) as pool:
+    with ProcessPoolExecutor(
+        workers, mp_context=get_context("spawn"), initializer=single_threaded
+    ) as pool:
         for future in [pool.submit(_one, *job) for job in jobs]:
             future.result()
 
 
 def _one(lake: str, batch: Sequence[str], folder: Path, number: int, seed: int) -> None:
     rng = stream(seed, "masks", "runs", number)
-    some = rng.choice(len(batch), size=min(len(batch), 1 + int(rng.integers(_MOST_RUNS))), replace=False)
+    some = rng.choice(
+        len(batch), size=min(len(batch), 1 + int(rng.integers(_MOST_RUNS))), replace=False
+    )
     opened = Lake.open(lake)
     runs = [read_meshes(opened.whole_object(batch[int(k)])) for k in some]
     flags = [run for run in runs if isinstance(run, MeshSequence)]
@@ -71,7 +87,9 @@ def _one(lake: str, batch: Sequence[str], folder: Path, number: int, seed: int) 
     content = io.BytesIO()
     if made is not None:
         stills = {name: getattr(made.stills, name) for name in _STILLS}
-        np.savez_compressed(content, pictures=made.pictures, cloth=made.cloth, hoist=made.hoist, **stills)
+        np.savez_compressed(
+            content, pictures=made.pictures, cloth=made.cloth, hoist=made.hoist, **stills
+        )
     rewrite(folder / f"{number:05}.npz", content.getvalue())
 
 

@@ -1,9 +1,11 @@
-"""Short films of simulated flags, made fit as any film is, with the cloth's silhouette in each picture.
+"""Short films of simulated flags, made fit as any film is, with the cloth's silhouette in each
+picture.
 
-A film is one camera before one to four runs of flags of one shape in winds of their own, so that its still picture is
-of calm and of gusty moments. Runs come from a data set's sequences; camera, light, texture and background are drawn
-anew, the frames get a camera's noise and H.264's losses, and the pictures are what `models.conditioning` makes of them.
-The silhouette is the projection of the mesh, brought into the picture by the same cut.
+A film is one camera before one to four runs of flags of one shape in winds of their own, so that
+its still picture is of calm and of gusty moments. Runs come from a data set's sequences; camera,
+light, texture and background are drawn anew, the frames get a camera's noise and H.264's losses,
+and the pictures are what `models.conditioning` makes of them. The silhouette is the projection of
+the mesh, brought into the picture by the same cut.
 """
 
 from __future__ import annotations
@@ -51,7 +53,8 @@ class Example:
         pictures: (n, size, size) gray.
         stills: of the whole film.
         cloth: (n, size, size) share of the pixel that the cloth covers, in 1/255.
-        hoist: (n, 2, 2) upper and lower end of the hoist: column and row, the first pixel's middle at 0.5 [px].
+        hoist: (n, 2, 2) upper and lower end of the hoist: column and row, the first pixel's middle
+            at 0.5 [px].
     """
 
     pictures: UInt8Array
@@ -61,8 +64,8 @@ class Example:
 
 
 def example(runs: Sequence[MeshSequence], *, seed: int, assets: Assets) -> Example | None:
-    """Film some runs of one mesh; None where no region of cloth is found, the camera is taken to move, or the flag is
-    hardly in the picture.
+    """Film some runs of one mesh; None where no region of cloth is found, the camera is taken to
+    move, or the flag is hardly in the picture.
 
     Args:
         runs: of one mesh and one rate, each of a dozen frames or more, in a wind along +x.
@@ -75,7 +78,9 @@ def example(runs: Sequence[MeshSequence], *, seed: int, assets: Assets) -> Examp
     ends = np.cumsum([0, *lengths])
     # The first and the last frame of a run would be blurred towards another run.
     picked = [k for a, b in itertools.pairwise(ends) for k in range(a + 1, b - 1)]
-    times = np.array([k / meshes.rate + _APART * float(np.searchsorted(ends, k, side="right")) for k in picked])
+    times = np.array(
+        [k / meshes.rate + _APART * float(np.searchsorted(ends, k, side="right")) for k in picked]
+    )
     with torch.no_grad():
         colour = Raster(assets=assets).render(meshes, zeta).numpy()[picked]
     film = _coded(_lit(colour, rng), rng)
@@ -89,7 +94,10 @@ def example(runs: Sequence[MeshSequence], *, seed: int, assets: Assets) -> Examp
     if cloth.mean() / 255 < _SHOWN:
         return None
     return Example(
-        pictures=small[kept], stills=Stills.of(small), cloth=cloth, hoist=_hoist(places, runs[0].rest, found)
+        pictures=small[kept],
+        stills=Stills.of(small),
+        cloth=cloth,
+        hoist=_hoist(places, runs[0].rest, found),
     )
 
 
@@ -106,7 +114,10 @@ def _joined(runs: Sequence[MeshSequence]) -> MeshSequence:
     step = int(first.time[_EVERY] - first.time[0])
     positions = np.concatenate([run.positions[::_EVERY] for run in runs])
     return MeshSequence(
-        time=np.arange(len(positions), dtype=np.int64) * step, positions=positions, faces=first.faces, rest=first.rest
+        time=np.arange(len(positions), dtype=np.int64) * step,
+        positions=positions,
+        faces=first.faces,
+        rest=first.rest,
     )
 
 
@@ -120,12 +131,15 @@ def _lit(colour: UInt8Array, rng: np.random.Generator) -> UInt8Array:
 
 
 def _coded(colour: UInt8Array, rng: np.random.Generator) -> UInt8Array:
-    """(n, height, width) gray of frames (n, height, width, 3) after the noise and the coding of the data set's
-    cameras."""
+    """(n, height, width) gray of frames (n, height, width, 3) after the noise and the coding of the
+    data set's cameras."""
     camera = load(_CAMERA).camera
     seed = int(rng.integers(2**31))
     return np.stack(
-        decode(encode_pictures(colour, settings(camera, seed=seed), camera, seed=seed), where="a simulated film")
+        decode(
+            encode_pictures(colour, settings(camera, seed=seed), camera, seed=seed),
+            where="a simulated film",
+        )
     )
 
 
@@ -133,10 +147,14 @@ def _places(meshes: Meshes, zeta: RenderParameters, picked: Sequence[int]) -> Fl
     """(n, vertex, 2) of the film's pixels, the first pixel's middle at 0.5."""
     placed = stage(meshes, zeta)
     each = [meshes.positions[meshes.vertex_offset[k] : meshes.vertex_offset[k + 1]] for k in picked]
-    return placed.camera.project(torch.stack(each).double() + torch.tensor(placed.shift).double())[0].numpy()
+    return placed.camera.project(torch.stack(each).double() + torch.tensor(placed.shift).double())[
+        0
+    ].numpy()
 
 
-def _cloth(places: FloatArray, faces: NDArray[np.int32], zeta: RenderParameters, found: Conditioning) -> UInt8Array:
+def _cloth(
+    places: FloatArray, faces: NDArray[np.int32], zeta: RenderParameters, found: Conditioning
+) -> UInt8Array:
     fine = np.zeros((zeta.height * _FINE, zeta.width * _FINE), np.uint8)
     corners = np.rint((places * _FINE - 0.5) * 16).astype(np.int32)
     for face in faces:

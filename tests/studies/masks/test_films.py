@@ -1,4 +1,5 @@
-"""Films of flags whose silhouettes are known: what moves is cloth, and what is cloth is where the mesh is."""
+"""Films of flags whose silhouettes are known: what moves is cloth, and what is cloth is where the
+mesh is."""
 
 from __future__ import annotations
 
@@ -16,7 +17,10 @@ from tests.studies.masks.films import Example, example
 def waving(phase: float) -> MeshSequence:
     """A flag of 1.5 m × 1 m that flies along +x and swings across the wind, 3 s at 30 Hz."""
     time = np.arange(90) / 30
-    u, v = (a.ravel() for a in np.meshgrid(np.linspace(0, 1.5, 16), np.linspace(0, 1, 11), indexing="ij"))
+    u, v = (
+        a.ravel()
+        for a in np.meshgrid(np.linspace(0, 1.5, 16), np.linspace(0, 1, 11), indexing="ij")
+    )
     t = time[:, None]
     angle = 0.6 * np.sin(2 * np.pi * (0.7 * t + phase)) * np.ones_like(u)
     droop = 0.35 + 0.2 * np.sin(2 * np.pi * (1.1 * t + phase))
@@ -41,7 +45,8 @@ def made() -> Example:
 
 
 def test_what_changes_is_where_cloth_comes_or_goes(made: Example) -> None:
-    """Two pictures differ where the cloth is in one of them, beyond noise and coding; and the bare rest is the same."""
+    """Two pictures differ where the cloth is in one of them, beyond noise and coding; and the bare
+    rest is the same."""
     assert made.pictures.shape == made.cloth.shape
     some, other = made.pictures.astype(np.int16), made.cloth
     bare = (other.max(axis=0) == 0)[None] & np.ones_like(other, bool)
@@ -73,7 +78,9 @@ def test_the_same_seed_films_the_same(made: Example) -> None:
 def test_kept_examples_are_read_back(made: Example, tmp_path) -> None:
     """And a film that showed no region is passed over."""
     stills = {name: getattr(made.stills, name) for name in ("usual", "least", "greatest")}
-    np.savez_compressed(tmp_path / "00000.npz", pictures=made.pictures, cloth=made.cloth, hoist=made.hoist, **stills)
+    np.savez_compressed(
+        tmp_path / "00000.npz", pictures=made.pictures, cloth=made.cloth, hoist=made.hoist, **stills
+    )
     (tmp_path / "00001.npz").write_bytes(b"")
     (found,) = read(tmp_path)
     assert isinstance(found.stills, Stills)

@@ -1,10 +1,11 @@
-"""The flag as an anemometer, judged: ten minutes of `flagdata build gusty`, another day, another place, another flag.
+"""The flag as an anemometer, judged: ten minutes of `flagdata build gusty`, another day, another
+place, another flag.
 
-A reading model is made of the first five minutes and read on the last five, on another day's film of the same flag from
-the same place (in another light, and in the same), on one from another place, and on one of another flag. The wind it
-reads is compared with what the cup logged over each window, and with the true wind at the flag. FLAGDATA_ANEMOMETER
-names the folder of the films (`anemometer_films`), where those that are missing are made, and what was
-looked at in them is kept.
+A reading model is made of the first five minutes and read on the last five, on another day's film
+of the same flag from the same place (in another light, and in the same), on one from another place,
+and on one of another flag. The wind it reads is compared with what the cup logged over each window,
+and with the true wind at the flag. FLAGDATA_ANEMOMETER names the folder of the films
+(`anemometer_films`), where those that are missing are made, and what was looked at in them is kept.
 
 Seed 2023 is that of the data set; what was chosen was chosen on another (decision 047).
 """
@@ -62,7 +63,11 @@ class _Film:
     """A film that was looked at before: what a measurement asks of it."""
 
     def __init__(self, subject: Subject, findings: tuple[Finding, ...]) -> None:
-        self.name, self.rate, self.duration = subject.film.name, subject.film.rate, subject.film.duration
+        self.name, self.rate, self.duration = (
+            subject.film.name,
+            subject.film.rate,
+            subject.film.duration,
+        )
         self._findings = findings
 
     def findings(self) -> tuple[Finding, ...]:
@@ -86,7 +91,8 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
 
 
 def judged(lake: Lake, name: str, *, seed: int, first: float, kept: Path) -> dict[str, Any]:
-    """What a reading model of the first half of the first film says of the second and of the other films.
+    """What a reading model of the first half of the first film says of the second and of the other
+    films.
 
     Args:
         name: of the network whose summary it uses.
@@ -95,20 +101,29 @@ def judged(lake: Lake, name: str, *, seed: int, first: float, kept: Path) -> dic
     own = network(name, lake=None, at=None)
     fitted = _looked(lake, FIRST, own, kept, part=(0.0, first / 2))
     model = calibrate_reading([_recording(lake, fitted)], network=own, size=SIZE, level=LEVEL)
-    parts = {FIRST: (first / 2, first), **{name: (0.0, seconds) for name, seconds in SECONDS.items()}}
-    truths = {name: _air(shot.film.cast, shot.film.index) for name, shot in shots(seed, first=first)}
+    parts = {
+        FIRST: (first / 2, first),
+        **{name: (0.0, seconds) for name, seconds in SECONDS.items()},
+    }
+    truths = {
+        name: _air(shot.film.cast, shot.film.index) for name, shot in shots(seed, first=first)
+    }
     rows = []
     for name, part in parts.items():
         seen = _looked(lake, name, own, kept, part=part)
         subject = _subject(lake, name)
         film: Any = _Film(subject, seen.findings)
-        found = measured_from(film, seen.features, model.model, own.estimator, Options(level=LEVEL), name="judged")
+        found = measured_from(
+            film, seen.features, model.model, own.estimator, Options(level=LEVEL), name="judged"
+        )
         rows.append(_row(name, subject, seen, found, truths[name]))
     return {"model": model.as_dict(), "films": rows}
 
 
 def _subject(lake: Lake, name: str) -> Subject:
-    (subject,) = subjects(name, query=None, lake=lake, at="main", reading=FilmReading(aspect=SIZE.aspect))
+    (subject,) = subjects(
+        name, query=None, lake=lake, at="main", reading=FilmReading(aspect=SIZE.aspect)
+    )
     return subject
 
 
@@ -150,7 +165,11 @@ def _over(starts: FloatArray, length: float, times: FloatArray, values: FloatArr
 
 
 def _row(
-    name: str, subject: Subject, seen: Seen, found: Measurement, truth: tuple[FloatArray, FloatArray]
+    name: str,
+    subject: Subject,
+    seen: Seen,
+    found: Measurement,
+    truth: tuple[FloatArray, FloatArray],
 ) -> dict[str, Any]:
     features, wind = seen.features, None if subject.record is None else subject.record.wind()
     if wind is None or subject.film.start is None:
@@ -172,12 +191,17 @@ def _row(
         "reasons": [one.what for one in verdict.faults],
         "verdict": verdict.sentence,
         "median_p": verdict.p,
-        "read": {key: _agreement(series.wind, series.low, series.high, value) for key, value in references.items()},
+        "read": {
+            key: _agreement(series.wind, series.low, series.high, value)
+            for key, value in references.items()
+        },
         "alone": {key: _error(alone - value) for key, value in references.items()},
     }
 
 
-def _agreement(read: FloatArray, low: FloatArray, high: FloatArray, reference: FloatArray) -> dict[str, float]:
+def _agreement(
+    read: FloatArray, low: FloatArray, high: FloatArray, reference: FloatArray
+) -> dict[str, float]:
     inside = (low <= reference) & (reference <= high)
     return {**_error(read - reference), "within": float(inside.mean())}
 
@@ -192,9 +216,12 @@ def page(sheet: Mapping[str, Any]) -> str:
         "# The flag as an anemometer",
         "",
         f"Seed {sheet['seed']}; calibrated on the first half of the film `{FIRST}`.",
-        "RMSE in m/s over windows: against the cup (its mean over the window, linear between samples), against the",
-        "samples in the window, as `flagdata measure` compares, and against the true wind at the flag. Within: share",
-        f"of windows whose interval of {LEVEL:.0%} contains that. Last, the network alone against the cup",
+        "RMSE in m/s over windows: against the cup (its mean over the window, linear between "
+        "samples), against the",
+        "samples in the window, as `flagdata measure` compares, and against the true wind at the "
+        "flag. Within: share",
+        f"of windows whose interval of {LEVEL:.0%} contains that. Last, the network alone against "
+        "the cup",
         "(`python -m tests.studies anemometer`).",
         "",
     ]
@@ -211,7 +238,8 @@ def page(sheet: Mapping[str, Any]) -> str:
 
 def _table(films: Sequence[Mapping[str, Any]]) -> list[str]:
     lines = [
-        "| film | windows | wind [m/s] | refused | cup | samples | flag | within, cup | within, flag | network alone |",
+        "| film | windows | wind [m/s] | refused | cup | samples | flag | within, cup | within, "
+        "flag | network alone |",
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for row in films:
@@ -219,7 +247,16 @@ def _table(films: Sequence[Mapping[str, Any]]) -> list[str]:
         samples = f"{read['samples']['rmse']:.2f}" if "samples" in read else ""
         shown = [f"{read['cup']['rmse']:.3f}", samples, f"{read['flag']['rmse']:.3f}"]
         shown += [f"{read[key]['within']:.0%}" for key in ("cup", "flag")]
-        head = f"| {row['film']} | {row['windows']} | {row['wind'][0]:.1f} to {row['wind'][1]:.1f} | "
+        head = (
+            f"| {row['film']} | {row['windows']} | {row['wind'][0]:.1f} to {row['wind'][1]:.1f} | "
+        )
         refused = "yes" if row["refused"] else "no"
         lines.append(f"{head}{refused} | {' | '.join(shown)} | {row['alone']['cup']['rmse']:.2f} |")
-    return [*lines, "", "What the gate says:", "", *(f"- {row['film']}: {row['verdict']}" for row in films), ""]
+    return [
+        *lines,
+        "",
+        "What the gate says:",
+        "",
+        *(f"- {row['film']}: {row['verdict']}" for row in films),
+        "",
+    ]

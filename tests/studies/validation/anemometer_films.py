@@ -1,4 +1,5 @@
-"""Films that judge the flag as an anemometer: a flag on several days and from several places, and another flag.
+"""Films that judge the flag as an anemometer: a flag on several days and from several places, and
+another flag.
 
 All of them are simulated by the recipe of the data set `gusty`, a cup anemometer beside the flag:
 
@@ -26,7 +27,17 @@ from flagdata.recipes.typed_tables import Range
 from flagdata.record import Record
 from flagdata.timebase import NANOSECONDS
 from sim.assets import Assets
-from sim.datasets import EPOCH, Cast, DatasetRecipe, PlannedFilm, Roll, Sequences, build_jobs, casts, load
+from sim.datasets import (
+    EPOCH,
+    Cast,
+    DatasetRecipe,
+    PlannedFilm,
+    Roll,
+    Sequences,
+    build_jobs,
+    casts,
+    load,
+)
 from sim.render import RenderPrior
 from sim.run import Crew, MaterialSpec
 from sim.run import Recipe as Simulation
@@ -124,7 +135,9 @@ def shots(seed: int, *, first: float) -> Iterator[tuple[str, Shot]]:
         yield name, Shot(recipe=shown, film=film, frames=round(SECONDS[name] * rate))
 
 
-def _of(cast: Cast, name: str, seconds: float, seed: int, *, material: MaterialSpec, mean: float) -> Cast:
+def _of(
+    cast: Cast, name: str, seconds: float, seed: int, *, material: MaterialSpec, mean: float
+) -> Cast:
     simulation = cast.simulation
     around = Range(low=mean * (1 - _ABOUT), high=mean * (1 + _ABOUT))
     own = replace(
@@ -135,14 +148,18 @@ def _of(cast: Cast, name: str, seconds: float, seed: int, *, material: MaterialS
         batch=1,
         material=material,
         wind=replace(simulation.wind, speed=around),
-        time=replace(simulation.time, settle=_SETTLED, frames=round(seconds * simulation.time.rate)),
+        time=replace(
+            simulation.time, settle=_SETTLED, frames=round(seconds * simulation.time.rate)
+        ),
     )
     return replace(cast, simulation=own)
 
 
 def _in_other_light(recipe: DatasetRecipe, look: int) -> RenderPrior:
     drawn = recipe.prior.draw(look, Assets(photos=recipe.photos))
-    return recipe.prior.with_quantities({name: getattr(drawn, name) for name in _OF_LIGHT}, source="another day")
+    return recipe.prior.with_quantities(
+        {name: getattr(drawn, name) for name in _OF_LIGHT}, source="another day"
+    )
 
 
 def make(folder: Path, seed: int, *, first: float = 600.0) -> Lake:
@@ -161,7 +178,9 @@ def make(folder: Path, seed: int, *, first: float = 600.0) -> Lake:
             sequences[simulation.name] = _sequence(lake, simulation, shot)
         identity, sequence = sequences[simulation.name]
         film = replace(shot.film, sequence=identity)
-        shown = replace(sequence, time=sequence.time[: shot.frames], positions=sequence.positions[: shot.frames])
+        shown = replace(
+            sequence, time=sequence.time[: shot.frames], positions=sequence.positions[: shot.frames]
+        )
         done = build_jobs.film(shot.recipe, film, shown, "cpu")
         with lake.transaction(f"film {name}") as transaction:
             staged = transaction.staging(".mcap")

@@ -38,15 +38,17 @@ FIRST, LAST = 50, 151
 DAMPINGS = (0.0, 0.1e-3, 0.25e-3, 0.5e-3)
 REPLICATES = 16
 NOISE = {True: (1e-4, torch.float32), False: (1e-9, torch.float64)}
-"""Of the starts [m], and the precision, whether there is wind. In wind the noise is forgotten. Without, a flag falls in
-its plane until noise folds it, and the sooner that is, the less motion is left: the reference starts without any."""
+"""Of the starts [m], and the precision, whether there is wind. In wind the noise is forgotten.
+Without, a flag falls in its plane until noise folds it, and the sooner that is, the less motion is
+left: the reference starts without any."""
 ACCEPTANCE = {5: 5e-3, 10: 15e-3}
 """Through these frames, the mean vertex distance accepted [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReferenceMotion:
-    """One run of the reference: its wind [m/s], step, and (5,) statistics as `Ensemble.statistics` has them."""
+    """One run of the reference: its wind [m/s], step, and (5,) statistics as `Ensemble.statistics`
+    has them."""
 
     wind: float
     step: str
@@ -88,13 +90,16 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
 def motions(runs: Path) -> list[ReferenceMotion]:
     """The reference's free edge, over all frames from 2 s on that a run has."""
     return [
-        ReferenceMotion(wind=wind, step=step, statistics=_statistics(_positions(runs, name)[FIRST:, _edge()]))
+        ReferenceMotion(
+            wind=wind, step=step, statistics=_statistics(_positions(runs, name)[FIRST:, _edge()])
+        )
         for (step, wind), name in RUNS.items()
     ]
 
 
 def distances(runs: Path) -> dict[str, dict[str, list[float | None]]]:
-    """Mean vertex distance to the reference, run → method → frame 1 … `SHORT` [m]; None where ours has diverged.
+    """Mean vertex distance to the reference, run → method → frame 1 … `SHORT` [m]; None where ours
+    has diverged.
 
     The 0.5 ms runs are followed with leapfrog, the 5 ms runs with backward Euler.
     """
@@ -111,14 +116,18 @@ def distances(runs: Path) -> dict[str, dict[str, list[float | None]]]:
         expected = _positions(runs, RUNS["5 ms", wind])
         label = f"5 ms, {wind:g} m/s"
         result[label] = {
-            f"air at the {shape.value} shape": _gaps(expected, wind, 0.0, BackwardEuler(air_shape=shape))
+            f"air at the {shape.value} shape": _gaps(
+                expected, wind, 0.0, BackwardEuler(air_shape=shape)
+            )
             for shape in (AirShape.PREVIOUS, AirShape.CURRENT)
         }
         result[label]["moved so far"] = _travel(expected)
     return result
 
 
-def _gaps(expected: FloatArray, wind: float, damping: float, method: Integrator) -> list[float | None]:
+def _gaps(
+    expected: FloatArray, wind: float, damping: float, method: Integrator
+) -> list[float | None]:
     scene = flag(material=replace(CAMEL, damping=damping), wind_speed=wind)
     system, state = assemble([scene], dtype=torch.float64)
     gaps: list[float | None] = []
@@ -146,7 +155,9 @@ def _replicated(runs: Path, step: str, wind: float, seed: int) -> dict[str, Any]
     size, dtype = NOISE[wind > 0]
     generator = stream(seed, "validate-flags", "reference", step, f"{wind:g}")
     noise = generator.normal(0, size, (REPLICATES, *scene.position.shape))
-    system, state = assemble([replace(scene, position=scene.position + n) for n in noise], dtype=dtype)
+    system, state = assemble(
+        [replace(scene, position=scene.position + n) for n in noise], dtype=dtype
+    )
     edge, track = _edge(), []
     for _ in range(LAST):
         track.append(state.position[edge].numpy())
@@ -173,14 +184,20 @@ def _compared(ours: FloatArray, theirs: FloatArray) -> dict[str, Any]:
 def draw_reference(
     gaps: Mapping[str, Mapping[str, list[float | None]]], compared: Mapping[str, Any], path: Path
 ) -> None:
-    """Above: vertex distances against frame. Below: settled statistics of replicates, and the reference's one run."""
+    """Above: vertex distances against frame. Below: settled statistics of replicates, and the
+    reference's one run."""
     figure = Figure(figsize=(12.5, 7.4), layout="constrained")
     upper, lower = figure.subfigures(2, 1, height_ratios=(1.25, 1))
     for axes, (run, methods) in zip(upper.subplots(1, 5, sharey=True), gaps.items(), strict=True):
         for (name, values), colour in zip(methods.items(), _colours(methods), strict=True):
             style = ":" if name.startswith("moved") else "-"
             axes.semilogy(
-                range(1, SHORT + 1), 1e3 * np.array(values, dtype=np.float64), style, color=colour, lw=1.2, label=name
+                range(1, SHORT + 1),
+                1e3 * np.array(values, dtype=np.float64),
+                style,
+                color=colour,
+                lw=1.2,
+                label=name,
             )
         start = 1
         for frame, band in ACCEPTANCE.items():
@@ -228,17 +245,25 @@ def draw_reference(
             band = {"speed": 0.15, "frequency": 0.20}.get(name)
             half = band * rows[name]["reference"] if band else 0.05
             axes.plot(
-                [place - 0.15] * 2, [rows[name]["reference"] - half, rows[name]["reference"] + half], "k-", lw=0.8
+                [place - 0.15] * 2,
+                [rows[name]["reference"] - half, rows[name]["reference"] + half],
+                "k-",
+                lw=0.8,
             )
         axes.set(ylabel=f"free edge, {label}", xlim=(-0.5, len(compared) - 0.5))
-        axes.set_xticks(range(len(compared)), [run.replace(", ", "\n") for run in compared], fontsize=8)
+        axes.set_xticks(
+            range(len(compared)), [run.replace(", ", "\n") for run in compared], fontsize=8
+        )
     panels[3].legend(frameon=False, fontsize=8)
     lower.suptitle(
-        f"Settled, frames {FIRST} to {LAST - 1}, {REPLICATES} starts with 0.1 mm of noise (1 nm without wind); black "
+        f"Settled, frames {FIRST} to {LAST - 1}, {REPLICATES} starts with 0.1 mm of noise (1 nm "
+        "without wind); black "
         "bars: accepted (5 cm, 15 %, 20 %), coloured: standard deviation of one run",
         fontsize=9,
     )
-    upper.suptitle("The same flag, mesh, material and wind; contact and strain limits off", fontsize=10)
+    upper.suptitle(
+        "The same flag, mesh, material and wind; contact and strain limits off", fontsize=10
+    )
     figure.savefig(path, dpi=95)
 
 

@@ -1,14 +1,17 @@
-"""The loop closed on seven experiments of ArcSim whose undeclared effect is known, by three draws of nulls.
+"""The loop closed on seven experiments of ArcSim whose undeclared effect is known, by three draws
+of nulls.
 
-Each is three winds of 10 s on an irregular mesh of 486 vertices: nothing undeclared, the pressure of the air × 1.6, a
-linear tangential drag, an internal damping of 30 ms, a wind turned by 10°, one that varies by 20 % at 0.5 Hz along
-itself, and a hoist that is attached along its length though two corners are declared. A verdict is right if it names
-what acted, alone or as one of several, and names nothing where only a calibrated parameter differs. All are judged by
-the same bank of nulls, and then by banks that were drawn anew: verdicts that differ between them depend on the draw.
+Each is three winds of 10 s on an irregular mesh of 486 vertices: nothing undeclared, the pressure
+of the air × 1.6, a linear tangential drag, an internal damping of 30 ms, a wind turned by 10°, one
+that varies by 20 % at 0.5 Hz along itself, and a hoist that is attached along its length though two
+corners are declared. A verdict is right if it names what acted, alone or as one of several, and
+names nothing where only a calibrated parameter differs. All are judged by the same bank of nulls,
+and then by banks that were drawn anew: verdicts that differ between them depend on the draw.
 The verdicts are made twice: with the weight's uncertainty not given, and given as 2 %.
 
-The others are damped by ArcSim's steps alone, like 2.5 ms where a motion is slow beside them and less where it is
-not, so that only for that of 30 ms it is reported whether the interval of damping contains the true value.
+The others are damped by ArcSim's steps alone, like 2.5 ms where a motion is slow beside them and
+less where it is not, so that only for that of 30 ms it is reported whether the interval of damping
+contains the true value.
 """
 
 from __future__ import annotations
@@ -48,10 +51,11 @@ WINDS = (3, 5, 7)
 DRAWS = tuple(range(1, 1 + int(os.environ.get("FLAGDATA_DRAWS", "3"))))
 """Of the nulls, some 13 minutes of a core each; FLAGDATA_DRAWS says how many."""
 KNOWN = tuple(
-    float(known) for known in os.environ.get("FLAGDATA_KNOWN", f"{AREA_WEIGHT_UNCERTAINTY:g},0.02").split(",")
+    float(known)
+    for known in os.environ.get("FLAGDATA_KNOWN", f"{AREA_WEIGHT_UNCERTAINTY:g},0.02").split(",")
 )
-"""Relative standard uncertainties of the area weight that is declared: where it is not given, and of a cloth that was
-weighed; FLAGDATA_KNOWN says which are tried."""
+"""Relative standard uncertainties of the area weight that is declared: where it is not given, and
+of a cloth that was weighed; FLAGDATA_KNOWN says which are tried."""
 WORKERS = int(os.environ.get("FLAGDATA_WORKERS", "0")) or len(os.sched_getaffinity(0))
 """Processes that simulate the nulls; FLAGDATA_WORKERS says how many."""
 _UNIT = 1e-4  # m, of the stored positions
@@ -84,22 +88,33 @@ CASES = {
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
-    """Verdicts; what is missing where the reference runs are. Nulls and verdicts of a draw stay in `out`, so that a run
-    that was stopped goes on where it was."""
+    """Verdicts; what is missing where the reference runs are. Nulls and verdicts of a draw stay in
+    `out`, so that a run that was stopped goes on where it was."""
     runs = folder()
     if runs is None or not (runs / "jittered").is_dir():
         return dict(ABSENT)
-    experiments = {known: {name: _experiment(runs / "jittered", name, known) for name in CASES} for known in KNOWN}
+    experiments = {
+        known: {name: _experiment(runs / "jittered", name, known) for name in CASES}
+        for known in KNOWN
+    }
     results: dict[str, Any] = {"criteria": CRITERIA.as_dict()}
     setting = Setting.of(experiments[KNOWN[0]]["null"])
     for draw in DRAWS:
         place = out / f"arcsim-jittered-{seed}-{draw}"
         wanted = batches(setting, kinds=CRITERIA.simulated_kinds, seed=100 * seed + draw)
-        banks.build(place / "nulls", wanted, workers=WORKERS, progress=lambda done: _report(f"nulls + {done}"))
+        banks.build(
+            place / "nulls",
+            wanted,
+            workers=WORKERS,
+            progress=lambda done: _report(f"nulls + {done}"),
+        )
         for known, group in experiments.items():
             heading = _heading(draw, known)
             results[heading] = {name: _once(place, name, own, seed) for name, own in group.items()}
-            _report(f"{heading}: {sum(own['right'] for own in results[heading].values())} of {len(group)} right")
+            _report(
+                f"{heading}: {sum(own['right'] for own in results[heading].values())} of "
+                f"{len(group)} right"
+            )
     (out / "validate-arcsim-jittered.md").write_text(_page(results), encoding="utf-8")
     return results
 
@@ -116,14 +131,18 @@ def _once(place: Path, name: str, experiment: Experiment, seed: int) -> dict[str
     """A verdict as the page reports it, from its file where it was made before."""
     kept = place / f"{name}-{experiment.specimen.area_weight_uncertainty:g}.json"
     if not kept.exists():
-        record = _record(close_loop(experiment, LoopOptions(bank=place / "nulls", seed=seed)), CASES[name])
+        record = _record(
+            close_loop(experiment, LoopOptions(bank=place / "nulls", seed=seed)), CASES[name]
+        )
         kept.write_text(json.dumps(record, allow_nan=False), encoding="utf-8")
     return json.loads(kept.read_text(encoding="utf-8"))
 
 
 def _experiment(runs: Path, name: str, known: float = AREA_WEIGHT_UNCERTAINTY) -> Experiment:
     setup = Setup(material=CAMEL, area_weight_uncertainty=known, pins=Hold.HOIST_CORNERS)
-    return observe([_recording(runs / f"{name}_w{wind}.npz", wind) for wind in WINDS], setup).experiment
+    return observe(
+        [_recording(runs / f"{name}_w{wind}.npz", wind) for wind in WINDS], setup
+    ).experiment
 
 
 def _recording(path: Path, wind: int) -> Observation:
@@ -168,7 +187,12 @@ def _record(verdict: Verdict, truth: Truth) -> dict[str, Any]:
             for c in verdict.ranking[:_SHOWN]
         ],
         "unseen": [
-            {"what": c.what, "before": c.before.value, "after": c.after.value, "floor": c.floor.value}
+            {
+                "what": c.what,
+                "before": c.before.value,
+                "after": c.after.value,
+                "floor": c.floor.value,
+            }
             for c in verdict.comparisons
         ],
         "words": verdict.words,
@@ -177,11 +201,15 @@ def _record(verdict: Verdict, truth: Truth) -> dict[str, Any]:
 
 
 def _right(verdict: Verdict, truth: Truth) -> bool:
-    """Whether it names what acted, alone or as one of several, or nothing where nothing did, whether
-    that is decided or not. A parameter of the base model that is not the nominal cloth's is no effect."""
+    """Whether it names what acted, alone or as one of several, or nothing where nothing did,
+    whether that is decided or not. A parameter of the base model that is not the nominal cloth's is
+    no effect."""
     if not truth.effect:
         return verdict.conclusion in (Conclusion.SUFFICIENT, Conclusion.UNDECIDED)
-    return verdict.conclusion in (Conclusion.EFFECT, Conclusion.ONE_OF) and truth.effect in verdict.named
+    return (
+        verdict.conclusion in (Conclusion.EFFECT, Conclusion.ONE_OF)
+        and truth.effect in verdict.named
+    )
 
 
 def _interval(found: Estimate, true: float | None) -> dict[str, Any]:
@@ -203,18 +231,23 @@ def _table(heading: str, verdicts: Mapping[str, Any]) -> list[str]:
     lines = [
         f"## {heading}",
         "",
-        "| what acted | verdict | p | area weight, of nominal | bending, of nominal | damping [ms] | right | s |",
+        "| what acted | verdict | p | area weight, of nominal | bending, of nominal | damping [ms] "
+        "| right | s |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for name, own in verdicts.items():
         found = own["parameters"]
         lines.append(
-            f"| {name} | {own['said']}{': ' * bool(own['named'])}{', '.join(own['named'])} | {own['p']:.3f} "
-            f"[{own['p low']:.3f}, {own['p high']:.3f}] | {_span(found['area_weight'])} | {_span(found['bending'])} | "
-            f"{_span(found['damping'], 1e3)} | {'yes' if own['right'] else 'no'} | {own['seconds']} |"
+            f"| {name} | {own['said']}{': ' * bool(own['named'])}{', '.join(own['named'])} | "
+            f"{own['p']:.3f} "
+            f"[{own['p low']:.3f}, {own['p high']:.3f}] | {_span(found['area_weight'])} | "
+            f"{_span(found['bending'])} | "
+            f"{_span(found['damping'], 1e3)} | {'yes' if own['right'] else 'no'} | "
+            f"{own['seconds']} |"
         )
     unseen = [
-        f"| {name} | {c['what']} | {1e3 * c['before']:.1f} | {1e3 * c['after']:.1f} | {1e3 * c['floor']:.1f} |"
+        f"| {name} | {c['what']} | {1e3 * c['before']:.1f} | {1e3 * c['after']:.1f} | "
+        f"{1e3 * c['floor']:.1f} |"
         for name, own in verdicts.items()
         for c in own["unseen"]
     ]
@@ -244,5 +277,7 @@ def _strength(candidate: Mapping[str, Any]) -> str:
 
 
 def _span(found: Mapping[str, Any], unit: float = 1.0) -> str:
-    interval = f"{unit * found['value']:.3g} [{unit * found['low']:.3g}, {unit * found['high']:.3g}]"
+    interval = (
+        f"{unit * found['value']:.3g} [{unit * found['low']:.3g}, {unit * found['high']:.3g}]"
+    )
     return f"{interval}, misses" if found["covers"] is False else interval

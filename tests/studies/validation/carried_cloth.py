@@ -1,9 +1,11 @@
-"""A verdict on a real cloth that a robot swings in still air, by nulls that are carried along the same ways.
+"""A verdict on a real cloth that a robot swings in still air, by nulls that are carried along the
+same ways.
 
-One repeat of each of four programmes makes an experiment, each from when its nodes begin to move. The depth camera's
-nodes come at uneven stamps of about 10 Hz and are brought to 10 Hz by splines; its pins are where the camera shows the
-upper corners, as `close-loop` takes them of any recording. As a control, recordings are made along the same ways by a
-mesh and steps of their own, without an effect and with a strong one, and judged by the same nulls.
+One repeat of each of four programmes makes an experiment, each from when its nodes begin to move.
+The depth camera's nodes come at uneven stamps of about 10 Hz and are brought to 10 Hz by splines;
+its pins are where the camera shows the upper corners, as `close-loop` takes them of any recording.
+As a control, recordings are made along the same ways by a mesh and steps of their own, without an
+effect and with a strong one, and judged by the same nulls.
 """
 
 from __future__ import annotations
@@ -24,7 +26,16 @@ from measure.forecasting import Calibration, Setting
 from measure.loop import LoopOptions
 from measure.nulls import NullBatch, null_plan, tracks
 from measure.nulls import bank as banks
-from measure.observe import Experiment, Hold, Observation, Setup, WindTrack, from_arrays, observe, sheet
+from measure.observe import (
+    Experiment,
+    Hold,
+    Observation,
+    Setup,
+    WindTrack,
+    from_arrays,
+    observe,
+    sheet,
+)
 from measure.verdict import Verdict
 from sim.cloth.material import named_material
 from sim.effects import EFFECTS, Effect
@@ -87,8 +98,8 @@ def setup(cloth: Cloth) -> Setup:
 
 
 def observed(cloth: Cloth, swing: Swing) -> Observation:
-    """`LASTING` of a recording at `RATE` from when its upper corners have moved, each node by a spline through where it
-    was tracked."""
+    """`LASTING` of a recording at `RATE` from when its upper corners have moved, each node by a
+    spline through where it was tracked."""
     upper = swing.positions[:, list(cloth.upper)].mean(axis=1)
     away = np.linalg.norm(upper - swing.hanging[list(cloth.upper)].mean(axis=0), axis=1)
     begins = float(swing.times[int(np.argmax(np.nan_to_num(away) > _MOVED))])
@@ -96,9 +107,15 @@ def observed(cloth: Cloth, swing: Swing) -> Observation:
     positions = np.empty((len(times), swing.side**2, 3))
     for node in range(swing.side**2):
         tracked = np.isfinite(swing.positions[:, node]).all(axis=1)
-        positions[:, node] = CubicSpline(swing.times[tracked], swing.positions[tracked, node])(times)
+        positions[:, node] = CubicSpline(swing.times[tracked], swing.positions[tracked, node])(
+            times
+        )
     return from_arrays(
-        name=swing.name, positions=positions, rest=_places(cloth), rate=RATE, wind=WindTrack.constant((0.0, 0.0, 0.0))
+        name=swing.name,
+        positions=positions,
+        rest=_places(cloth),
+        rate=RATE,
+        wind=WindTrack.constant((0.0, 0.0, 0.0)),
     )
 
 
@@ -131,7 +148,8 @@ def page(document: dict[str, Any]) -> str:
         "",
         _DATA.format(**document),
         "",
-        "| data | conclusion | p | statistic | nulls' largest | error of forecasts [mm] | density, bending, damping |",
+        "| data | conclusion | p | statistic | nulls' largest | error of forecasts [mm] | density, "
+        "bending, damping |",
         "|---|---|---|---|---|---|---|",
         *(f"| {name} | {_cells(row)} |" for name, row in document["verdicts"].items()),
         "",
@@ -141,17 +159,22 @@ def page(document: dict[str, Any]) -> str:
 
 
 _DATA = (
-    "{seconds:g} s of one repeat of each of four programmes, {rate:g} Hz, in still air, by a mesh of {vertices} "
-    "vertices; {kinds} kinds of nulls, carried along the same ways from other instants on, judged at 0.05. Controls "
+    "{seconds:g} s of one repeat of each of four programmes, {rate:g} Hz, in still air, by a mesh "
+    "of {vertices} "
+    "vertices; {kinds} kinds of nulls, carried along the same ways from other instants on, judged "
+    "at 0.05. Controls "
     "are made along these ways by a mesh and steps of their own and judged by the same nulls."
 )
 
 
 def _cells(row: dict[str, Any]) -> str:
-    values = ", ".join(f"{row['parameters'][name]:.3g}" for name in ("density", "bending", "damping"))
+    values = ", ".join(
+        f"{row['parameters'][name]:.3g}" for name in ("density", "bending", "damping")
+    )
     called = f"{row['conclusion']}{': ' if row['named'] else ''}{', '.join(row['named'])}"
     return (
-        f"{called} | {row['p']:.3f} | {row['statistic']:.1f} | {row['largest_null']:.1f} | {1e3 * row['error']:.1f} | "
+        f"{called} | {row['p']:.3f} | {row['statistic']:.1f} | {row['largest_null']:.1f} | "
+        f"{1e3 * row['error']:.1f} | "
         f"{values}"
     )
 
@@ -176,7 +199,9 @@ def _row(verdict: Verdict) -> dict[str, Any]:
 def _bank(experiment: Experiment, seed: int) -> LoopOptions:
     """By `KINDS` kinds of nulls of an experiment's own ways."""
     setting = Setting.of(experiment)
-    null_plan.simulate_bank(setting, nulls=KINDS * banks.WINDS, seed=seed, workers=2, stage=lambda *_: None)
+    null_plan.simulate_bank(
+        setting, nulls=KINDS * banks.WINDS, seed=seed, workers=2, stage=lambda *_: None
+    )
     return LoopOptions(seed=seed, bank=null_plan.kept_in(setting, seed=seed))
 
 

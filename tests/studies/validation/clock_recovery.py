@@ -1,8 +1,8 @@
 """Is the hidden offset of two clocks found, and does its interval cover it as often as it says?
 
-Field recordings of 10 minutes are made with drawn flags in gusty wind, each with a hidden offset; the clock
-estimator gets the frames (as uint8 pictures at 25 Hz) and the anemometer's log alone. As many recordings in steady wind
-must all be refused.
+Field recordings of 10 minutes are made with drawn flags in gusty wind, each with a hidden offset;
+the clock estimator gets the frames (as uint8 pictures at 25 Hz) and the anemometer's log alone. As
+many recordings in steady wind must all be refused.
 """
 
 from __future__ import annotations
@@ -30,7 +30,9 @@ _RECORDINGS = 20
 def _estimate(recipe: DrawnRecipe) -> tuple[LagEstimate, float]:
     start = from_datetime(START)
     pictures = DrawnFlag().frames(recipe.at_frames(), recipe.rate, stream(recipe.seed, "camera"))
-    motion = motion_energy((start + i * NANOSECONDS // _RATE, picture) for i, picture in enumerate(pictures))
+    motion = motion_energy(
+        (start + i * NANOSECONDS // _RATE, picture) for i, picture in enumerate(pictures)
+    )
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "anemometer.csv"
         offset = write_drawn_log(log, recipe)
@@ -39,7 +41,9 @@ def _estimate(recipe: DrawnRecipe) -> tuple[LagEstimate, float]:
         series = read_log(log, WindOptions(recipe=str(recipe_file), zone=ZONE)).series
     bins = wind_bins(series)
     search = LagSearch(stamp_sigma=bins.sigma)
-    estimate = estimate_offset(motion, bins.average, search=search, generator=stream(recipe.seed, "surrogates"))
+    estimate = estimate_offset(
+        motion, bins.average, search=search, generator=stream(recipe.seed, "surrogates")
+    )
     return estimate, offset
 
 
@@ -60,7 +64,9 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         "median_error_s": float(np.median(errors)),
         "largest_error_s": float(errors.max()),
         "within_half_a_second": int((errors <= 0.5).sum()),
-        "covered_by_90_percent_interval": sum(e.interval[0] <= o <= e.interval[1] for e, o in gusty if e.is_accepted),
+        "covered_by_90_percent_interval": sum(
+            e.interval[0] <= o <= e.interval[1] for e, o in gusty if e.is_accepted
+        ),
         "median_sigma_s": float(np.median([e.sigma for e, _ in gusty if e.is_accepted])),
         "steady_recordings": len(steady),
         "steady_refused": sum(not e.is_accepted for e in steady),

@@ -1,9 +1,10 @@
-"""A data set built on one machine, and into a bucket by four workers of which one is killed and one preempted.
+"""A data set built on one machine, and into a bucket by four workers of which one is killed and one
+preempted.
 
-The command reaches the bucket and the scheduler through forwarders that count its bytes; the workers reach both
-directly. At `KILLED` of all sequences and films one worker is ended by SIGKILL, at `PREEMPTED` another by SIGTERM, as a
-batch system takes a node back. Aims: the rows and objects that one machine makes, and at most 1 % of all bytes through
-the command.
+The command reaches the bucket and the scheduler through forwarders that count its bytes; the
+workers reach both directly. At `KILLED` of all sequences and films one worker is ended by SIGKILL,
+at `PREEMPTED` another by SIGTERM, as a batch system takes a node back. Aims: the rows and objects
+that one machine makes, and at most 1 % of all bytes through the command.
 """
 
 from __future__ import annotations
@@ -88,7 +89,9 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         os.environ.update(direct)
         ended = [
             _end(workers[place], signal_, build, lake, share)
-            for place, (signal_, share) in enumerate(((signal.SIGKILL, KILLED), (signal.SIGTERM, PREEMPTED)))
+            for place, (signal_, share) in enumerate(
+                ((signal.SIGKILL, KILLED), (signal.SIGTERM, PREEMPTED))
+            )
         ]
         if build.wait() != 0:
             raise RuntimeError("the build on the cluster failed: read its messages above")
@@ -122,7 +125,17 @@ def _build(
     lake: object, *, workers: Sequence[str], environment: Mapping[str, str] | None = None
 ) -> subprocess.Popen[bytes]:
     counts = ["--sequences", str(SEQUENCES), "--films", str(FILMS)]
-    command = [sys.executable, "-m", "flagdata.cli", "build", RECIPE, *counts, "--lake", str(lake), *workers]
+    command = [
+        sys.executable,
+        "-m",
+        "flagdata.cli",
+        "build",
+        RECIPE,
+        *counts,
+        "--lake",
+        str(lake),
+        *workers,
+    ]
     return subprocess.Popen(command, env={**os.environ, **(environment or {})})
 
 
@@ -142,11 +155,15 @@ def _worker(scheduler: str, environment: Mapping[str, str]) -> Iterator[subproce
 
 
 @contextmanager
-def _running(*command: str, environment: Mapping[str, str] | None = None) -> Iterator[subprocess.Popen[bytes]]:
+def _running(
+    *command: str, environment: Mapping[str, str] | None = None
+) -> Iterator[subprocess.Popen[bytes]]:
     dask = shutil.which("dask", path=str(Path(sys.executable).parent))
     if dask is None:
         raise RuntimeError("Dask is not installed: pip install 'flagdata[cluster]'")
-    process = subprocess.Popen([dask, *command], env={**os.environ, **(environment or {})}, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(
+        [dask, *command], env={**os.environ, **(environment or {})}, stderr=subprocess.DEVNULL
+    )
     try:
         yield process
     finally:
@@ -155,7 +172,11 @@ def _running(*command: str, environment: Mapping[str, str] | None = None) -> Ite
 
 
 def _end(
-    worker: subprocess.Popen[bytes], signal_: signal.Signals, build: subprocess.Popen[bytes], lake: str, share: float
+    worker: subprocess.Popen[bytes],
+    signal_: signal.Signals,
+    build: subprocess.Popen[bytes],
+    lake: str,
+    share: float,
 ) -> int:
     """Ends a worker once a share of the work is in the lake; how many artifacts that were."""
     while build.poll() is None:

@@ -1,6 +1,8 @@
-"""A whole data set built twice: without interruption, and killed on the way; compared, loaded, and tested for leaks.
+"""A whole data set built twice: without interruption, and killed on the way; compared, loaded, and
+tested for leaks.
 
-Takes as long as two builds (`flagdata build flagsim-small --plan`), and twice its size on the disk meanwhile.
+Takes as long as two builds (`flagdata build flagsim-small --plan`), and twice its size on the disk
+meanwhile.
 """
 
 from __future__ import annotations
@@ -36,14 +38,18 @@ KILLS = (0.1, 0.35, 0.7)
 """Shares of all sequences and films at which the second build is killed."""
 WORKERS = 2
 BATCH = 16
-DEALS, TOGETHER = 400, 20  # of the parameters to other sequences, and how many of them are guessed at once
+DEALS, TOGETHER = (
+    400,
+    20,
+)  # of the parameters to other sequences, and how many of them are guessed at once
 UNEQUAL = ("created", "code_version")
 """Columns that say when a row was committed, and by which commit of the code."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Built:
-    """A lake with the data set, the seconds its last build took, and how many artifacts it had at each kill."""
+    """A lake with the data set, the seconds its last build took, and how many artifacts it had at
+    each kill."""
 
     lake: Path
     seconds: float
@@ -51,7 +57,8 @@ class Built:
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
-    """Both builds and what is found in them; the recipe has its own seed, and no picture is drawn."""
+    """Both builds and what is found in them; the recipe has its own seed, and no picture is
+    drawn."""
     del seed, out
     with tempfile.TemporaryDirectory(prefix="flagdata-datasets-") as folder:
         unbroken = build(Path(folder) / "unbroken", kills=())
@@ -59,7 +66,8 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
 
 
 def build(lake: Path, *, kills: Sequence[float]) -> Built:
-    """Build the data set in a process of its own, killed with all its workers at these shares of the work."""
+    """Build the data set in a process of its own, killed with all its workers at these shares of
+    the work."""
     recipe = load(RECIPE)
     work = sum(side.sequences + side.renders for side in recipe.sides)
     found: list[int] = []
@@ -79,14 +87,26 @@ def build(lake: Path, *, kills: Sequence[float]) -> Built:
 
 
 def _start(lake: Path) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "flagdata.cli", "build", RECIPE, "--lake", str(lake), "--workers", str(WORKERS)]
+    command = [
+        sys.executable,
+        "-m",
+        "flagdata.cli",
+        "build",
+        RECIPE,
+        "--lake",
+        str(lake),
+        "--workers",
+        str(WORKERS),
+    ]
     return subprocess.Popen(command, start_new_session=True)
 
 
 def artifacts(lake: Path | str) -> int:
     """Counts the sequences and films in the lake; 0 while there is none."""
     with suppress(FlagdataError, OSError):
-        return Lake.open(lake).rows("kind in ('meshes', 'recording')", columns=["artifact"]).num_rows
+        return (
+            Lake.open(lake).rows("kind in ('meshes', 'recording')", columns=["artifact"]).num_rows
+        )
     return 0
 
 
@@ -94,7 +114,9 @@ def evidence(unbroken: Built, killed: Built) -> dict[str, Any]:
     """All that is found in the two lakes, as JSON."""
     recipe, lake = load(RECIPE), Lake.open(unbroken.lake)
     rows = lake.rows(columns=["kind", "object", "object_bytes"]).to_pylist()
-    sizes = {row["object"]: row["object_bytes"] or 0 for row in rows}  # clips are rows of their recording's object
+    sizes = {
+        row["object"]: row["object_bytes"] or 0 for row in rows
+    }  # clips are rows of their recording's object
     return {
         "recipe": recipe.name,
         "recipe_hash": recipe.hash,
@@ -112,11 +134,16 @@ def evidence(unbroken: Built, killed: Built) -> dict[str, Any]:
 
 
 def compare(one: Lake, other: Lake) -> dict[str, Any]:
-    """Row by row and column by column; objects are re-hashed in both, so that equal names are equal bytes."""
-    first, second = ({row["artifact"]: row for row in lake.rows().to_pylist()} for lake in (one, other))
+    """Row by row and column by column; objects are re-hashed in both, so that equal names are equal
+    bytes."""
+    first, second = (
+        {row["artifact"]: row for row in lake.rows().to_pylist()} for lake in (one, other)
+    )
     common = sorted(first.keys() & second.keys())
     columns = [column for column in CATALOG if column not in UNEQUAL]
-    different = Counter(column for id_ in common for column in columns if first[id_][column] != second[id_][column])
+    different = Counter(
+        column for id_ in common for column in columns if first[id_][column] != second[id_][column]
+    )
     names = [sorted(object_names(lake)) for lake in (one, other)]
     return {
         "rows": [len(first), len(second)],
@@ -126,7 +153,9 @@ def compare(one: Lake, other: Lake) -> dict[str, Any]:
         "rows_that_differ_by_column": dict(different),
         "objects": [len(names[0]), len(names[1])],
         "same_objects": names[0] == names[1],
-        "objects_missing_or_changed": [len(verify(lake, own)) for lake, own in zip((one, other), names, strict=True)],
+        "objects_missing_or_changed": [
+            len(verify(lake, own)) for lake, own in zip((one, other), names, strict=True)
+        ],
     }
 
 
@@ -135,7 +164,9 @@ def loading(lake: Path, recipe: DatasetRecipe) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for side in recipe.sides:
         sure = Tolerance(clock_sigma=0.5)
-        pairs = flagdata.open(lake).pairs({"dataset": recipe.name}, split=side.name, tolerance=sure, seed=0)
+        pairs = flagdata.open(lake).pairs(
+            {"dataset": recipe.name}, split=side.name, tolerance=sure, seed=0
+        )
         begun, clips = time.perf_counter(), 0
         for batch in pairs.loader(BATCH, workers=WORKERS):
             clips += len(batch.wind)
@@ -151,10 +182,12 @@ def loading(lake: Path, recipe: DatasetRecipe) -> dict[str, Any]:
 
 
 def leak(lake: Lake, recipe: DatasetRecipe) -> dict[str, Any]:
-    """How well wind, θ and ζ are guessed from what surrounds the pictures, and how well if they were dealt by chance.
+    """How well wind, θ and ζ are guessed from what surrounds the pictures, and how well if they
+    were dealt by chance.
 
-    The interval of an accuracy is that of chance: 95 % of deals of the same parameters to other sequences. The one test
-    over all parameters compares the best accuracy with the best of each deal.
+    The interval of an accuracy is that of chance: 95 % of deals of the same parameters to other
+    sequences. The one test over all parameters compares the best accuracy with the best of each
+    deal.
     """
     around = surroundings(lake, recipe)
     targets = [name for name in around.parameters[0] if _drawn(around, name)]
@@ -163,7 +196,9 @@ def leak(lake: Lake, recipe: DatasetRecipe) -> dict[str, Any]:
     found = accuracies(around.features, labels, around.sequence)
     chances: dict[str, list[np.ndarray]] = {guess: [] for guess in found}
     for _ in range(DEALS // TOGETHER):
-        deals = np.concatenate([labels[dealt_anew(around.sequence, rng)] for _ in range(TOGETHER)], axis=1)
+        deals = np.concatenate(
+            [labels[dealt_anew(around.sequence, rng)] for _ in range(TOGETHER)], axis=1
+        )
         for guess, values in accuracies(around.features, deals, around.sequence).items():
             chances[guess].append(values.reshape(TOGETHER, len(targets)))
     result: dict[str, Any] = {
@@ -178,7 +213,9 @@ def leak(lake: Lake, recipe: DatasetRecipe) -> dict[str, Any]:
         chance = np.concatenate(chances[guess])
         low, high = np.quantile(chance, [0.025, 0.975], axis=0)
         best = chance.max(axis=1)
-        above = [name for name, value, most in zip(targets, values, high, strict=True) if value > most]
+        above = [
+            name for name, value, most in zip(targets, values, high, strict=True) if value > most
+        ]
         result[guess] = {
             "best": float(values.max()),
             "best_of": targets[int(values.argmax())],
@@ -198,20 +235,34 @@ def _different(around: Surroundings, feature: str) -> int:
 
 
 def _drawn(around: Surroundings, name: str) -> bool:
-    """Whether a parameter is of wind, θ, ζ or anemometer, and drawn. A camera's shows in its JPEGs, as it should."""
+    """Whether a parameter is of wind, θ, ζ or anemometer, and drawn. A camera's shows in its JPEGs,
+    as it should."""
     return not name.startswith("camera.") and len({film[name] for film in around.parameters}) > 1
 
 
 def surroundings(lake: Lake, recipe: DatasetRecipe) -> Surroundings:
-    """Of all films of a data set, by the catalog; a name among the parameters is 0 or 1 for each there is."""
+    """Of all films of a data set, by the catalog; a name among the parameters is 0 or 1 for each
+    there is."""
     columns = ["name", "seed", "object", "object_bytes", "parameters"]
     rows = lake.rows({"kind": Kind.RECORDING, "dataset": recipe.name}, columns=columns).to_pylist()
     features = [
-        features_of(row["name"], Record.open(lake.object_path(row["object"])), order=order, size=row["object_bytes"])
+        features_of(
+            row["name"],
+            Record.open(lake.object_path(row["object"])),
+            order=order,
+            size=row["object_bytes"],
+        )
         for order, row in enumerate(rows)
     ]
     drawn = [json.loads(row["parameters"]) for row in rows]
-    kinds = sorted({(key, _kind(value)) for film in drawn for key, value in film.items() if isinstance(value, str)})
+    kinds = sorted(
+        {
+            (key, _kind(value))
+            for film in drawn
+            for key, value in film.items()
+            if isinstance(value, str)
+        }
+    )
     return Surroundings(
         features=np.array(features),
         sequence=np.array([row["seed"] for row in rows]),

@@ -1,8 +1,10 @@
-"""Measured drapes of five fabrics: bending by its own simulation, specimens left out predicted, faces compared.
+"""Measured drapes of five fabrics: bending by its own simulation, specimens left out predicted,
+faces compared.
 
-The criteria are in docs/decisions/074-drapes.md. The drapes are in the reference data; without them only the verdicts
-on simulated drapes are made. `shapes` reads a fabric: the published flat coordinates are shifted by one vertex, and the
-last one is missing, which lies at the gap of the rim.
+The criteria are in docs/decisions/074-drapes.md. The drapes are in the reference data; without them
+only the verdicts on simulated drapes are made. `shapes` reads a fabric: the published flat
+coordinates are shifted by one vertex, and the last one is missing, which lies at the gap of the
+rim.
 """
 
 from __future__ import annotations
@@ -54,11 +56,17 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     for number, name in enumerate(FABRICS, start=1):
         weight, faces = shapes(folder / f"fabric{number}_{name}.npz")
         results[name] = fabric(surface, weight, faces, seed=seed)
-    truths = {f"{curvature:g} 1/m": fabric(surface, 0.2, made(curvature), seed=seed) for curvature in TRUTHS}
+    truths = {
+        f"{curvature:g} 1/m": fabric(surface, 0.2, made(curvature), seed=seed)
+        for curvature in TRUTHS
+    }
     passed = [name for name, result in results.items() if result["drape_coefficient_passed"]]
     result = {
         "simulations": SIMULATIONS,
-        "residual": {"drape_coefficient": float(surface.residual[0]), "lobe": float(surface.residual[1])},
+        "residual": {
+            "drape_coefficient": float(surface.residual[0]),
+            "lobe": float(surface.residual[1]),
+        },
         "passed": passed,
         "fabrics": results,
         "simulated": truths,
@@ -85,11 +93,14 @@ def shapes(path: Path) -> tuple[float, list[Face]]:
     flat = Mesh(rest=rest, faces=faces)
     rim = rim_of(flat)
     figures = np.stack([shape_of(flat, frame, rim=rim).numbers() for frame in position])
-    return weight, [Face(shapes=figures[up], specimen=specimen[up]) for up in (capture <= 2, capture > 2)]
+    return weight, [
+        Face(shapes=figures[up], specimen=specimen[up]) for up in (capture <= 2, capture > 2)
+    ]
 
 
 def made(curvature: float) -> list[Face]:
-    """Simulates nine specimens of a cloth, draped twice on either face, on another mesh than the fit's."""
+    """Simulates nine specimens of a cloth, draped twice on either face, on another mesh than the
+    fit's."""
     faces = []
     for sign in (1, -1):
         values = {
@@ -114,7 +125,10 @@ def fabric(surface: Surface, weight: float, faces: list[Face], *, seed: int) -> 
     scatter = together(faces).scatter
     repeats = float(np.sqrt(np.mean([face.scatter**2 for face in faces])))
     models = {model.value: fit_drapes(surface, faces, model=model, seed=seed) for model in Model}
-    errors = {model.value: float(np.sqrt(np.mean([t["squares"][model.value] for t in thirds]))) for model in Model}
+    errors = {
+        model.value: float(np.sqrt(np.mean([t["squares"][model.value] for t in thirds])))
+        for model in Model
+    }
     curled = models[Model.CURLED.value]
     found = bool(test.pvalue < SIGNIFICANCE and abs(difference.mean()) > repeats / 3)
     half, rival = errors["base"] / 2, models[Model.SIDED.value]
@@ -139,20 +153,30 @@ def fabric(surface: Surface, weight: float, faces: list[Face], *, seed: int) -> 
             "p": float(test.pvalue),
             "same_sign": int((np.sign(difference) == np.sign(difference.mean())).sum()),
             "found": found,
-            "named": found and errors[curled.model.value] < half and curled.evidence >= rival.evidence,
+            "named": found
+            and errors[curled.model.value] < half
+            and curled.evidence >= rival.evidence,
             "control": errors[Model.WET.value] / errors["base"],
             "errors": errors,
-            "evidence": {name: fit.evidence - models["base"].evidence for name, fit in models.items()},
+            "evidence": {
+                name: fit.evidence - models["base"].evidence for name, fit in models.items()
+            },
             "rest_curvature": interval(curled.cloth[CURVATURE.name]),
             "lobe_difference": lobes(faces, curled.direction),
-            "lobe_difference_of_rest_curvature": interval(curled.predicted[:, 1, 1] - curled.predicted[:, 0, 1]),
-            "difference_of_rest_curvature": interval(curled.predicted[:, 1, 0] - curled.predicted[:, 0, 0]),
+            "lobe_difference_of_rest_curvature": interval(
+                curled.predicted[:, 1, 1] - curled.predicted[:, 0, 1]
+            ),
+            "difference_of_rest_curvature": interval(
+                curled.predicted[:, 1, 0] - curled.predicted[:, 0, 0]
+            ),
             "sidedness": interval(models[Model.SIDED.value].cloth["sidedness"]),
         },
     }
 
 
-def third(surface: Surface, faces: list[Face], out: tuple[int, ...], *, seed: int) -> dict[str, Any]:
+def third(
+    surface: Surface, faces: list[Face], out: tuple[int, ...], *, seed: int
+) -> dict[str, Any]:
     """Predicts three specimens from the other six."""
     chosen = [n for n in range(1, 10) if n not in out]
     trained, left = [face.of(chosen) for face in faces], [face.of(out) for face in faces]
@@ -162,9 +186,16 @@ def third(surface: Surface, faces: list[Face], out: tuple[int, ...], *, seed: in
     tolerance = together(trained).scatter
     squares = {}
     for model in Model:
-        several = fit_drapes(surface, trained, model=model, seed=seed).predicted[..., 0].mean(axis=0)
+        several = (
+            fit_drapes(surface, trained, model=model, seed=seed).predicted[..., 0].mean(axis=0)
+        )
         squares[model.value] = float(
-            np.mean([np.square(face.means(0.0)[:, 0] - several[n]).mean() for n, face in enumerate(left)])
+            np.mean(
+                [
+                    np.square(face.means(0.0)[:, 0] - several[n]).mean()
+                    for n, face in enumerate(left)
+                ]
+            )
         )
     return {
         "left_out": list(out),

@@ -1,12 +1,14 @@
 """Programs that validations take data from, each in an environment of its own, at a fixed version.
 
-What users run depends on none of them, and `sim` and `measure` know nothing of them. MuJoCo's `discrete` integrator,
-the only one that is implicit for a flex, appeared in 4.0 and is announced to change; the constants of a flex's
-stiffness changed with 4.0. Pictures by VTK change a little with its version.
+What users run depends on none of them, and `sim` and `measure` know nothing of them. MuJoCo's
+`discrete` integrator, the only one that is implicit for a flex, appeared in 4.0 and is announced to
+change; the constants of a flex's stiffness changed with 4.0. Pictures by VTK change a little with
+its version.
 
-`python -m tests.studies environments NAME [FOLDER]` makes one (`make mujoco`, `make vtk`, `make lerobot`,
-`make datasets`, `make pylance`). The last three hold other programs' readers: by those of the first two, tests read
-what `flagdata export` writes, and by all the benchmark `peers` reads clips; without them these skip, with the reason.
+`python -m tests.studies environments NAME [FOLDER]` makes one (`make mujoco`, `make vtk`, `make
+lerobot`, `make datasets`, `make pylance`). The last three hold other programs' readers: by those of
+the first two, tests read what `flagdata export` writes, and by all the benchmark `peers` reads
+clips; without them these skip, with the reason.
 """
 
 from __future__ import annotations
@@ -67,15 +69,24 @@ class Environment:
             NotFoundError: there is none.
             UnusableError: the program cannot be imported by it, or it is of another version.
         """
-        python = Path(os.environ[self.setting]) if self.setting in os.environ else interpreter(self.folder)
+        python = (
+            Path(os.environ[self.setting])
+            if self.setting in os.environ
+            else interpreter(self.folder)
+        )
         if not python.is_file():
             raise NotFoundError(
                 f"{self.title} is not installed",
                 where=str(python),
-                fix=f"make its environment with make {self.package}, or name the Python of one by {self.setting}",
+                fix=f"make its environment with make {self.package}, or name the Python of one by "
+                f"{self.setting}",
             )
         done = subprocess.run(
-            (str(python), "-I", "-c", self.probe), capture_output=True, text=True, timeout=_TIMEOUT, check=False
+            (str(python), "-I", "-c", self.probe),
+            capture_output=True,
+            text=True,
+            timeout=_TIMEOUT,
+            check=False,
         )
         found = done.stdout.strip()
         if done.returncode or found != self.version:
@@ -113,7 +124,8 @@ class Environment:
                 raise UnusableError(
                     f"{' '.join(command[1:4])} failed: {said}",
                     where=str(folder),
-                    fix=f"read its messages: the package index must offer {wanted[0]} for this Python",
+                    fix=f"read its messages: the package index must offer {wanted[0]} for this "
+                    "Python",
                 )
 
 

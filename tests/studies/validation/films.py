@@ -1,8 +1,10 @@
-"""What `flagdata measure` answers on films whose wind is known: ArcSim's runs filmed by VTK, neither of them ours.
+"""What `flagdata measure` answers on films whose wind is known: ArcSim's runs filmed by VTK,
+neither of them ours.
 
-The list of films was fixed before the first was measured (`vtk_films.designs`). Each is measured with
-the flag's size, once with the area weight open and once with a range about the true one. FLAGDATA_FILMS names the
-folder of the films, where those that are missing are made; FLAGDATA_FILMS_ONLY gives patterns of their names.
+The list of films was fixed before the first was measured (`vtk_films.designs`). Each is measured
+with the flag's size, once with the area weight open and once with a range about the true one.
+FLAGDATA_FILMS names the folder of the films, where those that are missing are made;
+FLAGDATA_FILMS_ONLY gives patterns of their names.
 """
 
 from __future__ import annotations
@@ -67,7 +69,8 @@ def answers(design: Design, found: Network, gate: WindowGate, *, seed: int) -> d
     begun = time.perf_counter()
     size = FlagSize(length=LENGTH, height=HEIGHT)
     asked = {
-        name: Options(size=size, seed=seed, area_weight=weight) for name, weight in (("open", None), ("stated", WEIGHT))
+        name: Options(size=size, seed=seed, area_weight=weight)
+        for name, weight in (("open", None), ("stated", WEIGHT))
     }
     path = path_of(design, FOLDER)
     said = {name: answer(path, found, gate, options) for name, options in asked.items()}
@@ -87,7 +90,11 @@ def answer(path: Path, found: Network, gate: WindowGate, options: Options) -> di
     (subject,) = subjects(str(path), query=None, lake=None, at=None, reading=FilmReading())
     try:
         measured = measure(
-            subject.film, found.estimator, gate=gate, dependence=of_model(found.estimator), options=options
+            subject.film,
+            found.estimator,
+            gate=gate,
+            dependence=of_model(found.estimator),
+            options=options,
         )
     except FlagdataError as error:
         return {"refused": True, "reasons": [kind_of(error)], "why": error.what}
@@ -96,7 +103,10 @@ def answer(path: Path, found: Network, gate: WindowGate, options: Options) -> di
 
 def kind_of(error: FlagdataError) -> str:
     """Returns the kind of the reason that an error states, and of any other error its own."""
-    return next((kind for kind, one in REASONS.items() if error.what.startswith(f"{one.sentence}: ")), error.kind)
+    return next(
+        (kind for kind, one in REASONS.items() if error.what.startswith(f"{one.sentence}: ")),
+        error.kind,
+    )
 
 
 def _reasons(measured: Measurement) -> dict[str, Any]:
@@ -127,12 +137,17 @@ def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """The acceptance's figures."""
     return {
         "refused": {
-            part: Share.of(row["stated"]["refused"] for row in rows if row["part"] == part).as_dict()
+            part: Share.of(
+                row["stated"]["refused"] for row in rows if row["part"] == part
+            ).as_dict()
             for part in _PARTS[:3]
             if any(row["part"] == part for row in rows)
         },
         "errors": {
-            part: {name: _errors([row for row in rows if row["part"] == part], name) for name in ("open", "stated")}
+            part: {
+                name: _errors([row for row in rows if row["part"] == part], name)
+                for name in ("open", "stated")
+            }
             for part in _PARTS[:3]
             if any(row["part"] == part for row in rows)
         },
@@ -147,7 +162,11 @@ def _errors(rows: Sequence[Mapping[str, Any]], name: str) -> dict[str, Any]:
     if not answered:
         return {"films": 0}
     error = np.array([found["value"] - wind for wind, found in answered])
-    width = [found["high"] - found["low"] for _, found in answered if None not in (found["low"], found["high"])]
+    width = [
+        found["high"] - found["low"]
+        for _, found in answered
+        if None not in (found["low"], found["high"])
+    ]
     return {
         "films": len(answered),
         "bias": float(error.mean()),
@@ -166,7 +185,9 @@ def _rates(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         own = {row["rate"]: row for row in rows if row["wind"] == wind}
         of = {}
         for name in ("open", "stated"):
-            values = {rate: row[name]["wind"]["value"] for rate, row in own.items() if "wind" in row[name]}
+            values = {
+                rate: row[name]["wind"]["value"] for rate, row in own.items() if "wind" in row[name]
+            }
             compared = [values[rate] for rate in COMPARED if rate in values]
             of[name] = {
                 "values": values,
@@ -178,13 +199,18 @@ def _rates(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def _stressed(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """By stressor: the difference to the film without, of each base film, or the reason of the refusal."""
+    """By stressor: the difference to the film without, of each base film, or the reason of the
+    refusal."""
     by_name = {one.name: one for one in designs()}
     plain = {row["wind"]: row for row in rows if stressor_of(by_name[row["name"]]) == "none"}
     found: dict[str, dict[str, Any]] = {}
     for row in rows:
         said, base = row["stated"], plain[row["wind"]]["stated"]
-        shift = said["wind"]["value"] - base["wind"]["value"] if "wind" in said and "wind" in base else None
+        shift = (
+            said["wind"]["value"] - base["wind"]["value"]
+            if "wind" in said and "wind" in base
+            else None
+        )
         found.setdefault(stressor_of(by_name[row["name"]]), {})[f"{row['wind']:g}"] = {
             "shift": shift,
             "refused": said["refused"],
@@ -200,14 +226,18 @@ def page(sheet: Mapping[str, Any]) -> str:
         "# Films of another simulator by another renderer",
         "",
         (
-            f"Model {sheet['model']}; ArcSim's runs filmed by VTK, {len(sheet['films'])} films, each measured with the "
-            f"flag's size and once with the area weight open, once with {WEIGHT.low:g} to {WEIGHT.high:g} kg/m² (true "
-            f"{DENSITY:g}). The films were listed before the first was measured; their motion has nothing above 12.5 "
+            f"Model {sheet['model']}; ArcSim's runs filmed by VTK, {len(sheet['films'])} films, "
+            "each measured with the "
+            f"flag's size and once with the area weight open, once with {WEIGHT.low:g} to "
+            f"{WEIGHT.high:g} kg/m² (true "
+            f"{DENSITY:g}). The films were listed before the first was measured; their motion has "
+            "nothing above 12.5 "
             "Hz (`python -m tests.studies films`)."
         ),
         "",
         (
-            "| films | weight | refused | answered | 90 % intervals contain the wind | mean width [m/s] | median "
+            "| films | weight | refused | answered | 90 % intervals contain the wind | mean width "
+            "[m/s] | median "
             "error [m/s] | bias [m/s] | read too low |"
         ),
         "|---|---|---|---|---|---|---|---|---|",
@@ -215,12 +245,19 @@ def page(sheet: Mapping[str, Any]) -> str:
     for part, of in sheet["errors"].items():
         for name, own in of.items():
             count = sum(row["part"] == part for row in sheet["films"])
-            lines.append(f"| {part} | {name} | {count - own['films']} of {count} | " + _errors_row(own) + " |")
+            lines.append(
+                f"| {part} | {name} | {count - own['films']} of {count} | "
+                + _errors_row(own)
+                + " |"
+            )
     lines += ["", "## One view at all frame rates", ""]
     lines += _rates_table(sheet["rates"])
     lines += ["", "## Stressors, weight stated: difference to the film without [m/s]", ""]
     winds = sorted({wind for of in sheet["stressors"].values() for wind in of})
-    lines += ["| stressor | " + " | ".join(f"{wind} m/s" for wind in winds) + " |", "|---" * (1 + len(winds)) + "|"]
+    lines += [
+        "| stressor | " + " | ".join(f"{wind} m/s" for wind in winds) + " |",
+        "|---" * (1 + len(winds)) + "|",
+    ]
     lines += [
         f"| {name} | " + " | ".join(_stressor_cell(of.get(wind)) for wind in winds) + " |"
         for name, of in sheet["stressors"].items()
@@ -230,18 +267,22 @@ def page(sheet: Mapping[str, Any]) -> str:
         "## All films",
         "",
         (
-            "| film | rate | true wind [m/s] | weight open: wind [m/s] | weight [kg/m²] | weight stated: wind [m/s] | "
+            "| film | rate | true wind [m/s] | weight open: wind [m/s] | weight [kg/m²] | weight "
+            "stated: wind [m/s] | "
             "refused for |"
         ),
         "|---|---|---|---|---|---|---|",
         *(
-            f"| {row['name']} | {row['rate']} | {row['wind']:g} | {_cell(row['open'], 'wind', row['wind'])} | "
-            f"{_cell(row['open'], 'weight', DENSITY)} | {_cell(row['stated'], 'wind', row['wind'])} | "
+            f"| {row['name']} | {row['rate']} | {row['wind']:g} | "
+            f"{_cell(row['open'], 'wind', row['wind'])} | "
+            f"{_cell(row['open'], 'weight', DENSITY)} | "
+            f"{_cell(row['stated'], 'wind', row['wind'])} | "
             f"{', '.join(row['stated']['reasons'][:3])} |"
             for row in sheet["films"]
         ),
         "",
-        "An interval in bold does not contain the true value. Of refused films the estimate is that of `--anyway`.",
+        "An interval in bold does not contain the true value. Of refused films the estimate is "
+        "that of `--anyway`.",
     ]
     return "\n".join(lines) + "\n"
 
@@ -251,8 +292,10 @@ def _errors_row(own: Mapping[str, Any]) -> str:
         return "0 | | | | |"
     covered, width = own["covered"], own["width"]
     return (
-        f"{own['films']} | {covered['hits']} ({covered['value']:.0%} [{covered['low']:.0%}, {covered['high']:.0%}]) | "
-        f"{'' if width is None else f'{width:.2f}'} | {own['median_error']:.2f} | {own['bias']:+.2f} | "
+        f"{own['films']} | {covered['hits']} ({covered['value']:.0%} [{covered['low']:.0%}, "
+        f"{covered['high']:.0%}]) | "
+        f"{'' if width is None else f'{width:.2f}'} | {own['median_error']:.2f} | "
+        f"{own['bias']:+.2f} | "
         f"{own['too_low']} of {own['films']}"
     )
 
@@ -260,7 +303,9 @@ def _errors_row(own: Mapping[str, Any]) -> str:
 def _rates_table(found: Mapping[str, Any]) -> list[str]:
     rates = list(dict.fromkeys(rate for of in found.values() for rate in of["stated"]["values"]))
     lines = [
-        "| true wind [m/s], weight | " + " | ".join(rates) + f" | largest difference of {', '.join(COMPARED)} |",
+        "| true wind [m/s], weight | "
+        + " | ".join(rates)
+        + f" | largest difference of {', '.join(COMPARED)} |",
         "|---" * (2 + len(rates)) + "|",
     ]
     for wind, of in found.items():
@@ -271,7 +316,11 @@ def _rates_table(found: Mapping[str, Any]) -> list[str]:
                 else f"{own['values'][rate]:.2f}" + (" (refused)" if rate in own["refused"] else "")
                 for rate in rates
             ]
-            lines.append(f"| {wind}, {name} | " + " | ".join(cells) + f" | {_number(own['largest_difference'])} |")
+            lines.append(
+                f"| {wind}, {name} | "
+                + " | ".join(cells)
+                + f" | {_number(own['largest_difference'])} |"
+            )
     return lines
 
 

@@ -1,4 +1,5 @@
-"""Flags in the wind: their shapes and motion against wind, damping and method. Writes `validate-flags-*.png`."""
+"""Flags in the wind: their shapes and motion against wind, damping and method. Writes
+`validate-flags-*.png`."""
 
 from __future__ import annotations
 
@@ -14,7 +15,13 @@ from tests.studies.validation.flags_runs import (
     one_core,
 )
 from tests.studies.validation.flags_shapes import draw_shapes
-from tests.studies.validation.flags_wind import broadside_speed, draw_damping, draw_energies, draw_wind, summary
+from tests.studies.validation.flags_wind import (
+    broadside_speed,
+    draw_damping,
+    draw_energies,
+    draw_wind,
+    summary,
+)
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:

@@ -25,7 +25,8 @@ _AMBIENT = 0.3
 
 @dataclass(frozen=True, kw_only=True)
 class View:
-    """Looking at the origin from an azimuth (from +x towards +y) and an elevation [rad]; lengths stay metres."""
+    """Looking at the origin from an azimuth (from +x towards +y) and an elevation [rad]; lengths
+    stay metres."""
 
     azimuth: float
     elevation: float
@@ -43,12 +44,16 @@ class View:
         return np.asarray(points, dtype=np.float64) @ self.axes.T
 
 
-# From the side of negative y, so that the wind (+x) blows to the right, turned and raised enough to see depth.
+# From the side of negative y, so that the wind (+x) blows to the right, turned and raised enough to
+# see depth.
 SIDE = View(azimuth=math.radians(-68), elevation=math.radians(16))
 
 
-def draw_cloth(axes: Axes, position: NDArray[np.floating], faces: IntArray, view: View = SIDE) -> None:
-    """The faces from far to near, lit from the viewer's upper left; the two sides of the cloth differ in colour.
+def draw_cloth(
+    axes: Axes, position: NDArray[np.floating], faces: IntArray, view: View = SIDE
+) -> None:
+    """The faces from far to near, lit from the viewer's upper left; the two sides of the cloth
+    differ in colour.
 
     Args:
         position: (vertex, 3) [m].
@@ -64,7 +69,9 @@ def draw_cloth(axes: Axes, position: NDArray[np.floating], faces: IntArray, view
     seen = view.seen(corners)
     order = np.argsort(seen[..., 2].mean(axis=1))
     paint = np.clip(colour[order], 0, 1)
-    axes.add_collection(PolyCollection(seen[order][..., :2], facecolors=paint, edgecolors=paint, linewidths=0.25))
+    axes.add_collection(
+        PolyCollection(seen[order][..., :2], facecolors=paint, edgecolors=paint, linewidths=0.25)
+    )
 
 
 def _smoothed(normal: FloatArray, faces: IntArray, count: int) -> FloatArray:
@@ -81,14 +88,19 @@ def _line(axes: Axes, *points: tuple[float, float, float], **style: float | str)
     axes.plot(seen[:, 0], seen[:, 1], **style)  # type: ignore[arg-type]
 
 
-def _furniture(axes: Axes, position: NDArray[np.floating], held: tuple[int, int], wind: float) -> None:
+def _furniture(
+    axes: Axes, position: NDArray[np.floating], held: tuple[int, int], wind: float
+) -> None:
     """The held corners, the line between them, the ground-plane axes, a metre, and the wind."""
     _line(axes, (0, 0, -0.75), (0, 0, 1.25), color="#999999", lw=0.8, zorder=0)
     corners = SIDE.seen(position[list(held)])
     axes.plot(corners[:, 0], corners[:, 1], "o", color="black", ms=2.5)
     start, end = SIDE.seen(np.array([[-0.55, 0, 1.12], [-0.55 + 0.045 * wind, 0, 1.12]]))[:, :2]
     axes.annotate(
-        "", xy=tuple(end), xytext=tuple(start), arrowprops={"arrowstyle": "-|>", "color": "#1f5f8b", "lw": 1.4}
+        "",
+        xy=tuple(end),
+        xytext=tuple(start),
+        arrowprops={"arrowstyle": "-|>", "color": "#1f5f8b", "lw": 1.4},
     )
     axes.set(xlim=(-0.6, 1.5), ylim=(-0.78, 1.3), aspect="equal")
     axes.axis("off")
@@ -100,9 +112,19 @@ def _compass(axes: Axes) -> None:
     for name, step in (("x", (0.5, 0, 0)), ("y", (0, 0.5, 0)), ("z", (0, 0, 0.5))):
         start, end = SIDE.seen(np.stack([origin, origin + step]))[:, :2]
         axes.annotate(
-            "", xy=tuple(end), xytext=tuple(start), arrowprops={"arrowstyle": "-|>", "color": "#444444", "lw": 0.8}
+            "",
+            xy=tuple(end),
+            xytext=tuple(start),
+            arrowprops={"arrowstyle": "-|>", "color": "#444444", "lw": 0.8},
         )
-        axes.text(*(end + 0.06 * (end - start)), name, fontsize=8, color="#444444", ha="center", va="center")
+        axes.text(
+            *(end + 0.06 * (end - start)),
+            name,
+            fontsize=8,
+            color="#444444",
+            ha="center",
+            va="center",
+        )
 
 
 def draw_shapes(ensemble: Ensemble, path: Path) -> None:
@@ -117,13 +139,20 @@ def draw_shapes(ensemble: Ensemble, path: Path) -> None:
         for axes, instant in zip(row, INSTANTS, strict=True):
             position = ensemble.first[round(instant * RATE), ..., group]
             draw_cloth(axes, position, scene.mesh.faces)
-            _furniture(axes, position, (scene.handles.vertices[0], scene.handles.vertices[-1]), wind)
-        row[0].text(0.02, 0.80, f"{wind:g} m/s", transform=row[0].transAxes, fontsize=10, color="#1f5f8b")
+            _furniture(
+                axes, position, (scene.handles.vertices[0], scene.handles.vertices[-1]), wind
+            )
+        row[0].text(
+            0.02, 0.80, f"{wind:g} m/s", transform=row[0].transAxes, fontsize=10, color="#1f5f8b"
+        )
     _compass(panels[0, -1])
     figure.suptitle(
-        "A 1.5 × 1.0 m flag of Camel Ponte Roma (0.284 kg/m², d = 0.25 ms), self-contact on; wind towards +x (arrow, "
-        "in proportion).\nHeld at two hoist corners (dots), at rest across the wind at t = 0; blue: the side "
-        "that faced the wind then.\nView from −y, 22° to the lee and 16° above; axes (upper right) 0.5 m long; shading "
+        "A 1.5 × 1.0 m flag of Camel Ponte Roma (0.284 kg/m², d = 0.25 ms), self-contact on; wind "
+        "towards +x (arrow, "
+        "in proportion).\nHeld at two hoist corners (dots), at rest across the wind at t = 0; "
+        "blue: the side "
+        "that faced the wind then.\nView from −y, 22° to the lee and 16° above; axes (upper right) "
+        "0.5 m long; shading "
         "smoothed.",
         fontsize=9,
     )

@@ -1,4 +1,5 @@
-"""Single bits that flip in what flagdata keeps, by two seeds; `validate-flips.md` is written beside."""
+"""Single bits that flip in what flagdata keeps, by two seeds; `validate-flips.md` is written
+beside."""
 
 from __future__ import annotations
 
@@ -22,14 +23,18 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
 def page(result: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> str:
     """The counts of each kind of file by each seed."""
     rows = [
-        f"| {kind} | {seed} | {one['flips']} | {one['refused']} | {one['same']} | {len(one['failures'])} |"
+        f"| {kind} | {seed} | {one['flips']} | {one['refused']} | {one['same']} | "
+        f"{len(one['failures'])} |"
         for seed, kinds in result.items()
         for kind, one in kinds.items()
     ]
     words = (
-        "One bit of a file flips, and what reads the file is asked as a fresh process asks. It refuses with an error "
-        "that names the file; or it gives the same as before, where the bit carries no meaning, where a summary or a "
-        "checkpoint covers an old entry of the log (`verify` and `clone` compare those), or where a cache is made "
+        "One bit of a file flips, and what reads the file is asked as a fresh process asks. It "
+        "refuses with an error "
+        "that names the file; or it gives the same as before, where the bit carries no meaning, "
+        "where a summary or a "
+        "checkpoint covers an old entry of the log (`verify` and `clone` compare those), or where "
+        "a cache is made "
         "anew. Another value without an error, or any other exception, is a failure."
     )
     head = "| kind of file | seed | flips | refused | the same | failed |"

@@ -1,8 +1,10 @@
-"""Where does a clamped sheet in a stream begin to flutter, how fast, and what has the reactive loading to do with it?
+"""Where does a clamped sheet in a stream begin to flutter, how fast, and what has the reactive
+loading to do with it?
 
-The simulator against the linear calculation of the same equations (`tests.verification.flutter.beam`) over the range
-of mass ratios and with the mesh; what the simulator does without the effect; and both beside theory and experiments of
-others (`tests.studies.validation.flutter_measured`).
+The simulator against the linear calculation of the same equations
+(`tests.verification.flutter.beam`) over the range of mass ratios and with the mesh; what the
+simulator does without the effect; and both beside theory and experiments of others
+(`tests.studies.validation.flutter_measured`).
 """
 
 from __future__ import annotations
@@ -37,7 +39,9 @@ def _loaded(beta: float) -> Strip:
 def _reduced(strip: Strip, found: Onset) -> tuple[float, float]:
     """u = U L √(M/B) and ω L² √((m + M)/B)."""
     time = strip.length**2 * float(np.sqrt((strip.mass + strip.air_mass) / strip.rigidity))
-    return found.speed * strip.length * float(np.sqrt(strip.air_mass / strip.rigidity)), found.frequency * time
+    return found.speed * strip.length * float(
+        np.sqrt(strip.air_mass / strip.rigidity)
+    ), found.frequency * time
 
 
 def _onsets() -> dict[str, Any]:
@@ -49,7 +53,9 @@ def _onsets() -> dict[str, Any]:
         for beta, s, t in zip(_RATIOS, strips, theory, strict=True)
     ]
     for columns in _COLUMNS:
-        members = [m for s, t in zip(strips, theory, strict=True) for m in sweep(s, _SHARES * t.speed)]
+        members = [
+            m for s, t in zip(strips, theory, strict=True) for m in sweep(s, _SHARES * t.speed)
+        ]
         rates = growth(members, columns=columns, duration=_DURATION).reshape(len(strips), -1)
         for row, expected, found in zip(rows, theory, rates, strict=True):
             row["columns"][str(columns)] = _ratios(expected, found)
@@ -72,28 +78,41 @@ def _ratios(expected: Onset, rates: NDArray[np.complex128]) -> dict[str, Any]:
         found = crossing(_SHARES * expected.speed, rates)
     except ValueError as error:
         return {"none": str(error)}
-    return {"speed": found.speed / expected.speed, "frequency": found.frequency / expected.frequency}
+    return {
+        "speed": found.speed / expected.speed,
+        "frequency": found.frequency / expected.frequency,
+    }
 
 
 def _implicit() -> dict[str, float]:
-    """Onset with backward Euler at the paper's step h, over that of the calculation with what the step adds.
+    """Onset with backward Euler at the paper's step h, over that of the calculation with what the
+    step adds.
 
-    To first order in h: damping d + h of the elastic part, and a Coriolis load that is late by h/2, since it is taken
-    with the velocity of the step before.
+    To first order in h: damping d + h of the elastic part, and a Coriolis load that is late by h/2,
+    since it is taken with the velocity of the step before.
     """
     step = 5e-3
     strip = replace(_loaded(0.5), damping=_BARE.damping + step, lag=step / 2)
     expected = onset(strip, lowest=0.1, highest=8.0)
     speeds = _SHARES * expected.speed
-    rates = growth(sweep(_loaded(0.5), speeds), columns=24, duration=_DURATION, integrator=BackwardEuler(step=step))
+    rates = growth(
+        sweep(_loaded(0.5), speeds),
+        columns=24,
+        duration=_DURATION,
+        integrator=BackwardEuler(step=step),
+    )
     found = crossing(speeds, rates)
-    return {"speed": found.speed / expected.speed, "frequency": found.frequency / expected.frequency}
+    return {
+        "speed": found.speed / expected.speed,
+        "frequency": found.frequency / expected.frequency,
+    }
 
 
 def _growth_over_speed() -> dict[str, Any]:
     """Growth rates far around the onset, with the loading and without.
 
-    Of the mode that is largest at the end of the run: well below the onset not always the one that decays slowest.
+    Of the mode that is largest at the end of the run: well below the onset not always the one that
+    decays slowest.
     """
     result: dict[str, Any] = {}
     for beta in _SWEPT:
@@ -149,7 +168,9 @@ def _amplitudes() -> dict[str, Any]:
         tip = frames[:, -1] / strip.length
         for name, part in (("2_to_4_s", tip[100:200]), ("6_to_8_s", tip[300:])):
             rms = np.sqrt(((part - part.mean(0)) ** 2).mean(0))
-            result[f"{label}_{name}"] = [float(value) if np.isfinite(value) else None for value in rms]
+            result[f"{label}_{name}"] = [
+                float(value) if np.isfinite(value) else None for value in rms
+            ]
     return result
 
 
@@ -161,15 +182,27 @@ def _plot(result: dict[str, Any], out: Path) -> None:
     rows = result["onset"]["rows"]
     for axes, name, values, label in (
         (speed, "speed", [line.speed for line in lines], "onset speed  U L √(M/B)"),
-        (frequency, "frequency", [line.frequency for line in lines], "its frequency  ω L² √((m+M)/B)"),
+        (
+            frequency,
+            "frequency",
+            [line.frequency for line in lines],
+            "its frequency  ω L² √((m+M)/B)",
+        ),
     ):
         axes.plot(betas, values, color=_THEORY, lw=1.2, label="linear calculation, undamped")
         key = "u" if name == "speed" else "omega"
         for columns, marker in zip(_COLUMNS, "xo.", strict=True):
-            found = [(row["beta"], row[key], row["columns"][str(columns)].get(name, np.nan)) for row in rows]
+            found = [
+                (row["beta"], row[key], row["columns"][str(columns)].get(name, np.nan))
+                for row in rows
+            ]
             points = [(beta, expected * ratio) for beta, expected, ratio in found]
             axes.plot(
-                *zip(*points, strict=True), marker, color=_SIMULATED, mfc="none", label=f"simulator, {columns} columns"
+                *zip(*points, strict=True),
+                marker,
+                color=_SIMULATED,
+                mfc="none",
+                label=f"simulator, {columns} columns",
             )
         axes.set(xlabel="mass ratio M/(m+M)", ylabel=label)
     speed.legend(frameon=False, fontsize=8)
@@ -200,9 +233,16 @@ def _plot(result: dict[str, Any], out: Path) -> None:
         xlim=(0.25, 2.6),
         ylim=(-6, 16),
     )
-    strongest = max(abs(v) for sweeps in result["growth"].values() for v in sweeps["without_loading_growth"])
+    strongest = max(
+        abs(v) for sweeps in result["growth"].values() for v in sweeps["without_loading_growth"]
+    )
     rate.text(
-        2.55, -0.3, f"M = 0, up to 4 times the onset: within {strongest:.1g} 1/s of 0", fontsize=7, ha="right", va="top"
+        2.55,
+        -0.3,
+        f"M = 0, up to 4 times the onset: within {strongest:.1g} 1/s of 0",
+        fontsize=7,
+        ha="right",
+        va="top",
     )
     rate.legend(frameon=False, fontsize=8, loc="upper right")
     shares = result["amplitude"]["shares_of_critical_speed"]

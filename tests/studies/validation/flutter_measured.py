@@ -1,21 +1,26 @@
-"""The reactive loading beside what others found: Argentina and Mahadevan 2005, d'Adamo and others 2024.
+"""The reactive loading beside what others found: Argentina and Mahadevan 2005, d'Adamo and others
+2024.
 
 The loading's only parameter is the air's mass M per area, here the same everywhere.
 
-Experiments plotted by Argentina and Mahadevan (ρL/ρₛh from 2.7 to 9.3): the loading with M = ρL/2 flutters at 0.44 to
-0.67 of the measured speeds; with M = ρL/4, as waves of 0.8 L have, at 0.53 to 0.76. Their own curves lie below most
-measurements too: the highest meets the first and has 0.40 of the speed at heavier air. Curves and loading differ in
-how they depend on the mass ratio. Theirs fall, steeply at light air; the reactive onset rises in steps, where the
-leading mode changes, from 4.2/√(M/ρL) in the limit of light air, where the loading is a follower force. What theirs
-has and the loading lacks: the wake, whose circulation lags and damps, and an uneven load without a pressure jump at
-the free edge. What both lack: the finite height of real sheets, which are more stable than two-dimensional theory
-says (Eloy, Lagrange, Souilliez and Schouveiler, J. Fluid Mech. 611:97, 2008).
+Experiments plotted by Argentina and Mahadevan (ρL/ρₛh from 2.7 to 9.3): the loading with M = ρL/2
+flutters at 0.44 to 0.67 of the measured speeds; with M = ρL/4, as waves of 0.8 L have, at 0.53 to
+0.76. Their own curves lie below most
+measurements too: the highest meets the first and has 0.40 of the speed at heavier air. Curves and
+loading differ in how they depend on the mass ratio. Theirs fall, steeply at light air; the reactive
+onset rises in steps, where the leading mode changes, from 4.2/√(M/ρL) in the limit of light air,
+where the loading is a follower force. What theirs
+has and the loading lacks: the wake, whose circulation lags and damps, and an uneven load without a
+pressure jump at the free edge. What both lack: the finite height of real sheets, which are more
+stable than two-dimensional theory says (Eloy, Lagrange, Souilliez and Schouveiler, J. Fluid Mech.
+611:97, 2008).
 
-Paper sheets of d'Adamo: with M = ρL/2 the onset is at half the tunnel's speed, as in the jet's shear layer, for the
-shortest sheet (7 cm: 7.1 against 7.3 m/s, 26 against 22 Hz). With the length the calculation falls faster than the
-measurement, to 2.4 against 5.3 m/s and 5 against 17 Hz at 15.5 cm: a mass that grows with L is too much for sheets
-that are longer than high or than their waves. In the clips of the 13.85 cm sheet, far above the onset, the leading
-mode at half the tunnel's speed is 15 to 28 % above the filmed frequency; at the tunnel's full speed it is five times
+Paper sheets of d'Adamo: with M = ρL/2 the onset is at half the tunnel's speed, as in the jet's
+shear layer, for the shortest sheet (7 cm: 7.1 against 7.3 m/s, 26 against 22 Hz). With the length
+the calculation falls faster than the measurement, to 2.4 against 5.3 m/s and 5 against 17 Hz at
+15.5 cm: a mass that grows with L is too much for sheets that are longer than high or than their
+waves. In the clips of the 13.85 cm sheet, far above the onset, the leading mode at half the
+tunnel's speed is 15 to 28 % above the filmed frequency; at the tunnel's full speed it is five times
 too fast.
 """
 
@@ -36,13 +41,14 @@ from tests.verification.flutter.beam import Strip, leading, onset, pipe_onset
 _FOLDER = REFERENCE / "flutter"
 
 _SHARES = (0.25, 0.5, np.pi / 4)
-"""M/(ρ L). π/4: a plate moving broadside, averaged over its chord; ½: what is often taken; ¼: waves of 0.8 L on both
-sides of a wide sheet, 2 ρ/k."""
+"""M/(ρ L). π/4: a plate moving broadside, averaged over its chord; ½: what is often taken; ¼: waves
+of 0.8 L on both sides of a wide sheet, 2 ρ/k."""
 
 # The paper sheet of d'Adamo and others: 80 g/m², bending stiffness by Stuart loop, air of the day.
 _SHEET, _RIGIDITY, _AIR, _LENGTH = 0.080, 1.315e-4, 1.0888, 0.1385
 _CLIPS = {7.64: 10.4, 8.09: 11.7, 9.30: 14.5}
-"""Tunnel speed [m/s] → flutter frequency [Hz] of the clips, by the column centroids of the dark line at 1000 Hz."""
+"""Tunnel speed [m/s] → flutter frequency [Hz] of the clips, by the column centroids of the dark
+line at 1000 Hz."""
 
 
 def _columns(path: Path) -> dict[str, FloatArray]:
@@ -57,7 +63,8 @@ def _columns(path: Path) -> dict[str, FloatArray]:
 
 
 def reactive(mass_ratio: float, *, share: float) -> float:
-    """Onset U/√(B/(ρ L³)) of the reactive loading with M = share · ρ L, at ρ L/(ρ_s h); no damping."""
+    """Onset U/√(B/(ρ L³)) of the reactive loading with M = share · ρ L, at ρ L/(ρ_s h); no
+    damping."""
     loading = share * mass_ratio
     return pipe_onset(beta=loading / (1 + loading)).speed / float(np.sqrt(share))
 
@@ -82,7 +89,11 @@ def _paper(length: float) -> Strip:
 
 
 def _dadamo() -> dict[str, Any]:
-    rows = list(csv.DictReader((_FOLDER / "dadamo-2024" / "thresholds_by_length.csv").read_text().splitlines()))
+    rows = list(
+        csv.DictReader(
+            (_FOLDER / "dadamo-2024" / "thresholds_by_length.csv").read_text().splitlines()
+        )
+    )
     thresholds = []
     for row in sorted(rows, key=lambda r: float(r["L"])):
         length = float(row["L"]) / 100
@@ -115,7 +126,8 @@ def compared() -> dict[str, Any]:
 
 
 def plot_measured(rows: list[dict[str, Any]], out: Path) -> None:
-    """Onsets in Argentina and Mahadevan's plane, with the simulator's own, and the sheets of d'Adamo and others."""
+    """Onsets in Argentina and Mahadevan's plane, with the simulator's own, and the sheets of
+    d'Adamo and others."""
     if not _FOLDER.is_dir():
         return
     found = _columns(_FOLDER / "argentina_mahadevan_2005_digitised.csv")
@@ -125,11 +137,23 @@ def plot_measured(rows: list[dict[str, Any]], out: Path) -> None:
         if name == "experiments":
             plane.plot(*curve.T, "s", color="#222222", label="experiments they cite")
         else:
-            plane.plot(*curve.T, color="#999999", lw=1, label="their theory" if name.endswith("00") else None)
+            plane.plot(
+                *curve.T,
+                color="#999999",
+                lw=1,
+                label="their theory" if name.endswith("00") else None,
+            )
     ratios = np.geomspace(0.1, 10, 90)
     for share, style in zip(_SHARES, (":", "-", "--"), strict=True):
         onsets = [reactive(float(x), share=share) for x in ratios]
-        plane.plot(ratios, onsets, style, color="#1f5f8b", lw=1.2, label=f"reactive loading, M = {share:.2f} ρL")
+        plane.plot(
+            ratios,
+            onsets,
+            style,
+            color="#1f5f8b",
+            lw=1.2,
+            label=f"reactive loading, M = {share:.2f} ρL",
+        )
     half = np.sqrt(0.5)
     points = [
         (2 * row["beta"] / (1 - row["beta"]), row["u"] * finest["speed"] / half)
@@ -137,7 +161,13 @@ def plot_measured(rows: list[dict[str, Any]], out: Path) -> None:
         if "speed" in (finest := list(row["columns"].values())[-1])
     ]
     if points:
-        plane.plot(*zip(*points, strict=True), "o", color="#b5541c", mfc="none", label="simulator, M = 0.50 ρL")
+        plane.plot(
+            *zip(*points, strict=True),
+            "o",
+            color="#b5541c",
+            mfc="none",
+            label="simulator, M = 0.50 ρL",
+        )
     plane.set(xlabel="ρ L / ρₛ h", ylabel="onset  U / √(B / ρ L³)", xlim=(0, 10), ylim=(0, 60))
     plane.legend(frameon=False, fontsize=8, ncols=2, loc="upper right")
     thresholds = _dadamo()["thresholds"]
@@ -149,7 +179,14 @@ def plot_measured(rows: list[dict[str, Any]], out: Path) -> None:
         for key, style in parts:
             colour = "#222222" if style == "s" else "#1f5f8b"
             label = "measured (tunnel)" if style == "s" else "reactive, M = ρL/2"
-            axes.plot(length, [row[key] for row in thresholds], style, color=colour, mfc="none", label=label)
+            axes.plot(
+                length,
+                [row[key] for row in thresholds],
+                style,
+                color=colour,
+                mfc="none",
+                label=label,
+            )
     sheets.plot(
         length,
         [row["tunnel_speed_flutter"] / 2 for row in thresholds],

@@ -1,13 +1,16 @@
-"""Verdicts on experiments of a flag that MuJoCo simulated: nulls, in which nothing undeclared acts, and effects.
+"""Verdicts on experiments of a flag that MuJoCo simulated: nulls, in which nothing undeclared acts,
+and effects.
 
-Truths are another code's, with its own elements, integrators and wind force, on cloths that differ from the declared
-one (see `mujoco`). Everything is judged through the public interface, from the recipe and marker
-tables that a user would bring, against one bank of nulls by flagdata's own simulator, which serves all experiments.
+Truths are another code's, with its own elements, integrators and wind force, on cloths that differ
+from the declared one (see `mujoco`). Everything is judged through the public interface, from the
+recipe and marker tables that a user would bring, against one bank of nulls by flagdata's own
+simulator, which serves all experiments.
 
-Environment variables: FLAGDATA_FOREIGN_NULLS (how many nulls), FLAGDATA_FOREIGN_EFFECTS (how many of each effect),
-FLAGDATA_FOREIGN_ACTED (which effects, separated by commas), FLAGDATA_FOREIGN_KINDS (kinds of numerics in the bank),
-FLAGDATA_FOREIGN_WEIGHED (the relative uncertainty that each cloth is weighed with; its own area weight is then what is
-declared), FLAGDATA_FOREIGN_FOLDER (where bank, recordings and verdicts are kept; a run that was stopped goes on there).
+Environment variables: FLAGDATA_FOREIGN_NULLS (how many nulls), FLAGDATA_FOREIGN_EFFECTS (how many
+of each effect), FLAGDATA_FOREIGN_ACTED (which effects, separated by commas), FLAGDATA_FOREIGN_KINDS
+(kinds of numerics in the bank), FLAGDATA_FOREIGN_WEIGHED (the relative uncertainty that each cloth
+is weighed with; its own area weight is then what is declared), FLAGDATA_FOREIGN_FOLDER (where bank,
+recordings and verdicts are kept; a run that was stopped goes on there).
 """
 
 from __future__ import annotations
@@ -33,7 +36,16 @@ from measure.shares import Share
 from measure.verdict import NOT_REJECTED, Conclusion, Estimate
 from tests.studies.challenge.classes import class_of
 from tests.studies.validation.environments import MUJOCO
-from tests.studies.validation.mujoco.experiments import NOISE, NOMINAL, NOTHING, SPEEDS, UNDECLARED, Truth, draw, write
+from tests.studies.validation.mujoco.experiments import (
+    NOISE,
+    NOMINAL,
+    NOTHING,
+    SPEEDS,
+    UNDECLARED,
+    Truth,
+    draw,
+    write,
+)
 
 _NULLS, _EFFECTS, _KINDS = 20, 1, 40
 _COVERED = ("area_weight", "bending", "damping")
@@ -49,7 +61,9 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     named = [(f"null-{k:03d}", NOTHING) for k in range(_number("NULLS", _NULLS))]
     acted = os.environ.get("FLAGDATA_FOREIGN_ACTED", ",".join(UNDECLARED))
     for name in filter(None, acted.split(",")):
-        named += [(f"{name}-{k:03d}", UNDECLARED[name]) for k in range(_number("EFFECTS", _EFFECTS))]
+        named += [
+            (f"{name}-{k:03d}", UNDECLARED[name]) for k in range(_number("EFFECTS", _EFFECTS))
+        ]
     truths = [draw(name, undeclared, seed=seed) for name, undeclared in named]
     with TemporaryDirectory(prefix="flagdata-foreign-") as temporary:
         folder = Path(os.environ.get("FLAGDATA_FOREIGN_FOLDER", temporary))
@@ -73,13 +87,16 @@ def _row(truth: Truth, folder: Path, python: Path, seed: int) -> dict[str, Any]:
             write(truth, recipe.parent, python=python, seed=seed)
         observed = read(load(recipe))
         bank = _bank(folder / "bank", observed, seed)
-        row = _graded(truth, _weighed(observed, truth, float(weighed)) if weighed else observed, bank, seed)
+        row = _graded(
+            truth, _weighed(observed, truth, float(weighed)) if weighed else observed, bank, seed
+        )
         kept.write_text(json.dumps(row), encoding="utf-8")
     return json.loads(kept.read_text(encoding="utf-8"))
 
 
 def _weighed(observed: Observed, truth: Truth, uncertainty: float) -> Observed:
-    """With the cloth's own area weight declared, known to a relative uncertainty, in place of the nominal one."""
+    """With the cloth's own area weight declared, known to a relative uncertainty, in place of the
+    nominal one."""
     specimen = observed.experiment.specimen
     known = replace(
         specimen,
@@ -90,7 +107,8 @@ def _weighed(observed: Observed, truth: Truth, uncertainty: float) -> Observed:
 
 
 def _bank(folder: Path, observed: Observed, seed: int) -> Path:
-    """Nulls of the declared cloth, its markers and winds, by many kinds of numerics; simulated once."""
+    """Nulls of the declared cloth, its markers and winds, by many kinds of numerics; simulated
+    once."""
     experiment = observed.experiment
     first, segments = experiment.recordings[0], Segments.of(experiment.recordings)
     batches = [
@@ -148,23 +166,32 @@ def _graded(truth: Truth, observed: Observed, bank: Path, seed: int) -> dict[str
         "grade": grade(truth, verdict.conclusion, verdict.named),
         "criteria": verdict.provenance["criteria"]["hash"],
     }
-    ours = [c for c in verdict.ranking if c.effect == undeclared.effect and c.effect in verdict.named]
+    ours = [
+        c for c in verdict.ranking if c.effect == undeclared.effect and c.effect in verdict.named
+    ]
     if ours:
         row["strength_found"] = _interval(ours[0].strength, undeclared.strength)
     return row
 
 
 def grade(truth: Truth, said: Conclusion, named: Sequence[str]) -> str:
-    """right: the effect alone, or none where none acts; class: another of its class; among: one of several; undecided:
-    nothing is decided; wrong."""
-    effect, outside = truth.undeclared.effect, truth.undeclared is not NOTHING and truth.undeclared.damping is None
+    """right: the effect alone, or none where none acts; class: another of its class; among: one of
+    several; undecided: nothing is decided; wrong."""
+    effect, outside = (
+        truth.undeclared.effect,
+        truth.undeclared is not NOTHING and truth.undeclared.damping is None,
+    )
     if said is Conclusion.UNDECIDED:
         return "undecided"
     if not effect:
         right = {Conclusion.OUTSIDE, Conclusion.PARTLY} if outside else {Conclusion.SUFFICIENT}
         return "right" if said in right else "wrong"
     if effect in named:
-        return {Conclusion.EFFECT: "right", Conclusion.ONE_OF: "among", Conclusion.PARTLY: "partly"}.get(said, "wrong")
+        return {
+            Conclusion.EFFECT: "right",
+            Conclusion.ONE_OF: "among",
+            Conclusion.PARTLY: "partly",
+        }.get(said, "wrong")
     return "class" if class_of(effect) in {class_of(name) for name in named} else "wrong"
 
 
@@ -195,16 +222,21 @@ def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "missed": Share.of(missed(row) for row in acting).as_dict(),
         "undecided": Share.of(row["grade"] == "undecided" for row in judged).as_dict(),
         "wrong": Share.of(row["grade"] == "wrong" and not missed(row) for row in acting).as_dict(),
-        "covered": {name: Share.of(own[name]["covers"] for own in intervals).as_dict() for name in _COVERED},
+        "covered": {
+            name: Share.of(own[name]["covers"] for own in intervals).as_dict() for name in _COVERED
+        },
         "covered_of_nulls": {
-            name: Share.of(row["parameters"][name]["covers"] for row in nulls).as_dict() for name in _COVERED
+            name: Share.of(row["parameters"][name]["covers"] for row in nulls).as_dict()
+            for name in _COVERED
         },
     }
 
 
 def missed(row: Mapping[str, Any]) -> bool:
     """Whether something acted and the base model is not rejected."""
-    return row["grade"] in ("wrong", "undecided") and row["said"] in [own.value for own in NOT_REJECTED]
+    return row["grade"] in ("wrong", "undecided") and row["said"] in [
+        own.value for own in NOT_REJECTED
+    ]
 
 
 def page(found: Mapping[str, Any]) -> str:
@@ -224,11 +256,15 @@ def page(found: Mapping[str, Any]) -> str:
                 ("verdicts that are not decided", "undecided"),
             )
         ),
-        *(_share(f"90 % intervals of {name} that cover", found["covered"][name]) for name in _COVERED),
+        *(
+            _share(f"90 % intervals of {name} that cover", found["covered"][name])
+            for name in _COVERED
+        ),
         "",
         f"{found['refused']} were refused. The bank holds {found['kinds']} kinds of numerics.",
         "",
-        "| experiment | acted | cloth: area weight, stretching, bending; damping | method | said | p | grade |",
+        "| experiment | acted | cloth: area weight, stretching, bending; damping | method | said | "
+        "p | grade |",
         "|---|---|---|---|---|---|---|",
         *(_line(row) for row in found["experiments"]),
     ]
@@ -237,12 +273,24 @@ def page(found: Mapping[str, Any]) -> str:
 
 def _share(title: str, share: Mapping[str, Any]) -> str:
     value = "–" if share["value"] is None else f"{share['value']:.2f}"
-    return f"| {title} | {value} | {share['hits']} of {share['count']} | {share['low']:.2f}–{share['high']:.2f} |"
+    return (
+        f"| {title} | {value} | {share['hits']} of {share['count']} | "
+        f"{share['low']:.2f}–{share['high']:.2f} |"
+    )
 
 
 def _line(row: Mapping[str, Any]) -> str:
-    cloth = ", ".join(f"× {value:.2f}" for value in row["factors"].values()) + f"; {1e3 * row['damping']:.1f} ms"
+    cloth = (
+        ", ".join(f"× {value:.2f}" for value in row["factors"].values())
+        + f"; {1e3 * row['damping']:.1f} ms"
+    )
     if "refused" in row:
-        return f"| {row['name']} | {row['acted']} | {cloth} | {row['method']} | refused: {row['refused']} | – | – |"
+        return (
+            f"| {row['name']} | {row['acted']} | {cloth} | {row['method']} | refused: "
+            f"{row['refused']} | – | – |"
+        )
     said = f"{row['said']} {' or '.join(row['named'])}".strip()
-    return f"| {row['name']} | {row['acted']} | {cloth} | {row['method']} | {said} | {row['p']:.2g} | {row['grade']} |"
+    return (
+        f"| {row['name']} | {row['acted']} | {cloth} | {row['method']} | {said} | {row['p']:.2g} | "
+        f"{row['grade']} |"
+    )

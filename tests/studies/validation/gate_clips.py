@@ -1,7 +1,9 @@
-"""Clips that are not what a network of flags was trained on, made by code of its own: ten kinds, six of each.
+"""Clips that are not what a network of flags was trained on, made by code of its own: ten kinds,
+six of each.
 
-The gate's own distortions (`measure.gate.distortions`) are not used here. Films of one flag are altered as a careless
-recording would be; trees, people and sheets are drawn or simulated. All of them then go through the camera of the data
+The gate's own distortions (`measure.gate.distortions`) are not used here. Films of one flag are
+altered as a careless recording would be; trees, people and sheets are drawn or simulated. All of
+them then go through the camera of the data
 set: H.264 at a rate factor of 18 to 24, so that the coding identifies no kind.
 """
 
@@ -38,8 +40,11 @@ _WHITE = 255.0
 
 
 def no_flag(films: Films, rng: np.random.Generator) -> UInt8Array:
-    """A landscape without a flag, with the camera's noise and, in every other, light that changes as clouds pass."""
-    clouds = 1 + rng.choice([0.0, 0.03]) * np.sin(2 * np.pi * 0.3 * np.arange(FRAMES) / RATE + rng.uniform(0, 6))
+    """A landscape without a flag, with the camera's noise and, in every other, light that changes
+    as clouds pass."""
+    clouds = 1 + rng.choice([0.0, 0.03]) * np.sin(
+        2 * np.pi * 0.3 * np.arange(FRAMES) / RATE + rng.uniform(0, 6)
+    )
     return _filmed(_landscape(rng)[None] * clouds[:, None, None], rng)
 
 
@@ -74,7 +79,10 @@ def moving_camera(films: Films, rng: np.random.Generator) -> UInt8Array:
                 2 * np.pi * (frequency * time + rng.uniform(0, 1, (2, 1)))
             )
     first = (SIZE - side) / 2 + np.clip(path, -35, 35)
-    seen = [ndimage.shift(film[k], -first[:, k], order=3, mode="nearest")[:side, :side] for k in range(FRAMES)]
+    seen = [
+        ndimage.shift(film[k], -first[:, k], order=3, mode="nearest")[:side, :side]
+        for k in range(FRAMES)
+    ]
     return _resized(np.clip(np.stack(seen), 0, 255).astype(np.uint8))
 
 
@@ -89,7 +97,8 @@ def ten_frames(films: Films, rng: np.random.Generator) -> UInt8Array:
 
 
 def night(films: Films, rng: np.random.Generator) -> UInt8Array:
-    """Three to six stops under-exposed, with a sensor's noise at high gain, at times brightened afterwards."""
+    """Three to six stops under-exposed, with a sensor's noise at high gain, at times brightened
+    afterwards."""
     film = _one(films, rng)[:FRAMES].astype(np.float64)
     light = (film / 255) ** 2.2 * 2.0 ** -rng.uniform(3, 6)
     noise = np.sqrt(0.006**2 + 0.0006 * light) * rng.standard_normal(light.shape)
@@ -105,7 +114,8 @@ def ten_hertz(films: Films, rng: np.random.Generator) -> UInt8Array:
 
 
 def two_flags(films: Films, rng: np.random.Generator) -> UInt8Array:
-    """Two films side by side, each cut to its flag; or a second flag before the first one's background."""
+    """Two films side by side, each cut to its flag; or a second flag before the first one's
+    background."""
     one, two = (_one(films, rng) for _ in range(2))
     if rng.random() < 0.5:
         halves = []
@@ -125,17 +135,25 @@ def two_flags(films: Films, rng: np.random.Generator) -> UInt8Array:
 
 
 def tree(films: Films, rng: np.random.Generator) -> UInt8Array:
-    """A tree in the wind: branches on branches that swing about where they grow, leaves at their ends."""
+    """A tree in the wind: branches on branches that swing about where they grow, leaves at their
+    ends."""
     behind, seed = _landscape(rng, kinds=("sky", "hills")), int(rng.integers(1 << 31))
     gust, leaf = rng.uniform(0.03, 0.12), rng.uniform(3, 7)
     dark = rng.uniform(20, 90)
     return _filmed(
-        np.stack([_tree(behind, t / RATE, np.random.default_rng(seed), gust, leaf, dark) for t in range(FRAMES)]), rng
+        np.stack(
+            [
+                _tree(behind, t / RATE, np.random.default_rng(seed), gust, leaf, dark)
+                for t in range(FRAMES)
+            ]
+        ),
+        rng,
     )
 
 
 def sheet(films: Films, rng: np.random.Generator) -> UInt8Array:
-    """A simulated sheet held by its four corners, more or less slack, that billows and then hardly moves."""
+    """A simulated sheet held by its four corners, more or less slack, that billows and then hardly
+    moves."""
     mesh = grid(width=1.4, height=1.0, columns=21, rows=15)
     start = upright(mesh)
     corners = [
@@ -168,7 +186,9 @@ def sheet(films: Films, rng: np.random.Generator) -> UInt8Array:
         rest=np.asarray(mesh.rest, dtype=np.float32),
     )
     assets = Assets()
-    zeta = replace(prior("cloth").draw(int(rng.integers(1 << 31)), assets), camera_radius=2.5, raster_samples=4)
+    zeta = replace(
+        prior("cloth").draw(int(rng.integers(1 << 31)), assets), camera_radius=2.5, raster_samples=4
+    )
     shown = Raster(assets=assets).render(Meshes.hanging(sequence), zeta)
     return _filmed(shown.numpy().astype(np.float64) @ (0.299, 0.587, 0.114), rng)
 
@@ -177,9 +197,15 @@ def person(films: Films, rng: np.random.Generator) -> UInt8Array:
     """A person who waves one arm or both, and shifts from one leg to the other."""
     behind = _landscape(rng)
     rate, both, phase = rng.uniform(0.6, 1.8), rng.random() < 0.5, rng.uniform(0, 6)
-    tone, height, x = rng.uniform(20, 220, 3), rng.uniform(0.6, 0.85) * SIZE, SIZE * rng.uniform(0.4, 0.6)
+    tone, height, x = (
+        rng.uniform(20, 220, 3),
+        rng.uniform(0.6, 0.85) * SIZE,
+        SIZE * rng.uniform(0.4, 0.6),
+    )
     frames = [
-        _person(behind, 2 * np.pi * rate * t / RATE + phase, height=height, x=x, tone=tone, both=both)
+        _person(
+            behind, 2 * np.pi * rate * t / RATE + phase, height=height, x=x, tone=tone, both=both
+        )
         for t in range(FRAMES)
     ]
     return _filmed(np.stack(frames), rng)
@@ -197,7 +223,8 @@ KINDS: dict[str, tuple[Callable[[Films, np.random.Generator], UInt8Array], tuple
     "sheet held by four corners": (sheet, ("unlike-cloth", "scale", "no-motion")),
     "person": (person, ("unlike-cloth",)),
 }
-"""Name → what makes it of films (n, 300, 300) that fly one flag each, and the reasons that are right for it."""
+"""Name → what makes it of films (n, 300, 300) that fly one flag each, and the reasons that are
+right for it."""
 
 
 def made(films: Films, *, seed: int, each: int = 6) -> list[tuple[str, UInt8Array]]:
@@ -237,7 +264,9 @@ def _filmed(light: FloatArray, rng: np.random.Generator) -> UInt8Array:
     """Gray levels with the data set's read and shot noise."""
     read, shot = rng.uniform(0.3, 1.5), rng.uniform(0.5, 3.0)
     sigma = np.sqrt(read**2 + shot**2 * np.clip(light, 0, None) / _WHITE)
-    return np.clip(np.rint(light + sigma * rng.standard_normal(light.shape)), 0, 255).astype(np.uint8)
+    return np.clip(np.rint(light + sigma * rng.standard_normal(light.shape)), 0, 255).astype(
+        np.uint8
+    )
 
 
 def _coded(clip: UInt8Array, *, rate_factor: float) -> UInt8Array:
@@ -247,7 +276,12 @@ def _coded(clip: UInt8Array, *, rate_factor: float) -> UInt8Array:
 
 def _resized(clip: UInt8Array, side: int = SIZE) -> UInt8Array:
     size = (side, side)
-    return np.stack([np.asarray(Image.fromarray(frame).resize(size, Image.Resampling.BICUBIC)) for frame in clip])
+    return np.stack(
+        [
+            np.asarray(Image.fromarray(frame).resize(size, Image.Resampling.BICUBIC))
+            for frame in clip
+        ]
+    )
 
 
 def _tree(
@@ -261,7 +295,10 @@ def _tree(
         swing = (
             gust
             * (7 - depth) ** 0.8
-            * math.sin(2 * math.pi * rng.uniform(0.3, 1.0) * (7 - depth) ** 0.7 * time + rng.uniform(0, 6.3))
+            * math.sin(
+                2 * math.pi * rng.uniform(0.3, 1.0) * (7 - depth) ** 0.7 * time
+                + rng.uniform(0, 6.3)
+            )
         )
         angle += swing
         end_x, end_y = x + length * math.cos(angle), y - length * math.sin(angle)
@@ -270,35 +307,72 @@ def _tree(
             for _ in range(4):
                 at_x, at_y = end_x + rng.normal(0, 2.5 * leaf), end_y + rng.normal(0, 2.5 * leaf)
                 size = leaf * rng.uniform(0.6, 1.4)
-                draw.ellipse((at_x - size, at_y - size, at_x + size, at_y + size), fill=int(dark + rng.uniform(0, 90)))
+                draw.ellipse(
+                    (at_x - size, at_y - size, at_x + size, at_y + size),
+                    fill=int(dark + rng.uniform(0, 90)),
+                )
             return
         for spread in (-0.45, 0.05, 0.5):
-            grow(end_x, end_y, angle + spread + rng.normal(0, 0.15), length * 0.74, width * 0.62, depth - 1)
+            grow(
+                end_x,
+                end_y,
+                angle + spread + rng.normal(0, 0.15),
+                length * 0.74,
+                width * 0.62,
+                depth - 1,
+            )
 
-    grow(SIZE * rng.uniform(0.8, 1.2), 2 * SIZE, math.pi / 2, SIZE * rng.uniform(0.38, 0.5), SIZE * 0.06, 5)
+    grow(
+        SIZE * rng.uniform(0.8, 1.2),
+        2 * SIZE,
+        math.pi / 2,
+        SIZE * rng.uniform(0.38, 0.5),
+        SIZE * 0.06,
+        5,
+    )
     return np.asarray(picture.resize((SIZE, SIZE), Image.Resampling.BOX), dtype=np.float64)
 
 
-def _person(behind: FloatArray, phase: float, *, height: float, x: float, tone: FloatArray, both: bool) -> FloatArray:
+def _person(
+    behind: FloatArray, phase: float, *, height: float, x: float, tone: FloatArray, both: bool
+) -> FloatArray:
     picture = Image.fromarray(np.clip(behind, 0, 255).astype(np.uint8)).resize((2 * SIZE, 2 * SIZE))
     draw = ImageDraw.Draw(picture)
     unit, foot = 2 * height / 8, 1.95 * SIZE
     middle = 2 * x + 0.15 * unit * math.sin(phase / 2)
     hip, neck = foot - 4 * unit, foot - 6.6 * unit
 
-    def limb(start: tuple[float, float], angle: float, length: float, width: float, fill: float) -> tuple[float, float]:
+    def limb(
+        start: tuple[float, float], angle: float, length: float, width: float, fill: float
+    ) -> tuple[float, float]:
         end = start[0] + length * math.cos(angle), start[1] - length * math.sin(angle)
         draw.line((*start, *end), fill=int(fill), width=round(width))
         return end
 
     for side in (-1, 1):
-        draw.line((middle, hip, 2 * x + side * 0.7 * unit, foot), fill=int(tone[0]), width=round(0.8 * unit))
+        draw.line(
+            (middle, hip, 2 * x + side * 0.7 * unit, foot),
+            fill=int(tone[0]),
+            width=round(0.8 * unit),
+        )
         lively = both or side == 1
-        raised = math.pi / 2 - side * (0.7 + 0.3 * math.sin(phase)) if lively else -math.pi / 2 + side * 0.2
-        elbow = limb((middle + side * 0.7 * unit, neck + 0.3 * unit), raised, 1.4 * unit, 0.45 * unit, tone[1])
+        raised = (
+            math.pi / 2 - side * (0.7 + 0.3 * math.sin(phase))
+            if lively
+            else -math.pi / 2 + side * 0.2
+        )
+        elbow = limb(
+            (middle + side * 0.7 * unit, neck + 0.3 * unit),
+            raised,
+            1.4 * unit,
+            0.45 * unit,
+            tone[1],
+        )
         swing = math.pi / 2 - side * (0.1 + 0.8 * math.sin(phase)) if lively else raised
         limb(elbow, swing, 1.3 * unit, 0.4 * unit, tone[2])
-    draw.rectangle((middle - 0.8 * unit, neck, middle + 0.8 * unit, hip + 0.3 * unit), fill=int(tone[1]))
+    draw.rectangle(
+        (middle - 0.8 * unit, neck, middle + 0.8 * unit, hip + 0.3 * unit), fill=int(tone[1])
+    )
     top = neck - 1.3 * unit
     draw.ellipse((middle - 0.5 * unit, top, middle + 0.5 * unit, neck), fill=int(tone[2]))
     return np.asarray(picture.resize((SIZE, SIZE), Image.Resampling.BOX), dtype=np.float64)

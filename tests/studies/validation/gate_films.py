@@ -1,8 +1,9 @@
-"""What `flagdata measure` says of 78 films that have a known defect each, of thirteen kinds (`vtk_films.defects`).
+"""What `flagdata measure` says of 78 films that have a known defect each, of thirteen kinds
+(`vtk_films.defects`).
 
-Thresholds were chosen on the films of even number, and the others judge; false alarms are those of the films of
-`validation.films`. FLAGDATA_FILMS names the folder of the films, FLAGDATA_GATE_FILMS ("tuned" or "judging") one
-half of them.
+Thresholds were chosen on the films of even number, and the others judge; false alarms are those of
+the films of `validation.films`. FLAGDATA_FILMS names the folder of the films, FLAGDATA_GATE_FILMS
+("tuned" or "judging") one half of them.
 """
 
 from __future__ import annotations
@@ -43,17 +44,23 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     found = network(None, lake=None, at=None)
     gate = gate_beside(found, false_alarm=Options().false_alarm)
     only = os.environ.get("FLAGDATA_GATE_FILMS")
-    wanted = [(kind, number) for kind, number in names() if only is None or tuned(number) == _HALVES[only]]
+    wanted = [
+        (kind, number) for kind, number in names() if only is None or tuned(number) == _HALVES[only]
+    ]
     rows = [row(kind, number, found, gate, python=python, seed=seed) for kind, number in wanted]
     sheet = {"model": found.estimator.name, "halves": summary(rows), "films": rows}
     (out / "validate-gate-films.md").write_text(page(sheet), encoding="utf-8")
     return sheet
 
 
-def row(kind: str, number: int, found: Network, gate: WindowGate, *, python: Path, seed: int) -> dict[str, Any]:
+def row(
+    kind: str, number: int, found: Network, gate: WindowGate, *, python: Path, seed: int
+) -> dict[str, Any]:
     """What `flagdata measure` reports of one film."""
     path = defect(kind, number, folder=FOLDER, python=python)
-    said = answer(path, found, gate, Options(size=FlagSize(length=LENGTH, height=HEIGHT), seed=seed))
+    said = answer(
+        path, found, gate, Options(size=FlagSize(length=LENGTH, height=HEIGHT), seed=seed)
+    )
     right = DEFECTS[kind][1]
     return {
         "kind": kind,
@@ -87,8 +94,10 @@ def page(sheet: Mapping[str, Any]) -> str:
         "# Films with known defects",
         "",
         (
-            f"Model {sheet['model']}; {len(sheet['films'])} films of {len(DEFECTS)} kinds, made of ArcSim's runs "
-            "filmed by VTK and of drawn scenes (`python -m tests.studies gate-films`). Thresholds were chosen on "
+            f"Model {sheet['model']}; {len(sheet['films'])} films of {len(DEFECTS)} kinds, made of "
+            "ArcSim's runs "
+            "filmed by VTK and of drawn scenes (`python -m tests.studies gate-films`). Thresholds "
+            "were chosen on "
             "one half."
         ),
         "",
@@ -98,7 +107,11 @@ def page(sheet: Mapping[str, Any]) -> str:
     for half, of in sheet["halves"].items():
         cells = " | ".join(_share(of[name]) for name in ("refused", "right_first", "right"))
         lines.append(f"| {half} | {of['refused']['count']} | {cells} |")
-    lines += ["", "| kind | refused | the true reason first | first reasons | one sentence |", "|---|---|---|---|---|"]
+    lines += [
+        "",
+        "| kind | refused | the true reason first | first reasons | one sentence |",
+        "|---|---|---|---|---|",
+    ]
     for kind in DEFECTS:
         own = [one for one in sheet["films"] if one["kind"] == kind]
         firsts = Counter(one["reasons"][0] if one["reasons"] else "answered" for one in own)

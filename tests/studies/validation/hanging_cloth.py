@@ -1,10 +1,11 @@
-"""What the shipped model of hanging cloth says of area weight, beside the paper's errors and beside knowing nothing.
+"""What the shipped model of hanging cloth says of area weight, beside the paper's errors and beside
+knowing nothing.
 
-Runia et al. 2020 (supplement, hanging cloth) measured three of Bouman's recordings by refinement: 0.17, 0.24 and
-0.39 kg/m² were found as 0.22, 0.29 and 0.45. Those films are real and ours are simulated, so that the errors are put
-beside each other, not compared. The spread of the tested weights is reported with them: it is the error of always
-predicting the mean of the training clips. The error of knowing the material's name, but not its drawn weight, is
-reported too.
+Runia et al. 2020 (supplement, hanging cloth) measured three of Bouman's recordings by refinement:
+0.17, 0.24 and 0.39 kg/m² were found as 0.22, 0.29 and 0.45. Those films are real and ours are
+simulated, so that the errors are put beside each other, not compared. The spread of the tested
+weights is reported with them: it is the error of always predicting the mean of the training clips.
+The error of knowing the material's name, but not its drawn weight, is reported too.
 
 The films are those of the test side of `clothsim-wide`, in a lake that FLAGDATA_CLOTH_LAKE names.
 """
@@ -47,10 +48,16 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     source = flagdata.open(place)
     spec = DataSpec(datasets=(_DATASET,))
     train, test = (source.pairs(spec.rows, split=side) for side in ("train", "test"))
-    rows = source.lake.rows({"kind": Kind.RECORDING, **spec.where("test")}, columns=["artifact", "parameters"])
-    material = {row["artifact"]: json.loads(row["parameters"])["material"] for row in rows.to_pylist()}
+    rows = source.lake.rows(
+        {"kind": Kind.RECORDING, **spec.where("test")}, columns=["artifact", "parameters"]
+    )
+    material = {
+        row["artifact"]: json.loads(row["parameters"])["material"] for row in rows.to_pylist()
+    }
     found = model.estimate(
-        torch.cat([model.inputs(test[k].clip.numpy()) for k in range(len(test))]), seed=seed, draws=DRAWS
+        torch.cat([model.inputs(test[k].clip.numpy()) for k in range(len(test))]),
+        seed=seed,
+        draws=DRAWS,
     )
     low, high = found.interval(LEVEL)
     of = [material[str(recording)] for recording in test.table.recording]
@@ -59,13 +66,21 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         "clips": len(test),
         "level": LEVEL,
         "paper": [list(pair) for pair in PAPER],
-        "p_unlike_below_0.05": None if found.unlike is None else float((found.unlike < 0.05).mean()),
+        "p_unlike_below_0.05": None
+        if found.unlike is None
+        else float((found.unlike < 0.05).mean()),
         "of": {},
     }
     for column, target in enumerate(found.targets):
         truth, known = (_of(pairs, target.name) for pairs in (test, train))
         result["of"][target.name] = _scores(
-            truth, found.mean[:, column], low[:, column], high[:, column], known, unit=target.unit, seed=seed
+            truth,
+            found.mean[:, column],
+            low[:, column],
+            high[:, column],
+            known,
+            unit=target.unit,
+            seed=seed,
         )
     weight = [target.name for target in found.targets].index("area_weight")
     truth = _of(test, "area_weight")
@@ -99,9 +114,17 @@ def _of(pairs: Pairs, quantity: str) -> FloatArray:
 
 
 def _scores(
-    truth: FloatArray, mean: FloatArray, low: FloatArray, high: FloatArray, known: FloatArray, *, unit: str, seed: int
+    truth: FloatArray,
+    mean: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    known: FloatArray,
+    *,
+    unit: str,
+    seed: int,
 ) -> dict[str, Any]:
-    """RMSE with an interval over clips, one of each simulation, beside that of the training clips' mean."""
+    """RMSE with an interval over clips, one of each simulation, beside that of the training clips'
+    mean."""
     drawn = stream(seed, "bootstrap", unit).integers(len(truth), size=(RESAMPLES, len(truth)))
     error, trivial = (mean - truth) ** 2, (known.mean() - truth) ** 2
     ours, theirs = np.sqrt(error[drawn].mean(axis=1)), np.sqrt(trivial[drawn].mean(axis=1))
@@ -126,7 +149,8 @@ def _rmse(error: FloatArray) -> float:
 
 
 def _mean_of_each(values: FloatArray, of: list[str]) -> FloatArray:
-    """The mean of all clips of a clip's own material, that clip left out; of a material with one clip that of all."""
+    """The mean of all clips of a clip's own material, that clip left out; of a material with one
+    clip that of all."""
     found = np.empty(len(values))
     for k, name in enumerate(of):
         others = [j for j, other in enumerate(of) if other == name and j != k]
@@ -138,11 +162,19 @@ def _one_of_each(of: list[str], seed: int) -> list[int]:
     """A clip of each of six materials, drawn by chance before any estimate is looked at."""
     generator = stream(seed, "targets")
     names = generator.permutation(sorted(set(of)))[:TARGETS]
-    return [int(generator.choice([k for k, name in enumerate(of) if name == wanted])) for wanted in names]
+    return [
+        int(generator.choice([k for k, name in enumerate(of) if name == wanted]))
+        for wanted in names
+    ]
 
 
 def _draw(
-    path: Path, truth: FloatArray, mean: FloatArray, low: FloatArray, high: FloatArray, chosen: list[int]
+    path: Path,
+    truth: FloatArray,
+    mean: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+    chosen: list[int],
 ) -> None:
     from matplotlib.figure import Figure
 

@@ -1,10 +1,11 @@
 """Whether a film of hanging cloth constrains its area weight, and what a stated weight is worth.
 
-Films of one window are simulated of cloths as the shipped network was trained on, from a seed of their own
-(`tests.studies.long_films`), and measured as `flagdata measure --model wave-cloth --flag-size 1x1` does, once without
-and once with the true weight. The network's mixture is also conditioned on the true wind, which the program does not
-offer: it shows whether it is the unknown wind that hides the weight. Criteria, counts and seed are those of decision
-077, fixed before the films were drawn.
+Films of one window are simulated of cloths as the shipped network was trained on, from a seed of
+their own (`tests.studies.long_films`), and measured as `flagdata measure --model wave-cloth
+--flag-size 1x1` does, once without and once with the true weight. The network's mixture is also
+conditioned on the true wind, which the program does not
+offer: it shows whether it is the unknown wind that hides the weight. Criteria, counts and seed are
+those of decision 077, fixed before the films were drawn.
 """
 
 from __future__ import annotations
@@ -32,7 +33,8 @@ from tests.studies.long_films import LongFilm, simulated
 FILMS = 40
 LEVEL = 0.9
 COVERED = (32, 39)
-"""Films of 40 whose interval may hold the truth: a binomial count of 0.9 lies there with a probability of 97 %."""
+"""Films of 40 whose interval may hold the truth: a binomial count of 0.9 lies there with a
+probability of 97 %."""
 INFORMATIVE = 0.8
 """Median width over the prior's, below which films tell the weight."""
 FALSELY = 0.1
@@ -48,11 +50,13 @@ class Film:
         weight, wind: true [kg/m², m/s].
         refused: whether the gate refused it.
         constrained: whether a weight or a bound of it was given.
-        low, high: of the interval of the weight [kg/m²]; of a bound one end is that of the range or infinite.
+        low, high: of the interval of the weight [kg/m²]; of a bound one end is that of the range or
+            infinite.
         width: of the weight's central 90 %, over that of the prior.
         width_wind_known: the same with the true wind stated.
         covered_wind_known: whether that interval contains the weight.
-        wind_error, wind_error_stated: without and with the true weight stated, mean less truth [m/s].
+        wind_error, wind_error_stated: without and with the true weight stated, mean less truth
+            [m/s].
         wind_covered, wind_covered_stated: whether the wind's interval contains the truth.
     """
 
@@ -79,7 +83,11 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     films = []
     for number, film in enumerate(simulated(model, count=FILMS, windows=1, seed=seed)):
         images = film.windows.reshape(-1, *film.windows.shape[2:])
-        frames = Frames(time=np.arange(len(images)) / model.front_end.rate, images=images, name=f"cloth {number}")
+        frames = Frames(
+            time=np.arange(len(images)) / model.front_end.rate,
+            images=images,
+            name=f"cloth {number}",
+        )
         answers = [
             measure(
                 frames,
@@ -96,7 +104,12 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
             for known in (None, Stated.of(film.parameters[WEIGHT]))
         ]
         films.append(_film(film, model, *answers))
-    sheet = {"model": model.name, "level": LEVEL, **grade(films, seed=seed), "films": [_row(film) for film in films]}
+    sheet = {
+        "model": model.name,
+        "level": LEVEL,
+        **grade(films, seed=seed),
+        "films": [_row(film) for film in films],
+    }
     (out / "validate-hanging-weight.md").write_text(page(sheet), encoding="utf-8")
     return sheet
 
@@ -113,9 +126,13 @@ def _film(film: LongFilm, model: Estimator, unstated: Measurement, stated: Measu
     given = model.learners[0].scaling.values(restricted.logits).cpu().numpy()[0, :, column]
     low, high = np.quantile(given, [0.05, 0.95])
     winds = [
-        next(quantity for quantity in measured.quantities if quantity.name == WIND) for measured in (unstated, stated)
+        next(quantity for quantity in measured.quantities if quantity.name == WIND)
+        for measured in (unstated, stated)
     ]
-    means = [float(measured.draws[:, measured.names.index(WIND)].mean()) for measured in (unstated, stated)]
+    means = [
+        float(measured.draws[:, measured.names.index(WIND)].mean())
+        for measured in (unstated, stated)
+    ]
     return Film(
         weight=weight,
         wind=wind,
@@ -144,8 +161,8 @@ def _width(draws: FloatArray) -> float:
 
 
 def grade(films: Sequence[Film], *, seed: int) -> dict[str, Any]:
-    """Computes the figures of the sheet and whether each criterion holds; films that the gate refuses count in none
-    but the first."""
+    """Computes the figures of the sheet and whether each criterion holds; films that the gate
+    refuses count in none but the first."""
     shown = [film for film in films if not film.refused]
     covered = sum(film.low <= film.weight <= film.high for film in shown)
     scale = len(shown) / FILMS
@@ -157,7 +174,10 @@ def grade(films: Sequence[Film], *, seed: int) -> dict[str, Any]:
     rmse = np.sqrt(np.square(errors).mean(axis=0))
     resampled = np.sqrt(np.square(errors[drawn]).mean(axis=1))
     change = np.quantile(resampled[:, 1] - resampled[:, 0], [0.05, 0.95])
-    winds = [sum(film.wind_covered for film in shown), sum(film.wind_covered_stated for film in shown)]
+    winds = [
+        sum(film.wind_covered for film in shown),
+        sum(film.wind_covered_stated for film in shown),
+    ]
     least, most = COVERED[0] * scale, COVERED[1] * scale
     return {
         "drawn": len(films),
@@ -165,7 +185,9 @@ def grade(films: Sequence[Film], *, seed: int) -> dict[str, Any]:
         "covered": covered,
         "claimed": claimed,
         "median_width_over_prior": width,
-        "median_width_over_prior_wind_known": float(np.median([film.width_wind_known for film in shown])),
+        "median_width_over_prior_wind_known": float(
+            np.median([film.width_wind_known for film in shown])
+        ),
         "covered_wind_known": sum(film.covered_wind_known for film in shown),
         "wind_rmse": float(rmse[0]),
         "wind_rmse_weight_stated": float(rmse[1]),
@@ -191,26 +213,33 @@ def page(sheet: dict[str, Any]) -> str:
         "# The area weight of hanging cloth, from films",
         "",
         (
-            f"{sheet['drawn']} films of simulated cloths, one window each, measured with the shipped network "
-            f"`{sheet['model']}`; the gate refused {sheet['refused']}. Criteria, counts and seed were fixed before the "
+            f"{sheet['drawn']} films of simulated cloths, one window each, measured with the "
+            "shipped network "
+            f"`{sheet['model']}`; the gate refused {sheet['refused']}. Criteria, counts and seed "
+            "were fixed before the "
             "films were drawn ([decision 077](../decisions/077-the-weight-of-hanging-cloth.md))."
         ),
         "",
         "| | |",
         "|---|---|",
-        f"| films on which the weight's 90 % interval contains the truth | {sheet['covered']} of {of} |",
-        f"| median width of that interval over the prior's | {sheet['median_width_over_prior']:.2f} |",
+        f"| films on which the weight's 90 % interval contains the truth | {sheet['covered']} of "
+        f"{of} |",
+        "| median width of that interval over the prior's | "
+        f"{sheet['median_width_over_prior']:.2f} |",
         (
-            f"| the same with the true wind stated | {sheet['median_width_over_prior_wind_known']:.2f}, "
+            "| the same with the true wind stated | "
+            f"{sheet['median_width_over_prior_wind_known']:.2f}, "
             f"contains the truth on {sheet['covered_wind_known']} |"
         ),
         f"| films on which a weight or a bound is given | {sheet['claimed']} |",
         (
-            f"| wind RMSE, weight not stated | {sheet['wind_rmse']:.2f} m/s, its interval contains the truth on "
+            f"| wind RMSE, weight not stated | {sheet['wind_rmse']:.2f} m/s, its interval contains "
+            "the truth on "
             f"{sheet['wind_covered']} |"
         ),
         (
-            f"| wind RMSE, true weight stated | {sheet['wind_rmse_weight_stated']:.2f} m/s, its interval contains the "
+            f"| wind RMSE, true weight stated | {sheet['wind_rmse_weight_stated']:.2f} m/s, its "
+            "interval contains the "
             f"truth on {sheet['wind_covered_weight_stated']} |"
         ),
         f"| change of the RMSE by the stated weight, 90 % | [{low:+.2f}, {high:+.2f}] m/s |",

@@ -1,7 +1,7 @@
 """What `flagdata measure` answers on a flag of heavy cloth, filmed in the looks of `ten-looks`.
 
-Cloth of 0.383 kg/m² is near the end of the weights that `flow-outdoor` learned from, 0.40 kg/m². Weight, winds and
-looks were fixed before a film was measured.
+Cloth of 0.383 kg/m² is near the end of the weights that `flow-outdoor` learned from, 0.40 kg/m².
+Weight, winds and looks were fixed before a film was measured.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
-"""Which films of one flag, of two that overlap, upside down and on their side are refused, and with which reason.
+"""Which films of one flag, of two that overlap, upside down and on their side are refused, and with
+which reason.
 
-Constants of the rules were fixed on the films of the seeds `FIXED`; those of another seed judge (decision 081).
+Constants of the rules were fixed on the films of the seeds `FIXED`; those of another seed judge
+(decision 081).
 """
 
 from __future__ import annotations
@@ -40,7 +42,12 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     """Judges films of a seed, and writes the sheet as JSON and as `validate-kinds.md`."""
     torch.set_num_threads(1)
     rows = [{"film": name, "kinds": found(pictures)} for name, pictures in films(seed)]
-    sheet = {"seed": seed, "fixed_on": " and ".join(map(str, FIXED)), "counts": counts(rows), "films": rows}
+    sheet = {
+        "seed": seed,
+        "fixed_on": " and ".join(map(str, FIXED)),
+        "counts": counts(rows),
+        "films": rows,
+    }
     (out / "validate-kinds.md").write_text(page(sheet), encoding="utf-8")
     return sheet
 
@@ -61,8 +68,11 @@ def films(seed: int) -> Iterator[tuple[str, UInt8Array]]:
 
 
 def found(pictures: UInt8Array) -> list[str]:
-    """Returns the kinds of a film's faults, in order, then the warning of a second pole where there is one."""
-    film = ConditionedFilm(Frames(images=pictures, time=np.arange(len(pictures)) / RATE), aspect=1.5)
+    """Returns the kinds of a film's faults, in order, then the warning of a second pole where there
+    is one."""
+    film = ConditionedFilm(
+        Frames(images=pictures, time=np.arange(len(pictures)) / RATE), aspect=1.5
+    )
     for _ in film.frames(0.0, film.duration):
         pass
     kinds = [one.kind for one in film.findings()]
@@ -70,7 +80,8 @@ def found(pictures: UInt8Array) -> list[str]:
 
 
 def counts(rows: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, int]]:
-    """Counts films by what they show, and of these the refused ones, the answered ones with a warning, and kinds."""
+    """Counts films by what they show, and of these the refused ones, the answered ones with a
+    warning, and kinds."""
     sheet: dict[str, dict[str, int]] = {}
     for row in rows:
         own = sheet.setdefault(row["film"], Counter({"films": 0, "refused": 0, "warned": 0}))
@@ -89,7 +100,8 @@ def page(sheet: Mapping[str, Any]) -> str:
         "# Films that must not be answered",
         "",
         (
-            f"Films of seed {sheet['seed']}; constants were fixed on those of the seeds {sheet['fixed_on']} "
+            f"Films of seed {sheet['seed']}; constants were fixed on those of the seeds "
+            f"{sheet['fixed_on']} "
             "(`python -m tests.studies kinds`)."
         ),
         "",
@@ -98,5 +110,7 @@ def page(sheet: Mapping[str, Any]) -> str:
     ]
     for name, own in sheet["counts"].items():
         reasons = ", ".join(f"`{kind}` {own[kind]}" for kind in REASONS if kind in own) or "none"
-        lines.append(f"| {name} | {own['films']} | {own['refused']} | {own['warned']} | {reasons} |")
+        lines.append(
+            f"| {name} | {own['films']} | {own['refused']} | {own['warned']} | {reasons} |"
+        )
     return "\n".join(lines) + "\n"

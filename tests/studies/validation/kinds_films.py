@@ -1,7 +1,9 @@
-"""Films of one flag and of two, simulated and drawn for the rules on what may not be answered (decision 081).
+"""Films of one flag and of two, simulated and drawn for the rules on what may not be answered
+(decision 081).
 
-A shot is a flag on its pole before a background. Two shots of one camera give a pair: the second flag, with its pole,
-is laid over the first film by its silhouette. Everything follows from one seed.
+A shot is a flag on its pole before a background. Two shots of one camera give a pair: the second
+flag, with its pole, is laid over the first film by its silhouette. Everything follows from one
+seed.
 """
 
 from __future__ import annotations
@@ -70,7 +72,8 @@ class Shot:
 
 
 def flights(seed: int, count: int) -> list[Flight]:
-    """Simulates flags of 1.5 × 1 m, of any bending and damping of the scene, with 0.08 to 0.3 kg/m²."""
+    """Simulates flags of 1.5 × 1 m, of any bending and damping of the scene, with 0.08 to 0.3
+    kg/m²."""
     given = {
         "seed": seed,
         "count": count,
@@ -87,9 +90,13 @@ def flights(seed: int, count: int) -> list[Flight]:
     crew = Crew(recipe_of(_SCENE, given))
     members = [crew.member(k) for k in range(count)]
     found = []
-    for member, outcome in zip(members, run(crew, Stepper.of(crew, members[0].base), members, size=count), strict=True):
+    for member, outcome in zip(
+        members, run(crew, Stepper.of(crew, members[0].base), members, size=count), strict=True
+    ):
         if outcome.sequence is None:
-            raise RuntimeError(f"flag {member.index} of seed {seed} was not simulated: {outcome.failure}")
+            raise RuntimeError(
+                f"flag {member.index} of seed {seed} was not simulated: {outcome.failure}"
+            )
         weight = float(str(member.parameters["area_weight"]))
         found.append(Flight(wind=member.wind_speed, area_weight=weight, sequence=outcome.sequence))
     return found
@@ -120,12 +127,18 @@ def shot(flight: Flight, zeta: RenderParameters, seed: int) -> Shot:
         colour = Raster(assets=Assets()).render(meshes, zeta).numpy()
     rng = stream(seed, "kinds", "noise")
     cloth, pole = silhouettes(flight, zeta)
-    gray = np.stack([noisy(np.asarray(cv2.cvtColor(one, cv2.COLOR_RGB2GRAY), np.uint8), _NOISE, rng) for one in colour])
+    gray = np.stack(
+        [
+            noisy(np.asarray(cv2.cvtColor(one, cv2.COLOR_RGB2GRAY), np.uint8), _NOISE, rng)
+            for one in colour
+        ]
+    )
     return Shot(pictures=gray, cloth=cloth, pole=pole)
 
 
 def silhouettes(flight: Flight, zeta: RenderParameters) -> tuple[BoolArray, BoolArray]:
-    """Draws where the cloth is in each frame (n, `HEIGHT`, `WIDTH`), and where the pole is (`HEIGHT`, `WIDTH`)."""
+    """Draws where the cloth is in each frame (n, `HEIGHT`, `WIDTH`), and where the pole is
+    (`HEIGHT`, `WIDTH`)."""
     meshes = Meshes.flag(flight.sequence, heading=0.0)
     placed = stage(meshes, zeta)
 
@@ -157,12 +170,18 @@ def pair(first: Flight, second: Flight, seed: int) -> Shot:
         child_seed(seed, "front"),
     )
     over = front.cloth | front.pole
-    return Shot(pictures=np.where(over, front.pictures, back.pictures), cloth=front.cloth, pole=front.pole)
+    return Shot(
+        pictures=np.where(over, front.pictures, back.pictures), cloth=front.cloth, pole=front.pole
+    )
 
 
 def mirrored(pictures: UInt8Array, seed: int) -> UInt8Array:
     """Half of the films, left for right."""
-    return np.ascontiguousarray(pictures[:, :, ::-1]) if stream(seed, "kinds", "mirror").random() < 0.5 else pictures
+    return (
+        np.ascontiguousarray(pictures[:, :, ::-1])
+        if stream(seed, "kinds", "mirror").random() < 0.5
+        else pictures
+    )
 
 
 def upside_down(pictures: UInt8Array) -> UInt8Array:

@@ -1,4 +1,5 @@
-"""The tests of the lake with its lakes in a bucket: how many pass, and which are about a disk alone, with the reason.
+"""The tests of the lake with its lakes in a bucket: how many pass, and which are about a disk
+alone, with the reason.
 
 `FLAGDATA_TEST_STORAGE=s3` puts the lakes of the fixture `lake` on moto's server, on loopback.
 """
@@ -21,9 +22,11 @@ TESTS = ("tests/flagdata/lake", "tests/flagdata/record/test_ranges.py")
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
-    """Tests that passed, failed and were left out; a failure ends the validation, once all files have run.
+    """Tests that passed, failed and were left out; a failure ends the validation, once all files
+    have run.
 
-    Files of tests that passed in an earlier run of the same code, which was stopped, are not run again.
+    Files of tests that passed in an earlier run of the same code, which was stopped, are not run
+    again.
     """
     folder = out / f"lake-in-a-bucket-{code_version()}"
     folder.mkdir(parents=True, exist_ok=True)
@@ -50,15 +53,28 @@ def _files(place: Path) -> list[Path]:
 def _test(file: Path, report: Path) -> None:
     """Run a file of tests with its lakes in a bucket; the report appears once it is whole."""
     scratch = report.with_suffix(".part")
-    command = [sys.executable, "-m", "pytest", "-q", str(file), f"--junitxml={scratch}", "-o", "junit_family=xunit2"]
-    subprocess.run(command, cwd=_ROOT, env={**os.environ, "FLAGDATA_TEST_STORAGE": "s3"}, check=False)
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        str(file),
+        f"--junitxml={scratch}",
+        "-o",
+        "junit_family=xunit2",
+    ]
+    subprocess.run(
+        command, cwd=_ROOT, env={**os.environ, "FLAGDATA_TEST_STORAGE": "s3"}, check=False
+    )
     scratch.rename(report)
 
 
 def summary(cases: list[ET.Element]) -> dict[str, Any]:
     """What the cases of a report say."""
     skipped = Counter(
-        str(left.get("message")).removeprefix("of a disk: ") for case in cases for left in case.findall("skipped")
+        str(left.get("message")).removeprefix("of a disk: ")
+        for case in cases
+        for left in case.findall("skipped")
     )
     failed = [
         f"{case.get('classname')}::{case.get('name')}"

@@ -30,9 +30,12 @@ from flagdata.lake import Lake
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "results" / "wind-log-transcripts.md"
 INTRODUCTION = (
     "# Transcripts of ten wind logs\n\n"
-    "Ten made files as a new user ingests them, first without a terminal (a script), then at one; `>` is followed by "
-    "what was typed.\nShown are the first lines of each file, then everything the program printed, but for reasons "
-    "that repeat the preview. The lake was\nempty each time. [Describing a sensor](../sensors.md) explains the parts.\n"
+    "Ten made files as a new user ingests them, first without a terminal (a script), then at one; "
+    "`>` is followed by "
+    "what was typed.\nShown are the first lines of each file, then everything the program printed, "
+    "but for reasons "
+    "that repeat the preview. The lake was\nempty each time. [Describing a sensor](../sensors.md) "
+    "explains the parts.\n"
     "`python -m tests.studies log-transcripts` makes this page.\n"
 )
 START = dt.datetime(2026, 5, 14, 11, 30)  # noqa: DTZ001  a logger's wall clock
@@ -40,7 +43,12 @@ START = dt.datetime(2026, 5, 14, 11, 30)  # noqa: DTZ001  a logger's wall clock
 
 def speed(at: float, mean: float = 5.0, phase: float = 0.0) -> float:
     """A gusty wind [m/s]."""
-    return mean * (1 + 0.25 * math.sin(at / 9 + phase) + 0.1 * math.sin(at / 2.3 + 2 * phase) + 0.02 * math.sin(7 * at))
+    return mean * (
+        1
+        + 0.25 * math.sin(at / 9 + phase)
+        + 0.1 * math.sin(at / 2.3 + 2 * phase)
+        + 0.02 * math.sin(7 * at)
+    )
 
 
 def away(at: float) -> int:
@@ -54,8 +62,17 @@ def rows(form: str, count: int = 60, every: float = 1.0, start: dt.datetime = ST
     for n in range(count):
         at = n * every
         t, v, d = start + dt.timedelta(seconds=at), speed(at), away(at)
-        values = {"low": 0.75 * speed(at, phase=0.1), "kn": v / 0.514444, "kmh": 3.6 * v, "ms": 1000 * n + 7}
-        axes = {"u": v * math.cos(at / 300), "side": v * math.sin(at / 300), "w": 0.05 * math.cos(at)}
+        values = {
+            "low": 0.75 * speed(at, phase=0.1),
+            "kn": v / 0.514444,
+            "kmh": 3.6 * v,
+            "ms": 1000 * n + 7,
+        }
+        axes = {
+            "u": v * math.cos(at / 300),
+            "side": v * math.sin(at / 300),
+            "w": 0.05 * math.cos(at),
+        }
         made.append(form.format(t=t, n=n, v=v, d=d, **values, **axes))
     return "".join(f"{row}\n" for row in made)
 
@@ -92,7 +109,8 @@ TRIALS = (
     ),
     Trial(
         title="A Campbell table (TOA5)",
-        about="Recognised by its first line. The sonic's components need the sensor's azimuth for a direction.",
+        about="Recognised by its first line. The sonic's components need the sensor's azimuth for "
+        "a direction.",
         name="campbell.dat",
         shown=5,
         runs=[("", None), ("", ["+02:00"])],
@@ -102,12 +120,16 @@ TRIALS = (
     ),
     Trial(
         title="What an Arduino printed",
-        about="Two numbers a line, without a heading: the columns have to be given, then the start of its count of "
+        about="Two numbers a line, without a heading: the columns have to be given, then the start "
+        "of its count of "
         "milliseconds.",
         name="arduino.txt",
         shown=3,
         text=rows("{ms} {v:.2f}"),
-        runs=[("", None), ('--columns "time[ms],wind_speed[m/s]"', ["2026-05-14T11:30:00+02:00", "yes"])],
+        runs=[
+            ("", None),
+            ('--columns "time[ms],wind_speed[m/s]"', ["2026-05-14T11:30:00+02:00", "yes"]),
+        ],
     ),
     Trial(
         title="A spreadsheet",
@@ -119,7 +141,8 @@ TRIALS = (
     ),
     Trial(
         title="A log without a zone",
-        about="Everything else is stated, so the answer completes it and there is nothing to confirm.",
+        about="Everything else is stated, so the answer completes it and there is nothing to "
+        "confirm.",
         name="zoneless.csv",
         shown=3,
         runs=[("", None), ("", ["+02:00"])],
@@ -135,7 +158,8 @@ TRIALS = (
     ),
     Trial(
         title="Components",
-        about="Headings of one letter are inferred. `--azimuth` gives the axes, and the preview then has a direction "
+        about="Headings of one letter are inferred. `--azimuth` gives the axes, and the preview "
+        "then has a direction "
         "to check.",
         name="components.csv",
         shown=3,
@@ -144,7 +168,8 @@ TRIALS = (
     ),
     Trial(
         title="Two heights",
-        about="Each height becomes an artifact. The direction is read with the speed of its own height only.",
+        about="Each height becomes an artifact. The direction is read with the speed of its own "
+        "height only.",
         name="heights.csv",
         shown=3,
         runs=[("", None), ("", ["yes", "yes"])],
@@ -157,11 +182,13 @@ TRIALS = (
         name="boat.csv",
         shown=3,
         runs=[("", None), ("", ["AWS (kn)", "moving"])],
-        text="time,AWS (kn),AWA (deg),SOG (kn),Heading (deg)\n" + rows(ISO + ",{kn:.1f},{d},5.1,187"),
+        text="time,AWS (kn),AWA (deg),SOG (kn),Heading (deg)\n"
+        + rows(ISO + ",{kn:.1f},{d},5.1,187"),
     ),
     Trial(
         title="A clock that was set back",
-        about="All is stated, but the time goes back by 2 min. `--clock last` says that the clock was right after it "
+        about="All is stated, but the time goes back by 2 min. `--clock last` says that the clock "
+        "was right after it "
         "was set.",
         name="setback.csv",
         shown=3,

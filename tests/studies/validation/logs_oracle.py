@@ -1,10 +1,12 @@
-"""Whether wind logs are read as an earlier commit read them, to the bit: its tests are the files and the options.
+"""Whether wind logs are read as an earlier commit read them, to the bit: its tests are the files
+and the options.
 
     python -m tests.studies logs-oracle record COMMIT FOLDER    # runs that commit's tests of logs, about 20 minutes
     python -m tests.studies logs-oracle compare FOLDER          # reads every file again, and counts
 
-An entry of FOLDER is a call of `read_log`: KEY.bin the file, KEY.toml its recipe, KEY.json the options and what came of
-them, KEY.npz the samples. The recording itself runs in the earlier commit, with this module as a plugin of pytest.
+An entry of FOLDER is a call of `read_log`: KEY.bin the file, KEY.toml its recipe, KEY.json the
+options and what came of them, KEY.npz the samples. The recording itself runs in the earlier commit,
+with this module as a plugin of pytest.
 """
 
 from __future__ import annotations
@@ -51,13 +53,21 @@ def _record_calls(folder: Path) -> None:
         if not path.is_file() or path.stat().st_size > _LARGEST:
             return original(path, options)
         data = path.read_bytes()
-        recipe = Path(options.recipe).read_bytes() if options.recipe and Path(options.recipe).is_file() else None
+        recipe = (
+            Path(options.recipe).read_bytes()
+            if options.recipe and Path(options.recipe).is_file()
+            else None
+        )
         given = {name: value for name, value in options.as_dict().items() if value is not None}
         if options.limits != Limits():
             given["limits"] = dataclasses.asdict(options.limits)
         if recipe is not None:
             given["recipe"] = ""
-        named = json.dumps([given, path.suffix, (recipe or b"").decode(errors="replace")], sort_keys=True, default=str)
+        named = json.dumps(
+            [given, path.suffix, (recipe or b"").decode(errors="replace")],
+            sort_keys=True,
+            default=str,
+        )
         at = folder / hashlib.sha256(data + named.encode()).hexdigest()[:24]
         entry: dict[str, object] = {"name": path.name, "options": given}
         try:
@@ -67,8 +77,12 @@ def _record_calls(folder: Path) -> None:
             raise
         _keep(at, data, recipe, {**entry, "format": log.format, "drafted": log.drafted})
         series = log.series
-        channels: dict[str, Any] = {f"channel:{name}": values for name, values in series.channels.items()}
-        np.savez_compressed(at.with_suffix(".npz"), time=series.time, flags=series.flags, **channels)
+        channels: dict[str, Any] = {
+            f"channel:{name}": values for name, values in series.channels.items()
+        }
+        np.savez_compressed(
+            at.with_suffix(".npz"), time=series.time, flags=series.flags, **channels
+        )
         return log
 
     module.read_log = package.read_log = recording
@@ -82,7 +96,8 @@ def _keep(at: Path, data: bytes, recipe: bytes | None, entry: Mapping[str, objec
 
 
 def record(commit: str, folder: Path, tests: str = _TESTS) -> int:
-    """Run the tests of logs of a commit of this repository, with every file that they read kept in a folder."""
+    """Run the tests of logs of a commit of this repository, with every file that they read kept in
+    a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as made:
         tree, plugin = Path(made, "tree"), Path(made, "plugin")
@@ -92,7 +107,17 @@ def record(commit: str, folder: Path, tests: str = _TESTS) -> int:
         plugin.mkdir()
         shutil.copy(__file__, plugin / "logs_oracle.py")
         paths = os.pathsep.join(map(str, (tree, plugin)))
-        command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "logs_oracle", tests]
+        command = [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-q",
+            "-p",
+            "no:cacheprovider",
+            "-p",
+            "logs_oracle",
+            tests,
+        ]
         environment = {**os.environ, "PYTHONPATH": paths, _FOLDER: str(folder.resolve())}
         return subprocess.run(command, cwd=tree, env=environment, check=False).returncode
 
@@ -100,8 +125,9 @@ def record(commit: str, folder: Path, tests: str = _TESTS) -> int:
 def compare(folder: Path) -> Counter[tuple[str, str]]:
     """Read every file of a folder again: (kind of entry, outcome) → how many.
 
-    Kinds are "exact" (a maker's format or a recipe), "draft" and "refused", as they were; outcomes "same" (times,
-    channels, values and flags to the bit), "asks", "refused", "reads" (what was refused), and what differs.
+    Kinds are "exact" (a maker's format or a recipe), "draft" and "refused", as they were; outcomes
+    "same" (times, channels, values and flags to the bit), "asks", "refused", "reads" (what was
+    refused), and what differs.
     """
     found: Counter[tuple[str, str]] = Counter()
     with tempfile.TemporaryDirectory() as made:
@@ -117,20 +143,28 @@ def compare(folder: Path) -> Counter[tuple[str, str]]:
 def _kind(entry: Mapping[str, Any]) -> str:
     if "error" in entry:
         return "refused"
-    drafted = entry["format"] == "delimited" and "recipe" not in entry["options"] and entry["drafted"]
+    drafted = (
+        entry["format"] == "delimited" and "recipe" not in entry["options"] and entry["drafted"]
+    )
     return "draft" if drafted else "exact"
 
 
 def _outcome(at: Path, entry: Mapping[str, Any], folder: Path) -> str:
     file, recipe = folder / entry["name"], folder / "recipe.toml"
     shutil.copy(at.with_suffix(".bin"), file)
-    options = {name: value for name, value in entry["options"].items() if name in WindOptions.__dataclass_fields__}
+    options = {
+        name: value
+        for name, value in entry["options"].items()
+        if name in WindOptions.__dataclass_fields__
+    }
     if at.with_suffix(".toml").exists():
         shutil.copy(at.with_suffix(".toml"), recipe)
         options["recipe"] = str(recipe)
     if "limits" in options:
         known = Limits.__dataclass_fields__
-        options["limits"] = Limits(**{name: value for name, value in options["limits"].items() if name in known})
+        options["limits"] = Limits(
+            **{name: value for name, value in options["limits"].items() if name in known}
+        )
     if "date" in options:
         options["date"] = dt.date.fromisoformat(options["date"])
     if "start" in options:
@@ -147,7 +181,10 @@ def _outcome(at: Path, entry: Mapping[str, Any], folder: Path) -> str:
         return "other times"
     if names != set(series.channels):
         return "other channels"
-    if not all(np.array_equal(old[f"channel:{name}"], series.channels[name], equal_nan=True) for name in names):
+    if not all(
+        np.array_equal(old[f"channel:{name}"], series.channels[name], equal_nan=True)
+        for name in names
+    ):
         return "other values"
     return "same" if np.array_equal(old["flags"], series.flags) else "other flags"
 
@@ -156,7 +193,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """See the module's text."""
     parser = argparse.ArgumentParser(description="wind logs as an earlier commit read them")
     steps = parser.add_subparsers(dest="step", required=True)
-    first = steps.add_parser("record", help="run an earlier commit's tests of logs and keep what they read")
+    first = steps.add_parser(
+        "record", help="run an earlier commit's tests of logs and keep what they read"
+    )
     first.add_argument("commit")
     first.add_argument("folder", type=Path)
     first.add_argument("--tests", default=_TESTS, help="of that commit, if not all")

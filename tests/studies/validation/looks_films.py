@@ -1,4 +1,5 @@
-"""Films of flags whose geometry is known, by a renderer of the project, and what is read of them against it."""
+"""Films of flags whose geometry is known, by a renderer of the project, and what is read of them
+against it."""
 
 from __future__ import annotations
 
@@ -37,8 +38,8 @@ class Place:
     """Where a flag is filmed from.
 
     Attributes:
-        azimuth, elevation: of the camera's axis, as `measure.observables.View` has them; the air goes to the left where
-            the azimuth is negative [rad].
+        azimuth, elevation: of the camera's axis, as `measure.observables.View` has them; the air
+            goes to the left where the azimuth is negative [rad].
         distance: [m].
         wide: share of the picture's width that the flat flag would take.
     """
@@ -59,7 +60,9 @@ class Place:
             wide=float(rng.uniform(*_WIDE)),
         )
 
-    def put(self, zeta: RenderParameters, positions: FloatArray, upper: int, length: float) -> RenderParameters:
+    def put(
+        self, zeta: RenderParameters, positions: FloatArray, upper: int, length: float
+    ) -> RenderParameters:
         """A look with its camera here: the axis goes through the middle of the flag's box.
 
         Args:
@@ -99,10 +102,25 @@ def look(seed: int, *, light: int) -> RenderParameters:
     own, other = (render_prior.named_prior("outdoor").draw(one, Assets()) for one in (seed, light))
     shown = {
         name: getattr(other, name)
-        for name in ("sun_height", "sun_radius", "sun_azimuth", "sun_strength", "sun_softness", "sky_strength")
+        for name in (
+            "sun_height",
+            "sun_radius",
+            "sun_azimuth",
+            "sun_strength",
+            "sun_softness",
+            "sky_strength",
+        )
     }
     width, height = SIZE
-    return replace(own, **shown, width=width, height=height, raster_samples=4, cycles_samples=4, cycles_bounces=2)
+    return replace(
+        own,
+        **shown,
+        width=width,
+        height=height,
+        raster_samples=4,
+        cycles_samples=4,
+        cycles_bounces=2,
+    )
 
 
 def meshes_of(positions: FloatArray, mesh: Mesh) -> Meshes:
@@ -137,13 +155,17 @@ def filmed(
         colour = render(meshes, zeta).numpy()
     camera = load(_CAMERA).camera
     pictures = np.stack(
-        decode(encode_pictures(colour, settings(camera, seed=seed), camera, seed=seed), where="a filmed flag")
+        decode(
+            encode_pictures(colour, settings(camera, seed=seed), camera, seed=seed),
+            where="a filmed flag",
+        )
     )
     return read(pictures, places(meshes, zeta), mesh, flag)
 
 
 def read(pictures: UInt8Array, projected: FloatArray, mesh: Mesh, flag: Flag) -> Filmed | None:
-    """Read pictures (frame, height, width), and the geometry (frame, vertex, 2) [px] of the same windows."""
+    """Read pictures (frame, height, width), and the geometry (frame, vertex, 2) [px] of the same
+    windows."""
     times = np.arange(len(pictures)) / RATE
     film = ConditionedFilm(Frames(images=pictures, time=times), aspect=flag.length / flag.height)
     try:

@@ -1,5 +1,6 @@
-"""The fitted flag filmed once: a flag that is nearly the film's, drawn with the film's own colours before its own
-background, and read as the film is; what its reading is off by is what the film's may be off by."""
+"""The fitted flag filmed once: a flag that is nearly the film's, drawn with the film's own colours
+before its own background, and read as the film is; what its reading is off by is what the film's
+may be off by."""
 
 from __future__ import annotations
 
@@ -82,11 +83,15 @@ class Look:
         )
 
 
-def refilmed(look: Look, positions: FloatArray, mesh: Mesh, flag: Flag, place: Place, *, seed: int) -> Filmed | None:
+def refilmed(
+    look: Look, positions: FloatArray, mesh: Mesh, flag: Flag, place: Place, *, seed: int
+) -> Filmed | None:
     """A flag (frame, vertex, 3) [m] filmed in a look, and read; None where its film is refused."""
     texture = np.repeat(look.cloth[:, :, None], 3, axis=2)
     texture = cv2.resize(texture, (256, 192), interpolation=cv2.INTER_NEAREST)
-    own = _Own(cloth=np.asarray(texture, np.uint8), behind=np.repeat(look.behind[:, :, None], 3, axis=2))
+    own = _Own(
+        cloth=np.asarray(texture, np.uint8), behind=np.repeat(look.behind[:, :, None], 3, axis=2)
+    )
     side = look.behind.shape[0]
     zeta = RenderParameters(
         background="film/own",
@@ -103,12 +108,16 @@ def refilmed(look: Look, positions: FloatArray, mesh: Mesh, flag: Flag, place: P
     zeta = seen.put(zeta, positions, int(hoist[0]), flag.length)
     zeta = replace(zeta, sun_azimuth=math.remainder(zeta.camera_angle + math.pi, 2 * math.pi))
     meshes = meshes_of(positions, mesh)
-    zeta = aimed(zeta, lambda one: places(meshes, one)[:, [hoist[0], hoist[-1]]].mean(axis=0), look.hoist)
+    zeta = aimed(
+        zeta, lambda one: places(meshes, one)[:, [hoist[0], hoist[-1]]].mean(axis=0), look.hoist
+    )
     raster = Raster(assets=own)
     with torch.no_grad():
         few = meshes.part(0, min(_LEVEL, len(meshes)))
         shown = raster.part(meshes, zeta, 0, len(few)).numpy()[..., 0]
-        zeta = replace(zeta, exposure_bias=_exposure(shown, places(meshes, zeta)[: len(few)], mesh, look))
+        zeta = replace(
+            zeta, exposure_bias=_exposure(shown, places(meshes, zeta)[: len(few)], mesh, look)
+        )
         pictures = raster.render(meshes, zeta).numpy()[..., 0]
     noise = look.noise * stream(seed, "refilmed").standard_normal(pictures.shape)
     noisy = np.clip(np.rint(pictures + noise), 0, 255).astype(np.uint8)
@@ -118,12 +127,15 @@ def refilmed(look: Look, positions: FloatArray, mesh: Mesh, flag: Flag, place: P
 def aimed(
     zeta: RenderParameters, ends: Callable[[RenderParameters], FloatArray], wanted: FloatArray
 ) -> RenderParameters:
-    """With the hoist's ends where they are wanted [px], by the angle of view and the picture's place."""
+    """With the hoist's ends where they are wanted [px], by the angle of view and the picture's
+    place."""
     for _ in range(2):
         now = ends(zeta)
         larger = (wanted[1, 1] - wanted[0, 1]) / (now[1, 1] - now[0, 1])
         zeta = replace(zeta, view_angle=2 * math.atan(math.tan(zeta.view_angle / 2) / larger))
-        across, down = (wanted.mean(axis=0) - ends(zeta).mean(axis=0)) / max(zeta.width, zeta.height)
+        across, down = (wanted.mean(axis=0) - ends(zeta).mean(axis=0)) / max(
+            zeta.width, zeta.height
+        )
         zeta = replace(
             zeta,
             frame_offset_x=float(np.clip(zeta.frame_offset_x + across, -1, 1)),
@@ -133,18 +145,22 @@ def aimed(
 
 
 def _exposure(shown: UInt8Array, projected: FloatArray, mesh: Mesh, look: Look) -> float:
-    """Stops by which pictures of the cloth are to be lighter, so that it is on average as light as in the film."""
+    """Stops by which pictures of the cloth are to be lighter, so that it is on average as light as
+    in the film."""
     levels = []
     for picture, corners in zip(shown, projected, strict=True):
         inside = np.zeros(picture.shape, np.uint8)
         for face in mesh.faces:
             cv2.fillConvexPoly(inside, np.rint(corners[face] - 0.5).astype(np.int32), 1)
         levels.append(to_linear(picture)[inside > 0].mean())
-    return float(np.clip(math.log2(to_linear(look.cloth).mean() / max(float(np.mean(levels)), 1e-4)), -6, 6))
+    return float(
+        np.clip(math.log2(to_linear(look.cloth).mean() / max(float(np.mean(levels)), 1e-4)), -6, 6)
+    )
 
 
 def _colours(windows: list[FilmWindow]) -> UInt8Array:
-    """(rows, columns) mean gray of the cloth's places: shares of its area away from the hoist, shares of its height."""
+    """(rows, columns) mean gray of the cloth's places: shares of its area away from the hoist,
+    shares of its height."""
     total, count = np.zeros(_CELLS), np.zeros(_CELLS)
     for window in windows:
         for number in np.flatnonzero(window.shown)[::_EVERY].tolist():
@@ -166,11 +182,14 @@ def _colours(windows: list[FilmWindow]) -> UInt8Array:
 
 def _beyond(window: FilmWindow, shape: tuple[int, ...]) -> BoolArray:
     """(rows, columns) what is beyond the hoist, where no cloth is: the pole among it."""
-    return np.broadcast_to(window.side * (np.arange(shape[1]) + 0.5 - window.hoist[:, 0].mean()) < 0, shape)
+    return np.broadcast_to(
+        window.side * (np.arange(shape[1]) + 0.5 - window.hoist[:, 0].mean()) < 0, shape
+    )
 
 
 def _behind(windows: list[FilmWindow], background: UInt8Array) -> UInt8Array:
-    """The picture made fit without its cloth: medians of what is bare, and what surrounds it where nothing is."""
+    """The picture made fit without its cloth: medians of what is bare, and what surrounds it where
+    nothing is."""
     frames = np.concatenate([window.frames[::_EVERY] for window in windows])
     masks = np.concatenate([window.masks[::_EVERY] for window in windows])
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _NEAR + 1, 2 * _NEAR + 1))
@@ -179,7 +198,9 @@ def _behind(windows: list[FilmWindow], background: UInt8Array) -> UInt8Array:
     bare = 1 - near.mean(axis=0)
     seen = np.ma.median(np.ma.array(frames, mask=near), axis=0)
     usual = np.asarray(np.ma.filled(seen, 0.0))
-    filled = cv2.inpaint(usual.astype(np.uint8), (bare < _BARE).astype(np.uint8), 3, cv2.INPAINT_TELEA)
+    filled = cv2.inpaint(
+        usual.astype(np.uint8), (bare < _BARE).astype(np.uint8), 3, cv2.INPAINT_TELEA
+    )
     large = (background.shape[1], background.shape[0])
     coarse = cv2.resize(filled, large, interpolation=cv2.INTER_CUBIC)
     often = cv2.resize(bare.astype(np.float32), large, interpolation=cv2.INTER_LINEAR) > 0.7

@@ -1,16 +1,19 @@
-"""Verdicts on flags of other numerics, without and with an effect, of which the loop is shown only observables.
+"""Verdicts on flags of other numerics, without and with an effect, of which the loop is shown only
+observables.
 
-**Registered** before any result of it was looked at (seed and rules are this file's). Two recordings of 30 s, in winds
-of von Kármán's spectrum at means of 4 and 6.5 m/s, logged once a second by a cup. Truths are flags as null experiments
-are, by other kinds of numerics. Those without an effect are null experiments, each kind judged by all others; those
-with one are eight cloths for each effect, its strength from the stronger half of those that are weighed. What is stated
-is the azimuth, ± 7°. Reported: how many are rejected at the level, and for those that are, whether the effect is named
-alone, among several, as a part, or wrongly.
+**Registered** before any result of it was looked at (seed and rules are this file's). Two
+recordings of 30 s, in winds of von Kármán's spectrum at means of 4 and 6.5 m/s, logged once a
+second by a cup. Truths are flags as null experiments are, by other kinds of numerics. Those without
+an effect are null experiments, each kind judged by all others; those with one are eight cloths for
+each effect, its strength from the stronger half of those that are weighed. What is stated is the
+azimuth, ± 7°. Reported: how many are rejected at the level, and for those that are, whether the
+effect is named alone, among several, as a part, or wrongly.
 
-`python -m tests.studies loop-on-films`; the simulations are kept in FLAGDATA_LOOP_ON_FILMS, by default a new folder.
-FLAGDATA_LOOP_ON_FILMS_EFFECTS names the effects that are weighed and that act, _KINDS is how many kinds of numerics
-null experiments have, _RECORDINGS which of the two recordings are used, as in "1" (all by default), and _SIMULATIONS
-how many flags of the base model are simulated for each.
+`python -m tests.studies loop-on-films`; the simulations are kept in FLAGDATA_LOOP_ON_FILMS, by
+default a new folder. FLAGDATA_LOOP_ON_FILMS_EFFECTS names the effects that are weighed and that
+act, _KINDS is how many kinds of numerics null experiments have, _RECORDINGS which of the two
+recordings are used, as in "1" (all by default), and _SIMULATIONS how many flags of the base model
+are simulated for each.
 """
 
 from __future__ import annotations
@@ -69,7 +72,10 @@ _BEFORE = 64.0  # s
 _INTENSITY, _LENGTH, _RATE = 0.18, 50.0, 10.0  # 1, m, Hz
 FLAG = Flag(length=1.5, height=1.0)
 AZIMUTH = Uncertain(
-    name="azimuth", unit="rad", prior=Normal(mean=math.radians(70.0), sigma=math.radians(7.0)), source="stated"
+    name="azimuth",
+    unit="rad",
+    prior=Normal(mean=math.radians(70.0), sigma=math.radians(7.0)),
+    source="stated",
 )
 
 
@@ -80,7 +86,11 @@ def log(mean: float) -> Log:
     spectrum = VonKarman(mean=mean, intensity=_INTENSITY, length=_LENGTH)
     speed = spectrum.series(rng, duration=count / _RATE, rate=_RATE)[:count]
     times = np.arange(count) / _RATE - _BEFORE
-    lagged = AnemometerLag(distance=3.0).read(torch.from_numpy(times), torch.from_numpy(speed[:, None])).numpy()[:, 0]
+    lagged = (
+        AnemometerLag(distance=3.0)
+        .read(torch.from_numpy(times), torch.from_numpy(speed[:, None]))
+        .numpy()[:, 0]
+    )
     at = np.arange(-60.0, DURATION + 1.0)
     read = np.interp(at, times, lagged) + 0.05 * rng.standard_normal(len(at))
     return Log(times=at, speed=np.round(read, 1), distance=3.0)
@@ -88,7 +98,9 @@ def log(mean: float) -> Log:
 
 def chosen() -> tuple[int, ...]:
     """Places of the recordings that are used."""
-    return tuple(int(place) for place in os.environ.get("FLAGDATA_LOOP_ON_FILMS_RECORDINGS", "0 1").split())
+    return tuple(
+        int(place) for place in os.environ.get("FLAGDATA_LOOP_ON_FILMS_RECORDINGS", "0 1").split()
+    )
 
 
 def effects() -> tuple[Weighable, ...]:
@@ -119,7 +131,11 @@ def truths(effect: Weighable, number: int) -> list[list[FlagBatch]]:
     strengths = stronger(effect, seed)
     kind = Discretisation.drawn(stream(seed, "kind"), explicit=0.0)
     return [
-        [replace(batch, effects=((effect.column, strengths),), discretisation=kind) for batch in own] for own in made
+        [
+            replace(batch, effects=((effect.column, strengths),), discretisation=kind)
+            for batch in own
+        ]
+        for own in made
     ]
 
 
@@ -143,15 +159,22 @@ def simulations(folder: Path) -> Simulations:
 
     finer = [Finer.of(own[place]) for place in chosen()]
     base = tuple(seen(own[place].batches()) for place in chosen())
-    made = [[pairs(design, effect, until=lasting(len(own))) for effect in effects()] for design in own]
+    made = [
+        [pairs(design, effect, until=lasting(len(own))) for effect in effects()] for design in own
+    ]
     return Simulations(
         designs=tuple(own[place] for place in chosen()),
         base=base,
-        pairs=tuple(tuple((pair, seen(pair.batches)) for pair in made[place]) for place in chosen()),
+        pairs=tuple(
+            tuple((pair, seen(pair.batches)) for pair in made[place]) for place in chosen()
+        ),
         nulls=tuple(seen(null[place]) for place in chosen()),
         kinds=np.repeat(np.arange(KINDS), TOGETHER),
         weights=np.concatenate([batch.values["area_weight"] for batch in null[0]]),
-        corrections=tuple(one.correction(seen(one.batches), coarse) for one, coarse in zip(finer, base, strict=True)),
+        corrections=tuple(
+            one.correction(seen(one.batches), coarse)
+            for one, coarse in zip(finer, base, strict=True)
+        ),
     )
 
 
@@ -161,7 +184,12 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     folder = Path(os.environ.get("FLAGDATA_LOOP_ON_FILMS") or mkdtemp(prefix="loop-on-films-"))
     made = simulations(folder)
     recordings = [
-        Observed(name=f"{MEANS[place]:g} m/s", source="", readings=np.nanmean(base, axis=0), log=design.log)
+        Observed(
+            name=f"{MEANS[place]:g} m/s",
+            source="",
+            readings=np.nanmean(base, axis=0),
+            log=design.log,
+        )
         for place, base, design in zip(chosen(), made.base, made.designs, strict=True)
     ]
     sights = sights_of(recordings, made)
@@ -170,11 +198,15 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     weighed, along = weigh(sights, null, effects(), seed=SEED), directions(sights, effects(), None)
 
     def found(own: Experiments, weighing: Weighing, place: int, by: BoolArray) -> Judged:
-        """One experiment judged by some of the null flags. How far it departs from the base model is left out, which
-        moves no rejection."""
-        scored = score(rows_of(own, [place]), base, rows_of(null, by), kinds[by], along, level=LEVEL)
+        """One experiment judged by some of the null flags. How far it departs from the base model
+        is left out, which moves no rejection."""
+        scored = score(
+            rows_of(own, [place]), base, rows_of(null, by), kinds[by], along, level=LEVEL
+        )
         others = weighed.misfits.rows(np.flatnonzero(by).tolist())
-        single = replace(weighing, factors=weighing.factors[[place]], misfits=weighing.misfits.rows([place]))
+        single = replace(
+            weighing, factors=weighing.factors[[place]], misfits=weighing.misfits.rows([place])
+        )
         return judge(single, others, kinds[by], scored, level=LEVEL, departure=0.0)
 
     rows: list[dict[str, Any]] = []
@@ -185,12 +217,22 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
             batches = truths(effect, number)
             shown = tuple(readings_of(batches[place], folder=folder)[:, 0] for place in chosen())
             true, whole = of_nulls(
-                sights, recordings, replace(made, nulls=shown, kinds=np.arange(TOGETHER)), None, seed=SEED + number
+                sights,
+                recordings,
+                replace(made, nulls=shown, kinds=np.arange(TOGETHER)),
+                None,
+                seed=SEED + number,
             )
             own = weigh(sights, true, effects(), seed=SEED)
             strengths = stronger(effect, child_seed(SEED, "truths", number))[whole]
             for place, strength in enumerate(strengths.tolist()):
-                rows.append(_row(effect, strength, found(true, own, place, np.ones(len(kinds), dtype=np.bool_))))
+                rows.append(
+                    _row(
+                        effect,
+                        strength,
+                        found(true, own, place, np.ones(len(kinds), dtype=np.bool_)),
+                    )
+                )
     return {
         "recordings": list(chosen()),
         "kinds": KINDS,
@@ -219,13 +261,18 @@ def _row(effect: Weighable | None, strength: float, found: Judged) -> dict[str, 
         "whole": found.scored.whole,
         "tail": found.scored.nulls.tail(found.scored.statistic),
         "power": found.scored.power.tolist(),
-        "probability": None if effect is None else float(found.probability[names.index(effect.name)]),
+        "probability": None
+        if effect is None
+        else float(found.probability[names.index(effect.name)]),
     }
 
 
 def _summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """How often which became of truths without and with an effect."""
-    without, true = [one for one in rows if one["effect"] is None], [one for one in rows if one["effect"] is not None]
+    without, true = (
+        [one for one in rows if one["effect"] is None],
+        [one for one in rows if one["effect"] is not None],
+    )
     rejected = [one for one in true if one["p"] <= LEVEL]
     by_tail = [one["tail"] <= LEVEL for one in without]
     return {
@@ -238,8 +285,12 @@ def _summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
             "count": len(true),
             "rejected": len(rejected),
             "named alone": sum(one["named"] == [one["effect"]] for one in rejected),
-            "one of": sum(one["effect"] in one["named"] and len(one["named"]) > 1 for one in rejected),
-            "another alone": sum(len(one["named"]) == 1 and one["named"] != [one["effect"]] for one in rejected),
+            "one of": sum(
+                one["effect"] in one["named"] and len(one["named"]) > 1 for one in rejected
+            ),
+            "another alone": sum(
+                len(one["named"]) == 1 and one["named"] != [one["effect"]] for one in rejected
+            ),
             "none": sum(not one["named"] for one in rejected),
         },
     }

@@ -1,9 +1,11 @@
-"""Whether intervals of one window and of several together hold what they say, on long films whose truth is known.
+"""Whether intervals of one window and of several together hold what they say, on long films whose
+truth is known.
 
-Films of six windows of 1.2 s are simulated of the cloths that the shipped model was trained on, each with a seed of its
-own (`tests.studies.long_films`). One window of each: ranks of simulation-based calibration (Talts et al.,
-arXiv:1804.06788), coverage, and expected coverage by random points (TARP). Two, four and six: coverage, error and width
-of the answer that `flagdata measure` gives. Errors of two windows correlate by their distance in time.
+Films of six windows of 1.2 s are simulated of the cloths that the shipped model was trained on,
+each with a seed of its own (`tests.studies.long_films`). One window of each: ranks of
+simulation-based calibration (Talts et al., arXiv:1804.06788), coverage, and expected coverage by
+random points (TARP). Two, four and six: coverage, error and width of the answer that `flagdata
+measure` gives. Errors of two windows correlate by their distance in time.
 
 FLAGDATA_WINDOWS_FILMS says how many films (300).
 """
@@ -44,18 +46,29 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     films = _noted(simulated(model, count=FILMS, windows=WINDOWS, seed=own), datasets)
     found = posteriors(model, films, draws=_DRAWS, seed=own)
     answers = {count: _answers(model, found, count, seed=seed) for count in TOGETHER}
-    resamples = Resamples.of(answers[1].group, generator=stream(seed, "measure-windows", "bootstrap"))
+    resamples = Resamples.of(
+        answers[1].group, generator=stream(seed, "measure-windows", "bootstrap")
+    )
     dependence, dataset = of_model(model), np.array(datasets)
     sheet = {
         "model": model.name,
         "films": len(found.known),
         "windows": WINDOWS,
-        "dependence": {"wind": dependence.wind, "cloth": dependence.cloth, "source": dependence.source},
+        "dependence": {
+            "wind": dependence.wind,
+            "cloth": dependence.cloth,
+            "source": dependence.source,
+        },
         "correlation_by_distance": _correlations(found),
         "one_window": {
             "ranks": {name: _ranks(answers[1], name) for name in answers[1].targets},
             "tarp": _shares(
-                tarp((answers[1],), resamples, generator=stream(seed, "measure-windows", "tarp"), levels=LEVELS)
+                tarp(
+                    (answers[1],),
+                    resamples,
+                    generator=stream(seed, "measure-windows", "tarp"),
+                    levels=LEVELS,
+                )
             ),
         },
         "together": {
@@ -63,7 +76,9 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
             for count, answer in answers.items()
         },
         "by_dataset": {
-            str(name): {str(count): _wind(answer, dataset == name) for count, answer in answers.items()}
+            str(name): {
+                str(count): _wind(answer, dataset == name) for count, answer in answers.items()
+            }
             for name in np.unique(dataset)
         },
     }
@@ -174,15 +189,20 @@ def page(found: Mapping[str, Any]) -> str:
         "",
         _about(found),
         "",
-        "| windows | wind: RMSE [m/s] | width of the 90 % interval [m/s] | covered at 50 % | at 80 % | at 90 % |",
+        "| windows | wind: RMSE [m/s] | width of the 90 % interval [m/s] | covered at 50 % | at 80 "
+        "% | at 90 % |",
         "|---|---|---|---|---|---|",
         *(_of_wind(count, of[WIND]) for count, of in found["together"].items()),
         "",
         "Expected coverage of all targets together by random points, one window: "
-        + "; ".join(f"{float(level):.0%}: {_share(share)}" for level, share in found["one_window"]["tarp"].items())
+        + "; ".join(
+            f"{float(level):.0%}: {_share(share)}"
+            for level, share in found["one_window"]["tarp"].items()
+        )
         + ".",
         "",
-        "| target, one window | covered at 50 % | at 80 % | at 90 % | rank bins out of the 99 % band, of 10 |",
+        "| target, one window | covered at 50 % | at 80 % | at 90 % | rank bins out of the 99 % "
+        "band, of 10 |",
         "|---|---|---|---|---|",
         *(
             f"| {name} | "
@@ -194,7 +214,8 @@ def page(found: Mapping[str, Any]) -> str:
         "| films of | how many | windows | bias [m/s] | RMSE [m/s] | covered at 90 % |",
         "|---|---|---|---|---|---|",
         *(
-            f"| {name} | {of['films']} | {count} | {of['bias']:+.2f} | {of['rmse']:.2f} | {of['covered_90']:.0%} |"
+            f"| {name} | {of['films']} | {count} | {of['bias']:+.2f} | {of['rmse']:.2f} | "
+            f"{of['covered_90']:.0%} |"
             for name, own in found["by_dataset"].items()
             for count, of in own.items()
         ),
@@ -208,8 +229,10 @@ def page(found: Mapping[str, Any]) -> str:
 
 def _about(found: Mapping[str, Any]) -> str:
     return (
-        f"The shipped model {found['model']!r} on {found['films']} simulated films of {found['windows']} windows "
-        "of 1.2 s each, of the cloths that it was trained on (`python -m tests.studies measure-windows`). "
+        f"The shipped model {found['model']!r} on {found['films']} simulated films of "
+        f"{found['windows']} windows "
+        "of 1.2 s each, of the cloths that it was trained on (`python -m tests.studies "
+        "measure-windows`). "
         "Intervals in brackets are of 90 %, over films."
     )
 

@@ -1,7 +1,9 @@
-"""Draws messages and help texts of the program at random, for someone to read who does not know the project.
+"""Draws messages and help texts of the program at random, for someone to read who does not know the
+project.
 
-`python -m tests.studies messages SEED COUNT` prints them, each with its place: what errors and findings report with
-the fix beside, and the help of options. Half of each. docs/results/messages-read.md has what reading sixty came to.
+`python -m tests.studies messages SEED COUNT` prints them, each with its place: what errors and
+findings report with the fix beside, and the help of options. Half of each.
+docs/results/messages-read.md has what reading sixty came to.
 """
 
 from __future__ import annotations
@@ -55,7 +57,9 @@ def _text(node: ast.expr) -> str:
     if isinstance(node, ast.Constant):
         return node.value if isinstance(node.value, str) else ""
     if isinstance(node, ast.JoinedStr):
-        return "".join(_text(part) if isinstance(part, ast.Constant) else "…" for part in node.values)
+        return "".join(
+            _text(part) if isinstance(part, ast.Constant) else "…" for part in node.values
+        )
     return ""
 
 

@@ -1,9 +1,11 @@
-"""Which of 40 films without a flag on a pole are answered: ten kinds of things that move, drawn before scenery.
+"""Which of 40 films without a flag on a pole are answered: ten kinds of things that move, drawn
+before scenery.
 
-Each kind is drawn four times, at a place and of a size that the seed gives. In half of the films a post stands still at
-one side of what moves, as a pole would: no rule may rest on the absence of posts. Every film is measured as `flagdata
-measure` does by default, as of a flag of 1.5 × 1.0 m. Constants of the rules were fixed on the films of the seeds
-`FIXED`; those of another seed judge (decision 085).
+Each kind is drawn four times, at a place and of a size that the seed gives. In half of the films a
+post stands still at
+one side of what moves, as a pole would: no rule may rest on the absence of posts. Every film is
+measured as `flagdata measure` does by default, as of a flag of 1.5 × 1.0 m. Constants of the rules
+were fixed on the films of the seeds `FIXED`; those of another seed judge (decision 085).
 """
 
 from __future__ import annotations
@@ -64,14 +66,23 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     torch.set_num_threads(1)
     model = network(None, lake=None, at=None)
     gate = gate_beside(model, false_alarm=Options().false_alarm)
-    rows = [{"film": kind, "post": post, **judged(film, model, gate)} for kind, post, film in films(seed)]
-    sheet = {"seed": seed, "fixed_on": " and ".join(map(str, FIXED)), "counts": counts(rows), "films": rows}
+    rows = [
+        {"film": kind, "post": post, **judged(film, model, gate)}
+        for kind, post, film in films(seed)
+    ]
+    sheet = {
+        "seed": seed,
+        "fixed_on": " and ".join(map(str, FIXED)),
+        "counts": counts(rows),
+        "films": rows,
+    }
     (out / "validate-no-flag.md").write_text(page(sheet), encoding="utf-8")
     return sheet
 
 
 def films(seed: int) -> Iterator[tuple[str, bool, UInt8Array]]:
-    """Makes all films of a seed: the kind, whether a post stands beside it, and its pictures (n, height, width)."""
+    """Makes all films of a seed: the kind, whether a post stands beside it, and its pictures (n,
+    height, width)."""
     assets = Assets()
     for kind in KINDS:
         for number in range(OF_EACH):
@@ -99,19 +110,28 @@ def _stand(film: UInt8Array, column: float, top: int) -> None:
 
 
 def judged(pictures: UInt8Array, model: Network, gate: WindowGate) -> dict[str, Any]:
-    """Measures a film: the kinds of its reasons in order, none where it is answered, and then the wind [m/s]."""
+    """Measures a film: the kinds of its reasons in order, none where it is answered, and then the
+    wind [m/s]."""
     film = ConditionedFilm(
-        Frames(images=pictures, time=np.arange(len(pictures)) / RATE), aspect=SIZE.length / SIZE.height
+        Frames(images=pictures, time=np.arange(len(pictures)) / RATE),
+        aspect=SIZE.length / SIZE.height,
     )
     try:
         measured = measure(
-            film, model.estimator, gate=gate, dependence=of_model(model.estimator), options=Options(size=SIZE)
+            film,
+            model.estimator,
+            gate=gate,
+            dependence=of_model(model.estimator),
+            options=Options(size=SIZE),
         )
     except RefusedError as error:
         return {"kinds": [kind_of(error)], "wind": None}
     if measured.verdict.refused:
         return {"kinds": [reason.kind for reason in measured.verdict.reasons], "wind": None}
-    return {"kinds": [], "wind": float(measured.draws[:, measured.names.index("wind_speed")].mean())}
+    return {
+        "kinds": [],
+        "wind": float(measured.draws[:, measured.names.index("wind_speed")].mean()),
+    }
 
 
 def counts(rows: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
@@ -132,7 +152,8 @@ def page(sheet: Mapping[str, Any]) -> str:
         "# Films without a flag on a pole",
         "",
         (
-            f"{len(answered)} of {len(sheet['films'])} films of seed {sheet['seed']} are answered; constants were "
+            f"{len(answered)} of {len(sheet['films'])} films of seed {sheet['seed']} are answered; "
+            "constants were "
             f"fixed on those of the seeds {sheet['fixed_on']} (`python -m tests.studies no-flag`)."
         ),
         "",
@@ -140,6 +161,8 @@ def page(sheet: Mapping[str, Any]) -> str:
         "|---|---|---|---|",
     ]
     for name, of_kind in sheet["counts"].items():
-        reasons = ", ".join(f"`{kind}` {count}" for kind, count in of_kind["first"].items()) or "none"
+        reasons = (
+            ", ".join(f"`{kind}` {count}" for kind, count in of_kind["first"].items()) or "none"
+        )
         lines.append(f"| {name} | {of_kind['films']} | {of_kind['refused']} | {reasons} |")
     return "\n".join(lines) + "\n"

@@ -1,12 +1,13 @@
-"""A lake in a bucket under kills and faults: what was acknowledged is there, nothing dangles, no answer is wrong.
+"""A lake in a bucket under kills and faults: what was acknowledged is there, nothing dangles, no
+answer is wrong.
 
-Kills: in each trial two processes commit at once; one is ended by SIGKILL at its nth request to the store, before it
-was sent or after it was answered, n in turn over all requests that a commit makes. Then all that any process had
-acknowledged is looked for, and the lake examined.
+Kills: in each trial two processes commit at once; one is ended by SIGKILL at its nth request to the
+store, before it was sent or after it was answered, n in turn over all requests that a commit makes.
+Then all that any process had acknowledged is looked for, and the lake examined.
 
-Faults: three processes commit through a proxy that answers a share of the requests by an error, closes the connection
-before or after the store has acted, or waits. rclone's server, which ignores conditions, is refused: FLAGDATA_RCLONE
-names the program, or `make rclone` installs it.
+Faults: three processes commit through a proxy that answers a share of the requests by an error,
+closes the connection before or after the store has acted, or waits. rclone's server, which ignores
+conditions, is refused: FLAGDATA_RCLONE names the program, or `make rclone` installs it.
 """
 
 from __future__ import annotations
@@ -54,7 +55,8 @@ def _write(pipe: int, said: object) -> None:
 
 
 class Child:
-    """A forked process that uses the store, which its parent must not; what it says is read from a pipe."""
+    """A forked process that uses the store, which its parent must not; what it says is read from a
+    pipe."""
 
     def __init__(self, work: Callable[[Say], None]) -> None:
         self._reading, writing = os.pipe()
@@ -91,7 +93,9 @@ def commit(lake: Lake, text: str) -> str:
         else:
             path.write_text(text)
         name = transaction.put(path)
-        artifact = Artifact(kind=Kind.WIND, name=text, object=name, source_hash=name.partition("/")[2])
+        artifact = Artifact(
+            kind=Kind.WIND, name=text, object=name, source_hash=name.partition("/")[2]
+        )
         transaction.add(artifact)
     return artifact.id
 
@@ -134,7 +138,9 @@ def killed(group: int) -> dict[str, int]:
     for trial in range(group * _GROUP, (group + 1) * _GROUP):
         call, answered = 1 + trial // 2 % _CALLS, trial % 2 == 1
 
-        def victim(say: Say, trial: int = trial, call: int = call, answered: bool = answered) -> None:
+        def victim(
+            say: Say, trial: int = trial, call: int = call, answered: bool = answered
+        ) -> None:
             lake = Lake.open(address)
             kill_at(call, answered=answered)
             say(commit(lake, f"victim {trial}"))
@@ -162,7 +168,8 @@ def killed(group: int) -> dict[str, int]:
 
 
 def resumed(file: Path, trials: Callable[[int], dict[str, int]] = killed) -> list[dict[str, int]]:
-    """What each group of trials counted; groups that an earlier run of the same code ended are read from `file`."""
+    """What each group of trials counted; groups that an earlier run of the same code ended are read
+    from `file`."""
     version = code_version()
     known: dict[str, Any] = json.loads(file.read_text()) if file.exists() else {}
     done: list[dict[str, int]] = known["groups"] if known.get("code_version") == version else []
@@ -191,7 +198,11 @@ class Faulty(BaseHTTPRequestHandler):
 
     def _pass(self) -> None:
         body = self.rfile.read(int(self.headers.get("Content-Length") or 0))
-        fault = self.draws.choice(("error", "cut before", "cut after", "slow")) if self.draws.random() < _FAULTY else ""
+        fault = (
+            self.draws.choice(("error", "cut before", "cut after", "slow"))
+            if self.draws.random() < _FAULTY
+            else ""
+        )
         if fault:
             self.faults[fault] = self.faults.get(fault, 0) + 1
         if fault == "cut before":
@@ -324,6 +335,8 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         results["faults"] = beside_faults(address, f"s3://{BUCKET}/faults")
         results["kills"] = total(resumed(out / "object-storage-groups.json"))
     rclone = os.environ.get("FLAGDATA_RCLONE", str(_RCLONE))
-    results["rclone refused"] = refused(rclone) if Path(rclone).is_file() else "left out: there is no rclone"
+    results["rclone refused"] = (
+        refused(rclone) if Path(rclone).is_file() else "left out: there is no rclone"
+    )
     shutil.rmtree(cache, ignore_errors=True)
     return results

@@ -1,10 +1,11 @@
 """What the observables of films are off by: pixels against geometry on ArcSim's runs filmed by VTK.
 
-Each film of the list of `vtk_films.designs` that shows one whole flag is read in windows of 2.5 s, and
-the same windows are taken from the motion that was filmed, projected by the film's own camera. Pixels less geometry
-gives each observable's bias and sigma. The hoist's known height is the only size that pixels get. FLAGDATA_FILMS names
-the folder of the films, FLAGDATA_FILMS_ONLY gives patterns of their names. Films that were read are kept in `out`, so
-that a run that was stopped goes on.
+Each film of the list of `vtk_films.designs` that shows one whole flag is read in windows of 2.5 s,
+and the same windows are taken from the motion that was filmed, projected by the film's own camera.
+Pixels less geometry gives each observable's bias and sigma. The hoist's known height is the only
+size that pixels get. FLAGDATA_FILMS names the folder of the films, FLAGDATA_FILMS_ONLY gives
+patterns of their names. Films that were read are kept in `out`, so that a run that was stopped goes
+on.
 """
 
 from __future__ import annotations
@@ -40,7 +41,10 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     wanted = [one for one in chosen(designs()) if one.part in ("coverage", "other air") and one.yaw]
     missing = [one.name for one in wanted if not path_of(one, FOLDER).exists()]
     if missing:
-        return {"left_out": f"{len(missing)} films are missing: run `python -m tests.studies films` first"}
+        return {
+            "left_out": f"{len(missing)} films are missing: run `python -m tests.studies films` "
+            "first"
+        }
     kept = out / "observables-films"
     kept.mkdir(exist_ok=True)
     rows = [_once(one, kept / f"{one.name}.json") for one in wanted]
@@ -58,7 +62,9 @@ def _once(design: Design, path: Path) -> dict[str, Any]:
 def compared(design: Design) -> dict[str, Any]:
     """Pixels and geometry of the windows of a film; NaN as None."""
     motion = read(REFERENCE, design.run)
-    (subject,) = subjects(str(path_of(design, FOLDER)), query=None, lake=None, at=None, reading=FilmReading())
+    (subject,) = subjects(
+        str(path_of(design, FOLDER)), query=None, lake=None, at=None, reading=FilmReading()
+    )
     row: dict[str, Any] = {
         "name": design.name,
         "wind": motion.wind,
@@ -111,14 +117,23 @@ def seen(design: Design, motion: Motion, times: FloatArray) -> ClothWindow:
 
 
 def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """By observable: the mean of pixels less geometry, its standard error by films, and the deviation of a window."""
+    """By observable: the mean of pixels less geometry, its standard error by films, and the
+    deviation of a window."""
     found: dict[str, Any] = {}
     for name in OBSERVABLES:
         films, apart, unseen = [], [], 0
         for row in rows:
-            own = [one["values"][name] for one in row["windows"] if one is not None and name in one["values"]]
+            own = [
+                one["values"][name]
+                for one in row["windows"]
+                if one is not None and name in one["values"]
+            ]
             unseen += len(row["windows"]) - len(own)
-            both = [one["pixels"] - one["geometry"] for one in own if None not in (one["pixels"], one["geometry"])]
+            both = [
+                one["pixels"] - one["geometry"]
+                for one in own
+                if None not in (one["pixels"], one["geometry"])
+            ]
             unseen += sum(one["pixels"] is None for one in own)
             apart += both
             if both:
@@ -146,29 +161,39 @@ def page(sheet: Mapping[str, Any]) -> str:
         "# Observables: pixels against geometry",
         "",
         (
-            f"ArcSim's runs filmed by VTK, {len(sheet['films'])} films, windows of 2.5 s; pixels less geometry, before "
+            f"ArcSim's runs filmed by VTK, {len(sheet['films'])} films, windows of 2.5 s; pixels "
+            "less geometry, before "
             "the bias that `flagdata observe` takes off. The error is the bias's, by films "
             "(`python -m tests.studies observables`)."
         ),
         "",
-        "| observable | unit | films | windows | not shown | bias | error | sigma | median | robust sigma |",
+        "| observable | unit | films | windows | not shown | bias | error | sigma | median | "
+        "robust sigma |",
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for name, own in sheet["summary"].items():
-        unit, head = OBSERVABLES[name].unit, f"| {own['films']} | {own['windows']} | {own['unseen']} |"
+        unit, head = (
+            OBSERVABLES[name].unit,
+            f"| {own['films']} | {own['windows']} | {own['unseen']} |",
+        )
         if "bias" not in own:
             lines.append(f"| {name} | {unit} {head} | | | | |")
             continue
         lines.append(
-            f"| {name} | {unit} {head} {own['bias']:+.3f} | {own['error']:.3f} | {own['sigma']:.3f} | "
+            f"| {name} | {unit} {head} {own['bias']:+.3f} | {own['error']:.3f} | "
+            f"{own['sigma']:.3f} | "
             f"{own['median']:+.3f} | {own['robust_sigma']:.3f} |"
         )
-    lines += ["", "| film | wind [m/s] | cloth | behind it | droop, pixels and geometry [rad] | extension |"]
+    lines += [
+        "",
+        "| film | wind [m/s] | cloth | behind it | droop, pixels and geometry [rad] | extension |",
+    ]
     lines += ["|---|---|---|---|---|---|"]
     for row in sheet["films"]:
         cells = [_cell(row, name) for name in ("droop", "extension")]
         lines.append(
-            f"| {row['name']} | {row['wind']:g} | {row['texture']} | {row['background']} | {cells[0]} | {cells[1]} |"
+            f"| {row['name']} | {row['wind']:g} | {row['texture']} | {row['background']} | "
+            f"{cells[0]} | {cells[1]} |"
         )
     return "\n".join(lines) + "\n"
 
@@ -176,8 +201,12 @@ def page(sheet: Mapping[str, Any]) -> str:
 def _cell(row: Mapping[str, Any], name: str) -> str:
     if "refused" in row:
         return f"refused: {row['refused']}"
-    own = [one["values"][name] for one in row["windows"] if one is not None and name in one["values"]]
-    shown = [f"{one['pixels']:.3f} ({one['geometry']:.3f})" for one in own if one["pixels"] is not None]
+    own = [
+        one["values"][name] for one in row["windows"] if one is not None and name in one["values"]
+    ]
+    shown = [
+        f"{one['pixels']:.3f} ({one['geometry']:.3f})" for one in own if one["pixels"] is not None
+    ]
     return ", ".join(shown) or "not shown"
 
 

@@ -1,17 +1,19 @@
-"""Refinement against its peers on held-out simulated clips, at equal evaluations and at equal seconds.
+"""Refinement against its peers on held-out simulated clips, at equal evaluations and at equal
+seconds.
 
-Reads a lake with a simulated data set: FLAGDATA_REFINE_LAKE names its folder, FLAGDATA_REFINE_AT the version ("v1"),
-FLAGDATA_REFINE_TARGETS how many targets (2), FLAGDATA_REFINE_EVALUATIONS how many evaluations each method has (50),
-FLAGDATA_REFINE_PEERS which optimisers (all, separated by commas), FLAGDATA_REFINE_MODEL a model's folder (the shipped
-one), FLAGDATA_REFINE_CACHE a folder for evaluations and films, so that an interrupted run goes on. Without a lake it is
-left out.
-With FLAGDATA_REFINE_LAKE=changed the targets are flags of another mesh, integrator and step than any that was learned
-from, with textures that none had; half of them are rendered by Cycles (in the environment that FLAGDATA_BLENDER names).
-With FLAGDATA_REFINE_LAKE=arcsim the targets are runs of the reference simulator (../shared/data/arcsim), filmed by our
-rasteriser: six runs, of two views each for 12 targets.
-FLAGDATA_REFINE_HANDMADE names a lake with flagsim-wide that gradient boosting on hand-made features learns from, at
-FLAGDATA_REFINE_AT, with the features kept beside it; without it that peer is left out.
-Writes `refinement.md` beside the JSON.
+Reads a lake with a simulated data set: FLAGDATA_REFINE_LAKE names its folder, FLAGDATA_REFINE_AT
+the version ("v1"), FLAGDATA_REFINE_TARGETS how many targets (2), FLAGDATA_REFINE_EVALUATIONS how
+many evaluations each method has (50), FLAGDATA_REFINE_PEERS which optimisers (all, separated by
+commas), FLAGDATA_REFINE_MODEL a model's folder (the shipped one), FLAGDATA_REFINE_CACHE a folder
+for evaluations and films, so that an interrupted run goes on. Without a lake it is left out. With
+FLAGDATA_REFINE_LAKE=changed the targets are flags of another mesh, integrator and step than any
+that was learned from, with textures that none had; half of them are rendered by Cycles (in the
+environment that FLAGDATA_BLENDER names). With FLAGDATA_REFINE_LAKE=arcsim the targets are runs of
+the reference simulator (../shared/data/arcsim), filmed by our
+rasteriser: six runs, of two views each for 12 targets. FLAGDATA_REFINE_HANDMADE names a lake with
+flagsim-wide that gradient boosting on hand-made features learns from, at FLAGDATA_REFINE_AT, with
+the features kept beside it; without it that peer is left out. Writes `refinement.md` beside the
+JSON.
 """
 
 from __future__ import annotations
@@ -69,7 +71,8 @@ from tests.studies.validation.transfer import (
 
 _OF = {
     "arcsim": "the reference simulator's runs, filmed by our rasteriser by cameras unknown to it",
-    "changed": "flags of another mesh, integrator, step and texture than any learned from, half of them by Cycles",
+    "changed": "flags of another mesh, integrator, step and texture than any learned from, half of "
+    "them by Cycles",
 }
 """What the targets are, where they are of no lake."""
 LEVEL = 0.9
@@ -85,7 +88,8 @@ class Score:
     Attributes:
         method: its name; with " at equal seconds" where it had as long as the project's own.
         wind_error, density_error: absolute [m/s, kg/m²].
-        wind_inside, density_inside: whether the interval contains the truth; None for methods without intervals.
+        wind_inside, density_inside: whether the interval contains the truth; None for methods
+            without intervals.
         evaluations: clips that were simulated.
         seconds: from start to end, with the optimiser's own.
     """
@@ -103,7 +107,10 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     """All methods on all targets; the sheet."""
     lake = os.environ.get("FLAGDATA_REFINE_LAKE")
     if lake is None:
-        return {"left_out": "FLAGDATA_REFINE_LAKE names no lake with a simulated data set, such as flagsim-wide"}
+        return {
+            "left_out": "FLAGDATA_REFINE_LAKE names no lake with a simulated data set, such as "
+            "flagsim-wide"
+        }
     torch.set_num_threads(1)
     chosen = os.environ.get("FLAGDATA_REFINE_PEERS")
     peers = list(PEERS) if chosen is None else [name for name in chosen.split(",") if name]
@@ -123,7 +130,9 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     if lake == ARCSIM:
         plain = _arcsim(count, frames=estimator.front_end.frames, seed=seed)
     elif lake == CHANGED:
-        plain = _changed(count, space, frames=estimator.front_end.frames, seed=seed, folder=cache / "films")
+        plain = _changed(
+            count, space, frames=estimator.front_end.frames, seed=seed, folder=cache / "films"
+        )
     else:
         plain = _targets(Path(lake), space, at=at, count=count, seed=seed)
     for number, as_filmed in enumerate(plain):
@@ -134,7 +143,9 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
             scenes,
             space=space,
             cache=cache,
-            settings=Settings(budget=budget, level=LEVEL, seed=child_seed(seed, "refine", number), to_floor=False),
+            settings=Settings(
+                budget=budget, level=LEVEL, seed=child_seed(seed, "refine", number), to_floor=False
+            ),
         )
         own.append(found)
         scores += [_regression(target, estimator, space, seed), _of_own(target, found)]
@@ -143,10 +154,18 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         for stage, spent in found.seconds.items():
             stages.setdefault(stage, []).append(spent / found.evaluations)
         for peer in peers:
-            trace = _peer(peer, found.evaluators[0], target, budget=budget, seed=child_seed(seed, peer, number))
+            trace = _peer(
+                peer,
+                found.evaluators[0],
+                target,
+                budget=budget,
+                seed=child_seed(seed, peer, number),
+            )
             scores += [
                 _of_trace(target, trace, found, peer, evaluations=budget),
-                _of_trace(target, trace, found, f"{peer} at equal seconds", seconds=_seconds(found)),
+                _of_trace(
+                    target, trace, found, f"{peer} at equal seconds", seconds=_seconds(found)
+                ),
             ]
     rows = _rows(scores, seed=seed)
     result = {
@@ -159,7 +178,9 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         "density_range": space.area_weight.high - space.area_weight.low,
         "methods": rows,
         "scores": [vars(score).copy() for score in scores],
-        "seconds_per_evaluation": {stage: float(np.median(values)) for stage, values in stages.items()},
+        "seconds_per_evaluation": {
+            stage: float(np.median(values)) for stage, values in stages.items()
+        },
         "floor_reached": [found.reached for found in own],
     }
     (out / "refinement.md").write_text(_sheet(result), encoding="utf-8")
@@ -189,12 +210,15 @@ def _targets(lake: Path, space: Space, *, at: str, count: int, seed: int) -> lis
             continue
         taken.add(flag)
         recording = source.lake.artifact(str(pairs.table.recording[index]), at=at)
-        found.append(of_recording(recording, pairs[index].clip[0].numpy(), otherwise=otherwise, space=space))
+        found.append(
+            of_recording(recording, pairs[index].clip[0].numpy(), otherwise=otherwise, space=space)
+        )
     return found
 
 
 def _changed(count: int, space: Space, *, frames: int, seed: int, folder: Path) -> list[Target]:
-    """Flags of another mesh, integrator, step and texture, the second half rendered by Cycles; films of `frames`."""
+    """Flags of another mesh, integrator, step and texture, the second half rendered by Cycles;
+    films of `frames`."""
     otherwise = DrawnView(prior=named_prior(RENDERS), assets=Assets())
     found: list[Target] = []
     for renderer, flags in (("raster", count - count // 2), ("cycles", count // 2)):
@@ -212,30 +236,41 @@ def _changed(count: int, space: Space, *, frames: int, seed: int, folder: Path) 
 
 
 def _arcsim(count: int, *, frames: int, seed: int) -> list[Target]:
-    """Runs of the reference simulator, of as many views as there must be; the estimator does not get their cameras."""
+    """Runs of the reference simulator, of as many views as there must be; the estimator does not
+    get their cameras."""
     otherwise = DrawnView(prior=named_prior(RENDERS), assets=Assets())
     clips = reference_clips(REFERENCE / "arcsim", seed, frames, views=-(-count // REFERENCE_RUNS))
     return [
-        Target(name=name, clip=film[:frames], view=otherwise, truth={"wind_speed": wind, "area_weight": density})
+        Target(
+            name=name,
+            clip=film[:frames],
+            view=otherwise,
+            truth={"wind_speed": wind, "area_weight": density},
+        )
         for name, (film, wind, density) in list(clips)[:count]
     ]
 
 
 def _peer(method: str, evaluator: Evaluator, target: Target, *, budget: int, seed: int) -> Trace:
-    """An optimiser of the paper's objective: the squared distance of embeddings, one clip an evaluation."""
+    """An optimiser of the paper's objective: the squared distance of embeddings, one clip an
+    evaluation."""
     wanted = evaluator.embed(target.clip[None])[0]
 
     def evaluate(points: FloatArray) -> tuple[FloatArray, FloatArray]:
         made = evaluator.evaluate(points, 1)
         seconds = np.array([sum(entry.seconds[stage] for stage in STAGES) for entry in made])
-        return np.array([float(squared_embedding_distance(entry.embedding, wanted)[0]) for entry in made]), seconds
+        return np.array(
+            [float(squared_embedding_distance(entry.embedding, wanted)[0]) for entry in made]
+        ), seconds
 
     return minimise(method, evaluate, dimension=DIMENSION, budget=budget, seed=seed)
 
 
 def _regression(target: Target, estimator: Estimator, space: Space, seed: int) -> Score:
     begun = time.perf_counter()
-    draws = refinement_start.amortised_draws(estimator, target.clip, space, aspect=1.5, seed=seed, draws=models.DRAWS)
+    draws = refinement_start.amortised_draws(
+        estimator, target.clip, space, aspect=1.5, seed=seed, draws=models.DRAWS
+    )
     seconds = time.perf_counter() - begun
     low, middle, high = np.quantile(draws, [(1 - LEVEL) / 2, 0.5, (1 + LEVEL) / 2], axis=0)
     wind, density = target.truth["wind_speed"], target.truth["area_weight"]
@@ -284,7 +319,8 @@ def _seconds(found: Refinement) -> float:
 
 
 def _of_own(target: Target, found: Refinement) -> Score:
-    """Errors of the posterior's medians, also where `found` gives a bound instead: no hard target is left out."""
+    """Errors of the posterior's medians, also where `found` gives a bound instead: no hard target
+    is left out."""
     wind, density = (entry.span for entry in found.intervals[:2])
     truth = target.truth["wind_speed"], target.truth["area_weight"]
     values = found.evaluators[0].simulator.space.values(found.posterior.points)
@@ -331,10 +367,16 @@ def _rows(scores: Sequence[Score], *, seed: int) -> list[dict[str, Any]]:
         own = [score for score in scores if score.method == method]
         row: dict[str, Any] = {"method": method, "targets": len(own)}
         for name in ("wind_error", "density_error"):
-            row[name] = _resampled(np.array([getattr(s, name) for s in own]), np.median, seed, method, name)
+            row[name] = _resampled(
+                np.array([getattr(s, name) for s in own]), np.median, seed, method, name
+            )
         for name in ("wind_inside", "density_inside"):
             values = [getattr(s, name) for s in own]
-            row[name] = None if None in values else _resampled(np.array(values, float), np.mean, seed, method, name)
+            row[name] = (
+                None
+                if None in values
+                else _resampled(np.array(values, float), np.mean, seed, method, name)
+            )
         row["evaluations"] = float(np.median([s.evaluations for s in own]))
         row["seconds"] = float(np.median([s.seconds for s in own]))
         rows.append(row)
@@ -351,22 +393,28 @@ def _resampled(values: FloatArray, of: Callable[..., Any], seed: int, *names: st
 def _sheet(result: dict[str, Any]) -> str:
     about = (
         f"{len(result['targets'])} clips of {_OF.get(result['lake'], _of_lake(result))}, model "
-        f"`{result['model']}`, {result['budget']} simulated clips for each method; medians with 90 % bootstrap "
-        f"intervals over targets, coverage of {result['level']:.0%} intervals. Peers report their nearest evaluation "
+        f"`{result['model']}`, {result['budget']} simulated clips for each method; medians with 90 "
+        "% bootstrap "
+        f"intervals over targets, coverage of {result['level']:.0%} intervals. Peers report their "
+        "nearest evaluation "
         "and have no interval."
     )
     header = (
-        "| method | wind error [m/s] | area-weight error [% of range] | wind inside | area weight inside | "
+        "| method | wind error [m/s] | area-weight error [% of range] | wind inside | area weight "
+        "inside | "
         "evaluations | seconds |"
     )
     lines = ["# Refinement and its peers", "", about, "", header, "|---|---|---|---|---|---|---|"]
     for row in result["methods"]:
         share = [100 * value / result["density_range"] for value in row["density_error"]]
         lines.append(
-            f"| {row['method']} | {_span(row['wind_error'], 2)} | {_span(share, 0)} | {_span(row['wind_inside'], 2)} | "
+            f"| {row['method']} | {_span(row['wind_error'], 2)} | {_span(share, 0)} | "
+            f"{_span(row['wind_inside'], 2)} | "
             f"{_span(row['density_inside'], 2)} | {row['evaluations']:.0f} | {row['seconds']:.1f} |"
         )
-    stages = ", ".join(f"{stage} {spent:.2f} s" for stage, spent in result["seconds_per_evaluation"].items())
+    stages = ", ".join(
+        f"{stage} {spent:.2f} s" for stage, spent in result["seconds_per_evaluation"].items()
+    )
     lines += ["", f"Time of an evaluation of `{_OWN}`: {stages}.", ""]
     return "\n".join(lines)
 

@@ -1,6 +1,8 @@
-"""The paper's flag, remeshed while it is simulated, beside ArcSim's run of it: faces, positions and cost.
+"""The paper's flag, remeshed while it is simulated, beside ArcSim's run of it: faces, positions and
+cost.
 
-The criteria are in docs/decisions/076-remeshing.md. Layers do not meet in the frames that there are, so that contact is
+The criteria are in docs/decisions/076-remeshing.md. Layers do not meet in the frames that there
+are, so that contact is
 left out: with it fixed meshes do the same after forty times as long.
 """
 
@@ -33,7 +35,9 @@ FACES = (0.7, 1.3)
 """Accepted count of faces, of ArcSim's."""
 GRIDS = {"grid of 25 cm": 12, "grid of 10 cm": 30}
 """Fixed meshes → columns of 3 m."""
-PLACES = np.stack(np.meshgrid(np.linspace(0.05, 2.95, 13), np.linspace(0.05, 1.95, 9)), axis=-1).reshape(-1, 2)
+PLACES = np.stack(
+    np.meshgrid(np.linspace(0.05, 2.95, 13), np.linspace(0.05, 1.95, 9)), axis=-1
+).reshape(-1, 2)
 """(place, 2) on the cloth at which shapes are compared [m]."""
 
 Frame: TypeAlias = tuple[FloatArray, FloatArray, IntArray]
@@ -48,19 +52,32 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     torch.set_num_threads(1)
     sequence = read_folder(folder)
     theirs = [
-        (mesh.positions.astype(np.float64), mesh.rest.astype(np.float64), mesh.faces.astype(np.int64))
+        (
+            mesh.positions.astype(np.float64),
+            mesh.rest.astype(np.float64),
+            mesh.faces.astype(np.int64),
+        )
         for mesh in map(sequence.frame, range(len(sequence)))
     ]
     scene = papers_scene()
     ours, cost = simulated(scene, len(theirs))
-    fixed = {name: simulated(on_grid(scene, columns), len(theirs))[0] for name, columns in GRIDS.items()}
-    counts = {name: [len(faces) for _, _, faces in frames] for name, frames in (("arcsim", theirs), ("ours", ours))}
+    fixed = {
+        name: simulated(on_grid(scene, columns), len(theirs))[0] for name, columns in GRIDS.items()
+    }
+    counts = {
+        name: [len(faces) for _, _, faces in frames]
+        for name, frames in (("arcsim", theirs), ("ours", ours))
+    }
     ratios = (np.array(counts["ours"]) / np.array(counts["arcsim"])).tolist()
     positions = compared(theirs, ours, list(fixed.values()))
     draw(theirs, ours, counts, out / "validate-remeshing.png")
     result = {
         "frames": len(theirs) - 1,
-        "faces": {**counts, "ratio": ratios, "passed": all(FACES[0] <= ratio <= FACES[1] for ratio in ratios[1:])},
+        "faces": {
+            **counts,
+            "ratio": ratios,
+            "passed": all(FACES[0] <= ratio <= FACES[1] for ratio in ratios[1:]),
+        },
         "positions": positions,
         "cost": cost,
     }
@@ -79,16 +96,25 @@ def papers_scene() -> Scene:
         ):
             (Path(scratch) / kind).mkdir(exist_ok=True)
             shutil.copy(file, Path(scratch) / kind)
-        scene = read_scene(Path(scratch) / "conf.json", accept=("collision", "separation", "popfilter")).scene
+        scene = read_scene(
+            Path(scratch) / "conf.json", accept=("collision", "separation", "popfilter")
+        ).scene
     return replace(scene, contact=None)
 
 
 def on_grid(scene: Scene, columns: int) -> Scene:
     """The scene on a mesh that stays."""
-    sheet = flag(material=scene.material, wind_speed=scene.wind[0], width=3.0, height=2.0, columns=columns)
+    sheet = flag(
+        material=scene.material, wind_speed=scene.wind[0], width=3.0, height=2.0, columns=columns
+    )
     limits = None if scene.limits is None else replace(scene.limits, sweeps=SWEEPS)
     return replace(
-        scene, mesh=sheet.mesh, position=sheet.position, handles=sheet.handles, limits=limits, remeshing=None
+        scene,
+        mesh=sheet.mesh,
+        position=sheet.position,
+        handles=sheet.handles,
+        limits=limits,
+        remeshing=None,
     )
 
 
@@ -113,12 +139,22 @@ def simulated(scene: Scene, frames: int) -> tuple[list[Frame], dict[str, Any]]:
     return kept, cost
 
 
-def compared(theirs: Sequence[Frame], ours: Sequence[Frame], fixed: Sequence[Sequence[Frame]]) -> dict[str, Any]:
-    """Distances, root mean square over the frames after the first [m], and whether ours is within the scatter."""
+def compared(
+    theirs: Sequence[Frame], ours: Sequence[Frame], fixed: Sequence[Sequence[Frame]]
+) -> dict[str, Any]:
+    """Distances, root mean square over the frames after the first [m], and whether ours is within
+    the scatter."""
     result: dict[str, Any] = {}
-    figures = {"centre": centre, "droop": lambda frame: centre(frame)[2:], "tip": tip, "shape": shape}
+    figures = {
+        "centre": centre,
+        "droop": lambda frame: centre(frame)[2:],
+        "tip": tip,
+        "shape": shape,
+    }
     for name, figure in figures.items():
-        runs = [np.array([figure(frame) for frame in frames[1:]]) for frames in (theirs, ours, *fixed)]
+        runs = [
+            np.array([figure(frame) for frame in frames[1:]]) for frames in (theirs, ours, *fixed)
+        ]
         reference, remeshed_, coarse, fine = runs
         scatter = {
             "coarse to arcsim": distance(coarse, reference),
@@ -151,7 +187,9 @@ def centre(frame: Frame) -> FloatArray:
 def tip(frame: Frame) -> FloatArray:
     """(3,) mean of the two free corners [m]."""
     positions, rest, _ = frame
-    corners = [int(np.linalg.norm(rest - corner, axis=1).argmin()) for corner in ((3.0, 0.0), (3.0, 2.0))]
+    corners = [
+        int(np.linalg.norm(rest - corner, axis=1).argmin()) for corner in ((3.0, 0.0), (3.0, 2.0))
+    ]
     return positions[corners].mean(axis=0)
 
 
@@ -159,7 +197,9 @@ def shape(frame: Frame) -> FloatArray:
     """(place, 3) positions of `PLACES` of the cloth [m]."""
     positions, rest, faces = frame
     net = Triangulation(rest[:, 0], rest[:, 1], faces)
-    return np.stack([LinearTriInterpolator(net, axis)(*PLACES.T).filled(np.nan) for axis in positions.T], axis=1)
+    return np.stack(
+        [LinearTriInterpolator(net, axis)(*PLACES.T).filled(np.nan) for axis in positions.T], axis=1
+    )
 
 
 def page(result: Mapping[str, Any]) -> str:
@@ -175,11 +215,15 @@ def page(result: Mapping[str, Any]) -> str:
         "|---|---|---|---|---|",
     ]
     rows = zip(faces["arcsim"], faces["ours"], faces["ratio"], cost["of_frames"], strict=True)
-    lines += [f"| {n} | {theirs} | {ours} | {ratio:.2f} | {s:.1f} |" for n, (theirs, ours, ratio, s) in enumerate(rows)]
+    lines += [
+        f"| {n} | {theirs} | {ours} | {ratio:.2f} | {s:.1f} |"
+        for n, (theirs, ours, ratio, s) in enumerate(rows)
+    ]
     verdict = {True: "met", False: "**not met**"}
     lines += [
         "",
-        f"Faces within {FACES[0]} and {FACES[1]} of ArcSim's at every frame: {verdict[faces['passed']]}.",
+        f"Faces within {FACES[0]} and {FACES[1]} of ArcSim's at every frame: "
+        f"{verdict[faces['passed']]}.",
         "",
         "| figure | to ArcSim [mm] | accepted [mm] | moved [mm] | |",
         "|---|---|---|---|---|",
@@ -187,7 +231,9 @@ def page(result: Mapping[str, Any]) -> str:
     for name, row in result["positions"].items():
         accepted = 1e3 * max(row["scatter_m"].values())
         off, moved = 1e3 * row["off_m"], 1e3 * row["moved_m"]
-        lines.append(f"| {name} | {off:.1f} | {accepted:.1f} | {moved:.0f} | {verdict[row['passed']]} |")
+        lines.append(
+            f"| {name} | {off:.1f} | {accepted:.1f} | {moved:.0f} | {verdict[row['passed']]} |"
+        )
     lines += [
         "",
         f"Cost: {cost['seconds']:.0f} s on one core for {result['frames']} frames.",
@@ -199,14 +245,22 @@ def page(result: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def draw(theirs: Sequence[Frame], ours: Sequence[Frame], counts: Mapping[str, Sequence[int]], path: Path) -> None:
+def draw(
+    theirs: Sequence[Frame], ours: Sequence[Frame], counts: Mapping[str, Sequence[int]], path: Path
+) -> None:
     """Draws the counts, and both last meshes: above on the cloth, below from the side."""
     figure = Figure(figsize=(11, 4.6), layout="constrained")
     axes = figure.subplot_mosaic("aabc;aade")
     for (name, values), colour in zip(counts.items(), ("black", "#b5541c"), strict=True):
-        axes["a"].plot(values, "o-", color=colour, label={"arcsim": "ArcSim 0.2.1", "ours": "flagdata"}[name])
+        axes["a"].plot(
+            values, "o-", color=colour, label={"arcsim": "ArcSim 0.2.1", "ours": "flagdata"}[name]
+        )
     axes["a"].fill_between(
-        range(len(counts["arcsim"])), *(np.outer(FACES, counts["arcsim"])), color="black", alpha=0.08, lw=0
+        range(len(counts["arcsim"])),
+        *(np.outer(FACES, counts["arcsim"])),
+        color="black",
+        alpha=0.08,
+        lw=0,
     )
     axes["a"].set(xlabel="frame of 40 ms", ylabel="faces")
     axes["a"].legend(frameon=False)

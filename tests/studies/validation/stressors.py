@@ -1,14 +1,17 @@
-"""Null experiments as a field brings them: what is no effect of the cloth must not reject the base model.
+"""Null experiments as a field brings them: what is no effect of the cloth must not reject the base
+model.
 
-A flag of 1.5 m × 1.0 m with 70 markers, in three winds of 4, 5 and 6 m/s that fluctuate by 11 % along their mean, is
-simulated by the base model on other meshes and by other steps, with density, bending, stretching and damping that
-differ from the declared ones. The recordings are then made worse by one thing each: a log of 1 Hz, a clock that is
-off, a wrong direction, markers that were not tracked, more or coloured noise, another frame rate. In two more cases the
-simulation itself differs: the cloth is of another material than the declared one, or the turbulence has three
-components. Turbulence that a log does not hold is an effect of the library, and is rightly reported as gusts.
+A flag of 1.5 m × 1.0 m with 70 markers, in three winds of 4, 5 and 6 m/s that fluctuate by 11 %
+along their mean, is simulated by the base model on other meshes and by other steps, with density,
+bending, stretching and damping that differ from the declared ones. The recordings are then made
+worse by one thing each: a log of 1 Hz, a clock that is off, a wrong direction, markers that were
+not tracked, more or coloured noise, another frame rate. In two more cases the
+simulation itself differs: the cloth is of another material than the declared one, or the turbulence
+has three components. Turbulence that a log does not hold is an effect of the library, and is
+rightly reported as gusts.
 
-Environment variables: FLAGDATA_STRESSORS (how many nulls of each kind), FLAGDATA_STRESSORS_FOLDER (where banks,
-recordings and verdicts are kept; a run that was stopped goes on there).
+Environment variables: FLAGDATA_STRESSORS (how many nulls of each kind), FLAGDATA_STRESSORS_FOLDER
+(where banks, recordings and verdicts are kept; a run that was stopped goes on there).
 """
 
 from __future__ import annotations
@@ -37,7 +40,17 @@ from measure.forecasting import Setting
 from measure.loop import LoopOptions, solve
 from measure.nulls import NullBatch, StiffnessFactors, batches
 from measure.nulls import bank as banks
-from measure.observe import Experiment, Hold, Observation, Setup, Specimen, WindTrack, from_arrays, observe, sheet
+from measure.observe import (
+    Experiment,
+    Hold,
+    Observation,
+    Setup,
+    Specimen,
+    WindTrack,
+    from_arrays,
+    observe,
+    sheet,
+)
 from measure.shares import Share
 from measure.verdict import CRITERIA, Estimate
 from sim.cloth.material import named_material
@@ -53,7 +66,8 @@ VERTICES = 96
 ACROSS_MARKERS = 10
 INTENSITY, LENGTH = 0.11, 20.0
 ACROSS, UPWARD = 0.8, 0.5
-"""Deviations of the wind across its mean and upward, over that along it (EN 1991-1-4 literature)."""
+"""Deviations of the wind across its mean and upward, over that along it (EN 1991-1-4
+literature)."""
 NOISE = 1e-3
 _COUNT = 40
 _SETTLED = 3.5
@@ -99,7 +113,8 @@ def _recorded(
     turned: float = 0.0,
     log: float = 0.0,
 ) -> Recorded:
-    """One recording at a frame rate, with white noise, a log that is late [s], turned [rad] or averaged [s]."""
+    """One recording at a frame rate, with white noise, a log that is late [s], turned [rad] or
+    averaged [s]."""
     seen = truth.positions[index, :: RATE // rate]
     seen = seen + noise * rng.standard_normal(seen.shape)
     times = np.arange(len(truth.winds[index])) / LOG_RATE - _SETTLED
@@ -111,7 +126,9 @@ def _recorded(
         times = times[: count * every].reshape(count, every).mean(axis=1)
     cos, sin = math.cos(turned), math.sin(turned)
     wind = wind @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
-    return Recorded(positions=seen, rate=rate, wind=WindTrack(times=times + late, velocity=wind), noise=noise)
+    return Recorded(
+        positions=seen, rate=rate, wind=WindTrack(times=times + late, velocity=wind), noise=noise
+    )
 
 
 def _lost(truth: Truth, index: int, rng: np.random.Generator, *, run: int) -> Recorded:
@@ -156,7 +173,8 @@ STRESSORS: Mapping[str, Stressor] = {
 }
 _OTHER, _TURBULENT = "another material", "turbulence of three components"
 _BANKS = {"noise of 7 mm": "noise of 7 mm", "10 Hz": "10 Hz"}
-"""Stressors that are judged by nulls of their own, as a user's design has them; all others by those of `none`."""
+"""Stressors that are judged by nulls of their own, as a user's design has them; all others by those
+of `none`."""
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
@@ -166,12 +184,23 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         folder = Path(os.environ.get("FLAGDATA_STRESSORS_FOLDER", temporary))
         for name in dict.fromkeys(_BANKS.get(stressor, "none") for stressor in STRESSORS):
             first = experiment(_truth(folder, "", 0, seed), name, seed)
-            wanted = batches(Setting.of(first), kinds=CRITERIA.simulated_kinds, seed=child_seed(seed, "bank", name))
+            wanted = batches(
+                Setting.of(first),
+                kinds=CRITERIA.simulated_kinds,
+                seed=child_seed(seed, "bank", name),
+            )
             banks.build(_bank(folder, name), wanted, workers=len(os.sched_getaffinity(0)))
         judged = partial(_rows, folder, seed)
-        with ProcessPoolExecutor(len(os.sched_getaffinity(0)), mp_context=get_context("spawn")) as pool:
+        with ProcessPoolExecutor(
+            len(os.sched_getaffinity(0)), mp_context=get_context("spawn")
+        ) as pool:
             rows = [row for own in pool.map(judged, range(count)) for row in own]
-    found = {"nulls": count, "stressors": summary(rows), "experiments": rows, "criteria": CRITERIA.as_dict()}
+    found = {
+        "nulls": count,
+        "stressors": summary(rows),
+        "experiments": rows,
+        "criteria": CRITERIA.as_dict(),
+    }
     (out / "validate-stressors.md").write_text(page(found), encoding="utf-8")
     return found
 
@@ -181,7 +210,8 @@ def _bank(folder: Path, name: str) -> Path:
 
 
 def _rows(folder: Path, seed: int, number: int) -> list[dict[str, Any]]:
-    """Verdicts on one null by all stressors, one after another: most of them are of the same simulation."""
+    """Verdicts on one null by all stressors, one after another: most of them are of the same
+    simulation."""
     torch.set_num_threads(1)
     return [_row(folder, stressor, number, seed) for stressor in STRESSORS]
 
@@ -190,7 +220,9 @@ def _row(folder: Path, stressor: str, number: int, seed: int) -> dict[str, Any]:
     """A verdict on one null, from its file where it was made before."""
     kept = folder / f"row-{list(STRESSORS).index(stressor):02d}-{number:02d}.json"
     if not kept.exists():
-        case = _OTHER if stressor == _OTHER else _TURBULENT if stressor.startswith(_TURBULENT) else ""
+        case = (
+            _OTHER if stressor == _OTHER else _TURBULENT if stressor.startswith(_TURBULENT) else ""
+        )
         truth = _truth(folder, case, number, seed)
         bank = _bank(folder, _BANKS.get(stressor, "none"))
         kept.write_text(json.dumps(_judged(truth, stressor, number, seed, bank)), encoding="utf-8")
@@ -200,7 +232,10 @@ def _row(folder: Path, stressor: str, number: int, seed: int) -> dict[str, Any]:
 def _judged(truth: Truth, stressor: str, number: int, seed: int, bank: Path) -> dict[str, Any]:
     row: dict[str, Any] = {"stressor": stressor, "number": number, "true": dict(truth.parameters)}
     try:
-        found = solve(experiment(truth, stressor, child_seed(seed, "noise", number)), LoopOptions(bank=bank, seed=seed))
+        found = solve(
+            experiment(truth, stressor, child_seed(seed, "noise", number)),
+            LoopOptions(bank=bank, seed=seed),
+        )
     except InputError as error:
         return {**row, "refused": str(error)}
     verdict = found.verdict
@@ -226,7 +261,9 @@ def _holds(estimate: Estimate, true: float) -> bool:
     return bool(estimate.low <= true <= estimate.high)
 
 
-def experiment(truth: Truth, stressor: str, seed: int, *, across: int = ACROSS_MARKERS) -> Experiment:
+def experiment(
+    truth: Truth, stressor: str, seed: int, *, across: int = ACROSS_MARKERS
+) -> Experiment:
     """What a user would bring, read as it would be.
 
     Args:
@@ -234,9 +271,13 @@ def experiment(truth: Truth, stressor: str, seed: int, *, across: int = ACROSS_M
     """
     rng = stream(seed, stressor, "recorded")
     seen = [STRESSORS[stressor](truth, index, rng) for index in range(len(SPEEDS))]
-    setup = Setup(material=CAMEL, outline=sheet(WIDTH, HEIGHT), pins=Hold.HOIST_CORNERS, vertices=VERTICES)
+    setup = Setup(
+        material=CAMEL, outline=sheet(WIDTH, HEIGHT), pins=Hold.HOIST_CORNERS, vertices=VERTICES
+    )
     rest = markers(across)
-    observations = [_observation(made, speed, rest) for made, speed in zip(seen, SPEEDS, strict=True)]
+    observations = [
+        _observation(made, speed, rest) for made, speed in zip(seen, SPEEDS, strict=True)
+    ]
     return observe(observations, setup).experiment
 
 
@@ -252,9 +293,12 @@ def _observation(made: Recorded, speed: float, rest: FloatArray) -> Observation:
 
 
 def markers(across: int = ACROSS_MARKERS) -> FloatArray:
-    """(70, 2) rest coordinates [m], up to the edges, or with so many along the flag as many as are needed."""
+    """(70, 2) rest coordinates [m], up to the edges, or with so many along the flag as many as are
+    needed."""
     rows = round(across * 7 / ACROSS_MARKERS)
-    grid_of = np.meshgrid(np.linspace(0, WIDTH, across), np.linspace(0, HEIGHT, rows), indexing="ij")
+    grid_of = np.meshgrid(
+        np.linspace(0, WIDTH, across), np.linspace(0, HEIGHT, rows), indexing="ij"
+    )
     return np.stack(grid_of, axis=-1).reshape(-1, 2)
 
 
@@ -270,7 +314,11 @@ def _truth(folder: Path, case: str, number: int, seed: int) -> Truth:
     with np.load(kept) as content:
         parts = {name: content[name] for name in content.files}
     positions, winds = parts.pop("positions"), parts.pop("winds")
-    return Truth(positions=positions, winds=winds, parameters={name: float(value) for name, value in parts.items()})
+    return Truth(
+        positions=positions,
+        winds=winds,
+        parameters={name: float(value) for name, value in parts.items()},
+    )
 
 
 def simulated(case: str, number: int, seed: int, *, across: int = ACROSS_MARKERS) -> Truth:
@@ -284,13 +332,25 @@ def simulated(case: str, number: int, seed: int, *, across: int = ACROSS_MARKERS
     material, parameters = CAMEL, {}
     if case == _OTHER:
         other = named_material(
-            str(rng.choice([name for name in sorted((*TABLES, "aluminium", "paper")) if name != CAMEL.name]))
+            str(
+                rng.choice(
+                    [name for name in sorted((*TABLES, "aluminium", "paper")) if name != CAMEL.name]
+                )
+            )
         )
-        material = replace(other.scaled(area_weight=CAMEL.area_weight / other.area_weight), damping=CAMEL.damping)
+        material = replace(
+            other.scaled(area_weight=CAMEL.area_weight / other.area_weight), damping=CAMEL.damping
+        )
     flat = grid(width=WIDTH, height=HEIGHT, columns=11, rows=7)
-    ends = [int(np.argmin(np.linalg.norm(flat.rest - corner, axis=1))) for corner in ((0.0, 0.0), (0.0, HEIGHT))]
+    ends = [
+        int(np.argmin(np.linalg.norm(flat.rest - corner, axis=1)))
+        for corner in ((0.0, 0.0), (0.0, HEIGHT))
+    ]
     specimen = Specimen(
-        mesh=flat, material=material, held=tuple(ends), anchors=np.array([[0.0, 0.0, 0.0], [0.0, 0.0, HEIGHT]])
+        mesh=flat,
+        material=material,
+        held=tuple(ends),
+        anchors=np.array([[0.0, 0.0, 0.0], [0.0, 0.0, HEIGHT]]),
     )
     drawn = banks.prior_batch(
         specimen,
@@ -321,7 +381,9 @@ def simulated(case: str, number: int, seed: int, *, across: int = ACROSS_MARKERS
 def _wind(speed: float, rng: np.random.Generator, *, turbulent: bool) -> FloatArray:
     """(sample, 3) from before the first frame to behind the last [m/s]."""
     duration = _SETTLED + DURATION + 1.5
-    along = VonKarman(mean=speed, intensity=INTENSITY, length=LENGTH).series(rng, duration=duration, rate=LOG_RATE)
+    along = VonKarman(mean=speed, intensity=INTENSITY, length=LENGTH).series(
+        rng, duration=duration, rate=LOG_RATE
+    )
     rest = np.zeros((2, len(along)))
     if turbulent:
         for place, share in enumerate((ACROSS, UPWARD)):
@@ -331,7 +393,8 @@ def _wind(speed: float, rng: np.random.Generator, *, turbulent: bool) -> FloatAr
 
 
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Of each stressor how many were rejected and refused, what was named, and how often intervals cover."""
+    """Of each stressor how many were rejected and refused, what was named, and how often intervals
+    cover."""
     results: dict[str, Any] = {}
     for name in dict.fromkeys(row["stressor"] for row in rows):
         own = [row for row in rows if row["stressor"] == name]
@@ -346,7 +409,9 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
             "bound_95": share.high,
             "gusts": sum(row["named"] == ["gusts"] for row in wrong),
             "named": sorted({effect for row in wrong for effect in row["named"]}),
-            "p": [float(v) for v in np.quantile([row["p"] for row in judged], [0.1, 0.5, 0.9])] if judged else [],
+            "p": [float(v) for v in np.quantile([row["p"] for row in judged], [0.1, 0.5, 0.9])]
+            if judged
+            else [],
             "covered": sum(covered),
             "intervals": len(covered),
             "seconds": float(np.median([row["seconds"] for row in judged])) if judged else None,
@@ -357,8 +422,10 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
 def page(found: Mapping[str, Any]) -> str:
     """The sheet."""
     said = (
-        f"{found['nulls']} simulated null experiments of each kind, of 70 markers in three winds, judged by 40 kinds "
-        "of nulls in steady winds. Three of 40 rejected are what the plan allows. Where the log does not hold the "
+        f"{found['nulls']} simulated null experiments of each kind, of 70 markers in three winds, "
+        "judged by 40 kinds "
+        "of nulls in steady winds. Three of 40 rejected are what the plan allows. Where the log "
+        "does not hold the "
         "turbulence, gusts are the right name."
     )
     heads = (
@@ -372,7 +439,14 @@ def page(found: Mapping[str, Any]) -> str:
         "intervals of 90 % that cover",
         "s",
     )
-    lines = ["# Nulls as a field brings them", "", said, "", _line(heads), _line(["---"] * len(heads))]
+    lines = [
+        "# Nulls as a field brings them",
+        "",
+        said,
+        "",
+        _line(heads),
+        _line(["---"] * len(heads)),
+    ]
     for name, own in found["stressors"].items():
         p = ", ".join(f"{value:.2f}" for value in own["p"])
         seconds = "" if own["seconds"] is None else f"{own['seconds']:.0f}"

@@ -1,11 +1,13 @@
-"""One flag's motion filmed in ten looks: what `flagdata measure` answers must not depend on the print or the sky.
+"""One flag's motion filmed in ten looks: what `flagdata measure` answers must not depend on the
+print or the sky.
 
 A flag is simulated once at each of three winds, from one seed, by the scene `flag-outdoor-damped`.
-Each motion is filmed ten times by one camera, with the same noise and coding; only the cloth's print, what is behind it
-and, for the silhouette, the light differ. Each film is a file, which is measured as `flagdata measure` does by default,
-with the flag's size, once with its area weight open and once stated. Prints are drawn here, not by what networks learn
-from, except for those that are named after a texture of the package. Looks, winds, weight and seed were fixed before
-the first film was measured.
+Each motion is filmed ten times by one camera, with the same noise and coding; only the cloth's
+print, what is behind it and, for the silhouette, the light differ. Each film is a file, which is
+measured as `flagdata measure` does by default, with the flag's size, once with its area weight open
+and once stated. Prints are drawn here, not by what networks learn from, except for those that are
+named after a texture of the package. Looks, winds, weight and seed were fixed before the first film
+was measured.
 """
 
 from __future__ import annotations
@@ -152,7 +154,8 @@ class Look:
     light: Mapping[str, float] = field(default_factory=dict)
 
     def zeta(self) -> RenderParameters:
-        """Render parameters: the one camera of all looks, and the light of a clear day from behind it."""
+        """Render parameters: the one camera of all looks, and the light of a clear day from behind
+        it."""
         width, height = SIZE
         usual = RenderParameters(
             texture=self.texture,
@@ -180,7 +183,12 @@ _AGAINST_THE_LIGHT = {"sun_azimuth": _CAMERA_ANGLE, "exposure_bias": -1.5, "tran
 LOOKS = (
     Look(name="quarters", texture="study/quarters", background="sky/10"),
     Look(name="stars and stripes", texture="study/stars-and-stripes", background="sky/10"),
-    Look(name="dark, against the light", texture="study/dark", background="sky/10", light=_AGAINST_THE_LIGHT),
+    Look(
+        name="dark, against the light",
+        texture="study/dark",
+        background="sky/10",
+        light=_AGAINST_THE_LIGHT,
+    ),
     Look(name="white before clouds", texture="study/white", background="clouds/11"),
     Look(name="white before sky", texture="study/white", background="sky/10"),
     Look(name="print", texture="print/7", background="hills/3"),
@@ -197,7 +205,8 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
 
 
 def graded(cloth: Cloth, *, seed: int, out: Path) -> dict[str, Any]:
-    """Answers on all films of a cloth, their spread over the looks and their largest errors at each wind."""
+    """Answers on all films of a cloth, their spread over the looks and their largest errors at each
+    wind."""
     torch.set_num_threads(1)
     found = network(None, lake=None, at=None)
     gate = gate_beside(found, false_alarm=Options().false_alarm)
@@ -205,7 +214,12 @@ def graded(cloth: Cloth, *, seed: int, out: Path) -> dict[str, Any]:
     for wind in cloth.winds:
         motion = flown(cloth, wind, seed=seed)
         rows += [
-            {"wind": wind, "look": look.name, **answers(cloth, motion, look, found, gate, seed=seed)} for look in LOOKS
+            {
+                "wind": wind,
+                "look": look.name,
+                **answers(cloth, motion, look, found, gate, seed=seed),
+            }
+            for look in LOOKS
         ]
     sheet = {"model": found.estimator.name, "summary": summary(rows), "films": rows}
     (out / f"validate-{cloth.study}.md").write_text(page(cloth, sheet), encoding="utf-8")
@@ -213,7 +227,8 @@ def graded(cloth: Cloth, *, seed: int, out: Path) -> dict[str, Any]:
 
 
 def flown(cloth: Cloth, wind: float, *, seed: int) -> MeshSequence | RaggedMeshSequence:
-    """Simulates the flag in a wind [m/s]; its cloth and its start are those of the seed, whatever the wind."""
+    """Simulates the flag in a wind [m/s]; its cloth and its start are those of the seed, whatever
+    the wind."""
     given = {
         "seed": child_seed(seed, cloth.stream),
         "count": 1,
@@ -231,7 +246,13 @@ def flown(cloth: Cloth, wind: float, *, seed: int) -> MeshSequence | RaggedMeshS
 
 
 def answers(
-    cloth: Cloth, motion: MeshSequence | RaggedMeshSequence, look: Look, found: Network, gate: WindowGate, *, seed: int
+    cloth: Cloth,
+    motion: MeshSequence | RaggedMeshSequence,
+    look: Look,
+    found: Network,
+    gate: WindowGate,
+    *,
+    seed: int,
 ) -> dict[str, Any]:
     """Films a motion in a look, and measures the file with its weight open and stated."""
     asked = {"open": None, "stated": cloth.stated}
@@ -240,12 +261,14 @@ def answers(
         path = Path(folder) / "flag.mp4"
         filmed(path, motion, look, seed=child_seed(seed, cloth.stream, "camera"))
         return {
-            name: answer(path, found, gate, Options(size=size, area_weight=weight)) for name, weight in asked.items()
+            name: answer(path, found, gate, Options(size=size, area_weight=weight))
+            for name, weight in asked.items()
         }
 
 
 def filmed(path: Path, motion: MeshSequence | RaggedMeshSequence, look: Look, *, seed: int) -> None:
-    """Writes the film of a motion in a look; the camera's noise is that of the seed, whatever the look."""
+    """Writes the film of a motion in a look; the camera's noise is that of the seed, whatever the
+    look."""
     write_film(
         path,
         motion,
@@ -260,11 +283,14 @@ def filmed(path: Path, motion: MeshSequence | RaggedMeshSequence, look: Look, *,
 
 
 def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """By weight and wind: of the films with an answer, how far winds lie apart [m/s] and how far from the true one.
+    """By weight and wind: of the films with an answer, how far winds lie apart [m/s] and how far
+    from the true one.
 
     Returns:
-        "open" and "stated" → wind → films, refused; lowest, highest, spread (highest less lowest), mean and the error
-        of the largest size [m/s], or None where nothing is answered; and how many intervals contain the wind.
+        "open" and "stated" → wind → films, refused; lowest, highest, spread (highest less lowest),
+            mean and the error
+        of the largest size [m/s], or None where nothing is answered; and how many intervals contain
+            the wind.
     """
     return {
         name: {
@@ -279,7 +305,10 @@ def _at_wind(said: Sequence[Mapping[str, Any]], wind: float) -> dict[str, Any]:
     answered = [one["wind"] for one in said if not one["refused"]]
     found: dict[str, Any] = {"films": len(said), "refused": len(said) - len(answered)}
     if not answered:
-        return {**found, **dict.fromkeys(("lowest", "highest", "spread", "mean", "largest_error", "contained"))}
+        return {
+            **found,
+            **dict.fromkeys(("lowest", "highest", "spread", "mean", "largest_error", "contained")),
+        }
     values = np.array([one["value"] for one in answered])
     errors = values - wind
     return {
@@ -299,14 +328,20 @@ def page(cloth: Cloth, sheet: Mapping[str, Any]) -> str:
         f"# {cloth.title}",
         "",
         (
-            f"Model {sheet['model']}. One simulated flag of {cloth.area_weight:g} kg/m² and {LENGTH:g} m by "
-            f"{HEIGHT:g} m at {', '.join(f'{wind:g}' for wind in cloth.winds)} m/s, each motion filmed in "
-            f"{len(LOOKS)} looks by one camera ({SECONDS} s at {RATE} Hz) and measured with the flag's size: with the "
-            f"area weight open, and stated as {cloth.stated.low:g} to {cloth.stated.high:g} kg/m². What differs "
-            f"between the answers on one motion is the look's (`python -m tests.studies {cloth.study}`)."
+            f"Model {sheet['model']}. One simulated flag of {cloth.area_weight:g} kg/m² and "
+            f"{LENGTH:g} m by "
+            f"{HEIGHT:g} m at {', '.join(f'{wind:g}' for wind in cloth.winds)} m/s, each motion "
+            "filmed in "
+            f"{len(LOOKS)} looks by one camera ({SECONDS} s at {RATE} Hz) and measured with the "
+            "flag's size: with the "
+            f"area weight open, and stated as {cloth.stated.low:g} to {cloth.stated.high:g} kg/m². "
+            "What differs "
+            "between the answers on one motion is the look's (`python -m tests.studies "
+            f"{cloth.study}`)."
         ),
         "",
-        "| wind [m/s] | weight | refused | lowest | highest | spread | mean | largest error | intervals contain it |",
+        "| wind [m/s] | weight | refused | lowest | highest | spread | mean | largest error | "
+        "intervals contain it |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
     for name, winds in sheet["summary"].items():
@@ -315,17 +350,22 @@ def page(cloth: Cloth, sheet: Mapping[str, Any]) -> str:
         "",
         "## All films",
         "",
-        "| look | " + " | ".join(f"{wind:g} m/s, {name}" for wind in cloth.winds for name in ("open", "stated")) + " |",
+        "| look | "
+        + " | ".join(f"{wind:g} m/s, {name}" for wind in cloth.winds for name in ("open", "stated"))
+        + " |",
         "|---" * (1 + 2 * len(cloth.winds)) + "|",
     ]
     for look in dict.fromkeys(row["look"] for row in sheet["films"]):
         own = {row["wind"]: row for row in sheet["films"] if row["look"] == look}
-        cells = [_cell(own[wind][name], wind) for wind in cloth.winds for name in ("open", "stated")]
+        cells = [
+            _cell(own[wind][name], wind) for wind in cloth.winds for name in ("open", "stated")
+        ]
         lines.append(f"| {look} | " + " | ".join(cells) + " |")
     lines += [
         "",
         (
-            "Winds in m/s with their 90 % intervals; one in bold does not contain the true wind. Of a refused film the "
+            "Winds in m/s with their 90 % intervals; one in bold does not contain the true wind. "
+            "Of a refused film the "
             "estimate is that of `--anyway`, which counts for no spread and no error."
         ),
     ]
@@ -337,7 +377,8 @@ def _summed(own: Mapping[str, Any]) -> str:
         return f"{own['refused']} of {own['films']} |" + " |" * 5
     answered = own["films"] - own["refused"]
     return (
-        f"{own['refused']} of {own['films']} | {own['lowest']:.2f} | {own['highest']:.2f} | {own['spread']:.2f} | "
+        f"{own['refused']} of {own['films']} | {own['lowest']:.2f} | {own['highest']:.2f} | "
+        f"{own['spread']:.2f} | "
         f"{own['mean']:.2f} | {own['largest_error']:+.2f} | {own['contained']} of {answered}"
     )
 

@@ -7,13 +7,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.studies.validation.card_flag import CALM, EVERY, LONG, OPENED, long_rows, rows_of, tracked
+from tests.studies.validation.card_flag import (
+    CALM,
+    EVERY,
+    LONG,
+    OPENED,
+    long_rows,
+    rows_of,
+    tracked,
+)
 
 
 @pytest.mark.reference
 def test_rows_whose_second_holds_a_jump_of_the_tracker_are_left_out(reference_data: Path) -> None:
-    """All points are lost and found anew at 7.6 s: the jump of 42 px raises the root mean square to 42/√30 = 7.7 px for
-    30 frames, in still air."""
+    """All points are lost and found anew at 7.6 s: the jump of 42 px raises the root mean square to
+    42/√30 = 7.7 px for 30 frames, in still air."""
     found = tracked(reference_data / "wind" / "flag-camera-tunnel", until=OPENED)
     jumped = (found.stamps > 7.65) & (found.stamps < 8.4)
     assert found.motion[jumped] == pytest.approx(42.1 / np.sqrt(30), abs=0.1)

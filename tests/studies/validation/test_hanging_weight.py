@@ -60,7 +60,9 @@ def test_narrow_intervals_constrain_and_must_be_given() -> None:
     narrow = [replace(_PLAIN, width=0.5)] * FILMS
     assert grade(narrow, seed=1)["criteria"]["constrains the weight"]
     assert not grade(narrow, seed=1)["criteria"]["says so"]
-    assert grade([replace(film, constrained=True) for film in narrow], seed=1)["criteria"]["says so"]
+    assert grade([replace(film, constrained=True) for film in narrow], seed=1)["criteria"][
+        "says so"
+    ]
 
 
 def test_a_stated_weight_that_helps_on_every_film_is_seen() -> None:

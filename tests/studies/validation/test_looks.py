@@ -1,4 +1,5 @@
-"""The arithmetic of `looks`, on errors whose shares are known, and the place of a flag that is filmed once more."""
+"""The arithmetic of `looks`, on errors whose shares are known, and the place of a flag that is
+filmed once more."""
 
 from __future__ import annotations
 
@@ -27,7 +28,9 @@ def _films(count: int, windows: int, *, together: float, seed: int) -> list[dict
         shared = rng.standard_normal(size)
         for film in range(2):
             lasting = np.sqrt(together) * shared + np.sqrt(1 - together) * rng.standard_normal(size)
-            errors = np.sqrt(_SHARES) * lasting + np.sqrt(1 - _SHARES) * rng.standard_normal((windows, size))
+            errors = np.sqrt(_SHARES) * lasting + np.sqrt(1 - _SHARES) * rng.standard_normal(
+                (windows, size)
+            )
             found.append({"look": number, "film": film, "errors": errors.tolist()})
     return found
 
@@ -41,13 +44,18 @@ def test_the_share_that_lasts_is_found() -> None:
 
 def test_what_two_films_of_a_look_share_is_found() -> None:
     for together in (0.0, 0.5, 1.0):
-        assert common_of_all(_films(400, 4, together=together, seed=2)) == pytest.approx(together, abs=0.12)
+        assert common_of_all(_films(400, 4, together=together, seed=2)) == pytest.approx(
+            together, abs=0.12
+        )
 
 
 def test_a_correction_counts_only_where_it_predicts() -> None:
     rng = stream(3, "test looks")
     errors = rng.standard_normal((40, len(OBSERVED)))
-    good, bad = 0.9 * errors + 0.1 * rng.standard_normal(errors.shape), rng.standard_normal(errors.shape)
+    good, bad = (
+        0.9 * errors + 0.1 * rng.standard_normal(errors.shape),
+        rng.standard_normal(errors.shape),
+    )
     whole = np.ones(len(OBSERVED))
     assert judged(errors, good, whole)["mean_log"] < -2
     assert judged(errors, bad, whole)["mean_log"] > 0.4  # twice the variance
@@ -58,7 +66,9 @@ def test_a_correction_counts_only_where_it_predicts() -> None:
 def test_a_flag_is_drawn_where_the_films_hoist_is() -> None:
     flag = Flag(length=1.5, height=1.0)
     mesh = flag.mesh(6)
-    positions = np.stack([mesh.rest[:, 0], 0.2 * np.sin(3 * mesh.rest[:, 0]), mesh.rest[:, 1]], axis=1)[None]
+    positions = np.stack(
+        [mesh.rest[:, 0], 0.2 * np.sin(3 * mesh.rest[:, 0]), mesh.rest[:, 1]], axis=1
+    )[None]
     hoist, _ = edges_of(mesh.rest)
     zeta = RenderParameters(background="film/own", texture="film/own", width=300, height=300)
     place = Place(azimuth=1.1, elevation=0.1, distance=9.0, wide=0.5)

@@ -1,4 +1,5 @@
-"""Verification of MuJoCo's cloths against closed forms: as a source of truth it has to be right by theory first."""
+"""Verification of MuJoCo's cloths against closed forms: as a source of truth it has to be right by
+theory first."""
 
 from __future__ import annotations
 
@@ -62,17 +63,31 @@ FREE = Sheet(
 @pytest.mark.parametrize("method", METHODS)
 def test_a_sheet_falls_freely_as_points_do(mujoco: Path, method: Method) -> None:
     made = fly(
-        mujoco, FREE, start=_level(FREE), air=STILL, wind=CALM, method=method, rate=25.0, frames=11, gravity=GRAVITY
+        mujoco,
+        FREE,
+        start=_level(FREE),
+        air=STILL,
+        wind=CALM,
+        method=method,
+        rate=25.0,
+        frames=11,
+        gravity=GRAVITY,
     )
     # Velocity first, then position, in n steps of h: z = −g h² n (n + 1)/2.
     steps = np.arange(11) * round(0.04 / method.step)
     expected = -GRAVITY * method.step**2 * steps * (steps + 1) / 2
-    np.testing.assert_allclose(made.positions[:, :, 2], np.repeat(expected[:, None], 35, axis=1), atol=1e-8)
-    np.testing.assert_allclose(made.positions[:, :, :2], np.tile(FREE.mesh.rest, (11, 1, 1)), atol=1e-8)
+    np.testing.assert_allclose(
+        made.positions[:, :, 2], np.repeat(expected[:, None], 35, axis=1), atol=1e-8
+    )
+    np.testing.assert_allclose(
+        made.positions[:, :, :2], np.tile(FREE.mesh.rest, (11, 1, 1)), atol=1e-8
+    )
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_level_sheet_in_air_falls_towards_its_terminal_speed(mujoco: Path, method: Method) -> None:
+def test_a_level_sheet_in_air_falls_towards_its_terminal_speed(
+    mujoco: Path, method: Method
+) -> None:
     """v = v∞ tanh(g t/v∞) with v∞ = √(σ g/p): mass and wind force in one, gravity on the vertices by their mass."""
     made = fly(
         mujoco,
@@ -88,7 +103,9 @@ def test_a_level_sheet_in_air_falls_towards_its_terminal_speed(mujoco: Path, met
     terminal = math.sqrt(FREE.area_weight * GRAVITY / 1.3)
     expected = -terminal * np.tanh(GRAVITY * np.arange(21) * 0.04 / terminal)
     # Forces are those at the start of a step: late by half a step, h g/2 at most.
-    np.testing.assert_allclose(made.velocities[:, :, 2].mean(axis=1), expected, atol=method.step * GRAVITY / 2)
+    np.testing.assert_allclose(
+        made.velocities[:, :, 2].mean(axis=1), expected, atol=method.step * GRAVITY / 2
+    )
 
 
 def test_a_level_sheet_whose_pressure_lags_falls_as_wagners_function_has_it(mujoco: Path) -> None:
@@ -96,7 +113,15 @@ def test_a_level_sheet_whose_pressure_lags_falls_as_wagners_function_has_it(mujo
 
     def speeds(air: Air) -> FloatArray:
         made = fly(
-            mujoco, FREE, start=_level(FREE), air=air, wind=CALM, method=Method(), rate=25.0, frames=21, gravity=GRAVITY
+            mujoco,
+            FREE,
+            start=_level(FREE),
+            air=air,
+            wind=CALM,
+            method=Method(),
+            rate=25.0,
+            frames=21,
+            gravity=GRAVITY,
         )
         return made.velocities[:, :, 2].mean(axis=1)
 
@@ -153,11 +178,15 @@ def test_air_that_is_carried_moves_by_mujocos_explicit_steps_alone(mujoco: Path)
         )
 
 
-def test_the_inertia_of_the_air_about_a_still_wave_is_that_of_its_wavenumbers(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_inertia_of_the_air_about_a_still_wave_is_that_of_its_wavenumbers(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """η = a cos k₄u in a stream U: √e Σ_b m(k₄, b π/H) cos(b π v/H) ⟨√e cos⟩_b U² k₄² η; and the library's mass."""
     monkeypatch.setitem(sys.modules, "mujoco", ModuleType("mujoco"))
     mesh = grid(width=1.5, height=1.0, columns=40, rows=28)
-    carried = import_module("tests.studies.validation.mujoco.worker").Carried(0.3, mesh.rest, mesh.vertex_areas)
+    carried = import_module("tests.studies.validation.mujoco.worker").Carried(
+        0.3, mesh.rest, mesh.vertex_areas
+    )
     u, v = mesh.rest.T
     along = 4 * np.pi / 1.5
     wave = 0.002 * np.cos(along * u)
@@ -172,7 +201,9 @@ def test_the_inertia_of_the_air_about_a_still_wave_is_that_of_its_wavenumbers(mo
     for b in range(14):
         part = (root(places) * np.cos(b * np.pi * places)).mean() * (1 if b == 0 else 2)
         k = math.hypot(along, b * np.pi)
-        size += 0.3 * ((k / 2) ** 1.5 + (4 / np.pi) ** 1.5) ** (-2 / 3) * part * np.cos(b * np.pi * v)
+        size += (
+            0.3 * ((k / 2) ** 1.5 + (4 / np.pi) ** 1.5) ** (-2 / 3) * part * np.cos(b * np.pi * v)
+        )
     expected = mesh.vertex_areas * root(v) * size * 25 * along**2 * wave
     assert np.linalg.norm(found[:, 1] - expected) < 0.05 * np.linalg.norm(expected)
     cloth = Cloth.build(mesh, [named_material("camel-ponte-roma")], dtype=torch.float64)
@@ -203,8 +234,9 @@ def test_the_wind_pushes_a_level_sheet_by_its_tangential_drag(mujoco: Path) -> N
 def test_a_clamped_sheet_vibrates_as_an_elastic_beam(mujoco: Path, along: int) -> None:
     """ω = 1.8751² √(B/(σ L⁴)) (Euler–Bernoulli), started from its mode; without gravity, along either axis.
 
-    Hinges that store D κ²/2 in a cylinder fold at the lines across it and not at the diagonals. A free strip of
-    alternating diagonals folds at both, and so has B = 4/5 D (derived in `tests.verification.cases.drooped_tips`).
+    Hinges that store D κ²/2 in a cylinder fold at the lines across it and not at the diagonals. A
+    free strip of alternating diagonals folds at both, and so has B = 4/5 D (derived in
+    `tests.verification.cases.drooped_tips`).
     """
     cells, length, rigidity, density = 40, 0.5, 0.005, 0.3
     size = {"width": length, "height": 0.025, "columns": cells, "rows": 2}
@@ -234,7 +266,8 @@ def test_a_clamped_sheet_vibrates_as_an_elastic_beam(mujoco: Path, along: int) -
     tip = made.positions[:, place > length - 1e-9, 2].mean(axis=1)
     down = np.flatnonzero((tip[:-1] > 0) & (tip[1:] <= 0))[0]
     crossing = (down + tip[down] / (tip[down] - tip[down + 1])) / 50.0
-    # The held cell clamps the strip at its middle; the turn at the clamp is off by a fifth, an error of first order.
+    # The held cell clamps the strip at its middle; the turn at the clamp is off by a fifth, an
+    # error of first order.
     free = length * (1 - 0.5 / cells)
     period = 2 * math.pi / (1.875104**2 * math.sqrt(0.8 * rigidity / (density * free**4)))
     assert 4 * crossing == pytest.approx(period, rel=1 / cells)
@@ -242,10 +275,13 @@ def test_a_clamped_sheet_vibrates_as_an_elastic_beam(mujoco: Path, along: int) -
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_hanging_sheet_sags_under_its_own_weight(mujoco: Path, method: Method) -> None:
-    """The weight below a point is the tension there, Y λ (λ² − 1)/2 of a Saint Venant–Kirchhoff strip of stretch λ."""
+    """The weight below a point is the tension there, Y λ (λ² − 1)/2 of a Saint Venant–Kirchhoff
+    strip of stretch λ."""
     mesh = grid(width=0.05, height=1.0, columns=1, rows=20)
     top = tuple(np.flatnonzero(mesh.rest[:, 1] > 1 - 1e-9).tolist())
-    sheet = Sheet(mesh=mesh, held=top, area_weight=0.3, stretching=20.0, bending=1e-6, damping=20e-3)
+    sheet = Sheet(
+        mesh=mesh, held=top, area_weight=0.3, stretching=20.0, bending=1e-6, damping=20e-3
+    )
     made = fly(
         mujoco,
         sheet,
@@ -261,20 +297,26 @@ def test_a_hanging_sheet_sags_under_its_own_weight(mujoco: Path, method: Method)
 
     def stretch(below: float) -> float:
         tension = sheet.area_weight * GRAVITY * below
-        return float(np.roots([sheet.stretching / 2, 0.0, -sheet.stretching / 2, -tension]).real.max())
+        return float(
+            np.roots([sheet.stretching / 2, 0.0, -sheet.stretching / 2, -tension]).real.max()
+        )
 
     length = quad(stretch, 0.0, 1.0)[0]
     bottom = made.positions[-1, mesh.rest[:, 1] < 1e-9, 2].mean()
     assert np.abs(made.velocities[-1]).max() < 1e-3  # at rest
-    # Linear elements and lumped masses err by the square of a cell over the length, 1/400 of the 72 mm, with room.
+    # Linear elements and lumped masses err by the square of a cell over the length, 1/400 of the 72
+    # mm, with room.
     assert 1.0 - bottom == pytest.approx(length, abs=5e-4)
 
 
 def test_a_hanging_strip_swings_with_the_period_of_a_chain(mujoco: Path) -> None:
-    """Bernoulli's hanging chain: ω = (j₀,₁/2) √(g/L) with j₀,₁ = 2.4048, its shape J₀(j₀,₁ √(s/L))."""
+    """Bernoulli's hanging chain: ω = (j₀,₁/2) √(g/L) with j₀,₁ = 2.4048, its shape J₀(j₀,₁
+    √(s/L))."""
     mesh = grid(width=0.1, height=1.0, columns=1, rows=20)
     top = tuple(np.flatnonzero(mesh.rest[:, 1] > 1 - 1e-9).tolist())
-    sheet = Sheet(mesh=mesh, held=top, area_weight=0.3, stretching=2000.0, bending=1e-8, damping=1e-4)
+    sheet = Sheet(
+        mesh=mesh, held=top, area_weight=0.3, stretching=2000.0, bending=1e-8, damping=1e-4
+    )
     start = _hanging(sheet)
     reference = start.copy()
     start[:, 1] = 0.01 * j0(2.40483 * np.sqrt(mesh.rest[:, 1]))
@@ -293,14 +335,17 @@ def test_a_hanging_strip_swings_with_the_period_of_a_chain(mujoco: Path) -> None
     tip = made.positions[:, mesh.rest[:, 1] < 1e-9, 1].mean(axis=1)
     down = np.flatnonzero((tip[:-1] > 0) & (tip[1:] <= 0))[0]
     crossing = (down + tip[down] / (tip[down] - tip[down + 1])) / 50.0
-    # A lumped chain of 20 is faster than a smooth one by about 1/(4·20²); crossings by lines between frames.
+    # A lumped chain of 20 is faster than a smooth one by about 1/(4·20²); crossings by lines
+    # between frames.
     assert 4 * crossing == pytest.approx(2 * math.pi / (2.40483 / 2 * math.sqrt(GRAVITY)), rel=5e-3)
 
 
 def test_a_swinging_sheet_without_losses_keeps_its_energy(mujoco: Path) -> None:
     """Semi-implicit Euler is symplectic: its energy wavers by the step and does not drift."""
     mesh = grid(width=0.5, height=0.5, columns=6, rows=6)
-    sheet = Sheet(mesh=mesh, held=(0, 42), area_weight=0.284, stretching=80.0, poisson=0.2, bending=1e-7)
+    sheet = Sheet(
+        mesh=mesh, held=(0, 42), area_weight=0.284, stretching=80.0, poisson=0.2, bending=1e-7
+    )
     u, v = mesh.rest.T
     start = np.stack([u * math.cos(0.5), u * math.sin(0.5), v], axis=1)
     made = fly(
@@ -337,15 +382,20 @@ def _kinetic(sheet: Sheet, made: Flight) -> FloatArray:
 
 
 def _energy(sheet: Sheet, made: Flight) -> FloatArray:
-    """Kinetic, of height, and of the membrane as Saint Venant and Kirchhoff have it [J]; hinges hold too little."""
+    """Kinetic, of height, and of the membrane as Saint Venant and Kirchhoff have it [J]; hinges
+    hold too little."""
     corners = made.positions[:, sheet.mesh.faces]
     rest = sheet.mesh.rest[sheet.mesh.faces]
     flat = np.stack([rest[:, 1] - rest[:, 0], rest[:, 2] - rest[:, 0]], axis=-1)
-    sides = np.stack([corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0]], axis=-1)
+    sides = np.stack(
+        [corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0]], axis=-1
+    )
     gradient = sides @ np.linalg.inv(flat)
     strain = (gradient.swapaxes(2, 3) @ gradient - np.eye(2)) / 2
     shear = sheet.stretching / (2 * (1 + sheet.poisson))
     spread = sheet.stretching * sheet.poisson / (1 - sheet.poisson**2)
-    density = shear * (strain**2).sum(axis=(2, 3)) + spread / 2 * np.trace(strain, axis1=2, axis2=3) ** 2
+    density = (
+        shear * (strain**2).sum(axis=(2, 3)) + spread / 2 * np.trace(strain, axis1=2, axis2=3) ** 2
+    )
     height = GRAVITY * (sheet.mass * made.positions[:, :, 2]).sum(axis=1)
     return _kinetic(sheet, made) + height + (sheet.mesh.areas * density).sum(axis=1)

@@ -16,7 +16,9 @@ def _quadratic(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("method", list(PEERS))
-def test_it_begins_at_the_centre_stays_in_the_box_and_depends_on_its_seed_alone(method: str) -> None:
+def test_it_begins_at_the_centre_stays_in_the_box_and_depends_on_its_seed_alone(
+    method: str,
+) -> None:
     trace = minimise(method, _quadratic, dimension=2, budget=13, seed=1)
     assert len(trace) == 13
     np.testing.assert_array_equal(trace.points[0], [0.0, 0.0])
@@ -29,7 +31,8 @@ def test_it_begins_at_the_centre_stays_in_the_box_and_depends_on_its_seed_alone(
 
 def test_expected_improvement_finds_the_minimum_of_a_quadratic_within_sixteen_evaluations() -> None:
     trace = minimise("bayesian", _quadratic, dimension=2, budget=16, seed=3)
-    # within 0.02 of it, where one of sixteen random points lies with a probability of 16 π 0.02²/4 = 0.5 %
+    # within 0.02 of it, where one of sixteen random points lies with a probability of 16 π 0.02²/4
+    # = 0.5 %
     assert trace.distances[trace.best[-1]] < 4 * 0.02**2
 
 

@@ -1,4 +1,5 @@
-"""Films by VTK: motion, view and files are what a design says, so that what they are measured by is the truth."""
+"""Films by VTK: motion, view and files are what a design says, so that what they are measured by is
+the truth."""
 
 from __future__ import annotations
 
@@ -14,7 +15,15 @@ from flagdata.errors import NotFoundError
 from tests.studies.validation.environments import VTK
 from tests.studies.validation.vtk_films.designs import ALL_RATES, designs
 from tests.studies.validation.vtk_films.runs import RATE, Motion
-from tests.studies.validation.vtk_films.scene import Body, Camera, Light, Scene, View, film, pictures
+from tests.studies.validation.vtk_films.scene import (
+    Body,
+    Camera,
+    Light,
+    Scene,
+    View,
+    film,
+    pictures,
+)
 
 
 @pytest.fixture(scope="session")
@@ -38,7 +47,10 @@ def _motion(frequency: float) -> Motion:
 
 def test_between_its_frames_a_run_moves_as_its_sines_do() -> None:
     times = np.linspace(1.0, 3.0, 241)
-    for frequency, error in ((2.0, 1e-4), (6.0, 0.02)):  # of an amplitude of 1; 6 Hz is half of the limit of 25 Hz
+    for frequency, error in (
+        (2.0, 1e-4),
+        (6.0, 0.02),
+    ):  # of an amplitude of 1; 6 Hz is half of the limit of 25 Hz
         shown = _motion(frequency).at(times)[:, 1, 1]
         assert np.abs(shown - np.sin(2 * np.pi * frequency * times)).max() < error
 
@@ -51,12 +63,27 @@ def test_names_are_unique_and_every_rate_is_there() -> None:
 
 
 def _square(view: View, *, rate: Fraction = Fraction(25), frames: int = 3, crf: int = 1) -> Scene:
-    """A white square of 0.4 m about the target, before black, that steps 0.5 m to the right with each frame."""
+    """A white square of 0.4 m about the target, before black, that steps 0.5 m to the right with
+    each frame."""
     corners = np.array([[-0.2, 0, -0.2], [0.2, 0, -0.2], [0.2, 0, 0.2], [-0.2, 0, 0.2]])
     moved = corners[None] + np.arange(frames)[:, None, None] * np.array([0.5, 0.0, 0.0])
-    body = Body(positions=moved, faces=np.array([[0, 1, 2], [0, 2, 3]]), lit=False, ambient=1.0, diffuse=0.0, gloss=0.0)
+    body = Body(
+        positions=moved,
+        faces=np.array([[0, 1, 2], [0, 2, 3]]),
+        lit=False,
+        ambient=1.0,
+        diffuse=0.0,
+        gloss=0.0,
+    )
     light = Light(towards=(0.0, -1.0, 0.0), intensity=1.0)
-    return Scene(bodies=[body], lights=[light], view=view, rate=rate, frames=frames, camera=Camera(noise=0.0, crf=crf))
+    return Scene(
+        bodies=[body],
+        lights=[light],
+        view=view,
+        rate=rate,
+        frames=frames,
+        camera=Camera(noise=0.0, crf=crf),
+    )
 
 
 def _view(turned: np.ndarray, side: int = -1) -> View:
@@ -83,13 +110,17 @@ def test_a_body_is_where_the_view_puts_it(vtk: Path) -> None:
         shown = list(pictures(vtk, _square(_view(np.zeros((3, 3)), side))))
         for frame, picture in enumerate(shown):
             assert _place(picture) == pytest.approx((80 + 25 * sign * frame, 60), abs=0.5)
-            assert np.count_nonzero(picture[..., 1] > 128) == pytest.approx(400, rel=0.05)  # (0.4 m · 50 px/m)²
+            assert np.count_nonzero(picture[..., 1] > 128) == pytest.approx(
+                400, rel=0.05
+            )  # (0.4 m · 50 px/m)²
 
 
 def test_the_camera_turns_by_pixels_and_shutters_blur(vtk: Path) -> None:
     turned = np.array([[0, 0, 0], [6, 0, 0], [0, 4, 0]], dtype=np.float64)
     still = _square(_view(turned), frames=3)
-    still = replace(still, bodies=[replace(still.bodies[0], positions=still.bodies[0].positions[:1])])
+    still = replace(
+        still, bodies=[replace(still.bodies[0], positions=still.bodies[0].positions[:1])]
+    )
     places = np.array([_place(picture) for picture in pictures(vtk, still)])
     assert np.abs(places[1] - places[0]) == pytest.approx((6, 0), abs=0.5)
     assert np.abs(places[2] - places[0]) == pytest.approx((0, 4), abs=0.5)

@@ -23,7 +23,9 @@ def _winds(design: Design) -> FloatArray:
 
 def _geometry(truth: Mapping[str, Any], at: Path) -> FloatArray:
     del at
-    values = {name: np.array([truth[name]]) for name in ("area_weight", "gain", "damping", "azimuth")}
+    values = {
+        name: np.array([truth[name]]) for name in ("area_weight", "gain", "damping", "azimuth")
+    }
     return readings(values, _winds(weighed.design()), seed=truth["seed"])[0]
 
 
@@ -33,8 +35,12 @@ def _finer(design: Design) -> tuple[FloatArray, IntArray]:
     return readings(values, _winds(design), seed=2) + 0.01, places
 
 
-def test_flags_are_weighed_and_their_sheet_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(weighed, "simulations", lambda at: readings(dict(own.values()), _winds(own), seed=1))
+def test_flags_are_weighed_and_their_sheet_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        weighed, "simulations", lambda at: readings(dict(own.values()), _winds(own), seed=1)
+    )
     monkeypatch.setattr(weighed, "geometry", _geometry)
     monkeypatch.setattr(weighed, "film", lambda truth, at: _geometry(truth, at))
     monkeypatch.setattr(weighed, "finer", _finer)

@@ -1,8 +1,10 @@
-"""What the shipped model's estimates are worth on clips that differ from those it was trained on, one change at a time.
+"""What the shipped model's estimates are worth on clips that differ from those it was trained on,
+one change at a time.
 
-Each change is filmed anew from flags that no model has seen: another mesh, another integrator, another renderer, other
-textures, a noisier camera; and runs of the reference simulator (../shared/data/arcsim), which share no code with ours,
-filmed by our rasteriser. The model's own test of unfamiliar clips is reported beside the errors.
+Each change is filmed anew from flags that no model has seen: another mesh, another integrator,
+another renderer, other textures, a noisier camera; and runs of the reference simulator
+(../shared/data/arcsim), which share no code with ours, filmed by our rasteriser. The model's own
+test of unfamiliar clips is reported beside the errors.
 """
 
 from __future__ import annotations
@@ -52,17 +54,29 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     del out
     torch.set_num_threads(1)
     model = estimator.load_shipped()
-    result: dict[str, Any] = {"model": model.name, "level": LEVEL, "false_alarm": FALSE_ALARM, "of": {}}
+    result: dict[str, Any] = {
+        "model": model.name,
+        "level": LEVEL,
+        "false_alarm": FALSE_ALARM,
+        "of": {},
+    }
     for name, change in CHANGES.items():
         recipe = change(unseen(FLAGS // 4 if name == "rendered by Cycles" else FLAGS, seed))
         clips = [_clip(frames, stated) for frames, stated in filmed(recipe)]
         result["of"][name] = _scores(model, clips, seed)
     runs = REFERENCE / "arcsim"
     if runs.is_dir():
-        clips = [clip for _, clip in reference_clips(runs, seed, model.front_end.frames, views=VIEWS)]
+        clips = [
+            clip for _, clip in reference_clips(runs, seed, model.front_end.frames, views=VIEWS)
+        ]
         result["of"]["simulated by ArcSim"] = _scores(model, clips, seed)
-        if any(t.name == "density" and t.low < WEIGHED[0] and WEIGHED[1] < t.high for t in model.targets):
-            result["of"]["simulated by ArcSim, the flag weighed to 5 %"] = _scores(model, clips, seed, known=WEIGHED)
+        if any(
+            t.name == "density" and t.low < WEIGHED[0] and WEIGHED[1] < t.high
+            for t in model.targets
+        ):
+            result["of"]["simulated by ArcSim, the flag weighed to 5 %"] = _scores(
+                model, clips, seed, known=WEIGHED
+            )
     else:
         result |= ABSENT
     return result
@@ -81,7 +95,9 @@ def unseen(flags: int, seed: int) -> DatasetRecipe:
 def finer_mesh(recipe: DatasetRecipe) -> DatasetRecipe:
     """925 vertices a flag."""
     simulation = recipe.simulation
-    return replace(recipe, simulation=replace(simulation, scene=replace(simulation.scene, columns=36)))
+    return replace(
+        recipe, simulation=replace(simulation, scene=replace(simulation.scene, columns=36))
+    )
 
 
 def implicit(recipe: DatasetRecipe) -> DatasetRecipe:
@@ -121,11 +137,14 @@ CHANGES: dict[str, Callable[[DatasetRecipe], DatasetRecipe]] = {
 }
 
 
-def filmed(recipe: DatasetRecipe, *, folder: Path | None = None) -> Iterator[tuple[UInt8Array, dict[str, Any]]]:
+def filmed(
+    recipe: DatasetRecipe, *, folder: Path | None = None
+) -> Iterator[tuple[UInt8Array, dict[str, Any]]]:
     """Frames (n, height, width) of each flag's film, and the parameters that its recording states.
 
     Args:
-        folder: where films are kept, each as soon as it is made, so that an interrupted run goes on.
+        folder: where films are kept, each as soon as it is made, so that an interrupted run goes
+            on.
     """
     (cast,) = casts(recipe)
     indices = range(cast.simulation.count)
@@ -146,12 +165,16 @@ def filmed(recipe: DatasetRecipe, *, folder: Path | None = None) -> Iterator[tup
         frames, stated = _frames(few, film, sequences[film.index])
         if path is not None:
             path.parent.mkdir(parents=True, exist_ok=True)
-            np.savez_compressed(part := path.with_suffix(".part.npz"), frames=frames, stated=json.dumps(stated))
+            np.savez_compressed(
+                part := path.with_suffix(".part.npz"), frames=frames, stated=json.dumps(stated)
+            )
             part.replace(path)
         yield frames, stated
 
 
-def _frames(recipe: DatasetRecipe, film: PlannedFilm, sequence: MeshSequence) -> tuple[UInt8Array, dict[str, Any]]:
+def _frames(
+    recipe: DatasetRecipe, film: PlannedFilm, sequence: MeshSequence
+) -> tuple[UInt8Array, dict[str, Any]]:
     done = build_jobs.film(recipe, film, sequence, "cpu")
     with tempfile.NamedTemporaryFile(suffix=".mcap") as kept:
         kept.write(done.data)
@@ -163,7 +186,9 @@ def _clip(frames: UInt8Array, stated: dict[str, Any]) -> Clip:
     return frames, stated["wind_speed"], stated["density"]
 
 
-def reference_clips(folder: Path, seed: int, frames: int, *, views: int) -> Iterator[tuple[str, Clip]]:
+def reference_clips(
+    folder: Path, seed: int, frames: int, *, views: int
+) -> Iterator[tuple[str, Clip]]:
     """Runs of the reference simulator, each seen by several cameras, with their names."""
     assets = Assets()
     drawn = DrawnView(prior=load(_BASE).prior, assets=assets)
@@ -181,7 +206,11 @@ def _sequences(folder: Path, frames: int) -> Iterator[tuple[str, float, MeshSequ
     """(name, wind speed [m/s], the last `frames` frames) of each run."""
     for name in _FIXED:
         with np.load(folder / f"{name}.npz") as stored:
-            yield name, float(name[6]), _sequence(stored["positions"][-frames:], stored["faces"], stored["rest"])
+            yield (
+                name,
+                float(name[6]),
+                _sequence(stored["positions"][-frames:], stored["faces"], stored["rest"]),
+            )
     for name, wind in _JITTERED.items():
         with np.load(folder / "jittered" / f"{name}.npz") as stored:
             positions = stored["q"][-frames:].astype(np.float32) * 1e-4
@@ -200,7 +229,11 @@ def _sequence(positions: AnyArray, faces: AnyArray, rest: AnyArray) -> MeshSeque
 
 
 def _scores(
-    model: estimator.Estimator, clips: list[Clip], seed: int, *, known: tuple[float, float] | None = None
+    model: estimator.Estimator,
+    clips: list[Clip],
+    seed: int,
+    *,
+    known: tuple[float, float] | None = None,
 ) -> dict[str, Any]:
     count = model.front_end.frames
     inputs = torch.cat([model.inputs(frames[None, :count]) for frames, _, _ in clips])
@@ -214,7 +247,9 @@ def _scores(
         column = names.index(name)
         true = np.array([clip[place] for clip in clips])
         error = found.mean[:, column] - true
-        again = error[stream(seed, "bootstrap", name).integers(len(error), size=(DRAWS, len(error)))]
+        again = error[
+            stream(seed, "bootstrap", name).integers(len(error), size=(DRAWS, len(error)))
+        ]
         scores[name] = {
             "rmse": float(np.sqrt(np.mean(error**2))),
             "rmse_interval": np.quantile(np.sqrt(np.mean(again**2, axis=1)), [0.05, 0.95]).tolist(),

@@ -1,4 +1,5 @@
-"""The verification curves: simulated points, theory over them, and the observed order of convergence.
+"""The verification curves: simulated points, theory over them, and the observed order of
+convergence.
 
 Numbered as in the specification; flutter (8) has a set of its own.
 """
@@ -83,7 +84,9 @@ def verify(seed: int) -> dict[str, Any]:
         },
         "hung_strip": {
             "length": strips[0][1],
-            **_converging([1 / n for n in rows], [abs(length - expected) for length, expected in strips]),
+            **_converging(
+                [1 / n for n in rows], [abs(length - expected) for length, expected in strips]
+            ),
         },
         "elastica": _elastica(),
         "pendulum": _pendulum(),
@@ -93,9 +96,12 @@ def verify(seed: int) -> dict[str, Any]:
             **_converging([0.3 / n for n in counts], [float(abs(f[2] - f[4])) for f in falls]),
         },
         "step": _converging(
-            [FRAME / n for n in (80, 160, 320, 640)], step_errors((80, 160, 320, 640), finest=5120).tolist()
+            [FRAME / n for n in (80, 160, 320, 640)],
+            step_errors((80, 160, 320, 640), finest=5120).tolist(),
         ),
-        "mesh_early": _converging([1.5 / n for n in _NESTED[:-1]], mesh_differences(_NESTED).tolist()),
+        "mesh_early": _converging(
+            [1.5 / n for n in _NESTED[:-1]], mesh_differences(_NESTED).tolist()
+        ),
         "mesh": _mesh(seed),
         "statistics_step": _statistics_step(seed),
     }
@@ -107,7 +113,9 @@ def _elastica() -> dict[str, Any]:
     middle, columns = 2, (6, 12, 24)
     errors = []
     for n in columns:
-        found = drooped_tips(_TABLES[middle : middle + 1], columns=n, length=_STRIP, area_weight=_DENSITY)[0]
+        found = drooped_tips(
+            _TABLES[middle : middle + 1], columns=n, length=_STRIP, area_weight=_DENSITY
+        )[0]
         errors.append(float(np.linalg.norm(found - exact[middle])) / _STRIP)
     return {
         "load": [_DENSITY * G * _STRIP**3 / (k / 5) for k in _TABLES],
@@ -129,20 +137,26 @@ def _pendulum() -> dict[str, Any]:
         "exact": [exact / (2 * math.pi) for _, exact in found[rows[-1]]],
         "rows": list(rows),
         "error": {str(n): errors[n] for n in rows},
-        "rates": [rates([1 / n for n in rows], [errors[n][i] for n in rows]) for i in range(len(modes))],
+        "rates": [
+            rates([1 / n for n in rows], [errors[n][i] for n in rows]) for i in range(len(modes))
+        ],
     }
 
 
 def _summary(runs: FloatArray) -> dict[str, list[float]]:
-    """Droop, downwind distance, speed and frequency of the free edge, powers of the tip: means and standard errors."""
+    """Droop, downwind distance, speed and frequency of the free edge, powers of the tip: means and
+    standard errors."""
     error = runs.std(0, ddof=1) / math.sqrt(len(runs))
     mean = runs.mean(0)
     mean[0] *= -1
     return {"mean": mean.tolist(), "error": error.tolist()}
 
 
-def observed_order(sizes: FloatArray, values: FloatArray, errors: FloatArray) -> tuple[float, float, float, float]:
-    """Weighted least squares of v = v0 + c sᵖ: p with its 68 % range (χ² within 1 of its least), and v0.
+def observed_order(
+    sizes: FloatArray, values: FloatArray, errors: FloatArray
+) -> tuple[float, float, float, float]:
+    """Weighted least squares of v = v0 + c sᵖ: p with its 68 % range (χ² within 1 of its least),
+    and v0.
 
     The range ends at the ends of what is tried where the values give no bound.
     """
@@ -158,7 +172,9 @@ def observed_order(sizes: FloatArray, values: FloatArray, errors: FloatArray) ->
 
 
 def _mesh(seed: int) -> dict[str, Any]:
-    each = [edge_statistics(n, seed=seed + n, wind=4.0, members=_MEMBERS, share=1.0) for n in _CELLS]
+    each = [
+        edge_statistics(n, seed=seed + n, wind=4.0, members=_MEMBERS, share=1.0) for n in _CELLS
+    ]
     cells = np.array([1.5 / n for n in _CELLS])
     statistics = [_summary(runs) for runs in each]
     mean, error = (np.array([s[key] for s in statistics]) for key in ("mean", "error"))
@@ -171,7 +187,10 @@ def _mesh(seed: int) -> dict[str, Any]:
 
 def _statistics_step(seed: int) -> dict[str, Any]:
     shares = (1.0, 0.5, 0.25)
-    each = [edge_statistics(15, seed=seed + i, wind=4.0, members=_MEMBERS, share=s) for i, s in enumerate(shares)]
+    each = [
+        edge_statistics(15, seed=seed + i, wind=4.0, members=_MEMBERS, share=s)
+        for i, s in enumerate(shares)
+    ]
     statistics = [_summary(runs) for runs in each]
     mean, error = (np.array([s[key] for s in statistics]) for key in ("mean", "error"))
     centre = (mean / error**2).sum(0) / (1 / error**2).sum(0)
@@ -179,15 +198,16 @@ def _statistics_step(seed: int) -> dict[str, Any]:
         "share": list(shares),
         "statistics": statistics,
         "quantities": [*_STATISTICS, *_BANDS],
-        # Of the three values about their mean: 2 is expected where the step changes nothing, 6 is exceeded by chance
-        # in one of twenty.
+        # Of the three values about their mean: 2 is expected where the step changes nothing, 6 is
+        # exceeded by chance in one of twenty.
         "chi_squared": (((mean - centre) / error) ** 2).sum(0).tolist(),
     }
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Order:
-    """How a convergence is drawn: its place, theory's order, labels, and the scale of the sizes shown."""
+    """How a convergence is drawn: its place, theory's order, labels, and the scale of the sizes
+    shown."""
 
     place: tuple[int, int]
     order: int
@@ -252,7 +272,9 @@ def _draw_order(axes: Axes, how: _Order, result: dict[str, Any]) -> None:
     line = 1.6 * error[-1] * (size / size[-1]) ** how.order
     axes.loglog(size, error, "o-", color=MEASURED, ms=4, lw=1)
     axes.loglog(size, line, "--", color=THEORY, lw=1)
-    axes.text(size[0], line[0], f"order {how.order} ", color=THEORY, fontsize=8, ha="right", va="bottom")
+    axes.text(
+        size[0], line[0], f"order {how.order} ", color=THEORY, fontsize=8, ha="right", va="bottom"
+    )
     observed = ", ".join(f"{rate:.2f}" for rate in result["rates"])
     axes.set(xlabel=how.xlabel, ylabel=how.ylabel)
     axes.set_title(f"{how.title}\nobserved orders {observed}", fontsize=9)
@@ -276,13 +298,18 @@ def draw_verification(result: dict[str, Any], path: Path) -> None:
     _draw_pendulum(panels[1, 2], panels[1, 3], result["pendulum"])
     for offset, names in enumerate((_STATISTICS[:2], _STATISTICS[2:], _BANDS)):
         _draw_statistics(panels[2, 1 + offset], result["mesh"], names)
-    panels[2, 3].set(ylabel="upper corner across the wind,\nmean square [m²]", yscale="log", ylim=(5e-4, 0.3))
+    panels[2, 3].set(
+        ylabel="upper corner across the wind,\nmean square [m²]", yscale="log", ylim=(5e-4, 0.3)
+    )
     _draw_steps(panels[2, 4], result["statistics_step"])
     figure.savefig(path, dpi=90)
 
 
 def _draw_energy(axes: Axes, result: dict[str, Any]) -> None:
-    for key, index, colour in (("drift_largest_step", 0, MEASURED), ("drift_smallest_step", -1, THEORY)):
+    for key, index, colour in (
+        ("drift_largest_step", 0, MEASURED),
+        ("drift_smallest_step", -1, THEORY),
+    ):
         drift = 1e3 * np.array(result[key])
         label = f"step {result['size'][index]:g} of the limit"
         axes.plot(0.01 * np.arange(1, len(drift) + 1), drift, color=colour, lw=0.9, label=label)
@@ -296,7 +323,13 @@ def _draw_fall(axes: Axes, result: dict[str, Any]) -> None:
     axes.plot(time, exact, color=THEORY, lw=1.2, label=r"$v_t\,\tanh(g t/v_t)$")
     axes.plot(time, speed, "o", color=MEASURED, ms=3.5, mfc="none", label="simulated")
     axes.axhline(result["terminal"], color=MARK, lw=0.8, ls=":")
-    axes.text(0.0, result["terminal"], f"$v_t$ = √(ρₛ g/ρ) = {result['terminal']:.3f} m/s", fontsize=8, va="bottom")
+    axes.text(
+        0.0,
+        result["terminal"],
+        f"$v_t$ = √(ρₛ g/ρ) = {result['terminal']:.3f} m/s",
+        fontsize=8,
+        va="bottom",
+    )
     axes.set(xlabel="time [s]", ylabel="downward speed [m/s]", ylim=(0, 1.15 * result["terminal"]))
     axes.set_title("5  falling sheet:\n0.15 kg/m², ρ = 1.2 kg/m³", fontsize=9)
     axes.legend(frameon=False, fontsize=8, loc="lower right")
@@ -306,11 +339,24 @@ def _draw_elastica(axes: Axes, result: dict[str, Any]) -> None:
     loads = np.geomspace(0.9 * min(result["load"]), 1.1 * max(result["load"]), 60)
     exact = np.array([elastica_tip(1.0, load, 1.0) for load in loads])
     for column, (label, style) in enumerate((("out", "o"), ("down", "s"))):
-        axes.semilogx(loads, exact[:, column], color=THEORY, lw=1.2, label="elastica" if not column else None)
+        axes.semilogx(
+            loads, exact[:, column], color=THEORY, lw=1.2, label="elastica" if not column else None
+        )
         tips = np.array(result["tips"])[:, column]
-        axes.semilogx(result["load"], tips, style, color=MEASURED, mfc="none", ms=5, label=f"simulated, {label}")
+        axes.semilogx(
+            result["load"],
+            tips,
+            style,
+            color=MEASURED,
+            mfc="none",
+            ms=5,
+            label=f"simulated, {label}",
+        )
     axes.set(xlabel="load ρₛ g L³/B", ylabel="tip of the strip / length", ylim=(0, 1.55))
-    axes.set_title(f"3  heavy elastica, 24 cells:\nwithin {100 * result['largest_error']:.2f} % of L", fontsize=9)
+    axes.set_title(
+        f"3  heavy elastica, 24 cells:\nwithin {100 * result['largest_error']:.2f} % of L",
+        fontsize=9,
+    )
     axes.legend(frameon=False, fontsize=8, loc="upper left")
 
 
@@ -319,7 +365,13 @@ def _draw_pendulum(axes: Axes, errors: Axes, result: dict[str, Any]) -> None:
     exact = np.array([jn_zeros(0, int(n))[-1] for n in modes]) / (4 * math.pi) * math.sqrt(G)
     axes.plot(modes, exact, "_", color=THEORY, ms=18, mew=1.4, label="(j₀ₙ/4π) √(g/L)")
     axes.plot(
-        modes, result["frequency"], "o", color=MEASURED, mfc="none", ms=6, label=f"simulated, {result['rows'][-1]} rows"
+        modes,
+        result["frequency"],
+        "o",
+        color=MEASURED,
+        mfc="none",
+        ms=6,
+        label=f"simulated, {result['rows'][-1]} rows",
     )
     axes.set(xlabel="mode", ylabel="frequency [Hz], L = 1 m", xticks=modes, ylim=(0, None))
     axes.set_title("4  hanging sheet's\npendulum modes", fontsize=9)
@@ -327,14 +379,34 @@ def _draw_pendulum(axes: Axes, errors: Axes, result: dict[str, Any]) -> None:
     size = 1 / np.array(result["rows"])
     table = np.array([result["error"][str(n)] for n in result["rows"]])
     for index, mode in enumerate(modes):
-        errors.loglog(size, table[:, index], "o-", ms=4, lw=1, color=MEASURED, alpha=1 - 0.2 * index)
+        errors.loglog(
+            size, table[:, index], "o-", ms=4, lw=1, color=MEASURED, alpha=1 - 0.2 * index
+        )
         errors.text(size[0] * 1.05, table[0, index], f"n = {mode}", fontsize=7, va="center")
     errors.loglog(size, 0.4 * table[-1, 0] * (size / size[-1]) ** 2, "--", color=THEORY, lw=1)
-    errors.text(size[1], 0.4 * table[-1, 0] * (size[1] / size[-1]) ** 2, "order 2", color=THEORY, fontsize=8, va="top")
+    errors.text(
+        size[1],
+        0.4 * table[-1, 0] * (size[1] / size[-1]) ** 2,
+        "order 2",
+        color=THEORY,
+        fontsize=8,
+        va="top",
+    )
     last = ", ".join(f"{mode[-1]:.2f}" for mode in result["rates"])
     errors.axhline(result["slowing"], color=MARK, lw=0.8, ls=":")
-    errors.text(size[-2], result["slowing"], "slowing by its static stretch", fontsize=7, va="top", color=MARK)
-    errors.set(xlabel="cell / length", ylabel="frequency error, relative", xlim=(size[-1] / 1.2, size[0] * 1.5))
+    errors.text(
+        size[-2],
+        result["slowing"],
+        "slowing by its static stretch",
+        fontsize=7,
+        va="top",
+        color=MARK,
+    )
+    errors.set(
+        xlabel="cell / length",
+        ylabel="frequency error, relative",
+        xlim=(size[-1] / 1.2, size[0] * 1.5),
+    )
     errors.set_title(f"4  pendulum modes\nlast orders {last}", fontsize=9)
     _mark_sizes(errors, size)
 
@@ -345,11 +417,17 @@ def _draw_statistics(axes: Axes, result: dict[str, Any], names: tuple[str, ...])
     colours = (MEASURED, THEORY, "#6a8f3c", MARK)
     for name, colour in zip(names, colours, strict=False):
         column = (_STATISTICS + _BANDS).index(name)
-        mean, error = (np.array([s[key][column] for s in result["statistics"]]) for key in ("mean", "error"))
+        mean, error = (
+            np.array([s[key][column] for s in result["statistics"]]) for key in ("mean", "error")
+        )
         label = f"{name}: {_order_text(result['orders'][name])}"
-        axes.errorbar(x, mean, yerr=error, fmt="o-", color=colour, lw=1, ms=4, capsize=3, label=label)
+        axes.errorbar(
+            x, mean, yerr=error, fmt="o-", color=colour, lw=1, ms=4, capsize=3, label=label
+        )
     axes.set(xlabel="cell [mm]", xlim=(0, 1.1 * max(x)), ylim=(0, None))
-    axes.set_title(f"7  settled, 4 m/s: {_MEMBERS} runs of 7 s,\n± standard error; order (68 %)", fontsize=9)
+    axes.set_title(
+        f"7  settled, 4 m/s: {_MEMBERS} runs of 7 s,\n± standard error; order (68 %)", fontsize=9
+    )
     axes.legend(frameon=False, fontsize=7, loc="upper left" if len(names) > 2 else "center left")
 
 
@@ -367,12 +445,16 @@ def _draw_steps(axes: Axes, result: dict[str, Any]) -> None:
     mean, error = (np.array([s[key] for s in result["statistics"]]) for key in ("mean", "error"))
     centre = (mean / error**2).sum(0) / (1 / error**2).sum(0)
     places = np.arange(len(result["quantities"]))
-    for share, values, colour in zip(result["share"], (mean - centre) / error, (MEASURED, THEORY, MARK), strict=True):
+    for share, values, colour in zip(
+        result["share"], (mean - centre) / error, (MEASURED, THEORY, MARK), strict=True
+    ):
         axes.plot(values, places, "o", color=colour, mfc="none", ms=5, label=f"{share:g} × default")
     axes.axvline(0, color=MARK, lw=0.6)
     axes.set_yticks(places, [name.partition(" [")[0] for name in result["quantities"]], fontsize=7)
     axes.invert_yaxis()
     axes.set(xlabel="from the mean of the three\n[standard errors]", xlim=(-3, 7))
     worst = max(result["chi_squared"])
-    axes.set_title(f"7  against the step, cell 100 mm:\nχ² at most {worst:.1f}, 2 expected", fontsize=9)
+    axes.set_title(
+        f"7  against the step, cell 100 mm:\nχ² at most {worst:.1f}, 2 expected", fontsize=9
+    )
     axes.legend(frameon=False, fontsize=7, loc="center right", handletextpad=0.0)

@@ -1,31 +1,35 @@
-"""The cloth weighed: twenty flags of other numerics and of MuJoCo, as geometry and, some of them, filmed.
+"""The cloth weighed: twenty flags of other numerics and of MuJoCo, as geometry and, some of them,
+filmed.
 
-**Registered** before any truth was simulated (seed, list and aims are this file's), and anew, still before any was,
-when recordings came to be weighed by one covariance: half of the truths are MuJoCo's now, and films last the two
-minutes that were asked for.
+**Registered** before any truth was simulated (seed, list and aims are this file's), and anew, still
+before any was, when recordings came to be weighed by one covariance: half of the truths are
+MuJoCo's now, and films last the two minutes that were asked for.
 
-*Truths.* One wind of von Kármán's spectrum blows for two minutes along one log of a cup (1 Hz, lag, noise, steps of 0.1
-m/s), so that one set of simulations serves all truths. Each truth has its own gain of the log, its own place, size
-error, bending, stretching and damping. Ten are of the kernel: fabrics of the catalog on a finer mesh with other
-diagonals (16 × 11), damped by 0.25 to 20 ms, by leapfrog below 1 ms and by backward Euler of 0.5 ms above. Ten are of
-MuJoCo, whose flags cost half a second of a core a second: isotropic cloth of constant stiffness on 12 × 8, damped by
-0.25 to 0.6 ms.
+*Truths.* One wind of von Kármán's spectrum blows for two minutes along one log of a cup (1 Hz, lag,
+noise, steps of 0.1 m/s), so that one set of simulations serves all truths. Each truth has its own
+gain of the log, its own place, size error, bending, stretching and damping. Ten are of the kernel:
+fabrics of the catalog on a finer mesh with other diagonals (16 × 11), damped by 0.25 to 20 ms, by
+leapfrog below 1 ms and by backward Euler of 0.5 ms above. Ten are of MuJoCo, whose flags cost half
+a second of a core a second: isotropic cloth of constant stiffness on 12 × 8, damped by 0.25 to 0.6
+ms.
 
-*Procedure*, that of `flagdata calibrate` at its commit: 128 simulations of the design below, of fabrics drawn evenly;
-of each observable its mean and its slope with the wind, those that a linear regression on cloth, place and gain
-predicts to 0.8 of their spread; the predictive covariance of their residuals, S/(n − p − k − 1), with what meshes add
-(`measure.cloth.numerics`) and, of films, the sigma of pixels; a multivariate t of 10 degrees of freedom; the
-posterior by an ensemble of walkers; withheld below a tail probability of 0.01. What is stated is the azimuth (± 7°),
-the elevation (± 5°) and the distance (8 m, where it is 7 to 9 m). All are weighed as geometry seen from their place;
-those of `FILMED` are filmed by the raster renderer as well, before sky, hills, foliage or buildings, and weighed from
-the coded film (`weighed_films`).
+*Procedure*, that of `flagdata calibrate` at its commit: 128 simulations of the design below, of
+fabrics drawn evenly; of each observable its mean and its slope with the wind, those that a linear
+regression on cloth, place and gain predicts to 0.8 of their spread; the predictive covariance of
+their residuals, S/(n − p − k − 1), with what meshes add (`measure.cloth.numerics`) and, of films,
+the sigma of pixels; a multivariate t of 10 degrees of freedom; the posterior by an ensemble of
+walkers; withheld below a tail probability of 0.01. What is stated is the azimuth (± 7°), the
+elevation (± 5°) and the distance (8 m, where it is 7 to 9 m). All are weighed as geometry seen from
+their place; those of `FILMED` are filmed by the raster renderer as well, before sky, hills, foliage
+or buildings, and weighed from the coded film (`weighed_films`).
 
-Aims: median error of the area weight of films 20 %, 8 of 10 in their intervals of 90 %. A flag whose weight is
-withheld or bounded has no error; it counts as a weight that is not given, and their number is reported beside. The
-first twenty truths (seed 20261130) were weighed before intervals became bounds; these are twenty others.
+Aims: median error of the area weight of films 20 %, 8 of 10 in their intervals of 90 %. A flag
+whose weight is withheld or bounded has no error; it counts as a weight that is not given, and their
+number is reported beside. The first twenty truths (seed 20261130) were weighed before intervals
+became bounds; these are twenty others.
 
-`python -m tests.studies weighed`; the simulations are kept in FLAGDATA_WEIGHED, by default a new folder, and a run
-that was stopped goes on.
+`python -m tests.studies weighed`; the simulations are kept in FLAGDATA_WEIGHED, by default a new
+folder, and a run that was stopped goes on.
 """
 
 from __future__ import annotations
@@ -94,7 +98,8 @@ _ELEVATION = Normal(mean=math.radians(12.0), sigma=math.radians(5.0))
 _COLUMNS, _ROWS = 16, 11
 _EXPLICIT, _STEP = 1e-3, 0.5e-3  # s
 _GENTLEST = 2.4
-"""Of damping of MuJoCo's flags over 0.25 ms: up to it its explicit steps of half a millisecond are stable."""
+"""Of damping of MuJoCo's flags over 0.25 ms: up to it its explicit steps of half a millisecond are
+stable."""
 _COARSE = (12, 8)
 """Columns and rows of MuJoCo's flags, of which a second takes a second of a core."""
 _WIND_RATE = 10.0  # Hz
@@ -108,7 +113,9 @@ def wind() -> tuple[FloatArray, FloatArray]:
     columns = []
     for ratio, length in ((1.0, _LENGTH), (0.78, _LENGTH / 2), (0.52, _LENGTH / 2)):
         spectrum = VonKarman(mean=_MEAN, intensity=_INTENSITY * ratio, length=length)
-        columns.append(spectrum.series(rng, duration=count / _WIND_RATE, rate=_WIND_RATE)[:count] - _MEAN)
+        columns.append(
+            spectrum.series(rng, duration=count / _WIND_RATE, rate=_WIND_RATE)[:count] - _MEAN
+        )
     velocity = np.stack(columns, axis=1)
     velocity[:, 0] += _MEAN
     return np.arange(count) / _WIND_RATE - _BEFORE, velocity
@@ -119,7 +126,11 @@ def log() -> Log:
     times, velocity = wind()
     rng = stream(SEED, "weighed", "cup")
     speed = torch.from_numpy(np.hypot(velocity[:, 0], velocity[:, 1])[:, None])
-    lagged = AnemometerLag(distance=float(rng.uniform(1.5, 5.0))).read(torch.from_numpy(times), speed).numpy()[:, 0]
+    lagged = (
+        AnemometerLag(distance=float(rng.uniform(1.5, 5.0)))
+        .read(torch.from_numpy(times), speed)
+        .numpy()[:, 0]
+    )
     at = np.arange(-60.0, DURATION + 1.0)
     read = np.interp(at, times, lagged) + 0.05 * rng.standard_normal(len(at))
     return Log(times=at, speed=np.round(read, 1))
@@ -172,18 +183,32 @@ def truths() -> list[Mapping[str, Any]]:
 def mesh(code: str) -> Mesh:
     """Of the truths of a code."""
     columns, rows = _COARSE if code == "mujoco" else (_COLUMNS, _ROWS)
-    return grid(width=FLAG.length, height=FLAG.height, columns=columns, rows=rows, diagonals=list(Diagonals)[1])
+    return grid(
+        width=FLAG.length,
+        height=FLAG.height,
+        columns=columns,
+        rows=rows,
+        diagonals=list(Diagonals)[1],
+    )
 
 
 def by_kernel(*, explicit: bool) -> dict[int, FloatArray]:
-    """Number → (frame, vertex, 3) at `FILM_RATE` from the film's first frame on [m], of the kernel's truths below 1 ms
-    of damping or of the others, simulated together."""
+    """Number → (frame, vertex, 3) at `FILM_RATE` from the film's first frame on [m], of the
+    kernel's truths below 1 ms of damping or of the others, simulated together."""
     own = mesh("kernel")
-    some = [one for one in truths() if one["code"] == "kernel" and (one["damping"] < _EXPLICIT) == explicit]
-    system, state = assemble([_scene(own, truth, damped=0.0 if explicit else _STEP) for truth in some])
+    some = [
+        one
+        for one in truths()
+        if one["code"] == "kernel" and (one["damping"] < _EXPLICIT) == explicit
+    ]
+    system, state = assemble(
+        [_scene(own, truth, damped=0.0 if explicit else _STEP) for truth in some]
+    )
     times, velocity = wind()
     blowing = velocity[times >= -_SETTLE - 1e-9]
-    samples = torch.as_tensor(np.stack([blowing * truth["gain"] for truth in some], axis=-1), dtype=torch.float32)
+    samples = torch.as_tensor(
+        np.stack([blowing * truth["gain"] for truth in some], axis=-1), dtype=torch.float32
+    )
     even = Even(start=0.0, period=1 / _WIND_RATE, count=len(samples))
     system = replace(system, wind=SampledWind(times=even, samples=samples, beyond=Beyond.HOLD))
     integrator = Symplectic() if explicit else BackwardEuler(step=_STEP, tolerance=1e-3)
@@ -193,7 +218,8 @@ def by_kernel(*, explicit: bool) -> dict[int, FloatArray]:
 
 
 def by_mujoco(truth: Mapping[str, Any]) -> FloatArray:
-    """(frame, vertex, 3) of one of MuJoCo's: bending and stretching are the nominal ones by its factors."""
+    """(frame, vertex, 3) of one of MuJoCo's: bending and stretching are the nominal ones by its
+    factors."""
     own = mesh("mujoco")
     sheet = Sheet(
         mesh=own,
@@ -275,7 +301,9 @@ def folder() -> Path:
 
 def simulations(at: Path) -> FloatArray:
     """(simulation, window, observable) of the design."""
-    return simulated_values(design(), folder=at / "batches", workers=int(os.environ.get("FLAGDATA_WORKERS", "1")))
+    return simulated_values(
+        design(), folder=at / "batches", workers=int(os.environ.get("FLAGDATA_WORKERS", "1"))
+    )
 
 
 def positions(truth: Mapping[str, Any], at: Path) -> FloatArray:
@@ -291,22 +319,28 @@ def positions(truth: Mapping[str, Any], at: Path) -> FloatArray:
 
 def geometry(truth: Mapping[str, Any], at: Path) -> FloatArray:
     """(window, observable) of a truth from its place, kept."""
-    return kept(at / f"geometry-{truth['number']}.npy", lambda: readings(positions(truth, at), truth))
+    return kept(
+        at / f"geometry-{truth['number']}.npy", lambda: readings(positions(truth, at), truth)
+    )
 
 
 def film(truth: Mapping[str, Any], at: Path) -> FloatArray:
     """The same of its film."""
     own = mesh(truth["code"])
-    return kept(at / f"film-{truth['number']}.npy", lambda: filmed(truth, positions(truth, at), own, at))
+    return kept(
+        at / f"film-{truth['number']}.npy", lambda: filmed(truth, positions(truth, at), own, at)
+    )
 
 
 def finer(design: Design) -> tuple[FloatArray, IntArray]:
-    """(flag, window, observable) of flags of the fourth to the last batch on a finer mesh, and their
-    places in the design's order. Those before have shorter steps."""
+    """(flag, window, observable) of flags of the fourth to the last batch on a finer mesh, and
+    their places in the design's order. Those before have shorter steps."""
     places = np.arange(4 * BATCH, design.count, 4)[:BATCH]
     values, (first, *_) = design.values(), design.batches()
     shared = {name: values[name][places] for name in first.values}
-    seen = np.stack([values["azimuth"], values["elevation"], np.full(design.count, design.distance)], axis=1)[places]
+    seen = np.stack(
+        [values["azimuth"], values["elevation"], np.full(design.count, design.distance)], axis=1
+    )[places]
     seeds = tuple(seed for batch in design.batches() for seed in batch.seeds)
     batch = replace(
         first,
@@ -322,7 +356,12 @@ def options() -> CalibrationOptions:
     """What is stated."""
     own = design()
     return CalibrationOptions(
-        flag=FLAG, azimuth=own.azimuth, elevation=own.elevation, distance=DISTANCE, simulations=own.count, seed=SEED
+        flag=FLAG,
+        azimuth=own.azimuth,
+        elevation=own.elevation,
+        distance=DISTANCE,
+        simulations=own.count,
+        seed=SEED,
     )
 
 
@@ -370,14 +409,23 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     rows, films = [], []
     for truth in truths():
         name = f"truth-{truth['number']}"
-        rows.append(weigh(name, geometry(truth, at), base, sigma=np.zeros(len(OBSERVED)), truth=truth, of=of))
+        rows.append(
+            weigh(
+                name, geometry(truth, at), base, sigma=np.zeros(len(OBSERVED)), truth=truth, of=of
+            )
+        )
         if truth["number"] in FILMED:
-            films.append(weigh(f"{name}, filmed", film(truth, at), base, sigma=SIGMA, truth=truth, of=of))
+            films.append(
+                weigh(f"{name}, filmed", film(truth, at), base, sigma=SIGMA, truth=truth, of=of)
+            )
     fine, places = finer(design())
     blank = Observed(name="", source="", readings=fine[0], log=design().log)
     change = blank.projection.of(fine) - blank.projection.of(base[places])
     sheet = {
-        "mesh": {"bias": change.mean(axis=0).tolist(), "sigma": change.std(axis=0, ddof=1).tolist()},
+        "mesh": {
+            "bias": change.mean(axis=0).tolist(),
+            "sigma": change.std(axis=0, ddof=1).tolist(),
+        },
         "geometry": {**score(rows), "flags": rows},
         "films": {**score(films), "flags": films},
         "left_out": rows[0]["check"],
@@ -389,7 +437,8 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
 
 
 def score(rows: Sequence[Row]) -> dict[str, Any]:
-    """Median error of the weights that are given, how many are in their intervals, and how many bounds are true."""
+    """Median error of the weights that are given, how many are in their intervals, and how many
+    bounds are true."""
     given = [row for row in rows if row["value"] is not None]
     bounds = [row for row in rows if row["bounded"]]
     errors = [abs(row["value"] / row["truth"] - 1) for row in given]
@@ -412,25 +461,48 @@ def _contained(row: Row) -> bool:
 def page(sheet: Mapping[str, Any]) -> str:
     """The sheet in Markdown."""
     lines = ["# Simulated flags weighed", "", f"{sheet['seconds']:g} s each.", ""]
-    lines += ["| seen as | flags | nothing | weights | median error | in the 90 % interval | bounds | true |"]
+    lines += [
+        "| seen as | flags | nothing | weights | median error | in the 90 % interval | bounds | "
+        "true |"
+    ]
     lines += ["|---|---|---|---|---|---|---|---|"]
     for name in ("geometry", "films"):
         own = sheet[name]
         error = "" if own["median_error"] is None else f"{own['median_error']:.1%}"
         given = len(own["flags"]) - own["withheld"] - own["bounds"]
         lines.append(
-            f"| {name} | {len(own['flags'])} | {own['withheld']} | {given} | {error} | {own['held']} | "
+            f"| {name} | {len(own['flags'])} | {own['withheld']} | {given} | {error} | "
+            f"{own['held']} | "
             f"{own['bounds']} | {own['bounds_held']} |"
         )
-    check, heading = sheet["left_out"], "| flag | code | damping [ms] | weight [kg/m²] | found | interval | p |"
-    left_out = f"Of {check['count']} simulations left out {check['held']} lie in their intervals, median error "
-    lines += ["", f"{left_out}{check['median_error']:.1%}.", "", heading, "|---|---|---|---|---|---|---|"]
+    check, heading = (
+        sheet["left_out"],
+        "| flag | code | damping [ms] | weight [kg/m²] | found | interval | p |",
+    )
+    left_out = (
+        f"Of {check['count']} simulations left out {check['held']} lie in their intervals, median "
+        "error "
+    )
+    lines += [
+        "",
+        f"{left_out}{check['median_error']:.1%}.",
+        "",
+        heading,
+        "|---|---|---|---|---|---|---|",
+    ]
     for row in (*sheet["geometry"]["flags"], *sheet["films"]["flags"]):
-        found = "a bound" if row["bounded"] else "nothing" if row["value"] is None else f"{row['value']:.3f}"
+        found = (
+            "a bound"
+            if row["bounded"]
+            else "nothing"
+            if row["value"] is None
+            else f"{row['value']:.3f}"
+        )
         low, high = ("" if row[end] is None else f"{row[end]:.3f}" for end in ("low", "high"))
         misfit = "" if row["misfit"] is None else f"{row['misfit']:.2g}"
         lines.append(
-            f"| {row['name']} | {row['code']} | {row['damping'] * 1e3:.2f} | {row['truth']:.3f} | {found} | "
+            f"| {row['name']} | {row['code']} | {row['damping'] * 1e3:.2f} | {row['truth']:.3f} | "
+            f"{found} | "
             f"{low} to {high} | {misfit} |"
         )
     return "\n".join(lines) + "\n"

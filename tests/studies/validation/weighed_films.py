@@ -1,4 +1,5 @@
-"""Films of the flags of `weighed`, by the raster renderer, coded as H.264 and read as any film is."""
+"""Films of the flags of `weighed`, by the raster renderer, coded as H.264 and read as any film
+is."""
 
 from __future__ import annotations
 
@@ -39,13 +40,19 @@ def filmed(truth: Mapping[str, Any], positions: FloatArray, mesh: Mesh, at: Path
     """
     path = at / f"film-{truth['number']}.mp4"
     if not path.exists():
-        write(path, pictures(truth, positions[: round(SECONDS * RATE) + 1], mesh), seed=truth["seed"])
-    (subject,) = subjects(str(path), query=None, lake=None, at=None, reading=FilmReading(aspect=_SIZE.aspect))
+        write(
+            path, pictures(truth, positions[: round(SECONDS * RATE) + 1], mesh), seed=truth["seed"]
+        )
+    (subject,) = subjects(
+        str(path), query=None, lake=None, at=None, reading=FilmReading(aspect=_SIZE.aspect)
+    )
     seen = watch_film(subject.film, _SIZE, last=SECONDS)
     nothing = [math.nan] * len(OBSERVED)
     return np.array(
         [
-            nothing if window is None else [OBSERVABLES[name].of_film(window).value for name in OBSERVED]
+            nothing
+            if window is None
+            else [OBSERVABLES[name].of_film(window).value for name in OBSERVED]
             for window in seen.windows
         ]
     )
@@ -54,7 +61,9 @@ def filmed(truth: Mapping[str, Any], positions: FloatArray, mesh: Mesh, at: Path
 def pictures(truth: Mapping[str, Any], positions: FloatArray, mesh: Mesh) -> UInt8Array:
     """(frame, height, width, 3) of a look that is drawn, from the truth's place."""
     assets = Assets()
-    zeta = placed(render_prior.named_prior("flags").draw(truth["seed"], assets), truth, positions, mesh)
+    zeta = placed(
+        render_prior.named_prior("flags").draw(truth["seed"], assets), truth, positions, mesh
+    )
     count, vertices = positions.shape[:2]
     faces = torch.tensor(mesh.faces, dtype=torch.int64)
     size = mesh.rest.max(axis=0)
@@ -72,8 +81,11 @@ def pictures(truth: Mapping[str, Any], positions: FloatArray, mesh: Mesh) -> UIn
         return Raster(assets=assets).render(meshes, zeta).numpy()
 
 
-def placed(drawn: RenderParameters, truth: Mapping[str, Any], positions: FloatArray, mesh: Mesh) -> RenderParameters:
-    """A look with the camera where the truth has it: the axis goes through the middle of the flag's box."""
+def placed(
+    drawn: RenderParameters, truth: Mapping[str, Any], positions: FloatArray, mesh: Mesh
+) -> RenderParameters:
+    """A look with the camera where the truth has it: the axis goes through the middle of the flag's
+    box."""
     box = np.stack([positions.min(axis=(0, 1)), positions.max(axis=(0, 1))]).mean(axis=0)
     below = float(positions[0, _upper(mesh), 2] - box[2])
     away, elevation = truth["distance"], truth["elevation"]
@@ -95,7 +107,9 @@ def write(path: Path, frames: UInt8Array, *, seed: int) -> None:
         track.height, track.width = frames.shape[1:3]
         track.pix_fmt, track.options = "yuv420p", {"crf": _QUALITY}
         for frame in frames:
-            noisy = np.clip(np.rint(frame + _NOISE * rng.standard_normal(frame.shape)), 0, 255).astype(np.uint8)
+            noisy = np.clip(
+                np.rint(frame + _NOISE * rng.standard_normal(frame.shape)), 0, 255
+            ).astype(np.uint8)
             for packet in track.encode(av.VideoFrame.from_ndarray(noisy, format="rgb24")):
                 container.mux(packet)
         for packet in track.encode():

@@ -1,8 +1,10 @@
-"""Winds of gusty films by window and their means, each window by itself and as one series: errors, intervals, gusts.
+"""Winds of gusty films by window and their means, each window by itself and as one series: errors,
+intervals, gusts.
 
-Films of flags in gusts (`wind_series_films`) of a seed that the constants in the model's card are not from
-(`tests.studies.series_errors`) are measured as `flagdata measure` does, their flags' sizes given, with and without the
-weight of the cloth. Each is measured twice: by the model without its constants, as before decision 080, and with them.
+Films of flags in gusts (`wind_series_films`) of a seed that the constants in the model's card are
+not from (`tests.studies.series_errors`) are measured as `flagdata measure` does, their flags' sizes
+given, with and without the weight of the cloth. Each is measured twice: by the model without its
+constants, as before decision 080, and with them.
 
 FLAGDATA_WIND_SERIES names the folder of the films, where those that are missing are made.
 """
@@ -72,7 +74,9 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     card = {key: value for key, value in own.estimator.card.items() if key != SERIES_KEY}
     ways = {"alone": replace(own, estimator=replace(own.estimator, card=card)), "series": own}
     films = made(folder, own.estimator, count=FILMS, seed=seed)
-    found: dict[tuple[str, str], list[Read]] = {(weight, way): [] for weight in WEIGHTS for way in WAYS}
+    found: dict[tuple[str, str], list[Read]] = {
+        (weight, way): [] for weight in WEIGHTS for way in WAYS
+    }
     with progress(len(films), label="wind series", unit="film") as advance:
         for number, film in enumerate(films):
             for (weight, way), reads in found.items():
@@ -106,7 +110,11 @@ def read(film: LongFilm, model: Network, *, stated: bool, seed: int) -> Read:
         area_weight=Stated.of(film.parameters["area_weight"]) if stated else None,
     )
     found = measure(
-        Frames(images=images, time=np.arange(len(images)) / model.estimator.front_end.rate, name=film.dataset),
+        Frames(
+            images=images,
+            time=np.arange(len(images)) / model.estimator.front_end.rate,
+            name=film.dataset,
+        ),
         model.estimator,
         gate=gate_beside(model, false_alarm=options.false_alarm),
         dependence=of_model(model.estimator),
@@ -133,7 +141,9 @@ def beside_truth(found: Measurement, film: LongFilm) -> Read:
         mean_error=float("nan") if mean.value is None else mean.value - float(truth.mean()),
         mean_inside=bool(mean.span.low <= truth.mean() <= mean.span.high),
         mean_width=mean.span.high - mean.span.low,
-        gusts=None if found.gusts is None else (found.gusts.intensity.value, *found.gusts.intensity.interval),
+        gusts=None
+        if found.gusts is None
+        else (found.gusts.intensity.value, *found.gusts.intensity.interval),
         intensity=film.parameters["gusts.intensity"],
     )
 
@@ -141,10 +151,13 @@ def beside_truth(found: Measurement, film: LongFilm) -> Read:
 def scores(reads: Sequence[Read]) -> dict[str, Any]:
     """Errors, coverage and widths over films, and how the gusts' intensity was read."""
     error, inside, width = (
-        np.concatenate([getattr(one, name) for one in reads]) for name in ("error", "inside", "width")
+        np.concatenate([getattr(one, name) for one in reads])
+        for name in ("error", "inside", "width")
     )
     valued, means = np.isfinite(error), np.array([one.mean_error for one in reads])
-    within = np.concatenate([one.error - one.error.mean() for one in reads if np.isfinite(one.error).all()])
+    within = np.concatenate(
+        [one.error - one.error.mean() for one in reads if np.isfinite(one.error).all()]
+    )
     gusts = [(one.gusts, one.intensity) for one in reads if one.gusts is not None]
     return {
         "refused": sum(one.refused for one in reads),
@@ -156,7 +169,9 @@ def scores(reads: Sequence[Read]) -> dict[str, Any]:
         "width": float(width[np.isfinite(width)].mean()),
         "mean_rmse": _rms(means[np.isfinite(means)]),
         "mean_covered": float(np.mean([one.mean_inside for one in reads])),
-        "mean_width": float(np.mean([one.mean_width for one in reads if np.isfinite(one.mean_width)])),
+        "mean_width": float(
+            np.mean([one.mean_width for one in reads if np.isfinite(one.mean_width)])
+        ),
         "gusts": None
         if not gusts
         else {
@@ -177,25 +192,44 @@ def page(sheet: Mapping[str, Any]) -> str:
     rows, gusts = [], []
     for name, of in sheet["results"].items():
         numbers = [f"{of[key]:.2f}" for key in ("rmse", "rmse_within_films", "width")]
-        of_means = [f"{of['mean_rmse']:.2f}", f"{of['mean_covered']:.0%}", f"{of['mean_width']:.2f}"]
-        cells = [name, *numbers[:2], f"{of['covered']:.0%}", numbers[2], *of_means, str(of["bounded"])]
+        of_means = [
+            f"{of['mean_rmse']:.2f}",
+            f"{of['mean_covered']:.0%}",
+            f"{of['mean_width']:.2f}",
+        ]
+        cells = [
+            name,
+            *numbers[:2],
+            f"{of['covered']:.0%}",
+            numbers[2],
+            *of_means,
+            str(of["bounded"]),
+        ]
         rows.append(f"| {' | '.join(cells)} |")
         if of["gusts"] is not None:
             strength = of["gusts"]
             gusts.append(
-                f"Weight {name.partition(',')[0]}, {strength['films']} films as series: the intensity of the gusts "
+                f"Weight {name.partition(',')[0]}, {strength['films']} films as series: the "
+                "intensity of the gusts "
                 f"errs by {100 * strength['rmse']:.0f} % of the wind (RMSE), its intervals are "
-                f"{100 * strength['width']:.0f} % wide and contain it in {strength['covered']:.0%} of the films."
+                f"{100 * strength['width']:.0f} % wide and contain it in {strength['covered']:.0%} "
+                "of the films."
             )
             gusts.append("")
     refused = max(of["refused"] for of in sheet["results"].values())
     low, high = sheet["aims"]["covered"]
     about = (
-        f"The model {sheet['model']!r} on {sheet['films']} simulated films of {sheet['windows']} windows in gusts, of "
-        f"seed {sheet['seed']} (`python -m tests.studies wind-series`). The constants in its card are of "
-        f"{sheet['constants']['source']}. Intervals are of 90 %. The gate refuses {refused} of the films; all count."
+        f"The model {sheet['model']!r} on {sheet['films']} simulated films of {sheet['windows']} "
+        "windows in gusts, of "
+        f"seed {sheet['seed']} (`python -m tests.studies wind-series`). The constants in its card "
+        "are of "
+        f"{sheet['constants']['source']}. Intervals are of 90 %. The gate refuses {refused} of the "
+        "films; all count."
     )
-    aims = f"RMSE of windows at most {sheet['aims']['rmse']:g} m/s, {low:.0%} to {high:.0%} of the intervals contain it"
+    aims = (
+        f"RMSE of windows at most {sheet['aims']['rmse']:g} m/s, {low:.0%} to {high:.0%} of the "
+        "intervals contain it"
+    )
     names = (
         "weight, windows",
         "RMSE [m/s]",

@@ -1,6 +1,7 @@
 """Films of flags in gusts that a wind series is calibrated and judged on, made once and kept.
 
-The cloths, lights and cameras are those of the data set `outdoor-damped`, which the default network learned from; the
+The cloths, lights and cameras are those of the data set `outdoor-damped`, which the default network
+learned from; the
 gusts are not: the network learned from steady winds alone (`tests.studies.long_films.gusty`).
 """
 
@@ -35,7 +36,13 @@ def made(folder: Path, model: Estimator, *, count: int, seed: int) -> list[LongF
         with progress(count, label=f"films of seed {seed}", unit="film") as advance:
             films = []
             for film in gusty(
-                model, dataset=DATASET, count=count, windows=WINDOWS, seed=seed, speed=SPEED, intensity=INTENSITY
+                model,
+                dataset=DATASET,
+                count=count,
+                windows=WINDOWS,
+                seed=seed,
+                speed=SPEED,
+                intensity=INTENSITY,
             ):
                 films.append(film)
                 advance(1)

@@ -1,7 +1,9 @@
-"""Linear stability of a clamped–free sheet in an axial stream, solved by itself: nothing here is the simulator's.
+"""Linear stability of a clamped–free sheet in an axial stream, solved by itself: nothing here is
+the simulator's.
 
-A strip of length L, clamped at x = 0 and free at L, with mass m and flexural rigidity B (1 + d ∂t) per width, pulled
-towards its end by a weight g and by the friction c U of the stream, and loaded by air of mass M per area in a stream U:
+A strip of length L, clamped at x = 0 and free at L, with mass m and flexural rigidity B (1 + d ∂t)
+per width, pulled towards its end by a weight g and by the friction c U of the stream, and loaded by
+air of mass M per area in a stream U:
 
     m w_tt + B (1 + d ∂t) w_xxxx − g ((L − x) w_x)_x − c U (L − x) w_xx + M (∂t + U ∂x)² w = 0
     w = w_x = 0 at x = 0,                               w_xx = w_xxx = 0 at x = L
@@ -10,8 +12,9 @@ towards its end by a weight g and by the friction c U of the stream, and loaded 
 equation of a cantilevered pipe that conveys fluid (Gregory and Païdoussis, Proc. R. Soc. A 293:512, 1966), with
 u = U L √(M/B) and β = M/(m + M); at β = 0 that of Beck's column under a follower load u² B/L².
 
-Multiplied by a test function and integrated, with w = Σ q_j ξ² P_j(2ξ − 1), ξ = x/L and Legendre's polynomials P_j (a
-Galerkin method; the conditions at the free end are natural), it is M₂ q̈ + M₁ q̇ + M₀ q = 0: a matrix eigenproblem.
+Multiplied by a test function and integrated, with w = Σ q_j ξ² P_j(2ξ − 1), ξ = x/L and Legendre's
+polynomials P_j (a Galerkin method; the conditions at the free end are natural), it is M₂ q̈ + M₁ q̇
++ M₀ q = 0: a matrix eigenproblem.
 """
 
 from __future__ import annotations
@@ -44,7 +47,8 @@ class Strip:
         damping: d, a time.
         weight: g, per area.
         friction: c, both sides together: force per area and speed.
-        lag: τ by which the Coriolis load 2 M U w_xt is late, to first order: 2 M U (w_xt − τ w_xtt).
+        lag: τ by which the Coriolis load 2 M U w_xt is late, to first order: 2 M U (w_xt − τ
+            w_xtt).
     """
 
     length: float = 1.0
@@ -67,7 +71,8 @@ class Onset:
 
 
 def pipe(*, beta: float, gravity: float = 0.0, damping: float = 0.0) -> Strip:
-    """The strip whose numbers are those of the literature on pipes: time in L² √((m + M)/B), speed u/√β.
+    """The strip whose numbers are those of the literature on pipes: time in L² √((m + M)/B), speed
+    u/√β.
 
     Args:
         beta: M/(m + M); 0 stands for so light and fast a fluid that only its thrust is left.
@@ -80,11 +85,13 @@ def pipe(*, beta: float, gravity: float = 0.0, damping: float = 0.0) -> Strip:
 
 @functools.cache
 def _integrals(terms: int) -> dict[str, FloatArray]:
-    """∫ f_i g_j dξ of the basis and its derivatives, exact by Gauss quadrature: (terms, terms) each."""
+    """∫ f_i g_j dξ of the basis and its derivatives, exact by Gauss quadrature: (terms, terms)
+    each."""
     nodes, weights = legendre.leggauss(terms + 4)
     xi, weight = (nodes + 1) / 2, weights / 2
     p, p1, p2 = (
-        2**k * legendre.legval(nodes, legendre.legder(np.eye(terms), k) if k else np.eye(terms)) for k in range(3)
+        2**k * legendre.legval(nodes, legendre.legder(np.eye(terms), k) if k else np.eye(terms))
+        for k in range(3)
     )
     f, f1, f2 = xi**2 * p, 2 * xi * p + xi**2 * p1, 2 * p + 4 * xi * p1 + xi**2 * p2
     return {
@@ -98,7 +105,8 @@ def _integrals(terms: int) -> dict[str, FloatArray]:
 
 
 def eigenvalues(strip: Strip, *, terms: int = TERMS) -> NDArray[np.complex128]:
-    """(2 terms,) rates s of w ∝ exp(s t), those with positive imaginary part first, by rising frequency."""
+    """(2 terms,) rates s of w ∝ exp(s t), those with positive imaginary part first, by rising
+    frequency."""
     part = _integrals(terms)
     length, air, speed = strip.length, strip.air_mass, strip.speed
     total = strip.mass + air
@@ -106,7 +114,9 @@ def eigenvalues(strip: Strip, *, terms: int = TERMS) -> NDArray[np.complex128]:
     thrust = air * speed**2 * part["02"]
     tension = strip.weight * part["11 (1 − ξ)"] - strip.friction * speed * part["02 (1 − ξ)"]
     zeroth = part["22"] + (thrust + length * tension) * length**2 / strip.rigidity
-    first = strip.damping / unit * part["22"] + 2 * air * speed * unit / (total * length) * part["01"]
+    first = (
+        strip.damping / unit * part["22"] + 2 * air * speed * unit / (total * length) * part["01"]
+    )
     second = part["00"] - 2 * air * speed * strip.lag / (total * length) * part["01"]
     flow = np.linalg.solve(second, np.hstack([zeroth, first]))
     matrix = np.block([[np.zeros((terms, terms)), np.eye(terms)], [-flow]])
@@ -115,13 +125,16 @@ def eigenvalues(strip: Strip, *, terms: int = TERMS) -> NDArray[np.complex128]:
 
 
 def leading(strip: Strip, *, terms: int = TERMS) -> complex:
-    """The rate that grows fastest or decays slowest; of a pair the one with positive imaginary part."""
+    """The rate that grows fastest or decays slowest; of a pair the one with positive imaginary
+    part."""
     values = eigenvalues(strip, terms=terms)
     value = complex(values[np.argmax(values.real)])
     return complex(value.real, abs(value.imag))
 
 
-def onset(strip: Strip, *, lowest: float = 0.0, highest: float, samples: int = 100, terms: int = TERMS) -> Onset:
+def onset(
+    strip: Strip, *, lowest: float = 0.0, highest: float, samples: int = 100, terms: int = TERMS
+) -> Onset:
     """The lowest speed above `lowest` at which a mode stops decaying.
 
     Raises:
@@ -135,11 +148,15 @@ def onset(strip: Strip, *, lowest: float = 0.0, highest: float, samples: int = 1
     for low, high in itertools.pairwise(speeds):
         if growth(high) > 0:
             speed = float(brentq(growth, low, high, rtol=1e-10))
-            return Onset(speed=speed, frequency=leading(replace(strip, speed=speed), terms=terms).imag)
+            return Onset(
+                speed=speed, frequency=leading(replace(strip, speed=speed), terms=terms).imag
+            )
     raise ValueError(f"no flutter up to a speed of {highest:g}")
 
 
-def pipe_onset(*, beta: float, gravity: float = 0.0, damping: float = 0.0, terms: int = TERMS) -> Onset:
+def pipe_onset(
+    *, beta: float, gravity: float = 0.0, damping: float = 0.0, terms: int = TERMS
+) -> Onset:
     """u and ω L² √((m + M)/B) at the onset."""
     strip = pipe(beta=beta, gravity=gravity, damping=damping)
     root = float(np.sqrt(strip.air_mass))

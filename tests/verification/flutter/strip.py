@@ -1,8 +1,9 @@
-"""The simulator's answer to the question of `beam`: how fast small deflections of a strip of cloth grow in a stream.
+"""The simulator's answer to the question of `beam`: how fast small deflections of a strip of cloth
+grow in a stream.
 
-The strip is in the x–z plane, one cell high or more, its stream along x. The simulator knows nothing of beams: the
-strip is a mesh of triangles and hinges like any cloth, and goes through scenes, effects and integrators as a user's
-cloth does.
+The strip is in the x–z plane, one cell high or more, its stream along x. The simulator knows
+nothing of beams: the strip is a mesh of triangles and hinges like any cloth, and goes through
+scenes, effects and integrators as a user's cloth does.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ from tests.verification.flutter.beam import Onset, Strip
 
 # In-plane stiffness [N/m]: stiff enough that nothing stretches, soft enough that steps are long.
 _STRETCHING = 10.0
-# Tip deflection at the start, in lengths: small enough that quadratic drag and large slopes do not count at the end of
-# the growth either.
+# Tip deflection at the start, in lengths: small enough that quadratic drag and large slopes do not
+# count at the end of the growth either.
 _DEFLECTION = 1e-7
 _SAMPLES = 120
 
@@ -42,10 +43,12 @@ def assembled(
     deflection: float = _DEFLECTION,
     stretching: float = _STRETCHING,
 ) -> tuple[System, State]:
-    """One member a strip, bent by `deflection` lengths and at rest, of in-plane stiffness `stretching` [N/m].
+    """One member a strip, bent by `deflection` lengths and at rest, of in-plane stiffness
+    `stretching` [N/m].
 
-    The cells beside the clamp are held, which clamps the strip at their middle; the rigidity of a grid with alternating
-    diagonals is a fifth of the table's (by hand, in the verification of the heavy elastica).
+    The cells beside the clamp are held, which clamps the strip at their middle; the rigidity of a
+    grid with alternating diagonals is a fifth of the table's (by hand, in the verification of the
+    heavy elastica).
     """
     length = members[0].length
     cell = length / (columns - 0.5)
@@ -63,7 +66,8 @@ def assembled(
             damping=strip.damping,
         )
         free = np.clip(x, 0, None)
-        # Stretched by the friction, so that it does not bounce; the bend has no curvature at the free end.
+        # Stretched by the friction, so that it does not bounce; the bend has no curvature at the
+        # free end.
         along = x + strip.friction * strip.speed * (length * free - free**2 / 2) / stretching
         share = np.clip((x - cell / 2) / (length - cell / 2), 0, None)  # the clamp stays flat
         across = deflection * length * share**2 * (6 - 4 * share + share**2) / 3
@@ -100,7 +104,9 @@ def deflections(
     stretching: float = _STRETCHING,
 ) -> FloatArray:
     """(samples, vertex, member) out of the plane [m], every `interval` [s]."""
-    system, state = assembled(members, columns=columns, rows=rows, deflection=deflection, stretching=stretching)
+    system, state = assembled(
+        members, columns=columns, rows=rows, deflection=deflection, stretching=stretching
+    )
     frames = []
     for _ in range(samples):
         frames.append(state.position[:, 1].numpy().copy())
@@ -111,8 +117,9 @@ def deflections(
 def last_mode(frames: FloatArray, interval: float) -> complex:
     """The rate [1/s] of the largest of the exponentials that a motion consists of at its end.
 
-    By dynamic mode decomposition (Schmid, J. Fluid Mech. 656:5, 2010) with one delay: the eigenvalues of the matrix
-    that takes each pair of successive frames to the next, in the space of the leading singular vectors.
+    By dynamic mode decomposition (Schmid, J. Fluid Mech. 656:5, 2010) with one delay: the
+    eigenvalues of the matrix that takes each pair of successive frames to the next, in the space of
+    the leading singular vectors.
 
     Args:
         frames: (samples, vertex).
@@ -136,7 +143,8 @@ def growth(
     rows: int = 1,
     integrator: Integrator | None = None,
 ) -> NDArray[np.complex128]:
-    """(member,) rate s of what is left after `duration` [s], w ∝ exp(s t), Im s ≥ 0, from the second half of it."""
+    """(member,) rate s of what is left after `duration` [s], w ∝ exp(s t), Im s ≥ 0, from the
+    second half of it."""
     interval = duration / _SAMPLES
     frames = deflections(
         members,
@@ -162,7 +170,9 @@ def crossing(speeds: FloatArray, rates: NDArray[np.complex128]) -> Onset:
     share = rates.real[after - 1] / (rates.real[after - 1] - rates.real[after])
     return Onset(
         speed=float(speeds[after - 1] + share * (speeds[after] - speeds[after - 1])),
-        frequency=float(rates.imag[after - 1] + share * (rates.imag[after] - rates.imag[after - 1])),
+        frequency=float(
+            rates.imag[after - 1] + share * (rates.imag[after] - rates.imag[after - 1])
+        ),
     )
 
 

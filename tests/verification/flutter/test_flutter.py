@@ -1,4 +1,5 @@
-"""Verification 8: onset and frequency of flutter, against the linear stability of the same equations."""
+"""Verification 8: onset and frequency of flutter, against the linear stability of the same
+equations."""
 
 from __future__ import annotations
 
@@ -36,10 +37,16 @@ class Sweep:
 def simulated(columns: int, cases: dict[str, Strip]) -> dict[str, Sweep]:
     """All speeds of all cases in one batch."""
     theory = {name: onset(strip, lowest=0.1, highest=5.0) for name, strip in cases.items()}
-    members = [member for name, strip in cases.items() for member in sweep(strip, SHARES * theory[name].speed)]
+    members = [
+        member
+        for name, strip in cases.items()
+        for member in sweep(strip, SHARES * theory[name].speed)
+    ]
     rates = growth(members, columns=columns, duration=2.0).reshape(len(cases), -1)
     return {
-        name: Sweep(strip=strip, theory=theory[name], speeds=SHARES * theory[name].speed, rates=rates[index])
+        name: Sweep(
+            strip=strip, theory=theory[name], speeds=SHARES * theory[name].speed, rates=rates[index]
+        )
         for index, (name, strip) in enumerate(cases.items())
     }
 
@@ -53,8 +60,8 @@ def sweeps() -> dict[str, Sweep]:
 def test_flutter_begins_at_the_speed_and_frequency_of_the_linear_calculation(
     name: str, sweeps: dict[str, Sweep]
 ) -> None:
-    # 24 columns put the onset 1–2 % too high and the frequency 1.5–3 %; both fall with the cell (last test; finer
-    # meshes in the validation). The project's bound is 10 %.
+    # 24 columns put the onset 1–2 % too high and the frequency 1.5–3 %; both fall with the cell
+    # (last test; finer meshes in the validation). The project's bound is 10 %.
     case = sweeps[name]
     found = crossing(case.speeds, case.rates)
     assert found.speed == pytest.approx(case.theory.speed, rel=0.03)
@@ -62,8 +69,11 @@ def test_flutter_begins_at_the_speed_and_frequency_of_the_linear_calculation(
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_around_the_onset_growth_rates_follow_the_calculation(name: str, sweeps: dict[str, Sweep]) -> None:
-    # An onset that is shifted by 2 % shifts a rate by 2 % of what it changes over a relative change of speed of 1.
+def test_around_the_onset_growth_rates_follow_the_calculation(
+    name: str, sweeps: dict[str, Sweep]
+) -> None:
+    # An onset that is shifted by 2 % shifts a rate by 2 % of what it changes over a relative change
+    # of speed of 1.
     case = sweeps[name]
     expected = np.array([leading(member) for member in sweep(case.strip, case.speeds)])
     slope = abs(np.gradient(expected.real, SHARES))
@@ -79,8 +89,9 @@ def test_friction_delays_flutter_by_its_tension(sweeps: dict[str, Sweep]) -> Non
 
 
 def test_without_the_reactive_loading_a_flat_sheet_does_not_flutter() -> None:
-    # The simulator's own drag is quadratic in the deflection: to first order the stream does nothing, whatever its
-    # speed, and the strip swings as in a vacuum, at ω₁ with the decay d ω₁²/2. Mesh: 1 % in frequency at 24 columns.
+    # The simulator's own drag is quadratic in the deflection: to first order the stream does
+    # nothing, whatever its speed, and the strip swings as in a vacuum, at ω₁ with the decay d
+    # ω₁²/2. Mesh: 1 % in frequency at 24 columns.
     usual = onset(CASES["heavy air"], lowest=0.1, highest=5.0).speed
     rates = growth(sweep(BARE, usual * np.array([0.5, 1.5, 4.0])), columns=COLUMNS, duration=2.5)
     vacuum = eigenvalues(BARE)[0]
@@ -89,16 +100,21 @@ def test_without_the_reactive_loading_a_flat_sheet_does_not_flutter() -> None:
 
 
 def test_the_error_of_the_onset_falls_with_the_cell(sweeps: dict[str, Sweep]) -> None:
-    # Between first and second order: the free end's normals and slopes are one-sided. Observed: 1.6.
+    # Between first and second order: the free end's normals and slopes are one-sided. Observed:
+    # 1.6.
     name = "heavy air"
     coarse = simulated(COLUMNS // 2, {name: CASES[name]})[name]
-    errors = [abs(crossing(case.speeds, case.rates).speed / case.theory.speed - 1) for case in (coarse, sweeps[name])]
+    errors = [
+        abs(crossing(case.speeds, case.rates).speed / case.theory.speed - 1)
+        for case in (coarse, sweeps[name])
+    ]
     assert 1.3 < np.log2(errors[0] / errors[1]) < 2.2
 
 
 def test_a_sheet_of_the_shape_of_a_flag_flutters_as_the_strip_does() -> None:
-    # The load is local and the cloth has no Poisson effect: of all modes of the 3:2 sheet, those that are the same
-    # along the hoist go first. 18 × 12 cells are coarser than the strips': 5 % in the onset, 7 % in the frequency.
+    # The load is local and the cloth has no Poisson effect: of all modes of the 3:2 sheet, those
+    # that are the same along the hoist go first. 18 × 12 cells are coarser than the strips': 5 % in
+    # the onset, 7 % in the frequency.
     strip = CASES["heavy air"]
     theory = onset(strip, lowest=0.1, highest=5.0)
     speeds = np.array([0.97, 1.03, 1.07]) * theory.speed

@@ -14,7 +14,8 @@ _NAMES = 2000
 
 
 def as_table(source: TextFile) -> TableText:
-    """Converts JSON objects to rows of a table; the first object names the columns, other lines are left out.
+    """Converts JSON objects to rows of a table; the first object names the columns, other lines are
+    left out.
 
     Raises:
         InputError: objects that hold others, or no row.
@@ -43,12 +44,16 @@ def as_table(source: TextFile) -> TableText:
     lines = out.getvalue().splitlines()
     if len(lines) < 2:
         raise InputError(
-            "there is no row in the JSON lines", where=str(source.path), fix="check that the logger recorded anything"
+            "there is no row in the JSON lines",
+            where=str(source.path),
+            fix="check that the logger recorded anything",
         )
     findings = [Finding.of("json-lines", "lines are counted with the names as the first")]
     if left_out:
         message = f"{left_out} lines are no JSON object; left out"
-        findings.append(Finding(kind="malformed-lines", severity=Severity.WARNING, count=left_out, what=message))
+        findings.append(
+            Finding(kind="malformed-lines", severity=Severity.WARNING, count=left_out, what=message)
+        )
     return TableText.of(source, lines, findings)
 
 

@@ -1,8 +1,9 @@
-"""One topic of numbers in an MCAP file as a table of text: a row a message, a column a number, its path as the heading.
+"""One topic of numbers in an MCAP file as a table of text: a row a message, a column a number, its
+path as the heading.
 
-A message's time is the one that it states, else the one at which it was logged; messages come in that order. Messages
-of flagdata's own type, and those of ROS whose type has one unit, get headings that name quantity and unit; other units
-are the user's to give.
+A message's time is the one that it states, else the one at which it was logged; messages come in
+that order. Messages of flagdata's own type, and those of ROS whose type has one unit, get headings
+that name quantity and unit; other units are the user's to give.
 """
 
 from __future__ import annotations
@@ -36,7 +37,8 @@ _HEADINGS: dict[str, dict[str, str]] = {
 
 
 def of_numbers(path: Path, present: Sequence[Topic]) -> tuple[Topic, ...]:
-    """Selects the topics, not of pictures, whose first message can be read and holds a number beside its time."""
+    """Selects the topics, not of pictures, whose first message can be read and holds a number
+    beside its time."""
     of_numbers: list[Topic] = []
     for topic in present:
         if topic.pictures:
@@ -76,18 +78,30 @@ def open_topic(path: Path, name: str | None, *, limits: Limits) -> TableText:
         rows.append(row)
 
     messages = index(path, topic.name, limit=limits.rows, visit=add)
-    timed = zip(messages.stamps.tolist(), (rows[number] for number in messages.rows.tolist()), strict=True)
+    timed = zip(
+        messages.stamps.tolist(), (rows[number] for number in messages.rows.tolist()), strict=True
+    )
     lines = [",".join(["time", *(headings.get(field, field) for field in names)])]
-    lines += [",".join([iso(stamp), *(row.get(field, "") for field in names)]) for stamp, row in timed]
-    message = f"the topic {topic.name}: {len(rows)} messages of {topic.schema or topic.encoding}, a row each"
+    lines += [
+        ",".join([iso(stamp), *(row.get(field, "") for field in names)]) for stamp, row in timed
+    ]
+    message = (
+        f"the topic {topic.name}: {len(rows)} messages of {topic.schema or topic.encoding}, a row "
+        "each"
+    )
     read = Finding.of("topic-read", message, count=len(rows))
     return TableText(
-        path=path, encoding="utf-8", lines=len(lines), findings=(read, *messages.findings), text=tuple(lines)
+        path=path,
+        encoding="utf-8",
+        lines=len(lines),
+        findings=(read, *messages.findings),
+        text=tuple(lines),
     )
 
 
 def _numbers(values: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, str]]:
-    """Yields path and text of each number, those within messages and short lists too, but no times."""
+    """Yields path and text of each number, those within messages and short lists too, but no
+    times."""
     for name, value in values.items():
         if not before and name in _TIMES:
             continue

@@ -1,11 +1,14 @@
-"""netCDF files that keep the CF conventions, read through xarray: wind by its standard names, as a table of text.
+"""netCDF files that keep the CF conventions, read through xarray: wind by its standard names, as a
+table of text.
 
-Source: CF standard name table (wind_speed, wind_from_direction, wind_to_direction, eastward_wind, northward_wind).
+Source: CF standard name table (wind_speed, wind_from_direction, wind_to_direction, eastward_wind,
+northward_wind).
 
 Times of a netCDF file by the CF conventions: numbers of a unit since a date, as UTC nanoseconds.
 
-Source: CF conventions 1.12, section 4.4; UDUNITS for the writing of the date and its zone, which is UTC where it has
-none. Whole numbers stay exact. Calendars of models, and units of no fixed length, have no instants: they are refused.
+Source: CF conventions 1.12, section 4.4; UDUNITS for the writing of the date and its zone, which is
+UTC where it has none. Whole numbers stay exact. Calendars of models, and units of no fixed length,
+have no instants: they are refused.
 """
 
 from __future__ import annotations
@@ -84,40 +87,66 @@ def since(attributes: Mapping[str, Any], *, where: str) -> Since:
     """Reads the units and the calendar of a time.
 
     Raises:
-        TimeError: a calendar that is not the one of clocks, a unit that is not known or of no fixed length, or a date
-            that cannot be read.
+        TimeError: a calendar that is not the one of clocks, a unit that is not known or of no fixed
+            length, or a date that cannot be read.
     """
     units, calendar = str(attributes["units"]), str(attributes.get("calendar", "standard")).lower()
     if calendar not in _CALENDARS:
-        message = f"the times are of the calendar {calendar!r}, whose days are not those of clocks in UTC"
-        fix = f"write them in one of the calendars {', '.join(_CALENDARS)}, or export the readings as CSV"
+        message = (
+            f"the times are of the calendar {calendar!r}, whose days are not those of clocks in UTC"
+        )
+        fix = (
+            f"write them in one of the calendars {', '.join(_CALENDARS)}, or export the readings "
+            "as CSV"
+        )
         raise TimeError(message, where=where, fix=fix)
     match = _SINCE.fullmatch(units)
-    unit = _UNITS.get(name := match["unit"].lower()) or _UNITS.get(name.removesuffix("s")) if match else None
+    unit = (
+        _UNITS.get(name := match["unit"].lower()) or _UNITS.get(name.removesuffix("s"))
+        if match
+        else None
+    )
     if match is None or unit is None:
         fix = "write the times in seconds, minutes, hours or days since a date"
         raise TimeError(
-            f"the times are in {units!r}, whose unit is not known or has no fixed length", where=where, fix=fix
+            f"the times are in {units!r}, whose unit is not known or has no fixed length",
+            where=where,
+            fix=fix,
         )
     date = _DATE.fullmatch(match["date"])
     fix = "write the date as in 'seconds since 2026-05-01 12:00:00 +00:00'"
     if date is None:
-        raise TimeError(f"the times are in {units!r}, whose date cannot be read", where=where, fix=fix)
+        raise TimeError(
+            f"the times are in {units!r}, whose date cannot be read", where=where, fix=fix
+        )
     offset = (int(date["h"] or 0) * 60 + int(date["min"] or 0)) * (-1 if date["sign"] == "-" else 1)
     try:
         parts = (int(date[name] or 0) for name in "YmdHMS")
         zero = dt.datetime(*parts, tzinfo=dt.timezone(dt.timedelta(minutes=offset)))  # type: ignore[misc]
     except ValueError:
-        raise TimeError(f"the times are in {units!r}, which is no date", where=where, fix=fix) from None
+        raise TimeError(
+            f"the times are in {units!r}, which is no date", where=where, fix=fix
+        ) from None
     if calendar != "proleptic_gregorian" and zero.date() < _REFORM:
-        message = f"the times are in {units!r}: of days before {_REFORM} it does not say whether they are Julian"
-        raise TimeError(message, where=where, fix="state the calendar proleptic_gregorian, or write a later date")
-    return Since(unit=unit, zero=from_datetime(zero, nanosecond=int((date["f"] or "").ljust(9, "0"))))
+        message = (
+            f"the times are in {units!r}: of days before {_REFORM} it does not say whether they "
+            "are Julian"
+        )
+        raise TimeError(
+            message,
+            where=where,
+            fix="state the calendar proleptic_gregorian, or write a later date",
+        )
+    return Since(
+        unit=unit, zero=from_datetime(zero, nanosecond=int((date["f"] or "").ljust(9, "0")))
+    )
 
 
-def instants(values: AnyArray, attributes: Mapping[str, Any], *, where: str) -> tuple[IntArray, tuple[Finding, ...]]:
-    """Converts a variable as it is stored to (n,) UTC nanoseconds, `NOT_A_TIME` for missing ones and years beyond 1970
-    to 2199.
+def instants(
+    values: AnyArray, attributes: Mapping[str, Any], *, where: str
+) -> tuple[IntArray, tuple[Finding, ...]]:
+    """Converts a variable as it is stored to (n,) UTC nanoseconds, `NOT_A_TIME` for missing ones
+    and years beyond 1970 to 2199.
 
     Raises:
         TimeError: see `since`.
@@ -126,7 +155,10 @@ def instants(values: AnyArray, attributes: Mapping[str, Any], *, where: str) -> 
     absent = np.zeros(len(values), dtype=bool)
     for name in ("_FillValue", "missing_value"):
         absent |= np.isin(values, np.atleast_1d(attributes[name])) if name in attributes else False
-    scale, offset = (np.asarray(attributes.get(name, rest)) for name, rest in (("scale_factor", 1), ("add_offset", 0)))
+    scale, offset = (
+        np.asarray(attributes.get(name, rest))
+        for name, rest in (("scale_factor", 1), ("add_offset", 0))
+    )
     packed = bool((scale != 1).any() or (offset != 0).any())
     numbers = values * scale.astype(np.float64) + offset.astype(np.float64) if packed else values
     with np.errstate(invalid="ignore", over="ignore"):
@@ -134,15 +166,26 @@ def instants(values: AnyArray, attributes: Mapping[str, Any], *, where: str) -> 
         absent |= ~((about > _FIRST) & (about < _END))
         counts = np.where(absent, 0, numbers)
         floors = np.floor(counts).astype(np.int64)
-        rest = np.zeros(len(values)) if counts.dtype.kind in "iu" else np.round((counts - floors) * float(count.unit))
-        units, further = divmod(count.zero, count.unit)  # the nanoseconds from year 1 do not fit into 64 bits
+        rest = (
+            np.zeros(len(values))
+            if counts.dtype.kind in "iu"
+            else np.round((counts - floors) * float(count.unit))
+        )
+        units, further = divmod(
+            count.zero, count.unit
+        )  # the nanoseconds from year 1 do not fit into 64 bits
         time = (floors + units) * count.unit + further + rest.astype(np.int64)
     findings: tuple[Finding, ...] = ()
-    step = float(np.spacing(np.abs(counts).max(initial=0))) * count.unit if counts.dtype.kind == "f" else 0.0
+    step = (
+        float(np.spacing(np.abs(counts).max(initial=0))) * count.unit
+        if counts.dtype.kind == "f"
+        else 0.0
+    )
     time = snap_to_grid(time, 1_000_000, round(step)) if step <= 1_000 else time
     if step > NANOSECONDS / 1000:
         message = (
-            f"the times are numbers of {8 * counts.dtype.itemsize} bits, which are {step / NANOSECONDS:.3g} s apart"
+            f"the times are numbers of {8 * counts.dtype.itemsize} bits, which are "
+            f"{step / NANOSECONDS:.3g} s apart"
         )
         fix = "write them as numbers of 64 bits"
         findings = (Finding.of("coarse-stamps", message, value=step / NANOSECONDS, fix=fix),)
@@ -173,9 +216,16 @@ def open_dataset(path: Path, *, limits: Limits) -> TableText:
     where = str(path)
     xarray: Any = importlib.import_module("xarray")
     with path.open("rb") as stream:  # opened here: scipy leaves a damaged file open
-        if stream.read(4) == _HDF and not {"h5netcdf", "netcdf4"} & set(xarray.backends.list_engines()):
-            message = "this is netCDF-4 or another HDF5 file, and no library that reads it is installed"
-            fix = "pip install h5netcdf; or convert it, nccopy -k classic FILE OTHER.nc; or export it as CSV"
+        if stream.read(4) == _HDF and not {"h5netcdf", "netcdf4"} & set(
+            xarray.backends.list_engines()
+        ):
+            message = (
+                "this is netCDF-4 or another HDF5 file, and no library that reads it is installed"
+            )
+            fix = (
+                "pip install h5netcdf; or convert it, nccopy -k classic FILE OTHER.nc; or export "
+                "it as CSV"
+            )
             raise InputError(message, where=where, fix=fix)
         stream.seek(0)
         try:
@@ -183,21 +233,31 @@ def open_dataset(path: Path, *, limits: Limits) -> TableText:
             data = xarray.decode_cf(raw, decode_times=False).squeeze()
         except Exception as error:  # noqa: BLE001 - a damaged file makes its libraries raise anything
             message = f"this netCDF or HDF5 file cannot be read: {type(error).__name__}"
-            raise InputError(message, where=where, fix="copy it again, or export it as CSV") from None
+            raise InputError(
+                message, where=where, fix="copy it again, or export it as CSV"
+            ) from None
         with raw:
             return _table(data, raw, path, limits)
 
 
 def _table(data: Any, raw: Any, path: Path, limits: Limits) -> TableText:
-    """Converts a data set to the lines of a table; the times are those of `raw`, as they are stored."""
+    """Converts a data set to the lines of a table; the times are those of `raw`, as they are
+    stored."""
     where = str(path)
-    time = next((name for name, axis in data.coords.items() if axis.ndim == 1 and is_time(raw[name].attrs)), None)
+    time = next(
+        (name for name, axis in data.coords.items() if axis.ndim == 1 and is_time(raw[name].attrs)),
+        None,
+    )
     if time is None:
         raise InputError(
-            "there is no axis of time by the CF conventions", where=where, fix="export the readings as CSV"
+            "there is no axis of time by the CF conventions",
+            where=where,
+            fix="export the readings as CSV",
         )
     if data.sizes[time] > limits.rows:
-        raise LimitError(f"there are more than {limits.rows} instants", where=where, fix="split the file")
+        raise LimitError(
+            f"there are more than {limits.rows} instants", where=where, fix="split the file"
+        )
     columns: dict[str, Any] = {}
     unread: list[str] = []
     for variable in data.data_vars.values():
@@ -215,21 +275,32 @@ def _table(data: Any, raw: Any, path: Path, limits: Limits) -> TableText:
         columns[heading] = (values + half) % (2 * half) if half else values
     if not any("wind" in heading for heading in columns):
         fix = (
-            "give the variables of wind their CF standard names (wind_speed, wind_from_direction), units, and time as "
+            "give the variables of wind their CF standard names (wind_speed, wind_from_direction), "
+            "units, and time as "
             "their only dimension; or export them as CSV"
         )
         raise InputError(
-            "no variable of the file is a wind with a standard name, a known unit, and time as its only dimension",
+            "no variable of the file is a wind with a standard name, a known unit, and time as its "
+            "only dimension",
             where=where,
             fix=fix,
         )
-    stamps, findings = instants(raw[time].squeeze().values, raw[time].attrs, where=f"{where}, variable {time}")
+    stamps, findings = instants(
+        raw[time].squeeze().values, raw[time].attrs, where=f"{where}, variable {time}"
+    )
     rows = zip(stamps.tolist(), *(values.tolist() for values in columns.values()), strict=True)
     lines = [",".join(["time", *columns])]
     lines += [
-        ",".join(["" if stamp == NOT_A_TIME else iso(stamp), *("" if value != value else repr(value) for value in row)])
+        ",".join(
+            [
+                "" if stamp == NOT_A_TIME else iso(stamp),
+                *("" if value != value else repr(value) for value in row),
+            ]
+        )
         for stamp, *row in rows
     ]
     message = f"variables that are not read: {', '.join(unread)}"
     findings = (*findings, Finding.of("columns-not-read", message)) if unread else findings
-    return TableText(path=path, encoding="utf-8", lines=len(lines), findings=findings, text=tuple(lines))
+    return TableText(
+        path=path, encoding="utf-8", lines=len(lines), findings=findings, text=tuple(lines)
+    )

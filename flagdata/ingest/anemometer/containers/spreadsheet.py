@@ -1,8 +1,10 @@
-"""Excel workbooks (.xlsx): one sheet as the text that Excel would save as CSV, so that every format reads it.
+"""Excel workbooks (.xlsx): one sheet as the text that Excel would save as CSV, so that every format
+reads it.
 
-Dates and times become ISO 8601; formulas give the values that Excel stored; empty rows stay, so that line numbers are
-the sheet's row numbers. Needs the library python-calamine (the extra `flagdata[excel]`), which works in a process of
-its own, see `flagdata.ingest.anemometer.containers.workbook`.
+Dates and times become ISO 8601; formulas give the values that Excel stored; empty rows stay, so
+that line numbers are the sheet's row numbers. Needs the library python-calamine (the extra
+`flagdata[excel]`), which works in a process of its own, see
+`flagdata.ingest.anemometer.containers.workbook`.
 """
 
 from __future__ import annotations
@@ -19,7 +21,8 @@ from flagdata.ingest.anemometer.text.text_file import TableText
 from flagdata.ingest.anemometer.wind_options import Limits
 
 _MEMORY = 900 << 20
-"""Memory that reading a workbook may take [B]; a sheet of a million rows and ten columns takes half of it."""
+"""Memory that reading a workbook may take [B]; a sheet of a million rows and ten columns takes half
+of it."""
 _SECONDS = 60.0
 """Time that it may take [s]."""
 _FIX = "delete what lies far from the table, or save the sheet as CSV"
@@ -30,7 +33,8 @@ def open_sheet(path: Path, *, limits: Limits) -> TableText:
 
     Raises:
         InputError: python-calamine is missing, the workbook is damaged, or no sheet holds two rows.
-        LimitError: larger than `limits` allow, unpacked; or it takes too much memory or time to be read.
+        LimitError: larger than `limits` allow, unpacked; or it takes too much memory or time to be
+            read.
     """
     where = str(path)
     with zipfile.ZipFile(path) as archive:  # is_workbook has read its directory
@@ -46,18 +50,37 @@ def open_sheet(path: Path, *, limits: Limits) -> TableText:
         )
     sheet = _read(where, limits)
     if sheet is None:
-        raise InputError("there is no sheet with two rows", where=where, fix="check that the workbook holds the log")
+        raise InputError(
+            "there is no sheet with two rows",
+            where=where,
+            fix="check that the workbook holds the log",
+        )
     findings: tuple[Finding, ...] = ()
     if sheet.others:
         count = 1 + len(sheet.others)
-        text = f"the sheet {sheet.title!r} is read, the first of {count}; not {', '.join(map(repr, sheet.others))}"
+        text = (
+            f"the sheet {sheet.title!r} is read, the first of {count}; not "
+            f"{', '.join(map(repr, sheet.others))}"
+        )
         fix = "save another sheet as a file of its own to read it"
         findings = (Finding.of("several-sheets", text, count=count, fix=fix),)
     if sheet.of_1904:
-        text = "the workbook counts days from 1904-01-01: so its dates are read, and so is excel-days"
+        text = (
+            "the workbook counts days from 1904-01-01: so its dates are read, and so is excel-days"
+        )
         findings = (*findings, Finding.of("days-since-1904", text))
-    lines, days = tuple(sheet.text.splitlines()), "excel-days-1904" if sheet.of_1904 else "excel-days"
-    return TableText(path=path, encoding="utf-8", lines=len(lines), findings=findings, text=lines, serial_days=days)
+    lines, days = (
+        tuple(sheet.text.splitlines()),
+        "excel-days-1904" if sheet.of_1904 else "excel-days",
+    )
+    return TableText(
+        path=path,
+        encoding="utf-8",
+        lines=len(lines),
+        findings=findings,
+        text=lines,
+        serial_days=days,
+    )
 
 
 def _read(where: str, limits: Limits) -> Sheet | None:
@@ -66,12 +89,15 @@ def _read(where: str, limits: Limits) -> Sheet | None:
         return child.ask((where, limits.rows), seconds=_SECONDS)
     except EndedError as ended:
         if ended.late:
-            raise LimitError(f"reading it takes longer than {_SECONDS:g} s", where=where, fix=_FIX) from None
+            raise LimitError(
+                f"reading it takes longer than {_SECONDS:g} s", where=where, fix=_FIX
+            ) from None
         if ended.end is not End.MEMORY:
             message = f"the process that reads it has ended: {ended.detail or ended.end}"
             raise FlagdataError(message, where=where, fix=f"do it again, or {_FIX}") from None
         message = (
-            f"its sheets take more than {_MEMORY >> 20} MiB: cells count from the first to the last, filled or not"
+            f"its sheets take more than {_MEMORY >> 20} MiB: cells count from the first to the "
+            "last, filled or not"
         )
         raise LimitError(message, where=where, fix=_FIX) from None
     finally:

@@ -1,7 +1,8 @@
-"""The process that reads Excel workbooks, see `flagdata.core.files.bounded`: the first sheet that holds a table, as
-CSV.
+"""The process that reads Excel workbooks, see `flagdata.core.files.bounded`: the first sheet that
+holds a table, as CSV.
 
-python-calamine holds a sheet's cells from the first to the last, also where they are empty, and ends its process where
+python-calamine holds a sheet's cells from the first to the last, also where they are empty, and
+ends its process where
 there is no memory for them: one number in Excel's last cell is enough.
 """
 
@@ -71,8 +72,19 @@ def _read(calamine: Any, where: str, rows: int) -> Sheet | None:
             tables = _tables(calamine, where, rows)
             title, text = next(tables, ("", ""))
             other_titles = tuple(name for name, _ in tables)
-            return Sheet(title=title, text=text, others=other_titles, of_1904=of_1904) if text else None
-    except (calamine.CalamineError, zipfile.BadZipFile, zlib.error, OSError, ValueError, RuntimeError) as error:
+            return (
+                Sheet(title=title, text=text, others=other_titles, of_1904=of_1904)
+                if text
+                else None
+            )
+    except (
+        calamine.CalamineError,
+        zipfile.BadZipFile,
+        zlib.error,
+        OSError,
+        ValueError,
+        RuntimeError,
+    ) as error:
         damaged = type(error).__name__
     fix = "copy it again, or open it in Excel and save the sheet as CSV"
     raise InputError(f"the workbook cannot be read: {damaged}", where=where, fix=fix)
@@ -93,11 +105,15 @@ def _text(sheet: Any, rows: int, where: str) -> str:
         raise LimitError(f"the sheet has more than {rows} rows", where=where, fix="split the sheet")
     if sheet.total_width >= _WIDEST:
         raise LimitError(
-            f"the sheet has more than {_WIDEST} columns", where=where, fix="save the columns needed as CSV"
+            f"the sheet has more than {_WIDEST} columns",
+            where=where,
+            fix="save the columns needed as CSV",
         )
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    if sheet.start is not None:  # there is a cell; rows come from the sheet's first, columns from that of the cells
+    if (
+        sheet.start is not None
+    ):  # there is a cell; rows come from the sheet's first, columns from that of the cells
         empty_cells = [""] * sheet.start[1]
         writer.writerows([*empty_cells, *map(_cell, row)] for row in sheet.iter_rows())
     return out.getvalue()

@@ -1,7 +1,9 @@
-"""Numbers of a log that are impossible or doubtful: of a draft each opens a question that only the user answers.
+"""Numbers of a log that are impossible or doubtful: of a draft each opens a question that only the
+user answers.
 
-A doubt is answered for good by its key in a recipe: `[expect] confirmed = ["fast", …]`. Of a log that an exact format
-or a recipe reads, those that speak against the column or its unit are reported.
+A doubt is answered for good by its key in a recipe: `[expect] confirmed = ["fast", …]`. Of a log
+that an exact format or a recipe reads, those that speak against the column or its unit are
+reported.
 """
 
 from __future__ import annotations
@@ -20,7 +22,8 @@ from flagdata.record.signals import Series
 from flagdata.timebase import NANOSECONDS, iso
 
 _FASTEST = 75.0
-"""m/s; above the strongest gusts of any storm but tornadoes and the record of Barrow Island (113 m/s)."""
+"""m/s; above the strongest gusts of any storm but tornadoes and the record of Barrow Island (113
+m/s)."""
 _STRONG = 30.0
 """m/s; a median above it is a storm that lasts."""
 _FEW, _RARE = 0.05, 0.01
@@ -37,9 +40,11 @@ _WINDY = 12.0
 _CODE, _MOST = 2.0, 1e5
 """Times all others that a code for no value is, and a number that is a code in any unit."""
 _CHANGES, _RISES, _ANEW = 20, 0.7, 6.0
-"""Changes from which on a count is recognised, share of them that rise, and median rises at which it begins anew."""
+"""Changes from which on a count is recognised, share of them that rise, and median rises at which
+it begins anew."""
 _CHANCE, _DISTINCT = -4.0, 4
-"""Logarithm of the probability by chance below which a grid is evidence, and distinct values that can be."""
+"""Logarithm of the probability by chance below which a grid is evidence, and distinct values that
+can be."""
 _GRIDS = {"mph": (1.0, 0.5, 0.1), "kn": (1.0, 0.5, 0.1), "km/h": (1.0, 0.1), "m/s": (1.0, 0.5, 0.1)}
 """Steps in which instruments measure, and the units that are written."""
 _FACTOR = 6e-4
@@ -63,7 +68,8 @@ class Doubt:
 
 @dataclass(frozen=True, kw_only=True)
 class _Seen:
-    """A reading as it is examined: speed and direction as they are written, without missing values."""
+    """A reading as it is examined: speed and direction as they are written, without missing
+    values."""
 
     reading: Reading
     speed: Series
@@ -75,7 +81,9 @@ class _Seen:
     now: int
 
 
-def doubts(reading: Reading, recipe: Recipe, *, assumed: frozenset[str], left_out: int, now: int) -> tuple[Doubt, ...]:
+def doubts(
+    reading: Reading, recipe: Recipe, *, assumed: frozenset[str], left_out: int, now: int
+) -> tuple[Doubt, ...]:
     """Lists everything that is odd of a drafted reading, but for what the recipe expects.
 
     Args:
@@ -86,10 +94,21 @@ def doubts(reading: Reading, recipe: Recipe, *, assumed: frozenset[str], left_ou
     """
     written = {name: _written(reading, recipe, name) for name in ("wind_speed", "wind_direction")}
     sight = _sight(
-        reading, written, _unit(recipe, "wind_speed"), "wind_direction" in assumed, left_out=left_out, now=now
+        reading,
+        written,
+        _unit(recipe, "wind_speed"),
+        "wind_direction" in assumed,
+        left_out=left_out,
+        now=now,
     )
-    texts = ((key, check(sight), question) for key, (check, question) in CHECKS.items() if key not in recipe.expect)
-    of_values = tuple(Doubt(key=key, text=text, question=question) for key, text, question in texts if text)
+    texts = (
+        (key, check(sight), question)
+        for key, (check, question) in CHECKS.items()
+        if key not in recipe.expect
+    )
+    of_values = tuple(
+        Doubt(key=key, text=text, question=question) for key, text, question in texts if text
+    )
     of_reader = (
         Doubt(key=finding.kind, text=finding.what, question="Is that right?")
         for finding in reading.findings
@@ -99,15 +118,26 @@ def doubts(reading: Reading, recipe: Recipe, *, assumed: frozenset[str], left_ou
 
 
 def report_doubts(reading: Reading, answered: frozenset[str]) -> tuple[Finding, ...]:
-    """Reports what speaks against the column or the unit of the wind that an exact format or a recipe has read.
+    """Reports what speaks against the column or the unit of the wind that an exact format or a
+    recipe has read.
 
     Args:
         answered: keys of doubts whose numbers are right, as the recipe says.
     """
-    speed = next((channel for channel in ("wind_speed", "apparent_wind_speed") if channel in reading.channels), None)
+    speed = next(
+        (
+            channel
+            for channel in ("wind_speed", "apparent_wind_speed")
+            if channel in reading.channels
+        ),
+        None,
+    )
     if speed is None or not len(reading.time):
         return ()
-    written = {"wind_speed": reading.channels[speed], "wind_direction": np.full(len(reading.time), np.nan)}
+    written = {
+        "wind_speed": reading.channels[speed],
+        "wind_direction": np.full(len(reading.time), np.nan),
+    }
     sight = _sight(reading, written, "m/s", assumed=False, left_out=0, now=0)
     return tuple(
         Finding.of("doubtful-numbers", f"{speed}: {text}", fix=CHECKS[key][1])
@@ -117,7 +147,13 @@ def report_doubts(reading: Reading, answered: frozenset[str]) -> tuple[Finding, 
 
 
 def _sight(
-    reading: Reading, written: Mapping[str, Series], unit_name: str, assumed: bool, *, left_out: int, now: int
+    reading: Reading,
+    written: Mapping[str, Series],
+    unit_name: str,
+    assumed: bool,
+    *,
+    left_out: int,
+    now: int,
 ) -> _Seen:
     speed, direction = written["wind_speed"], written["wind_direction"]
     finite = np.isfinite(speed) & np.isfinite(direction)
@@ -138,7 +174,8 @@ def _unit(recipe: Recipe, name: str) -> str:
 
 
 def _written(reading: Reading, recipe: Recipe, name: str) -> Series:
-    """Returns a channel in the file's unit; angles in degrees where they are points of the compass."""
+    """Returns a channel in the file's unit; angles in degrees where they are points of the
+    compass."""
     values = reading.channels.get(name)
     if values is None:
         return np.full(len(reading.time), np.nan)
@@ -153,7 +190,9 @@ def _si(sight: _Seen) -> Series:
 def _fast(sight: _Seen) -> str:
     over = _si(sight) > _FASTEST
     return (
-        f"{int(over.sum())} speeds are above {_FASTEST:g} m/s, the highest {_si(sight).max():.4g}" if over.any() else ""
+        f"{int(over.sum())} speeds are above {_FASTEST:g} m/s, the highest {_si(sight).max():.4g}"
+        if over.any()
+        else ""
     )
 
 
@@ -161,47 +200,62 @@ def _strong(sight: _Seen) -> str:
     median = float(np.median(_si(sight))) if len(sight.speed) else 0.0
     days = int(np.ptp(sight.reading.time)) / DAY
     if median > _WINDY and days >= 1:
-        return f"the median speed of {days:.3g} days is {median:.3g} m/s, more than of the windiest stations"
+        return (
+            f"the median speed of {days:.3g} days is {median:.3g} m/s, more than of the windiest "
+            "stations"
+        )
     return f"the median speed is {median:.3g} m/s" if median > _STRONG else ""
 
 
 def _code(sight: _Seen) -> str:
-    """Finds a number that loggers write for no value: one that recurs, far above all others or below all directions."""
+    """Finds a number that loggers write for no value: one that recurs, far above all others or
+    below all directions."""
     sentences: list[str] = []
     high, counts = np.unique(sight.speed, return_counts=True)
     if len(high) > 1 and counts[-1] > 1 and (high[-1] > _CODE * high[-2] or high[-1] > _MOST):
         sentences.append(
-            f"{high[-1]:g} {sight.unit} occurs {counts[-1]} times, and all other speeds are up to {high[-2]:g}"
+            f"{high[-1]:g} {sight.unit} occurs {counts[-1]} times, and all other speeds are up to "
+            f"{high[-2]:g}"
         )
     low, counts = np.unique(sight.direction[sight.direction < 0], return_counts=True)
     if len(low) == 1 and counts[0] > 1 and sight.direction.max() > 180:
-        sentences.append(f"the direction {low[0]:g} occurs {counts[0]} times, and no other is below 0")
+        sentences.append(
+            f"the direction {low[0]:g} occurs {counts[0]} times, and no other is below 0"
+        )
     return "; ".join(sentences)
 
 
 def _grows(sight: _Seen) -> str:
-    """Checks whether most changes are rises, and what falls begins anew near the size of one: a count, a distance, a
-    sum.
+    """Checks whether most changes are rises, and what falls begins anew near the size of one: a
+    count, a distance, a sum.
 
-    A speed falls about as often as it rises: that m changes in a row are rises has a probability of about 2⁻ᵐ.
+    A speed falls about as often as it rises: that m changes in a row are rises has a probability of
+    about 2⁻ᵐ.
     """
     steps = np.diff(sight.speed)
     rises, falls = steps[steps > 0], np.flatnonzero(steps < 0)
-    if len(rises) < _RISES * max(_CHANGES, len(rises) + len(falls)) or bool((sight.speed < 0).any()):
+    if len(rises) < _RISES * max(_CHANGES, len(rises) + len(falls)) or bool(
+        (sight.speed < 0).any()
+    ):
         return ""
     usual = float(np.median(rises))
     anew = len(falls) == 0 or float((sight.speed[falls + 1] <= _ANEW * usual).mean()) >= 0.9
-    high = (sight.speed[falls] > _ANEW * usual).any() if len(falls) else sight.speed.max() > 2 * _CHANGES * usual
+    high = (
+        (sight.speed[falls] > _ANEW * usual).any()
+        if len(falls)
+        else sight.speed.max() > 2 * _CHANGES * usual
+    )
     if not (anew and high):
         return ""
     return f"the speed rises in {len(rises)} of {len(rises) + len(falls)} changes, as a sum does"
 
 
 def _steps(sight: _Seen) -> str:
-    """Checks whether the speeds are multiples of a step of one unit written in another unit than the stated one.
+    """Checks whether the speeds are multiples of a step of one unit written in another unit than
+    the stated one.
 
-    That n distinct values all are multiples of a step g by chance, within t, has the probability (4 t / g)ⁿ:
-    2 t for the product as it is, and as much for one whose factor was rounded first.
+    That n distinct values all are multiples of a step g by chance, within t, has the probability (4
+    t / g)ⁿ: 2 t for the product as it is, and as much for one whose factor was rounded first.
     """
     speeds = np.unique(sight.speed[sight.speed > 0])
     if len(speeds) < _DISTINCT:
@@ -212,7 +266,13 @@ def _steps(sight: _Seen) -> str:
         for written in {*_GRIDS, sight.unit} - {native}:
             for step in steps:
                 chance = _on(speeds, step * unit(native).scale / unit(written).scale, rounding)
-                grids.append((chance, written, f"the speeds are multiples of {step:g} {native} written in {written}"))
+                grids.append(
+                    (
+                        chance,
+                        written,
+                        f"the speeds are multiples of {step:g} {native} written in {written}",
+                    )
+                )
     chance, written, text = min(grids)
     chance_as_stated = min(chance for chance, written, _ in grids if written == sight.unit)
     return (
@@ -224,20 +284,26 @@ def _steps(sight: _Seen) -> str:
 
 def _rounding(speeds: Series) -> float:
     """Finds the last digit that is used."""
-    digits = (digit for digit in range(6) if np.all(np.abs(speeds * 10**digit - np.round(speeds * 10**digit)) < 1e-4))
+    digits = (
+        digit
+        for digit in range(6)
+        if np.all(np.abs(speeds * 10**digit - np.round(speeds * 10**digit)) < 1e-4)
+    )
     return 10.0 ** -next(digits, 6)
 
 
 def _on(speeds: Series, grid: float, rounding: float) -> float:
-    """Computes the logarithm of the probability that distinct values are multiples of `grid` by chance; 0 where they
-    are not.
+    """Computes the logarithm of the probability that distinct values are multiples of `grid` by
+    chance; 0 where they are not.
 
     A logger may round the factor first, as 0.45 m/s for a mile an hour, and write 0.9 for two.
     """
     tolerance = rounding / 2 * 1.02 + _FACTOR * speeds
     usable = tolerance < grid / 8
     steps = np.round(speeds / grid)
-    off = np.minimum(np.abs(speeds - steps * grid), np.abs(speeds - steps * np.round(grid / rounding) * rounding))
+    off = np.minimum(
+        np.abs(speeds - steps * grid), np.abs(speeds - steps * np.round(grid / rounding) * rounding)
+    )
     if usable.sum() < _DISTINCT or float((off[usable] <= tolerance[usable]).mean()) < 0.98:
         return 0.0
     return float(np.log10(4 * tolerance[usable] / grid).sum())
@@ -247,9 +313,15 @@ def _negative(sight: _Seen) -> str:
     below = sight.speed[sight.speed < 0]
     values, counts = np.unique(below, return_counts=True)
     if len(counts) and counts.max() > 1:
-        return f"{values[counts.argmax()]:g} {sight.unit} occurs {counts.max()} times and is no speed"
+        return (
+            f"{values[counts.argmax()]:g} {sight.unit} occurs {counts.max()} times and is no speed"
+        )
     share = len(below) / max(1, len(sight.speed))
-    return f"{share:.0%} of the speeds are below 0, the lowest {below.min():g} {sight.unit}" if share > _FEW else ""
+    return (
+        f"{share:.0%} of the speeds are below 0, the lowest {below.min():g} {sight.unit}"
+        if share > _FEW
+        else ""
+    )
 
 
 def _still(sight: _Seen) -> str:
@@ -257,15 +329,30 @@ def _still(sight: _Seen) -> str:
 
 
 def _constant(sight: _Seen) -> str:
-    same = len(sight.speed) > 10 and sight.speed[0] != 0 and bool((sight.speed == sight.speed[0]).all())
+    same = (
+        len(sight.speed) > 10
+        and sight.speed[0] != 0
+        and bool((sight.speed == sight.speed[0]).all())
+    )
     return f"every speed is {sight.speed[0]:g} {sight.unit}" if same else ""
 
 
 def _angles(sight: _Seen) -> str:
     off = np.abs(sight.speed - np.round(sight.speed))
-    whole_numbers = len(sight.speed) > 10 and bool((off < 1e-6).all()) and bool((sight.speed >= 0).all())
-    spread = whole_numbers and sight.speed.max() <= 360 and sight.speed.max() > 180 and len(np.unique(sight.speed)) > 10
-    return f"the speeds are whole numbers from {sight.speed.min():g} to {sight.speed.max():g}" if spread else ""
+    whole_numbers = (
+        len(sight.speed) > 10 and bool((off < 1e-6).all()) and bool((sight.speed >= 0).all())
+    )
+    spread = (
+        whole_numbers
+        and sight.speed.max() <= 360
+        and sight.speed.max() > 180
+        and len(np.unique(sight.speed)) > 10
+    )
+    return (
+        f"the speeds are whole numbers from {sight.speed.min():g} to {sight.speed.max():g}"
+        if spread
+        else ""
+    )
 
 
 def _tens(sight: _Seen) -> str:
@@ -277,12 +364,20 @@ def _tens(sight: _Seen) -> str:
         and directions.min() >= 0
         and directions.max() <= _TENS
     )
-    return f"the directions are whole numbers up to {directions.max():g}, and no unit is stated" if small else ""
+    return (
+        f"the directions are whole numbers up to {directions.max():g}, and no unit is stated"
+        if small
+        else ""
+    )
 
 
 def _fixed_sentence(sight: _Seen) -> str:
     speed, direction = sight.pairs
-    same = len(direction) > 10 and bool((direction == direction[0]).all()) and len(np.unique(speed)) > 3
+    same = (
+        len(direction) > 10
+        and bool((direction == direction[0]).all())
+        and len(np.unique(speed)) > 3
+    )
     return f"the direction is {direction[0]:g} in every row, while the speed varies" if same else ""
 
 
@@ -313,7 +408,10 @@ def _order(sight: _Seen) -> str:
     far_back = len(back) and -int(steps.min()) > max(_SLOW, _FAR * span)
     if far_back:
         by = f"{-int(steps.min()) / NANOSECONDS:g} s"
-        return f"the time goes back by {by}, as after a clock was set back, or where devices follow one another"
+        return (
+            f"the time goes back by {by}, as after a clock was set back, or where devices follow "
+            "one another"
+        )
     return f"the time does not increase in {share:.0%} of the rows" if share > _RARE else ""
 
 
@@ -351,7 +449,10 @@ CHECKS: Mapping[str, tuple[Callable[[_Seen], str], str]] = {
     "tens": (_tens, "Are these degrees, and no tens of degrees or sectors?"),
     "fixed": (_fixed_sentence, "Did the vane never turn?"),
     "calm": (_calm, "Is 0 the north, and not calm air or a variable wind?"),
-    "order": (_order, "Are all rows of one device, in their order? (--clock corrects a clock that was set)"),
+    "order": (
+        _order,
+        "Are all rows of one device, in their order? (--clock corrects a clock that was set)",
+    ),
     "future": (_future, "Is the clock right?"),
     "old": (_old, "Is the clock right?"),
     "coarse": (_coarse, "Are these readings or means that long apart?"),
@@ -362,4 +463,5 @@ _OF_THE_COLUMN = ("strong", "code", "steps", "grows", "angles")
 REPORTED = frozenset({"out-of-range", "below-threshold", "calm-in-words", "zero-beside-360"})
 """Kinds of findings of the reader that are doubts of a draft, each by its kind."""
 KEYS = frozenset({*CHECKS, *REPORTED, "components", "gust", "order"})
-"""All that [expect] and --expect can hold; "components" and "gust" are doubts of the draft itself (see `beside`)."""
+"""All that [expect] and --expect can hold; "components" and "gust" are doubts of the draft itself
+(see `beside`)."""

@@ -1,7 +1,8 @@
-"""A draft of a table that no recipe describes: what is stated, inferred, assumed or given, and what is open.
+"""A draft of a table that no recipe describes: what is stated, inferred, assumed or given, and what
+is open.
 
-A draft gives no rows. Where nothing is open, its recipe can be read and shown; where anything of it is inferred or
-assumed, what was read counts only when it is confirmed (see `confirm`).
+A draft gives no rows. Where nothing is open, its recipe can be read and shown; where anything of it
+is inferred or assumed, what was read counts only when it is confirmed (see `confirm`).
 
 The recipe of a draft as TOML; "?" stands where it is open.
 """
@@ -17,7 +18,14 @@ import numpy as np
 from flagdata.core import compass
 from flagdata.core.units import UNITS, canonical, name_of_unit
 from flagdata.ingest.anemometer.draft.given_columns import GivenColumns, given_columns
-from flagdata.ingest.anemometer.draft.heading_words import GUSTS, MOVING, Meaning, fits, meaning, named_alike
+from flagdata.ingest.anemometer.draft.heading_words import (
+    GUSTS,
+    MOVING,
+    Meaning,
+    fits,
+    meaning,
+    named_alike,
+)
 from flagdata.ingest.anemometer.draft.questions import ZONE, Open
 from flagdata.ingest.anemometer.draft.table_shape import TableShape, is_missing, is_number, shape_of
 from flagdata.ingest.anemometer.draft.times import (
@@ -37,7 +45,8 @@ from flagdata.record.signals import Series
 
 @dataclass(frozen=True, kw_only=True)
 class ChannelText:
-    """A channel of a recipe: its column by heading or number, its unit, and whether the wind blows that way."""
+    """A channel of a recipe: its column by heading or number, its unit, and whether the wind blows
+    that way."""
 
     column: str | int
     unit: str
@@ -71,7 +80,10 @@ def recipe_text(
         "[time]",
     ]
     columns = ["?"] if time is None else [shape.reference(i) for i in time]
-    lines += [f"columns = [{', '.join(map(reference, columns))}]", f"format = {quote_for_toml(form or '?')}"]
+    lines += [
+        f"columns = [{', '.join(map(reference, columns))}]",
+        f"format = {quote_for_toml(form or '?')}",
+    ]
     lines += [f"zone = {quote_for_toml(zone)}"] if zone is not None else []
     for name, channel in channels.items():
         lines += [
@@ -114,8 +126,13 @@ _PLAIN = {
     "wind_y": ("wind y", "northward wind"),
     "wind_z": ("wind z", "upward wind"),
 }
-"""Words of a heading that state a quantity in full; others are understood, and what is understood is inferred."""
-_WRITINGS = {"iso": "ISO 8601", "elapsed-s": "a count of seconds", "elapsed-ms": "a count of milliseconds"}
+"""Words of a heading that state a quantity in full; others are understood, and what is understood
+is inferred."""
+_WRITINGS = {
+    "iso": "ISO 8601",
+    "elapsed-s": "a count of seconds",
+    "elapsed-ms": "a count of milliseconds",
+}
 """Forms of stamps that have a name."""
 _LISTED = 5
 """Sites that a question names."""
@@ -132,7 +149,8 @@ class Fact:
     Attributes:
         what: it is about: "time", "wind_speed", "delimiter".
         value: for people.
-        origin: the file states it, the program inferred it from values or assumed it, or the user gave it.
+        origin: the file states it, the program inferred it from values or assumed it, or the user
+            gave it.
         evidence: what shows it.
     """
 
@@ -142,7 +160,10 @@ class Fact:
     evidence: str = ""
 
     def line(self) -> str:
-        return f"{self.what:<16}{self.value:<36}  {self.origin}{f' ({self.evidence})' if self.evidence else ''}"
+        return (
+            f"{self.what:<16}{self.value:<36}  "
+            f"{self.origin}{f' ({self.evidence})' if self.evidence else ''}"
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -170,7 +191,9 @@ class Draft:
     @property
     def stated(self) -> bool:
         """Whether nothing of it is inferred or assumed, and nothing else in it may be the wind."""
-        return not (self.open or self.rivals) and all(fact.origin in ("stated", "given") for fact in self.facts)
+        return not (self.open or self.rivals) and all(
+            fact.origin in ("stated", "given") for fact in self.facts
+        )
 
 
 @dataclass
@@ -184,7 +207,11 @@ class _Parts:
 
 
 def draft(
-    lines: Sequence[str], options: WindOptions, *, serial_days: str = "excel-days", counted: bool = False
+    lines: Sequence[str],
+    options: WindOptions,
+    *,
+    serial_days: str = "excel-days",
+    counted: bool = False,
 ) -> Draft | None:
     """Drafts a recipe for the table that a file begins with; `None` where it holds none.
 
@@ -241,22 +268,48 @@ def _ask_about_sites(parts: _Parts, shape: TableShape, meanings: Sequence[Meanin
     """Asks where a column names several sites or units, whose rows must not be mixed."""
     for index, heading in enumerate(meanings):
         values = sorted(set(shape.column(index)) - {""})
-        of_units = bool(values) and all(fits("wind_speed", name_of_unit(value) or "") for value in values)
-        if (heading.kind == "site" or of_units) and index not in parts.used and 1 < len(values) < len(shape.rows):
+        of_units = bool(values) and all(
+            fits("wind_speed", name_of_unit(value) or "") for value in values
+        )
+        if (
+            (heading.kind == "site" or of_units)
+            and index not in parts.used
+            and 1 < len(values) < len(shape.rows)
+        ):
             several = f"{len(values)} {'units' if of_units else 'sites'}"
-            question = f"rows are of {several} by {shape.shown(index)}: {', '.join(values[:_LISTED])}; which one?"
-            lines = f"[rows]\ncolumn = {reference(shape.reference(index))}\nvalue = {quote_for_toml(values[0])}"
-            parts.open.append(Open(key="sensor", question=question, example="FILE.toml", lines=lines))
+            question = (
+                f"rows are of {several} by {shape.shown(index)}: {', '.join(values[:_LISTED])}; "
+                "which one?"
+            )
+            lines = (
+                f"[rows]\ncolumn = {reference(shape.reference(index))}\nvalue = "
+                f"{quote_for_toml(values[0])}"
+            )
+            parts.open.append(
+                Open(key="sensor", question=question, example="FILE.toml", lines=lines)
+            )
 
 
 def _cutting(shape: TableShape, lines: Sequence[str]) -> Fact:
     delimiter = {" ": "blanks", "\t": "tabs"}.get(shape.delimiter, repr(shape.delimiter))
     value = f"divided by {delimiter}, decimal {shape.decimal!r}"
-    plain = shape.delimiter in ",\t" and shape.decimal == "." and shape.preamble == 0 and shape.header == 1
-    where = f"line {shape.preamble + 1} names the columns" if shape.header else "no line names the columns"
+    plain = (
+        shape.delimiter in ",\t"
+        and shape.decimal == "."
+        and shape.preamble == 0
+        and shape.header == 1
+    )
+    where = (
+        f"line {shape.preamble + 1} names the columns"
+        if shape.header
+        else "no line names the columns"
+    )
     if shape.preamble:
         fullest = max(range(shape.preamble), key=lambda at: sum(map(str.isdigit, lines[at])))
-        where += f"; {shape.preamble} lines above are not read, as line {fullest + 1} {lines[fullest][:_WIDE]!r}"
+        where += (
+            f"; {shape.preamble} lines above are not read, as line {fullest + 1} "
+            f"{lines[fullest][:_WIDE]!r}"
+        )
     return Fact(what="cells", value=value, origin="stated" if plain else "inferred", evidence=where)
 
 
@@ -271,12 +324,22 @@ def _time(
 ) -> TimeFields | None:
     if user_columns is not None:
         columns = user_columns.time or ((len(shape.names) - 1,) if counted else ())
-        time = of_columns(shape, columns, options.date_order, user_columns.form or None) if columns else None
+        time = (
+            of_columns(shape, columns, options.date_order, user_columns.form or None)
+            if columns
+            else None
+        )
     else:
         time = find_time(shape, meanings, options.date_order)
     if time is None:
-        question = f"no column reads as a time: which one is it, and in what format?{unread_count(shape, meanings)}"
-        example = "'1=time[FORMAT],2=wind_speed[UNIT]' (or, if readings came at a steady rate, --start TIME --rate HZ)"
+        question = (
+            "no column reads as a time: which one is it, and in what "
+            f"format?{unread_count(shape, meanings)}"
+        )
+        example = (
+            "'1=time[FORMAT],2=wind_speed[UNIT]' (or, if readings came at a steady rate, --start "
+            "TIME --rate HZ)"
+        )
         parts.open.append(Open(key="columns", question=question, example=example))
         return None
     parts.used.update(time.columns)
@@ -287,13 +350,18 @@ def _time(
         question += f" (It would be {counts_of(first)})" if set(time.forms) & set(EPOCH) else ""
         orders = {form.replace("%d", "%m") for form in time.forms}
         if len(orders) == 1:
-            parts.open.append(Open(key="date_order", question=question, example="ORDER (dmy, mdy or ymd)"))
+            parts.open.append(
+                Open(key="date_order", question=question, example="ORDER (dmy, mdy or ymd)")
+            )
         else:
             example = f"'{shape.reference(time.columns[0])}=time[FORMAT], and all other columns'"
             parts.open.append(Open(key="columns", question=question, example=example))
         return time
     if user_columns is None and of_another_origin(time, meanings):
-        question = f"{names} reads as {time.form}, and its heading speaks of another origin than 1970: which is right?"
+        question = (
+            f"{names} reads as {time.form}, and its heading speaks of another origin than 1970: "
+            "which is right?"
+        )
         example = f"'{shape.reference(time.columns[0])}=time[FORMAT], and all other columns'"
         parts.open.append(Open(key="columns", question=question, example=example))
     if user_columns is not None and user_columns.form:
@@ -313,7 +381,9 @@ def _time(
     if dates.is_elapsed(time.form):
         if options.start is None:
             question = f"{names} counts from a start: at what instant was the first row?"
-            parts.open.append(Open(key="start", question=question, example="TIME (as 2026-05-01T12:00:00+02:00)"))
+            parts.open.append(
+                Open(key="start", question=question, example="TIME (as 2026-05-01T12:00:00+02:00)")
+            )
         return time
     if dates.needs_date(time.form) and options.date is None:
         question = f"{names} has no whole date: of what day is the first row?"
@@ -334,8 +404,12 @@ def _of_user(parts: _Parts, shape: TableShape, user_columns: GivenColumns) -> tu
     for channel, (index, unit) in user_columns.channels.items():
         towards = channel == "wind_direction" and user_columns.towards
         parts.used.add(index)
-        parts.channels[channel] = ChannelText(column=shape.reference(index), unit=unit, towards=towards)
-        parts.facts.append(Fact(what=channel, value=f"{shape.shown(index)} in {unit}", origin="given"))
+        parts.channels[channel] = ChannelText(
+            column=shape.reference(index), unit=unit, towards=towards
+        )
+        parts.facts.append(
+            Fact(what=channel, value=f"{shape.shown(index)} in {unit}", origin="given")
+        )
     first = next(iter(user_columns.channels.values()))[0]
     return (shape.label(first),)
 
@@ -346,7 +420,9 @@ def _of_wind(
     """Labels of the anemometers; the facts of the one that is read are added to `parts`."""
     numeric = {i for i in range(len(meanings)) if _numeric(shape.column(i))}
     speeds = [
-        i for i, heading in enumerate(meanings) if heading.kind == "speed" and not heading.against and i in numeric
+        i
+        for i, heading in enumerate(meanings)
+        if heading.kind == "speed" and not heading.against and i in numeric
     ]
     moves = any(set(heading.against) & MOVING for heading in meanings)
     if moves or any(meanings[i].named for i in speeds):
@@ -363,7 +439,11 @@ def _of_wind(
         for i, heading in reversed(list(enumerate(meanings)))
         if heading.kind in _AXES and not heading.against
     }
-    components = {_AXES[kind]: axes[kind] for kind in ("x", "y", "z") if kind in axes and axes[kind] in numeric}
+    components = {
+        _AXES[kind]: axes[kind]
+        for kind in ("x", "y", "z")
+        if kind in axes and axes[kind] in numeric
+    }
     if chosen is None and not speeds and {"wind_x", "wind_y"} <= set(components):
         for channel, index in components.items():
             _add_wind_column(parts, shape, meanings, channel, index, options, is_given=False)
@@ -372,7 +452,11 @@ def _of_wind(
         return (shape.label(components["wind_x"]),), earth
     if chosen is None:
         listed = ", ".join(labels) or ", ".join(shape.shown(i) for i in range(len(shape.names)))
-        question = f"which column is the wind's speed? {listed}" if not labels else f"which anemometer? {listed}"
+        question = (
+            f"which column is the wind's speed? {listed}"
+            if not labels
+            else f"which anemometer? {listed}"
+        )
         parts.open.append(Open(key="wind", question=question, example="COLUMN"))
         return tuple(labels), False
     against = meanings[chosen].against
@@ -383,7 +467,8 @@ def _of_wind(
     ]
     if moving and options.platform is None:
         question = (
-            f"the heading {moving[0]!r} speaks of a platform that moves: which is it, fixed (it does not move), "
+            f"the heading {moving[0]!r} speaks of a platform that moves: which is it, fixed (it "
+            "does not move), "
             "moving (the wind is apparent), or corrected (the wind is over ground)?"
         )
         parts.open.append(Open(key="platform", question=question, example="PLATFORM"))
@@ -392,8 +477,14 @@ def _of_wind(
     doubts = [gust_factor(shape, meanings, chosen)]
     if direction is not None and {"wind_x", "wind_y"} <= set(components):
         axes_columns = (components["wind_x"], components["wind_y"])
-        doubts.append(ask_about_direction(shape, axes_columns, direction, parts.channels["wind_direction"].unit))
-    parts.open += [doubt for doubt in doubts if doubt is not None and doubt.example not in options.expect]
+        doubts.append(
+            ask_about_direction(
+                shape, axes_columns, direction, parts.channels["wind_direction"].unit
+            )
+        )
+    parts.open += [
+        doubt for doubt in doubts if doubt is not None and doubt.example not in options.expect
+    ]
     _other_quantities(parts, shape, meanings)
     return tuple(labels), False
 
@@ -408,8 +499,8 @@ def _add_wind_column(
     *,
     is_given: bool,
 ) -> None:
-    """Adds a column of wind with its unit; `is_given` where the user named it, and it is not one of several by its
-    heading."""
+    """Adds a column of wind with its unit; `is_given` where the user named it, and it is not one of
+    several by its heading."""
     meaning = meanings[index]
     parts.used.add(index)
     unit, origin, evidence = meaning.unit, _STATED, "the heading"
@@ -425,16 +516,22 @@ def _add_wind_column(
         origin = "given" if is_given else "inferred"
         evidence += "" if meaning.named else "; it does not name the wind"
     parts.channels[channel] = ChannelText(column=shape.reference(index), unit=unit)
-    parts.facts.append(Fact(what=channel, value=f"{shape.shown(index)} in {unit}", origin=origin, evidence=evidence))
+    parts.facts.append(
+        Fact(
+            what=channel, value=f"{shape.shown(index)} in {unit}", origin=origin, evidence=evidence
+        )
+    )
 
 
 _STATED: Origin = "stated"
 _GIVEN: Origin = "given"
 
 
-def _direction(parts: _Parts, shape: TableShape, meanings: Sequence[Meaning], speed: int) -> int | None:
-    """Finds the direction that belongs to a speed: of the same height, the only one of the table; its column, if
-    numeric."""
+def _direction(
+    parts: _Parts, shape: TableShape, meanings: Sequence[Meaning], speed: int
+) -> int | None:
+    """Finds the direction that belongs to a speed: of the same height, the only one of the table;
+    its column, if numeric."""
     candidates = [
         i
         for i, meaning in enumerate(meanings)
@@ -453,8 +550,14 @@ def _direction(parts: _Parts, shape: TableShape, meanings: Sequence[Meaning], sp
     )
     points = _compass(shape.column(index))
     if points == "?":
-        question = f"{shape.shown(index)} has points of the compass whose O may be east or west: of which language?"
-        example = f"'{shape.reference(index)}=wind_direction[points-de] (or points-es, …), and all other columns'"
+        question = (
+            f"{shape.shown(index)} has points of the compass whose O may be east or west: of which "
+            "language?"
+        )
+        example = (
+            f"'{shape.reference(index)}=wind_direction[points-de] (or points-es, …), and all other "
+            "columns'"
+        )
         parts.open.append(Open(key="columns", question=question, example=example))
         return None
     if points is not None:
@@ -469,7 +572,10 @@ def _direction(parts: _Parts, shape: TableShape, meanings: Sequence[Meaning], sp
         origin = "inferred"
     if meaning_of_direction.against:
         question = f"does {shape.shown(index)} say where the wind comes from, or where it blows to?"
-        example = f"'{shape.reference(index)}=wind_direction[{unit}] (or wind_direction_to), and all other columns'"
+        example = (
+            f"'{shape.reference(index)}=wind_direction[{unit}] (or wind_direction_to), and all "
+            "other columns'"
+        )
         parts.open.append(Open(key="columns", question=question, example=example))
     parts.used.add(index)
     parts.channels["wind_direction"] = ChannelText(column=shape.reference(index), unit=unit)
@@ -482,14 +588,21 @@ def _other_quantities(parts: _Parts, shape: TableShape, meanings: Sequence[Meani
     """Adds temperature, humidity and pressure whose unit is stated."""
     for index, heading in enumerate(meanings):
         channel = _BESIDE.get(heading.kind)
-        if channel is None or channel in parts.channels or heading.against or not _numeric(shape.column(index)):
+        if (
+            channel is None
+            or channel in parts.channels
+            or heading.against
+            or not _numeric(shape.column(index))
+        ):
             continue
         if heading.unit is not None and fits(channel, heading.unit):
             parts.used.add(index)
             parts.channels[channel] = ChannelText(column=shape.reference(index), unit=heading.unit)
             value = f"{shape.shown(index)} in {heading.unit}"
             origin: Origin = "stated" if heading.plain in _PLAIN[channel] else "inferred"
-            parts.facts.append(Fact(what=channel, value=value, origin=origin, evidence="the heading"))
+            parts.facts.append(
+                Fact(what=channel, value=value, origin=origin, evidence="the heading")
+            )
 
 
 def _numeric(cells: Sequence[str]) -> bool:
@@ -498,10 +611,13 @@ def _numeric(cells: Sequence[str]) -> bool:
 
 
 def _compass(cells: Sequence[str]) -> str | None:
-    """Names the unit of the compass points in a column's cells; `None` for none, "?" where languages differ."""
+    """Names the unit of the compass points in a column's cells; `None` for none, "?" where
+    languages differ."""
     filled = {cell.upper() for cell in cells if not is_missing(cell)}
     tables: Mapping[str, Mapping[str, float]] = compass.BY_UNIT
-    fitting = [name for name, points in tables.items() if filled and filled <= {*points, *compass.CALM}]
+    fitting = [
+        name for name, points in tables.items() if filled and filled <= {*points, *compass.CALM}
+    ]
     if not fitting or not any(cell.isalpha() for cell in filled):
         return None
     first = tables[fitting[0]]
@@ -510,18 +626,23 @@ def _compass(cells: Sequence[str]) -> str | None:
 
 
 _FACTORS = (1.0, 3.2)
-"""Gusts by the mean of their time: below 1 is impossible, above 3.2 no station has it in the mean of a log."""
+"""Gusts by the mean of their time: below 1 is impossible, above 3.2 no station has it in the mean
+of a log."""
 _APART, _TOGETHER, _LEAST = 30.0, 0.9, 5
-"""Degrees between a direction and its components, length of the mean of unit vectors, and rows that show it."""
+"""Degrees between a direction and its components, length of the mean of unit vectors, and rows that
+show it."""
 
 
 def gust_factor(shape: TableShape, meanings: Sequence[Meaning], speed: int) -> Open | None:
-    """Asks about a speed whose gusts are no gusts of it; `None` where there are none, or they are."""
+    """Asks about a speed whose gusts are no gusts of it; `None` where there are none, or they
+    are."""
     speed_heading = meanings[speed]
     for index, gust_heading in enumerate(meanings):
         of_speed = gust_heading.unit is None or fits("wind_speed", gust_heading.unit)
         if index == speed or not (
-            set(gust_heading.against) & GUSTS and of_speed and named_alike(gust_heading, speed_heading)
+            set(gust_heading.against) & GUSTS
+            and of_speed
+            and named_alike(gust_heading, speed_heading)
         ):
             continue
         mean, gust = _numbers(shape, speed), _numbers(shape, index)
@@ -536,14 +657,18 @@ def gust_factor(shape: TableShape, meanings: Sequence[Meaning], speed: int) -> O
         factor = float(scale * gust[present].sum() / mean[present].sum())
         if not _FACTORS[0] <= factor <= _FACTORS[1]:
             question = (
-                f"{shape.shown(index)} is {factor:.2g} times {shape.shown(speed)} in the mean; gusts are "
-                f"{_FACTORS[0]:g} to {_FACTORS[1]:g} times the wind. Is {shape.shown(speed)} the mean wind?"
+                f"{shape.shown(index)} is {factor:.2g} times {shape.shown(speed)} in the mean; "
+                "gusts are "
+                f"{_FACTORS[0]:g} to {_FACTORS[1]:g} times the wind. Is {shape.shown(speed)} the "
+                "mean wind?"
             )
             return Open(key="expect", question=question, example="gust")
     return None
 
 
-def ask_about_direction(shape: TableShape, axes: tuple[int, int], direction: int, unit: str) -> Open | None:
+def ask_about_direction(
+    shape: TableShape, axes: tuple[int, int], direction: int, unit: str
+) -> Open | None:
     """Asks about a direction that components towards east and north beside it contradict.
 
     Args:
@@ -560,7 +685,11 @@ def ask_about_direction(shape: TableShape, axes: tuple[int, int], direction: int
     if abs(mean_turn) >= _TOGETHER and abs(degrees) <= _APART:
         return None
     columns = f"{shape.shown(direction)} and the components {', '.join(map(shape.shown, axes))}"
-    how = f"differ by {degrees:.0f}\N{DEGREE SIGN}" if abs(mean_turn) >= _TOGETHER else "do not turn together"
+    how = (
+        f"differ by {degrees:.0f}\N{DEGREE SIGN}"
+        if abs(mean_turn) >= _TOGETHER
+        else "do not turn together"
+    )
     question = f"{columns} {how}. Does {shape.shown(direction)} say where the wind comes from?"
     return Open(key="expect", question=question, example="components")
 

@@ -1,11 +1,14 @@
-"""What the user gives of a table's columns in one line: "date,time,wind_speed[km/h],,wind_direction[deg]".
+"""What the user gives of a table's columns in one line:
+"date,time,wind_speed[km/h],,wind_direction[deg]".
 
     ENTRY,ENTRY,…              one entry a column, in the order of the file; a blank entry is a column that is not read
     COLUMN=ENTRY,COLUMN=ENTRY  or only those that are read, each after its heading or number (from 1)
 
-An entry is a channel with its unit in brackets, `wind_direction_to` for a direction that the wind blows to, or a part
-of the time: `time`, `date`, `year`, `month`, `day`, `day_of_year`, `hour`, `minute`, `second`. Behind `time` and `date`
-the format may stand in brackets, as a recipe's [time] format has it, or the unit of a count since a start (`time[s]`).
+An entry is a channel with its unit in brackets, `wind_direction_to` for a direction that the wind
+blows to, or a part
+of the time: `time`, `date`, `year`, `month`, `day`, `day_of_year`, `hour`, `minute`, `second`.
+Behind `time` and `date` the format may stand in brackets, as a recipe's [time] format has it, or
+the unit of a count since a start (`time[s]`).
 """
 
 from __future__ import annotations
@@ -35,7 +38,9 @@ PARTS = {
 _TIMES = ("date", "time", *PARTS)
 _COUNTS = {form.removeprefix("elapsed-"): form for form in ELAPSED}
 _NAMES = tuple(name for name, channel in CHANNELS.items() if channel.dims == ("time",))
-_ENTRY = re.compile(r"(?:(?P<column>.*)=)?\s*(?P<name>[^\[\]=]*?)\s*(?:\[(?P<detail>[^\]]*)\])?\s*", re.DOTALL)
+_ENTRY = re.compile(
+    r"(?:(?P<column>.*)=)?\s*(?P<name>[^\[\]=]*?)\s*(?:\[(?P<detail>[^\]]*)\])?\s*", re.DOTALL
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +64,8 @@ def given_columns(text: str, shape: TableShape) -> GivenColumns:
     """Reads the columns of a table as one line gives them.
 
     Raises:
-        UsageError, UnknownNameError: an entry that cannot be read, a name or a unit that is not known.
+        UsageError, UnknownNameError: an entry that cannot be read, a name or a unit that is not
+            known.
         InputError: a column that the table does not have.
     """
     parts = re.split(r",(?![^\[\]]*\])", text)
@@ -71,14 +77,24 @@ def given_columns(text: str, shape: TableShape) -> GivenColumns:
         if not part.strip():
             continue
         match = _ENTRY.fullmatch(part.strip())
-        if match is None or not match["name"] or by_name != (match["column"] is not None) or "?" in part:
-            fix = 'write NAME[UNIT] for each, as "time,wind_speed[km/h]", or COLUMN=NAME[UNIT] for each'
+        if (
+            match is None
+            or not match["name"]
+            or by_name != (match["column"] is not None)
+            or "?" in part
+        ):
+            fix = (
+                'write NAME[UNIT] for each, as "time,wind_speed[km/h]", or COLUMN=NAME[UNIT] for '
+                "each"
+            )
             raise UsageError(f"{part.strip()!r} cannot be read", where=_WHERE, fix=fix)
         name, detail = match["name"], (match["detail"] or "").strip()
         index = _index(match["column"].strip(), shape) if by_name else number - 1
         if index >= len(shape.names):
             message = f"entry {number} is beyond the {len(shape.names)} columns of the table"
-            raise InputError(message, where=_WHERE, fix="count the columns, or name them: COLUMN=NAME[UNIT]")
+            raise InputError(
+                message, where=_WHERE, fix="count the columns, or name them: COLUMN=NAME[UNIT]"
+            )
         if name in _TIMES:
             times.append((index, name, detail))
             continue
@@ -89,12 +105,18 @@ def given_columns(text: str, shape: TableShape) -> GivenColumns:
         if name in channels:
             raise UsageError(f"{name} stands twice", where=_WHERE, fix="name one of them")
         if not detail:
-            raise UsageError(f"{name} has no unit", where=_WHERE, fix=f"write {name}[UNIT], as {name}[m/s]")
+            raise UsageError(
+                f"{name} has no unit", where=_WHERE, fix=f"write {name}[UNIT], as {name}[m/s]"
+            )
         channels[name] = (index, canonical(detail, where=f"{_WHERE} {name}"))
     if not channels:
-        raise UsageError("no channel is named", where=_WHERE, fix="name the column of the wind: wind_speed[m/s]")
+        raise UsageError(
+            "no channel is named", where=_WHERE, fix="name the column of the wind: wind_speed[m/s]"
+        )
     times.sort()
-    return GivenColumns(time=tuple(i for i, _, _ in times), form=_form(times), channels=channels, towards=towards)
+    return GivenColumns(
+        time=tuple(i for i, _, _ in times), form=_form(times), channels=channels, towards=towards
+    )
 
 
 def _form(times: list[tuple[int, str, str]]) -> str:
@@ -108,9 +130,13 @@ def _form(times: list[tuple[int, str, str]]) -> str:
 def _index(column: str, shape: TableShape) -> int:
     if column in shape.names:
         if shape.names.count(column) > 1:
-            raise InputError(f"{column!r} heads several columns", where=_WHERE, fix="give its number (from 1)")
+            raise InputError(
+                f"{column!r} heads several columns", where=_WHERE, fix="give its number (from 1)"
+            )
         return shape.names.index(column)
     number = read_bounded(column, most=len(shape.names))
     if number:
         return number - 1
-    raise UnknownNameError.of("column", column, [name for name in shape.names if name], where=_WHERE)
+    raise UnknownNameError.of(
+        "column", column, [name for name in shape.names if name], where=_WHERE
+    )

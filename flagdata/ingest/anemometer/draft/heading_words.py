@@ -1,7 +1,8 @@
-"""What a heading says: the quantity that a column may hold, its unit, and words that speak against a plain mean wind.
+"""What a heading says: the quantity that a column may hold, its unit, and words that speak against
+a plain mean wind.
 
-English, and the commonest words of German, Dutch, French, Spanish and Italian. What is not in these tables is not
-understood, and the user says what the column is.
+English, and the commonest words of German, Dutch, French, Spanish and Italian. What is not in these
+tables is not understood, and the user says what the column is.
 """
 
 from __future__ import annotations
@@ -15,7 +16,19 @@ from flagdata.core.schema import CHANNELS
 from flagdata.core.units import UNITS, name_of_unit
 
 Kind = Literal[
-    "speed", "direction", "site", "sonic", "x", "y", "z", "time", "date", "temperature", "humidity", "pressure", "other"
+    "speed",
+    "direction",
+    "site",
+    "sonic",
+    "x",
+    "y",
+    "z",
+    "time",
+    "date",
+    "temperature",
+    "humidity",
+    "pressure",
+    "other",
 ]
 
 
@@ -24,13 +37,18 @@ def words_of(text: str) -> frozenset[str]:
     return frozenset(text.split())
 
 
-_WIND = words_of("wind winds windmean anemometer anemo anem sonic csat viento vent vento gill vane cup cups windvane")
+_WIND = words_of(
+    "wind winds windmean anemometer anemo anem sonic csat viento vent vento gill vane cup cups "
+    "windvane"
+)
 _SPEED = words_of(
-    "speed spd sp velocity vel ws wspd wsp windspeed windspd windsp wndspd wndsp ff fff vv geschwindigkeit "
+    "speed spd sp velocity vel ws wspd wsp windspeed windspd windsp wndspd wndsp ff fff vv "
+    "geschwindigkeit "
     "windgeschwindigkeit vitesse velocidad snelheid windsnelheid velocita"
 )
 _DIRECTION = words_of(
-    "direction dir dirn wd wdir winddir winddirection wnddir dd ddd bearing azimuth richtung windrichtung "
+    "direction dir dirn wd wdir winddir winddirection wnddir dd ddd bearing azimuth richtung "
+    "windrichtung "
     "direccion richting direzione"
 )
 _AXES: tuple[tuple[Kind, frozenset[str]], ...] = (
@@ -39,7 +57,8 @@ _AXES: tuple[tuple[Kind, frozenset[str]], ...] = (
     ("z", words_of("w uz z up vertical upward")),
 )
 _TIME = words_of(
-    "time timestamp datetime stamp clock hour uhrzeit zeit heure hora tijd ora tmstamp epoch unixtime utc gmt "
+    "time timestamp datetime stamp clock hour uhrzeit zeit heure hora tijd ora tmstamp epoch "
+    "unixtime utc gmt "
     "localtime zeitstempel date_time sampletime recordtime timestring millis elapsed"
 )
 _DATE = words_of("date day datum fecha jour giorno dato yyyymmdd")
@@ -47,20 +66,30 @@ _TEMPERATURE = words_of("temperature temp ta airtemp tair temperatur temperatura
 _HUMIDITY = words_of("humidity rh hum relhum feuchte humedad umidita humidite")
 _PRESSURE = words_of("pressure press baro bp barometer luftdruck presion pression pressione druk")
 _EXTREME = words_of(
-    "gust gusts gustspeed max maximum min minimum peak high hi low lo highest lowest extreme boe böe bö rafale "
+    "gust gusts gustspeed max maximum min minimum peak high hi low lo highest lowest extreme boe "
+    "böe bö rafale "
     "racha raffica windgust maxi mini"
 )
 GUSTS = _EXTREME - words_of("min minimum low lo lowest mini")
-_SPREAD = words_of("std stdev sd stddev sigma deviation dev variance var rms ti turbulence count quality qc flag")
+_SPREAD = words_of(
+    "std stdev sd stddev sigma deviation dev variance var rms ti turbulence count quality qc flag"
+)
 MOVING = words_of(
-    "apparent aws awa awd relative bow vessel boat ship drone uav sog cog heading hdg ground gps vehicle truewind "
+    "apparent aws awa awd relative bow vessel boat ship drone uav sog cog heading hdg ground gps "
+    "vehicle truewind "
     "tws twd twa track roll pitch yaw vx vy vz"
 )
 """Words that speak of a platform which may move."""
 _TOWARDS = words_of("to toward towards going")
-_RAW = words_of("volt volts voltage counts pulses pulse raw adc mv frequency freq beaufort bft class chill")
-_OTHER = words_of("battery batt rain solar radiation uv soil dew dewpoint snow wave tide water sea current")
-_SITES = words_of("station site sensor device location turbine buoy node mast id serial place logger")
+_RAW = words_of(
+    "volt volts voltage counts pulses pulse raw adc mv frequency freq beaufort bft class chill"
+)
+_OTHER = words_of(
+    "battery batt rain solar radiation uv soil dew dewpoint snow wave tide water sea current"
+)
+_SITES = words_of(
+    "station site sensor device location turbine buoy node mast id serial place logger"
+)
 _BRACKET = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]{1,20})[\])]\s*(?P<rest>.*)$")
 _WORD = re.compile(r"[a-zäöüß°]+|\d+(?:\.\d+)?")
 _HEIGHT = re.compile(r"(?<![a-z\d.])(\d{1,3}(?:\.\d+)?)\s*m(?![a-z/])", re.IGNORECASE)
@@ -72,7 +101,8 @@ class Meaning:
 
     Attributes:
         kind: of quantity.
-        unit: that the heading or the line below it states, as `flagdata.core.units` names it; `None` for none.
+        unit: that the heading or the line below it states, as `flagdata.core.units` names it;
+            `None` for none.
         against: words that speak against a plain mean wind of a fixed instrument.
         named: whether the wind itself is named, and not a speed or a direction of something.
         height: in metres, where it is stated.
@@ -92,13 +122,21 @@ class Meaning:
 def meaning(name: str, below: str = "") -> Meaning:
     """Reads what a heading says, with the unit that may stand below it."""
     bare, unit = _with_unit(name, below)
-    split = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", bare).lower().replace("é", "e").replace("à", "a").replace("ó", "o")
+    split = (
+        re.sub(r"(?<=[a-z])(?=[A-Z])", " ", bare)
+        .lower()
+        .replace("é", "e")
+        .replace("à", "a")
+        .replace("ó", "o")
+    )
     words = _WORD.findall(split.replace("_", " "))
     joined = {*words, *(a + b for a, b in pairwise(words))}
     against = tuple(w for w in words if w in _EXTREME | _SPREAD | MOVING | _RAW | _TOWARDS)
     height = _HEIGHT.search(name)
     kind = _kind(words, joined, unit)
-    named = bool(joined & _WIND) or any(word.startswith(("wind", "wnd", "ws", "wd")) for word in words)
+    named = bool(joined & _WIND) or any(
+        word.startswith(("wind", "wnd", "ws", "wd")) for word in words
+    )
     return Meaning(
         kind=kind,
         unit=unit,
@@ -116,9 +154,11 @@ def fits(channel: str, unit: str) -> bool:
 
 
 def named_alike(gust: Meaning, speed: Meaning) -> bool:
-    """Checks whether a gust has the name of a speed: its words, but those of gusts and speeds, are among the
-    other's."""
-    left, right = (set(a.plain.split()) - _EXTREME - _SPEED - {"mean", "avg", "average"} for a in (gust, speed))
+    """Checks whether a gust has the name of a speed: its words, but those of gusts and speeds, are
+    among the other's."""
+    left, right = (
+        set(a.plain.split()) - _EXTREME - _SPEED - {"mean", "avg", "average"} for a in (gust, speed)
+    )
     return left <= right
 
 
@@ -136,7 +176,9 @@ def _kind(words: list[str], joined: set[str], unit: str | None) -> Kind:
         return axes[0]
     if joined & _WIND and (UNITS[unit].si == "m/s" if unit is not None else set(words) <= _WIND):
         return "speed"
-    if set(words) & _SITES and not set(words) & (_TEMPERATURE | _HUMIDITY | _PRESSURE | _TIME | _DATE):
+    if set(words) & _SITES and not set(words) & (
+        _TEMPERATURE | _HUMIDITY | _PRESSURE | _TIME | _DATE
+    ):
         return "site"
     ordinary: tuple[tuple[frozenset[str], Kind], ...] = (
         (_TEMPERATURE, "temperature"),
@@ -152,7 +194,8 @@ def _kind(words: list[str], joined: set[str], unit: str | None) -> Kind:
 
 
 def _with_unit(name: str, below: str) -> tuple[str, str | None]:
-    """Splits a heading into name and unit, which stands in brackets, behind a comma or blank, or in the line below."""
+    """Splits a heading into name and unit, which stands in brackets, behind a comma or blank, or in
+    the line below."""
     if (alone := name_of_unit(name[:40])) is not None:
         return "", alone
     match = _BRACKET.match(name[:200])
@@ -161,6 +204,10 @@ def _with_unit(name: str, below: str) -> tuple[str, str | None]:
     for mark in (",", " - ", " in ", " ", "_"):
         head, _, tail = name[:200].rpartition(mark)
         unit = name_of_unit(tail) if head and (len(tail) > 1 or mark == ",") else None
-        if unit is not None and UNITS[unit].si in ("m/s", "rad", "K", "Pa") and tail.lower() not in ("to", "grad"):
+        if (
+            unit is not None
+            and UNITS[unit].si in ("m/s", "rad", "K", "Pa")
+            and tail.lower() not in ("to", "grad")
+        ):
             return head, unit
     return name[:200], name_of_unit(below.strip("[]() ")) if below else None

@@ -28,14 +28,20 @@ class Open:
         """Returns the option that answers the question."""
         if self.lines:
             return (
-                "save the recipe that flagdata ingest --sniff prints as FILE.toml, replace each ? in it, and add"
+                "save the recipe that flagdata ingest --sniff prints as FILE.toml, replace each ? "
+                "in it, and add"
                 f"\n{self.lines}\nfor the one to be read; then name it: --sensor FILE.toml"
             )
-        return f"--{self.key.replace('_', '-')} {self.example}{' (if yes)' if self.key == 'expect' else ''}"
+        return (
+            f"--{self.key.replace('_', '-')} "
+            f"{self.example}{' (if yes)' if self.key == 'expect' else ''}"
+        )
 
 
 ZONE = Open(
-    key="zone", question="what is the zone of the logger's clock (Europe/Amsterdam, +02:00, UTC)?", example="ZONE"
+    key="zone",
+    question="what is the zone of the logger's clock (Europe/Amsterdam, +02:00, UTC)?",
+    example="ZONE",
 )
 
 
@@ -44,7 +50,9 @@ class OpenFactsError(RefusedError):
 
     kind = ErrorKind.OPEN_FACTS
 
-    def __init__(self, what: str, *, where: str | None = None, fix: str, questions: tuple[Open, ...] = ()) -> None:
+    def __init__(
+        self, what: str, *, where: str | None = None, fix: str, questions: tuple[Open, ...] = ()
+    ) -> None:
         super().__init__(what, where=where, fix=fix)
         self.questions = questions
 
@@ -52,7 +60,10 @@ class OpenFactsError(RefusedError):
     def of(cls, questions: Sequence[Open], *, where: str) -> OpenFactsError:
         """Returns the error for some questions, which names what answers each."""
         recipes = [question.fix() for question in questions if question.lines]
-        options = f"answer by {' '.join(question.fix() for question in questions)}; or describe the file by a recipe: "
+        options = (
+            f"answer by {' '.join(question.fix() for question in questions)}; or describe the file "
+            "by a recipe: "
+        )
         return cls(
             f"the file leaves this open: {'; '.join(question.question for question in questions)}",
             where=where,

@@ -1,4 +1,5 @@
-"""NMEA 2000 as text: frames, and the canboat project's raw lines (PLAIN, FAST), analyzer's text and its JSON.
+"""NMEA 2000 as text: frames, and the canboat project's raw lines (PLAIN, FAST), analyzer's text and
+its JSON.
 
     (1502979132.106111) can0 09FD0223#00A50267FE02FFFF
     17:33:21.107 R 09FD0223 00 A5 02 67 FE 02 FF FF
@@ -6,15 +7,18 @@
     2011-11-24-22:42:04.437 2  36 255 130306 Wind Data:  SID = 177; Wind Speed = 0.92 m/s; Wind Angle = 353.4 deg; …
     {"timestamp":"…","prio":2,"src":36,"dst":255,"pgn":130306,"description":"Wind Data","fields":{"Wind Speed":0.92,…}}
 
-The first is of Linux' candump -L, the second the RAW text of Yacht Devices' gateways, of which the user gives the day.
-Source: SocketCAN, candump(1); Yacht Devices, Wi-Fi Gateway YDWG-02 user manual, appendix "Format of messages in RAW
-mode" (UTC, R received, identifier, data); SAE J1939-21, 5.2, for the identifier's 29 bits: priority 3, then data page,
-PDU format and PDU specific, which make the number of the message, and the sender's address 8; canboat project, README
-"File formats", wiki "analyzer", and its table of PGNs: 130306 Wind Data is SID, speed (uint16, 0.01 m/s), angle
-(uint16, 0.0001 rad), reference (3 bits: 0 over ground from true north, 1 from magnetic north, 2 apparent, 3 boat-
-referenced, 4 water-referenced); 129026 COG & SOG holds the speed over ground (uint16 in bytes 4 and 5, 0.01 m/s); the
-three largest numbers of a field mean no value. References 3 and 4 are winds computed as if the platform were
-at rest (theoretical). JSON says by "units" in its first line whether angles are rad ("si") or deg.
+The first is of Linux' candump -L, the second the RAW text of Yacht Devices' gateways, of which the
+user gives the day.
+Source: SocketCAN, candump(1); Yacht Devices, Wi-Fi Gateway YDWG-02 user manual, appendix "Format of
+messages in RAW mode" (UTC, R received, identifier, data); SAE J1939-21, 5.2, for the identifier's
+29 bits: priority 3, then data page, PDU format and PDU specific, which make the number of the
+message, and the sender's address 8; canboat project, README "File formats", wiki "analyzer", and
+its table of PGNs: 130306 Wind Data is SID, speed (uint16, 0.01 m/s), angle (uint16, 0.0001 rad),
+reference (3 bits: 0 over ground from true north, 1 from magnetic north, 2 apparent, 3 boat-
+referenced, 4 water-referenced); 129026 COG & SOG holds the speed over ground (uint16 in bytes 4 and
+5, 0.01 m/s); the three largest numbers of a field mean no value. References 3 and 4 are winds
+computed as if the platform were at rest (theoretical). JSON says by "units" in its first line
+whether angles are rad ("si") or deg.
 """
 
 from __future__ import annotations
@@ -48,12 +52,20 @@ _GATEWAY = re.compile(
 _WIND = 130306
 _OVER_GROUND = 129026
 _STAMP = r"(?P<date>\d{4}-\d{2}-\d{2})[T Z-](?P<time>\d{2}:\d{2}:\d{2}(?:\.\d{1,9})?)(?P<zone>Z?)"
-_RAW = re.compile(_STAMP + r",(?P<rest>\d,(?P<pgn>\d{4,6}),(?P<src>\d{1,3}),\d{1,3},\d{1,3}(?:,[0-9A-Fa-f]{2})*)\s*")
-_TEXT = re.compile(
-    _STAMP + r"\s+(?P<rest>\d\s+(?P<src>\d{1,3})\s+\d{1,3}\s+(?P<pgn>\d{4,6})\s[^:]{0,80}:(?P<fields>.*))"
+_RAW = re.compile(
+    _STAMP
+    + r",(?P<rest>\d,(?P<pgn>\d{4,6}),(?P<src>\d{1,3}),\d{1,3},\d{1,3}(?:,[0-9A-Fa-f]{2})*)\s*"
 )
-_RESTS = re.compile(r"\d,(?P<pgn>\d{4,6}),(?P<src>\d{1,3}),\d{1,3},(?P<size>\d{1,3})(?P<bytes>(?:,[0-9A-Fa-f]{2})*)")
-_WORDS = re.compile(r"\d\s+(?P<src>\d{1,3})\s+\d{1,3}\s+(?P<pgn>\d{4,6})\s[^:]{0,80}:(?P<fields>.*)")
+_TEXT = re.compile(
+    _STAMP
+    + r"\s+(?P<rest>\d\s+(?P<src>\d{1,3})\s+\d{1,3}\s+(?P<pgn>\d{4,6})\s[^:]{0,80}:(?P<fields>.*))"
+)
+_RESTS = re.compile(
+    r"\d,(?P<pgn>\d{4,6}),(?P<src>\d{1,3}),\d{1,3},(?P<size>\d{1,3})(?P<bytes>(?:,[0-9A-Fa-f]{2})*)"
+)
+_WORDS = re.compile(
+    r"\d\s+(?P<src>\d{1,3})\s+\d{1,3}\s+(?P<pgn>\d{4,6})\s[^:]{0,80}:(?P<fields>.*)"
+)
 _CUT = re.compile(r"\d{4}-\d{2}-\d{2}[T Z-]|\{\"timestamp\"")
 _REFERENCES: Mapping[str, int] = {
     "true (ground referenced to north)": 0,
@@ -111,11 +123,16 @@ class Canboat:
             raise InputError(
                 f"several devices send wind: {listed}; they are different instruments",
                 where=where,
-                fix=f"choose one by its address, e.g. {command_line('--talker', min(network.devices, key=int))}",
+                fix="choose one by its address, e.g. "
+                f"{command_line('--talker', min(network.devices, key=int))}",
             )
-        kept_findings = tuple(finding for finding in reading.findings if finding.kind != "non-data-lines")
+        kept_findings = tuple(
+            finding for finding in reading.findings if finding.kind != "non-data-lines"
+        )
         knots = [speed / UNITS["kn"].scale for speed in network.speeds]
-        channels, about = settle_platform(reading.channels, options, speeds=knots, source=f"PGN {_WIND}", where=where)
+        channels, about = settle_platform(
+            reading.channels, options, speeds=knots, source=f"PGN {_WIND}", where=where
+        )
         sensor = Sensor(name=f"NMEA 2000 device {next(iter(network.devices))}", resolution=0.01)
         return replace(reading, channels=channels, sensor=sensor, findings=(*kept_findings, about))
 
@@ -183,7 +200,9 @@ class _Network:
         if match is not None:
             pairs = (part.partition("=") for part in match["fields"].split(";"))
             return self._fields(
-                int(match["pgn"]), match["src"], {key.strip(): value.strip() for key, _, value in pairs}
+                int(match["pgn"]),
+                match["src"],
+                {key.strip(): value.strip() for key, _, value in pairs},
             )
         return Defect.CUT if _CUT.match(rest) else Defect.OTHER
 
@@ -211,7 +230,10 @@ class _Network:
         pgn = message.get("pgn")
         if not isinstance(fields, dict) or not str(pgn).isdigit():
             return Defect.OTHER
-        plain = {key: value.get("name") if isinstance(value, dict) else value for key, value in fields.items()}
+        plain = {
+            key: value.get("name") if isinstance(value, dict) else value
+            for key, value in fields.items()
+        }
         return self._fields(int(str(pgn)), str(message.get("src", "")), plain)
 
     def _fields(self, pgn: int, device: str, fields: Mapping[str, Any]) -> Sample | Defect:

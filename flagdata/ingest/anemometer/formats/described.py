@@ -1,8 +1,9 @@
 """Tables described by data: recipes that the heading of the file itself completes.
 
-Such a recipe leaves open what differs from one export to the next: where the heading stands, which of several names a
-column has, in which unit it is. The formats of catalogs/sensors/formats are recipes of this kind that recognise their
-files; a user's own is read by `--sensor FILE.toml`. Beside the keys of every recipe (see sensor_recipe.py) they have
+Such a recipe leaves open what differs from one export to the next: where the heading stands, which
+of several names a column has, in which unit it is. The formats of catalogs/sensors/formats are
+recipes of this kind that recognise their files; a user's own is read by `--sensor FILE.toml`.
+Beside the keys of every recipe (see sensor_recipe.py) they have
 
     described-by        whose description it follows, of a format that was never tested on a real file
     [match]             see recipe.MATCH
@@ -36,7 +37,13 @@ from flagdata.core.shell import command_line
 from flagdata.core.units import UNITS, name_of_unit, unit
 from flagdata.errors import InputError
 from flagdata.ingest.anemometer import sensor_recipe as recipes
-from flagdata.ingest.anemometer.formats.recipe_headings import Column, Heading, find, fits, stamp_format
+from flagdata.ingest.anemometer.formats.recipe_headings import (
+    Column,
+    Heading,
+    find,
+    fits,
+    stamp_format,
+)
 from flagdata.ingest.anemometer.instants.stamp_text import parse
 from flagdata.ingest.anemometer.log_reading import Reading, followed_finding
 from flagdata.ingest.anemometer.sensor_recipe import OpenRecipe, Recipe
@@ -53,7 +60,10 @@ from flagdata.timebase import NANOSECONDS
 _SHELF = Shelf(folder="sensors/formats", noun="table format")
 _LINES = 5000
 """Lines by which order of dates and decimal mark are decided."""
-_FIX = "export again in m/s, km/h, mph or knots (Beaufort is a scale of classes), or describe the file by a recipe"
+_FIX = (
+    "export again in m/s, km/h, mph or knots (Beaufort is a scale of classes), or describe the "
+    "file by a recipe"
+)
 _NAMED, _WIDE = 60, 120
 """Columns that are not read which a note names, and letters of each."""
 _WINDS = ("mph", "km/h", "m/s", "kn")
@@ -71,7 +81,8 @@ class Completed:
         channels: channel → the column that is read.
         unread, rivals: columns that are not read, and further ones of wind speed or components.
         inferred: why a unit is inferred that the file does not state; "" where none is.
-        averaged: whether a row is the average over the distance of the stamps; starts: and stamped by its beginning.
+        averaged: whether a row is the average over the distance of the stamps; starts: and stamped
+            by its beginning.
         findings: about dates and units.
     """
 
@@ -100,23 +111,32 @@ class Described:
         heading = find(self.open.data, head.lines)
         if heading is None:
             return None
-        reason = f"line {heading.at + 1} is as in every {self.about}: {head.lines[heading.at].strip()[:100]}"
+        reason = (
+            f"line {heading.at + 1} is as in every {self.about}: "
+            f"{head.lines[heading.at].strip()[:100]}"
+        )
         return Guess(format=self.name, score=0.96, reasons=(reason,))
 
     def read(self, source: TextFile, options: WindOptions) -> Reading:
         """Read the rows by what the heading states."""
         done = self.completed(source, options)
-        return self.finish_reading(self.table(source, done, options).reading, done, options, where=str(source.path))
+        return self.finish_reading(
+            self.table(source, done, options).reading, done, options, where=str(source.path)
+        )
 
     def completed(self, source: TextFile, options: WindOptions) -> Completed:
         """Reads what the heading of a file states."""
-        return complete(self.open, source.head(_LINES), options, where=str(source.path), relabel=self.named)
+        return complete(
+            self.open, source.head(_LINES), options, where=str(source.path), relabel=self.named
+        )
 
     def named(self, heading: Heading, lines: Sequence[str]) -> Heading:
         """Returns the heading with the names by which the recipe knows its columns."""
         return heading
 
-    def table(self, source: TextFile, done: Completed, options: WindOptions, extra: Sequence[str] = ()) -> Table:
+    def table(
+        self, source: TextFile, done: Completed, options: WindOptions, extra: Sequence[str] = ()
+    ) -> Table:
         """Reads the rows below the heading, and further columns by their names."""
         rows, where = RowReader(source, done.recipe.file), str(source.path)
         return read_table(
@@ -128,8 +148,11 @@ class Described:
             extra=extra,
         )
 
-    def finish_reading(self, reading: Reading, done: Completed, options: WindOptions, *, where: str) -> Reading:
-        """Adds to a reading what the format states of averages, and what is reported of other columns."""
+    def finish_reading(
+        self, reading: Reading, done: Completed, options: WindOptions, *, where: str
+    ) -> Reading:
+        """Adds to a reading what the format states of averages, and what is reported of other
+        columns."""
         findings = [*done.findings, *column_findings(done)]
         if done.averaged and len(reading.time) > 1:
             period = float(np.median(np.abs(np.diff(reading.time)))) / NANOSECONDS
@@ -137,22 +160,33 @@ class Described:
         if done.starts and reading.sensor.averaging:
             averaging = reading.sensor.averaging
             reading = replace(reading, time=reading.time + round(averaging * NANOSECONDS))
-            text = f"stamps are of the beginning of averages over {averaging:g} s; moved to their end"
+            text = (
+                f"stamps are of the beginning of averages over {averaging:g} s; moved to their end"
+            )
             findings.append(Finding.of("stamps-at-start", text))
         if "described-by" in self.open.data:
             findings.append(followed_finding(self.open.data["described-by"]))
-        reading = with_horizontal(reading.with_findings(tuple(findings)), options.azimuth, where=where)
+        reading = with_horizontal(
+            reading.with_findings(tuple(findings)), options.azimuth, where=where
+        )
         if not done.inferred:
             return replace(reading, described=self.text)
         return replace(reading, drafted=to_toml(done.data), understood=(self.about, done.inferred))
 
     def _whole_in(self) -> bool:
         layouts = self.open.data["channels"].values()
-        return any("whole" in layout["unit"] for layout in layouts if isinstance(layout["unit"], Mapping))
+        return any(
+            "whole" in layout["unit"] for layout in layouts if isinstance(layout["unit"], Mapping)
+        )
 
 
 def complete(
-    open_recipe: OpenRecipe, lines: Sequence[str], options: WindOptions, *, where: str, relabel: Any = None
+    open_recipe: OpenRecipe,
+    lines: Sequence[str],
+    options: WindOptions,
+    *,
+    where: str,
+    relabel: Any = None,
 ) -> Completed:
     """Completes a recipe by the heading of a file.
 
@@ -169,9 +203,15 @@ def complete(
     heading = find(data, lines)
     if heading is None:
         fix = "export it again, or name another --as or --sensor"
-        raise InputError(f"the file has no heading of a {data['about']}", where=f"{where}, line 1", fix=fix)
+        raise InputError(
+            f"the file has no heading of a {data['about']}", where=f"{where}, line 1", fix=fix
+        )
     heading = relabel(heading, lines) if relabel is not None else heading
-    rows = [row for row in cells_of_lines(lines[heading.rows :], heading.delimiter) if any(map(str.strip, row))]
+    rows = [
+        row
+        for row in cells_of_lines(lines[heading.rows :], heading.delimiter)
+        if any(map(str.strip, row))
+    ]
     at_rows = f"{where}, line {heading.rows + 1}"
     facts = _facts(data, lines[: heading.rows + 1])
     stamped, zone = _time_columns(data["time"], heading, facts, at_rows)
@@ -193,12 +233,16 @@ def complete(
         **{key: value for key, value in data.items() if key in keys},
         "time": time,
         "channels": channels,
-        "file": _file(data.get("file", {}), heading, [column.number - 1 for column in taken.values()], rows),
+        "file": _file(
+            data.get("file", {}), heading, [column.number - 1 for column in taken.values()], rows
+        ),
         "sensor": _sensor(data["sensor"], facts),
         "check": _checks(data.get("check", ()), heading),
     }
     match = data.get("match", {})
-    begins = "starts" in match and re.search(match["starts"], "\n".join(lines[: heading.at])) is not None
+    begins = (
+        "starts" in match and re.search(match["starts"], "\n".join(lines[: heading.at])) is not None
+    )
     return Completed(
         recipe=recipes.of_data(closed, where=where),
         data=closed,
@@ -221,16 +265,25 @@ def open_format(name: str) -> tuple[str, OpenRecipe]:
 
 def _facts(data: Mapping[str, Any], lines: Sequence[str]) -> defaultdict[str, str]:
     text = "\n".join(lines).lstrip("\ufeff")
-    matches = ((name, re.search(pattern, text, re.MULTILINE)) for name, pattern in data.get("facts", {}).items())
+    matches = (
+        (name, re.search(pattern, text, re.MULTILINE))
+        for name, pattern in data.get("facts", {}).items()
+    )
     return defaultdict(str, {name: match[1].strip() for name, match in matches if match})
 
 
 def _file(
     file: Mapping[str, Any], heading: Heading, read: Sequence[int], rows: Sequence[Sequence[str]]
 ) -> dict[str, Any]:
-    commas = heading.delimiter != "," and any("," in row[at] for row in rows for at in read if at < len(row))
+    commas = heading.delimiter != "," and any(
+        "," in row[at] for row in rows for at in read if at < len(row)
+    )
     # A line of units that names columns of its own leaves the heading no right count of cells.
-    has_names = bool(heading.cells) and not any(heading.below[len(heading.cells) :]) and heading.delimiter != " "
+    has_names = (
+        bool(heading.cells)
+        and not any(heading.below[len(heading.cells) :])
+        and heading.delimiter != " "
+    )
     return {
         "decimal": "," if commas else ".",
         **file,
@@ -250,13 +303,19 @@ def _time_columns(
         if isinstance(wanted, int):
             columns.append(wanted)
             continue
-        matching = ((at, match) for at, cell in enumerate(heading.cells, start=1) if (match := fits(wanted, cell)))
+        matching = (
+            (at, match)
+            for at, cell in enumerate(heading.cells, start=1)
+            if (match := fits(wanted, cell))
+        )
         for at, match in islice(matching, 1):
             columns.append(at)
             zone = match.groupdict().get("zone") or zone
     if not columns:
         fix = f"its columns are {', '.join(heading.cells)[:1000]}"
-        raise InputError(f"no column is called {' or '.join(time['columns'])}", where=where, fix=fix)
+        raise InputError(
+            f"no column is called {' or '.join(time['columns'])}", where=where, fix=fix
+        )
     return columns, zone
 
 
@@ -268,17 +327,21 @@ def _format(
     options: WindOptions,
     where: str,
 ) -> tuple[str, tuple[Finding, ...]]:
-    """Chooses the format of stamps: the recipe's, the first of its formats that most fit, or that of the stamps
-    themselves."""
+    """Chooses the format of stamps: the recipe's, the first of its formats that most fit, or that
+    of the stamps themselves."""
     forms = time.get("format", [])
     if isinstance(forms, str):
         return forms, ()
-    texts = [" ".join(row[at - 1].strip() for at in columns) for row in rows if len(row) >= max(columns)]
+    texts = [
+        " ".join(row[at - 1].strip() for at in columns) for row in rows if len(row) >= max(columns)
+    ]
     if options.date_order is None:
         for form in forms:
             if 2 * int(parse(texts, form).valid.sum()) >= max(1, len(texts)):
                 return form, ()
-    return stamp_format(texts, options, where, claim=heading.below[columns[0] - 1] if heading.below else "")
+    return stamp_format(
+        texts, options, where, claim=heading.below[columns[0] - 1] if heading.below else ""
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -290,7 +353,8 @@ class _Units:
 
 
 def _unit_of(text: str) -> str | None:
-    """Names the unit that an export spells as `text`; `None` where it is unknown. Inches are of mercury here."""
+    """Names the unit that an export spells as `text`; `None` where it is unknown. Inches are of
+    mercury here."""
     bare = re.sub(r"^\s*[\[(](.*)[\])]\s*$", r"\1", text).strip()
     return "inHg" if bare.lower() in ("in", "inches") else name_of_unit(bare)
 
@@ -300,7 +364,9 @@ def _channel(channels: Mapping[str, Mapping[str, Any]], column: Column) -> str |
     for name, layout in channels.items():
         wanted = layout["column"]
         names = wanted if isinstance(wanted, list) else [wanted]
-        if column.number in names or any(isinstance(name, str) and fits(name, column.name) for name in names):
+        if column.number in names or any(
+            isinstance(name, str) and fits(name, column.name) for name in names
+        ):
             return name
     return None
 
@@ -317,7 +383,10 @@ def _with_units(
     """Reads the units of all columns but those of time."""
     channels: Mapping[str, Mapping[str, Any]] = data["channels"]
     if not heading.cells:
-        columns = [Column(number=layout["column"], name=name, unit=layout["unit"]) for name, layout in channels.items()]
+        columns = [
+            Column(number=layout["column"], name=name, unit=layout["unit"])
+            for name, layout in channels.items()
+        ]
         return columns, _Units(notes=())
     columns, always = [], [f"{at}={heading.cells[at - 1]}" for at in stamped]
     strange, repaired, borrowed, inferred = [], [], "", ""
@@ -341,17 +410,26 @@ def _with_units(
             text = "deg"
         if not text and "whole" in of_recipe:
             speed_cells = [
-                other_column.number - 1 for other_column in heading.columns if "speed" in other_column.name.lower()
+                other_column.number - 1
+                for other_column in heading.columns
+                if "speed" in other_column.name.lower()
             ]
             speeds = [row[at] for row in rows for at in speed_cells if at < len(row)]
-            inferred_unit = _whole_in(cells, of_recipe["whole"]) or _whole_in(speeds, of_recipe["whole"])
+            inferred_unit = _whole_in(cells, of_recipe["whole"]) or _whole_in(
+                speeds, of_recipe["whole"]
+            )
             text = options.unit or inferred_unit or ""
             if not text:
-                message = f"the file states no unit of {column.name!r}, and its values do not show one"
+                message = (
+                    f"the file states no unit of {column.name!r}, and its values do not show one"
+                )
                 fix = "give the one that was set: --unit m/s (or km/h, mph, kn)"
                 raise InputError(message, where=f"{where}, line {heading.at + 1}", fix=fix)
             if options.unit is None:
-                inferred = f"{column.name!r} in {text}: inferred, its values are whole {of_recipe['whole']} converted"
+                inferred = (
+                    f"{column.name!r} in {text}: inferred, its values are whole "
+                    f"{of_recipe['whole']} converted"
+                )
         borrowed = borrowed or (text if not written and "{" in otherwise else "")
         if otherwise and heading.below:
             always.append(f"{column.number}={channel}[{otherwise}]")
@@ -370,7 +448,9 @@ def _with_units(
         raise InputError(message, where=f"{where}, line {heading.at + 2}", fix=fix)
     notes: list[Finding] = []
     if borrowed:
-        message = f"speeds carry no unit: taken to be in {borrowed}, which is stated above the heading"
+        message = (
+            f"speeds carry no unit: taken to be in {borrowed}, which is stated above the heading"
+        )
         notes.append(Finding.of("unit-from-preamble", message))
     if repaired:
         text = "; ".join(repaired)
@@ -379,8 +459,8 @@ def _with_units(
 
 
 def _whole_in(cells: Iterable[str], counted: str) -> str | None:
-    """Infers the unit in which all speeds are whole ones of `counted`, to one decimal; `None` unless there is just
-    one."""
+    """Infers the unit in which all speeds are whole ones of `counted`, to one decimal; `None`
+    unless there is just one."""
     texts = {cell.strip().replace(",", ".") for cell in cells}
     speeds = {float(text) for text in texts if re.fullmatch(r"\d{1,3}(\.\d)?", text)} - {0.0}
     steps = {name: UNITS[counted].scale / UNITS[name].scale for name in _WINDS}
@@ -393,9 +473,14 @@ def _whole_in(cells: Iterable[str], counted: str) -> str | None:
 
 
 def _assign_columns(
-    channels: Mapping[str, Mapping[str, Any]], columns: Sequence[Column], *, where: str, heading: Heading
+    channels: Mapping[str, Mapping[str, Any]],
+    columns: Sequence[Column],
+    *,
+    where: str,
+    heading: Heading,
 ) -> tuple[dict[str, Column], tuple[Column, ...], tuple[Column, ...]]:
-    """Assigns a column to each channel; also returns the columns that are not read, and further ones of speed.
+    """Assigns a column to each channel; also returns the columns that are not read, and further
+    ones of speed.
 
     Raises:
         InputError: a column that the recipe needs is not there, or its unit is not known.
@@ -403,11 +488,17 @@ def _assign_columns(
     taken: dict[str, Column] = {}
     unread: list[Column] = []
     rivals: list[Column] = []
-    at_names, at_units = (f"{where}, line {heading.at + 1 + below}" for below in (0, bool(heading.below)))
+    at_names, at_units = (
+        f"{where}, line {heading.at + 1 + below}" for below in (0, bool(heading.below))
+    )
     for column in columns:
         channel = column.name if not heading.cells else _channel(channels, column)
         if channel is None or channel in taken:
-            rival = channel is not None and channel.startswith("wind_") and CHANNELS[channel].unit == "m/s"
+            rival = (
+                channel is not None
+                and channel.startswith("wind_")
+                and CHANNELS[channel].unit == "m/s"
+            )
             (rivals if rival else unread).extend([column] if column.name else [])
             continue
         name = _unit_of(column.unit)
@@ -422,16 +513,30 @@ def _assign_columns(
     for channel in channels:
         if channel not in taken and not channels[channel].get("optional"):
             message = f"no column of {channel.replace('_', ' ')} among {listed}"
-            raise InputError(message, where=at_names, fix=f"{_FIX}; or let its columns be drafted: --as delimited")
+            raise InputError(
+                message,
+                where=at_names,
+                fix=f"{_FIX}; or let its columns be drafted: --as delimited",
+            )
     if not {name for name in taken if name.startswith("wind_") and CHANNELS[name].unit == "m/s"}:
-        fix = "let its columns be drafted, and confirm them: --as delimited; or describe the file by a recipe"
-        raise InputError(f"there is no column of wind speed among {listed}", where=at_names, fix=fix)
+        fix = (
+            "let its columns be drafted, and confirm them: --as delimited; or describe the file by "
+            "a recipe"
+        )
+        raise InputError(
+            f"there is no column of wind speed among {listed}", where=at_names, fix=fix
+        )
     return taken, tuple(unread), tuple(rivals)
 
 
 def _sensor(sensor: Mapping[str, Any], facts: Mapping[str, str]) -> dict[str, Any]:
-    """Fills facts into the texts of the sensor's keys; a height that the file does not state is left out."""
-    texts = {key: value.format_map(facts).strip() for key, value in sensor.items() if isinstance(value, str)}
+    """Fills facts into the texts of the sensor's keys; a height that the file does not state is
+    left out."""
+    texts = {
+        key: value.format_map(facts).strip()
+        for key, value in sensor.items()
+        if isinstance(value, str)
+    }
     height = {"height": float(texts.pop("height"))} if texts.get("height") else {}
     return {**sensor, **{key: value for key, value in texts.items() if key != "height"}, **height}
 
@@ -450,21 +555,29 @@ def column_findings(done: Completed) -> tuple[Finding, ...]:
     """Reports the columns that are not read, anemometers first."""
     findings: list[Finding] = []
     if done.rivals:
-        used = next(done.channels[name].name for name in ("wind_speed", "wind_x") if name in done.channels)
+        used = next(
+            done.channels[name].name for name in ("wind_speed", "wind_x") if name in done.channels
+        )
         findings.append(
             Finding.of(
                 "several-anemometers",
-                f"wind is read from {used!r}, the first of {len(done.rivals) + 1} columns of wind; not from "
+                f"wind is read from {used!r}, the first of {len(done.rivals) + 1} columns of wind; "
+                "not from "
                 f"{', '.join(column.name for column in done.rivals)}",
                 count=len(done.rivals),
-                fix="to read the others, too, ingest the file with --as delimited, which asks for what the headings do "
-                "not state (such as --unit); where it does not read them, describe the file by a recipe that names "
+                fix="to read the others, too, ingest the file with --as delimited, which asks for "
+                "what the headings do "
+                "not state (such as --unit); where it does not read them, describe the file by a "
+                "recipe that names "
                 "the column",
             )
         )
     if done.unread:
-        # Columns that speak of the wind come first, so that none of them is lost among a hundred others.
-        names = sorted((column.name for column in done.unread), key=lambda name: "wind" not in name.lower())
+        # Columns that speak of the wind come first, so that none of them is lost among a hundred
+        # others.
+        names = sorted(
+            (column.name for column in done.unread), key=lambda name: "wind" not in name.lower()
+        )
         further = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
         message = ", ".join(name[:_WIDE] for name in names[:_NAMED]) + further
         findings.append(Finding.of("columns-not-read", message, count=len(names)))

@@ -1,4 +1,5 @@
-"""Raw lines of a serial port with the stamp of the computer that logged them: `laptop_time,raw_line`."""
+"""Raw lines of a serial port with the stamp of the computer that logged them:
+`laptop_time,raw_line`."""
 
 from __future__ import annotations
 
@@ -27,7 +28,8 @@ _FIELD = (
 _STAMP = re.compile(r"^\d{4}-\d{2}-\d{2}[T ]\d{2}:\d{2}:\d{2}|^\d{10}(?:\.\d+)?(?=[,;\t])")
 _RAW = re.compile(r"raw|line|message|payload|sentence|serial", re.IGNORECASE)
 LEAST = 0.05
-"""Share of lines that must be data: devices print menus and counters, but a log of nothing else is no log."""
+"""Share of lines that must be data: devices print menus and counters, but a log of nothing else is
+no log."""
 
 
 class HostStamped:
@@ -38,11 +40,15 @@ class HostStamped:
     uses = frozenset({"zone", "azimuth"})
 
     def recognise(self, head: Head) -> Guess | None:
-        """Recognises raw lines below a header that speaks of them: by the recipe whose fields most lines have, within
-        its ranges."""
+        """Recognises raw lines below a header that speaks of them: by the recipe whose fields most
+        lines have, within its ranges."""
         lines = [line for line in head.lines if _STAMP.match(line)]
         first = head.lines[0] if head.lines else ""
-        if len(lines) < max(1, len(head.lines) // 2) or lines[0] == first or not _RAW.search(first.partition(",")[2]):
+        if (
+            len(lines) < max(1, len(head.lines) // 2)
+            or lines[0] == first
+            or not _RAW.search(first.partition(",")[2])
+        ):
             return None
         shares = {
             name: sum(_in_range(recipe, line) for line in lines) / len(lines)
@@ -57,13 +63,17 @@ class HostStamped:
             f"{len(lines)} of the first {len(head.lines)} lines begin with a computer's stamp",
             f"{share:.0%} of them go on with the fields of the recipe {name}",
         )
-        return Guess(format=self.name, recipe=name, score=max(0.55, min(0.9, share)), reasons=reasons)
+        return Guess(
+            format=self.name, recipe=name, score=max(0.55, min(0.9, share)), reasons=reasons
+        )
 
     def read(self, source: TextFile, options: WindOptions) -> Reading:
         """Read a file by the recipe in `options`."""
         if options.recipe is None:
             raise UsageError(
-                "the format host-stamped needs a recipe", where=str(source.path), fix="name one by --recipe"
+                "the format host-stamped needs a recipe",
+                where=str(source.path),
+                fix="name one by --recipe",
             )
         recipe = recipes.load(options.recipe)
         if not isinstance(recipe, Recipe) or not recipe.file.host:
@@ -75,20 +85,30 @@ class HostStamped:
         rows = HostRows(source, recipe)
         where = str(source.path)
         reading = read_table(
-            rows, recipe, where=where, zone_name=options.zone, stamp_options=StatedTime(clock=options.clock)
+            rows,
+            recipe,
+            where=where,
+            zone_name=options.zone,
+            stamp_options=StatedTime(clock=options.clock),
         ).reading
         return with_horizontal(reading, options.azimuth, where=where)
 
 
 def _shape(recipe: Recipe) -> re.Pattern[str]:
-    """Builds the pattern of a raw line of data: numbers in the columns of channels and time, anything in others.
+    """Builds the pattern of a raw line of data: numbers in the columns of channels and time,
+    anything in others.
 
-    A recipe that uses every column up to its last takes lines of that many fields alone; one that leaves columns out
-    takes longer lines too.
+    A recipe that uses every column up to its last takes lines of that many fields alone; one that
+    leaves columns out takes longer lines too.
     """
-    numeric = {int(c.column) for c in recipe.channels.values()} | {int(c) for c in recipe.time.columns}
+    numeric = {int(c.column) for c in recipe.channels.values()} | {
+        int(c) for c in recipe.time.columns
+    }
     last = max(numeric | {int(c.column) for c in recipe.checks})
-    between, number = re.escape(recipe.file.delimiter), _FIELD.format(mark=re.escape(recipe.file.decimal))
+    between, number = (
+        re.escape(recipe.file.delimiter),
+        _FIELD.format(mark=re.escape(recipe.file.decimal)),
+    )
     fields = [number if column in numeric else f"[^{between}]*+" for column in range(1, last + 1)]
     rest = "" if len(numeric) == last else f"(?:{between}.*)?"
     return re.compile(f"^{between.join(fields)}{rest}$")
@@ -120,7 +140,8 @@ def _in_range(recipe: Recipe, line: str) -> bool:
 
 
 class HostRows:
-    """Rows of [host stamp, field, field, …] out of stamped raw lines; other lines are counted, not read."""
+    """Rows of [host stamp, field, field, …] out of stamped raw lines; other lines are counted, not
+    read."""
 
     header: list[str] | None = None
     shift = 1
@@ -140,7 +161,9 @@ class HostRows:
             numbers: list[int] = []
             rows: list[list[str]] = []
             for number, line in enumerate(lines, start=first):
-                if not line.strip(" \t\x00") or (number < self.first_line and not _STAMP.match(line)):
+                if not line.strip(" \t\x00") or (
+                    number < self.first_line and not _STAMP.match(line)
+                ):
                     continue
                 stamp, raw = _payload(line, delimiter)
                 if raw and self._shape.match(raw):
@@ -172,7 +195,8 @@ class HostRows:
         return (
             Finding.of(
                 "non-data-lines",
-                f"{left_out} lines without the fields of a reading (counters, menus, fragments); left out",
+                f"{left_out} lines without the fields of a reading (counters, menus, fragments); "
+                "left out",
                 count=left_out,
                 where=f"line {self._other[0]}",
             ),

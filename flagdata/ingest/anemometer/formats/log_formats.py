@@ -22,8 +22,9 @@ class Format(Protocol):
     Attributes:
         name: its name in the table.
         about: one line.
-        uses: names of the `WindOptions` it heeds; others are refused when given, but for those that are settled for
-            every format alike (`WindOptions.given`). A format that names "platform" settles it itself.
+        uses: names of the `WindOptions` it heeds; others are refused when given, but for those that
+            are settled for every format alike (`WindOptions.given`). A format that names "platform"
+            settles it itself.
     """
 
     name: str
@@ -31,11 +32,13 @@ class Format(Protocol):
     uses: frozenset[str]
 
     def recognise(self, head: Head) -> Guess | None:
-        """Checks whether the first lines look like this format, and says why; `None` where nothing does."""
+        """Checks whether the first lines look like this format, and says why; `None` where nothing
+        does."""
         ...
 
     def read(self, source: TextFile, options: WindOptions) -> Reading:
-        """Reads all rows in the order of the file, in SI, instants in UTC nanoseconds. Raises FlagdataError only."""
+        """Reads all rows in the order of the file, in SI, instants in UTC nanoseconds. Raises
+        FlagdataError only."""
         ...
 
 
@@ -78,7 +81,10 @@ FORMATS = Registry(
         "host-stamped": "flagdata.ingest.anemometer.formats.host:HostStamped",
     },
     group="flagdata.formats",
-    accepts=lambda entry: callable(entry) and all(hasattr(_class(entry), name) for name in _CONTRACT),
+    accepts=lambda entry: (
+        callable(entry) and all(hasattr(_class(entry), name) for name in _CONTRACT)
+    ),
 )
 SIGNATURES: Mapping[str, tuple[str, ...]] = {"toa5": ('"TOA5"', "TOA5,")}
-"""Formats whose makers write these at the beginning of every file: no other format is asked about one."""
+"""Formats whose makers write these at the beginning of every file: no other format is asked about
+one."""

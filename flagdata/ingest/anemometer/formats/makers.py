@@ -1,4 +1,5 @@
-"""Formats of serial instruments, each described by a file of catalogs/sensors/serial, which cites the maker's manual.
+"""Formats of serial instruments, each described by a file of catalogs/sensors/serial, which cites
+the maker's manual.
 
     about, name, line   what the format, the instrument and one of its lines are called in messages
     described-by        the description that it follows; none was tested on a real log
@@ -111,7 +112,11 @@ def maker(name: str) -> Maker:
     data: dict[str, Any] = parse_recipe(_SHELF.named(name).text, where=name)
     sensor = Sensor(**data.pop("sensor"))
     fields = {key: Field(**value) for key, value in data.pop("fields").items()}
-    return Maker(sensor=sensor, fields=fields, **{key.replace("-", "_"): value for key, value in data.items()})
+    return Maker(
+        sensor=sensor,
+        fields=fields,
+        **{key.replace("-", "_"): value for key, value in data.items()},
+    )
 
 
 class Telegrams:
@@ -124,7 +129,9 @@ class Telegrams:
 
     def __init__(self, maker: Maker, unit: str | None = None) -> None:
         self._maker, self._unit = maker, unit
-        self._frame, self._begins, self._clock = map(re.compile, (maker.frame, maker.begins, maker.clock))
+        self._frame, self._begins, self._clock = map(
+            re.compile, (maker.frame, maker.begins, maker.clock)
+        )
         self._pair, self._missing = re.compile(maker.pair), re.compile(maker.missing)
         self._telegrams = [re.compile(text) for text in maker.telegrams]
         self._needs = [frozenset(names.split()) for names in maker.needs]
@@ -143,14 +150,23 @@ class Telegrams:
             match, total = self._telegram(body + total), None
         if match is None:
             return Defect.CUT if self._begins.match(raw) else Defect.OTHER
-        if total and total not in [_CHECKSUMS[maker.checksum](body + text) for text in maker.counted]:
+        if total and total not in [
+            _CHECKSUMS[maker.checksum](body + text) for text in maker.counted
+        ]:
             return Defect.CHECKSUM
         groups = match.groupdict()
         if groups.get("pairs") is None:
-            texts = {key: (text, "") for key, text in groups.items() if key in maker.fields and text is not None}
+            texts = {
+                key: (text, "")
+                for key, text in groups.items()
+                if key in maker.fields and text is not None
+            }
         else:
             pairs = self._pair.findall(groups["pairs"])
-            texts = {key: (text, letter) for key, text, letter in pairs[:: -1 if maker.first_counts else 1]}
+            texts = {
+                key: (text, letter)
+                for key, text, letter in pairs[:: -1 if maker.first_counts else 1]
+            }
         if self._lacks(texts):
             return Defect[maker.lacking]
         stated_unit = maker.stated_units.get(groups.get("unit") or "", self._unit)
@@ -170,12 +186,18 @@ class Telegrams:
         return self._sample(values), SampleFlag.OK if sound else SampleFlag.SENSOR_FAULT
 
     def _telegram(self, body: str) -> re.Match[str] | None:
-        return next((match for form in self._telegrams if (match := form.fullmatch(body)) is not None), None)
+        return next(
+            (match for form in self._telegrams if (match := form.fullmatch(body)) is not None), None
+        )
 
     def _lacks(self, texts: Mapping[str, object]) -> bool:
         maker = self._maker
         complete = not self._needs or any(names <= texts.keys() for names in self._needs)
-        return not complete or len(texts) < maker.fewest or bool(maker.unread and texts.keys() - self._names)
+        return (
+            not complete
+            or len(texts) < maker.fewest
+            or bool(maker.unread and texts.keys() - self._names)
+        )
 
     def _si(self, text: str, unit: str, factor: float, *, pairs: bool) -> float:
         if self._missing.fullmatch(text):
@@ -186,7 +208,9 @@ class Telegrams:
 
     def _sample(self, values: Mapping[str, float]) -> dict[str, float]:
         fields = self._maker.fields
-        sample = {fields[key].channel: value for key, value in values.items() if fields[key].channel}
+        sample = {
+            fields[key].channel: value for key, value in values.items() if fields[key].channel
+        }
         if "elevation" in values:
             length, up = values["length"], values["elevation"]
             sample |= {"wind_speed": length * math.cos(up), "wind_z": length * math.sin(up)}
@@ -203,8 +227,8 @@ class Telegrams:
 
 
 class _Split:
-    """Splits lines as `split_stamp` does, without what stands before a message; stamps those without a stamp by the
-    last line of the instrument's own clock."""
+    """Splits lines as `split_stamp` does, without what stands before a message; stamps those
+    without a stamp by the last line of the instrument's own clock."""
 
     def __init__(self, maker: Maker) -> None:
         self._before, self._clock = re.compile(maker.before), re.compile(maker.clock)
@@ -234,24 +258,31 @@ class SerialLines:
         split = _Split(self.maker)
         lines = [split(line) for line in head.lines if line.strip(NOTHING)]
         results = [self.parse(raw) if len(raw) <= LONGEST else Defect.OTHER for _, raw in lines]
-        readings = sum(not isinstance(result, Defect) or result is Defect.UNIT for result in results)
+        readings = sum(
+            not isinstance(result, Defect) or result is Defect.UNIT for result in results
+        )
         right = readings + results.count(Defect.BESIDE)
         if not readings or right < max(1, len(lines) // 2):
             return None
         stamps = sum(bool(stamp) for stamp, _ in lines)
         reasons = (
             f"{right} of the first {len(lines)} lines are {self.maker.line}",
-            GIVEN_CLOCK if head.counted else f"{stamps} of them carry the stamp of the computer that logged them",
+            GIVEN_CLOCK
+            if head.counted
+            else f"{stamps} of them carry the stamp of the computer that logged them",
         )
         return Guess(format=self.name, score=0.95, reasons=reasons)
 
     def read(self, source: TextFile, options: WindOptions) -> Reading:
-        """Reads speed and direction, or components, of every line whose checksum is right or absent."""
+        """Reads speed and direction, or components, of every line whose checksum is right or
+        absent."""
         maker, where, parse = self.maker, str(source.path), self.parse
         if options.unit is not None and maker.asks_unit:
             split = _Split(maker)
             if not any(parse(split(line)[1]) is Defect.UNIT for line in source.head()):
-                raise UsageError("the lines state the unit of speed", where=where, fix="leave out --unit")
+                raise UsageError(
+                    "the lines state the unit of speed", where=where, fix="leave out --unit"
+                )
             parse = Telegrams(maker, options.unit)
         instrument = Instrument(
             name=maker.name,
@@ -264,9 +295,13 @@ class SerialLines:
         reading = read_lines(source, instrument, zone_name=options.zone)
         if not maker.axes_from_south or "wind_x" not in reading.channels:
             return turn_directions(reading, options.azimuth, where=where)
-        # with_horizontal takes wind along +x to come from the azimuth; here it comes from the opposite.
+        # with_horizontal takes wind along +x to come from the azimuth; here it comes from the
+        # opposite.
         axes = {name: reading.channels[name] for name in _AXES}
-        facing = replace(reading, channels={**reading.channels, **{name: -values for name, values in axes.items()}})
+        facing = replace(
+            reading,
+            channels={**reading.channels, **{name: -values for name, values in axes.items()}},
+        )
         done = with_horizontal(facing, options.azimuth, where=where)
         return replace(done, channels={**done.channels, **axes})
 
@@ -277,7 +312,8 @@ def xor(text: str) -> str:
 
 
 def crc16(text: str) -> str:
-    """Returns the three characters of checksum of a message of Vaisala: CRC-16 with polynomial A001, six bits each."""
+    """Returns the three characters of checksum of a message of Vaisala: CRC-16 with polynomial
+    A001, six bits each."""
     crc = 0
     for byte in text.encode("latin-1", "replace"):
         crc ^= byte

@@ -1,9 +1,11 @@
 """Time marks of a stream: times of day at some lines, made into instants for all lines between.
 
-Sentences that come in bursts, one time sentence in each, with long silence between: whose burst a line is of.
+Sentences that come in bursts, one time sentence in each, with long silence between: whose burst a
+line is of.
 
-A burst of n sentences takes n × 82 characters at 4800 baud at most. Where marks are much farther apart than that, and
-each kind of wind comes once between two of them, a sentence is of its burst's mark, and not of an instant between.
+A burst of n sentences takes n × 82 characters at 4800 baud at most. Where marks are much farther
+apart than that, and each kind of wind comes once between two of them, a sentence is of its burst's
+mark, and not of an instant between.
 """
 
 from __future__ import annotations
@@ -30,14 +32,16 @@ _SILENT = 10
 _LEAST = 10 * NANOSECONDS
 """Distance of marks [ns] below which lines come as a stream."""
 _MARKS, _SHARE = 3, 0.9
-"""Marks from which bursts are recognised, and the share of times between them with each wind once at most."""
+"""Marks from which bursts are recognised, and the share of times between them with each wind once
+at most."""
 _ORDER = 1_000_000
 """What gives the order of the winds of one burst [ns]: they have one mark."""
 
 
 @dataclass
 class Bursts:
-    """What shows where bursts begin: the kind of a stream's first sentence, and the lines with that kind."""
+    """What shows where bursts begin: the kind of a stream's first sentence, and the lines with that
+    kind."""
 
     first: str = ""
     starts: list[int] = field(default_factory=list)
@@ -52,7 +56,9 @@ class Bursts:
         if kind == self.first:
             self.starts.append(line)
 
-    def placed(self, lines: IntArray, winds: Sequence[Hashable], at: IntArray, marks: Instants) -> Instants | None:
+    def placed(
+        self, lines: IntArray, winds: Sequence[Hashable], at: IntArray, marks: Instants
+    ) -> Instants | None:
         """Instants of lines by the marks of their bursts; `None` where the stream shows no bursts.
 
         Args:
@@ -65,9 +71,13 @@ class Bursts:
             return None
         edges = self._edges(at)
         # Of the burst before the first mark only the end may be there.
-        starts_of_bursts = np.concatenate(([marks[0] - int(np.median(np.diff(marks)))], marks)).astype(np.int64)
+        starts_of_bursts = np.concatenate(
+            ([marks[0] - int(np.median(np.diff(marks)))], marks)
+        ).astype(np.int64)
         burst = np.searchsorted(edges, lines, side="right")
-        distinct = np.unique(np.stack([burst, _marks_of_lines(winds)]), axis=1).shape[1] == len(lines)
+        distinct = np.unique(np.stack([burst, _marks_of_lines(winds)]), axis=1).shape[1] == len(
+            lines
+        )
         if not distinct or at[0] - self.begins > 2 * np.median(np.diff(at)):
             return None
         time = starts_of_bursts[burst]
@@ -75,10 +85,11 @@ class Bursts:
         return time + (np.arange(len(lines)) - first) * _ORDER
 
     def _edges(self, at: IntArray) -> IntArray:
-        """Finds (m,) the first line of each burst: that of its mark, or the first after the last mark that begins a
-        burst.
+        """Finds (m,) the first line of each burst: that of its mark, or the first after the last
+        mark that begins a burst.
 
-        The stream is taken to begin with a whole burst, unless it ends with as many lines behind its last mark as
+        The stream is taken to begin with a whole burst, unless it ends with as many lines behind
+        its last mark as
         there are between marks: then a burst begins with its mark.
         """
         between = int(np.median(np.diff(at)))
@@ -87,7 +98,9 @@ class Bursts:
         starts = np.array(self.starts, dtype=np.int64)
         after = np.concatenate(([self.begins], at[:-1] + 1))
         indices = np.searchsorted(starts, after)
-        first_lines = np.where(indices < len(starts), starts[np.minimum(indices, len(starts) - 1)], at)
+        first_lines = np.where(
+            indices < len(starts), starts[np.minimum(indices, len(starts) - 1)], at
+        )
         return np.where(first_lines <= at, first_lines, at)
 
 
@@ -97,7 +110,8 @@ def _marks_of_lines(winds: Sequence[Hashable]) -> IntArray:
 
 
 def _are_bursts(lines: IntArray, winds: Sequence[Hashable], at: IntArray, marks: Instants) -> bool:
-    """Checks whether marks are far apart for the lines between them, and each kind of wind comes once between them."""
+    """Checks whether marks are far apart for the lines between them, and each kind of wind comes
+    once between them."""
     spacing, between = float(np.median(np.diff(marks))), float(np.median(np.diff(at)))
     if spacing < max(_LEAST, _SILENT * between * SENTENCE):
         return False
@@ -108,18 +122,31 @@ def _are_bursts(lines: IntArray, winds: Sequence[Hashable], at: IntArray, marks:
 
 
 DAY = 86_400 * NANOSECONDS
-# The receiver sends ZDA at the second itself; RMC, GGA and GLL state the time of a fix and may come late.
+# The receiver sends ZDA at the second itself; RMC, GGA and GLL state the time of a fix and may come
+# late.
 _TRUST = ("ZDA", "RMC", "GGA", "GLL")
 NO_TIME = "the stream carries no time"
-_STEADY_FIX = "if its wind came at a steady rate that is known: --start TIME --rate HZ, with the instant of the first"
-NO_TIME_FIX = f"record ZDA, RMC, GGA or GLL sentences too, or log with a stamp before each line; {_STEADY_FIX}"
-_STILL_FIX = f"check that the receiver has a fix: the times of its ZDA, RMC, GGA or GLL go on with one; {_STEADY_FIX}"
+_STEADY_FIX = (
+    "if its wind came at a steady rate that is known: --start TIME --rate HZ, with the instant of "
+    "the first"
+)
+NO_TIME_FIX = (
+    "record ZDA, RMC, GGA or GLL sentences too, or log with a stamp before each line; "
+    f"{_STEADY_FIX}"
+)
+_STILL_FIX = (
+    "check that the receiver has a fix: the times of its ZDA, RMC, GGA or GLL go on with one; "
+    f"{_STEADY_FIX}"
+)
 BURST = 4
-"""Lines about a single mark that are of its second: 4800 baud carry five sentences of 82 characters, the mark too."""
+"""Lines about a single mark that are of its second: 4800 baud carry five sentences of 82
+characters, the mark too."""
 FEW = 10
-"""Marks, or a hundredth of all if that is more, that may leave the stream's time and come back to it."""
+"""Marks, or a hundredth of all if that is more, that may leave the stream's time and come back to
+it."""
 DISORDER = 2 * NANOSECONDS
-"""A mark this much behind the one before it is reported; less is the order of sentences within a second."""
+"""A mark this much behind the one before it is reported; less is the order of sentences within a
+second."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -172,13 +199,15 @@ class TimeLine:
         choice: ClockChoice | None = None,
         winds: Sequence[Hashable] = (),
     ) -> Placed:
-        """Instants of `lines`, by interpolation between the marks and at their usual pace outside them.
+        """Instants of `lines`, by interpolation between the marks and at their usual pace outside
+        them.
 
         Lines that come in bursts have the time of the mark of their burst instead.
 
         Args:
             date: day (UTC) of the first mark, for a stream that states none.
-            choice: whose marks are right where the stream's clock was set back and stays so; `None` where nobody said.
+            choice: whose marks are right where the stream's clock was set back and stays so; `None`
+                where nobody said.
             winds: which wind each line holds, where bursts are to be looked for.
 
         Raises:
@@ -200,11 +229,16 @@ class TimeLine:
         marks = (self._start(at, clock, day, date, where) + day) * DAY + clock
         marks, reported = _one_clock(marks, at, choice)
         findings.extend(reported)
-        rising = marks > np.concatenate(([np.iinfo(np.int64).min], np.maximum.accumulate(marks)[:-1]))
+        rising = marks > np.concatenate(
+            ([np.iinfo(np.int64).min], np.maximum.accumulate(marks)[:-1])
+        )
         behind = np.concatenate(([False], np.diff(marks) < -DISORDER))
         if behind.any():
             count = int(behind.sum())
-            message = f"{count} times the stream's clock runs backwards; marks behind earlier ones are not used"
+            message = (
+                f"{count} times the stream's clock runs backwards; marks behind earlier ones are "
+                "not used"
+            )
             findings.append(_backwards(count, f"line {at[behind][0]}", message))
         at, marks = at[rising], marks[rising]
         if len(marks) < 2:
@@ -231,26 +265,38 @@ class TimeLine:
         return next((kind for kind in _TRUST if kind in self.line), None)
 
     def _of_one(self, kind: str, lines: IntArray, *, date: dt.date | None, where: str) -> Placed:
-        """Dates a few lines about one mark: within the second before or behind it, in their order."""
+        """Dates a few lines about one mark: within the second before or behind it, in their
+        order."""
         at = np.array(self.line[kind], dtype=np.int64)
         clock = np.array(self.clock[kind], dtype=np.int64)
-        mark = self._start(at, clock, np.zeros(1, dtype=np.int64), date, where) * DAY + int(clock[0])
+        mark = self._start(at, clock, np.zeros(1, dtype=np.int64), date, where) * DAY + int(
+            clock[0]
+        )
         pace = NANOSECONDS // (_reach(lines, int(at[0])) + 1)
         message = (
-            f"the stream carries one time, in line {at[0]}: {len(lines)} wind sentences are taken as of the second "
+            f"the stream carries one time, in line {at[0]}: {len(lines)} wind sentences are taken "
+            "as of the second "
             "about it, in their order"
         )
         findings = (Finding.of("one-time", message, count=len(lines), fix=_STEADY_FIX),)
-        return Placed(time=mark + (lines - at[0]) * pace, spacing=1.0, marks=1, kind=kind, findings=findings)
+        return Placed(
+            time=mark + (lines - at[0]) * pace, spacing=1.0, marks=1, kind=kind, findings=findings
+        )
 
     def _kind(self, where: str) -> str:
         counts = {kind: len(lines) for kind, lines in self.line.items()}
         most = max(counts.values(), default=0)
         if most < 2:
-            raise TimeError(NO_TIME if not counts else "the stream carries only one time", where=where, fix=NO_TIME_FIX)
+            raise TimeError(
+                NO_TIME if not counts else "the stream carries only one time",
+                where=where,
+                fix=NO_TIME_FIX,
+            )
         return next(kind for kind in _TRUST if 2 * counts.get(kind, 0) >= most)
 
-    def _start(self, at: IntArray, clock: IntArray, day: IntArray, date: dt.date | None, where: str) -> int:
+    def _start(
+        self, at: IntArray, clock: IntArray, day: IntArray, date: dt.date | None, where: str
+    ) -> int:
         """Days since 1970 of the first mark."""
         epoch = dt.date(1970, 1, 1).toordinal()
         if self.dated is None:
@@ -268,7 +314,8 @@ class TimeLine:
         start = date_of_mark.toordinal() - epoch - int(day[nearest]) - across
         if date is not None and date.toordinal() - epoch != start:
             raise UsageError(
-                f"the date {date} was given, but the stream begins on {dt.date.fromordinal(start + epoch)}",
+                f"the date {date} was given, but the stream begins on "
+                f"{dt.date.fromordinal(start + epoch)}",
                 where=where,
                 fix="leave out --date",
             )
@@ -280,10 +327,17 @@ def _reach(lines: IntArray, mark: int) -> int:
     return int(np.abs(lines - mark).max()) if len(lines) else 0
 
 
-def _one_clock(marks: Instants, at: IntArray, choice: ClockChoice | None) -> tuple[Instants, tuple[Finding, ...]]:
-    """Marks on one clock where it was set back for good; those that leave its time for a moment do not rise."""
+def _one_clock(
+    marks: Instants, at: IntArray, choice: ClockChoice | None
+) -> tuple[Instants, tuple[Finding, ...]]:
+    """Marks on one clock where it was set back for good; those that leave its time for a moment do
+    not rise."""
     most = max(FEW, len(marks) // 100)
-    stray = clocks.excursions(marks, most=most) if len(clocks.set_back(marks)) <= most else np.zeros(len(marks), bool)
+    stray = (
+        clocks.excursions(marks, most=most)
+        if len(clocks.set_back(marks)) <= most
+        else np.zeros(len(marks), bool)
+    )
     settled = np.flatnonzero(~stray)
     jumps = clocks.set_back(marks[settled])
     jumps = jumps if len(jumps) <= clocks.MOST else ()
@@ -291,8 +345,12 @@ def _one_clock(marks: Instants, at: IntArray, choice: ClockChoice | None) -> tup
     out[settled], _ = clocks.continue_clock(marks[settled], jumps, choice)
     findings = clocks.report(marks[settled], jumps, at[settled], choice)
     if stray.any():
-        out[stray] = out[settled[np.maximum(np.searchsorted(settled, np.flatnonzero(stray)) - 1, 0)]]
-        message = f"{int(stray.sum())} times of the stream leave its course and come back to it; not used"
+        out[stray] = out[
+            settled[np.maximum(np.searchsorted(settled, np.flatnonzero(stray)) - 1, 0)]
+        ]
+        message = (
+            f"{int(stray.sum())} times of the stream leave its course and come back to it; not used"
+        )
         findings = (*findings, _backwards(int(stray.sum()), f"line {at[stray][0]}", message))
     return out, findings
 

@@ -1,17 +1,18 @@
-"""NMEA 0183 streams: wind from MWV and MWD, else VWR, VWT and MDA, time from the sentences around them.
+"""NMEA 0183 streams: wind from MWV and MWD, else VWR, VWT and MDA, time from the sentences around
+them.
 
-Wind sentences carry no time. Each gets one by interpolating, over line numbers, between the time sentences (ZDA, RMC,
-GGA, GLL), or that of its burst (`bursts`), and the flag TIME_UNSURE. MWV,R is wind past the
-platform; MWV,T is "theoretical": what the instrument computed as if the platform did not move; both are relative to the
-bow. They stay in channels of their own, and neither is ground truth unless the user says the platform is fixed. VWR,
-VWT and MDA are what older instruments and weather stations send for MWV,R, MWV,T and MWD; beside these they are the
-same wind again.
+Wind sentences carry no time. Each gets one by interpolating, over line numbers, between the time
+sentences (ZDA, RMC, GGA, GLL), or that of its burst (`bursts`), and the flag TIME_UNSURE. MWV,R is
+wind past the platform; MWV,T is "theoretical": what the instrument computed as if the platform did
+not move; both are relative to the bow. They stay in channels of their own, and neither is ground
+truth unless the user says the platform is fixed. VWR, VWT and MDA are what older instruments and
+weather stations send for MWV,R, MWV,T and MWD; beside these they are the same wind again.
 
 In the format "nmea-stamped" each sentence has the stamp of the computer that logged it:
-"2026-05-01T12:00:00.123Z,$WIMWV,…". So log LCJ CV7, Calypso, Gill, Vaisala and other instruments whose sentences carry
-no time themselves; a TAG block (IEC 61162-450, parameter "c") is such a stamp too. Sources for the instruments: LCJ
-Capteurs, CV7 user manual (MWV relative, and XDR); Calypso Instruments, ULP STD user manual, 3.1 (data format NMEA
-0183).
+"2026-05-01T12:00:00.123Z,$WIMWV,…". So log LCJ CV7, Calypso, Gill, Vaisala and other instruments
+whose sentences carry no time themselves; a TAG block (IEC 61162-450, parameter "c") is such a stamp
+too. Sources for the instruments: LCJ Capteurs, CV7 user manual (MWV relative, and XDR); Calypso
+Instruments, ULP STD user manual, 3.1 (data format NMEA 0183).
 """
 
 from __future__ import annotations
@@ -127,10 +128,15 @@ class Nmea:
                 wind += sentence.kind in WINDS
         if right < max(1, len(head.lines) // 2):
             return None
-        sure = " with right checksums" if checked == right else f", {checked or 'none'} of them with a checksum"
+        sure = (
+            " with right checksums"
+            if checked == right
+            else f", {checked or 'none'} of them with a checksum"
+        )
         wrong_ones = f"; {wrong} more have a wrong one" if wrong or checked else ""
         reasons = (
-            f"{right} of the first {len(head.lines)} lines are NMEA 0183 sentences{sure}{wrong_ones}",
+            f"{right} of the first {len(head.lines)} lines are NMEA 0183 "
+            f"sentences{sure}{wrong_ones}",
             f"{wind} of them are wind ({', '.join(WINDS)})",
         )
         fix = None if wind else no_wind(head.lines, self.name)
@@ -142,7 +148,9 @@ class Nmea:
         stream = gather_sentences(source, options, lambda number, line: line)
         line = np.array(stream.line, dtype=np.int64)
         winds = [frozenset(row) for row in stream.values]
-        placed = stream.times.place(line, date=options.date, where=where, choice=options.clock, winds=winds)
+        placed = stream.times.place(
+            line, date=options.date, where=where, choice=options.clock, winds=winds
+        )
         reading = reading_of(stream, placed.time, options, where=where)
         flags = reading.flags | np.uint16(SampleFlag.TIME_UNSURE)
         found = _placed_findings(len(line), placed)
@@ -150,7 +158,11 @@ class Nmea:
 
 
 def gather_sentences(
-    source: TextFile, options: WindOptions, divide: Callable[[int, str], str], *, timed: bool = False
+    source: TextFile,
+    options: WindOptions,
+    divide: Callable[[int, str], str],
+    *,
+    timed: bool = False,
 ) -> Stream:
     """Gathers the wind sentences of one talker.
 
@@ -176,14 +188,23 @@ def gather_sentences(
         raise InputError(message, where=where, fix=fix)
     talkers = Counter(stream.talkers)
     if len(talkers) > 1:
-        message = f"several talkers send wind: {', '.join(sorted(talkers))}; they are different instruments"
+        message = (
+            f"several talkers send wind: {', '.join(sorted(talkers))}; they are different "
+            "instruments"
+        )
         fix = f"choose one, e.g. {command_line('--talker', talkers.most_common(1)[0][0])}"
         if not timed and not stream.times.line:
-            raise InputError(f"{message}, and the lines have no time", where=where, fix=f"{NO_TIME_FIX}; then {fix}")
+            raise InputError(
+                f"{message}, and the lines have no time",
+                where=where,
+                fix=f"{NO_TIME_FIX}; then {fix}",
+            )
         raise InputError(message, where=where, fix=fix)
     if options.clock == "sort":
         fix = "give --clock first or --clock last, or leave it out"
-        raise UsageError("the lines of a stream are in the order in which they came", where=where, fix=fix)
+        raise UsageError(
+            "the lines of a stream are in the order in which they came", where=where, fix=fix
+        )
     return stream
 
 
@@ -207,9 +228,13 @@ def reading_of(stream: Stream, time: Instants, options: WindOptions, *, where: s
             channels[name] = values
     if not channels:
         fix = "check that the sensor is connected and gives valid data"
-        raise InputError("every wind sentence is empty or invalid", where=f"{where}, line {line[0]}", fix=fix)
+        raise InputError(
+            "every wind sentence is empty or invalid", where=f"{where}, line {line[0]}", fix=fix
+        )
     source = _sources(stream, "wind")
-    channels, about = settle_platform(channels, options, speeds=stream.speeds, source=source, where=where)
+    channels, about = settle_platform(
+        channels, options, speeds=stream.speeds, source=source, where=where
+    )
     return Reading(
         time=time,
         channels=channels,
@@ -267,7 +292,8 @@ def _take_others(stream: Stream) -> None:
 
 
 def _leave_silent(stream: Stream) -> None:
-    """Leaves out the sentences of talkers whose wind is empty in all of them, where another talker has one."""
+    """Leaves out the sentences of talkers whose wind is empty in all of them, where another talker
+    has one."""
     speaking = {talker for talker, row in zip(stream.talkers, stream.values, strict=True) if row}
     if speaking:
         stream.silent = Counter(talker for talker in stream.talkers if talker not in speaking)
@@ -284,12 +310,15 @@ def keep(stream: Stream, order: Sequence[int]) -> None:
 def _wind(stream: Stream, sentence: Sentence, at: int) -> None:
     """Reads the wind of one sentence.
 
-    MWV: the angle from the bow, R or T, the speed, its unit, a status. MWD: the direction true and magnetic, the speed
-    in knots and m/s. VWR and VWT: the angle to the left or right of the bow, the speed in knots, m/s and km/h. MDA: of
-    the composite of a weather station the direction true and magnetic, the speed in knots and m/s.
+    MWV: the angle from the bow, R or T, the speed, its unit, a status. MWD: the direction true and
+    magnetic, the speed in knots and m/s. VWR and VWT: the angle to the left or right of the bow,
+    the speed in knots, m/s and km/h. MDA: of the composite of a weather station the direction true
+    and magnetic, the speed in knots and m/s.
     """
     fields, kind = sentence.fields, sentence.kind
-    if len(fields) < _FIELDS[kind] or (kind not in ("MWD", "MDA") and fields[1] not in _SIDES[kind]):
+    if len(fields) < _FIELDS[kind] or (
+        kind not in ("MWD", "MDA") and fields[1] not in _SIDES[kind]
+    ):
         stream.invalid.append(at)
         return
     source, flag, magnetic = kind, SampleFlag.OK, None
@@ -301,12 +330,19 @@ def _wind(stream: Stream, sentence: Sentence, at: int) -> None:
             stream.undirected += 1
             return
     elif kind == "MWV":
-        wind, source = ("apparent_wind" if fields[1] == "R" else "theoretical_wind"), f"MWV,{fields[1]}"
+        wind, source = (
+            ("apparent_wind" if fields[1] == "R" else "theoretical_wind"),
+            f"MWV,{fields[1]}",
+        )
         angle, speed = number(fields[0]), _speed(fields[2:4])
         stream.unstated += len(fields) == 4  # canboat's n2kd leaves the status out
         flag = SampleFlag.OK if len(fields) == 4 or fields[4] == "A" else SampleFlag.SENSOR_FAULT
     else:
-        wind, angle, speed = _OTHERS[kind], number(fields[0]) if fields[1] else None, _speed(fields[2:])
+        wind, angle, speed = (
+            _OTHERS[kind],
+            number(fields[0]) if fields[1] else None,
+            _speed(fields[2:]),
+        )
         angle = -angle if angle is not None and fields[1] == "L" else angle
     angles = {f"{wind}_direction": angle, f"{wind}_direction_magnetic": magnetic}
     row = {name: float(np.radians(value)) for name, value in angles.items() if value is not None}
@@ -319,7 +355,8 @@ def _wind(stream: Stream, sentence: Sentence, at: int) -> None:
 
 
 def _speed(fields: Sequence[str]) -> float | None:
-    """Reads the speed that pairs of a value and a letter hold [m/s], by the one that is written most finely."""
+    """Reads the speed that pairs of a value and a letter hold [m/s], by the one that is written
+    most finely."""
     speeds: list[tuple[float, float]] = []
     for text, letter in zip(fields[0::2], fields[1::2], strict=False):
         value, unit = number(text), SPEED_UNITS.get(letter)
@@ -330,13 +367,20 @@ def _speed(fields: Sequence[str]) -> float | None:
 
 
 def _kinds(stream: Stream, time: Instants) -> tuple[Finding, ...]:
-    """Counts the sentences of each kind of wind, and how far apart they are, where a stream holds several kinds."""
+    """Counts the sentences of each kind of wind, and how far apart they are, where a stream holds
+    several kinds."""
     parts: list[str] = []
-    for prefix, kind in (("apparent_wind", "relative"), ("theoretical_wind", "theoretical"), ("wind", "over ground")):
+    for prefix, kind in (
+        ("apparent_wind", "relative"),
+        ("theoretical_wind", "theoretical"),
+        ("wind", "over ground"),
+    ):
         name = f"{kind} ({_sources(stream, prefix)})"
         at = [index for index, row in enumerate(stream.values) if f"{prefix}_speed" in row]
         if len(at) > 1:
-            parts.append(f"{len(at)} {name}, one every {np.median(np.diff(time[at])) / NANOSECONDS:.3g} s")
+            parts.append(
+                f"{len(at)} {name}, one every {np.median(np.diff(time[at])) / NANOSECONDS:.3g} s"
+            )
         elif at:
             parts.append(f"1 {name}")
     if len(parts) < 2:
@@ -358,7 +402,8 @@ def no_wind(lines: Sequence[str], format_name: str) -> str:
             sentence = split(line)
             kinds.update([] if sentence is None else [sentence.kind])
     return (
-        f"its first {len(lines)} lines hold no sentence of wind ({', '.join(WINDS)}){_others_seen(kinds)}: have the "
+        f"its first {len(lines)} lines hold no sentence of wind "
+        f"({', '.join(WINDS)}){_others_seen(kinds)}: have the "
         f"instrument send MWV; if winds come later in the file: {command_line('--as', format_name)}"
     )
 
@@ -383,7 +428,9 @@ def _placed_findings(count: int, placed: Placed) -> tuple[Finding, ...]:
         )
         message += f"each, and each has the time of the {placed.kind} of its burst"
     message = f"{count} wind sentences carry no time: {message}"
-    finding = Finding(kind=kind, severity=Severity.WARNING, count=count, value=placed.spacing, what=message)
+    finding = Finding(
+        kind=kind, severity=Severity.WARNING, count=count, value=placed.spacing, what=message
+    )
     return (finding, *placed.findings)
 
 
@@ -391,23 +438,66 @@ def _findings(stream: Stream) -> tuple[Finding, ...]:
     findings: list[Finding] = []
 
     def note(rows: Sequence[int] | int, kind: str, severity: Severity, message: str) -> None:
-        count, at = (rows, None) if isinstance(rows, int) else (len(rows), rows[0] if rows else None)
+        count, at = (
+            (rows, None) if isinstance(rows, int) else (len(rows), rows[0] if rows else None)
+        )
         if count:
             where = None if at is None else f"line {at}"
-            findings.append(Finding(kind=kind, severity=severity, count=count, where=where, what=f"{count} {message}"))
+            findings.append(
+                Finding(
+                    kind=kind,
+                    severity=severity,
+                    count=count,
+                    where=where,
+                    what=f"{count} {message}",
+                )
+            )
 
-    before = f"sentences follow text that is not a timestamp, as in {stream.first_before[:60]!r}; the text was not read"
+    before = (
+        f"sentences follow text that is not a timestamp, as in {stream.first_before[:60]!r}; the "
+        "text was not read"
+    )
     note(stream.before, "text-before-sentences", Severity.WARNING, before)
     for talker, silent in stream.silent.items():
-        note(silent, "sentences-not-read", Severity.NOTE, f"wind sentences of talker {talker} are empty; left out")
-    note(stream.bad_checksums, "checksum-errors", Severity.ERROR, "sentences with a wrong checksum; left out")
-    note(stream.not_sentences, "malformed-lines", Severity.WARNING, "lines that are no sentence; left out")
-    note(stream.invalid, "malformed-sentences", Severity.ERROR, "wind sentences with fields missing; left out")
+        note(
+            silent,
+            "sentences-not-read",
+            Severity.NOTE,
+            f"wind sentences of talker {talker} are empty; left out",
+        )
+    note(
+        stream.bad_checksums,
+        "checksum-errors",
+        Severity.ERROR,
+        "sentences with a wrong checksum; left out",
+    )
+    note(
+        stream.not_sentences,
+        "malformed-lines",
+        Severity.WARNING,
+        "lines that are no sentence; left out",
+    )
+    note(
+        stream.invalid,
+        "malformed-sentences",
+        Severity.ERROR,
+        "wind sentences with fields missing; left out",
+    )
     faults = sum(bool(flag & SampleFlag.SENSOR_FAULT) for flag in stream.flags)
     message = "wind sentences that the instrument itself marks invalid; left out of averages"
     note(faults, "sensor-fault", Severity.WARNING, message)
-    note(stream.unchecked, "no-checksum", Severity.WARNING, "sentences without a checksum; taken as they are")
-    note(stream.unstated, "no-status", Severity.WARNING, "MWV sentences without a status; taken as valid")
+    note(
+        stream.unchecked,
+        "no-checksum",
+        Severity.WARNING,
+        "sentences without a checksum; taken as they are",
+    )
+    note(
+        stream.unstated,
+        "no-status",
+        Severity.WARNING,
+        "MWV sentences without a status; taken as valid",
+    )
     for kind, number_of in stream.unread.items():
         message = f"{kind} sentences are not read: {_NEWER[_OTHERS[kind]]} is read for that wind"
         note(number_of, "sentences-not-read", Severity.NOTE, message)
@@ -419,7 +509,8 @@ def _findings(stream: Stream) -> tuple[Finding, ...]:
 
 
 _OFF = 60.0
-"""Median difference of a receiver's time from the stamps that no delay of a serial line explains [s]."""
+"""Median difference of a receiver's time from the stamps that no delay of a serial line explains
+[s]."""
 _REPORTED = 2.0
 """Median difference that is worth a word [s]: clips are paired with winds by the second."""
 
@@ -443,7 +534,9 @@ class StampedNmea:
             return None
         wind = sum(kind in WINDS for kind in kinds)
         message = (
-            f"NMEA 0183 sentences; {GIVEN_CLOCK}" if head.counted else "a computer's stamp and an NMEA 0183 sentence"
+            f"NMEA 0183 sentences; {GIVEN_CLOCK}"
+            if head.counted
+            else "a computer's stamp and an NMEA 0183 sentence"
         )
         reasons = (
             f"{len(kinds)} of the first {len(lines)} lines are {message}",
@@ -469,12 +562,18 @@ class StampedNmea:
         stream = gather_sentences(source, options, divide, timed=True)
         if not texts:
             raise InputError(
-                "no line has an NMEA 0183 sentence after a stamp", where=where, fix="name another format by --as"
+                "no line has an NMEA 0183 sentence after a stamp",
+                where=where,
+                fix="name another format by --as",
             )
         stamps = stamps_of(list(texts.values()))
         line = np.array(list(texts), dtype=np.int64)[stamps.valid]
         time, findings = instants(
-            stamps.ns[stamps.valid], stamps.utc[stamps.valid], line=line, zone_name=options.zone, where=where
+            stamps.ns[stamps.valid],
+            stamps.utc[stamps.valid],
+            line=line,
+            zone_name=options.zone,
+            where=where,
         )
         at = dict(zip(line.tolist(), time.tolist(), strict=True))
         timed = [index for index, number in enumerate(stream.line) if number in at]
@@ -483,13 +582,16 @@ class StampedNmea:
         if dropped:
             message = f"{dropped} wind sentences without a stamp; left out"
             findings = (*findings, Finding.of("no-stamp", message, count=dropped))
-        reading = reading_of(stream, np.array([at[number] for number in stream.line], np.int64), options, where=where)
+        reading = reading_of(
+            stream, np.array([at[number] for number in stream.line], np.int64), options, where=where
+        )
         findings = (*findings, *reading.findings, *_receiver(at, marks))
         return replace(reading, step=stamps.step, findings=findings)
 
 
 def _mark(text: str) -> int | None:
-    """Reads the instant [UTC ns] that a sentence states; `None` for one without a date, and for a damaged one."""
+    """Reads the instant [UTC ns] that a sentence states; `None` for one without a date, and for a
+    damaged one."""
     if not text[3:7].startswith(("ZDA,", "RMC,")):
         return None
     try:
@@ -504,7 +606,8 @@ def _mark(text: str) -> int | None:
 
 
 def _receiver(stamps: Mapping[int, int], marks: Mapping[int, int]) -> tuple[Finding, ...]:
-    """Reports a satellite receiver whose time is another than that of the stamps; nothing where they agree."""
+    """Reports a satellite receiver whose time is another than that of the stamps; nothing where
+    they agree."""
     off = [(at, (mark - stamps[at]) / NANOSECONDS) for at, mark in marks.items() if at in stamps]
     median = float(np.median([seconds for _, seconds in off])) if off else 0.0
     if abs(median) < _REPORTED:
@@ -518,7 +621,9 @@ def _receiver(stamps: Mapping[int, int], marks: Mapping[int, int]) -> tuple[Find
             count=len(off),
             value=median,
             where=f"line {off[0][0]}",
-            what=f"the satellite receiver's time (RMC, ZDA) is {size} {side} the stamps of the lines, which are taken",
-            fix="check the zone of the stamps and the computer's clock; for the receiver's time, take the stamps out",
+            what=f"the satellite receiver's time (RMC, ZDA) is {size} {side} the stamps of the "
+            "lines, which are taken",
+            fix="check the zone of the stamps and the computer's clock; for the receiver's time, "
+            "take the stamps out",
         ),
     )

@@ -1,7 +1,8 @@
-"""NMEA 0183 sentences: taken apart, checksums verified, and what MWV, MWD and the time sentences say.
+"""NMEA 0183 sentences: taken apart, checksums verified, and what MWV, MWD and the time sentences
+say.
 
-Source: NMEA 0183 4.10 as described in E. S. Raymond, "NMEA Revealed" (gpsd project), sections MWV, MWD, ZDA, RMC, GGA,
-GLL, VTG; IEC 61162-450 for TAG blocks.
+Source: NMEA 0183 4.10 as described in E. S. Raymond, "NMEA Revealed" (gpsd project), sections MWV,
+MWD, ZDA, RMC, GGA, GLL, VTG; IEC 61162-450 for TAG blocks.
 """
 
 from __future__ import annotations
@@ -14,8 +15,9 @@ from operator import xor
 
 from flagdata.ingest.anemometer.instants.stamp_text import whole_year
 
-# A talker is two letters, or, from canboat's n2kd, the device's address on NMEA 2000 as two hexadecimal digits.
-# What follows P, which makers use for sentences of their own, is theirs: "$PSMDCN,2*19".
+# A talker is two letters, or, from canboat's n2kd, the device's address on NMEA 2000 as two
+# hexadecimal digits. What follows P, which makers use for sentences of their own, is theirs:
+# "$PSMDCN,2*19".
 _SENTENCE = re.compile(
     r"[$!]([A-Z]{2}|[0-9A-F]{2}|P)([A-Z]{3}|(?<=[$!]P)[A-Z0-9]{3,12})((?:,[^,*$!]*)*)(?:\*([0-9A-Fa-f]{2}))?\s*$"
 )
@@ -29,7 +31,8 @@ SPEED_UNITS: Mapping[str, str] = {"N": "kn", "K": "km/h", "M": "m/s", "S": "mph"
 
 @dataclass(frozen=True, kw_only=True)
 class Sentence:
-    """One sentence: talker ("II"), kind ("MWV"), its fields, and whether a checksum was there (and then right)."""
+    """One sentence: talker ("II"), kind ("MWV"), its fields, and whether a checksum was there (and
+    then right)."""
 
     talker: str
     kind: str
@@ -57,13 +60,21 @@ def split(line: str) -> Sentence | None:
     if match is None:
         return None
     talker, kind, fields, stated_checksum = match.groups()
-    if stated_checksum is not None and checksum(f"{talker}{kind}{fields}") != int(stated_checksum, 16):
+    if stated_checksum is not None and checksum(f"{talker}{kind}{fields}") != int(
+        stated_checksum, 16
+    ):
         raise ChecksumError(line)
-    return Sentence(talker=talker, kind=kind, fields=tuple(fields.split(",")[1:]), checked=stated_checksum is not None)
+    return Sentence(
+        talker=talker,
+        kind=kind,
+        fields=tuple(fields.split(",")[1:]),
+        checked=stated_checksum is not None,
+    )
 
 
 def tag_time(line: str) -> int | None:
-    """Reads Unix milliseconds of a TAG block before the sentence, `None` where there is none that is whole."""
+    """Reads Unix milliseconds of a TAG block before the sentence, `None` where there is none that
+    is whole."""
     match = _TAG.match(line)
     if match is None or checksum(match[1]) != int(match[2], 16):
         return None
@@ -77,7 +88,8 @@ def number(text: str) -> float | None:
 
 
 def clock(text: str) -> int | None:
-    """Nanoseconds since midnight of "hhmmss.ss", `None` where it is no time of day. A leap second reads as 59.999…"""
+    """Nanoseconds since midnight of "hhmmss.ss", `None` where it is no time of day. A leap second
+    reads as 59.999…"""
     match = _CLOCK.match(text.strip())
     if match is None:
         return None
@@ -92,7 +104,8 @@ def clock(text: str) -> int | None:
 
 @dataclass(frozen=True, kw_only=True)
 class TimeMark:
-    """What a time sentence says: time of day [ns] and, where it has one, the date (year, month, day)."""
+    """What a time sentence says: time of day [ns] and, where it has one, the date (year, month,
+    day)."""
 
     clock: int
     date: tuple[int, int, int] | None
@@ -120,7 +133,11 @@ def _rmc(fields: Sequence[str]) -> TimeMark | None:
     if time is None:
         return None
     match = _DATE.match(fields[8])
-    date = (whole_year(int(match[3])), int(match[2]), int(match[1])) if match and fields[1] == "A" else None
+    date = (
+        (whole_year(int(match[3])), int(match[2]), int(match[1]))
+        if match and fields[1] == "A"
+        else None
+    )
     return TimeMark(clock=time, date=date)
 
 

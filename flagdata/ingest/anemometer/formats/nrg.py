@@ -1,6 +1,8 @@
-"""Text exports of NRG Systems loggers: names of columns by the history of the channels that stands above them.
+"""Text exports of NRG Systems loggers: names of columns by the history of the channels that stands
+above them.
 
-What the columns mean is in catalogs/sensors/formats/nrg.toml. An anemometer that does not turn reads its offset, not 0.
+What the columns mean is in catalogs/sensors/formats/nrg.toml. An anemometer that does not turn
+reads its offset, not 0.
 """
 
 from __future__ import annotations
@@ -17,7 +19,9 @@ from flagdata.ingest.anemometer.text.text_file import TextFile
 from flagdata.ingest.anemometer.wind_options import WindOptions
 
 _CHANNELS = 99_999
-_NAME = re.compile(r"Ch(?P<channel>\d+)_(?:.*_)?(?P<statistic>Avg|Samples)_(?P<unit>[^_]*|deg_[CF])", re.IGNORECASE)
+_NAME = re.compile(
+    r"Ch(?P<channel>\d+)_(?:.*_)?(?P<statistic>Avg|Samples)_(?P<unit>[^_]*|deg_[CF])", re.IGNORECASE
+)
 _SPEEDS = {"m/s", "mph", "km/h", "knots", "kn", "kts"}
 _SPELLED = {"deg_c": "degC", "deg_f": "degF", "deg": "deg"}
 
@@ -29,14 +33,19 @@ class Nrg(Described):
         super().__init__("nrg")
 
     def named(self, heading: Heading, lines: Sequence[str]) -> Heading:
-        """Columns called by what their channels are and measure, those of the first anemometer's device first.
+        """Columns called by what their channels are and measure, those of the first anemometer's
+        device first.
 
-        Channels of one digital instrument follow each other within a hundred (101 wind speed, 102 its direction, …).
+        Channels of one digital instrument follow each other within a hundred (101 wind speed, 102
+        its direction, …).
         """
         history = _history(lines[: heading.at])
         columns = [_column(column, history) for column in heading.columns]
         speed = next((column.name for column in columns if column.name.endswith("wind speed")), "")
-        ordered = sorted(columns, key=lambda column: _hundred_of_channel(column.name) != _hundred_of_channel(speed))
+        ordered = sorted(
+            columns,
+            key=lambda column: _hundred_of_channel(column.name) != _hundred_of_channel(speed),
+        )
         return replace(heading, columns=ordered)
 
     def read(self, source: TextFile, options: WindOptions) -> Reading:
@@ -53,9 +62,13 @@ class Nrg(Described):
         sensor = replace(
             reading.sensor,
             name=channel.get("description") or reading.sensor.name,
-            height=float(height) if re.fullmatch(r"\d+(\.\d+)?", height) and float(height) > 0 else None,
+            height=float(height)
+            if re.fullmatch(r"\d+(\.\d+)?", height) and float(height) > 0
+            else None,
         )
-        return self.finish_reading(replace(reading, sensor=sensor), done, options, where=str(source.path))
+        return self.finish_reading(
+            replace(reading, sensor=sensor), done, options, where=str(source.path)
+        )
 
 
 def _history(lines: Sequence[str]) -> Mapping[str, Mapping[str, str]]:
@@ -72,12 +85,17 @@ def _history(lines: Sequence[str]) -> Mapping[str, Mapping[str, str]]:
 
 
 def _column(column: Column, history: Mapping[str, Mapping[str, str]]) -> Column:
-    """Names a column by what its channel is and measures; a statistic other than the mean keeps its own name."""
+    """Names a column by what its channel is and measures; a statistic other than the mean keeps its
+    own name."""
     match = _NAME.fullmatch(column.name[:200])
     if match is None:
         return column
     facts = history.get(match["channel"], {})
-    about = " ".join(facts[key] for key in ("description", "type", "measurand") if facts.get(key, "Analog") != "Analog")
+    about = " ".join(
+        facts[key]
+        for key in ("description", "type", "measurand")
+        if facts.get(key, "Analog") != "Analog"
+    )
     spelled = match["unit"]
     kind = "wind speed" if spelled.lower() in _SPEEDS else ""
     name = " ".join(part for part in (f"Ch{match['channel']}", about.strip(), kind) if part)

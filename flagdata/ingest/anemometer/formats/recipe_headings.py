@@ -1,4 +1,5 @@
-"""The heading of a table, as an open recipe describes it: where it stands, its names, units and delimiter."""
+"""The heading of a table, as an open recipe describes it: where it stands, its names, units and
+delimiter."""
 
 from __future__ import annotations
 
@@ -23,7 +24,8 @@ _REST = re.compile(
 
 @dataclass(frozen=True, kw_only=True)
 class Column:
-    """A column of a heading: its number from 1, its name, and its unit as written ("" where there is none)."""
+    """A column of a heading: its number from 1, its name, and its unit as written ("" where there
+    is none)."""
 
     number: int
     name: str
@@ -32,7 +34,8 @@ class Column:
 
 @dataclass(frozen=True, kw_only=True)
 class Heading:
-    """The line of names, from 0; the lines above the rows; the names' cells and columns, and the units below them."""
+    """The line of names, from 0; the lines above the rows; the names' cells and columns, and the
+    units below them."""
 
     at: int
     rows: int
@@ -45,18 +48,23 @@ class Heading:
 def fits(name: str, cell: str) -> re.Match[str] | None:
     """Matches a cell of a heading with a name or a pattern; `None` where it does not fit."""
     cell = cell[:300]  # a heading of any length must not cost more
-    return re.fullmatch(name, cell, re.IGNORECASE) or re.fullmatch(re.escape(name), cell, re.IGNORECASE)
+    return re.fullmatch(name, cell, re.IGNORECASE) or re.fullmatch(
+        re.escape(name), cell, re.IGNORECASE
+    )
 
 
 def cut(line: str, delimiter: str) -> list[str]:
     """Cuts one line of a heading into cells, without the blanks and quotes around them."""
     if delimiter == " ":
         return line.split()
-    return [cell.strip() for cell in next(csv.reader([line.lstrip("\ufeff")], delimiter=delimiter), [])]
+    return [
+        cell.strip() for cell in next(csv.reader([line.lstrip("\ufeff")], delimiter=delimiter), [])
+    ]
 
 
 def find(data: Mapping[str, Any], lines: Sequence[str]) -> Heading | None:
-    """Finds the heading of a file by the [match] and [file] of an open recipe; `None` where it is not there."""
+    """Finds the heading of a file by the [match] and [file] of an open recipe; `None` where it is
+    not there."""
     match, file = data.get("match", {}), data.get("file", {})
     mark, preamble = match.get("mark", ""), file.get("preamble", 0)
     delimiter = DELIMITERS.get(file.get("delimiter", ""), file.get("delimiter"))
@@ -64,14 +72,20 @@ def find(data: Mapping[str, Any], lines: Sequence[str]) -> Heading | None:
         return None
     if file.get("header", 1) == 0:
         is_there = len(lines) > preamble and re.search(mark, "\n".join(lines[:preamble]))
-        return Heading(at=max(preamble - 1, 0), rows=preamble, delimiter=delimiter or ",") if is_there else None
+        return (
+            Heading(at=max(preamble - 1, 0), rows=preamble, delimiter=delimiter or ",")
+            if is_there
+            else None
+        )
     first = 0 if "header" in match else preamble
     above = [line[:_LONGEST] for line in lines[: match.get("within", first + 1)]]
     if not re.search(mark, "\n".join(above)):
         return None
     for at, line in enumerate(above[first:], start=first):
         line = line.lstrip("\ufeff# ")
-        used = delimiter or ("\t" if "\t" in line else ";" if line.count(";") > 1 or "," not in line else ",")
+        used = delimiter or (
+            "\t" if "\t" in line else ";" if line.count(";") > 1 or "," not in line else ","
+        )
         cells = cut(line, used)
         if match.get("groups") and at:
             cells = _grouped_names(cut(above[at - 1], used), cells)
@@ -80,21 +94,32 @@ def find(data: Mapping[str, Any], lines: Sequence[str]) -> Heading | None:
             cells = _stacked_names(above[at - 1].lstrip("\ufeff"), above[at], used)
         complete = all(any(fits(name, cell) for cell in cells) for name in match.get("header", ()))
         if complete and re.search(mark, "\n".join(above[: at + 1])):
-            heading = _heading_at(match, lines, at, used, cells, file.get("header", 1 + bool(match.get("units"))))
+            heading = _heading_at(
+                match, lines, at, used, cells, file.get("header", 1 + bool(match.get("units")))
+            )
             row = lines[heading.rows] if heading.rows < len(lines) else ""
             return heading if re.match(match.get("row", ""), row) else None
     return None
 
 
 def _heading_at(
-    match: Mapping[str, Any], lines: Sequence[str], at: int, delimiter: str, cells: list[str], header: int
+    match: Mapping[str, Any],
+    lines: Sequence[str],
+    at: int,
+    delimiter: str,
+    cells: list[str],
+    header: int,
 ) -> Heading:
     below = cut(lines[at + 1], delimiter) if match.get("units") and at + 1 < len(lines) else []
     rows = at + header
     while rows < len(lines) and not lines[rows].strip(f'{delimiter} "-'):
         rows += 1
     parts = [fits(match["cell"], cell) if "cell" in match else None for cell in cells]
-    units = [*below, *[""] * len(cells)] if below else [part["unit"] or "" if part else "" for part in parts]
+    units = (
+        [*below, *[""] * len(cells)]
+        if below
+        else [part["unit"] or "" if part else "" for part in parts]
+    )
     names = [part["name"] or "" if part else cell for part, cell in zip(parts, cells, strict=True)]
     columns = [Column(number=i + 1, name=name, unit=units[i]) for i, name in enumerate(names)]
     return Heading(at=at, rows=rows, delimiter=delimiter, cells=cells, columns=columns, below=below)
@@ -110,15 +135,23 @@ def _grouped_names(above: Sequence[str], cells: Sequence[str]) -> list[str]:
 
 
 def _stacked_names(upper: str, lower: str, delimiter: str) -> list[str]:
-    """Joins names whose first word stands in the line above: in the same cell, or over one of the letters."""
+    """Joins names whose first word stands in the line above: in the same cell, or over one of the
+    letters."""
     if delimiter != " ":
         first, second = cut(upper, delimiter), cut(lower, delimiter)
-        return [f"{first[at] if at < len(first) else ''} {cell}".strip() for at, cell in enumerate(second)]
+        return [
+            f"{first[at] if at < len(first) else ''} {cell}".strip()
+            for at, cell in enumerate(second)
+        ]
     words = [(match.start(), match.end(), match[0]) for match in re.finditer(r"\S+", upper)]
     return [
         " ".join(
             [
-                *(word for start, end, word in words if start < lower_word.end() and end > lower_word.start()),
+                *(
+                    word
+                    for start, end, word in words
+                    if start < lower_word.end() and end > lower_word.start()
+                ),
                 lower_word[0],
             ]
         )
@@ -129,8 +162,8 @@ def _stacked_names(upper: str, lower: str, delimiter: str) -> list[str]:
 def stamp_format(
     texts: Sequence[str], options: WindOptions, where: str, *, claim: str = ""
 ) -> tuple[str, tuple[Finding, ...]]:
-    """Infers the format of stamps (see stamp_text.py) from the stamps themselves; also returns findings on the order of
-    dates.
+    """Infers the format of stamps (see stamp_text.py) from the stamps themselves; also returns
+    findings on the order of dates.
 
     Args:
         texts: stamps of the first rows, date before time.
@@ -147,11 +180,21 @@ def stamp_format(
         first = filled[0] if filled else ""
         raise TimeError(f"{first!r} has no time of day", where=where, fix="export date and time")
     clock = ("%I" if rest["p"] else "%H") + ":%M" + (":%S" if rest["s"] else "")
-    clock += "%f" if any(match["f"] for match in rests) else ""  # some loggers drop zeros at the end
+    clock += (
+        "%f" if any(match["f"] for match in rests) else ""
+    )  # some loggers drop zeros at the end
     half = f"{' ' if rest['b'] else ''}%p" if rest["p"] else ""
     form = f"{date} {clock}{half}{'%z' if rest['z'] else ''}"
     if order == "ymd":
         return form, ()
     contradicted = claim.upper().startswith("YYYY")
-    text = f"dates are read as {order}: {reason}" + (f"; the heading says {claim!r}" if contradicted else "")
-    return form, (Finding(kind="date-order", severity=Severity.WARNING if contradicted else Severity.NOTE, what=text),)
+    text = f"dates are read as {order}: {reason}" + (
+        f"; the heading says {claim!r}" if contradicted else ""
+    )
+    return form, (
+        Finding(
+            kind="date-order",
+            severity=Severity.WARNING if contradicted else Severity.NOTE,
+            what=text,
+        ),
+    )

@@ -1,9 +1,10 @@
 """Lines that an instrument sent over a serial port, as a computer or logger wrote them down.
 
-The instruments do not know the time: it is the stamp that the logging computer wrote before each line, ISO 8601 or Unix
-time, alone or in brackets, set off by a comma, semicolon, tab or blank. Signal K's server writes the connection's name
-between stamp and sentence, other programs what they have to say about it; an NMEA sentence is found wherever its line
-holds a stamp. What the lines of an instrument mean is declared beside: see `makers`.
+The instruments do not know the time: it is the stamp that the logging computer wrote before each
+line, ISO 8601 or Unix time, alone or in brackets, set off by a comma, semicolon, tab or blank.
+Signal K's server writes the connection's name between stamp and sentence, other programs what they
+have to say about it; an NMEA sentence is found wherever its line holds a stamp. What the lines of
+an instrument mean is declared beside: see `makers`.
 """
 
 from __future__ import annotations
@@ -37,7 +38,8 @@ _CLOCK = r"(?P<time>\d{2}:\d{2}:\d{2}(?:\.\d{1,9})?)"
 _RAW = r"[\"\])]?[\s,;>|]+(?P<raw>\S.*)"
 _STAMP = re.compile(
     r"\s*(?:[A-Za-z]\w{0,15}[ ,;:\t]+|[A-Za-z][\w.-]{0,60}\t)?"
-    r"[\"\[(]?(?P<date>\d{4}[-/]\d{2}[-/]\d{2})[T ,;\t](?P<time>\d{2}:\d{2}:\d{2}(?:\.\d{1,9}|,\d{3}(?=[\s\])]))?)"
+    r"[\"\[(]?(?P<date>\d{4}[-/]\d{2}[-/]\d{2})[T "
+    r",;\t](?P<time>\d{2}:\d{2}:\d{2}(?:\.\d{1,9}|,\d{3}(?=[\s\])]))?)"
     r"(?P<zone>Z|[+-]\d{2}:?\d{2})?[\"\])]?[\s,;>|]+"
     r"(?:(?:\w{0,40}[,;]){1,2}(?=\"?[$!])|[^$!]{1,120}(?=[$!][A-Z]{2}[A-Z0-9]{3},))?(?P<raw>\S.*)"
 )
@@ -59,19 +61,24 @@ _CTIME = re.compile(
     + r" (?:(?P<zone>[A-Z]{3,4}) )?(?P<year>\d{4})"
     + _RAW
 )
-"""As C's asctime and the command date write it, perhaps with a fraction: "Tue Jul 17 12:48:36.971 2018"."""
+"""As C's asctime and the command date write it, perhaps with a fraction: "Tue Jul 17 12:48:36.971
+2018"."""
 _COMPACT = re.compile(
     r"\s*[\"\[(]?(?P<year>(?:19|20)\d{2})(?P<month>\d{2})(?P<day>\d{2})[T _-]?"
     r"(?P<hour>\d{2}):?(?P<minute>\d{2}):?(?P<second>\d{2}(?:\.\d{1,9})?)(?P<zone>Z|[+-]\d{2}:?\d{2})?[\"\])]?"
     r"[\s,;>|]+(?P<raw>[$!]\S.*)"
 )
-"""A stamp without signs between its numbers, before a sentence: "20260501 120000+00:00 $WIMWV,…"."""
+"""A stamp without signs between its numbers, before a sentence: "20260501 120000+00:00
+$WIMWV,…"."""
 _SENTENCE = re.compile(r"[$!][A-Z]{2}[A-Z0-9]{3},[^*$!\"]*\*[0-9A-Fa-f]{2}")
 _ANYWHERE = re.compile(
-    r"(?<!\d)(?P<date>\d{4}[-/]\d{2}[-/]\d{2})[T ,;\t]+(?P<time>\d{2}:\d{2}:\d{2}(?:[.,]\d{1,9})?)\s?"
+    r"(?<!\d)(?P<date>\d{4}[-/]\d{2}[-/]\d{2})[T "
+    r",;\t]+(?P<time>\d{2}:\d{2}:\d{2}(?:[.,]\d{1,9})?)\s?"
     r"(?P<zone>Z|UTC|[+-]\d{2}:?\d{2})?(?![\d:])"
 )
-_UNIX = re.compile(r"(?<![\d.])(?P<whole>1\d{9})(?:\.(?P<part>\d{1,9})|(?P<rest>(?:\d{3}){0,3}))(?![\d.])")
+_UNIX = re.compile(
+    r"(?<![\d.])(?P<whole>1\d{9})(?:\.(?P<part>\d{1,9})|(?P<rest>(?:\d{3}){0,3}))(?![\d.])"
+)
 """Seconds, perhaps with a fraction, and milli-, micro- and nanoseconds since 1970."""
 GIVEN_CLOCK = "they carry no time of their own: they are on the clock that was given"
 NOTHING = " \t\x00\x02\x03\x1a"
@@ -97,7 +104,8 @@ class Defect(Enum):
 
 
 Sample: TypeAlias = tuple[Mapping[str, float], SampleFlag]
-"""Values (SI, NaN or not there where missing) by names of schema.CHANNELS, and what the instrument says of itself."""
+"""Values (SI, NaN or not there where missing) by names of schema.CHANNELS, and what the instrument
+says of itself."""
 Parse: TypeAlias = Callable[[str], Sample | Defect]
 Split: TypeAlias = Callable[[str], tuple[str, str]]
 
@@ -111,9 +119,10 @@ class Instrument:
         channels: names of schema.CHANNELS that its lines may have.
         parse: a line without its stamp → sample or defect.
         sensor: the instrument.
-        described_by: the maker's description that `parse` follows, where no file of the instrument was at hand.
-        splits: makes, for a file, what divides a line into stamp ("" where there is none; ISO 8601 or Unix time) and
-            the rest.
+        described_by: the maker's description that `parse` follows, where no file of the instrument
+            was at hand.
+        splits: makes, for a file, what divides a line into stamp ("" where there is none; ISO 8601
+            or Unix time) and the rest.
     """
 
     name: str
@@ -131,34 +140,48 @@ class _Gathered:
     line: list[int] = field(default_factory=list)
     flags: list[int] = field(default_factory=list)
     unstamped: list[int] = field(default_factory=list)
-    defects: dict[Defect, list[int]] = field(default_factory=lambda: {defect: [] for defect in Defect})
+    defects: dict[Defect, list[int]] = field(
+        default_factory=lambda: {defect: [] for defect in Defect}
+    )
     last: int = 0
 
 
 @lru_cache(maxsize=2048)
 def split_stamp(line: str) -> tuple[str, str]:
-    """Splits a line into the stamp that a computer wrote before it ("" where there is none) and the rest, out of its
-    quotes.
+    """Splits a line into the stamp that a computer wrote before it ("" where there is none) and the
+    rest, out of its quotes.
 
     The stamp of an NMEA sentence may stand anywhere in its line.
     """
     if line.startswith("\\"):
         instant = tag_time(line)
         fraction = f".{instant % 1000:03d}" if instant is not None and instant % 1000 else ""
-        return ("", line) if instant is None else (f"{instant // 1000}{fraction}", line[line.rfind("\\") + 1 :])
+        return (
+            ("", line)
+            if instant is None
+            else (f"{instant // 1000}{fraction}", line[line.rfind("\\") + 1 :])
+        )
     match = _STAMP.match(line)
     if match is not None:
-        stamp, raw = f"{match['date']}T{match['time']}{match['zone'] or ''}", _unquote_text(match["raw"])
+        stamp, raw = (
+            f"{match['date']}T{match['time']}{match['zone'] or ''}",
+            _unquote_text(match["raw"]),
+        )
         return stamp, _AFTER.sub("", raw) if raw.startswith(("$", "!")) else raw
     match = _MONTH.match(line) or _CTIME.match(line)
     if match is not None and match["month"].lower() in ENGLISH:
         month = ENGLISH.index(match["month"].lower()) + 1
         east = {"UTC": 0, "GMT": 0, **ABBREVIATED}.get(match["zone"] or "")
         zone = "" if east is None else f"{east:+03d}:00"
-        return f"{match['year']}-{month:02d}-{match['day']:0>2}T{match['time']}{zone}", _unquote_text(match["raw"])
+        return (
+            f"{match['year']}-{month:02d}-{match['day']:0>2}T{match['time']}{zone}",
+            _unquote_text(match["raw"]),
+        )
     match = _COMPACT.match(line)
     if match is not None:
-        stamp = "{year}-{month}-{day}T{hour}:{minute}:{second}".format(**match.groupdict()) + (match["zone"] or "")
+        stamp = "{year}-{month}-{day}T{hour}:{minute}:{second}".format(**match.groupdict()) + (
+            match["zone"] or ""
+        )
         return stamp, _AFTER.sub("", match["raw"])
     match = _EPOCH.match(line)
     if match is not None:
@@ -219,7 +242,8 @@ def read_lines(source: TextFile, instrument: Instrument, *, zone_name: str | Non
         raise TimeError(
             f"the lines of {instrument.name} carry no time",
             where=f"{where}, line {gathered.unstamped[0]}",
-            fix="log each line after the computer's stamp: 2026-05-01T12:00:00.123Z,LINE; if the readings came at a "
+            fix="log each line after the computer's stamp: 2026-05-01T12:00:00.123Z,LINE; if the "
+            "readings came at a "
             "steady rate that is known: --start TIME --rate HZ, with the instant of the first",
         )
     if count == 0:
@@ -227,18 +251,23 @@ def read_lines(source: TextFile, instrument: Instrument, *, zone_name: str | Non
         raise InputError(
             f"none of {bad} lines is a reading of {instrument.name}",
             where=where,
-            fix="a stamp before each line is known as 2026-05-01T12:00:00 or 2026/05/01 12:00:00: write it so; or "
+            fix="a stamp before each line is known as 2026-05-01T12:00:00 or 2026/05/01 12:00:00: "
+            "write it so; or "
             "look at the lines with flagdata ingest --sniff",
         )
     stamps = stamps_of(gathered.stamps)
     line = np.array(gathered.line, dtype=np.int64)
     keep = stamps.valid
-    time, findings = instants(stamps.ns[keep], stamps.utc[keep], line=line[keep], zone_name=zone_name, where=where)
+    time, findings = instants(
+        stamps.ns[keep], stamps.utc[keep], line=line[keep], zone_name=zone_name, where=where
+    )
     flags = np.array(gathered.flags, dtype=np.uint16)[keep]
     channels, about = _channels(gathered, line, keep)
     if not channels:
         raise InputError(
-            f"every reading of {instrument.name} is empty", where=f"{where}, line {line[0]}", fix="check the sensor"
+            f"every reading of {instrument.name} is empty",
+            where=f"{where}, line {line[0]}",
+            fix="check the sensor",
         )
     flags |= _missing(channels)
     return Reading(
@@ -248,7 +277,11 @@ def read_lines(source: TextFile, instrument: Instrument, *, zone_name: str | Non
         line=line[keep],
         sensor=instrument.sensor,
         step=stamps.step,
-        findings=(*findings, *_findings(gathered, instrument, flags, line[keep], int((~keep).sum())), *about),
+        findings=(
+            *findings,
+            *_findings(gathered, instrument, flags, line[keep], int((~keep).sum())),
+            *about,
+        ),
     )
 
 
@@ -278,7 +311,10 @@ def turn_directions(reading: Reading, azimuth: float | None, *, where: str) -> R
     channels = dict(reading.channels)
     if azimuth is not None:
         channels["wind_direction"] = np.mod(channels["wind_direction"] + azimuth, 2 * np.pi)
-        text = f"directions are turned by the azimuth of the north mark, {np.degrees(azimuth):.1f}°, as given"
+        text = (
+            f"directions are turned by the azimuth of the north mark, {np.degrees(azimuth):.1f}°, "
+            "as given"
+        )
         fix = None
     finding = Finding.of("north-mark", text, fix=fix)
     return replace(reading, channels=channels).with_findings((finding,))
@@ -312,7 +348,9 @@ def _gather(source: TextFile, instrument: Instrument) -> _Gathered:
     return gathered
 
 
-def _channels(gathered: _Gathered, line: IntArray, keep: BoolArray) -> tuple[dict[str, FloatArray], list[Finding]]:
+def _channels(
+    gathered: _Gathered, line: IntArray, keep: BoolArray
+) -> tuple[dict[str, FloatArray], list[Finding]]:
     channels: dict[str, FloatArray] = {}
     findings: list[Finding] = []
     for name, column in gathered.channels.items():
@@ -328,7 +366,8 @@ def _channels(gathered: _Gathered, line: IntArray, keep: BoolArray) -> tuple[dic
 
 
 def _missing(channels: dict[str, FloatArray]) -> NDArray[np.uint16]:
-    """Returns the flag MISSING where there is neither a speed nor a pair of horizontal components."""
+    """Returns the flag MISSING where there is neither a speed nor a pair of horizontal
+    components."""
     speeds = [values for name, values in channels.items() if name.endswith("wind_speed")]
     pair = [channels[name] for name in ("wind_x", "wind_y") if name in channels]
     is_finite = [np.isfinite(values) for values in speeds]
@@ -339,7 +378,11 @@ def _missing(channels: dict[str, FloatArray]) -> NDArray[np.uint16]:
 
 
 def _findings(
-    gathered: _Gathered, instrument: Instrument, flags: NDArray[np.uint16], line: IntArray, unreadable: int
+    gathered: _Gathered,
+    instrument: Instrument,
+    flags: NDArray[np.uint16],
+    line: IntArray,
+    unreadable: int,
 ) -> list[Finding]:
     findings: list[Finding] = []
     places = {defect: [n for n in numbers if n > 1] for defect, numbers in gathered.defects.items()}
@@ -351,17 +394,53 @@ def _findings(
         if len(numbers):
             text = f"{len(numbers)} {what}"
             findings.append(
-                Finding(kind=kind, severity=severity, count=len(numbers), where=f"line {numbers[0]}", what=text)
+                Finding(
+                    kind=kind,
+                    severity=severity,
+                    count=len(numbers),
+                    where=f"line {numbers[0]}",
+                    what=text,
+                )
             )
 
-    note(places[Defect.CHECKSUM], "checksum-errors", Severity.ERROR, "lines with a wrong checksum; left out")
-    note(places[Defect.CUT], "malformed-lines", Severity.ERROR, f"incomplete lines of {instrument.name}; left out")
-    note(places[Defect.OTHER], "non-data-lines", Severity.WARNING, f"lines without a reading of {instrument.name}")
+    note(
+        places[Defect.CHECKSUM],
+        "checksum-errors",
+        Severity.ERROR,
+        "lines with a wrong checksum; left out",
+    )
+    note(
+        places[Defect.CUT],
+        "malformed-lines",
+        Severity.ERROR,
+        f"incomplete lines of {instrument.name}; left out",
+    )
+    note(
+        places[Defect.OTHER],
+        "non-data-lines",
+        Severity.WARNING,
+        f"lines without a reading of {instrument.name}",
+    )
     note(gathered.unstamped, "no-stamp", Severity.ERROR, "readings without a stamp; left out")
-    note(places[Defect.BESIDE], "other-messages", Severity.NOTE, f"other messages of {instrument.name}; not read")
-    note([0] * unreadable, "unreadable-stamps", Severity.ERROR, "readings whose stamp is no date; left out")
+    note(
+        places[Defect.BESIDE],
+        "other-messages",
+        Severity.NOTE,
+        f"other messages of {instrument.name}; not read",
+    )
+    note(
+        [0] * unreadable,
+        "unreadable-stamps",
+        Severity.ERROR,
+        "readings whose stamp is no date; left out",
+    )
     faults = line[(flags & SampleFlag.SENSOR_FAULT) != 0].tolist()
-    note(faults, "sensor-fault", Severity.WARNING, "readings that the instrument marks as faulty; left out of averages")
+    note(
+        faults,
+        "sensor-fault",
+        Severity.WARNING,
+        "readings that the instrument marks as faulty; left out of averages",
+    )
     missing = line[(flags & SampleFlag.MISSING) != 0].tolist()
     note(missing, "missing-values", Severity.WARNING, "readings without a wind speed")
     if instrument.described_by is not None:

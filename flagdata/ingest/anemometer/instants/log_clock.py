@@ -1,9 +1,11 @@
-"""Where a log's time does not go on: a clock that was set back or on, stamps that leave its course, rows out of order.
+"""Where a log's time does not go on: a clock that was set back or on, stamps that leave its course,
+rows out of order.
 
-Rows follow one another at the usual step p, the median of the steps forward. A step s that differs from it says that
-rows are missing, or that the clock was set by s - p. Set back, time repeats itself, which a log does for no other
-reason; set on, it leaves an interval that missing rows leave as well. The size distinguishes the two: people and
-daylight saving set clocks by whole hours, and an outage lasts a whole hour, to within p, with probability p / 1 h.
+Rows follow one another at the usual step p, the median of the steps forward. A step s that differs
+from it says that rows are missing, or that the clock was set by s - p. Set back, time repeats
+itself, which a log does for no other reason; set on, it leaves an interval that missing rows leave
+as well. The size distinguishes the two: people and daylight saving set clocks by whole hours, and
+an outage lasts a whole hour, to within p, with probability p / 1 h.
 """
 
 from __future__ import annotations
@@ -22,18 +24,20 @@ from flagdata.record.signals import Instants
 from flagdata.timebase import NANOSECONDS, iso
 
 ClockChoice: TypeAlias = Literal["first", "last", "sort"]
-"""Whose stamps are right where they run back: those before the first jump, those after the last, or all ("sort"), since
-no clock was set and the rows are out of order."""
+"""Whose stamps are right where they run back: those before the first jump, those after the last, or
+all ("sort"), since no clock was set and the rows are out of order."""
 
 JITTER = 2 * NANOSECONDS
 """Disorder that buffers of a computer explain; a clock that is set back jumps further."""
 _LEAST, _AROUND, _APART = 5, 20, 1 / 3
-"""Steady steps before and after a small step back, the most that are looked at, and the share of the jump by which no
-row around it may be off the clock on its side."""
+"""Steady steps before and after a small step back, the most that are looked at, and the share of
+the jump by which no row around it may be off the clock on its side."""
 MOST = 4
-"""Times a clock is set within one log; one that runs backwards more often is disordered, or corrected all the time."""
+"""Times a clock is set within one log; one that runs backwards more often is disordered, or
+corrected all the time."""
 _CHANCE = 0.5
-"""Number of outages of such a length expected by chance below which an interval may be a clock set on."""
+"""Number of outages of such a length expected by chance below which an interval may be a clock set
+on."""
 _FARTHEST = 14 * HOUR
 """Zones differ by no more."""
 _NEVER_SET = 1000 * DAY
@@ -49,7 +53,8 @@ class Jump:
     Attributes:
         row: the first row after it.
         size: by which it was set [ns]: negative where it was set back.
-        by_quarters: whether that is a multiple of a quarter of an hour; else it is the step less the usual one.
+        by_quarters: whether that is a multiple of a quarter of an hour; else it is the step less
+            the usual one.
     """
 
     row: int
@@ -69,28 +74,36 @@ def usual(time: Instants) -> int:
 
 
 def set_back(time: Instants) -> tuple[Jump, ...]:
-    """Finds every step back by more than `JITTER`, as a jump; (n,) instants in the order of the rows."""
+    """Finds every step back by more than `JITTER`, as a jump; (n,) instants in the order of the
+    rows."""
     steps, step = np.diff(time), usual(time)
-    return tuple(_jump(row + 1, int(steps[row]), step) for row in np.flatnonzero(steps < -JITTER).tolist())
+    return tuple(
+        _jump(row + 1, int(steps[row]), step) for row in np.flatnonzero(steps < -JITTER).tolist()
+    )
 
 
 def _jump(row: int, step: int, usual_step: int) -> Jump:
-    """Finds the jump that a step amounts to: the multiple of a quarter of an hour that leaves most nearly the usual
-    step."""
+    """Finds the jump that a step amounts to: the multiple of a quarter of an hour that leaves most
+    nearly the usual step."""
     sizes = [round((step - usual_step) / unit) * unit for unit in (HOUR, HOUR // 2, HOUR // 4)]
     most = max(3 * usual_step, 60 * NANOSECONDS)
     fitting = [size for size in sizes if size and usual_step // 2 <= step - size <= most]
     if not fitting:
         return Jump(row=row, size=step - usual_step, by_quarters=False)
-    return Jump(row=row, size=min(fitting, key=lambda size: abs(step - size - usual_step)), by_quarters=True)
+    return Jump(
+        row=row, size=min(fitting, key=lambda size: abs(step - size - usual_step)), by_quarters=True
+    )
 
 
 def set_back_a_little(time: Instants, choice: ClockChoice | None) -> tuple[Jump, ...]:
-    """Steps back by no more than `JITTER` that no buffer explains: the rows before and after them come at the usual
-    step, and none of those after makes up for it, as the row behind a late one does.
+    """Steps back by no more than `JITTER` that no buffer explains: the rows before and after them
+    come at the usual step, and none of those after makes up for it, as the row behind a late one
+    does.
 
-    Rows that share a stamp count as one, since a clock of whole seconds may stamp several; unless the user says that
-    the clock was set: a stamp that comes twice in a steady log is then a clock set back by one step.
+    Rows that share a stamp count as one, since a clock of whole seconds may stamp several; unless
+    the user says that
+    the clock was set: a stamp that comes twice in a steady log is then a clock set back by one
+    step.
     """
     step = usual(time)
     rows = np.concatenate(([0], np.flatnonzero(np.diff(time)) + 1))
@@ -110,8 +123,14 @@ def set_back_a_little(time: Instants, choice: ClockChoice | None) -> tuple[Jump,
         sides = np.stack([position, np.ones(len(position)), position > 0], axis=1)
         solved = np.linalg.lstsq(sides, clock, rcond=None)[0]
         shift, behind = round(float(solved[2])), at + 1 + after
-        undone = behind < len(steps) and abs(int(steps[behind]) - step + shift) <= _APART * abs(shift)
-        if shift < 0 and not undone and float(np.abs(clock - sides @ solved).max()) <= _APART * abs(shift):
+        undone = behind < len(steps) and abs(int(steps[behind]) - step + shift) <= _APART * abs(
+            shift
+        )
+        if (
+            shift < 0
+            and not undone
+            and float(np.abs(clock - sides @ solved).max()) <= _APART * abs(shift)
+        ):
             jumps.append(Jump(row=int(rows[at + 1]), size=shift, by_quarters=False))
         if len(jumps) > MOST:
             return ()
@@ -124,13 +143,16 @@ def _length(steady: BoolArray) -> int:
 
 
 def set_on(time: Instants, *, returns: Sequence[Jump] = ()) -> tuple[Jump, ...]:
-    """Intervals by which the clock may have been set on: whole hours that chance does not explain, or years.
+    """Intervals by which the clock may have been set on: whole hours that chance does not explain,
+    or years.
 
-    Of rows a day or more apart none is reported: they keep whole days between them whatever the clock does.
+    Of rows a day or more apart none is reported: they keep whole days between them whatever the
+    clock does.
 
     Args:
         time: (n,) instants in the order of the rows.
-        returns: jumps back; an interval of the same size as one of them undoes it, however many others there are.
+        returns: jumps back; an interval of the same size as one of them undoes it, however many
+            others there are.
     """
     steps, step = np.diff(time), usual(time)
     if step == 0 or step >= DAY:
@@ -155,10 +177,12 @@ def set_on(time: Instants, *, returns: Sequence[Jump] = ()) -> tuple[Jump, ...]:
 
 
 def excursions(time: Instants, *, most: int) -> BoolArray:
-    """Rows whose stamps leave the log's time and come back to it: (n,), at most `most` rows at a time.
+    """Rows whose stamps leave the log's time and come back to it: (n,), at most `most` rows at a
+    time.
 
-    Such a stretch lies outside the longest rise, between a step back and a step forward of half its size or more and
-    no usual one, and the rows on both sides of it follow each other as rows do. Beside the log's first or last row only
+    Such a stretch lies outside the longest rise, between a step back and a step forward of half its
+    size or more and no usual one, and the rows on both sides of it follow each other as rows do.
+    Beside the log's first or last row only
     one side is known: a stretch there counts where it is more than a day off.
     """
     n, step = len(time), usual(time)
@@ -198,7 +222,8 @@ def longest_rise(time: Instants) -> IntArray:
 
 
 def is_disordered(time: Instants) -> bool:
-    """Checks whether rows that run back fill, once sorted, the intervals that they left: fewer steps are then unusual.
+    """Checks whether rows that run back fill, once sorted, the intervals that they left: fewer
+    steps are then unusual.
 
     Of a clock that was set back the sorted rows share stamps, or lie closer than the log's step.
     """
@@ -208,8 +233,11 @@ def is_disordered(time: Instants) -> bool:
     return unusual[0] < unusual[1]
 
 
-def sorted_as_given(time: Instants, line: IntArray, choice: ClockChoice | None) -> tuple[IntArray, Finding] | None:
-    """Sorts rows that the user says to be out of order, with a finding; `None` where there are none.
+def sorted_as_given(
+    time: Instants, line: IntArray, choice: ClockChoice | None
+) -> tuple[IntArray, Finding] | None:
+    """Sorts rows that the user says to be out of order, with a finding; `None` where there are
+    none.
 
     Rows of one stamp stay in the file's order.
     """
@@ -218,14 +246,20 @@ def sorted_as_given(time: Instants, line: IntArray, choice: ClockChoice | None) 
     moved = np.ones(len(time), dtype=bool)
     moved[longest_rise(time)] = False
     count = int(moved.sum())
-    message = f"{count} of {len(time)} rows are out of order in the file; sorted by their stamps, as given"
+    message = (
+        f"{count} of {len(time)} rows are out of order in the file; sorted by their stamps, as "
+        "given"
+    )
     where = f"line {line[moved][0]}"
     finding = Finding.of("rows-sorted", message, count=count, where=where)
     return np.argsort(time, kind="stable"), finding
 
 
-def continue_clock(time: Instants, jumps: Sequence[Jump], choice: ClockChoice | None) -> tuple[Instants, BoolArray]:
-    """Puts all rows on one clock through all jumps; also says which rows were shifted for it: (n,) both.
+def continue_clock(
+    time: Instants, jumps: Sequence[Jump], choice: ClockChoice | None
+) -> tuple[Instants, BoolArray]:
+    """Puts all rows on one clock through all jumps; also says which rows were shifted for it: (n,)
+    both.
 
     Args:
         choice: whose stamps stay; `None` those of the first rows.
@@ -247,7 +281,8 @@ def report(
     stamps_stay: bool = False,
     sortable: bool = False,
 ) -> tuple[Finding, ...]:
-    """Reports clocks that were set anew and continued: the jump, its line, and what remains uncertain.
+    """Reports clocks that were set anew and continued: the jump, its line, and what remains
+    uncertain.
 
     Args:
         time: (n,) as the clock showed it.
@@ -264,12 +299,16 @@ def report(
             message = f"the clock of the {jump.row} rows before line {at} was not set yet: {follow}"
         elif stamps_stay:
             message = (
-                f"an interval is longer than usual by {span(jump.size)}: either the clock was {jump.text()} at line "
+                f"an interval is longer than usual by {span(jump.size)}: either the clock was "
+                f"{jump.text()} at line "
             )
-            message += f"{at} ({follow}) and what follows is off by that much, or so many rows are missing"
+            message += (
+                f"{at} ({follow}) and what follows is off by that much, or so many rows are missing"
+            )
         elif choice is None:
             message += (
-                f"all rows are kept, and the {rows} from there on continue the clock of those before; the log does "
+                f"all rows are kept, and the {rows} from there on continue the clock of those "
+                "before; the log does "
             )
             message += "not say which of the two clocks is right, so either may be off by that much"
         else:
@@ -279,7 +318,10 @@ def report(
         if jump.size > _NEVER_SET:
             fix = "to let those rows end where the others begin: --clock last"
         elif abs(jump.size) == HOUR:
-            fix += "; if it is daylight saving, and the stamps state no offset, name the place by --zone Region/City"
+            fix += (
+                "; if it is daylight saving, and the stamps state no offset, name the place by "
+                "--zone Region/City"
+            )
         fix += f"; {SORT}" if sortable and jump.size < 0 else ""
         findings.append(
             Finding(
@@ -301,5 +343,7 @@ def span(length: int) -> str:
         return f"{length / DAY:.0f} days"
     if length % (60 * NANOSECONDS) == 0 and length:
         hours, minutes = divmod(length // (60 * NANOSECONDS), 60)
-        return " ".join(f"{number} {unit}" for number, unit in ((hours, "h"), (minutes, "min")) if number)
+        return " ".join(
+            f"{number} {unit}" for number, unit in ((hours, "h"), (minutes, "min")) if number
+        )
     return f"{length / NANOSECONDS:.4g} s"

@@ -1,11 +1,13 @@
 """From stamps as text to nanoseconds, in bulk: ISO 8601, counts, and strptime directives.
 
-Directives: %Y %y %m %d %e %j %H %I %p %M %S %b %a, and %f, which stands for an optional fraction with its mark ("" or
-".5" or ",123456789"): loggers drop trailing zeros, so that 20 Hz stamps read 00.05, 00.1, 00.15. %z stands for an
-optional offset from UTC ("Z", "UTC", "GMT", "+02:00", "+02", "CEST"), %Z for letters of a zone that are not read, %p
-for "AM", "p.m." or a bare "a" or "p", %a for a day of the week, which is not read, %b for an English month, whole or
-cut short. Numbers between blanks may end in ".0", as tables of floats have them. 24:00 is the midnight that ends a day
-(ISO 8601:2004, 4.2.3). A blank stands for any run of blanks or a "T". Two-digit years are 1970 to 2069.
+Directives: %Y %y %m %d %e %j %H %I %p %M %S %b %a, and %f, which stands for an optional fraction
+with its mark ("" or ".5" or ",123456789"): loggers drop trailing zeros, so that 20 Hz stamps read
+00.05, 00.1, 00.15. %z stands for an optional offset from UTC ("Z", "UTC", "GMT", "+02:00", "+02",
+"CEST"), %Z for letters of a zone that are not read, %p for "AM", "p.m." or a bare "a" or "p", %a
+for a day of the week, which is not read, %b for an English month, whole or cut short. Numbers
+between blanks may end in ".0", as tables of floats have them. 24:00 is the midnight that ends a day
+(ISO 8601:2004, 4.2.3). A blank stands for any run of blanks or a "T". Two-digit years are 1970 to
+2069.
 
 Names of counts:
 
@@ -42,7 +44,8 @@ from flagdata.timebase import NANOSECONDS
 HOUR = 3600 * NANOSECONDS
 DAY = 24 * HOUR
 NEXT_DAY = 2 * HOUR
-"""A time of day that falls by more is of the next day: clocks are set back by less, and a logger may rest by night."""
+"""A time of day that falls by more is of the next day: clocks are set back by less, and a logger
+may rest by night."""
 _MINUTE = 60 * NANOSECONDS
 ABBREVIATED = {
     "WEST": 1,
@@ -102,13 +105,17 @@ _GROUPS: dict[str, str] = {
     "Z": r"\s*(?:[A-Z]{3,4})?",
 }
 _SAME = {"B": "b", "h": "b", "A": "a", "e": "d"}
-"""Directives of C's strftime that others here read as well: a month's name may be whole or cut short."""
-_TOKEN = re.compile(r"(?P<run>(?<![^ ])%H%M(?:%S)?)|%(?P<directive>.?)|[.,](?=%f)|(?P<sign>.)", re.DOTALL)
+"""Directives of C's strftime that others here read as well: a month's name may be whole or cut
+short."""
+_TOKEN = re.compile(
+    r"(?P<run>(?<![^ ])%H%M(?:%S)?)|%(?P<directive>.?)|[.,](?=%f)|(?P<sign>.)", re.DOTALL
+)
 _CLOCK_RUNS = {
     "%H%M": r"(?P<H>\d{0,2}?)(?P<M>\d{1,2})",
     "%H%M%S": r"(?P<H>\d{1,2})(?P<M>\d{2})(?P<S>\d{2})",
 }
-"""Clocks written as one number. Loggers leave out its zeros: 59 is 00:59, 100 is 01:00; of HHMMSS only the first."""
+"""Clocks written as one number. Loggers leave out its zeros: 59 is 00:59, 100 is 01:00; of HHMMSS
+only the first."""
 _NUMERIC = re.compile(r"%[YymdjHIMS]")
 """Directives of numbers; those with nothing between them have all their digits."""
 _ALONE = re.compile(r"(?<![^ ])%[YmdjHMS](?= |$)")
@@ -120,7 +127,8 @@ _ISO = (
 YEARS = (1970, 2200)
 """First and last year of a stamp that is taken for a date."""
 _CENTURY = YEARS[0] % 100
-"""The first year of two digits that is of the 1900s: no log is of the years to come, and some are of the 1990s."""
+"""The first year of two digits that is of the 1900s: no log is of the years to come, and some are
+of the 1990s."""
 PLAIN_FORMS = ("iso", "%Y-%m-%d %H:%M:%S%f")
 """Forms of which 2021-05-14 00:00:00.05 is one."""
 EPOCH = {
@@ -168,10 +176,12 @@ class Stamps:
     """Parsed stamps, in the order of the rows.
 
     Attributes:
-        ns: (n,) nanoseconds since 1970 of the wall clock, or of UTC where `utc`; since the start of what is elapsed.
+        ns: (n,) nanoseconds since 1970 of the wall clock, or of UTC where `utc`; since the start of
+            what is elapsed.
         utc: (n,) whether the stamp itself says its zone.
         valid: (n,) whether it could be read at all and is a calendar date within `YEARS`.
-        distant: (n,) whether it is written as a stamp, but of a year outside `YEARS`: a clock that was never set.
+        distant: (n,) whether it is written as a stamp, but of a year outside `YEARS`: a clock that
+            was never set.
         step: the resolution of the stamps as written [ns]: the last digit that is ever used.
     """
 
@@ -192,8 +202,8 @@ def pattern(form: str) -> str:
     """Builds the regular expression of a format.
 
     Raises:
-        UsageError: an unknown directive, one given twice, hours of 1 to 12 without their half of the day, or no whole
-            date in it. A date alone is its midnight.
+        UsageError: an unknown directive, one given twice, hours of 1 to 12 without their half of
+            the day, or no whole date in it. A date alone is its midnight.
     """
     if form == "iso":
         return _ISO
@@ -218,11 +228,18 @@ def pattern(form: str) -> str:
     if len(letters) < len(used):
         raise UsageError("a directive occurs twice", where=where, fix="name each once")
     if not (letters & {"Y", "y"} and ("j" in letters or (letters & {"m", "b"} and "d" in letters))):
-        raise UsageError("the format has no whole date", where=where, fix="name year, month and day")
+        raise UsageError(
+            "the format has no whole date", where=where, fix="name year, month and day"
+        )
     if not {"H", "I"} & letters and {"M", "S", "f", "p"} & letters:
-        raise UsageError("the format has no hour", where=where, fix="name the hour, or the date alone")
+        raise UsageError(
+            "the format has no hour", where=where, fix="name the hour, or the date alone"
+        )
     if ("I" in letters) != ("p" in letters):
-        fix = "name the hours of a clock of 12 by %I with %p, those of 24 by %H; export the log so where it has neither"
+        fix = (
+            "name the hours of a clock of 12 by %I with %p, those of 24 by %H; export the log so "
+            "where it has neither"
+        )
         raise UsageError("the half of the day goes with hours of 12", where=where, fix=fix)
     return "^" + "".join(out) + "$"
 
@@ -232,7 +249,9 @@ def _group(form: str, directive: str, at: int) -> str:
     if directive == "f" and form[at - 1 : at] in ("_", "-", ":"):
         return r"(?P<f>\d{1,9})"  # the sign before it stands for the point
     adjoining = _NUMERIC.match(form, at + 2) or (at > 1 and _NUMERIC.match(form, at - 2))
-    expression = f"(?P<{directive}>\\d{{2}})" if adjoining and directive in "mdHMSI" else _GROUPS[directive]
+    expression = (
+        f"(?P<{directive}>\\d{{2}})" if adjoining and directive in "mdHMSI" else _GROUPS[directive]
+    )
     return expression + (r"(?:\.0*)?" if _ALONE.match(form, at) else "")
 
 
@@ -263,7 +282,9 @@ def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
         return plain
     fields = pc.extract_regex(text, pattern(form))
     written = fields.is_valid().to_numpy(zero_copy_only=False).astype(bool)
-    year, month, day, of_year, hour, twelve, minute, second = (_part(fields, name) for name in "YmdjHIMS")
+    year, month, day, of_year, hour, twelve, minute, second = (
+        _part(fields, name) for name in "YmdjHIMS"
+    )
     zero = np.zeros(len(text), dtype=np.int64)
     if year is None:
         short = _part(fields, "y")
@@ -272,27 +293,39 @@ def parse(texts: Sequence[str] | pa.StringArray, form: str) -> Stamps:
     distant = written & ~valid
     if twelve is not None:
         valid &= (twelve >= 1) & (twelve <= 12)
-        half = pc.starts_with(pc.utf8_lower(pc.coalesce(_field(fields, "p"), "")), "p").to_numpy(zero_copy_only=False)
+        half = pc.starts_with(pc.utf8_lower(pc.coalesce(_field(fields, "p"), "")), "p").to_numpy(
+            zero_copy_only=False
+        )
         hour = twelve % 12 + 12 * half.astype(np.int64)
     hour, minute, second = (zero if part is None else part for part in (hour, minute, second))
-    valid &= ((hour < 24) | ((hour == 24) & (minute == 0) & (second == 0))) & (minute < 60) & (second < 60)
+    valid &= (
+        ((hour < 24) | ((hour == 24) & (minute == 0) & (second == 0)))
+        & (minute < 60)
+        & (second < 60)
+    )
     if of_year is None:
         month = _month(fields) if month is None else month
         days, dated = _days(year, month, zero + 1 if day is None else day)
     else:
         first = _midnight(year, zero + 1)
-        days, dated = first + of_year - 1, (of_year >= 1) & (of_year <= _midnight(year + 1, zero + 1) - first)
+        days, dated = (
+            first + of_year - 1,
+            (of_year >= 1) & (of_year <= _midnight(year + 1, zero + 1) - first),
+        )
     valid &= dated
     fraction, digits = _fraction(fields)
     offset, utc = _offset(fields, len(text))
     ns = days * DAY + ((hour * 60 + minute) * 60 + second) * NANOSECONDS + fraction - offset
     step = NANOSECONDS if np.any(second[valid]) else DAY if is_date_alone(form) else _MINUTE
     step = 10 ** (9 - digits) if digits else step
-    return Stamps(ns=np.where(valid, ns, 0), utc=utc & valid, valid=valid, distant=distant, step=step)
+    return Stamps(
+        ns=np.where(valid, ns, 0), utc=utc & valid, valid=valid, distant=distant, step=step
+    )
 
 
 def _plain(text: pa.StringArray) -> Stamps | None:
-    """Parses stamps that are all 2021-05-14 00:00:00 with a fraction or none, by Arrow's own parser; `None` for others.
+    """Parses stamps that are all 2021-05-14 00:00:00 with a fraction or none, by Arrow's own
+    parser; `None` for others.
 
     `None` where one of them is not.
     """
@@ -304,7 +337,10 @@ def _plain(text: pa.StringArray) -> Stamps | None:
         ns = pc.cast(pc.cast(text, pa.timestamp("ns")), pa.int64()).to_numpy(zero_copy_only=False)
     except pa.ArrowInvalid:
         return None
-    low, high = (int(np.datetime64(f"{year}-01-01", "ns").astype(np.int64)) for year in (YEARS[0], YEARS[1] + 1))
+    low, high = (
+        int(np.datetime64(f"{year}-01-01", "ns").astype(np.int64))
+        for year in (YEARS[0], YEARS[1] + 1)
+    )
     if int(ns.min()) < low or int(ns.max()) >= high:
         return None
     step = _MINUTE if longest < 20 and not np.any(ns % _MINUTE) else NANOSECONDS
@@ -315,25 +351,34 @@ def _plain(text: pa.StringArray) -> Stamps | None:
 def _counts(ns: IntArray, valid: BoolArray, step: int, *, utc: bool = False) -> Stamps:
     """Stamps of one kind, all with their zone or all without."""
     none = np.zeros(len(ns), dtype=bool)
-    return Stamps(ns=np.where(valid, ns, 0), utc=valid.copy() if utc else none, valid=valid, distant=none, step=step)
+    return Stamps(
+        ns=np.where(valid, ns, 0),
+        utc=valid.copy() if utc else none,
+        valid=valid,
+        distant=none,
+        step=step,
+    )
 
 
 def _epoch(text: pa.StringArray, scale: int, zero: int, *, utc: bool) -> Stamps:
-    """Reads a count of units of `scale` ns that is `zero` in 1970, exact in integers: a double holds today's seconds to
-    0.2 µs only."""
+    """Reads a count of units of `scale` ns that is `zero` in 1970, exact in integers: a double
+    holds today's seconds to 0.2 µs only."""
     text = _without_exponents(text, scale)
     fields = pc.extract_regex(text, r"^(?P<whole>\d{1,18}|[1-8]\d{18})(?:[.,](?P<f>\d{1,9})\d*)?$")
     units = _part(fields, "whole")
     fraction, digits = _fraction(fields)
     units = (np.zeros(len(text), dtype=np.int64) if units is None else units) - zero
     seconds = units * (scale / NANOSECONDS)
-    valid = fields.is_valid().to_numpy(zero_copy_only=False) & (seconds > _SINCE) & (seconds < _UNTIL)
+    valid = (
+        fields.is_valid().to_numpy(zero_copy_only=False) & (seconds > _SINCE) & (seconds < _UNTIL)
+    )
     ns = np.where(valid, units, 0) * scale + fraction * scale // NANOSECONDS
     return _counts(ns, valid, max(1, scale // 10**digits), utc=utc)
 
 
 def _without_exponents(text: pa.StringArray, scale: int) -> pa.StringArray:
-    """Numbers such as 1.777636801e9 with all their digits; of a column that was rounded to more than a second none."""
+    """Numbers such as 1.777636801e9 with all their digits; of a column that was rounded to more
+    than a second none."""
     written = pc.fill_null(pc.match_substring_regex(text, EXPONENT), False)
     if not pc.any(written).as_py():
         return text
@@ -354,8 +399,9 @@ def _numbers(text: pa.StringArray) -> tuple[FloatArray, BoolArray, int]:
 
 
 def _serial(text: pa.StringArray, base: float) -> Stamps:
-    """Reads serial days. A double holds a day's number to a microsecond or so, and days have no round seconds: noise of
-    the last digits below a millisecond is rounding, and so is what is within the last digit of whole minutes."""
+    """Reads serial days. A double holds a day's number to a microsecond or so, and days have no
+    round seconds: noise of the last digits below a millisecond is rounding, and so is what is
+    within the last digit of whole minutes."""
     value, valid, digits = _numbers(text)
     days = value - base
     valid = valid & (days > _SINCE / 86_400) & (days < _UNTIL / 86_400)
@@ -368,8 +414,8 @@ def _serial(text: pa.StringArray, base: float) -> Stamps:
 
 
 def _elapsed_counts(text: pa.StringArray, form: str) -> Stamps:
-    """Counts since a start, up to ten years. Thirds and sixths of an hour are no decimal fractions: what is within the
-    last digit of a whole second is one."""
+    """Counts since a start, up to ten years. Thirds and sixths of an hour are no decimal fractions:
+    what is within the last digit of a whole second is one."""
     value, valid, digits = _numbers(text)
     scale = ELAPSED[form]
     valid = valid & (value * (scale / NANOSECONDS) < 3.2e8)
@@ -391,7 +437,8 @@ def _field(fields: pa.StructArray, name: str) -> Any:
 
 
 def _part(fields: pa.StructArray, name: str) -> IntArray | None:
-    """Reads one named group as integers, 0 where absent; `None` when the format has no such group."""
+    """Reads one named group as integers, 0 where absent; `None` when the format has no such
+    group."""
     column = _field(fields, name)
     if column is None:
         return None
@@ -415,7 +462,9 @@ def _days(year: IntArray, month: IntArray, day: IntArray) -> tuple[IntArray, Boo
 def _month(fields: pa.StructArray) -> IntArray:
     """Returns the month of each name, 0 for none."""
     names = pc.utf8_lower(pc.coalesce(_field(fields, "b"), ""))
-    indices = pc.fill_null(pc.index_in(names, pa.array(list(_MONTHS))), -1).to_numpy(zero_copy_only=False)
+    indices = pc.fill_null(pc.index_in(names, pa.array(list(_MONTHS))), -1).to_numpy(
+        zero_copy_only=False
+    )
     return np.array([*_MONTHS.values(), 0], dtype=np.int64)[indices]
 
 
@@ -441,7 +490,11 @@ def _offset(fields: pa.StructArray, n: int) -> tuple[IntArray, BoolArray]:
     for value in set(pc.unique(text).to_pylist()) - {"", "Z", "UTC", "GMT"}:
         rows = pc.equal(text, value).to_numpy(zero_copy_only=False).astype(bool)
         hours, minutes = value[1:3], value[3:].lstrip(":") or "0"
-        seconds = ABBREVIATED[value] * 3600 if value in ABBREVIATED else int(hours) * 3600 + int(minutes) * 60
+        seconds = (
+            ABBREVIATED[value] * 3600
+            if value in ABBREVIATED
+            else int(hours) * 3600 + int(minutes) * 60
+        )
         offset[rows] = (-seconds if value[0] == "-" else seconds) * NANOSECONDS
     return offset, states_zone
 
@@ -451,9 +504,12 @@ _TO_THE_MINUTE = re.compile(r"(%[HI])([:.])%M(?!\W?%S)")
 _CLOCK = {"%f": "", "%I": "12", "%p": "AM", "%H": "00", "%M": "00", "%S": "00"}
 
 
-def parse_mixed(texts: Sequence[str] | pa.StringArray, form: str, *, before: str = "") -> tuple[Stamps, int]:
-    """Stamps written as `form`; where most are, also those with seconds beside it, a 24:00 without them, and dates
-    alone, which are midnight as R and spreadsheets write it; and how many dates alone there are.
+def parse_mixed(
+    texts: Sequence[str] | pa.StringArray, form: str, *, before: str = ""
+) -> tuple[Stamps, int]:
+    """Stamps written as `form`; where most are, also those with seconds beside it, a 24:00 without
+    them, and dates alone, which are midnight as R and spreadsheets write it; and how many dates
+    alone there are.
 
     Args:
         before: date that the texts lack, as `form` has it.
@@ -463,14 +519,20 @@ def parse_mixed(texts: Sequence[str] | pa.StringArray, form: str, *, before: str
     """
     text = pc.binary_join_element_wise(before, array(texts), " ") if before else array(texts)
     stamps_read = parse(text, form)
-    if form in NAMED or bool(stamps_read.valid.all()) or 2 * int(stamps_read.valid.sum()) <= len(text):
+    if (
+        form in NAMED
+        or bool(stamps_read.valid.all())
+        or 2 * int(stamps_read.valid.sum()) <= len(text)
+    ):
         return stamps_read, 0
     at = np.flatnonzero(~stamps_read.valid)
     rest = [cell or "" for cell in text.take(pa.array(at)).to_pylist()]
     clock = (
         "00:00:00"
         if form == "iso"
-        else re.sub(r"%[fIpHMS]", lambda further_form: _CLOCK[further_form[0]], form.partition(" ")[2])
+        else re.sub(
+            r"%[fIpHMS]", lambda further_form: _CLOCK[further_form[0]], form.partition(" ")[2]
+        )
     )
     ends = [_BARE_END.sub("24:00:00", cell) for cell in rest]
     dates = ["" if before else f"{cell} {clock}" for cell in rest]

@@ -1,11 +1,13 @@
-"""From the wall clock of a place to UTC for a whole log, and the zone that a log states above its rows.
+"""From the wall clock of a place to UTC for a whole log, and the zone that a log states above its
+rows.
 
-A wall time in the hour that daylight saving repeats is settled only by the log itself: its rows run through the hour
-twice, or follow without a gap from before it, or lead without a gap to after it. Otherwise the log is refused.
+A wall time in the hour that daylight saving repeats is settled only by the log itself: its rows run
+through the hour twice, or follow without a gap from before it, or lead without a gap to after it.
+Otherwise the log is refused.
 
-What lines above the rows say of the clock ("UTC Offset,+2", "Timezone=UTC") is a hint, not a property of the stamps: a
-logger's setting may be one thing and its export another. It is named where a zone is missing, and compared with the
-zone that the user gives.
+What lines above the rows say of the clock ("UTC Offset,+2", "Timezone=UTC") is a hint, not a
+property of the stamps: a logger's setting may be one thing and its export another. It is named
+where a zone is missing, and compared with the zone that the user gives.
 """
 
 from __future__ import annotations
@@ -32,16 +34,20 @@ _LONGEST = 300
 """Characters of a line that are looked at."""
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _FIX = (
-    "give the fixed offset that the logger's clock ran on, e.g. +01:00 (many loggers stay on winter time); if its "
-    "clock was set at another time than those of the zone, the offset of its first rows and --clock first, or that of "
+    "give the fixed offset that the logger's clock ran on, e.g. +01:00 (many loggers stay on "
+    "winter time); if its "
+    "clock was set at another time than those of the zone, the offset of its first rows and "
+    "--clock first, or that of "
     "its last rows and --clock last"
 )
 _MISSING = (
-    "name the zone of the logger's clock: the place whose clocks it followed through summer and winter time, e.g. "
+    "name the zone of the logger's clock: the place whose clocks it followed through summer and "
+    "winter time, e.g. "
     "--zone Europe/Amsterdam, or its offset if it was never set, e.g. --zone +01:00"
 )
 _STATED = re.compile(
-    r"(?<![A-Za-z])(?:time[ _-]?zone(?:[ _]name)?(?:\s*\((?:utc|gmt)\s*[+±]?\s*\))?|(?:utc|gmt)[ _-]?(?:time[ _]?)?"
+    r"(?<![A-Za-z])(?:time[ _-]?zone(?:[ _]name)?(?:\s*\((?:utc|gmt)\s*[+±]?\s*\))?|(?:utc|gmt)[ "
+    r"_-]?(?:time[ _]?)?"
     r"offset|offset[ _](?:from|to)[ _](?:utc|gmt))[\"']?\s*(?:->|[=:,;|\t(]|\s)+\s*[\"']?(?P<zone>"
     r"[A-Z][A-Za-z]+/[A-Za-z_]+(?:/[A-Za-z_]+)?(?:[+-]\d{1,2})?|(?:UTC|GMT)?\s?[+-]?\d{1,4}(?::?\d{2})?|UTC|GMT|Z)"
     r"(?![A-Za-z/\d.]|\s?[+±]\s?\))",
@@ -49,7 +55,9 @@ _STATED = re.compile(
 )
 
 
-def to_utc(wall: IntArray, local_zone: tzinfo, *, lines: IntArray, where: str) -> tuple[IntArray, tuple[Finding, ...]]:
+def to_utc(
+    wall: IntArray, local_zone: tzinfo, *, lines: IntArray, where: str
+) -> tuple[IntArray, tuple[Finding, ...]]:
     """Converts wall-clock nanoseconds to UTC nanoseconds, in the order of the rows.
 
     Args:
@@ -57,7 +65,8 @@ def to_utc(wall: IntArray, local_zone: tzinfo, *, lines: IntArray, where: str) -
         lines: (n,) line numbers, for messages.
 
     Raises:
-        TimeError: a wall time that never occurred there, or one that occurred twice without evidence which.
+        TimeError: a wall time that never occurred there, or one that occurred twice without
+            evidence which.
     """
     if len(wall) == 0:
         return wall.copy(), ()
@@ -72,19 +81,27 @@ def to_utc(wall: IntArray, local_zone: tzinfo, *, lines: IntArray, where: str) -
             continue
         if after > before:
             raise TimeError(
-                f"{_show(int(wall[rows[0]]))} does not exist in {local_zone}: the clocks were set forward over it",
+                f"{_show(int(wall[rows[0]]))} does not exist in {local_zone}: the clocks were set "
+                "forward over it",
                 where=f"{where}, line {lines[rows[0]]}",
                 fix=_FIX,
             )
         late = _second_pass(wall, rows, end - start, local_zone, f"{where}, line {lines[rows[0]]}")
         offset[late] = after
-        message = f"the hour from {_show(start)} occurs twice in {local_zone}; by their order {len(rows) - len(late)} "
+        message = (
+            f"the hour from {_show(start)} occurs twice in {local_zone}; by their order "
+            f"{len(rows) - len(late)} "
+        )
         message += f"rows are of its first pass, {len(late)} of its second"
-        findings.append(Finding.of("clocks-set-back", message, count=len(rows), where=f"line {lines[rows[0]]}"))
+        findings.append(
+            Finding.of("clocks-set-back", message, count=len(rows), where=f"line {lines[rows[0]]}")
+        )
     return wall - offset, tuple(findings)
 
 
-def _second_pass(wall: IntArray, rows: IntArray, length: int, local_zone: tzinfo, where: str) -> IntArray:
+def _second_pass(
+    wall: IntArray, rows: IntArray, length: int, local_zone: tzinfo, where: str
+) -> IntArray:
     """Finds the rows in a repeated interval [ns] that are of its second pass."""
     steps, step = np.diff(wall[rows[0] : rows[-1] + 1]), usual(wall)
     back = np.flatnonzero((steps <= -length // 2) | ((steps == 0) & (step >= length)))
@@ -100,7 +117,11 @@ def _second_pass(wall: IntArray, rows: IntArray, length: int, local_zone: tzinfo
         reason = "the log goes back more than once within that hour"
     elif before:
         reason = "the log runs through it once without a break, so its clock was not set back"
-    raise TimeError(f"{_show(int(wall[rows[0]]))} occurs twice in {local_zone} and {reason}", where=where, fix=_FIX)
+    raise TimeError(
+        f"{_show(int(wall[rows[0]]))} occurs twice in {local_zone} and {reason}",
+        where=where,
+        fix=_FIX,
+    )
 
 
 def instants(
@@ -142,7 +163,9 @@ def _changes(local_zone: tzinfo, low: int, high: int) -> Sequence[tuple[int, int
             while later - earlier > 1:
                 middle = (earlier + later) // 2
                 earlier, later = (
-                    (middle, later) if offset_at(local_zone, middle * NANOSECONDS) == offset else (earlier, middle)
+                    (middle, later)
+                    if offset_at(local_zone, middle * NANOSECONDS) == offset
+                    else (earlier, middle)
                 )
             changes.append((later * NANOSECONDS, offset, value))
         edge, offset = upper, value
@@ -174,7 +197,8 @@ class Statement:
 
 
 def stated_zone(lines: Sequence[str]) -> Statement | None:
-    """Finds the zone that the first lines of a file state; `None` where none does, or they state several."""
+    """Finds the zone that the first lines of a file state; `None` where none does, or they state
+    several."""
     statements = [
         Statement(line=number, text=" ".join(match[0].split()), name=name)
         for number, line in enumerate(lines[:LINES], start=1)
@@ -182,16 +206,21 @@ def stated_zone(lines: Sequence[str]) -> Statement | None:
         if (name := _name(match["zone"].strip())) is not None
     ]
     winters, summers = (
-        {offset_at(zone(statement.name), at) for statement in statements} for at in (0, 182 * 24 * HOUR)
+        {offset_at(zone(statement.name), at) for statement in statements}
+        for at in (0, 182 * 24 * HOUR)
     )
     return statements[0] if len(winters) == 1 or len(summers) == 1 else None
 
 
 def _name(word: str) -> str | None:
-    """Names the zone that a value spells, as `flagdata.timebase.zone` reads it; a number alone is hours, or hours and
-    minutes."""
+    """Names the zone that a value spells, as `flagdata.timebase.zone` reads it; a number alone is
+    hours, or hours and minutes."""
     number = re.fullmatch(r"(?:UTC|GMT)?\s?([+-]?)(\d{1,2})(\d{2})?", word, re.IGNORECASE)
-    name = f"{number[1] or '+'}{int(number[2]):02d}:{number[3] or '00'}" if number is not None else word
+    name = (
+        f"{number[1] or '+'}{int(number[2]):02d}:{number[3] or '00'}"
+        if number is not None
+        else word
+    )
     try:
         zone(name)
     except FlagdataError:
@@ -200,7 +229,8 @@ def _name(word: str) -> str | None:
 
 
 def contradiction(says: str, theirs: str, given_zone: str, time: Instants) -> tuple[Finding, ...]:
-    """Reports that the zone a file states is another than the one that was given, at its first or last instant.
+    """Reports that the zone a file states is another than the one that was given, at its first or
+    last instant.
 
     Args:
         says: who states it, as the subject and verb of a sentence.
@@ -209,12 +239,18 @@ def contradiction(says: str, theirs: str, given_zone: str, time: Instants) -> tu
     """
     ends = (int(time.min()), int(time.max())) if len(time) else ()
     hours_between = (
-        max((offset_at(zone(given_zone), at) - offset_at(zone(theirs), at) for at in ends), key=abs, default=0) / HOUR
+        max(
+            (offset_at(zone(given_zone), at) - offset_at(zone(theirs), at) for at in ends),
+            key=abs,
+            default=0,
+        )
+        / HOUR
     )
     if not hours_between:
         return ()
     message = (
-        f"{says} that the stamps are of {theirs}; {given_zone} was given and is used, {abs(hours_between):g} h away"
+        f"{says} that the stamps are of {theirs}; {given_zone} was given and is used, "
+        f"{abs(hours_between):g} h away"
     )
     fix = f"give {command_line('--zone', theirs)}, unless the file is known to be wrong"
     return (Finding.of("zone-contradicts", message, value=hours_between, fix=fix),)

@@ -1,9 +1,11 @@
-"""What the anemometer is mounted on: on a mast the air past it is the wind, on a boat or vehicle it is not.
+"""What the anemometer is mounted on: on a mast the air past it is the wind, on a boat or vehicle it
+is not.
 
-Formats that know nothing of platforms deliver `wind_speed` for whatever the sensor read. Where the user says that the
-platform moves, or its own speed or position says so, that becomes `apparent_wind_speed`, which is no ground truth,
-unless the user says that the platform's motion was taken out before the wind was logged ("corrected"). Of the winds of
-a network, `settle_platform` says which are wind over ground.
+Formats that know nothing of platforms deliver `wind_speed` for whatever the sensor read. Where the
+user says that the platform moves, or its own speed or position says so, that becomes
+`apparent_wind_speed`, which is no ground truth, unless the user says that the platform's motion was
+taken out before the wind was logged ("corrected"). Of the winds of a network, `settle_platform`
+says which are wind over ground.
 """
 
 from __future__ import annotations
@@ -27,8 +29,8 @@ Platform: TypeAlias = Literal["fixed", "moving", "corrected"]
 MOVING = 0.5
 """Speed over ground that a moored or fixed receiver does not report in the median [kn]."""
 RANGE = 100.0
-"""Extent of the positions of a fixed receiver, which its errors alone explain, from the 5th to the 95th percentile
-[m]."""
+"""Extent of the positions of a fixed receiver, which its errors alone explain, from the 5th to the
+95th percentile [m]."""
 POSITION = ("latitude", "longitude")
 EARTH = 6_371_000.0
 """Mean radius [m]."""
@@ -52,15 +54,21 @@ class PlatformMotion:
 
 
 def position_columns(header: Sequence[str]) -> tuple[str, str] | None:
-    """Finds the columns of latitude and longitude that a header names, each once; `None` where it does not."""
-    columns = [[name for name in header if pattern.fullmatch(name.strip()[:40])] for pattern in (_LATITUDE, _LONGITUDE)]
+    """Finds the columns of latitude and longitude that a header names, each once; `None` where it
+    does not."""
+    columns = [
+        [name for name in header if pattern.fullmatch(name.strip()[:40])]
+        for pattern in (_LATITUDE, _LONGITUDE)
+    ]
     return (columns[0][0], columns[1][0]) if all(len(names) == 1 for names in columns) else None
 
 
 def extent(latitude: FloatArray, longitude: FloatArray) -> float:
-    """Computes how far positions [deg] reach, without the farthest twentieth on each side [m]; 0 where there are
-    none."""
-    valid = (np.abs(latitude) <= 90) & (np.abs(longitude) <= 180) & ((latitude != 0) | (longitude != 0))
+    """Computes how far positions [deg] reach, without the farthest twentieth on each side [m]; 0
+    where there are none."""
+    valid = (
+        (np.abs(latitude) <= 90) & (np.abs(longitude) <= 180) & ((latitude != 0) | (longitude != 0))
+    )
     if int(valid.sum()) < 2:
         return 0.0
     north, east = np.radians(latitude[valid]), np.radians(longitude[valid])
@@ -79,7 +87,9 @@ def motion(reading: Reading, positions: Mapping[str, FloatArray]) -> PlatformMot
     if speed is not None and np.isfinite(speed).any():
         median = float(np.nanmedian(speed))
         if median > MOVING * UNITS["kn"].scale:
-            return PlatformMotion(text=f"moves at {median:.2g} m/s over ground in the median", speed=median)
+            return PlatformMotion(
+                text=f"moves at {median:.2g} m/s over ground in the median", speed=median
+            )
     if {"latitude", "longitude"} <= set(positions):
         reach = extent(positions["latitude"], positions["longitude"])
         if reach > RANGE:
@@ -108,18 +118,26 @@ def settle(
         raise InputError(
             f"the platform was given as fixed, but {motion_shown.text}",
             where=where,
-            fix="say --platform moving: its wind is then apparent wind; where the log's wind is over ground, "
+            fix="say --platform moving: its wind is then apparent wind; where the log's wind is "
+            "over ground, "
             "computed from a moving platform: --platform corrected",
         )
     has = set(reading.channels)
     if given_platform == "fixed":
         text, names = "fixed platform, as given", {}
         if "wind_speed" not in has and "apparent_wind_speed" in has:
-            text += ": apparent wind is wind over ground, its direction still from the sensor's own mark"
+            text += (
+                ": apparent wind is wind over ground, its direction still from the sensor's own "
+                "mark"
+            )
             names = {"apparent_wind_speed": "wind_speed"}
         return _rename(reading, names, "fixed-platform", text, severity=Severity.NOTE)
     if given_platform == "corrected":
-        text, names = "wind over ground was computed from a moving platform's motion before it was logged, as given", {}
+        text, names = (
+            "wind over ground was computed from a moving platform's motion before it was logged, "
+            "as given",
+            {},
+        )
         if "wind_speed" not in has and "theoretical_wind_speed" in has:
             text += "; what the file calls true wind is kept as wind_speed"
             names = {"theoretical_wind_speed": "wind_speed"}
@@ -127,16 +145,38 @@ def settle(
     if given_platform is None and motion_shown is None:
         return _of_unknown(reading)
     if {"wind_speed", "apparent_wind_speed"} <= has:
-        text = "wind over ground was computed by the instrument from a moving platform's heading and speed"
+        text = (
+            "wind over ground was computed by the instrument from a moving platform's heading and "
+            "speed"
+        )
         return _rename(reading, {}, "computed-true-wind", text)
-    names = {name: renamed for name, renamed in _RENAMED.items() if name in has and renamed not in has}
-    platform = "a moving platform, as given" if motion_shown is None else f"a platform that {motion_shown.text}"
+    names = {
+        name: renamed for name, renamed in _RENAMED.items() if name in has and renamed not in has
+    }
+    platform = (
+        "a moving platform, as given"
+        if motion_shown is None
+        else f"a platform that {motion_shown.text}"
+    )
     text = f"wind relative to {platform}: no ground truth"
-    text += "; what the file calls wind speed is kept as apparent_wind_speed" if "wind_speed" in names else ""
+    text += (
+        "; what the file calls wind speed is kept as apparent_wind_speed"
+        if "wind_speed" in names
+        else ""
+    )
     text += ", its direction as one from the bow" if "wind_direction" in names else ""
-    fix = None if given_platform else "if the log's wind is over ground all the same, give --platform corrected"
+    fix = (
+        None
+        if given_platform
+        else "if the log's wind is over ground all the same, give --platform corrected"
+    )
     return _rename(
-        reading, names, "apparent-wind-only", text, value=motion_shown.speed if motion_shown else None, fix=fix
+        reading,
+        names,
+        "apparent-wind-only",
+        text,
+        value=motion_shown.speed if motion_shown else None,
+        fix=fix,
     )
 
 
@@ -157,7 +197,8 @@ def _rename(
 
 
 def check_corrected(reading: Reading, given_platform: Platform | None, *, where: str) -> None:
-    """Raises InputError where the platform's motion is stated to have been removed, and no wind is over ground."""
+    """Raises InputError where the platform's motion is stated to have been removed, and no wind is
+    over ground."""
     if (
         given_platform != "corrected"
         or "wind_speed" in reading.channels
@@ -179,12 +220,20 @@ def _of_unknown(reading: Reading) -> Reading:
     fix = "if the sensor is on a mast, give --platform fixed"
     if "theoretical_wind_speed" in has:
         text = "wind that is computed as if its platform did not move (true wind, TWS)"
-        fix = "if it is wind over ground, computed with the platform's speed and heading, give --platform corrected"
+        fix = (
+            "if it is wind over ground, computed with the platform's speed and heading, give "
+            "--platform corrected"
+        )
     return _rename(reading, {}, "apparent-wind-only", f"{text}: no ground truth", fix=fix)
 
 
 def settle_platform(
-    channels: Mapping[str, Series], options: WindOptions, *, speeds: list[float], source: str, where: str
+    channels: Mapping[str, Series],
+    options: WindOptions,
+    *,
+    speeds: list[float],
+    source: str,
+    where: str,
 ) -> tuple[dict[str, Series], Finding]:
     """Adds wind over ground to the channels where the platform is fixed, with a finding.
 
@@ -201,7 +250,10 @@ def settle_platform(
     moving = speed is not None and speed > MOVING
     if options.platform == "fixed":
         if moving:
-            message = f"the platform was given as fixed, but moves at {speed:.1f} kn over ground in the median"
+            message = (
+                f"the platform was given as fixed, but moves at {speed:.1f} kn over ground in the "
+                "median"
+            )
             raise InputError(message, where=where, fix="leave out --platform")
         return _fixed_platform(channels, options, source, where)
     if options.azimuth is not None:
@@ -213,15 +265,24 @@ def settle_platform(
     elif options.platform in ("moving", "corrected"):
         platform = "a moving platform, as given"
     else:
-        platform, fix = "a platform of unknown motion", "if the sensor is on a mast, give --platform fixed"
+        platform, fix = (
+            "a platform of unknown motion",
+            "if the sensor is on a mast, give --platform fixed",
+        )
     if "wind_speed" not in channels:
         message = f"wind relative to {platform}: no ground truth"
         kind = "apparent-wind-only"
-        return dict(channels), Finding(kind=kind, severity=Severity.WARNING, value=speed, what=message, fix=fix)
-    message = f"wind over ground ({source}) was computed by the instrument from heading and speed of {platform}"
+        return dict(channels), Finding(
+            kind=kind, severity=Severity.WARNING, value=speed, what=message, fix=fix
+        )
+    message = (
+        f"wind over ground ({source}) was computed by the instrument from heading and speed of "
+        f"{platform}"
+    )
     if fix is not None:
         message = (
-            f"wind over ground ({source}): if its platform moves, the instrument computed it from that platform's "
+            f"wind over ground ({source}): if its platform moves, the instrument computed it from "
+            "that platform's "
         )
         message += "heading and speed"
     return dict(channels), Finding.of("computed-true-wind", message, fix=fix)
@@ -238,8 +299,18 @@ def _fixed_platform(
         out["wind_speed"] = out.pop(speed)
     if options.azimuth is not None:
         if states_ground or angle not in out:
-            message = "the stream states wind over ground itself" if states_ground else "the stream has no directions"
-            raise UsageError(f"an azimuth was given, but {message}", where=where, fix="leave out --azimuth")
+            message = (
+                "the stream states wind over ground itself"
+                if states_ground
+                else "the stream has no directions"
+            )
+            raise UsageError(
+                f"an azimuth was given, but {message}", where=where, fix="leave out --azimuth"
+            )
         out["wind_direction"] = np.mod(out.pop(angle) + options.azimuth, 2 * np.pi)
-    message = f"the wind over ground is that of {source}" if states_ground else f"{kind} wind is wind over ground"
+    message = (
+        f"the wind over ground is that of {source}"
+        if states_ground
+        else f"{kind} wind is wind over ground"
+    )
     return out, Finding.of("fixed-platform", f"fixed platform, as given: {message}")

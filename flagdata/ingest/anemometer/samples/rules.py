@@ -1,7 +1,7 @@
 """What is wrong with the samples of an anemometer: found, counted and flagged, never smoothed over.
 
-`RULES` is the table of them. Each takes rows in strictly increasing time, marks the samples that it concerns with a
-flag and adds one finding a channel or kind of wind.
+`RULES` is the table of them. Each takes rows in strictly increasing time, marks the samples that it
+concerns with a flag and adds one finding a channel or kind of wind.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from flagdata.timebase import NANOSECONDS, iso
 SPEEDS = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed", "wind_speed_estimate")
 """Channels that cannot be negative."""
 _FASTEST = 150.0
-"""Largest speed, or component, of air near the ground [m/s]. Lowered, it cuts real gusts; raised, codes for no value
-pass as wind."""
+"""Largest speed, or component, of air near the ground [m/s]. Lowered, it cuts real gusts; raised,
+codes for no value pass as wind."""
 _TURNS = (-math.pi - 1e-6, 2 * math.pi + 1e-6)
-"""Directions as instruments write them, signed or not, with room for conversion from degrees [rad]; beyond, the cell is
-a code or another quantity."""
+"""Directions as instruments write them, signed or not, with room for conversion from degrees [rad];
+beyond, the cell is a code or another quantity."""
 _POSSIBLE: Mapping[str, tuple[float, float]] = {
     **dict.fromkeys(sorted(WIND_CHANNELS), (-_FASTEST, _FASTEST)),
     "sonic_temperature": (170.0, 370.0),
@@ -35,32 +35,40 @@ _POSSIBLE: Mapping[str, tuple[float, float]] = {
     "air_pressure": (30_000.0, 115_000.0),
     "relative_humidity": (-0.05, 1.1),
 }
-"""Smallest and largest possible value [SI], outside the records of the World Meteorological Organization (World Weather
-and Climate Extremes Archive: gust 113 m/s, air -89.2 to 56.7 °C) and of station pressure on land (about 31 kPa on the
-highest summit, 108 kPa at the lowest shore), with room for wind tunnels, sensors in the sun and humidity sensors that
-overshoot. A recipe's `range` narrows them."""
+"""Smallest and largest possible value [SI], outside the records of the World Meteorological
+Organization (World Weather
+and Climate Extremes Archive: gust 113 m/s, air -89.2 to 56.7 °C) and of station pressure on land
+(about 31 kPa on the highest summit, 108 kPa at the lowest shore), with room for wind tunnels,
+sensors in the sun and humidity sensors that overshoot. A recipe's `range` narrows them."""
 _STALE_CHANCE, _STALE_SHORTEST, _STALE_SECONDS = 1e-3, 5, 1.0
-"""Probability of flagging one run of repeats in a log without any, see `stale`; rows and seconds below which a run is
-never stale: fast loggers read a smoothed signal several times over. Lowered chances or raised lengths let short
-freezes of a sensor pass."""
+"""Probability of flagging one run of repeats in a log without any, see `stale`; rows and seconds
+below which a run is
+never stale: fast loggers read a smoothed signal several times over. Lowered chances or raised
+lengths let short freezes of a sensor pass."""
 _COARSE_STEP, _LEAST_OFF = 0.2, 0.1
-"""Step between speeds [m/s] from which on an instrument is coarse, and how far its least speed may be from that."""
+"""Step between speeds [m/s] from which on an instrument is coarse, and how far its least speed may
+be from that."""
 _VANE_ROWS, _VANE_SPEEDS = 20, 3
 """Rows and different speeds from which on a direction that stays the same is reported."""
 _STUCK_SECONDS, _STUCK_REPEATS = 60.0, 60
-"""Wind that reads the same for as long as this [s], so many times, is stale whatever the rest of the log looks like."""
+"""Wind that reads the same for as long as this [s], so many times, is stale whatever the rest of
+the log looks like."""
 _SIGNED_SHARE, _SIGNED_KINDS, _SIGNED_LEVEL = 0.05, 3, -0.5
-"""Share of the rows, different values, and their median [m/s], from which negative speeds are those of a component."""
+"""Share of the rows, different values, and their median [m/s], from which negative speeds are those
+of a component."""
 _INTENSITY, _STEADY_ROWS, _STEADY_SPAN, _SLOWEST = 0.02, 20, 600.0, 1.0
-"""Turbulence intensity (standard deviation by the mean) that no wind outdoors stays below; readings, seconds and mean
-speed [m/s] from which on a speed is judged. A raised intensity reports calm nights as wind tunnels."""
+"""Turbulence intensity (standard deviation by the mean) that no wind outdoors stays below;
+readings, seconds and mean speed [m/s] from which on a speed is judged. A raised intensity reports
+calm nights as wind tunnels."""
 _OUT = "out-of-range"
-_OUT_FIX = "check the recipe's columns and units; a code for no value belongs into its [file] missing"
+_OUT_FIX = (
+    "check the recipe's columns and units; a code for no value belongs into its [file] missing"
+)
 
 
 def impossible(reading: Reading) -> Reading:
-    """Flags impossible winds OUT_OF_RANGE. Impossible values of other channels are left out (NaN): one absurd
-    temperature does not make the wind beside it unusable."""
+    """Flags impossible winds OUT_OF_RANGE. Impossible values of other channels are left out (NaN):
+    one absurd temperature does not make the wind beside it unusable."""
     for name, (low, high) in _POSSIBLE.items():
         if name not in reading.channels:
             continue
@@ -72,7 +80,9 @@ def impossible(reading: Reading) -> Reading:
         flagged = (reading.flags & flag) != 0
         reading = reading.marked(beyond & ~flagged, _OUT, message, flag=flag, fix=_OUT_FIX)
         if not of_wind:
-            reading = replace(reading, channels={**reading.channels, name: np.where(beyond, np.nan, values)})
+            reading = replace(
+                reading, channels={**reading.channels, name: np.where(beyond, np.nan, values)}
+            )
     return reading
 
 
@@ -84,13 +94,17 @@ def direction(
     Args:
         angle: (n,) as written [rad], not yet wrapped.
         line: (n,) their lines.
-        offset: [rad] that a recipe added to turn the vane: the angle is possible with or without it.
+        offset: [rad] that a recipe added to turn the vane: the angle is possible with or without
+            it.
     """
     (low, high), bare = _TURNS, angle - offset
     beyond = ((angle < low) | (angle > high)) & ((bare < low) | (bare > high))
     if not beyond.any():
         return angle, ()
-    message = f"{int(beyond.sum())} impossible values of {name}, outside -180° to 360°; left out of averages"
+    message = (
+        f"{int(beyond.sum())} impossible values of {name}, outside -180° to 360°; left out of "
+        "averages"
+    )
     finding = Finding(
         kind=_OUT,
         severity=Severity.WARNING,
@@ -107,15 +121,19 @@ def faults(reading: Reading) -> Reading:
     for name in reading.rules.fault_where_zero:
         if name in reading.channels:
             message = f"{{n}} rows in which {name} is 0"
-            reading = reading.marked(reading.channels[name] == 0, "sensor-fault", message, flag=SampleFlag.SENSOR_FAULT)
+            reading = reading.marked(
+                reading.channels[name] == 0, "sensor-fault", message, flag=SampleFlag.SENSOR_FAULT
+            )
     return reading
 
 
 def negative(reading: Reading) -> Reading:
-    """Speeds below zero are impossible: OUT_OF_RANGE; but for the scatter of a calm about a zero that was set right.
+    """Speeds below zero are impossible: OUT_OF_RANGE; but for the scatter of a calm about a zero
+    that was set right.
 
     Raises:
-        InputError: values are below zero as those of a component of the wind are: often, far, by different numbers.
+        InputError: values are below zero as those of a component of the wind are: often, far, by
+            different numbers.
     """
     calm = (reading.flags & SampleFlag.DEAD_ZONE) != 0
     for name in SPEEDS:
@@ -125,13 +143,19 @@ def negative(reading: Reading) -> Reading:
             continue
         lowest, values = float(np.nanmin(speed)), speed[below]
         often = len(values) >= _SIGNED_SHARE * np.isfinite(speed[~calm]).sum()
-        if often and len(np.unique(values)) >= _SIGNED_KINDS and float(np.median(values)) < _SIGNED_LEVEL:
+        if (
+            often
+            and len(np.unique(values)) >= _SIGNED_KINDS
+            and float(np.median(values)) < _SIGNED_LEVEL
+        ):
             share = 100 * len(values) / int(np.isfinite(speed).sum())
             raise InputError(
-                f"{name} is negative in {share:.0f} % of its rows, down to {lowest:.3g} m/s: this looks like one "
+                f"{name} is negative in {share:.0f} % of its rows, down to {lowest:.3g} m/s: this "
+                "looks like one "
                 "component of the wind, not its speed",
                 where=f"line {reading.line[below][0]}",
-                fix="name both components and their columns in --columns, as wind_x[m/s] and wind_y[m/s]; if they "
+                fix="name both components and their columns in --columns, as wind_x[m/s] and "
+                "wind_y[m/s]; if they "
                 "point east and north, add --azimuth 270",
             )
         message = f"{{n}} negative values of {name}, down to {lowest:.3g} m/s; left out of averages"
@@ -157,7 +181,11 @@ def dead_zone(reading: Reading) -> Reading:
     threshold = reading.sensor.threshold
     below = (speed >= 0) & (speed < threshold) if threshold else speed == 0
     below &= (reading.flags & SampleFlag.DEAD_ZONE) == 0
-    text = f"below the sensor's threshold, {threshold:g} m/s" if threshold else "exactly 0: calm, or below a threshold"
+    text = (
+        f"below the sensor's threshold, {threshold:g} m/s"
+        if threshold
+        else "exactly 0: calm, or below a threshold"
+    )
     return reading.marked(
         below,
         "dead-zone",
@@ -171,8 +199,9 @@ def dead_zone(reading: Reading) -> Reading:
 def idle(reading: Reading) -> Reading:
     """Speeds that stay at exactly 0, as of a sensor that is not connected or blocked.
 
-    On a platform that may move no calm reads 0 for `_STUCK_REPEATS` rows over `_STUCK_SECONDS`: such runs of apparent
-    or theoretical wind are STALE. On a mast a calm may last; a log that never reads anything else is reported.
+    On a platform that may move no calm reads 0 for `_STUCK_REPEATS` rows over `_STUCK_SECONDS`:
+    such runs of apparent or theoretical wind are STALE. On a mast a calm may last; a log that never
+    reads anything else is reported.
     """
     for name in SPEEDS:
         values = reading.channels.get(name, np.zeros(0))
@@ -186,11 +215,15 @@ def idle(reading: Reading) -> Reading:
         zero = np.zeros(len(values), dtype=bool)
         zero[rows[_within(starts[long], lengths[long])]] = True
         longest = float(span[long].max())
-        message = f"{name} reads exactly 0 in {'all ' if always else ''}{{n}} rows, for {longest:.0f} s on end: "
+        message = (
+            f"{name} reads exactly 0 in {'all ' if always else ''}{{n}} rows, for {longest:.0f} s "
+            "on end: "
+        )
         message += (
             "a calm all along, or a sensor that is not connected or blocked"
             if on_mast
-            else "past a platform that may move no air stands so still; the sensor is not connected or blocked; left "
+            else "past a platform that may move no air stands so still; the sensor is not "
+            "connected or blocked; left "
             "out of averages"
         )
         reading = reading.marked(
@@ -205,7 +238,8 @@ def idle(reading: Reading) -> Reading:
 
 
 def one_direction(reading: Reading) -> Reading:
-    """Directions that are the same in every row of a wind that varies, and speeds and directions that are all 0."""
+    """Directions that are the same in every row of a wind that varies, and speeds and directions
+    that are all 0."""
     none = np.full(len(reading.time), np.nan)
     speed, towards = (reading.channels.get(name, none) for name in ("wind_speed", "wind_direction"))
     finite = np.isfinite(speed) & np.isfinite(towards)
@@ -219,23 +253,28 @@ def one_direction(reading: Reading) -> Reading:
         message += ", while the speed varies: a vane that is stuck, not connected or not set up"
     else:
         return reading
-    return reading.marked(finite, "direction-stays", message, value=at, fix="check the vane, its cable and the column")
+    return reading.marked(
+        finite, "direction-stays", message, value=at, fix="check the vane, its cable and the column"
+    )
 
 
 def stale(reading: Reading) -> Reading:
-    """Runs in which every wind reading repeats exactly, longer than chance and resolution explain: STALE.
+    """Runs in which every wind reading repeats exactly, longer than chance and resolution explain:
+    STALE.
 
-    Were repeats independent with probability p, n rows would hold a run of L or more repeats with probability at most
-    n p^L (Feller, An Introduction to Probability Theory I, XIII.7). A run is stale from the L on at which that is
-    `_STALE_CHANCE`, if it lasts `_STALE_SECONDS`. p is the share of repeats in the log, taken again without the runs
-    found (three passes), and never below 5 %. It must be so with the p of the rows around the run too, since a night's
-    light wind repeats more than a day's. A sensor that is stuck most of the time shows in neither: a run of
-    `_STUCK_REPEATS` over `_STUCK_SECONDS` is stale in any case. Readings of a calm (0, or dead zone) are no repeats. A
-    recipe's `stale_after` replaces the rules.
+    Were repeats independent with probability p, n rows would hold a run of L or more repeats with
+    probability at most n p^L (Feller, An Introduction to Probability Theory I, XIII.7). A run is
+    stale from the L on at which that is `_STALE_CHANCE`, if it lasts `_STALE_SECONDS`. p is the
+    share of repeats in the log, taken again without the runs found (three passes), and never below
+    5 %. It must be so with the p of the rows around the run too, since a night's light wind repeats
+    more than a day's. A sensor that is stuck most of the time shows in neither: a run of
+    `_STUCK_REPEATS` over `_STUCK_SECONDS` is stale in any case. Readings of a calm (0, or dead
+    zone) are no repeats. A recipe's `stale_after` replaces the rules.
     """
     names = [n for n in (*SPEEDS, "wind_x", "wind_y", "wind_z") if n in reading.channels]
     names += [n for n in ("wind_direction", "apparent_wind_direction") if n in reading.channels]
-    # Streams interleave kinds of wind: rows that hold the same channels are compared with each other.
+    # Streams interleave kinds of wind: rows that hold the same channels are compared with each
+    # other.
     channels_present = np.zeros(len(reading.time), dtype=np.int64)
     for bit, name in enumerate(names):
         channels_present |= np.isfinite(reading.channels[name]).astype(np.int64) << bit
@@ -247,7 +286,9 @@ def stale(reading: Reading) -> Reading:
             continue  # a direction without a speed is no reading of the wind
         values = {name: reading.channels[name][rows] for name in present}
         same = (
-            np.logical_and.reduce([channel_values[1:] == channel_values[:-1] for channel_values in values.values()])
+            np.logical_and.reduce(
+                [channel_values[1:] == channel_values[:-1] for channel_values in values.values()]
+            )
             & ~moves[rows[1:]]
         )
         same &= ~_least(values.get("wind_speed", np.zeros(len(rows))))[1:]
@@ -256,12 +297,18 @@ def stale(reading: Reading) -> Reading:
         long, text, fix = _longer(same, starts, lengths, span, reading.rules.stale_after)
         repeats = np.zeros(len(reading.time), dtype=bool)
         repeats[rows[_within(starts[long] + 1, lengths[long])]] = True
-        number, seconds = int(long.sum()), float(span[np.argmax(np.where(long, lengths, 0))]) if len(span) else 0.0
+        number, seconds = (
+            int(long.sum()),
+            float(span[np.argmax(np.where(long, lengths, 0))]) if len(span) else 0.0,
+        )
         message = (
-            f"{{n}} rows in {number} {'run' if number == 1 else 'runs'} repeat the {' and '.join(present)} before "
+            f"{{n}} rows in {number} {'run' if number == 1 else 'runs'} repeat the "
+            f"{' and '.join(present)} before "
         )
         message += f"them {text}; the longest run lasts {seconds:.2f} s; left out of averages"
-        reading = reading.marked(repeats, "stale-repeats", message, flag=SampleFlag.STALE, value=seconds, fix=fix)
+        reading = reading.marked(
+            repeats, "stale-repeats", message, flag=SampleFlag.STALE, value=seconds, fix=fix
+        )
     return reading
 
 
@@ -272,7 +319,8 @@ def _longer(
     span: FloatArray,
     allowed: float | None,
 ) -> tuple[BoolArray, str, str | None]:
-    """Decides which runs of repeats are too long, in words, and what to do where the air was that steady."""
+    """Decides which runs of repeats are too long, in words, and what to do where the air was that
+    steady."""
     if allowed is not None:
         return span > allowed, f"for longer than the {allowed:g} s its recipe allows", None
     n = len(same) + 1
@@ -281,7 +329,8 @@ def _longer(
         within = lengths < limit
         rest = n - 1 - float(lengths[~within].sum())
         limit = int(_limit(n, np.array([float(lengths[within].sum()) / max(rest, 1.0)]))[0])
-    # The share of repeats around a run, itself left out: five times its length to each side, at least 200 rows.
+    # The share of repeats around a run, itself left out: five times its length to each side, at
+    # least 200 rows.
     total, reach = np.concatenate(([0], np.cumsum(same))), np.maximum(200, 5 * lengths)
     low, high = np.maximum(0, starts - reach), np.minimum(n - 1, starts + lengths + reach)
     rest = high - low - lengths
@@ -289,19 +338,25 @@ def _longer(
     long = (lengths >= limit) & (span >= _STALE_SECONDS) & (lengths >= _limit(n, around))
     stuck = (lengths >= _STUCK_REPEATS) & (span >= _STUCK_SECONDS)
     fewest = min(limit, _STUCK_REPEATS) if stuck.any() else limit
-    fix = "if the air was that steady, say how long a reading may stand: stale-after in a recipe's [quality]"
+    fix = (
+        "if the air was that steady, say how long a reading may stand: stale-after in a recipe's "
+        "[quality]"
+    )
     return long | stuck, f"{fewest} times or more, which chance and resolution do not explain", fix
 
 
 def _limit(n: int, share: FloatArray) -> IntArray:
-    """Repeats in a row that chance does not explain among n rows of which `share` repeat the one before them."""
+    """Repeats in a row that chance does not explain among n rows of which `share` repeat the one
+    before them."""
     clipped = np.clip(share, 0.05, 0.999)
-    return np.maximum(_STALE_SHORTEST, np.ceil(math.log(n / _STALE_CHANCE) / -np.log(clipped))).astype(np.int64)
+    return np.maximum(
+        _STALE_SHORTEST, np.ceil(math.log(n / _STALE_CHANCE) / -np.log(clipped))
+    ).astype(np.int64)
 
 
 def _least(speed: FloatArray) -> BoolArray:
-    """Finds (n,) rows whose speed is the least that a coarse instrument shows above calm: it stays there as calm air
-    does."""
+    """Finds (n,) rows whose speed is the least that a coarse instrument shows above calm: it stays
+    there as calm air does."""
     above = speed[np.isfinite(speed) & (speed > 0)]
     step, least = resolution(above), float(above.min(initial=np.inf))
     return (speed == least) & (step >= _COARSE_STEP) & (abs(least - step) <= _LEAST_OFF * step)
@@ -320,12 +375,13 @@ def _within(starts: IntArray, lengths: IntArray) -> IntArray:
 
 
 def at_nyquist(reading: Reading) -> Reading:
-    """Frequencies found in frames taken once a row that lie within one step of half the frame rate: ALIASED.
+    """Frequencies found in frames taken once a row that lie within one step of half the frame rate:
+    ALIASED.
 
-    A sampled oscillation of frequency f is the same as one of |k·rate - f| for every whole k (Shannon 1949); close to
-    rate/2 the two lowest candidates cannot be distinguished within the resolution of the estimate: two of its steps, or
-    5 % of rate/2. The step is the median spacing of the frequencies above a quarter of the rate; the rate is the
-    mean one.
+    A sampled oscillation of frequency f is the same as one of |k·rate - f| for every whole k
+    (Shannon 1949); close to rate/2 the two lowest candidates cannot be distinguished within the
+    resolution of the estimate: two of its steps, or 5 % of rate/2. The step is the median spacing
+    of the frequencies above a quarter of the rate; the rate is the mean one.
     """
     for name in reading.rules.frame_rate_of:
         values = reading.channels.get(name, np.zeros(0))
@@ -338,20 +394,26 @@ def at_nyquist(reading: Reading) -> Reading:
         at_limit = values >= limit - max(2 * step, 0.05 * limit)
         typical = float(np.median(values[at_limit])) if at_limit.any() else 0.0
         message = (
-            f"{{n}} values of {name}, median {typical:.2f} Hz in steps of {step:.2f} Hz, lie at the Nyquist limit "
-            f"{limit:.2f} Hz of {rate:.1f} frames a second: the true frequency may as well be {rate - typical:.1f} or "
+            f"{{n}} values of {name}, median {typical:.2f} Hz in steps of {step:.2f} Hz, lie at "
+            "the Nyquist limit "
+            f"{limit:.2f} Hz of {rate:.1f} frames a second: the true frequency may as well be "
+            f"{rate - typical:.1f} or "
             f"{rate + typical:.1f} Hz"
         )
         fix = f"only a camera faster than {4 * limit:.0f} frames a second can show it"
-        reading = reading.marked(at_limit, "at-nyquist", message, flag=SampleFlag.ALIASED, value=typical, fix=fix)
+        reading = reading.marked(
+            at_limit, "at-nyquist", message, flag=SampleFlag.ALIASED, value=typical, fix=fix
+        )
     return reading
 
 
 def gaps(reading: Reading) -> Reading:
-    """Stretches without rows, of each kind of wind by itself: longer than the jitter of the stamps explains.
+    """Stretches without rows, of each kind of wind by itself: longer than the jitter of the stamps
+    explains.
 
-    A gap is an interval beyond 1.5 times the median m, and beyond m + 3 (q - m) with the 99th percentile q, but in any
-    case one beyond 3 m. A row without a value was not lost, though nobody knows of which kind it is.
+    A gap is an interval beyond 1.5 times the median m, and beyond m + 3 (q - m) with the 99th
+    percentile q, but in any case one beyond 3 m. A row without a value was not lost, though nobody
+    knows of which kind it is.
     """
     kinds = streams(reading.channels)
     blank = np.ones(len(reading.time), dtype=bool)
@@ -361,7 +423,9 @@ def gaps(reading: Reading) -> Reading:
         if len(rows_of_kind) < 4:
             continue
         rows = np.union1d(rows_of_kind, np.flatnonzero(blank)) if len(kinds) > 1 else rows_of_kind
-        of = f" of {next(name for name in names if name in WIND_CHANNELS)}" if len(kinds) > 1 else ""
+        of = (
+            f" of {next(name for name in names if name in WIND_CHANNELS)}" if len(kinds) > 1 else ""
+        )
         between, steps = np.diff(reading.time[rows_of_kind]), np.diff(reading.time[rows])
         usual = float(np.median(between))
         jitter = 3 * (float(np.quantile(between, 0.99)) - usual)
@@ -369,11 +433,16 @@ def gaps(reading: Reading) -> Reading:
         if len(wide) == 0:
             continue
         longest = int(wide[np.argmax(steps[wide])])
-        lost, seconds = float((steps[wide] - usual).sum()) / NANOSECONDS, float(steps[longest]) / NANOSECONDS
+        lost, seconds = (
+            float((steps[wide] - usual).sum()) / NANOSECONDS,
+            float(steps[longest]) / NANOSECONDS,
+        )
         finding = Finding.of(
             "gaps",
-            f"{len(wide)} {'interval' if len(wide) == 1 else 'intervals'}{of} longer than the usual "
-            f"{usual / NANOSECONDS:.4g} s, {lost:.3f} s lost in all; the longest interval, {seconds:.3f} s, ends at "
+            f"{len(wide)} {'interval' if len(wide) == 1 else 'intervals'}{of} longer than the "
+            "usual "
+            f"{usual / NANOSECONDS:.4g} s, {lost:.3f} s lost in all; the longest interval, "
+            f"{seconds:.3f} s, ends at "
             "the line named",
             count=len(wide),
             value=seconds,
@@ -384,33 +453,49 @@ def gaps(reading: Reading) -> Reading:
 
 
 def steady(reading: Reading) -> Reading:
-    """Speeds that vary less than any wind outdoors: of a wind tunnel, or of another quantity under a wind's name.
+    """Speeds that vary less than any wind outdoors: of a wind tunnel, or of another quantity under
+    a wind's name.
 
-    The turbulence intensity is some hundredths over a calm sea and a tenth or more over land; means of ten minutes and
-    more vary by as much with the weather. A wind tunnel's is below one hundredth, and so is that of a pressure, a
-    temperature in K or a humidity of some hours.
+    The turbulence intensity is some hundredths over a calm sea and a tenth or more over land; means
+    of ten minutes and more vary by as much with the weather. A wind tunnel's is below one
+    hundredth, and so is that of a pressure, a temperature in K or a humidity of some hours.
     """
     speed = reading.channels.get("wind_speed", np.full(len(reading.time), np.nan))
     usable = np.isfinite(speed) & ((reading.flags & UNUSABLE) == 0)
     values, time = speed[usable], reading.time[usable]
-    if len(values) < _STEADY_ROWS or float(np.ptp(time)) < _STEADY_SPAN * NANOSECONDS or values.mean() < _SLOWEST:
+    if (
+        len(values) < _STEADY_ROWS
+        or float(np.ptp(time)) < _STEADY_SPAN * NANOSECONDS
+        or values.mean() < _SLOWEST
+    ):
         return reading
     intensity = float(values.std() / values.mean())
     if intensity >= _INTENSITY:
         return reading
     message = (
-        f"the speed varies by {100 * intensity:.2g} % about its mean of {values.mean():.3g} m/s: as steady as in a "
-        "wind tunnel, and steadier than wind outdoors; if it was outdoors, the column is likely another quantity"
+        f"the speed varies by {100 * intensity:.2g} % about its mean of {values.mean():.3g} m/s: "
+        "as steady as in a "
+        "wind tunnel, and steadier than wind outdoors; if it was outdoors, the column is likely "
+        "another quantity"
     )
     finding = Finding.of("steady-wind", message, value=intensity)
     return reading.with_findings((finding,))
 
 
 def future(reading: Reading, *, now: int) -> Reading:
-    """Rows that are stamped more than a day after `now` [UTC ns]; a clock that is a little fast is not reported."""
-    message = f"{{n}} rows are stamped after today, the last {iso(int(reading.time.max()))}: a wrong clock or date"
-    fix = "check the logger's clock and the order of day, month and year; years of two digits are taken as 1970 to 2069"
-    return reading.marked(reading.time > now + 86_400 * NANOSECONDS, "stamps-in-future", message, fix=fix)
+    """Rows that are stamped more than a day after `now` [UTC ns]; a clock that is a little fast is
+    not reported."""
+    message = (
+        f"{{n}} rows are stamped after today, the last {iso(int(reading.time.max()))}: a wrong "
+        "clock or date"
+    )
+    fix = (
+        "check the logger's clock and the order of day, month and year; years of two digits are "
+        "taken as 1970 to 2069"
+    )
+    return reading.marked(
+        reading.time > now + 86_400 * NANOSECONDS, "stamps-in-future", message, fix=fix
+    )
 
 
 RULES: tuple[Callable[[Reading], Reading], ...] = (

@@ -18,19 +18,21 @@ from flagdata.timebase import NANOSECONDS
 _WINDOW = 2.0
 """Length of a stretch that is looked at whole [s]."""
 _SHORTEST = 10.0
-"""Idle time it takes to believe an offset [s]: free air does not hold its speed within `_BAND` for so long.
-Lowered, a lull passes for idling; raised, short calms no longer show the offset."""
+"""Idle time it takes to believe an offset [s]: free air does not hold its speed within `_BAND` for
+so long. Lowered, a lull passes for idling; raised, short calms no longer show the offset."""
 _BAND = 0.05
-"""Widest spread of an idle reading within a stretch [m/s], or four steps of its resolution if that is more.
-Raised, light steady wind passes for idling."""
+"""Widest spread of an idle reading within a stretch [m/s], or four steps of its resolution if that
+is more. Raised, light steady wind passes for idling."""
 _LARGEST = 1.0
-"""An idle reading beyond this is no zero offset but steady wind [m/s]. Raised, steady wind may be subtracted."""
+"""An idle reading beyond this is no zero offset but steady wind [m/s]. Raised, steady wind may be
+subtracted."""
 _BELOW = 0.1
 """Readings below an idle one, over those that are idle, beyond which it is no calm air's."""
 _LEAST_JUMP = 0.1
 """A smaller step out of idling is no dead zone [m/s]."""
 _BETWEEN = 0.02
-"""Share of the readings of wind that lie between calm and the step, beyond which no dead zone hides them."""
+"""Share of the readings of wind that lie between calm and the step, beyond which no dead zone hides
+them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,8 +44,8 @@ class Zero:
         sigma: standard deviation of the idle stretches' medians [m/s]: how far the zero wanders.
         idle: (n,) rows that are idle.
         seconds: idle time in all [s].
-        jump: from the offset to the first reading outside the idle band after idling [m/s]; NaN if it never left, or
-            has readings below that.
+        jump: from the offset to the first reading outside the idle band after idling [m/s]; NaN if
+            it never left, or has readings below that.
         leaves: (n,) rows after which the reading leaves the idle band.
     """
 
@@ -56,13 +58,15 @@ class Zero:
 
 
 def resolution(values: FloatArray) -> float:
-    """Finds the smallest step between different readings that occurs [same unit], 0 when all are equal."""
+    """Finds the smallest step between different readings that occurs [same unit], 0 when all are
+    equal."""
     levels = np.unique(np.round(values[np.isfinite(values)], 9))
     return float(np.diff(levels).min()) if len(levels) > 1 else 0.0
 
 
 def estimate(time: IntArray, speed: FloatArray) -> Zero | None:
-    """Estimates the zero offset shown by idle stretches, `None` where there is not enough idle time.
+    """Estimates the zero offset shown by idle stretches, `None` where there is not enough idle
+    time.
 
     Args:
         time: (n,) increasing UTC nanoseconds.
@@ -80,7 +84,9 @@ def estimate(time: IntArray, speed: FloatArray) -> Zero | None:
         steady = (top - bottom <= band) & (np.abs(top) <= _LARGEST) & (counts >= 4)
     if steady.sum() * _WINDOW < _SHORTEST:
         return None
-    medians = np.array([np.median(speed[s : s + c]) for s, c in zip(starts[steady], counts[steady], strict=True)])
+    medians = np.array(
+        [np.median(speed[s : s + c]) for s, c in zip(starts[steady], counts[steady], strict=True)]
+    )
     offset = float(np.median(medians))
     # Stretches at another level (a steady breeze within the limits) are not the same zero.
     same = np.abs(medians - offset) <= band
@@ -108,20 +114,28 @@ def check(reading: Reading, asked: ZeroOffset | None, *, where: str) -> None:
     """Refuse to subtract a zero offset where there is no speed it belongs to.
 
     Raises:
-        UsageError: an offset, or its estimate, was asked for a log of components or without wind speed.
+        UsageError: an offset, or its estimate, was asked for a log of components or without wind
+            speed.
     """
-    if asked is None or asked == "report" or ("wind_speed" in reading.channels and "wind_x" not in reading.channels):
+    if (
+        asked is None
+        or asked == "report"
+        or ("wind_speed" in reading.channels and "wind_x" not in reading.channels)
+    ):
         return
     components = "wind_x" in reading.channels
     message = "wind components, each with a zero of its own" if components else "no wind speed"
     fix = "give each column its offset in a recipe" if components else "leave out --zero-offset"
-    raise UsageError(f"a zero offset was asked for, but the log has {message}", where=where, fix=fix)
+    raise UsageError(
+        f"a zero offset was asked for, but the log has {message}", where=where, fix=fix
+    )
 
 
 def settle(reading: Reading, choice: ZeroOffset) -> Reading:
     """Report the zero offset of `wind_speed`, and subtract it where `choice` says so.
 
-    A jump out of the calm that was found becomes the sensor's threshold, where its recipe states none and calm reads
+    A jump out of the calm that was found becomes the sensor's threshold, where its recipe states
+    none and calm reads
     about 0 after the shift: the uncertainty of a calm then covers what it may hide.
 
     Raises:
@@ -137,7 +151,8 @@ def settle(reading: Reading, choice: ZeroOffset) -> Reading:
         if zero is None:
             raise RefusedError(
                 f"no zero offset can be estimated: the reading is nowhere idle for {_SHORTEST:g} s",
-                fix="give the reading in calm air: --zero-offset M/S, or leave it as it is: --zero-offset report",
+                fix="give the reading in calm air: --zero-offset M/S, or leave it as it is: "
+                "--zero-offset report",
             )
         shift = zero.offset
     elif choice != "report":
@@ -150,15 +165,19 @@ def settle(reading: Reading, choice: ZeroOffset) -> Reading:
     corrected = speed - shift
     calm = np.zeros(len(speed), dtype=bool)
     if shift:
-        # The scatter of a calm about its zero is no impossible wind: flagged as calm, its sign kept.
+        # The scatter of a calm about its zero is no impossible wind: flagged as calm, its sign
+        # kept.
         calm = (corrected < 0) & (np.abs(corrected) <= max(_BAND, 4 * step))
         calm |= zero.idle if zero is not None and abs(zero.offset - shift) <= _BAND else False
     flags = np.where(calm, reading.flags | SampleFlag.DEAD_ZONE, reading.flags)
-    return replace(reading, channels={**reading.channels, "wind_speed": corrected}).with_findings((), flags=flags)
+    return replace(reading, channels={**reading.channels, "wind_speed": corrected}).with_findings(
+        (), flags=flags
+    )
 
 
 def _report_zero(reading: Reading, zero: Zero, shift: float) -> Reading:
-    """Reports what calm air reads, whether the `shift` subtracted [m/s] has settled it, and the jump out of it."""
+    """Reports what calm air reads, whether the `shift` subtracted [m/s] has settled it, and the
+    jump out of it."""
     settled = abs(zero.offset - shift) <= _BAND
     done, fix = "subtracted" if shift else f"left as it is, within {_BAND:g} m/s of zero", None
     if not settled:
@@ -166,16 +185,28 @@ def _report_zero(reading: Reading, zero: Zero, shift: float) -> Reading:
         fix = f"correct it: {ways}" if shift else f"subtract it: {ways}"
         rest = zero.offset - shift
         done = (
-            f"{shift:+.3f} m/s was subtracted, which leaves {rest:+.3f} m/s in calm air" if shift else "not subtracted"
+            f"{shift:+.3f} m/s was subtracted, which leaves {rest:+.3f} m/s in calm air"
+            if shift
+            else "not subtracted"
         )
-    message = f"calm air reads {zero.offset:+.3f} m/s (σ {zero.sigma:.3f}, {zero.seconds:.0f} s idle); {done}"
+    message = (
+        f"calm air reads {zero.offset:+.3f} m/s (σ {zero.sigma:.3f}, {zero.seconds:.0f} s idle); "
+        f"{done}"
+    )
     severity = Severity.NOTE if settled else Severity.WARNING
-    reading = reading.marked(zero.idle, "zero-offset", message, severity=severity, value=zero.offset, fix=fix)
+    reading = reading.marked(
+        zero.idle, "zero-offset", message, severity=severity, value=zero.offset, fix=fix
+    )
     if not zero.jump > _LEAST_JUMP:
         return reading
-    message = f"the reading leaves calm in a jump of {zero.jump:.2f} m/s ({{n}} times): lower speeds read as calm"
+    message = (
+        f"the reading leaves calm in a jump of {zero.jump:.2f} m/s ({{n}} times): lower speeds "
+        "read as calm"
+    )
     fix = "do not use winds below that jump"
-    reading = reading.marked(np.roll(zero.leaves, 1), "dead-zone-jump", message, value=zero.jump, fix=fix)
+    reading = reading.marked(
+        np.roll(zero.leaves, 1), "dead-zone-jump", message, value=zero.jump, fix=fix
+    )
     if settled and reading.sensor.threshold is None:
         # Calm now reads about 0, and what blows below the jump reads as calm: that is a threshold.
         return replace(reading, sensor=replace(reading.sensor, threshold=zero.jump))

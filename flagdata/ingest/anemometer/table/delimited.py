@@ -40,7 +40,8 @@ class Delimited:
     uses = frozenset({"zone", "azimuth", "platform", "start", "date", *_ASKED})
 
     def recognise(self, head: Head) -> Guess | None:
-        """Finds the recipe of the catalog whose columns the header names; the one with most columns in common."""
+        """Finds the recipe of the catalog whose columns the header names; the one with most columns
+        in common."""
         best: Guess | None = None
         for name in recipes.SENSORS.names():
             recipe = recipes.load(name)
@@ -57,7 +58,9 @@ class Delimited:
         strange = sorted(_ASKED & options.given())
         if strange:
             raise UsageError(
-                f"the recipe says for itself: {', '.join(strange)}", where=where, fix="leave it out, or edit the recipe"
+                f"the recipe says for itself: {', '.join(strange)}",
+                where=where,
+                fix="leave it out, or edit the recipe",
             )
         recipe = recipes.load(options.recipe)
         if isinstance(recipe, OpenRecipe):
@@ -66,22 +69,35 @@ class Delimited:
             return reading.with_findings((*done.findings, *column_findings(done)))
         if recipe.file.host:
             raise UsageError(
-                f"the recipe {recipe.name} is for host-stamped lines", where=where, fix="use --as host-stamped"
+                f"the recipe {recipe.name} is for host-stamped lines",
+                where=where,
+                fix="use --as host-stamped",
             )
         return _by_recipe(source, recipe, options, options.azimuth)
 
 
-def _by_recipe(source: TextFile, recipe: Recipe, options: WindOptions, azimuth: float | None) -> Reading:
-    """Reads all rows of a table, in the order of the file; `azimuth` of components' axes [rad, clockwise from true
-    north]."""
+def _by_recipe(
+    source: TextFile, recipe: Recipe, options: WindOptions, azimuth: float | None
+) -> Reading:
+    """Reads all rows of a table, in the order of the file; `azimuth` of components' axes [rad,
+    clockwise from true north]."""
     where, rows = str(source.path), RowReader(source, recipe.file)
     if recipe.time.format == "excel-days":
         recipe = replace(recipe, time=replace(recipe.time, format=source.serial_days))
     columns = platform.position_columns(rows.header or ()) or ()
     stamp_options = StatedTime(start=options.start, date=options.date, clock=options.clock)
-    table = read_table(rows, recipe, where=where, zone_name=options.zone, extra=columns, stamp_options=stamp_options)
+    table = read_table(
+        rows,
+        recipe,
+        where=where,
+        zone_name=options.zone,
+        extra=columns,
+        stamp_options=stamp_options,
+    )
     reading = with_horizontal(table.reading, azimuth, where=where)
-    positions = {name: table.extra[column] for name, column in zip(platform.POSITION, columns, strict=False)}
+    positions = {
+        name: table.extra[column] for name, column in zip(platform.POSITION, columns, strict=False)
+    }
     return platform.settle(reading, options.platform, positions=positions, where=where)
 
 
@@ -94,7 +110,9 @@ def draft_recipe(source: TextFile, options: WindOptions) -> Draft | None:
     for key in options.expect:
         if key not in KEYS:
             raise UnknownNameError.of("check", key, KEYS, where="--expect")
-    return draft(source.head(HEAD_LINES), options, serial_days=source.serial_days, counted=source.counted)
+    return draft(
+        source.head(HEAD_LINES), options, serial_days=source.serial_days, counted=source.counted
+    )
 
 
 def _by_draft(source: TextFile, options: WindOptions, where: str) -> Reading:
@@ -103,12 +121,19 @@ def _by_draft(source: TextFile, options: WindOptions, where: str) -> Reading:
         fix = "describe it by a recipe: --sensor FILE.toml"
         raise UsageError("there is no table in its first lines", where=where, fix=fix)
     if len(draft.winds) > 1 and options.wind is None:
-        question = f"the file holds {len(draft.winds)} anemometers: {', '.join(draft.winds)}; which one?"
-        raise OpenFactsError.of([Open(key="wind", question=question, example="COLUMN")], where=where)
+        question = (
+            f"the file holds {len(draft.winds)} anemometers: {', '.join(draft.winds)}; which one?"
+        )
+        raise OpenFactsError.of(
+            [Open(key="wind", question=question, example="COLUMN")], where=where
+        )
     if draft.open:
         raise OpenFactsError.of(draft.open, where=where)
     recipe = recipes.parse(draft.recipe, where=f"the draft for {where}")
-    recipe = replace(recipe, expect=frozenset((*options.expect, *(("order",) if options.clock is not None else ()))))
+    recipe = replace(
+        recipe,
+        expect=frozenset((*options.expect, *(("order",) if options.clock is not None else ()))),
+    )
     azimuth = _WEST if draft.of_earth and options.azimuth is None else options.azimuth
     reading = _by_recipe(source, recipe, options, azimuth)
     if _LEFT_OUT & {finding.kind for finding in reading.findings}:
@@ -121,22 +146,33 @@ def _by_draft(source: TextFile, options: WindOptions, where: str) -> Reading:
         now=time.time_ns(),
     )
     if odd:
-        asked = [Open(key="expect", question=f"{doubt.text}. {doubt.question}", example=doubt.key) for doubt in odd]
+        asked = [
+            Open(key="expect", question=f"{doubt.text}. {doubt.question}", example=doubt.key)
+            for doubt in odd
+        ]
         raise OpenFactsError.of(asked, where=where)
     unused = _unused_findings(draft)
     understood = tuple(fact.line() for fact in draft.facts)
-    return replace(reading.with_findings(unused), drafted=draft.recipe, stated=draft.stated, understood=understood)
+    return replace(
+        reading.with_findings(unused),
+        drafted=draft.recipe,
+        stated=draft.stated,
+        understood=understood,
+    )
 
 
 def _refuse_new_names(source: TextFile, recipe: Recipe, where: str) -> None:
-    """Refuse a table whose columns change places on the way, by a line that names them in another order."""
+    """Refuse a table whose columns change places on the way, by a line that names them in another
+    order."""
     heading = source.head(recipe.file.preamble + 1)[-1].strip()
     cut = recipe.file.delimiter if recipe.file.delimiter != " " else None
     names = sorted(heading.split(cut))
     for number, line in enumerate(source.each_line(), start=1):
         if len(line) == len(heading) and line != heading and sorted(line.split(cut)) == names:
             message = "this line names the columns anew, in another order"
-            raise InputError(message, where=f"{where}, line {number}", fix="split the file before it")
+            raise InputError(
+                message, where=f"{where}, line {number}", fix="split the file before it"
+            )
 
 
 def _unused_findings(draft: Draft) -> tuple[Finding, ...]:
@@ -152,13 +188,21 @@ def _states_its_unit(recipe: Recipe) -> bool:
 
 def _match(recipe: Recipe, name: str, head: Head) -> Guess | None:
     layout = recipe.file
-    if not _states_its_unit(recipe) or layout.host or layout.header == 0 or len(head.lines) <= layout.preamble:
+    if (
+        not _states_its_unit(recipe)
+        or layout.host
+        or layout.header == 0
+        or len(head.lines) <= layout.preamble
+    ):
         return None
     line = head.lines[layout.preamble]
     cells = [
-        cell.strip().strip('"') for cell in (line.split() if layout.delimiter == " " else line.split(layout.delimiter))
+        cell.strip().strip('"')
+        for cell in (line.split() if layout.delimiter == " " else line.split(layout.delimiter))
     ]
-    needed = [c.column for c in recipe.channels.values() if not c.optional] + list(recipe.time.columns)
+    needed = [c.column for c in recipe.channels.values() if not c.optional] + list(
+        recipe.time.columns
+    )
     if not all(column in cells for column in needed):
         return None
     columns = [c.column for c in recipe.channels.values() if c.column in cells]
@@ -166,5 +210,8 @@ def _match(recipe: Recipe, name: str, head: Head) -> Guess | None:
         format="delimited",
         recipe=name,
         score=min(0.95, 0.6 + 0.05 * (len(columns) + len(recipe.time.columns))),
-        reasons=(f"line {layout.preamble + 1} names the columns of recipe {name}: {', '.join(map(str, needed))}",),
+        reasons=(
+            f"line {layout.preamble + 1} names the columns of recipe {name}: "
+            f"{', '.join(map(str, needed))}",
+        ),
     )

@@ -1,4 +1,5 @@
-"""Cells of a delimited log, by a recipe, into a `Reading`: what the formats with rows and columns share."""
+"""Cells of a delimited log, by a recipe, into a `Reading`: what the formats with rows and columns
+share."""
 
 from __future__ import annotations
 
@@ -31,7 +32,9 @@ _ROUND = 1e-6
 """rad, by which an angle is off after its conversion."""
 _SPEEDS = ("wind_speed", "apparent_wind_speed", "theoretical_wind_speed")
 """Channels in which a word for calm air, or "<0.3", is a speed."""
-_DIRECTIONS = frozenset(name for name in CHANNELS if name.endswith(("wind_direction", "wind_direction_magnetic")))
+_DIRECTIONS = frozenset(
+    name for name in CHANNELS if name.endswith(("wind_direction", "wind_direction_magnetic"))
+)
 
 
 class Rows(Protocol):
@@ -124,7 +127,13 @@ class _Gathered:
     def width(self) -> int:
         """Cells a row must have."""
         only = [] if self.rows is None else [self.rows]
-        return 1 + max([*only, *self.clock.columns, *(column.index for column in [*self.columns(), *self.checks])])
+        return 1 + max(
+            [
+                *only,
+                *self.clock.columns,
+                *(column.index for column in [*self.columns(), *self.checks]),
+            ]
+        )
 
     def add(self, line: IntArray, block: Block, recipe: Recipe) -> None:
         if self.rows is not None and recipe.rows is not None:
@@ -147,7 +156,11 @@ class _Gathered:
         self.lines.add(line[keep])
         for column in self.columns():
             cells = cells_of(block, column.index)
-            cells = _in_degrees(cells, recipe.file.decimal, column.points) if column.points is not None else cells
+            cells = (
+                _in_degrees(cells, recipe.file.decimal, column.points)
+                if column.points is not None
+                else cells
+            )
             parsed = numbers(
                 cells,
                 decimal=recipe.file.decimal,
@@ -168,19 +181,28 @@ class _Gathered:
 
 
 def _still(states: Mapping[str, UInt8Array]) -> dict[str, BoolArray]:
-    """Finds where a word for calm air stands in a speed: the speed's name and those of its directions → (n,) rows.
+    """Finds where a word for calm air stands in a speed: the speed's name and those of its
+    directions → (n,) rows.
 
-    WMO-No. 8 (part I, chapter 5) and WMO-No. 306 (FM 15, 00000KT): calm air has speed 0 and no direction.
+    WMO-No. 8 (part I, chapter 5) and WMO-No. 306 (FM 15, 00000KT): calm air has speed 0 and no
+    direction.
     """
-    calm = {name: state == Cell.CALM for name, state in states.items() if (state == Cell.CALM).any()}
+    calm = {
+        name: state == Cell.CALM for name, state in states.items() if (state == Cell.CALM).any()
+    }
     return {
         channel: is_calm
         for name, is_calm in calm.items()
-        for channel in (name, *(angle for angle in states if angle.startswith(name.replace("speed", "direction"))))
+        for channel in (
+            name,
+            *(angle for angle in states if angle.startswith(name.replace("speed", "direction"))),
+        )
     }
 
 
-def _of_cells(kind: str, severity: Severity, name: str, affected: BoolArray, line: IntArray, text: str) -> Finding:
+def _of_cells(
+    kind: str, severity: Severity, name: str, affected: BoolArray, line: IntArray, text: str
+) -> Finding:
     """Reports cells of a channel in the rows `affected` (n,)."""
     count = int(affected.sum())
     return Finding(
@@ -192,7 +214,9 @@ def _of_cells(kind: str, severity: Severity, name: str, affected: BoolArray, lin
     )
 
 
-def _in_degrees(cells: Sequence[str] | pa.StringArray, decimal: str, points: Mapping[str, float]) -> list[str]:
+def _in_degrees(
+    cells: Sequence[str] | pa.StringArray, decimal: str, points: Mapping[str, float]
+) -> list[str]:
     """Points of the compass as degrees; calm air and what else is no point have no direction."""
     texts: list[str] = [str(text) for text in cells]
     degrees = (points.get(text.strip().upper()) for text in texts)
@@ -239,14 +263,18 @@ def read_table(
     time_columns = [_index(column, rows, where) for column in recipe.time.columns]
     host = RowClock(form=recipe.file.host, columns=[0]) if recipe.file.host else None
     gathered = _Gathered(
-        clock=RowClock(form=recipe.time.format, columns=time_columns) if time_columns or host is None else host,
+        clock=RowClock(form=recipe.time.format, columns=time_columns)
+        if time_columns or host is None
+        else host,
         host=host if time_columns else None,
         channels={
             name: _channel_column(name, i, recipe.channels[name])
             for name, i in _channel_columns(recipe, rows, where).items()
         },
         extra={name: _Column(index=_index(name, rows, where)) for name in extra},
-        checks=[_Check(layout=check, index=_index(check.column, rows, where)) for check in recipe.checks],
+        checks=[
+            _Check(layout=check, index=_index(check.column, rows, where)) for check in recipe.checks
+        ],
         rows=None if recipe.rows is None else _index(recipe.rows.column, rows, where),
     )
     for line, block in rows.blocks(gathered.width()):
@@ -273,7 +301,11 @@ def read_table(
     )
     findings.extend(new_findings)
     if zone_given is not None and recipe.time.zone is not None:
-        findings.extend(zones.contradiction("the heading, or the recipe, says", recipe.time.zone, zone_given, time))
+        findings.extend(
+            zones.contradiction(
+                "the heading, or the recipe, says", recipe.time.zone, zone_given, time
+            )
+        )
     host_time = None
     if gathered.host is not None:
         host_time, _ = gathered.host.instants(
@@ -290,28 +322,42 @@ def read_table(
         cells = column.value(order)  # NaN where a cell is no number
         if name in still and name in _SPEEDS:
             message = "cells of {name} are words for calm air: read as 0 m/s, without a direction"
-            findings.append(_of_cells("calm-in-words", Severity.NOTE, name, still[name], line, message))
+            findings.append(
+                _of_cells("calm-in-words", Severity.NOTE, name, still[name], line, message)
+            )
         elif name in still:
-            state, cells = np.where(still[name], np.uint8(Cell.CALM), state), np.where(still[name], np.nan, cells)
+            state, cells = (
+                np.where(still[name], np.uint8(Cell.CALM), state),
+                np.where(still[name], np.nan, cells),
+            )
         value = in_si(cells, layout)
         if column.limit:
             limit = float(in_si(np.array([column.limit]), layout)[0])
-            message = f"cells of {{name}} say no more than that it was below {limit:.3g} m/s: read as 0"
-            below = _of_cells("below-threshold", Severity.WARNING, name, state == Cell.BELOW, line, message)
+            message = (
+                f"cells of {{name}} say no more than that it was below {limit:.3g} m/s: read as 0"
+            )
+            below = _of_cells(
+                "below-threshold", Severity.WARNING, name, state == Cell.BELOW, line, message
+            )
             findings.append(replace(below, value=limit))
             # averages over the ground truth's window know by the threshold what a 0 may hide
             sensor = sensor if sensor.threshold is not None else replace(sensor, threshold=limit)
         channel_flags, new_findings = cell_flags(name, layout, value, state, line)
         findings.extend(new_findings)
         if CHANNELS[name].unit == "rad" and CHANNELS[name].frame.startswith("from"):
-            value, new_findings = rules.direction(name, value, line, offset=unit(layout.unit).scale * layout.offset)
+            value, new_findings = rules.direction(
+                name, value, line, offset=unit(layout.unit).scale * layout.offset
+            )
             findings.extend(new_findings)
             zero, north = value == 0, np.abs(value - 2 * np.pi) < _ROUND
             if zero.any() and north.any():
                 message = (
-                    f"values of {{name}} are 0, and {int(north.sum())} are 360: where 360 is north, 0 may be calm air"
+                    f"values of {{name}} are 0, and {int(north.sum())} are 360: where 360 is "
+                    "north, 0 may be calm air"
                 )
-                findings.append(_of_cells("zero-beside-360", Severity.WARNING, name, zero, line, message))
+                findings.append(
+                    _of_cells("zero-beside-360", Severity.WARNING, name, zero, line, message)
+                )
             value = turn_angles(value, layout)
         channels[name] = value
         if name in WIND_CHANNELS:
@@ -331,16 +377,23 @@ def read_table(
         host_time=host_time,
         findings=tuple(findings),
     )
-    return Table(reading=reading, extra={name: column.value(order) for name, column in gathered.extra.items()})
+    return Table(
+        reading=reading,
+        extra={name: column.value(order) for name, column in gathered.extra.items()},
+    )
 
 
 def _list_first(names: Collection[str]) -> str:
     """Lists the first of the names, and how many more there are."""
     first_names = [repr(name) for name in sorted(names)[:_LISTED]]
-    return " or ".join(first_names) + (f", or one of {len(names) - _LISTED} more" if len(names) > _LISTED else "")
+    return " or ".join(first_names) + (
+        f", or one of {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    )
 
 
-def _stamp_findings(gathered: _Gathered, rows: Rows, recipe: Recipe, where: str) -> tuple[Finding, ...]:
+def _stamp_findings(
+    gathered: _Gathered, rows: Rows, recipe: Recipe, where: str
+) -> tuple[Finding, ...]:
     """Rows left out for their stamps.
 
     Raises:
@@ -352,16 +405,20 @@ def _stamp_findings(gathered: _Gathered, rows: Rows, recipe: Recipe, where: str)
     distance_note = f"; {distant} of them are {years}: a clock that was not set" if distant else ""
     if count == 0 and not bad and recipe.rows is not None:
         raise InputError(
-            f"there is no row with {recipe.rows.value!r} in column {recipe.rows.column!r}, which names the site",
+            f"there is no row with {recipe.rows.value!r} in column {recipe.rows.column!r}, which "
+            "names the site",
             where=where,
             fix=f"name a site as the file writes it: {_list_first(gathered.sites)}",
         )
     if count == 0:
-        refused = InputError if recipe.rows is None else NothingMeasuredError  # of several sites the others are read
+        refused = (
+            InputError if recipe.rows is None else NothingMeasuredError
+        )  # of several sites the others are read
         raise refused(
             f"no row with a readable time stamp{distance_note}",
             where=f"{where}, line {bad[0] if bad else rows.first_line}",
-            fix=f"stamps are expected as {form}; check the recipe, or that the logger recorded anything",
+            fix=f"stamps are expected as {form}; check the recipe, or that the logger recorded "
+            "anything",
         )
     if not bad:
         return ()
@@ -386,7 +443,12 @@ def _channel_columns(recipe: Recipe, rows: Rows, where: str) -> dict[str, int]:
     absent = set(rows.header).isdisjoint if rows.header is not None else None
     columns: dict[str, int] = {}
     for name, layout in recipe.channels.items():
-        if layout.optional and isinstance(layout.column, str) and absent is not None and absent([layout.column]):
+        if (
+            layout.optional
+            and isinstance(layout.column, str)
+            and absent is not None
+            and absent([layout.column])
+        ):
             continue
         columns[name] = _index(layout.column, rows, where)
     return columns
@@ -406,7 +468,11 @@ def _index(column: str | int, rows: Rows, where: str) -> int:
     header = rows.header
     if isinstance(column, int):
         if header is not None and column > len(header):
-            raise InputError(f"there is no column {column}, only {len(header)}", where=where, fix="correct the recipe")
+            raise InputError(
+                f"there is no column {column}, only {len(header)}",
+                where=where,
+                fix="correct the recipe",
+            )
         return column - 1 + rows.shift
     names = list(header or ())
     if column not in names:
@@ -414,13 +480,16 @@ def _index(column: str | int, rows: Rows, where: str) -> int:
         raise InputError(f"the header has no column {column!r}", where=where, fix=fix)
     if names.count(column) > 1:
         raise InputError(
-            f"{names.count(column)} columns are called {column!r}", where=where, fix="give the column's number instead"
+            f"{names.count(column)} columns are called {column!r}",
+            where=where,
+            fix="give the column's number instead",
         )
     return names.index(column)
 
 
 def in_si(value: FloatArray, layout: ChannelLayout) -> FloatArray:
-    """Cells of a column in SI, by the recipe's calibration; directions still as the vane gives them."""
+    """Cells of a column in SI, by the recipe's calibration; directions still as the vane gives
+    them."""
     if layout.gain != 1.0 or layout.offset != 0.0:
         value = value * layout.gain + layout.offset
     si_unit = unit(layout.unit)
@@ -429,14 +498,17 @@ def in_si(value: FloatArray, layout: ChannelLayout) -> FloatArray:
 
 def turn_angles(angle: FloatArray, layout: ChannelLayout) -> FloatArray:
     """Turns a vane's angles [rad] to 'from', clockwise, 0 to 2π."""
-    mounted = unit(layout.unit).to_si(layout.rotation) + (np.pi if layout.convention == "to" else 0.0)
+    mounted = unit(layout.unit).to_si(layout.rotation) + (
+        np.pi if layout.convention == "to" else 0.0
+    )
     return np.mod(angle + mounted, 2 * np.pi)
 
 
 def cell_flags(
     name: str, layout: ChannelLayout, value: FloatArray, state: UInt8Array, line: IntArray
 ) -> tuple[NDArray[np.uint16], tuple[Finding, ...]]:
-    """Flags and findings about single cells: missing, unreadable, infinite, outside the instrument's range."""
+    """Flags and findings about single cells: missing, unreadable, infinite, outside the
+    instrument's range."""
     flags = np.zeros(len(value), dtype=np.uint16)
     findings: list[Finding] = []
 
@@ -445,13 +517,37 @@ def cell_flags(
             flags[mask] |= flag
             findings.append(_of_cells(kind, severity, name, mask, line, f"{text} of {{name}}"))
 
-    note(state == Cell.MISSING, SampleFlag.MISSING, "missing-values", Severity.WARNING, "missing values")
-    note(state == Cell.UNREADABLE, SampleFlag.MISSING, "unreadable-values", Severity.ERROR, "unreadable values")
-    note(state == Cell.INFINITE, SampleFlag.OUT_OF_RANGE, "out-of-range", Severity.WARNING, "infinite values")
+    note(
+        state == Cell.MISSING,
+        SampleFlag.MISSING,
+        "missing-values",
+        Severity.WARNING,
+        "missing values",
+    )
+    note(
+        state == Cell.UNREADABLE,
+        SampleFlag.MISSING,
+        "unreadable-values",
+        Severity.ERROR,
+        "unreadable values",
+    )
+    note(
+        state == Cell.INFINITE,
+        SampleFlag.OUT_OF_RANGE,
+        "out-of-range",
+        Severity.WARNING,
+        "infinite values",
+    )
     if layout.range is not None:
         low, high = (float(unit(layout.unit).to_si(bound)) for bound in layout.range)
         text = f"values outside {layout.range[0]:g} to {layout.range[1]:g} {layout.unit}"
-        note((value < low) | (value > high), SampleFlag.OUT_OF_RANGE, "out-of-range", Severity.WARNING, text)
+        note(
+            (value < low) | (value > high),
+            SampleFlag.OUT_OF_RANGE,
+            "out-of-range",
+            Severity.WARNING,
+            text,
+        )
     return flags, tuple(findings)
 
 
@@ -463,16 +559,19 @@ def refuse_if_most(bad: int, good: int, text: str, where: str) -> None:
     """
     if bad > good or (bad and bad == good and good > 1):
         raise InputError(
-            f"{bad} of {bad + good} are {text}", where=where, fix="look at it with flagdata ingest --sniff"
+            f"{bad} of {bad + good} are {text}",
+            where=where,
+            fix="look at it with flagdata ingest --sniff",
         )
 
 
 def with_horizontal(reading: Reading, azimuth: float | None, *, where: str) -> Reading:
-    """Add `wind_speed` = √(x² + y²), and with the azimuth `wind_direction`, where a log has components alone.
+    """Add `wind_speed` = √(x² + y²), and with the azimuth `wind_direction`, where a log has
+    components alone.
 
-    The azimuth is the compass direction the array points to, against +x: wind along +x comes from there. With +z up, +y
-    is 90° to the left of +x, so that the wind comes from azimuth - atan2(y, x) (Campbell Scientific, CSAT3 manual,
-    appendix "Orientation").
+    The azimuth is the compass direction the array points to, against +x: wind along +x comes from
+    there. With +z up, +y is 90° to the left of +x, so that the wind comes from azimuth - atan2(y,
+    x) (Campbell Scientific, CSAT3 manual, appendix "Orientation").
 
     Args:
         azimuth: [rad, clockwise from true north]; `None` where nobody knows: no direction then.
@@ -495,10 +594,15 @@ def with_horizontal(reading: Reading, azimuth: float | None, *, where: str) -> R
     fix = None
     if azimuth is None:
         text += "; no direction, since the sensor's azimuth is not known"
-        fix = "give the sensor's azimuth for a direction: --azimuth DEG (270 for x to the east, y to the north)"
+        fix = (
+            "give the sensor's azimuth for a direction: --azimuth DEG (270 for x to the east, y to "
+            "the north)"
+        )
     else:
         towards = np.mod(azimuth - np.arctan2(y, x), 2 * np.pi)
-        added["wind_direction"] = np.where(added["wind_speed"] == 0, np.nan, towards)  # calm air comes from nowhere
+        added["wind_direction"] = np.where(
+            added["wind_speed"] == 0, np.nan, towards
+        )  # calm air comes from nowhere
         text += f", wind_direction is from the azimuth {np.degrees(azimuth):.1f}° given"
     finding = Finding.of("speed-from-components", text, count=len(x), fix=fix)
     return replace(reading, channels={**channels, **added}, findings=(*reading.findings, finding))

@@ -1,4 +1,5 @@
-"""The times of a table's rows: collects their stamps block by block, finds the rows' order, converts them to UTC."""
+"""The times of a table's rows: collects their stamps block by block, finds the rows' order,
+converts them to UTC."""
 
 from __future__ import annotations
 
@@ -21,7 +22,8 @@ from flagdata.ingest.anemometer.text.text_cells import Growing
 from flagdata.record.signals import Instants
 
 NEWEST_FIRST = 0.9
-"""Share of rows older than the row before them from which a log is a list with the newest row on top."""
+"""Share of rows older than the row before them from which a log is a list with the newest row on
+top."""
 
 Block: TypeAlias = Columns | Sequence[Sequence[str]]
 """Rows of cells, or their columns."""
@@ -80,13 +82,15 @@ class RowClock:
         self.step = min(self.step, stamps.step)
 
     def needs_no_zone(self) -> bool:
-        """Checks whether no zone has to be known: every stamp states its own, as Unix times do, or all count from a
-        start."""
+        """Checks whether no zone has to be known: every stamp states its own, as Unix times do, or
+        all count from a start."""
         return dates.is_elapsed(self.form) or bool(self.utc.view().all())
 
-    def order(self, line: IntArray, choice: ClockChoice | None) -> tuple[Order, tuple[Finding, ...]]:
-        """Orders the rows from the oldest on, for logs that list the newest first or out of order; also returns its
-        findings.
+    def order(
+        self, line: IntArray, choice: ClockChoice | None
+    ) -> tuple[Order, tuple[Finding, ...]]:
+        """Orders the rows from the oldest on, for logs that list the newest first or out of order;
+        also returns its findings.
 
         Args:
             line: (n,) numbers of the rows' lines, for messages.
@@ -101,7 +105,8 @@ class RowClock:
             text = "the newest row comes first: read from the end"
             findings = (Finding.of("newest-first", text, count=len(wall)),)
         if dates.is_elapsed(self.form) or dates.needs_date(self.form):
-            # such stamps have no day of their own: it follows from the rows' order, so they are not sorted
+            # such stamps have no day of their own: it follows from the rows' order, so they are not
+            # sorted
             return order, findings
         sorting = log_clock.sorted_as_given(wall[order], line[order], choice)
         if sorting is None:
@@ -109,23 +114,40 @@ class RowClock:
         return np.arange(len(wall))[order][sorting[0]], (*findings, sorting[1])
 
     def instants(
-        self, order: Order, *, line: IntArray, zone_name: str | None, where: str, stamp_options: StatedTime
+        self,
+        order: Order,
+        *,
+        line: IntArray,
+        zone_name: str | None,
+        where: str,
+        stamp_options: StatedTime,
     ) -> tuple[Instants, tuple[Finding, ...]]:
         """Converts the stamps to instants and reports what was odd; the blocks are released."""
         wall, utc = self.ns.view()[order], self.utc.view()[order]
         self.ns, self.utc = Growing(np.int64), Growing(np.bool_)
         if dates.is_elapsed(self.form):
-            return dates.since_start(wall, self.form, start=stamp_options.start, line=line, where=where)
+            return dates.since_start(
+                wall, self.form, start=stamp_options.start, line=line, where=where
+            )
         if self.form not in stamp_text.NAMED and "%p" not in self.form and not utc.any():
             dates.refuse_twelve(wall, line=line, where=where)
         findings: tuple[Finding, ...] = ()
         if dates.needs_date(self.form):
-            wall, findings = dates.complete_dates(wall, self.form, date=stamp_options.date, line=line, where=where)
+            wall, findings = dates.complete_dates(
+                wall, self.form, date=stamp_options.date, line=line, where=where
+            )
         elif stamp_options.start is not None or stamp_options.date is not None:
             option = "--start" if stamp_options.start is not None else "--date"
-            raise UsageError(f"the stamps say when they were: {option} is not used", where=where, fix="leave it out")
+            raise UsageError(
+                f"the stamps say when they were: {option} is not used",
+                where=where,
+                fix="leave it out",
+            )
         if self.bare_dates:
-            message = f"{self.bare_dates} stamps are dates without a time among others with one: read as midnight"
+            message = (
+                f"{self.bare_dates} stamps are dates without a time among others with one: read as "
+                "midnight"
+            )
             bare = Finding.of("bare-dates", message, count=self.bare_dates)
             findings = (*findings, bare)
         time, further = zones.instants(wall, utc, line=line, zone_name=zone_name, where=where)

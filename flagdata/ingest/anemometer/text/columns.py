@@ -1,8 +1,10 @@
-"""Delimited text cut into columns by Arrow, block by block: what `rows` says of lines, without a Python object a cell.
+"""Delimited text cut into columns by Arrow, block by block: what `rows` says of lines, without a
+Python object a cell.
 
-A line is regular when its bytes alone show its cells: as many delimiters as the others have, quotes that begin and end
-cells and hold no delimiter, no NUL and no line end but its own. Arrow reads those. All other lines (damaged, blank,
-commented, quoted within a cell) go the way of `rows`, which defines what they are. Both give the same, which is tested.
+A line is regular when its bytes alone show its cells: as many delimiters as the others have, quotes
+that begin and end cells and hold no delimiter, no NUL and no line end but its own. Arrow reads
+those. All other lines (damaged, blank, commented, quoted within a cell) go the way of `rows`, which
+defines what they are. Both give the same, which is tested.
 """
 
 # pyarrow.compute makes its functions at import, where a type checker cannot see them.
@@ -42,11 +44,15 @@ class Columns:
 
     def joined(self, indices: Sequence[int]) -> pa.StringArray:
         """Joins the cells of several columns of each row, trimmed, with a blank between."""
-        return pc.binary_join_element_wise(*(pc.utf8_trim_whitespace(self.cells[i]) for i in indices), " ")
+        return pc.binary_join_element_wise(
+            *(pc.utf8_trim_whitespace(self.cells[i]) for i in indices), " "
+        )
 
     def among(self, index: int, values: Sequence[str]) -> BoolArray:
         """Checks (n,) whether the trimmed cells of a column are among `values`."""
-        is_among = pc.is_in(pc.utf8_trim_whitespace(self.cells[index]), pa.array(list(values), pa.string()))
+        is_among = pc.is_in(
+            pc.utf8_trim_whitespace(self.cells[index]), pa.array(list(values), pa.string())
+        )
         return is_among.to_numpy(zero_copy_only=False).astype(bool)
 
     def where(self, wanted: BoolArray) -> Columns:
@@ -59,7 +65,8 @@ class Columns:
         further = [pa.array([row[i] for row in rows], pa.string()) for i in range(len(self.cells))]
         return Columns(
             cells=[
-                pa.concat_arrays([own, new]).take(pa.array(order)) for own, new in zip(self.cells, further, strict=True)
+                pa.concat_arrays([own, new]).take(pa.array(order))
+                for own, new in zip(self.cells, further, strict=True)
             ]
         )
 
@@ -71,7 +78,8 @@ class LineShape:
     Attributes:
         delimiter: one byte.
         cells: in a line.
-        empty: how many of them are empty at the end of the line, beyond those that the header names.
+        empty: how many of them are empty at the end of the line, beyond those that the header
+            names.
         comment: first byte of lines that may be comments, `None` where there are none.
         ascii: whether a line with a byte beyond ASCII is irregular.
     """
@@ -115,8 +123,12 @@ class Lines:
             return Columns(cells=[pa.array([], pa.string()) for _ in range(count)])
         table = csv.read_csv(
             pa.BufferReader(own_copy(regular)),
-            read_options=csv.ReadOptions(use_threads=False, block_size=len(regular) + 1, column_names=names),
-            parse_options=csv.ParseOptions(delimiter=chr(self.shape.delimiter), ignore_empty_lines=False),
+            read_options=csv.ReadOptions(
+                use_threads=False, block_size=len(regular) + 1, column_names=names
+            ),
+            parse_options=csv.ParseOptions(
+                delimiter=chr(self.shape.delimiter), ignore_empty_lines=False
+            ),
             convert_options=csv.ConvertOptions(
                 check_utf8=False,
                 column_types=dict.fromkeys(names[:count], pa.string()),
@@ -134,11 +146,16 @@ class Lines:
         edges = np.diff(np.concatenate(([0], self.regular.astype(np.int8), [0])))
         begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
         bounds = np.append(self.start, len(self.data))
-        return b"".join(self.data[bounds[low] : bounds[high]] for low, high in zip(begins, ends, strict=True))
+        return b"".join(
+            self.data[bounds[low] : bounds[high]] for low, high in zip(begins, ends, strict=True)
+        )
 
 
-def shape_of(line: bytes, *, delimiter: str, names: int | None, comment: str | None, ascii_only: bool) -> LineShape:
-    """Finds the shape of a file of which `line` is a row and whose header names `names` cells, if it has one."""
+def shape_of(
+    line: bytes, *, delimiter: str, names: int | None, comment: str | None, ascii_only: bool
+) -> LineShape:
+    """Finds the shape of a file of which `line` is a row and whose header names `names` cells, if
+    it has one."""
     mark = ord(delimiter)
     cells = line.count(mark) + 1
     beyond = cells - names if names is not None else 0
@@ -153,15 +170,21 @@ def shape_of(line: bytes, *, delimiter: str, names: int | None, comment: str | N
 
 
 def lines_of(data: bytes, shape: LineShape) -> Lines | None:
-    """Splits a block that ends with a line end or with the file into lines; `None` where that takes a closer look.
+    """Splits a block that ends with a line end or with the file into lines; `None` where that takes
+    a closer look.
 
-    It does where a CR alone ends a line, and where Arrow would take a cell's first character for a byte-order mark.
+    It does where a CR alone ends a line, and where Arrow would take a cell's first character for a
+    byte-order mark.
     """
     byte = np.frombuffer(data, dtype=np.uint8)
     feeds = np.flatnonzero(byte == _LF)
     if len(byte) and byte[-1] != _LF:
         feeds = np.append(feeds, len(byte))
-    start = np.concatenate(([0], feeds[:-1] + 1)).astype(np.int64) if len(feeds) else np.zeros(0, dtype=np.int64)
+    start = (
+        np.concatenate(([0], feeds[:-1] + 1)).astype(np.int64)
+        if len(feeds)
+        else np.zeros(0, dtype=np.int64)
+    )
     returned = (byte[np.maximum(feeds - 1, 0)] == _CR) & (feeds > start)
     if data.count(_CR) != int(returned.sum()) or codecs.BOM_UTF8 in data:
         return None
@@ -180,8 +203,11 @@ def lines_of(data: bytes, shape: LineShape) -> Lines | None:
     return Lines(data=data, start=start, end=end, regular=regular, shape=shape)
 
 
-def _with(data: bytes, byte: UInt8Array, feeds: IntArray, start: IntArray, shape: LineShape) -> BoolArray:
-    """Lines that hold nothing but blanks, or a byte that has to be looked at: NUL, Ctrl-Z, beyond ASCII."""
+def _with(
+    data: bytes, byte: UInt8Array, feeds: IntArray, start: IntArray, shape: LineShape
+) -> BoolArray:
+    """Lines that hold nothing but blanks, or a byte that has to be looked at: NUL, Ctrl-Z, beyond
+    ASCII."""
     odd_lines = np.zeros(len(feeds), dtype=bool)
     odd = (byte == 0) | (byte == 0x1A) if 0 in data or b"\x1a" in data else None
     if shape.ascii and not data.isascii():
@@ -201,7 +227,8 @@ def _misquoted_lines(
     on: IntArray,
     delimiter: int,
 ) -> BoolArray:
-    """Lines with a quote that neither begins nor ends a cell, with one too many, or with a delimiter between two."""
+    """Lines with a quote that neither begins nor ends a cell, with one too many, or with a
+    delimiter between two."""
     line = np.searchsorted(feeds, quotes)
     count = np.bincount(line, minlength=len(feeds))
     first = np.concatenate(([0], np.cumsum(count)))

@@ -1,4 +1,5 @@
-"""Lines cut into cells, with the number of each row's line and a count of the lines that do not fit."""
+"""Lines cut into cells, with the number of each row's line and a count of the lines that do not
+fit."""
 
 from __future__ import annotations
 
@@ -54,19 +55,30 @@ class RowReader:
             names = head[layout.preamble].lstrip("\ufeff")
             self.header = [cell.strip() for cell in cells_of_lines([names], layout.delimiter)[0]]
             row = cells_of_lines(head[layout.preamble + layout.header :], layout.delimiter)
-            used = max((at for at, cell in enumerate(row[0], start=1) if cell.strip()), default=0) if row else 0
+            used = (
+                max((at for at, cell in enumerate(row[0], start=1) if cell.strip()), default=0)
+                if row
+                else 0
+            )
             self._headed = len(self.header)
             while len(self.header) > max(1, used) and not self.header[-1]:
                 self.header.pop()
 
     def blocks(self, width: int) -> Iterator[tuple[IntArray, Columns | list[list[str]]]]:
-        """Yields line numbers and rows of at least `width` cells; with a header, of as many cells as it names.
+        """Yields line numbers and rows of at least `width` cells; with a header, of as many cells
+        as it names.
 
-        Empty cells beyond (delimiters at the line's end) are allowed. Where the encoding lets bytes be cut, regular
+        Empty cells beyond (delimiters at the line's end) are allowed. Where the encoding lets bytes
+        be cut, regular
         lines come as columns: see `columns`.
         """
         delimiter = self._layout.delimiter
-        plain = self._source.encoding in _PLAIN and len(delimiter) == 1 and delimiter.isascii() and delimiter != " "
+        plain = (
+            self._source.encoding in _PLAIN
+            and len(delimiter) == 1
+            and delimiter.isascii()
+            and delimiter != " "
+        )
         return self._columns(width) if plain and delimiter != '"' else self.rows(width)
 
     def rows(self, width: int) -> Iterator[tuple[IntArray, list[list[str]]]]:
@@ -79,7 +91,8 @@ class RowReader:
     def _cut_and_sort(
         self, numbers: Sequence[int], lines: Sequence[str], width: int
     ) -> tuple[IntArray, list[list[str]]]:
-        """Cuts these lines into rows and keeps those that fit, with their numbers; the others are counted."""
+        """Cuts these lines into rows and keeps those that fit, with their numbers; the others are
+        counted."""
         names = len(self.header) if self.header is not None else None
         comment = self._layout.comment
         numbers_kept: list[int] = []
@@ -95,9 +108,12 @@ class RowReader:
             lines_kept.append(line)
         good: list[list[str]] = []
         where: list[int] = []
-        for number, row in zip(numbers_kept, cells_of_lines(lines_kept, self._layout.delimiter), strict=True):
+        for number, row in zip(
+            numbers_kept, cells_of_lines(lines_kept, self._layout.delimiter), strict=True
+        ):
             size = len(row)
-            # Cells below the empty headings at the end, which hold something in some rows only, shift no others.
+            # Cells below the empty headings at the end, which hold something in some rows only,
+            # shift no others.
             fits = names is None or size in (names, self._headed) or _only_empty_beyond(row, names)
             if fits and size >= width:
                 good.append(row)
@@ -129,7 +145,8 @@ class RowReader:
             first += len(lines.start)
 
     def _shape(self, data: bytes) -> LineShape | None:
-        """Finds the shape of the file's regular lines by its first row; `None` where the block has no row."""
+        """Finds the shape of the file's regular lines by its first row; `None` where the block has
+        no row."""
         at = -1
         for _ in range(self.first_line - 1):
             at = data.find(b"\n", at + 1)
@@ -145,7 +162,9 @@ class RowReader:
             ascii_only=self._source.encoding == "latin-1",
         )
 
-    def _of_lines(self, lines: Lines, first: int, width: int, encoding: str) -> tuple[IntArray, Columns]:
+    def _of_lines(
+        self, lines: Lines, first: int, width: int, encoding: str
+    ) -> tuple[IntArray, Columns]:
         """Reads the rows of a block whose first line has the number `first`."""
         number = first + np.arange(len(lines.start), dtype=np.int64)
         lines = replace(lines, regular=lines.regular & (number >= self.first_line))
@@ -174,7 +193,8 @@ class RowReader:
         malformed = list(self._malformed)
         if len(malformed) > self._read and len(malformed) > 1:
             raise InputError(
-                f"{len(malformed)} of {len(malformed) + self._read} lines have another number of columns than expected",
+                f"{len(malformed)} of {len(malformed) + self._read} lines have another number of "
+                "columns than expected",
                 where=f"{self._source.path}, line {malformed[0]}",
                 fix="check delimiter and header of the recipe",
             )
@@ -194,28 +214,35 @@ class RowReader:
                     severity=Severity.ERROR,
                     count=len(malformed),
                     where=f"line {malformed[0]}",
-                    what=f"{len(malformed)} lines with another number of columns than the header; left out",
+                    what=f"{len(malformed)} lines with another number of columns than the header; "
+                    "left out",
                 )
             )
         return tuple(findings)
 
 
 def _is_mark(line: str, delimiter: str) -> bool:
-    """Checks whether a line is one word without letters and digits: a ruler, or "***" where a file ends."""
+    """Checks whether a line is one word without letters and digits: a ruler, or "***" where a file
+    ends."""
     words = line.split()
-    return len(words) == 1 and delimiter not in words[0] and not any(sign.isalnum() for sign in words[0])
+    return (
+        len(words) == 1
+        and delimiter not in words[0]
+        and not any(sign.isalnum() for sign in words[0])
+    )
 
 
 def blank_cells(line: str) -> list[str]:
-    """Cells divided by runs of blanks, or by a comma and blanks; quotes bind where they are closed."""
+    """Cells divided by runs of blanks, or by a comma and blanks; quotes bind where they are
+    closed."""
     if '"' not in line or line.count('"') % 2:
         return line.replace(", ", " ").split()
     return [quoted or plain for quoted, plain in _BLANK_CELL.findall(line)]
 
 
 def has_open_quote(line: str, delimiter: str) -> bool:
-    """Checks whether a quote begins a cell and is not closed; one within a cell that has none before it is a sign
-    (0.01")."""
+    """Checks whether a quote begins a cell and is not closed; one within a cell that has none
+    before it is a sign (0.01")."""
     if line.count('"') % 2 == 0:
         return False
     cell, rest = re.escape(delimiter), line
@@ -223,7 +250,9 @@ def has_open_quote(line: str, delimiter: str) -> bool:
         end = re.search(rf'(?<!")(?:"")*"\s*(?:{cell}|$)', rest[quoted.end() :])
         if end is None:
             return True
-        rest = rest[quoted.end() + end.end() - len(delimiter) :] if end[0].endswith(delimiter) else ""
+        rest = (
+            rest[quoted.end() + end.end() - len(delimiter) :] if end[0].endswith(delimiter) else ""
+        )
     return False
 
 
@@ -232,11 +261,15 @@ def _only_empty_beyond(row: Sequence[str], names: int) -> bool:
 
 
 def cells_of_lines(lines: Sequence[str], delimiter: str) -> list[list[str]]:
-    """Cuts each line into cells. Quotes bind within a line; a line with a quote that is not closed becomes one cell."""
+    """Cuts each line into cells. Quotes bind within a line; a line with a quote that is not closed
+    becomes one cell."""
     if delimiter == " ":
         return [blank_cells(line) for line in lines]
     if not any('"' in line for line in lines):
         return [line.split(delimiter) for line in lines]
     closed = ["" if has_open_quote(line, delimiter) else line for line in lines]
     rows = list(csv.reader(closed, delimiter=delimiter))
-    return [row if is_closed else [line] for row, is_closed, line in zip(rows, closed, lines, strict=True)]
+    return [
+        row if is_closed else [line]
+        for row, is_closed, line in zip(rows, closed, lines, strict=True)
+    ]

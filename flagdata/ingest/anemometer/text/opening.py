@@ -1,16 +1,25 @@
-"""A log's file opened as text, whatever it is: a text, a topic of an MCAP file, a sheet, a netCDF data set."""
+"""A log's file opened as text, whatever it is: a text, a topic of an MCAP file, a sheet, a netCDF
+data set."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from flagdata.errors import LimitError, UsageError
-from flagdata.ingest.anemometer.text.text_file import NETCDF, TextFile, first_bytes, is_workbook, settle_text
+from flagdata.ingest.anemometer.text.text_file import (
+    NETCDF,
+    TextFile,
+    first_bytes,
+    is_workbook,
+    settle_text,
+)
 from flagdata.ingest.anemometer.wind_options import Limits
 from flagdata.ingest.mcap.bags import is_bag
 
 
-def open_text(path: Path, *, limits: Limits, encoding: str | None = None, topic: str | None = None) -> TextFile:
+def open_text(
+    path: Path, *, limits: Limits, encoding: str | None = None, topic: str | None = None
+) -> TextFile:
     """Check a file against the limits and settle its encoding, in one pass over its bytes.
 
     Args:
@@ -42,5 +51,7 @@ def open_text(path: Path, *, limits: Limits, encoding: str | None = None, topic:
 
         return netcdf.open_dataset(path, limits=limits)
     if topic is not None:
-        raise UsageError("a topic was given, but this is no MCAP file", where=where, fix="leave out --topic")
+        raise UsageError(
+            "a topic was given, but this is no MCAP file", where=where, fix="leave out --topic"
+        )
     return settle_text(path, head, limits=limits, encoding=encoding)

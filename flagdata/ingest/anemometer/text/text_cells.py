@@ -1,4 +1,5 @@
-"""From cells of text to numbers, in bulk, with a reason for each cell that is none; columns that grow by blocks."""
+"""From cells of text to numbers, in bulk, with a reason for each cell that is none; columns that
+grow by blocks."""
 
 # pyarrow.compute makes its functions at import, where a type checker cannot see them.
 # pyright: reportAttributeAccessIssue=false
@@ -61,13 +62,18 @@ def numbers(
     """Read a column of cells.
 
     Args:
-        decimal: "." or ","; with "," a cell holding a point is unreadable, never a thousand times off.
-        missing: spellings of "no value" beside `MISSING`, lower-case; numeric ones are compared by value.
+        decimal: "." or ","; with "," a cell holding a point is unreadable, never a thousand times
+            off.
+        missing: spellings of "no value" beside `MISSING`, lower-case; numeric ones are compared by
+            value.
         suffix: what stands behind each number, such as its unit; a number without it is unreadable.
         zeros: words that mean 0, lower-case; those of `missing` go before them.
-        below: whether "<0.3" is a value below the instrument's threshold, 0 within 0.3; else it is unreadable.
+        below: whether "<0.3" is a value below the instrument's threshold, 0 within 0.3; else it is
+            unreadable.
     """
-    text = pc.utf8_trim_whitespace(cells if isinstance(cells, pa.StringArray) else pa.array(cells, pa.string()))
+    text = pc.utf8_trim_whitespace(
+        cells if isinstance(cells, pa.StringArray) else pa.array(cells, pa.string())
+    )
     if suffix:
         text = _without(text, suffix)
     written = text
@@ -88,9 +94,13 @@ def numbers(
         if below:
             smaller = pc.match_substring_regex(text, BELOW)
             state[_mask(smaller)] = Cell.BELOW
-            limits = pc.cast(pc.replace_substring_regex(text.filter(smaller), BELOW, r"\1"), pa.float64())
+            limits = pc.cast(
+                pc.replace_substring_regex(text.filter(smaller), BELOW, r"\1"), pa.float64()
+            )
             limit = float(pc.max(limits).as_py() or 0.0)
-        state[_mask(pc.or_(absent, pc.match_substring_regex(written, MISSING_SIGNS)))] = Cell.MISSING
+        state[_mask(pc.or_(absent, pc.match_substring_regex(written, MISSING_SIGNS)))] = (
+            Cell.MISSING
+        )
         state[_mask(endless)] = Cell.INFINITE
         parsed = pc.cast(pc.if_else(readable, text, None), pa.float64())
     value = parsed.to_numpy(zero_copy_only=False).astype(np.float64)
@@ -104,10 +114,15 @@ def numbers(
 
 
 def _without(text: pa.StringArray, suffix: str) -> pa.StringArray:
-    """Strips from trimmed cells the suffix that each number must have; numbers without it become "?"."""
+    """Strips from trimmed cells the suffix that each number must have; numbers without it become
+    "?"."""
     has_suffix = pc.ends_with(text, suffix)
-    bare = pc.utf8_trim_whitespace(pc.if_else(has_suffix, pc.utf8_slice_codeunits(text, 0, -len(suffix)), text))
-    return pc.if_else(pc.and_(pc.invert(has_suffix), pc.match_substring_regex(bare, r"\d")), "?", bare)
+    bare = pc.utf8_trim_whitespace(
+        pc.if_else(has_suffix, pc.utf8_slice_codeunits(text, 0, -len(suffix)), text)
+    )
+    return pc.if_else(
+        pc.and_(pc.invert(has_suffix), pc.match_substring_regex(bare, r"\d")), "?", bare
+    )
 
 
 def _mask(array: pa.BooleanArray) -> BoolArray:
@@ -132,8 +147,8 @@ _FIRST = 1 << 17
 class Growing(Generic[T]):
     """Values of one type, added block by block and taken once.
 
-    A list of blocks that is joined at the end holds the column twice, and leaves holes in the heap that no later array
-    fits; room that nothing was written to costs no memory.
+    A list of blocks that is joined at the end holds the column twice, and leaves holes in the heap
+    that no later array fits; room that nothing was written to costs no memory.
     """
 
     def __init__(self, kind: type[T]) -> None:

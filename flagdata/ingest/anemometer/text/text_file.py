@@ -1,6 +1,8 @@
-"""The file under a log: refused when it is no text or too large, its encoding settled; its text, line by line.
+"""The file under a log: refused when it is no text or too large, its encoding settled; its text,
+line by line.
 
-Of a file compressed by gzip what is in it; workbooks and netCDF files are opened as the table that they hold.
+Of a file compressed by gzip what is in it; workbooks and netCDF files are opened as the table that
+they hold.
 """
 
 from __future__ import annotations
@@ -25,7 +27,8 @@ from flagdata.errors import InputError, LimitError
 from flagdata.ingest.anemometer.wind_options import Limits
 
 GZIP = b"\x1f\x8b"
-"""First bytes of a file compressed by gzip (RFC 1952); a log may be: it is read as what is in it."""
+"""First bytes of a file compressed by gzip (RFC 1952); a log may be: it is read as what is in
+it."""
 
 RATE_GIVEN = "rate-given"
 """The finding that the stamps of a file were counted at a rate that the user gave."""
@@ -40,7 +43,8 @@ class TextFile:
         encoding: a Python codec name.
         lines: number of line ends, roughly the number of lines.
         findings: about encoding, line ends and NUL bytes.
-        serial_days: what "excel-days" are in it: "excel-days-1904" in a workbook of that date system.
+        serial_days: what "excel-days" are in it: "excel-days-1904" in a workbook of that date
+            system.
     """
 
     path: Path
@@ -55,7 +59,8 @@ class TextFile:
         return any(finding.kind == RATE_GIVEN for finding in self.findings)
 
     def blocks(self, size: int = 200_000) -> Iterator[tuple[int, list[str]]]:
-        """Lines without their ends, `size` at a time, each block with the number (from 1) of its first line."""
+        """Lines without their ends, `size` at a time, each block with the number (from 1) of its
+        first line."""
         first = 1
         with _text(self.path, self.encoding) as stream:
             while lines := [line.rstrip("\n") for line in islice(stream, size)]:
@@ -67,8 +72,8 @@ class TextFile:
         return (line for _, block in self.blocks() for line in block)
 
     def raw_blocks(self, size: int = 2 << 20) -> Iterator[bytes]:
-        """Yields the file's bytes without a byte-order mark of UTF-8, about `size` at a time; each block ends with a
-        line."""
+        """Yields the file's bytes without a byte-order mark of UTF-8, about `size` at a time; each
+        block ends with a line."""
         with open_bytes(self.path) as stream:
             rest = b""
             first = True
@@ -91,7 +96,8 @@ class TextFile:
 
 @dataclass(frozen=True, kw_only=True)
 class TableText(TextFile):
-    """What is no table of text, made one: a workbook's sheet, JSON, labelled lines, as lines of comma-separated text.
+    """What is no table of text, made one: a workbook's sheet, JSON, labelled lines, as lines of
+    comma-separated text.
 
     Attributes:
         text: one line a row.
@@ -100,7 +106,9 @@ class TableText(TextFile):
     text: tuple[str, ...]
 
     @classmethod
-    def of(cls, source: TextFile, lines: Sequence[str], findings: Iterable[Finding] = ()) -> TableText:
+    def of(
+        cls, source: TextFile, lines: Sequence[str], findings: Iterable[Finding] = ()
+    ) -> TableText:
         """Converts a file to these lines, with what was found beside the file's own findings."""
         return cls(
             path=source.path,
@@ -146,7 +154,12 @@ _OPEN_DOCUMENT = b"application/vnd.oasis.opendocument.spreadsheet"
 # First bytes → what it is, what to do. Signatures as in the formats' own specifications.
 _SIGNATURES: tuple[tuple[int, bytes, str, str], ...] = (
     (0, GZIP, "gzip-compressed and damaged", "copy it again, or unpack it: gunzip FILE"),
-    (30, b"mimetype" + _OPEN_DOCUMENT, "an OpenDocument spreadsheet", "save it as .xlsx, or the sheet as CSV"),
+    (
+        30,
+        b"mimetype" + _OPEN_DOCUMENT,
+        "an OpenDocument spreadsheet",
+        "save it as .xlsx, or the sheet as CSV",
+    ),
     (0, b"PK\x03\x04", "a zip archive or an Excel workbook", "unpack it, or save the sheet as CSV"),
     (0, b"PK\x05\x06", "an empty zip archive", "give the log itself"),
     (0, b"\xfd7zXZ\x00", "xz-compressed", "unpack it first: unxz FILE"),
@@ -154,9 +167,19 @@ _SIGNATURES: tuple[tuple[int, bytes, str, str], ...] = (
     (0, b"7z\xbc\xaf\x27\x1c", "a 7-Zip archive", "unpack it first"),
     (0, b"\x28\xb5\x2f\xfd", "zstd-compressed", "unpack it first: zstd -d FILE -o NEW"),
     (0, b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an old Excel workbook", "save the sheet as CSV"),
-    (0, b"{\\rtf", "rich text (RTF), whose marks stand among the readings", "save it as plain text, and ingest that"),
+    (
+        0,
+        b"{\\rtf",
+        "rich text (RTF), whose marks stand among the readings",
+        "save it as plain text, and ingest that",
+    ),
     (0, b"%PDF", "a PDF document", "export the readings as CSV"),
-    (0, b"\x00\x05\x16\x07", "macOS's note beside another file (AppleDouble)", "give that file: the name without ._"),
+    (
+        0,
+        b"\x00\x05\x16\x07",
+        "macOS's note beside another file (AppleDouble)",
+        "give that file: the name without ._",
+    ),
     (0, b"\x89PNG", "a PNG picture", "give the anemometer's log"),
     (0, b"\xff\xd8\xff", "a JPEG picture", "give the anemometer's log"),
     (4, b"ftyp", "a video (MP4 or MOV)", "ingest it as a camera file"),
@@ -199,8 +222,8 @@ def is_workbook(path: Path, head: bytes) -> bool:
 
 
 def signature(head: bytes) -> tuple[str, str] | None:
-    """Names what a file of another kind is by its first bytes, and what to do with it; `None` when none is
-    recognised."""
+    """Names what a file of another kind is by its first bytes, and what to do with it; `None` when
+    none is recognised."""
     if len(head) > 188 * 2 and head[0] == head[188] == head[376] == 0x47:
         return "a video (MPEG transport stream)", "ingest it as a camera file"
     if len(head) > 4 + 192 and head[4] == head[4 + 192] == 0x47:
@@ -225,14 +248,19 @@ def first_bytes(path: Path) -> bytes:
     except (gzip.BadGzipFile, zlib.error, EOFError):
         return GZIP
     except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", where=str(path), fix="check its permissions") from None
+        raise InputError(
+            f"cannot be read: {error.strerror}", where=str(path), fix="check its permissions"
+        ) from None
     if not head:
         raise InputError("the file is empty", where=str(path), fix="copy it from the logger again")
     return head
 
 
-def settle_text(path: Path, head: bytes, *, limits: Limits, encoding: str | None = None) -> TextFile:
-    """Settles the encoding of a file that begins so, and checks it against the limits, in one pass over its bytes.
+def settle_text(
+    path: Path, head: bytes, *, limits: Limits, encoding: str | None = None
+) -> TextFile:
+    """Settles the encoding of a file that begins so, and checks it against the limits, in one pass
+    over its bytes.
 
     Raises:
         InputError: not text, or not in the encoding named.
@@ -245,7 +273,9 @@ def settle_text(path: Path, head: bytes, *, limits: Limits, encoding: str | None
     codec = encoding or next((name for bom, name in _BOMS if head.startswith(bom)), None)
     if codec is None and _looks_utf16(head):
         raise InputError(
-            "this looks like UTF-16 without a byte-order mark", where=where, fix="name it: --encoding utf-16-le"
+            "this looks like UTF-16 without a byte-order mark",
+            where=where,
+            fix="name it: --encoding utf-16-le",
         )
     if codec is None or not codec.startswith(("utf-16", "utf-32")):
         _refuse_binary(head, where)
@@ -254,7 +284,9 @@ def settle_text(path: Path, head: bytes, *, limits: Limits, encoding: str | None
         lines, findings = _count(path, limits, wide=codec.startswith(("utf-16", "utf-32")))
     except (gzip.BadGzipFile, zlib.error, EOFError):
         raise InputError(
-            "the gzip file is damaged or incomplete", where=where, fix="copy it again, or save what is left: gunzip"
+            "the gzip file is damaged or incomplete",
+            where=where,
+            fix="copy it again, or save what is left: gunzip",
         ) from None
     return TextFile(path=path, encoding=codec, lines=lines, findings=(*problem, *findings))
 
@@ -270,13 +302,18 @@ def _looks_utf16(head: bytes) -> bool:
 def _refuse_binary(head: bytes, where: str) -> None:
     text = head.rstrip(b"\x00")
     if not text:
-        raise InputError("the file holds nothing but NUL bytes", where=where, fix="copy it from the logger again")
+        raise InputError(
+            "the file holds nothing but NUL bytes", where=where, fix="copy it from the logger again"
+        )
     sample = np.frombuffer(text, dtype=np.uint8)
-    # Tabs, line ends, form feeds, and the STX and ETX that serial instruments frame their lines with.
+    # Tabs, line ends, form feeds, and the STX and ETX that serial instruments frame their lines
+    # with.
     control = (sample < 32) & ~np.isin(sample, (2, 3, 9, 10, 12, 13))
     if float(control.mean()) > 0.05:
         raise InputError(
-            "the file is binary, not a text log", where=where, fix="export it as text with the logger's own program"
+            "the file is binary, not a text log",
+            where=where,
+            fix="export it as text with the logger's own program",
         )
 
 
@@ -288,10 +325,14 @@ def _settle(path: Path, codec: str | None, limits: Limits) -> tuple[str, tuple[F
         text = getattr(info, "_is_text_encoding", True)  # what open() itself looks at
     except LookupError:
         raise InputError(
-            f"there is no encoding {codec!r}", where=where, fix="give a Python codec name such as cp1252"
+            f"there is no encoding {codec!r}",
+            where=where,
+            fix="give a Python codec name such as cp1252",
         ) from None
     if not text or info.incrementaldecoder is None:
-        raise InputError(f"{codec!r} is not a text encoding", where=where, fix="give one such as cp1252")
+        raise InputError(
+            f"{codec!r} is not a text encoding", where=where, fix="give one such as cp1252"
+        )
     decoder = info.incrementaldecoder()
     done = size = 0
     with open_bytes(path) as stream:
@@ -300,7 +341,9 @@ def _settle(path: Path, codec: str | None, limits: Limits) -> tuple[str, tuple[F
                 size += len(chunk)
                 if size > limits.size:
                     fix = "split it"
-                    raise LimitError(f"the file unpacks to more than {limits.size} bytes", where=where, fix=fix)
+                    raise LimitError(
+                        f"the file unpacks to more than {limits.size} bytes", where=where, fix=fix
+                    )
                 decoder.decode(chunk)
                 done += chunk.count(b"\n")
             decoder.decode(b"", final=True)
@@ -316,7 +359,8 @@ def _settle(path: Path, codec: str | None, limits: Limits) -> tuple[str, tuple[F
             return "latin-1", (
                 Finding.of(
                     "encoding-assumed",
-                    "not valid UTF-8, read as Latin-1: letters beyond ASCII may be wrong, numbers are not",
+                    "not valid UTF-8, read as Latin-1: letters beyond ASCII may be wrong, numbers "
+                    "are not",
                     where=f"line {done + 1}",
                     fix="name the encoding, e.g. --encoding cp1252",
                 ),
@@ -327,7 +371,8 @@ def _settle(path: Path, codec: str | None, limits: Limits) -> tuple[str, tuple[F
 def _count(path: Path, limits: Limits, *, wide: bool) -> tuple[int, tuple[Finding, ...]]:
     """Counts line ends of each kind, NUL bytes and the longest line, within the limits.
 
-    In `wide` encodings (2 or 4 bytes a character) the limits hold all the same, but bytes say nothing on line ends.
+    In `wide` encodings (2 or 4 bytes a character) the limits hold all the same, but bytes say
+    nothing on line ends.
     """
     where = str(path)
     unix = windows = mac = nul = lines = tail = before = 0
@@ -346,12 +391,16 @@ def _count(path: Path, limits: Limits, *, wide: bool) -> tuple[int, tuple[Findin
             spans = np.diff(np.concatenate(([-1 - tail], ends, [len(data)])))
             tail = int(spans[-1]) - 1
             if lines > limits.rows:
-                raise LimitError(f"there are more than {limits.rows} lines", where=where, fix="split the file")
+                raise LimitError(
+                    f"there are more than {limits.rows} lines", where=where, fix="split the file"
+                )
             if int(spans.max()) > limits.line:
                 at = int(np.append(ends, len(data))[int(np.argmax(spans))])
                 number = before + max(chunk.count(b"\n", 0, at), chunk.count(b"\r", 0, at)) + 1
                 message = f"a line longer than {limits.line} bytes"
-                raise LimitError(message, where=f"{where}, line {number}", fix="check that this is the log")
+                raise LimitError(
+                    message, where=f"{where}, line {number}", fix="check that this is the log"
+                )
             before = lines
             last = chunk[-1:]
     findings: list[Finding] = []
@@ -365,7 +414,8 @@ def _count(path: Path, limits: Limits, *, wide: bool) -> tuple[int, tuple[Findin
         findings.append(
             Finding.of(
                 "nul-bytes",
-                f"{nul} NUL bytes, as a logger leaves behind when it loses power; lines holding them are left out",
+                f"{nul} NUL bytes, as a logger leaves behind when it loses power; lines holding "
+                "them are left out",
                 count=nul,
             )
         )

@@ -1,4 +1,5 @@
-"""Addresses of storage, streams and machines are refused as what they are; none becomes a local folder."""
+"""Addresses of storage, streams and machines are refused as what they are; none becomes a local
+folder."""
 
 from __future__ import annotations
 
@@ -29,7 +30,17 @@ ADDRESSES = [
     ("me@host:/data/lake", "another machine", "mount it"),
     ("new-thing+v2://x", "another machine or service", "give the local path"),
 ]
-PATHS = ["lake", "./s3/lake", "/data/s3:/lake", "log 12:30.csv", "C:/films/a.mp4", "wind:a.csv", "a=b/c", ".", "s3:"]
+PATHS = [
+    "lake",
+    "./s3/lake",
+    "/data/s3:/lake",
+    "log 12:30.csv",
+    "C:/films/a.mp4",
+    "wind:a.csv",
+    "a=b/c",
+    ".",
+    "s3:",
+]
 
 
 def test_an_address_is_refused_as_what_it_is_as_text_and_as_a_path() -> None:
@@ -38,7 +49,11 @@ def test_an_address_is_refused_as_what_it_is_as_text_and_as_a_path() -> None:
             with pytest.raises(UsageError) as refused:
                 local_path(given)
             error = refused.value
-            assert (what in error.what, fix in error.fix, error.where) == (True, True, str(given)), address
+            assert (what in error.what, fix in error.fix, error.where) == (
+                True,
+                True,
+                str(given),
+            ), address
 
 
 def test_what_is_no_address_stays_the_path_it_is() -> None:
@@ -88,7 +103,10 @@ def test_the_library_refuses_them_too(tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def test_every_path_of_the_command_line_is_checked() -> None:
-    verbs = [getattr(import_module(module), name) for module, name in (v[0].split(":") for v in VERBS.values())]
+    verbs = [
+        getattr(import_module(module), name)
+        for module, name in (v[0].split(":") for v in VERBS.values())
+    ]
     commands = [verb if isinstance(verb, click.Command) else verb.command for verb in verbs]
     while commands:
         command = commands.pop()

@@ -89,7 +89,9 @@ def test_a_child_answers_until_it_is_closed() -> None:
         (("leave", 5), End.EXIT, "exit code 5: for no reason"),
     ],
 )
-def test_each_end_of_a_child_is_reported_as_what_it_was(message: tuple[str, Any], end: End, detail: str) -> None:
+def test_each_end_of_a_child_is_reported_as_what_it_was(
+    message: tuple[str, Any], end: End, detail: str
+) -> None:
     child = _child()
     with pytest.raises(EndedError) as caught:
         child.ask(message, seconds=LONG)
@@ -158,10 +160,13 @@ def test_a_child_leaves_with_a_parent_that_was_killed() -> None:
     code = (
         f"import sys; sys.path[:] = {sys.path!r}; from {__name__} import _child, os\n"
         "child = _child(); print(child.ask(('', None), seconds=60), flush=True)\n"
-        "import threading; threading.Thread(target=child.ask, args=[('sleep', 60)], kwargs={'seconds': 60}).start()\n"
+        "import threading; threading.Thread(target=child.ask, args=[('sleep', 60)], "
+        "kwargs={'seconds': 60}).start()\n"
         "import time; time.sleep(0.2); os.kill(os.getpid(), 9)"
     )
-    parent = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    parent = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False
+    )
     pid = int(parent.stdout)
     until = time.monotonic() + LONG / 2
     while _is_running(pid) and time.monotonic() < until:

@@ -1,4 +1,5 @@
-"""Arrow's threads are given memory of Arrow's own: what belongs to Python they can let go only while Python runs."""
+"""Arrow's threads are given memory of Arrow's own: what belongs to Python they can let go only
+while Python runs."""
 
 from __future__ import annotations
 

@@ -26,7 +26,10 @@ def test_the_checksums_are_those_of_sha256sum(folder: Path) -> None:
     # SHA-256 of "abc": FIPS 180-2, appendix B.1
     first = (folder / SUMS).read_text().splitlines()[0]
     assert first == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad  a.bin"
-    assert subprocess.run(["sha256sum", "-c", "--quiet", SUMS], cwd=folder, check=False).returncode == 0
+    assert (
+        subprocess.run(["sha256sum", "-c", "--quiet", SUMS], cwd=folder, check=False).returncode
+        == 0
+    )
     check_sums(folder, fix="")
 
 

@@ -1,4 +1,5 @@
-"""What a user names is written whole or not at all, and never on top of what is not flagdata's own."""
+"""What a user names is written whole or not at all, and never on top of what is not flagdata's
+own."""
 
 from __future__ import annotations
 
@@ -54,11 +55,17 @@ CONTENTS: dict[str, bytes] = {
 
 def whole(folder: Path) -> dict[str, bytes]:
     """All files of a folder, hidden ones too."""
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
 
 
 @pytest.mark.parametrize("name", CONTENTS)
-def test_a_commands_own_file_is_replaced_and_any_other_is_left_alone(name: str, tmp_path: Path) -> None:
+def test_a_commands_own_file_is_replaced_and_any_other_is_left_alone(
+    name: str, tmp_path: Path
+) -> None:
     path = tmp_path / name
     write_file(path, CONTENTS[name], command="measure")
     first = path.read_bytes()
@@ -141,7 +148,9 @@ def test_a_file_system_without_hard_links_is_written_to(
     assert whole(tmp_path) == {"a.arrow": b"ours"}
 
 
-def test_a_write_that_fails_or_is_interrupted_leaves_the_old_file_and_no_other(tmp_path: Path) -> None:
+def test_a_write_that_fails_or_is_interrupted_leaves_the_old_file_and_no_other(
+    tmp_path: Path,
+) -> None:
     write_file(tmp_path / "page.html", "old", command="measure")
     before = whole(tmp_path)
 
@@ -184,7 +193,9 @@ def test_files_of_a_group_are_written_together_or_not_at_all(tmp_path: Path) -> 
     assert whole(out) == before
 
 
-def test_what_an_earlier_run_wrote_and_this_one_does_not_is_removed_unless_it_was_changed(tmp_path: Path) -> None:
+def test_what_an_earlier_run_wrote_and_this_one_does_not_is_removed_unless_it_was_changed(
+    tmp_path: Path,
+) -> None:
     write_files(tmp_path, {"base.toml": "a = 1\n", "model.toml": "a = 2\n"}, command="close-loop")
     write_files(tmp_path, {"base.toml": "a = 1\n", "model.toml": None}, command="close-loop")
     assert sorted(whole(tmp_path)) == ["base.toml"]
@@ -201,7 +212,9 @@ def make(folder: Path, *, last: str = "b") -> None:
         (scratch / last).write_text(last)
 
 
-def test_a_folder_is_replaced_by_its_own_kind_only_where_it_holds_nothing_else(tmp_path: Path) -> None:
+def test_a_folder_is_replaced_by_its_own_kind_only_where_it_holds_nothing_else(
+    tmp_path: Path,
+) -> None:
     make(tmp_path / "demo", last="b")
     make(tmp_path / "demo", last="c")
     assert sorted(whole(tmp_path)) == ["demo/c", "demo/lake/a", "demo/manifest.json"]

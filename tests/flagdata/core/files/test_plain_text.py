@@ -1,4 +1,5 @@
-"""A small text is the same text in every encoding that states itself, and with every kind of line end."""
+"""A small text is the same text in every encoding that states itself, and with every kind of line
+end."""
 
 from __future__ import annotations
 
@@ -35,7 +36,9 @@ TABLES: dict[str, Bytes] = {
     "semicolons": lambda text: spreadsheets(text).replace("\n", "\r\n").encode("utf-8-sig"),
     "its delimiter named": lambda text: f"sep=;\r\n{spreadsheets(text)}".encode(),
     "tabs": lambda text: text.replace(",", "\t").replace("\n", "\r\n").encode("utf-16"),
-    "quotes": lambda text: ('"' + text.rstrip("\n").replace(",", '","').replace("\n", '"\n"') + '"').encode(),
+    "quotes": lambda text: (
+        '"' + text.rstrip("\n").replace(",", '","').replace("\n", '"\n"') + '"'
+    ).encode(),
 }
 CLOTHS = "film,fabric,area_weight,bending_stiffness,wind_speed,wind_sigma\nfilm.mp4,felt,0.24,3.5e-5,2.4,0.3\n"
 MARKERS = "marker,u,v,x,y,z,time\n" + "".join(
@@ -49,11 +52,18 @@ MARKERS = "marker,u,v,x,y,z,time\n" + "".join(
 def test_a_recipe_is_read_however_it_was_saved(tmp_path: Path, saved: str) -> None:
     path = tmp_path / "mast.toml"
     path.write_bytes(SAVED[saved]('name = "mast"\nabout = "Böen, 風"\n'))
-    assert parse_recipe(read_recipe(path).text, where="mast") == {"name": "mast", "about": "Böen, 風"}
+    assert parse_recipe(read_recipe(path).text, where="mast") == {
+        "name": "mast",
+        "about": "Böen, 風",
+    }
 
 
-@pytest.mark.parametrize("data", ['about = "Böe"'.encode("cp1252"), 'about = "Böe"'.encode("utf-16-le")])
-def test_a_recipe_of_an_encoding_that_states_nothing_is_refused_with_what_to_do(tmp_path: Path, data: bytes) -> None:
+@pytest.mark.parametrize(
+    "data", ['about = "Böe"'.encode("cp1252"), 'about = "Böe"'.encode("utf-16-le")]
+)
+def test_a_recipe_of_an_encoding_that_states_nothing_is_refused_with_what_to_do(
+    tmp_path: Path, data: bytes
+) -> None:
     path = tmp_path / "mast.toml"
     path.write_bytes(b"\n\n" + data)
     with pytest.raises(InputError) as refused:
@@ -68,7 +78,12 @@ def test_a_table_of_cloths_is_read_however_it_was_saved(tmp_path: Path, saved: s
     path = tmp_path / "cloths.csv"
     path.write_bytes(TABLES[saved](CLOTHS))
     (one,) = read_cloths(path)
-    assert (one.film.name, one.fabric, one.area_weight, one.bending_stiffness) == ("film.mp4", "felt", 0.24, 3.5e-5)
+    assert (one.film.name, one.fabric, one.area_weight, one.bending_stiffness) == (
+        "film.mp4",
+        "felt",
+        0.24,
+        3.5e-5,
+    )
     assert one.wind == (2.4, 0.3)
 
 

@@ -15,7 +15,8 @@ from flagdata.ingest.anemometer.text.text_file import first_bytes
 from flagdata.ingest.source_file import Source
 from flagdata.recipes.shelves import read_recipe
 
-# Neither waits for a writer nor goes on for ever, so that a reader that opens them fails here and does not hang.
+# Neither waits for a writer nor goes on for ever, so that a reader that opens them fails here and
+# does not hang.
 DEVICE, KERNEL = Path("/dev/null"), Path("/proc/version")
 
 
@@ -69,10 +70,20 @@ def test_every_reader_of_inputs_refuses_devices_and_files_of_the_kernel(
         READERS[reader](path, tmp_path)
 
 
-def test_files_that_an_operating_system_puts_beside_a_users_are_no_part_of_a_folder(tmp_path: Path) -> None:
+def test_files_that_an_operating_system_puts_beside_a_users_are_no_part_of_a_folder(
+    tmp_path: Path,
+) -> None:
     (tmp_path / "f_0.png").write_bytes(b"1")
     alone = Source.of(tmp_path)
-    for name in ("._f_0.png", ".DS_Store", "Thumbs.db", "thumbs.db", "Desktop.ini", "desktop.ini", "ehthumbs.db"):
+    for name in (
+        "._f_0.png",
+        ".DS_Store",
+        "Thumbs.db",
+        "thumbs.db",
+        "Desktop.ini",
+        "desktop.ini",
+        "ehthumbs.db",
+    ):
         (tmp_path / name).write_bytes(b"2")
     assert Source.of(tmp_path) == alone
     (tmp_path / "._f_0.png").write_bytes(b"3")  # macOS writes it anew when the file is tagged

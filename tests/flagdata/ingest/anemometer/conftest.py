@@ -52,8 +52,13 @@ def log_file(tmp_path: Path) -> Callable[[str | bytes], Path]:
 
 
 def named(content: str | bytes, options: Mapping[str, Any]) -> dict[str, Any]:
-    """Options that name the recipe generic-csv for a log with its heading, as its user must: it states no unit."""
-    first = content[:200] if isinstance(content, str) else content.replace(b"\0", b"")[:200].decode("latin-1")
+    """Options that name the recipe generic-csv for a log with its heading, as its user must: it
+    states no unit."""
+    first = (
+        content[:200]
+        if isinstance(content, str)
+        else content.replace(b"\0", b"")[:200].decode("latin-1")
+    )
     if "time,wind_speed" in first.partition("\n")[0] and not {"recipe", "format"} & set(options):
         return {**options, "recipe": "generic-csv"}
     return dict(options)
@@ -67,7 +72,10 @@ def answered(path: Path, options: WindOptions) -> WindLog:
         except OpenFactsError as error:
             if any(question.key != "expect" for question in error.questions):
                 raise
-            options = replace(options, expect=(*options.expect, *(question.example for question in error.questions)))
+            options = replace(
+                options,
+                expect=(*options.expect, *(question.example for question in error.questions)),
+            )
 
 
 @contextmanager
@@ -94,15 +102,17 @@ def shows(
     faults: Sequence[int] | None = None,
     **channels: float | Sequence[float],
 ) -> None:
-    """Check a log's format and first instant, the rows marked as missing or faulty, and channels: the first value by a
-    number, all values by a list."""
+    """Check a log's format and first instant, the rows marked as missing or faulty, and channels:
+    the first value by a number, all values by a list."""
     assert log.format == name
     assert not first or iso(int(log.series.time[0])) == first
     for flag, rows in ((SampleFlag.MISSING, missing), (SampleFlag.SENSOR_FAULT, faults)):
         assert rows is None or np.flatnonzero(log.series.flags & flag).tolist() == rows
     for channel, values in channels.items():
         found = log.series.channels[channel]
-        assert (found[0] if isinstance(values, (int, float)) else found) == pytest.approx(values), channel
+        assert (found[0] if isinstance(values, (int, float)) else found) == pytest.approx(values), (
+            channel
+        )
 
 
 def check_refused(
@@ -112,7 +122,8 @@ def check_refused(
     says: str = "",
     options: Mapping[str, Any] | None = None,
 ) -> None:
-    """Check that a log is refused: by which error, with what in its place and in its sentence or fix."""
+    """Check that a log is refused: by which error, with what in its place and in its sentence or
+    fix."""
     with pytest.raises(FlagdataError) as caught:
         read(content, **(options or {}))
     assert isinstance(caught.value, error), caught.value
@@ -131,7 +142,8 @@ def check_reported(
     samples: int | None = None,
     options: Mapping[str, Any] | None = None,
 ) -> None:
-    """Check that a log is read with a finding of this kind, count and place, and so many samples flagged."""
+    """Check that a log is read with a finding of this kind, count and place, and so many samples
+    flagged."""
     log = read(content, **(options or {}))
     found = [f for f in log.findings if f.kind == finding]
     assert found, [f.kind for f in log.findings]

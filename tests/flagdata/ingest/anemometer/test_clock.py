@@ -41,7 +41,8 @@ BACK = [
     # rows, row of the jump, seconds, period [s], in words
     (9000, 4000, -3600, 1, "set back 1 h"), (9000, 4000, -3600, 60, "set back 1 h"),
     (9000, 4000, -37, 1, "set back 37 s"), (9000, 4000, -2220, 60, "set back 37 min"),
-    (9000, 4000, -5400, 60, "set back 1 h 30 min"), (200, 80, -2, 1, "set back 2 s"), (30, 15, -2, 1, "set back 2 s"),
+    (9000, 4000, -5400, 60, "set back 1 h 30 min"), (200, 80, -2, 1, "set back 2 s"), (30, 15, -2, 1, "set "
+        "back 2 s"),
     (14, 7, -2, 1, "set back 2 s"), (24, 18, -1, 0.5, "set back 1 s"),
 ]  # fmt: skip
 
@@ -55,19 +56,29 @@ def test_a_clock_set_back_loses_no_row_and_is_named_with_its_line(
     assert found.channels["wind_speed"].tolist() == log.channels["wind_speed"].tolist()
     assert after(found) == pytest.approx(plain.tolist(), abs=1e-9)
     finding = said(found, "clock-set-back")
-    assert (finding.severity, finding.where, finding.value) == (Severity.WARNING, f"line {row + 2}", size)
+    assert (finding.severity, finding.where, finding.value) == (
+        Severity.WARNING,
+        f"line {row + 2}",
+        size,
+    )
     assert words in finding.what
-    assert all(way in (finding.fix or "") for way in ("--clock first", "--clock last", "--clock sort"))
+    assert all(
+        way in (finding.fix or "") for way in ("--clock first", "--clock last", "--clock sort")
+    )
     assert np.flatnonzero(found.flags & SampleFlag.TIME_UNSURE).tolist() == list(range(row, n))
     assert [one.kind for one in gaps(found).findings] == ["clock-set-back"]
     for choice, shift in CHOICES:
         given = in_order(log, where="x", choice=choice)
         assert after(given) == pytest.approx((plain + shift * size).tolist(), abs=1e-9)
-        assert (said(given, "clock-set-back").severity, said(given, "clock-set-back").fix) == (Severity.NOTE, None)
+        assert (said(given, "clock-set-back").severity, said(given, "clock-set-back").fix) == (
+            Severity.NOTE,
+            None,
+        )
 
 
 def test_a_clock_set_back_by_a_second_shows_through_unsteady_stamps() -> None:
-    # the time of each row is off by up to a fifth of the step, so the rows show the size of the jump together
+    # the time of each row is off by up to a fifth of the step, so the rows show the size of the
+    # jump together
     noise = stream(7, "clock").uniform(-0.1, 0.1, 400)
     found = in_order(made(jumped(400, 200, -1, 0.5) + noise), where="x")
     assert len(found.time) == 400
@@ -97,7 +108,10 @@ def test_one_stamp_twice_in_a_steady_log_is_a_clock_set_back_by_one_step_where_t
     log = made(jumped(200, 80, -period, period))
     found = in_order(log, where="x")
     assert [(one.kind, one.count) for one in found.findings] == [("duplicate-stamps", 1)]
-    assert after(in_order(log, where="x", choice=choice)) == (period * np.arange(200) - shift * period).tolist()
+    assert (
+        after(in_order(log, where="x", choice=choice))
+        == (period * np.arange(200) - shift * period).tolist()
+    )
 
 
 QUIET = {
@@ -134,7 +148,10 @@ def test_a_clock_that_starts_anew_years_back_is_refused_with_all_ways_out() -> N
     at[5000:] -= 9000 * 86_400
     with pytest.raises(TimeError) as caught:
         in_order(made(at), where="x")
-    assert all(way in (caught.value.fix or "") for way in ("--clock first", "--clock sort", "split the file"))
+    assert all(
+        way in (caught.value.fix or "")
+        for way in ("--clock first", "--clock sort", "split the file")
+    )
     assert after(in_order(made(at), where="x", choice="first")) == list(range(9000))
     with pytest.raises(TimeError) as caught:
         in_order(made(at, stamped=False), where="x")
@@ -161,11 +178,15 @@ def test_a_streams_clock_set_back_for_good_leaves_its_rate() -> None:
 
 
 @pytest.mark.reference
-def test_a_real_log_set_back_an_hour_keeps_its_rows_five_minutes_apart(reference_data: Path, tmp_path: Path) -> None:
+def test_a_real_log_set_back_an_hour_keeps_its_rows_five_minutes_apart(
+    reference_data: Path, tmp_path: Path
+) -> None:
     recipe = tmp_path / "station.toml"
     recipe.write_text(
-        'name = "station"\nabout = "a"\nsource = "b"\n[file]\npreamble = 2\nheader = 2\n[time]\ncolumns = [1]\n'
-        'format = "%m/%d/%Y %H:%M"\n[channels.wind_speed]\ncolumn = 3\nunit = "m/s"\n[sensor]\nname = "station"\n'
+        'name = "station"\nabout = "a"\nsource = "b"\n[file]\npreamble = 2\nheader = '
+        "2\n[time]\ncolumns = [1]\n"
+        'format = "%m/%d/%Y %H:%M"\n[channels.wind_speed]\ncolumn = 3\nunit = '
+        '"m/s"\n[sensor]\nname = "station"\n'
     )
     path = reference_data / "wind" / "more" / "atmos22_clock_set_back.csv"
     found = read_log(path, WindOptions(recipe=str(recipe), zone="+03:00"))

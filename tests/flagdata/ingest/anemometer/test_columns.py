@@ -53,7 +53,10 @@ def columns_of(rows: RowReader, width: int) -> tuple[list[int], list[list[str]],
     for line, block in rows.blocks(width):
         numbers += line.tolist()
         if isinstance(block, Columns):
-            cells += [list(row) for row in zip(*(block.column(i).to_pylist() for i in range(width)), strict=True)]
+            cells += [
+                list(row)
+                for row in zip(*(block.column(i).to_pylist() for i in range(width)), strict=True)
+            ]
         else:
             cells += [row[:width] for row in block]
     return numbers, cells, list(rows.findings())
@@ -93,7 +96,9 @@ def test_columns_equal_rows(
     assert columns_of(reader(path, delimiter=delimiter, comment=comment), 3) == expected
 
 
-@pytest.mark.parametrize("body", [b"1,2,3\n4,5,6,7\n8,9\n", b"1,2\n3,4,5\n6,7\n", b"\n1,2,3\n4,5,6\n"])
+@pytest.mark.parametrize(
+    "body", [b"1,2,3\n4,5,6,7\n8,9\n", b"1,2\n3,4,5\n6,7\n", b"\n1,2,3\n4,5,6\n"]
+)
 def test_columns_equal_rows_without_a_header(tmp_path: Path, body: bytes) -> None:
     path = tmp_path / "log.csv"
     path.write_bytes(body)
@@ -103,7 +108,11 @@ def test_columns_equal_rows_without_a_header(tmp_path: Path, body: bytes) -> Non
 @pytest.mark.parametrize("first", [b"\xef\xbb\xbf", b"\xff"], ids=["byte-order-mark", "latin-1"])
 def test_columns_equal_rows_in_other_encodings(tmp_path: Path, first: bytes) -> None:
     path = tmp_path / "log.csv"
-    path.write_bytes(first + b"a,b,c\n1,2,3\n4,\xb0,6\n7,8,9\n" if first == b"\xff" else first + b"a,b,c\n1,2,3\n")
+    path.write_bytes(
+        first + b"a,b,c\n1,2,3\n4,\xb0,6\n7,8,9\n"
+        if first == b"\xff"
+        else first + b"a,b,c\n1,2,3\n"
+    )
     assert columns_of(reader(path), 3) == rows_of(reader(path), 3)
 
 
@@ -115,7 +124,9 @@ def test_mostly_malformed_lines_are_refused_by_columns_too(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_columns_equal_rows_for_random_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
+def test_columns_equal_rows_for_random_bytes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seed: int
+) -> None:
     rng = np.random.default_rng(seed)
     small_blocks(monkeypatch, int(rng.integers(5, 200)))
     body = bytearray(b'1,2,3\n"4",5,6\n' * 20)
@@ -127,7 +138,8 @@ def test_columns_equal_rows_for_random_bytes(tmp_path: Path, monkeypatch: pytest
 
 
 def toa5(path: Path) -> None:
-    """20 Hz with missing trailing zeros, NAN, a jump of RECORD, damaged rows, and rows cut off at the end."""
+    """20 Hz with missing trailing zeros, NAN, a jump of RECORD, damaged rows, and rows cut off at
+    the end."""
     lines = [
         '"TOA5","CR3000","CR3000","1","os","CPU:a","2","t"',
         '"TIMESTAMP","RECORD","Ux","Uy","Uz","diag_csat"',
@@ -141,7 +153,9 @@ def toa5(path: Path) -> None:
         record = i if i < 300 else i + 7
         x = '"NAN"' if i % 50 == 3 else f"{rng.normal(4, 1):.5f}"
         z = "-7999" if i % 90 == 5 else "0.01"
-        lines.append(f'"2021-05-14 00:00:{whole:02d}{text}",{record},{x},{rng.normal():.5f},{z},{i % 64}')
+        lines.append(
+            f'"2021-05-14 00:00:{whole:02d}{text}",{record},{x},{rng.normal():.5f},{z},{i % 64}'
+        )
     lines[100] = lines[100][:20]
     lines[200] = lines[200].replace(",", ";")
     lines[250] = lines[250].replace("2021-05-14", "2021-13-14")
@@ -150,13 +164,20 @@ def toa5(path: Path) -> None:
     path.write_bytes("\r\n".join(lines).encode())
 
 
-def test_a_damaged_toa5_table_is_read_as_row_by_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_damaged_toa5_table_is_read_as_row_by_row(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = tmp_path / "t.dat"
     toa5(path)
     fast = read_log(path, WindOptions(zone="UTC"))
     monkeypatch.setattr(RowReader, "blocks", RowReader.rows)
     slow = read_log(path, WindOptions(zone="UTC"))
-    assert {f.kind for f in slow.findings} >= {"records-lost", "malformed-lines", "cut-off", "unreadable-stamps"}
+    assert {f.kind for f in slow.findings} >= {
+        "records-lost",
+        "malformed-lines",
+        "cut-off",
+        "unreadable-stamps",
+    }
     assert fast.findings == slow.findings
     np.testing.assert_array_equal(fast.series.time, slow.series.time)
     np.testing.assert_array_equal(fast.series.flags, slow.series.flags)
@@ -179,7 +200,9 @@ def test_a_damaged_toa5_table_is_read_as_row_by_row(tmp_path: Path, monkeypatch:
     ],
 )
 @pytest.mark.parametrize("form", PLAIN_FORMS)
-def test_stamps_by_arrow_are_those_of_the_pattern(monkeypatch: pytest.MonkeyPatch, form: str, texts: list[str]) -> None:
+def test_stamps_by_arrow_are_those_of_the_pattern(
+    monkeypatch: pytest.MonkeyPatch, form: str, texts: list[str]
+) -> None:
     quick = parse(texts, form)
     monkeypatch.setattr("flagdata.ingest.anemometer.instants.stamp_text.PLAIN_FORMS", ())
     slow = parse(texts, form)

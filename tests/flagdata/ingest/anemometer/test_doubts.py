@@ -23,9 +23,13 @@ PLAIN = "time,wind_speed (m/s),wind_direction (deg)\n"
 
 
 def table(
-    speed: Callable[[int], object], away: Callable[[int], object], stamp: str = "2026-05-01T12:{m:02d}:{s:02d}Z"
+    speed: Callable[[int], object],
+    away: Callable[[int], object],
+    stamp: str = "2026-05-01T12:{m:02d}:{s:02d}Z",
 ) -> str:
-    return PLAIN + "".join(f"{stamp.format(m=k // 60, s=k % 60, h=k // 2)},{speed(k)},{away(k)}\n" for k in range(60))
+    return PLAIN + "".join(
+        f"{stamp.format(m=k // 60, s=k % 60, h=k // 2)},{speed(k)},{away(k)}\n" for k in range(60)
+    )
 
 
 def usual(k: int) -> float:
@@ -37,7 +41,8 @@ def vane(k: int) -> float:
 
 
 def blowing(k: int, away: float) -> str:
-    """A row with a direction, and components towards east and north of a wind that comes from `away` [deg]."""
+    """A row with a direction, and components towards east and north of a wind that comes from
+    `away` [deg]."""
     east, north = -usual(k) * np.sin(np.radians(away)), -usual(k) * np.cos(np.radians(away))
     return f"2026-05-01T12:00:{k:02d}Z,{usual(k)},{vane(k)},{east:.3f},{north:.3f}\n"
 
@@ -64,13 +69,18 @@ ODD = {
     "future": table(usual, vane, stamp="2199-05-01T12:{m:02d}:{s:02d}Z"),
     "old": table(usual, vane, stamp="1980-05-01T12:{m:02d}:{s:02d}Z"),
     "coarse": PLAIN
-    + "".join(f"2026-05-{1 + k // 12:02d}T{2 * (k % 12):02d}:00:00Z,{usual(k)},{vane(k)}\n" for k in range(60)),
+    + "".join(
+        f"2026-05-{1 + k // 12:02d}T{2 * (k % 12):02d}:00:00Z,{usual(k)},{vane(k)}\n"
+        for k in range(60)
+    ),
     "lines": table(usual, vane).replace("12:00:30Z", "nonsense"),
 }
 
 
 def test_every_check_has_a_case() -> None:
-    assert KEYS - {"below-threshold", "calm-in-words", "zero-beside-360"} == set(ODD)  # these have tests of their own
+    assert KEYS - {"below-threshold", "calm-in-words", "zero-beside-360"} == set(
+        ODD
+    )  # these have tests of their own
 
 
 def asked(path: Path, options: WindOptions | None = None) -> set[str]:
@@ -91,8 +101,13 @@ def test_what_is_odd_is_asked_and_a_yes_closes_it(key: str, log_file: Write) -> 
 
 
 def test_devices_that_follow_one_another_are_asked_about(log_file: Write) -> None:
-    """A column that no word calls a site: 2 devices of 200 rows each, so that the time goes back only once."""
-    made = [f"2026-05-01T12:{k // 60:02d}:{k % 60:02d}Z,{pod},{usual(k)}" for pod in (17, 23) for k in range(200)]
+    """A column that no word calls a site: 2 devices of 200 rows each, so that the time goes back
+    only once."""
+    made = [
+        f"2026-05-01T12:{k // 60:02d}:{k % 60:02d}Z,{pod},{usual(k)}"
+        for pod in (17, 23)
+        for k in range(200)
+    ]
     with pytest.raises(OpenFactsError, match="goes back by 199 s"):
         read_log(log_file("\n".join(["time,pod,wind_speed (m/s)", *made]) + "\n"))
 
@@ -108,25 +123,39 @@ def test_a_code_for_no_value_is_given(log_file: Write) -> None:
     assert np.nanmin(speed) == 4.0
 
 
-@pytest.mark.parametrize(("gust", "odd"), [(0.9, True), (1.0, False), (1.4, False), (3.2, False), (3.3, True)])
-def test_gusts_are_1_to_3_2_times_the_wind_of_their_name(gust: float, odd: bool, log_file: Write) -> None:
-    text = table(usual, lambda k: f"{gust * usual(k):.4f}").replace("wind_direction (deg)", "wind gust (m/s)")
+@pytest.mark.parametrize(
+    ("gust", "odd"), [(0.9, True), (1.0, False), (1.4, False), (3.2, False), (3.3, True)]
+)
+def test_gusts_are_1_to_3_2_times_the_wind_of_their_name(
+    gust: float, odd: bool, log_file: Write
+) -> None:
+    text = table(usual, lambda k: f"{gust * usual(k):.4f}").replace(
+        "wind_direction (deg)", "wind gust (m/s)"
+    )
     path = log_file(text)
     if odd:
         assert asked(path) == {"gust"}
     else:
         assert read_log(path).drafted
-    other = text.replace("wind_speed (m/s)", "wind speed 10m (m/s)").replace("wind gust (m/s)", "wind gust 80m (m/s)")
+    other = text.replace("wind_speed (m/s)", "wind speed 10m (m/s)").replace(
+        "wind gust (m/s)", "wind gust 80m (m/s)"
+    )
     assert read_log(log_file(other)).drafted  # another height's gusts are of another wind
 
 
 def test_gusts_in_another_unit_are_compared_in_one(log_file: Write) -> None:
-    gusts = table(usual, lambda k: round(3.6 * 1.4 * usual(k), 2)).replace("wind_direction (deg)", "wind gust (km/h)")
+    gusts = table(usual, lambda k: round(3.6 * 1.4 * usual(k), 2)).replace(
+        "wind_direction (deg)", "wind gust (km/h)"
+    )
     assert read_log(log_file(gusts)).drafted
 
 
-@pytest.mark.parametrize(("turn", "odd"), [(0, False), (20, False), (40, True), (90, True), (-150, True)])
-def test_a_direction_that_its_components_contradict_is_asked(turn: float, odd: bool, log_file: Write) -> None:
+@pytest.mark.parametrize(
+    ("turn", "odd"), [(0, False), (20, False), (40, True), (90, True), (-150, True)]
+)
+def test_a_direction_that_its_components_contradict_is_asked(
+    turn: float, odd: bool, log_file: Write
+) -> None:
     path = log_file(HEADING + "".join(blowing(k, vane(k) + turn) for k in range(60)))
     if odd:
         assert asked(path) == {"components"}
@@ -135,7 +164,9 @@ def test_a_direction_that_its_components_contradict_is_asked(turn: float, odd: b
 
 
 def test_components_that_turn_by_themselves_contradict_any_direction(log_file: Write) -> None:
-    assert asked(log_file(HEADING + "".join(blowing(k, 37 * k) for k in range(60)))) == {"components"}
+    assert asked(log_file(HEADING + "".join(blowing(k, 37 * k) for k in range(60)))) == {
+        "components"
+    }
 
 
 @pytest.mark.parametrize(
@@ -162,10 +193,13 @@ def test_an_unknown_answer_is_refused(log_file: Write) -> None:
         read_log(log_file(table(usual, vane)), WindOptions(expect=("clam",)))
 
 
-def test_a_recipe_is_read_and_what_speaks_against_its_column_is_reported(log_file: Write, tmp_path: Path) -> None:
+def test_a_recipe_is_read_and_what_speaks_against_its_column_is_reported(
+    log_file: Write, tmp_path: Path
+) -> None:
     recipe = tmp_path / "own.toml"
     recipe.write_text(
-        'name = "own"\nabout = "made"\nsource = "made"\n[time]\ncolumns = ["time"]\nformat = "iso"\n'
+        'name = "own"\nabout = "made"\nsource = "made"\n[time]\ncolumns = ["time"]\nformat = '
+        '"iso"\n'
         '[channels.wind_speed]\ncolumn = "wind_speed (m/s)"\nunit = "m/s"\n[sensor]\nname = "own"\n'
     )
     said: dict[str, list[str]] = {}
@@ -180,7 +214,9 @@ def test_a_recipe_is_read_and_what_speaks_against_its_column_is_reported(log_fil
     assert "whole numbers from 0 to 354" in " ".join(said["angles"])
     assert said["fast"] == []
     recipe.write_text(recipe.read_text() + '[expect]\nconfirmed = ["code"]\n')
-    log = read_log(log_file(ODD["code"].replace("(km/h)", "(m/s)")), WindOptions(recipe=str(recipe)))
+    log = read_log(
+        log_file(ODD["code"].replace("(km/h)", "(m/s)")), WindOptions(recipe=str(recipe))
+    )
     assert "doubtful-numbers" not in {found.kind for found in log.findings}
 
 
@@ -201,10 +237,14 @@ def seen(speed: FloatArray, unit_name: str, days: float = 0.01) -> str:
     recipe = replace(known, expect=frozenset(KEYS - {"steps", "strong", "grows"}))
     layout = replace(recipe.channels["wind_speed"], unit=unit_name)
     recipe = replace(recipe, channels={"wind_speed": layout})
-    return "; ".join(one.text for one in doubts(reading, recipe, assumed=frozenset(), left_out=0, now=0))
+    return "; ".join(
+        one.text for one in doubts(reading, recipe, assumed=frozenset(), left_out=0, now=0)
+    )
 
 
-WIND: FloatArray = np.asarray(5 * np.abs(np.random.default_rng(7).weibull(2.0, 400)), dtype=np.float64)
+WIND: FloatArray = np.asarray(
+    5 * np.abs(np.random.default_rng(7).weibull(2.0, 400)), dtype=np.float64
+)
 """m/s."""
 
 
@@ -227,10 +267,15 @@ def test_multiples_of_a_converted_step_show_the_unit_they_are_written_in() -> No
             if stated == shown:
                 assert text == "", (native, step, shown)
             else:
-                assert f"multiples of {step:g} {native} written in {shown}, and {stated} is stated" in text
+                assert (
+                    f"multiples of {step:g} {native} written in {shown}, and {stated} is stated"
+                    in text
+                )
     for digits in (0, 1, 2, 6):
         assert seen(np.round(WIND, digits), "m/s") == ""
-    assert seen(np.array([0.45, 0.9, 1.34, 1.79, 2.24, 2.68] * 4), "m/s") == ""  # whole mph, 2 as twice 0.45 m/s
+    assert (
+        seen(np.array([0.45, 0.9, 1.34, 1.79, 2.24, 2.68] * 4), "m/s") == ""
+    )  # whole mph, 2 as twice 0.45 m/s
 
 
 def test_days_of_gales_are_odd_and_an_hour_is_not() -> None:
@@ -243,7 +288,32 @@ def test_days_of_gales_are_odd_and_an_hour_is_not() -> None:
 def test_winds_that_wander_and_steps_of_a_tunnel_are_no_sums() -> None:
     draws = stream(1, "wandering winds")
     wandering = (np.round(np.abs(3 + np.cumsum(draws.normal(0, 0.3, 400))), 1) for _ in range(50))
-    assert not [speeds for speeds in wandering if "as a sum" in seen(np.asarray(speeds, dtype=np.float64), "m/s")]
+    assert not [
+        speeds
+        for speeds in wandering
+        if "as a sum" in seen(np.asarray(speeds, dtype=np.float64), "m/s")
+    ]
     assert "as a sum" not in seen(np.repeat(np.arange(21, dtype=np.float64), 30), "m/s")
-    sums = [2.5, 4, 8.5, 11, 15.5, 17, 21.5, 24, 1.5, 3, 1.5, 4, 2.5, 5, 9.5, 11, 13.5, 1.5, 4, 5.5] * 2
+    sums = [
+        2.5,
+        4,
+        8.5,
+        11,
+        15.5,
+        17,
+        21.5,
+        24,
+        1.5,
+        3,
+        1.5,
+        4,
+        2.5,
+        5,
+        9.5,
+        11,
+        13.5,
+        1.5,
+        4,
+        5.5,
+    ] * 2
     assert "as a sum" in seen(np.array(sums), "m/s")

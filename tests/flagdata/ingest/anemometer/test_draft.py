@@ -18,8 +18,11 @@ Write = Callable[[str | bytes], Path]
 
 
 def lines(heading: str, form: str, count: int = 30) -> list[str]:
-    """A heading and rows of `form` at each second `s`, with a speed `v`, a direction `d` and a count `n`."""
-    made = (form.format(s=s, v=f"{4 + s % 7 / 10:.1f}", d=200 + s % 9, n=s + 1) for s in range(count))
+    """A heading and rows of `form` at each second `s`, with a speed `v`, a direction `d` and a
+    count `n`."""
+    made = (
+        form.format(s=s, v=f"{4 + s % 7 / 10:.1f}", d=200 + s % 9, n=s + 1) for s in range(count)
+    )
     return [*heading.splitlines(), *made]
 
 
@@ -70,13 +73,17 @@ UNIX = 1_777_636_800
 
 
 @pytest.mark.parametrize(
-    ("scale", "form"), [(1, "epoch-s"), (10**3, "epoch-ms"), (10**6, "epoch-us"), (10**9, "epoch-ns")]
+    ("scale", "form"),
+    [(1, "epoch-s"), (10**3, "epoch-ms"), (10**6, "epoch-us"), (10**9, "epoch-ns")],
 )
 @pytest.mark.parametrize("written", [str, "{}.0".format, "{:.9e}".format])
 def test_unix_time_is_read_in_each_unit_and_writing_and_is_inferred(
     scale: int, form: str, written: Callable[[int], str]
 ) -> None:
-    table = ["time,wind_speed (m/s)", *(f"{written((UNIX + k) * scale)},{4 + k % 7 / 10}" for k in range(30))]
+    table = [
+        "time,wind_speed (m/s)",
+        *(f"{written((UNIX + k) * scale)},{4 + k % 7 / 10}" for k in range(30)),
+    ]
     found = draft(table, WindOptions())
     assert found is not None
     assert (asked(found), origin(found, "time")) == (set(), "inferred")
@@ -86,10 +93,18 @@ def test_unix_time_is_read_in_each_unit_and_writing_and_is_inferred(
 @pytest.mark.parametrize(
     ("heading", "cell", "says"),
     [
-        ("time", "46143.5{s:02d}", ("2026-05-01T12:", "excel-days", "2030-05-02T12:", "excel-days-1904")),
+        (
+            "time",
+            "46143.5{s:02d}",
+            ("2026-05-01T12:", "excel-days", "2030-05-02T12:", "excel-days-1904"),
+        ),
         ("time", "2461162.5{s:02d}", ("2026-05-02T00:", "julian-days")),
         ("date", "740103.5{s:02d}", ("2026-05-01T12:", "datenum")),
-        ("time", "38604816{s:02d}", ("2092-05-01T12:00:00 as epoch-s", "2026-05-01T12:00:00 as labview-s")),
+        (
+            "time",
+            "38604816{s:02d}",
+            ("2092-05-01T12:00:00 as epoch-s", "2026-05-01T12:00:00 as labview-s"),
+        ),
         ("time", "6391323360000000{s:02d}", ("epoch-ns", "2026-05-01T12:00:00 as ticks")),
         ("time", "1.7776{s:02d}E+12", ("'1.777600E+12'", "rounded")),
         ("GPS time", "14616720{s:02d}", ("another origin than 1970",)),
@@ -105,7 +120,9 @@ def test_a_count_that_may_be_of_another_origin_is_asked_with_the_dates_that_it_w
 
 
 def test_a_count_of_another_origin_is_read_where_the_user_gives_its_form() -> None:
-    found = drafted("GPS time,wind (m/s)", "14616720{s:02d},{v}", columns="1=time[epoch-s],2=wind_speed[m/s]")
+    found = drafted(
+        "GPS time,wind (m/s)", "14616720{s:02d},{v}", columns="1=time[epoch-s],2=wind_speed[m/s]"
+    )
     assert found.stated
 
 
@@ -131,7 +148,11 @@ def test_what_the_file_does_not_state_is_asked(heading: str, form: str, key: str
 
 @pytest.mark.parametrize(
     ("options", "key"),
-    [({"unit": "km/h"}, "unit"), ({"zone": "+02:00"}, "zone"), ({"date_order": "dmy"}, "date_order")],
+    [
+        ({"unit": "km/h"}, "unit"),
+        ({"zone": "+02:00"}, "zone"),
+        ({"date_order": "dmy"}, "date_order"),
+    ],
 )
 def test_what_the_user_gives_is_asked_no_more(options: dict[str, str], key: str) -> None:
     found = drafted("time,wind speed", "05/04/2026 12:00:{s:02d},{v}", **options)
@@ -140,14 +161,17 @@ def test_what_the_user_gives_is_asked_no_more(options: dict[str, str], key: str)
 
 def test_both_orders_of_a_date_are_named() -> None:
     (question,) = [
-        q for q in drafted("time,wind_speed (m/s)", "05/04/2026 12:00:{s:02d},{v}").open if q.key == "date_order"
+        q
+        for q in drafted("time,wind_speed (m/s)", "05/04/2026 12:00:{s:02d},{v}").open
+        if q.key == "date_order"
     ]
     assert "%d/%m/%Y" in question.question
     assert "%m/%d/%Y" in question.question
 
 
 def test_an_hour_is_not_taken_for_minutes() -> None:
-    """2026-05-01, 7 is seven o'clock, or seven minutes past midnight as loggers write clocks without zeros."""
+    """2026-05-01, 7 is seven o'clock, or seven minutes past midnight as loggers write clocks
+    without zeros."""
     found = drafted("date,hour,wind_speed (m/s)", "2026-05-01,{s},{v}".replace("{s}", "7"))
     assert "columns" in asked(found)
 
@@ -163,7 +187,10 @@ def test_rows_of_several_sites_are_not_mixed() -> None:
 
 
 def test_rows_in_several_units_are_not_mixed() -> None:
-    made = ["time,wind,unit", *(f"2026-05-01T12:00:{k:02d}Z,4.{k % 7},{('km/h', 'm/s')[k % 9 > 0]}" for k in range(30))]
+    made = [
+        "time,wind,unit",
+        *(f"2026-05-01T12:00:{k:02d}Z,4.{k % 7},{('km/h', 'm/s')[k % 9 > 0]}" for k in range(30)),
+    ]
     found = draft(made, WindOptions(unit="m/s"))
     assert found is not None
     assert "sensor" in asked(found)
@@ -216,7 +243,12 @@ def test_the_dialect_is_found(text: list[str], delimiter: str, decimal: str) -> 
 def test_lines_above_the_heading_and_units_below_it_are_distinguished() -> None:
     shape = shape_of(lines("logger 7\nsite: roof\ntime;wind\n;m/s", "{n};{v}"))
     assert shape is not None
-    assert (shape.preamble, shape.header, shape.names, shape.units) == (2, 2, ("time", "wind"), ("", "m/s"))
+    assert (shape.preamble, shape.header, shape.names, shape.units) == (
+        2,
+        2,
+        ("time", "wind"),
+        ("", "m/s"),
+    )
 
 
 def test_text_is_no_table() -> None:
@@ -249,7 +281,9 @@ def test_columns_are_given_in_one_line(log_file: Write) -> None:
     text = "\n".join(lines("", "2026-05-01,12:00:{s:02d},{v},x,{d}")) + "\n"
     log = read_log(log_file(text), WindOptions(columns=COLUMNS, zone="UTC"))
     assert log.series.channels["wind_speed"][0] == pytest.approx(4.0 * 1852 / 3600)
-    assert np.rad2deg(log.series.channels["wind_direction"][0]) == pytest.approx(20.0)  # to 200° is from 20°
+    assert np.rad2deg(log.series.channels["wind_direction"][0]) == pytest.approx(
+        20.0
+    )  # to 200° is from 20°
     assert log.drafted
 
 
@@ -265,7 +299,9 @@ def test_columns_are_given_in_one_line(log_file: Write) -> None:
         ("time", UsageError, "no channel"),
     ],
 )
-def test_a_line_of_columns_that_does_not_fit_is_refused(columns: str, error: type[Exception], says: str) -> None:
+def test_a_line_of_columns_that_does_not_fit_is_refused(
+    columns: str, error: type[Exception], says: str
+) -> None:
     with pytest.raises(error, match=says):
         draft(lines("a,b,c", ISO + ",{v},{d}"), WindOptions(columns=columns))
 
@@ -295,13 +331,23 @@ def test_no_printed_line_answers_an_open_question(heading: str, form: str, key: 
 
 def test_one_of_several_anemometers_is_inferred_though_its_label_is_chosen() -> None:
     several = "time,wind 2m (m/s),wind 10m (m/s)"
-    assert origin(drafted(several, ISO + ",{v},{v}", wind="wind 10m (m/s)"), "wind_speed") == "inferred"
-    assert origin(drafted("time,AWS (kn)", ISO + ",{v}", wind="AWS (kn)", platform="fixed"), "wind_speed") == "given"
+    assert (
+        origin(drafted(several, ISO + ",{v},{v}", wind="wind 10m (m/s)"), "wind_speed")
+        == "inferred"
+    )
+    assert (
+        origin(
+            drafted("time,AWS (kn)", ISO + ",{v}", wind="AWS (kn)", platform="fixed"), "wind_speed"
+        )
+        == "given"
+    )
 
 
 def test_a_choice_of_the_clock_answers_the_doubt_about_the_order(log_file: Write) -> None:
     seconds = [*range(300), *range(180, 480)]
-    rows = "".join(f"2026-05-01T12:{s // 60:02d}:{s % 60:02d}Z,{4 + s % 7 / 10:.1f}\n" for s in seconds)
+    rows = "".join(
+        f"2026-05-01T12:{s // 60:02d}:{s % 60:02d}Z,{4 + s % 7 / 10:.1f}\n" for s in seconds
+    )
     path = log_file("time,wind_speed (m/s)\n" + rows)
     with pytest.raises(OpenFactsError, match="goes back by 119 s"):
         read_log(path)
@@ -309,8 +355,12 @@ def test_a_choice_of_the_clock_answers_the_doubt_about_the_order(log_file: Write
     assert np.diff(time).min() > 0
 
 
-@pytest.mark.parametrize(("again", "refused"), [("time,temp (C),wind speed (m/s)", True), ("", False)])
-def test_columns_that_change_places_on_the_way_are_refused(log_file: Write, again: str, refused: bool) -> None:
+@pytest.mark.parametrize(
+    ("again", "refused"), [("time,temp (C),wind speed (m/s)", True), ("", False)]
+)
+def test_columns_that_change_places_on_the_way_are_refused(
+    log_file: Write, again: str, refused: bool
+) -> None:
     heading = "time,wind speed (m/s),temp (C)"
     first, second = (
         lines(heading, ISO + ",{v},12.5", 60),

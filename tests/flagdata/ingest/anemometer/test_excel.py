@@ -28,8 +28,12 @@ Book = Callable[..., Path]
 @pytest.fixture
 def book(tmp_path: Path) -> Book:
     """Writes sheets of rows to a workbook and returns its path."""
-    pytest.importorskip("python_calamine", reason="python-calamine absent: pip install 'flagdata[excel]'")
-    openpyxl: Any = pytest.importorskip("openpyxl", reason="openpyxl absent: pip install 'flagdata[dev]'")
+    pytest.importorskip(
+        "python_calamine", reason="python-calamine absent: pip install 'flagdata[excel]'"
+    )
+    openpyxl: Any = pytest.importorskip(
+        "openpyxl", reason="openpyxl absent: pip install 'flagdata[dev]'"
+    )
 
     def write(**sheets: Sequence[Sequence[object]]) -> Path:
         made = openpyxl.Workbook()
@@ -55,7 +59,10 @@ PLAIN = [
 def test_a_sheet_with_dates_is_read_by_its_recipe(book: Book) -> None:
     path = book(Log=PLAIN)
     log = read_log(path, WindOptions(recipe="generic-csv", zone="UTC"))
-    assert [iso(int(t)) for t in log.series.time[1:3]] == ["2026-05-01T23:59:59Z", "2026-05-02T00:00:00Z"]
+    assert [iso(int(t)) for t in log.series.time[1:3]] == [
+        "2026-05-01T23:59:59Z",
+        "2026-05-02T00:00:00Z",
+    ]
     assert log.series.channels["wind_speed"].tolist() == [3.0, 3.5, 4.0, 4.5]
     assert log.series.channels["air_temperature"][0] == pytest.approx(293.15)
 
@@ -73,7 +80,10 @@ def test_a_makers_export_in_a_sheet_is_identified_like_its_text(book: Book) -> N
 
 
 def test_the_first_sheet_with_a_table_is_read_and_the_others_are_named(book: Book) -> None:
-    log = read_log(book(Notes=[["made by hand"]], Log=PLAIN, More=PLAIN), WindOptions(recipe="generic-csv", zone="UTC"))
+    log = read_log(
+        book(Notes=[["made by hand"]], Log=PLAIN, More=PLAIN),
+        WindOptions(recipe="generic-csv", zone="UTC"),
+    )
     found = next(finding for finding in log.findings if finding.kind == "several-sheets")
     assert "'Log'" in found.what
     assert "'More'" in found.what
@@ -90,9 +100,13 @@ def test_days_of_the_1904_system_are_those_of_the_workbook(book: Book, plain: bo
     made.save(path)
     form = "excel-days" if plain else "iso"
     log = read_log(path, WindOptions(columns=f"1=time[{form}],2=wind_speed[m/s]", zone="UTC"))
-    assert iso(int(log.series.time[0])) == ("2026-05-01T12:00:00Z" if plain else "2026-05-01T23:59:58Z")
+    assert iso(int(log.series.time[0])) == (
+        "2026-05-01T12:00:00Z" if plain else "2026-05-01T23:59:58Z"
+    )
     assert "days-since-1904" in {finding.kind for finding in log.findings}
-    assert ("excel-days-1904" in str(log.drafted)) is plain  # what was understood is part of an artifact's identity
+    assert (
+        "excel-days-1904" in str(log.drafted)
+    ) is plain  # what was understood is part of an artifact's identity
 
 
 def test_an_opendocument_spreadsheet_is_refused_by_its_name(tmp_path: Path) -> None:
@@ -108,7 +122,10 @@ def test_line_numbers_are_those_of_the_sheets_rows(book: Book) -> None:
     rows = [list(row) for row in PLAIN]
     rows[3][1] = "broken"
     log = read_log(book(Log=rows), WindOptions(recipe="generic-csv", zone="UTC"))
-    assert next(finding for finding in log.findings if finding.kind == "unreadable-values").where == "line 4"
+    assert (
+        next(finding for finding in log.findings if finding.kind == "unreadable-values").where
+        == "line 4"
+    )
 
 
 def test_a_workbook_without_a_table_is_refused(book: Book) -> None:
@@ -135,7 +152,9 @@ def test_a_workbook_beyond_the_limits_is_refused_before_it_is_unpacked(book: Boo
         read_log(book(Log=PLAIN), WindOptions(limits=Limits(rows=2)))
 
 
-def test_without_the_library_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_library_the_extra_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = tmp_path / "wind.xlsx"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("xl/workbook.xml", "<workbook/>")
@@ -176,7 +195,9 @@ FAR = {
 @pytest.mark.parametrize("cells", FAR.values(), ids=FAR)
 def test_a_cell_far_from_the_table_is_refused_with_bounded_memory(book: Book, cells: str) -> None:
     path = _with_cells(book(Log=PLAIN), cells)
-    done = subprocess.run([sys.executable, "-c", _MEASURED, str(path)], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", _MEASURED, str(path)], capture_output=True, text=True, check=True
+    )
     words, _, peak = done.stdout.rpartition(" ")
     assert re.search(r"MiB|columns|cannot be read", words)
     assert int(peak) < 1 << 20  # KiB
@@ -234,19 +255,33 @@ print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
 """Reads a log in a process of its own, whose children are measured."""
 
 
-def test_a_workbook_that_is_refused_for_its_size_loses_no_other_source(book: Book, tmp_path: Path) -> None:
+def test_a_workbook_that_is_refused_for_its_size_loses_no_other_source(
+    book: Book, tmp_path: Path
+) -> None:
     path = _with_cells(book(Log=PLAIN), FAR["last cell"])
-    (tmp_path / "log.csv").write_text("time,wind_speed (m/s)\n2026-05-01T12:00:00Z,5.0\n2026-05-01T12:00:01Z,5.1\n")
+    (tmp_path / "log.csv").write_text(
+        "time,wind_speed (m/s)\n2026-05-01T12:00:00Z,5.0\n2026-05-01T12:00:01Z,5.1\n"
+    )
     lake = Lake.create(tmp_path / "lake")
-    command("ingest", path, tmp_path / "log.csv", "--lake", lake.path)  # ends with a code of its own
+    command(
+        "ingest", path, tmp_path / "log.csv", "--lake", lake.path
+    )  # ends with a code of its own
     assert lake.table(lake.view(None))["kind"].to_pylist() == ["wind"]
 
 
 def test_a_workbook_of_many_sheets_is_read(book: Book) -> None:
-    log = read_log(book(**{f"n{k}": PLAIN for k in range(300)}), WindOptions(recipe="generic-csv", zone="UTC"))
-    assert next(finding for finding in log.findings if finding.kind == "several-sheets").count == 300
+    log = read_log(
+        book(**{f"n{k}": PLAIN for k in range(300)}), WindOptions(recipe="generic-csv", zone="UTC")
+    )
+    assert (
+        next(finding for finding in log.findings if finding.kind == "several-sheets").count == 300
+    )
 
 
 def test_rows_and_columns_before_the_table_stay_where_they_are(book: Book) -> None:
     path = book(Log=[[], [], *([None, None, *row] for row in PLAIN)])
-    assert open_text(path, limits=Limits()).head()[:3] == [",,,,", ",,,,", ",,time,wind_speed,air_temperature"]
+    assert open_text(path, limits=Limits()).head()[:3] == [
+        ",,,,",
+        ",,,,",
+        ",,time,wind_speed,air_temperature",
+    ]

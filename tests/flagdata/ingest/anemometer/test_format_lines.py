@@ -1,4 +1,5 @@
-"""Lines of serial instruments: values, units, status and checksums as the makers' manuals give them."""
+"""Lines of serial instruments: values, units, status and checksums as the makers' manuals give
+them."""
 
 from __future__ import annotations
 
@@ -18,7 +19,9 @@ from tests.flagdata.ingest.anemometer.conftest import read
 
 def stamped(lines: list[str], *, start: int = 0) -> str:
     """Each line after a stamp, one a second."""
-    return "".join(f"2026-05-01T12:00:{start + i:02d}.000Z,{line}\n" for i, line in enumerate(lines))
+    return "".join(
+        f"2026-05-01T12:00:{start + i:02d}.000Z,{line}\n" for i, line in enumerate(lines)
+    )
 
 
 def kinds(log: WindLog) -> dict[str, int]:
@@ -53,7 +56,11 @@ POLAR = [f"\x02Q,{229 + i},00{2 + i}.74,M,00,\x03" for i in range(6)]
         (f"17,2026-05-01 12:00:05,{SENTENCE}", "2026-05-01T12:00:05", SENTENCE),
         (f"<2026-05-01 12:00:05> {SENTENCE}", "2026-05-01T12:00:05", SENTENCE),
         (f"1777636805000125,{SENTENCE}", "1777636805.000125", SENTENCE),
-        (f'{{"time": "2026-05-01T12:00:05Z", "nmea": "{SENTENCE}"}}', "2026-05-01T12:00:05Z", SENTENCE),
+        (
+            f'{{"time": "2026-05-01T12:00:05Z", "nmea": "{SENTENCE}"}}',
+            "2026-05-01T12:00:05Z",
+            SENTENCE,
+        ),
         (f"\\s:x,c:1777636800*49\\{SENTENCE}", "1777636800", SENTENCE),
         (f"\\s:x,c:1777636801*49\\{SENTENCE}", "", f"\\s:x,c:1777636801*49\\{SENTENCE}"),
     ],
@@ -79,9 +86,17 @@ METEK = "1B010000322000000300100000000000;-0.015;0.053;0.062;16.486;0.055;164.45
         # WindObserver 65 manual, 7.8: checksum 25, with speed of sound and temperature
         (gill, "\x02A,+000.04,-000.02,M,+345.01,+022.36,00,\x0325", {X: 0.04, Y: -0.02, T: 295.51}),
         # WindObserver II manual, 8.8: 121°, 0.08 m/s, checksum 06
-        (gill, "\x02A,121,000.08,M,+344.66,+021.76,00,\x0306", {SPEED: 0.08, FROM: np.radians(121), T: 294.91}),
+        (
+            gill,
+            "\x02A,121,000.08,M,+344.66,+021.76,00,\x0306",
+            {SPEED: 0.08, FROM: np.radians(121), T: 294.91},
+        ),
         # WindMaster manual, 7.1, mode 1: U, V, W
-        (gill, "\x02Q,-000.07,+000.04,+000.03,M,+344.22,+021.50,00,\x03", {X: -0.07, Y: 0.04, Z: 0.03, T: 294.65}),
+        (
+            gill,
+            "\x02Q,-000.07,+000.04,+000.03,M,+344.22,+021.50,00,\x03",
+            {X: -0.07, Y: 0.04, Z: 0.03, T: 294.65},
+        ),
         (gill, "Q,090,010.00,N,00,", {SPEED: 10 * 1852 / 3600}),
         (gill, "Q,090,010.00,P,00,", {SPEED: 4.4704}),
         (gill, "Q,090,036.00,K,00,", {SPEED: 10.0}),
@@ -95,13 +110,26 @@ METEK = "1B010000322000000300100000000000;-0.015;0.053;0.062;16.486;0.055;164.45
         (trisonica, "S 05.00 D 010 T 20.00", {SPEED: 5.0, T: 293.15}),
         (trisonica, "S 05.00 S2 -99.70 D -99.90 T 20.00", {SPEED: np.nan, FROM: np.nan}),
         # of a tag that comes twice the first is the wind's or the air's
-        (trisonica, "S  01.0 D  100 DV  031 P  1011.5 P -004 D  271 D  nan", {FROM: np.radians(100), P: 101_150.0}),
-        # speed is the length of the vector: 5 m/s at 30° up has a horizontal part of 5 cos 30° and 2.5 m/s upwards
-        (young, "   5.00  90.0  30.0 346.70  25.14", {SPEED: 5 * np.sqrt(3) / 2, FROM: np.pi / 2, Z: 2.5, T: 298.29}),
+        (
+            trisonica,
+            "S  01.0 D  100 DV  031 P  1011.5 P -004 D  271 D  nan",
+            {FROM: np.radians(100), P: 101_150.0},
+        ),
+        # speed is the length of the vector: 5 m/s at 30° up has a horizontal part of 5 cos 30° and
+        # 2.5 m/s upwards
+        (
+            young,
+            "   5.00  90.0  30.0 346.70  25.14",
+            {SPEED: 5 * np.sqrt(3) / 2, FROM: np.pi / 2, Z: 2.5, T: 298.29},
+        ),
         (young, "  -3.00   4.00   0.10 346.70  25.14", {SPEED: 5.0, X: -3.0, Y: 4.0, Z: 0.1}),
         # uSonic-2 manual, 3.3.3: 460 cm/s, 4°, 21.86 °C
         (metek, "M:v=460 d=4 t=2186", {SPEED: 4.6, FROM: np.radians(4), T: 295.01}),
-        (metek, "M:x =   300 y =  -400 z =     3 t =  2186", {SPEED: 5.0, X: 3.0, Y: -4.0, Z: 0.03, T: 295.01}),
+        (
+            metek,
+            "M:x =   300 y =  -400 z =     3 t =  2186",
+            {SPEED: 5.0, X: 3.0, Y: -4.0, Z: 0.03, T: 295.01},
+        ),
         (metek, "H:x = 300 y = -400 z = 3 t = -9999", {SPEED: 5.0, T: np.nan}),
         # a published sample, whose speed and direction are those of its x and y
         (metek, METEK, {SPEED: 0.055, FROM: np.radians(164.451), X: -0.015, T: 289.636}),
@@ -110,7 +138,9 @@ METEK = "1B010000322000000300100000000000;-0.015;0.053;0.062;16.486;0.055;164.45
         (ft, "$WI,WVP=007.4,212,0*//", {SPEED: 7.4}),
     ],
 )
-def test_lines_read_as_the_manuals_say(instrument: SerialLines, line: str, values: dict[str, float]) -> None:
+def test_lines_read_as_the_manuals_say(
+    instrument: SerialLines, line: str, values: dict[str, float]
+) -> None:
     sample = instrument.parse(line)
     assert not isinstance(sample, Defect)
     assert {name: sample[0][name] for name in values} == pytest.approx(values, nan_ok=True)
@@ -157,7 +187,8 @@ def test_a_gill_log_reports_wrong_checksums_and_a_cut_last_line() -> None:
 
 
 def test_components_of_a_gill_blow_towards_its_north_mark() -> None:
-    # manual, 9.2: U positive from the south mark, V positive from the east: 1 m/s each is wind from the south-east
+    # manual, 9.2: U positive from the south mark, V positive from the east: 1 m/s each is wind from
+    # the south-east
     lines = [f"Q,+00{1 + i}.00,+00{1 + i}.00,M,00," for i in range(4)]
     log = read(stamped(lines), azimuth=0.0)
     assert log.series.channels["wind_direction"] == pytest.approx([np.radians(135)] * 4)
@@ -186,7 +217,8 @@ def test_a_north_mark_that_points_elsewhere_turns_directions() -> None:
 
 @pytest.mark.parametrize(
     ("message", "crc"),
-    # WXT520 and WXT530 user guides, "Polling with CRC": queries, and the answer to a query for its checksum
+    # WXT520 and WXT530 user guides, "Polling with CRC": queries, and the answer to a query for its
+    # checksum
     [
         ("0r1", "Goe"),
         ("0r2", "Gje"),
@@ -222,12 +254,17 @@ def test_vaisalas_mark_of_invalid_data_is_a_fault_and_a_wrong_checksum_is_left_o
 
 
 TRISONICA = (
-    "S  00.08 S2 00.07 D  245 DV 033 U  00.06 V  00.03 W  00.05 T  21.40 C  346.68 H  17.92 DP -03.68 P  1006.05"
+    "S  00.08 S2 00.07 D  245 DV 033 U  00.06 V  00.03 W  00.05 T  21.40 C  346.68 H  17.92 DP "
+    "-03.68 P  1006.05"
 )
 
 
 def test_trisonica_tags_give_horizontal_wind_and_weather() -> None:
-    log = read(stamped([TRISONICA, TRISONICA.replace("00.07", "01.07"), TRISONICA.replace("00.07", "02.07")]))
+    log = read(
+        stamped(
+            [TRISONICA, TRISONICA.replace("00.07", "01.07"), TRISONICA.replace("00.07", "02.07")]
+        )
+    )
     first = {name: values[0] for name, values in log.series.channels.items()}
     assert log.format == "trisonica"
     assert first["wind_speed"] == pytest.approx(0.07)
@@ -257,17 +294,30 @@ def test_metek_lines_are_stamped_by_the_instruments_own_clock() -> None:
 
 def test_a_metek_telegram_of_another_kind_is_a_fault_and_no_value_is_missing() -> None:
     lines = [f"M:x = {300 + i} y = 0 z = 0 t = 2186" for i in range(4)]
-    log = read(stamped([*lines, "E:x = 1 y = 0 z = 0 t = 2186", "M:x = -9999 y = 0 z = 0 t = 2186"]))
+    log = read(
+        stamped([*lines, "E:x = 1 y = 0 z = 0 t = 2186", "M:x = -9999 y = 0 z = 0 t = 2186"])
+    )
     assert np.flatnonzero(log.series.flags & SampleFlag.SENSOR_FAULT).tolist() == [4]
     assert np.flatnonzero(log.series.flags & SampleFlag.MISSING).tolist() == [5]
 
 
 def wind_bytes(speed: int, angle: int, reference: int) -> str:
-    data = bytes([0, *speed.to_bytes(2, "little"), *angle.to_bytes(2, "little"), 0xF8 | reference, 0xFF, 0xFF])
+    data = bytes(
+        [
+            0,
+            *speed.to_bytes(2, "little"),
+            *angle.to_bytes(2, "little"),
+            0xF8 | reference,
+            0xFF,
+            0xFF,
+        ]
+    )
     return ",".join(f"{byte:02x}" for byte in data)
 
 
-def raw(second: int, *, speed: int = 500, angle: int = 15_708, reference: int = 2, device: int = 36) -> str:
+def raw(
+    second: int, *, speed: int = 500, angle: int = 15_708, reference: int = 2, device: int = 36
+) -> str:
     return f"2026-05-01T12:00:{second:02d}.000Z,2,130306,{device},255,8,{wind_bytes(speed, angle, reference)}\n"
 
 
@@ -288,7 +338,9 @@ def test_raw_nmea_2000_wind_is_hundredths_of_metres_a_second() -> None:
         (3, "theoretical_wind_speed", "theoretical_wind_direction"),
     ],
 )
-def test_the_reference_of_nmea_2000_decides_the_channel(reference: int, speed: str, angle: str) -> None:
+def test_the_reference_of_nmea_2000_decides_the_channel(
+    reference: int, speed: str, angle: str
+) -> None:
     log = read("".join(raw(i, speed=500 + i, reference=reference) for i in range(4)))
     assert set(log.series.channels) == {speed, angle}
 
@@ -303,8 +355,10 @@ def test_the_three_forms_of_canboat_give_the_same_wind() -> None:
             "Wind Angle = 57.2958 deg; Reference = Apparent\n"
         )
         forms["json"].append(
-            f'{{"timestamp":"{at}","prio":2,"src":36,"dst":255,"pgn":130306,"description":"Wind Data","fields":'
-            f'{{"SID":177,"Wind Speed":{0.92 + i / 100:.2f},"Wind Angle":57.2958,"Reference":"Apparent"}}}}\n'
+            f'{{"timestamp":"{at}","prio":2,"src":36,"dst":255,"pgn":130306,"description":"Wind '
+            'Data","fields":'
+            f'{{"SID":177,"Wind Speed":{0.92 + i / 100:.2f},"Wind '
+            f'Angle":57.2958,"Reference":"Apparent"}}}}\n'
         )
     logs = [read("".join(lines)) for lines in forms.values()]
     for log in logs:
@@ -343,7 +397,9 @@ def test_a_fixed_platform_makes_apparent_wind_wind_unless_it_moves() -> None:
     log = read(text, platform="fixed", azimuth=np.radians(90))
     assert log.series.channels["wind_speed"][0] == pytest.approx(5.0)
     assert log.series.channels["wind_direction"][0] == pytest.approx(1.5708 + np.pi / 2)
-    moving = "2026-05-01T12:00:00.000Z,2,129026,1,255,8,00,fc,00,00,2c,01,ff,ff\n"  # 0x012c = 300: 3 m/s
+    moving = (
+        "2026-05-01T12:00:00.000Z,2,129026,1,255,8,00,fc,00,00,2c,01,ff,ff\n"  # 0x012c = 300: 3 m/s
+    )
     with pytest.raises(InputError, match="over ground in the median"):
         read(text + moving, platform="fixed")
 
@@ -367,13 +423,17 @@ def test_sentences_of_n2kd_without_status_are_taken_with_a_finding() -> None:
 
 
 def test_sentences_after_stamps_with_names_of_months_are_read() -> None:
-    lines = "".join(f"[01-May-2026 12:00:0{second}] $WIMWV,210.0,R,8.4,N,A\n" for second in range(3))
+    lines = "".join(
+        f"[01-May-2026 12:00:0{second}] $WIMWV,210.0,R,8.4,N,A\n" for second in range(3)
+    )
     log = read(lines, zone="UTC")
     assert log.series.time[0] == 1_777_636_800_000_000_000
 
 
 def test_a_stream_of_several_talkers_without_time_names_both_at_once() -> None:
-    with pytest.raises(FlagdataError, match=r"several talkers .* and the lines have no time") as caught:
+    with pytest.raises(
+        FlagdataError, match=r"several talkers .* and the lines have no time"
+    ) as caught:
         read("$36MWV,353.4,R,0.92,M\n$37MWV,353.4,R,0.92,M\n$36MWV,350.4,R,0.97,M\n")
     assert "--talker" in caught.value.fix
     assert "ZDA" in caught.value.fix
@@ -388,7 +448,10 @@ def test_components_of_calm_air_have_no_direction() -> None:
 
 def test_stamps_as_asctime_writes_them_are_read_before_sentences() -> None:
     body = [f"WIMWV,{100 + at},T,003.{at},M,A" for at in range(8)]
-    lines = [f"[Tue Jul 17 12:48:{36 + at:02d}.971 2018] {sentence(text)}" for at, text in enumerate(body)]
+    lines = [
+        f"[Tue Jul 17 12:48:{36 + at:02d}.971 2018] {sentence(text)}"
+        for at, text in enumerate(body)
+    ]
     log = read("\n".join(lines), zone="-07:00")
     assert log.format == "nmea-stamped"
     assert iso(int(log.series.time[0])) == "2018-07-17T19:48:36.971Z"
@@ -398,16 +461,22 @@ def test_stamps_as_asctime_writes_them_are_read_before_sentences() -> None:
 
 def test_milliseconds_in_brackets_before_another_mark_are_a_computers_stamp() -> None:
     text = "".join(
-        f"[17776368{at:02d}{at * 31 % 1000:03d}][**] $WIMWV,{200 + at}.0,R,{3 + at % 5}.0,N,A\n" for at in range(20)
+        f"[17776368{at:02d}{at * 31 % 1000:03d}][**] $WIMWV,{200 + at}.0,R,{3 + at % 5}.0,N,A\n"
+        for at in range(20)
     )
     log = read(text, platform="fixed")
     assert log.format == "nmea-stamped"
-    assert log.series.time.tolist() == [(1_777_636_800 + at) * 10**9 + at * 31 % 1000 * 10**6 for at in range(20)]
+    assert log.series.time.tolist() == [
+        (1_777_636_800 + at) * 10**9 + at * 31 % 1000 * 10**6 for at in range(20)
+    ]
 
 
 @pytest.mark.parametrize(
     ("options", "says", "fix"),
-    [({}, "if its platform moves", "--platform fixed"), ({"platform": "moving"}, "of a moving platform", "")],
+    [
+        ({}, "if its platform moves", "--platform fixed"),
+        ({"platform": "moving"}, "of a moving platform", ""),
+    ],
 )
 def test_wind_over_ground_on_a_network_is_reported_as_computed_where_something_moves(
     options: dict[str, str], says: str, fix: str

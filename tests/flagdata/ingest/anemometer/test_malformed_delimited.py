@@ -1,4 +1,5 @@
-"""Malformed delimited logs: an error with place and fix, or samples flagged and findings with numbers."""
+"""Malformed delimited logs: an error with place and fix, or samples flagged and findings with
+numbers."""
 
 from __future__ import annotations
 
@@ -27,7 +28,13 @@ REFUSED = [
     case("header-only", content=csv(), error=InputError, where="line 2", says="no row"),
     case("header-without-line-end", content=b"time,wind_speed", error=InputError, says="no row"),
     case("header-and-blank-lines", content=csv("", "", ""), error=InputError, says="no row"),
-    case("no-zone", content=csv("2026-05-01T12:00:00,3"), error=TimeError, where="line 2", says="--zone"),
+    case(
+        "no-zone",
+        content=csv("2026-05-01T12:00:00,3"),
+        error=TimeError,
+        where="line 2",
+        says="--zone",
+    ),
     case(
         "wrong-zone-name",
         content=csv("2026-05-01 12:00:00,3"),
@@ -35,7 +42,12 @@ REFUSED = [
         says="Europe/Amsterdam",
         options={"zone": "Europe/Amsterdm"},
     ),
-    case("zone-beyond-14-h", content=csv("2026-05-01 12:00:00,3"), error=TimeError, options={"zone": "+15:00"}),
+    case(
+        "zone-beyond-14-h",
+        content=csv("2026-05-01 12:00:00,3"),
+        error=TimeError,
+        options={"zone": "+15:00"},
+    ),
     case(
         "time-set-forward",
         content=csv("2026-03-29 02:30:00,3"),
@@ -52,7 +64,9 @@ REFUSED = [
         says="occurs twice",
         options={"zone": "Europe/Amsterdam"},
     ),
-    case("no-stamp-readable", content=csv("yesterday,3", "today,4"), error=InputError, where="line 2"),
+    case(
+        "no-stamp-readable", content=csv("yesterday,3", "today,4"), error=InputError, where="line 2"
+    ),
     case("month-13", content=csv("2026-13-01T12:00:00Z,3"), error=InputError, where="line 2"),
     case("30-february", content=csv("2026-02-30T12:00:00Z,3"), error=InputError, where="line 2"),
     case("29-february-in-a-common-year", content=csv("2026-02-29T12:00:00Z,3"), error=InputError),
@@ -61,10 +75,26 @@ REFUSED = [
     case("year-0000", content=csv("0000-05-01T12:00:00Z,3"), error=InputError, where="line 2"),
     case("most-stamps-bad", content=csv(ROW, "x,1", "y,2", "z,3"), error=InputError, says="3 of 4"),
     case("most-values-bad", content=stamped("a", "b", "d", "3"), error=InputError, says="3 of 4"),
-    case("all-values-missing", content=stamped("", "NaN", "---", "n/a"), error=InputError, says="not one value"),
-    case("most-lines-ragged", content=csv("a,b,c,d", "a,b,c,d", ROW), error=InputError, where="line 2"),
-    case("other-delimiter", content=csv("2026-05-01T12:00:00Z;3.1", "2026-05-01T12:00:01Z;3.1"), error=InputError),
-    case("column-missing", content=csv(ROW, header="time,speed"), error=OpenFactsError, says="--unit"),
+    case(
+        "all-values-missing",
+        content=stamped("", "NaN", "---", "n/a"),
+        error=InputError,
+        says="not one value",
+    ),
+    case(
+        "most-lines-ragged",
+        content=csv("a,b,c,d", "a,b,c,d", ROW),
+        error=InputError,
+        where="line 2",
+    ),
+    case(
+        "other-delimiter",
+        content=csv("2026-05-01T12:00:00Z;3.1", "2026-05-01T12:00:01Z;3.1"),
+        error=InputError,
+    ),
+    case(
+        "column-missing", content=csv(ROW, header="time,speed"), error=OpenFactsError, says="--unit"
+    ),
     case(
         "column-missing-recipe-named",
         content=csv(ROW, header="time,wind_sped"),
@@ -94,12 +124,35 @@ REFUSED = [
         options={"format": "nmae"},
     ),
     case(
-        "format-without-recipe", content=csv(ROW), error=OpenFactsError, says="--unit", options={"format": "delimited"}
+        "format-without-recipe",
+        content=csv(ROW),
+        error=OpenFactsError,
+        says="--unit",
+        options={"format": "delimited"},
     ),
-    case("option-of-another-format", content=csv(ROW), error=UsageError, says="--date is not used", options=DATE),
-    case("azimuth-without-components", content=csv(ROW, NEXT), error=UsageError, options={"azimuth": 1.0}),
-    case("encoding-unknown", content=csv(ROW), error=InputError, says="no encoding", options={"encoding": "utf-99"}),
-    case("encoding-not-of-text", content=csv(ROW), error=InputError, options={"encoding": "base64"}),
+    case(
+        "option-of-another-format",
+        content=csv(ROW),
+        error=UsageError,
+        says="--date is not used",
+        options=DATE,
+    ),
+    case(
+        "azimuth-without-components",
+        content=csv(ROW, NEXT),
+        error=UsageError,
+        options={"azimuth": 1.0},
+    ),
+    case(
+        "encoding-unknown",
+        content=csv(ROW),
+        error=InputError,
+        says="no encoding",
+        options={"encoding": "utf-99"},
+    ),
+    case(
+        "encoding-not-of-text", content=csv(ROW), error=InputError, options={"encoding": "base64"}
+    ),
     case(
         "encoding-wrong",
         content="time,wind_speed\n2026-05-01T12:00:00Z,3 §\n".encode("cp1252"),
@@ -114,7 +167,8 @@ REFUSED = [
         where="line 32",
         says="split the file",
         content=csv(
-            *(f"2026-05-01T13:00:{i:02d}Z,3" for i in range(30)), *(f"2026-05-01T12:00:{i:02d}Z,3" for i in range(30))
+            *(f"2026-05-01T13:00:{i:02d}Z,3" for i in range(30)),
+            *(f"2026-05-01T12:00:{i:02d}Z,3" for i in range(30)),
         ),
     ),
     case(
@@ -147,7 +201,12 @@ REPORTED = [
         where="line 3",
         samples=2,
     ),
-    case("second-60", content=csv(ROW, "2026-05-01T12:00:60Z,3", NEXT), finding="unreadable-stamps", count=1),
+    case(
+        "second-60",
+        content=csv(ROW, "2026-05-01T12:00:60Z,3", NEXT),
+        finding="unreadable-stamps",
+        count=1,
+    ),
     case(
         "unreadable-value",
         content=stamped("3", "abc", "4", "5"),
@@ -159,10 +218,21 @@ REPORTED = [
         samples=4,
     ),
     case(
-        "nan", content=stamped("3", "NaN", "4"), finding="missing-values", count=1, flag=SampleFlag.MISSING, flagged=1
+        "nan",
+        content=stamped("3", "NaN", "4"),
+        finding="missing-values",
+        count=1,
+        flag=SampleFlag.MISSING,
+        flagged=1,
     ),
     case("nan-lower", content=stamped("3", "nan", "4"), finding="missing-values", count=1),
-    case("dashes", content=stamped("3", "---", "4"), finding="missing-values", count=1, where="line 3"),
+    case(
+        "dashes",
+        content=stamped("3", "---", "4"),
+        finding="missing-values",
+        count=1,
+        where="line 3",
+    ),
     case("empty-value", content=stamped("3", "", "4"), finding="missing-values", count=1),
     case("blank-value", content=stamped("3", "   ", "4"), finding="missing-values", count=1),
     case(
@@ -175,7 +245,9 @@ REPORTED = [
     ),
     case("minus-infinity", content=stamped("3", "-Infinity", "4"), finding="out-of-range", count=1),
     case("overflow", content=stamped("3", "1e999", "4"), finding="out-of-range", count=1),
-    case("microsoft-infinity", content=stamped("3", "1.#INF", "4"), finding="out-of-range", count=1),
+    case(
+        "microsoft-infinity", content=stamped("3", "1.#INF", "4"), finding="out-of-range", count=1
+    ),
     case("hexadecimal", content=stamped("3", "0x10", "4"), finding="unreadable-values", count=1),
     case(
         "decimal-comma",
@@ -199,7 +271,12 @@ REPORTED = [
         flag=SampleFlag.OUT_OF_RANGE,
         flagged=1,
     ),
-    case("minus-zero-point-zero-one", content=stamped("3", "-0.01", "4"), finding="negative-speed", count=1),
+    case(
+        "minus-zero-point-zero-one",
+        content=stamped("3", "-0.01", "4"),
+        finding="negative-speed",
+        count=1,
+    ),
     case(
         "too-many-cells",
         content=csv(ROW, "2026-05-01T12:00:01Z,3,4", "2026-05-01T12:00:02Z,3"),
@@ -224,7 +301,11 @@ REPORTED = [
         samples=2,
     ),
     case(
-        "cut-off-in-a-stamp", content=csv(ROW, NEXT) + b"2026-05-01T12:0", finding="cut-off", where="line 4", samples=2
+        "cut-off-in-a-stamp",
+        content=csv(ROW, NEXT) + b"2026-05-01T12:0",
+        finding="cut-off",
+        where="line 4",
+        samples=2,
     ),
     case(
         "repeated-header",
@@ -233,8 +314,12 @@ REPORTED = [
         count=1,
         where="line 3",
     ),
-    case("nul-tail", content=stamped(*GOOD) + bytes(200), finding="nul-bytes", count=200, samples=20),
-    case("nul-in-a-value", content=stamped("3", "4\x00", "4"), finding="unreadable-values", count=1),
+    case(
+        "nul-tail", content=stamped(*GOOD) + bytes(200), finding="nul-bytes", count=200, samples=20
+    ),
+    case(
+        "nul-in-a-value", content=stamped("3", "4\x00", "4"), finding="unreadable-values", count=1
+    ),
     case(
         "mixed-line-ends",
         content=b"time,wind_speed\r\n" + f"{ROW}\n{NEXT}\r\n".encode(),
@@ -303,7 +388,12 @@ REPORTED = [
         count=1,
         where="line 12",
         samples=19,
-        content=csv(*(f"{('1980-01-01' if i == 10 else '2026-05-01')}T12:00:{i:02d}Z,{v}" for i, v in enumerate(GOOD))),
+        content=csv(
+            *(
+                f"{('1980-01-01' if i == 10 else '2026-05-01')}T12:00:{i:02d}Z,{v}"
+                for i, v in enumerate(GOOD)
+            )
+        ),
     ),
     case(
         "one-stamp-of-2099",
@@ -311,7 +401,12 @@ REPORTED = [
         count=1,
         where="line 12",
         samples=19,
-        content=csv(*(f"{('2099-01-01' if i == 10 else '2026-05-01')}T12:00:{i:02d}Z,{v}" for i, v in enumerate(GOOD))),
+        content=csv(
+            *(
+                f"{('2099-01-01' if i == 10 else '2026-05-01')}T12:00:{i:02d}Z,{v}"
+                for i, v in enumerate(GOOD)
+            )
+        ),
     ),
     case(
         "gap",
@@ -319,7 +414,9 @@ REPORTED = [
         count=1,
         where="line 12",
         samples=20,
-        content=csv(*(f"2026-05-01T12:00:{i + 7 * (i >= 10):02d}Z,{v}" for i, v in enumerate(GOOD))),
+        content=csv(
+            *(f"2026-05-01T12:00:{i + 7 * (i >= 10):02d}Z,{v}" for i, v in enumerate(GOOD))
+        ),
     ),
     case(
         "hour-that-occurs-twice",

@@ -1,4 +1,5 @@
-"""Files that are no text log at all: an error with place and fix, or samples flagged and findings with numbers."""
+"""Files that are no text log at all: an error with place and fix, or samples flagged and findings
+with numbers."""
 
 from __future__ import annotations
 
@@ -54,7 +55,12 @@ REFUSED = [
     case("bzip2", content=b"BZh91AY&SY" + bytes(20), error=InputError, says="bzip2"),
     case("7z", content=b"7z\xbc\xaf'\x1c" + bytes(20), error=InputError, says="7-Zip"),
     case("zstd", content=b"(\xb5/\xfd" + bytes(20), error=InputError, says="zstd"),
-    case("excel-97", content=b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(500), error=InputError, says="Excel"),
+    case(
+        "excel-97",
+        content=b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(500),
+        error=InputError,
+        says="Excel",
+    ),
     case("pdf", content=b"%PDF-1.7\n", error=InputError, says="PDF"),
     case("png", content=b"\x89PNG\r\n\x1a\n" + bytes(50), error=InputError, says="PNG"),
     case("jpeg", content=b"\xff\xd8\xff\xe0" + bytes(50), error=InputError, says="JPEG"),
@@ -63,15 +69,38 @@ REFUSED = [
     case("matroska", content=b"\x1aE\xdf\xa3" + bytes(50), error=InputError, says="video"),
     case("mpeg-ts", content=(b"G" + bytes(187)) * 4, error=InputError, says="video"),
     case("avchd", content=(bytes(4) + b"G" + bytes(187)) * 4, error=InputError, says="video"),
-    case("mcap", content=b"\x89MCAP0\r\n" + bytes(50), error=CorruptError, says="MCAP file is damaged"),
+    case(
+        "mcap",
+        content=b"\x89MCAP0\r\n" + bytes(50),
+        error=CorruptError,
+        says="MCAP file is damaged",
+    ),
     case("parquet", content=b"PAR1" + bytes(50), error=InputError, says="Parquet"),
     case("hdf5", content=b"\x89HDF\r\n\x1a\n" + bytes(50), error=InputError, says="HDF5"),
     case("sqlite", content=b"SQLite format 3\x00" + bytes(50), error=InputError, says="SQLite"),
     case("tob1", content=b'"TOB1","st","CR3000"\r\n' + bytes(50), error=InputError, says="TOA5"),
-    case("noise", content=bytes(np.random.default_rng(1).integers(0, 256, 5000, dtype=np.uint8)), error=InputError),
-    case("utf16-without-mark", content=csv(ROW).decode().encode("utf-16-le"), error=InputError, says="utf-16-le"),
-    case("utf16-cut-in-a-unit", content=csv(ROW, NEXT).decode().encode("utf-16") + b"\x00", error=InputError),
-    case("prose", content=b"The wind blew all day.\nThen it stopped.\n", error=InputError, says="recipe"),
+    case(
+        "noise",
+        content=bytes(np.random.default_rng(1).integers(0, 256, 5000, dtype=np.uint8)),
+        error=InputError,
+    ),
+    case(
+        "utf16-without-mark",
+        content=csv(ROW).decode().encode("utf-16-le"),
+        error=InputError,
+        says="utf-16-le",
+    ),
+    case(
+        "utf16-cut-in-a-unit",
+        content=csv(ROW, NEXT).decode().encode("utf-16") + b"\x00",
+        error=InputError,
+    ),
+    case(
+        "prose",
+        content=b"The wind blew all day.\nThen it stopped.\n",
+        error=InputError,
+        says="recipe",
+    ),
     case("json", content=b'{"time": 1, "wind_speed": 3}\n', error=OpenFactsError, says="unit of"),
     case("html", content=b"<!doctype html><html><body>404</body></html>\n", error=InputError),
     case("toml", content=b'[file]\ndelimiter = ","\n', error=InputError),

@@ -1,4 +1,5 @@
-"""Malformed host-stamped lines: an error with place and fix, or samples flagged and findings with numbers."""
+"""Malformed host-stamped lines: an error with place and fix, or samples flagged and findings with
+numbers."""
 
 from __future__ import annotations
 
@@ -25,7 +26,13 @@ def host_line(i: int, raw: str = "3.14") -> str:
 
 
 REFUSED = [
-    case("no-zone", content=hosted(*map(host_line, range(5))), error=TimeError, where="line 2", says="--zone"),
+    case(
+        "no-zone",
+        content=hosted(*map(host_line, range(5))),
+        error=TimeError,
+        where="line 2",
+        says="--zone",
+    ),
     case("header-alone", content=hosted(), error=InputError),
     case(
         "header-alone-recipe-named",
@@ -34,7 +41,9 @@ REFUSED = [
         where="line 2",
         options={"recipe": "serial-speed"},
     ),
-    case("menus-only", content=hosted(*(host_line(i, "READY") for i in range(30))), error=InputError),
+    case(
+        "menus-only", content=hosted(*(host_line(i, "READY") for i in range(30))), error=InputError
+    ),
     case(
         "menus-only-recipe-named",
         content=hosted(*(host_line(i, "READY") for i in range(30))),

@@ -1,4 +1,5 @@
-"""Malformed Kestrel exports: an error with place and fix, or samples flagged and findings with numbers."""
+"""Malformed Kestrel exports: an error with place and fix, or samples flagged and findings with
+numbers."""
 
 from __future__ import annotations
 
@@ -30,8 +31,16 @@ def kestrel_day(day: int, speed: str = "2.5") -> str:
 
 REFUSED = [
     case("no-rows", content=kestrel(), error=InputError, where="line 6", says="no rows"),
-    case("no-zone", content=kestrel(kestrel_day(13), kestrel_day(14)), error=TimeError, says="--zone"),
-    case("date-order-unknowable", content=kestrel(kestrel_day(5)), error=TimeError, says="dmy or mdy", options=UTC),
+    case(
+        "no-zone", content=kestrel(kestrel_day(13), kestrel_day(14)), error=TimeError, says="--zone"
+    ),
+    case(
+        "date-order-unknowable",
+        content=kestrel(kestrel_day(5)),
+        error=TimeError,
+        says="dmy or mdy",
+        options=UTC,
+    ),
     case(
         "date-orders-mixed",
         content=kestrel(kestrel_day(13), "6/14/2026 10:00;300;2;20;1010"),
@@ -55,7 +64,11 @@ REFUSED = [
         options=UTC,
     ),
     case(
-        "no-time-of-day", content=kestrel("13/6/2026;300;2;20;1010"), error=TimeError, says="time of day", options=UTC
+        "no-time-of-day",
+        content=kestrel("13/6/2026;300;2;20;1010"),
+        error=TimeError,
+        says="time of day",
+        options=UTC,
     ),
     case(
         "no-wind-column",
@@ -63,7 +76,12 @@ REFUSED = [
         error=InputError,
         options={"format": "kestrel", **UTC},
     ),
-    case("date-order-in-words", content=kestrel(kestrel_day(13)), error=UsageError, options={"date_order": "ydm"}),
+    case(
+        "date-order-in-words",
+        content=kestrel(kestrel_day(13)),
+        error=UsageError,
+        options={"date_order": "ydm"},
+    ),
 ]
 REPORTED = [
     case(

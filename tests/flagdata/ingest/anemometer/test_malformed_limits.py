@@ -1,4 +1,5 @@
-"""Files beyond the limits: an error with place and fix, or samples flagged and findings with numbers."""
+"""Files beyond the limits: an error with place and fix, or samples flagged and findings with
+numbers."""
 
 from __future__ import annotations
 
@@ -14,8 +15,20 @@ from tests.flagdata.ingest.anemometer.cases import GOOD, ROW, case, csv, stamped
 from tests.flagdata.ingest.anemometer.conftest import check_refused
 
 REFUSED = [
-    case("rows", content=stamped(*GOOD), error=LimitError, says="10 lines", options={"limits": Limits(rows=10)}),
-    case("bytes", content=stamped(*GOOD), error=LimitError, says="100", options={"limits": Limits(size=100)}),
+    case(
+        "rows",
+        content=stamped(*GOOD),
+        error=LimitError,
+        says="10 lines",
+        options={"limits": Limits(rows=10)},
+    ),
+    case(
+        "bytes",
+        content=stamped(*GOOD),
+        error=LimitError,
+        says="100",
+        options={"limits": Limits(size=100)},
+    ),
     case("line", content=csv(ROW + "0" * 70000), error=LimitError, where="line 2", says="65536"),
     case("line-without-end", content=csv(ROW) + b"9" * 3000000, error=LimitError, where="line 3"),
     case("one-line-of-commas", content=b"," * 100000, error=LimitError),

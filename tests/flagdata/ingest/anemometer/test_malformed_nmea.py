@@ -1,4 +1,5 @@
-"""Malformed NMEA 0183 streams: an error with place and fix, or samples flagged and findings with numbers."""
+"""Malformed NMEA 0183 streams: an error with place and fix, or samples flagged and findings with
+numbers."""
 
 from __future__ import annotations
 
@@ -47,10 +48,25 @@ REFUSED = [
     ),
     case("no-time", content=nmea(*GOOD_WIND), error=TimeError, says="no time", options=DATE),
     case("one-time", content=nmea(ZDA[0], *GOOD_WIND), error=TimeError, says="only one time"),
-    case("time-stands-still", content=stream(GOOD_WIND, [ZDA[0]] * 10), error=TimeError, says="stands still"),
+    case(
+        "time-stands-still",
+        content=stream(GOOD_WIND, [ZDA[0]] * 10),
+        error=TimeError,
+        says="stands still",
+    ),
     case("no-wind", content=nmea(*ZDA), error=InputError, says="known format"),
-    case("no-wind-format-named", content=nmea(*ZDA), error=InputError, says="10 ZDA", options={"format": "nmea"}),
-    case("all-checksums-wrong", content=b"\r\n".join([b"$IIMWV,010,R,5.0,N,A*00"] * 10), error=OpenFactsError),
+    case(
+        "no-wind-format-named",
+        content=nmea(*ZDA),
+        error=InputError,
+        says="10 ZDA",
+        options={"format": "nmea"},
+    ),
+    case(
+        "all-checksums-wrong",
+        content=b"\r\n".join([b"$IIMWV,010,R,5.0,N,A*00"] * 10),
+        error=OpenFactsError,
+    ),
     case(
         "all-checksums-wrong-format-named",
         content=b"\r\n".join([b"$IIMWV,010,R,5.0,N,A*00"] * 10),
@@ -58,7 +74,12 @@ REFUSED = [
         says="baud rate",
         options={"format": "nmea"},
     ),
-    case("all-speeds-empty", content=stream(["IIMWV,,R,,N,A"] * 9), error=InputError, says="empty or invalid"),
+    case(
+        "all-speeds-empty",
+        content=stream(["IIMWV,,R,,N,A"] * 9),
+        error=InputError,
+        says="empty or invalid",
+    ),
     case(
         "two-talkers",
         content=stream(["IIMWV,010,R,5.0,N,A", "WIMWV,010,R,5.0,N,A"] * 4),
@@ -79,8 +100,16 @@ REFUSED = [
         says="6.1 kn",
         options={"platform": "fixed"},
     ),
-    case("zone-for-utc-stream", content=stream(GOOD_WIND), error=UsageError, says="zone", options={"zone": "+02:00"}),
-    case("azimuth-of-a-boat", content=stream(GOOD_WIND), error=UsageError, options={"azimuth": 0.5}),
+    case(
+        "zone-for-utc-stream",
+        content=stream(GOOD_WIND),
+        error=UsageError,
+        says="zone",
+        options={"zone": "+02:00"},
+    ),
+    case(
+        "azimuth-of-a-boat", content=stream(GOOD_WIND), error=UsageError, options={"azimuth": 0.5}
+    ),
     case(
         "talker-absent",
         content=stream(GOOD_WIND),
@@ -98,7 +127,13 @@ REPORTED = [
         where="line 10",
         samples=8,
     ),
-    case("no-checksums", content=stream(["$" + w for w in GOOD_WIND]), finding="no-checksum", count=9, samples=9),
+    case(
+        "no-checksums",
+        content=stream(["$" + w for w in GOOD_WIND]),
+        finding="no-checksum",
+        count=9,
+        samples=9,
+    ),
     case(
         "status-void",
         content=stream([*GOOD_WIND[:8], "IIMWV,010,R,5.0,N,V"]),
@@ -116,7 +151,12 @@ REPORTED = [
         flag=SampleFlag.MISSING,
         flagged=1,
     ),
-    case("unit-unknown", content=stream([*GOOD_WIND[:8], "IIMWV,010,R,5.0,X,A"]), finding="missing-values", count=1),
+    case(
+        "unit-unknown",
+        content=stream([*GOOD_WIND[:8], "IIMWV,010,R,5.0,X,A"]),
+        finding="missing-values",
+        count=1,
+    ),
     case(
         "reference-unknown",
         content=stream([*GOOD_WIND[:8], "IIMWV,010,Q,5.0,N,A"]),
@@ -124,14 +164,25 @@ REPORTED = [
         count=1,
         samples=8,
     ),
-    case("fields-missing", content=stream([*GOOD_WIND[:8], "IIMWV,010,R"]), finding="malformed-sentences", count=1),
+    case(
+        "fields-missing",
+        content=stream([*GOOD_WIND[:8], "IIMWV,010,R"]),
+        finding="malformed-sentences",
+        count=1,
+    ),
     case(
         "negative-speed-field",
         content=stream([*GOOD_WIND[:8], "IIMWV,010,R,-5.0,N,A"]),
         finding="missing-values",
         count=1,
     ),
-    case("half-a-line", content=stream(GOOD_WIND) + b"$IIMWV,01", finding="malformed-sentences", count=1, samples=9),
+    case(
+        "half-a-line",
+        content=stream(GOOD_WIND) + b"$IIMWV,01",
+        finding="malformed-sentences",
+        count=1,
+        samples=9,
+    ),
     case(
         "noise-between",
         content=stream(GOOD_WIND).replace(b"\r\n", b"\r\n%%%%\r\n", 3),
@@ -149,7 +200,11 @@ REPORTED = [
     case(
         "midnight",
         content=stream(
-            GOOD_WIND, [f"GPGGA,{('2359' if s < 5 else '0000')}{(55 + s) % 60:02d},,,,,0,,,,,,,," for s in range(10)]
+            GOOD_WIND,
+            [
+                f"GPGGA,{('2359' if s < 5 else '0000')}{(55 + s) % 60:02d},,,,,0,,,,,,,,"
+                for s in range(10)
+            ],
         ),
         finding="midnight",
         count=1,

@@ -1,4 +1,5 @@
-"""Malformed TOA5 tables: an error with place and fix, or samples flagged and findings with numbers."""
+"""Malformed TOA5 tables: an error with place and fix, or samples flagged and findings with
+numbers."""
 
 from __future__ import annotations
 
@@ -31,16 +32,29 @@ def toa5(*rows: str, head: str = TOA5_HEAD) -> bytes:
 
 
 def toa5_row(i: int, *, record: int | None = None, u: str = "1.5", diag: str = "0") -> str:
-    stamp = f"2026-05-01 12:00:{i // 20:02d}" + (f".{(i % 20) * 5:02d}".rstrip("0") if i % 20 else "")
+    stamp = f"2026-05-01 12:00:{i // 20:02d}" + (
+        f".{(i % 20) * 5:02d}".rstrip("0") if i % 20 else ""
+    )
     return f'"{stamp}",{100 + i if record is None else record},{u},{0.01 * i:.2f},0.1,20.5,{diag}'
 
 
 UTC = {"zone": "UTC"}
 
 REFUSED = [
-    case("header-cut-off", content=TOA5_HEAD.encode()[:120], error=InputError, says="four header lines"),
+    case(
+        "header-cut-off",
+        content=TOA5_HEAD.encode()[:120],
+        error=InputError,
+        says="four header lines",
+    ),
     case("header-alone", content=toa5(), error=InputError, where="line 5", options=UTC),
-    case("no-zone", content=toa5(*map(toa5_row, range(5))), error=TimeError, where="line 5", says="--zone"),
+    case(
+        "no-zone",
+        content=toa5(*map(toa5_row, range(5))),
+        error=TimeError,
+        where="line 5",
+        says="--zone",
+    ),
     case(
         "no-wind-column",
         content=toa5(head=TOA5_HEAD.replace("Ux", "co2").replace("Uy", "h2o").replace("Uz", "x")),
@@ -71,9 +85,19 @@ REFUSED = [
         options=UTC,
     ),
     case(
-        "named-but-other", content=csv(ROW, ROW, ROW, ROW), error=InputError, where="line 1", options={"format": "toa5"}
+        "named-but-other",
+        content=csv(ROW, ROW, ROW, ROW),
+        error=InputError,
+        where="line 1",
+        options={"format": "toa5"},
     ),
-    case("azimuth-in-degrees", content=toa5(toa5_row(0)), error=UsageError, says="radians", options={"azimuth": 270.0}),
+    case(
+        "azimuth-in-degrees",
+        content=toa5(toa5_row(0)),
+        error=UsageError,
+        says="radians",
+        options={"azimuth": 270.0},
+    ),
 ]
 REPORTED = [
     case(

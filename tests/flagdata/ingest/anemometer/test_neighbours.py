@@ -1,4 +1,5 @@
-"""Two logs of one wind that are hours apart are reported; two winds, and two logs on one clock, are not."""
+"""Two logs of one wind that are hours apart are reported; two winds, and two logs on one clock, are
+not."""
 
 from __future__ import annotations
 
@@ -21,7 +22,9 @@ N = 1440
 
 def wind(seed: int, n: int = N) -> np.ndarray:
     """A day of minutes: weather of hours with gusts of minutes about it."""
-    slow = np.convolve(stream(seed, "weather").normal(0, 1, n + 180), np.ones(180) / np.sqrt(180), mode="valid")[:n]
+    slow = np.convolve(
+        stream(seed, "weather").normal(0, 1, n + 180), np.ones(180) / np.sqrt(180), mode="valid"
+    )[:n]
     return 8 + 1.5 * slow + stream(seed, "gusts").normal(0, 1, n)
 
 
@@ -30,7 +33,9 @@ def series(speed: np.ndarray, *, off: float = 0.0, seed: int = 0) -> WindSeries:
     read = np.maximum(speed + stream(seed, "reading").normal(0, 0.4, len(speed)), 0.0)
     time = T0 + np.arange(len(speed)) * 60 * S + round(off * S)
     flags = np.zeros(len(speed), dtype=np.uint16)
-    return WindSeries(time=time, channels={"wind_speed": read}, flags=flags, sensor=Sensor(name="x"))
+    return WindSeries(
+        time=time, channels={"wind_speed": read}, flags=flags, sensor=Sensor(name="x")
+    )
 
 
 @pytest.mark.parametrize("off", [-3600, 3600, 5400, -7200])
@@ -49,7 +54,9 @@ def test_two_logs_on_one_clock_are_not_reported(off: int) -> None:
 
 @pytest.mark.parametrize("seed", range(4, 12))
 def test_two_winds_are_not_reported_whatever_their_weather(seed: int) -> None:
-    assert hours_off(series(wind(seed), seed=2), series(wind(seed + 100), seed=3), name="mast") is None
+    assert (
+        hours_off(series(wind(seed), seed=2), series(wind(seed + 100), seed=3), name="mast") is None
+    )
 
 
 def test_short_logs_are_not_compared() -> None:
@@ -63,7 +70,9 @@ def test_the_second_log_of_a_session_is_compared_with_the_first(tmp_path: Path) 
     for name, hour in (("summer", 2), ("winter", 1)):
         one = series(truth, seed=hour)
         local = [
-            (dt.datetime.fromtimestamp(t // S, dt.UTC) + dt.timedelta(hours=hour)).strftime("%Y-%m-%d %H:%M:%S")
+            (dt.datetime.fromtimestamp(t // S, dt.UTC) + dt.timedelta(hours=hour)).strftime(
+                "%Y-%m-%d %H:%M:%S"
+            )
             for t in one.time.tolist()
         ]
         path = tmp_path / f"{name}.csv"

@@ -1,4 +1,5 @@
-"""netCDF-3 files of the CF conventions: the wind of one point by its standard names, or refused with what to do."""
+"""netCDF-3 files of the CF conventions: the wind of one point by its standard names, or refused
+with what to do."""
 
 from __future__ import annotations
 
@@ -31,7 +32,8 @@ def written(
     kind: str = "d",
     **attributes: object,
 ) -> Path:
-    """A file of four seconds of some variables: name, standard name, unit and values; `attributes` of its time."""
+    """A file of four seconds of some variables: name, standard name, unit and values; `attributes`
+    of its time."""
     path = folder / "wind.nc"
     with netcdf_file(path, "w") as file:
         file.createDimension("time", 4)
@@ -48,11 +50,15 @@ def written(
 
 
 @pytest.mark.parametrize("direction", [FROM, TO], ids=["from", "to"])
-def test_speed_and_direction_are_read_in_utc_and_nothing_is_asked(tmp_path: Path, direction: Variable) -> None:
+def test_speed_and_direction_are_read_in_utc_and_nothing_is_asked(
+    tmp_path: Path, direction: Variable
+) -> None:
     log = read_log(written(tmp_path, SPEED, direction, ("battery", "", "V", [12.0] * 4)))
     assert log.stated
     assert log.series.time.tolist() == [(1_777_636_800 + s) * 10**9 for s in range(4)]
-    assert log.series.channels["wind_speed"] == pytest.approx(np.array(SPEED[3]) * 1852 / 3600, nan_ok=True)
+    assert log.series.channels["wind_speed"] == pytest.approx(
+        np.array(SPEED[3]) * 1852 / 3600, nan_ok=True
+    )
     assert np.degrees(log.series.channels["wind_direction"]) == pytest.approx(np.array(FROM[3]))
     assert "variables that are not read: 'battery'" in {finding.what for finding in log.findings}
 
@@ -60,7 +66,9 @@ def test_speed_and_direction_are_read_in_utc_and_nothing_is_asked(tmp_path: Path
 def test_components_give_the_direction_that_the_wind_comes_from(tmp_path: Path) -> None:
     log = read_log(written(tmp_path, EAST, NORTH))
     assert log.series.channels["wind_speed"] == pytest.approx([5.0, 3.0, 4.0, 4.0])
-    assert np.degrees(log.series.channels["wind_direction"]) == pytest.approx([216.8699, 90.0, 180.0, 0.0], abs=1e-4)
+    assert np.degrees(log.series.channels["wind_direction"]) == pytest.approx(
+        [216.8699, 90.0, 180.0, 0.0], abs=1e-4
+    )
 
 
 def refusal(path: Path, options: WindOptions) -> FlagdataError:
@@ -77,7 +85,9 @@ def refusal(path: Path, options: WindOptions) -> FlagdataError:
         ([("ff", "wind_speed", "counts", [4.0] * 4)], "no variable of the file is a wind"),
     ],
 )
-def test_what_is_no_one_wind_is_refused(tmp_path: Path, variables: Sequence[Variable], says: str) -> None:
+def test_what_is_no_one_wind_is_refused(
+    tmp_path: Path, variables: Sequence[Variable], says: str
+) -> None:
     error = refusal(written(tmp_path, *variables), WindOptions())
     assert says in error.what
     assert error.fix
@@ -88,7 +98,9 @@ def test_a_time_without_a_start_is_none(tmp_path: Path) -> None:
 
 
 def test_the_limit_of_rows_holds(tmp_path: Path) -> None:
-    assert isinstance(refusal(written(tmp_path, SPEED), WindOptions(limits=Limits(rows=3))), LimitError)
+    assert isinstance(
+        refusal(written(tmp_path, SPEED), WindOptions(limits=Limits(rows=3))), LimitError
+    )
 
 
 @pytest.mark.parametrize("size", [8, 60, 200])
@@ -129,9 +141,15 @@ NOON = 1_777_636_800
         ("minutes since 2026-05-01 11:59:59.5", 0.5 / 60, 1 / 60),
     ],
 )
-def test_a_time_since_a_date_is_the_instant_that_it_says(tmp_path: Path, since: str, first: float, step: float) -> None:
-    log = read_log(written(tmp_path, SPEED, since=since, times=[first + step * k for k in range(4)]))
-    assert np.abs(log.series.time - (NOON + np.arange(4)) * 10**9).max() <= 1000  # a double's days to 0.3 µs
+def test_a_time_since_a_date_is_the_instant_that_it_says(
+    tmp_path: Path, since: str, first: float, step: float
+) -> None:
+    log = read_log(
+        written(tmp_path, SPEED, since=since, times=[first + step * k for k in range(4)])
+    )
+    assert (
+        np.abs(log.series.time - (NOON + np.arange(4)) * 10**9).max() <= 1000
+    )  # a double's days to 0.3 µs
 
 
 def test_packed_times_are_unpacked_and_missing_ones_are_no_rows(tmp_path: Path) -> None:
@@ -150,8 +168,12 @@ def test_packed_times_are_unpacked_and_missing_ones_are_no_rows(tmp_path: Path) 
     assert [one.count for one in log.findings if one.kind == "unreadable-stamps"] == [1]
 
 
-@pytest.mark.parametrize("calendar", ["noleap", "365_day", "all_leap", "360_day", "julian", "utc", "tai", "none"])
-def test_a_calendar_that_is_none_of_clocks_is_refused_by_its_name(tmp_path: Path, calendar: str) -> None:
+@pytest.mark.parametrize(
+    "calendar", ["noleap", "365_day", "all_leap", "360_day", "julian", "utc", "tai", "none"]
+)
+def test_a_calendar_that_is_none_of_clocks_is_refused_by_its_name(
+    tmp_path: Path, calendar: str
+) -> None:
     error = refusal(written(tmp_path, SPEED, calendar=calendar), WindOptions())
     assert f"calendar {calendar!r}" in error.what
     assert "proleptic_gregorian" in str(error.fix)
@@ -176,8 +198,12 @@ def test_units_that_are_no_instant_are_refused_with_their_text(
     assert says in error.what
 
 
-def test_a_first_year_of_the_gregorian_calendar_is_read_where_that_is_stated(tmp_path: Path) -> None:
-    first = 739_736.5  # days to 2026-05-01 12:00, by Python's ordinals, which are proleptic Gregorian
+def test_a_first_year_of_the_gregorian_calendar_is_read_where_that_is_stated(
+    tmp_path: Path,
+) -> None:
+    first = (
+        739_736.5  # days to 2026-05-01 12:00, by Python's ordinals, which are proleptic Gregorian
+    )
     path = written(
         tmp_path,
         SPEED,
@@ -185,12 +211,18 @@ def test_a_first_year_of_the_gregorian_calendar_is_read_where_that_is_stated(tmp
         calendar="proleptic_gregorian",
         times=[first + k / 86_400 for k in range(4)],
     )
-    assert np.abs(read_log(path).series.time - (NOON + np.arange(4)) * 10**9).max() <= 10_000  # of a double, 10 µs
+    assert (
+        np.abs(read_log(path).series.time - (NOON + np.arange(4)) * 10**9).max() <= 10_000
+    )  # of a double, 10 µs
 
 
 def test_times_too_coarse_for_their_rows_are_reported(tmp_path: Path) -> None:
     path = written(
-        tmp_path, SPEED, since="seconds since 1970-01-01", times=[NOON + 600 * k for k in range(4)], kind="f"
+        tmp_path,
+        SPEED,
+        since="seconds since 1970-01-01",
+        times=[NOON + 600 * k for k in range(4)],
+        kind="f",
     )
     log = read_log(path, WindOptions(expect=("coarse",)))
     assert [one.value for one in log.findings if one.kind == "coarse-stamps"] == [128.0]

@@ -54,12 +54,21 @@ def test_a_published_wind_sentence_says_what_its_manual_says() -> None:
     # 214.8° relative, 0.1 km/h, valid
     sentence = split(PUBLISHED[4])
     assert sentence is not None
-    assert (sentence.talker, sentence.kind, sentence.fields) == ("WI", "MWV", ("214.8", "R", "0.1", "K", "A"))
+    assert (sentence.talker, sentence.kind, sentence.fields) == (
+        "WI",
+        "MWV",
+        ("214.8", "R", "0.1", "K", "A"),
+    )
 
 
 @pytest.mark.parametrize(
     ("text", "nanoseconds"),
-    [("000000", 0), ("123519", 45_319 * 10**9), ("235959.99", 86_399_990_000_000), ("235960", 86_399_999_999_999)],
+    [
+        ("000000", 0),
+        ("123519", 45_319 * 10**9),
+        ("235959.99", 86_399_990_000_000),
+        ("235960", 86_399_999_999_999),
+    ],
 )
 def test_times_of_day(text: str, nanoseconds: int) -> None:
     assert clock(text) == nanoseconds
@@ -72,7 +81,14 @@ def test_what_is_no_time_of_day(text: str) -> None:
 
 def test_wind_takes_its_time_from_the_sentences_around_it() -> None:
     # one wind sentence in the middle of two lines between seconds 0 and 3, one third on
-    log = read(stream("GPZDA,120000,01,05,2026,,", "WIMWV,010,R,5.0,M,A", "GPHDT,1,T", "GPZDA,120003,01,05,2026,,"))
+    log = read(
+        stream(
+            "GPZDA,120000,01,05,2026,,",
+            "WIMWV,010,R,5.0,M,A",
+            "GPHDT,1,T",
+            "GPZDA,120003,01,05,2026,,",
+        )
+    )
     assert iso(int(log.series.time[0])) == "2026-05-01T12:00:01Z"
     assert log.series.flags.tolist() == [SampleFlag.TIME_UNSURE]
 
@@ -80,7 +96,11 @@ def test_wind_takes_its_time_from_the_sentences_around_it() -> None:
 def test_the_stream_may_begin_and_end_with_wind() -> None:
     wind = "WIMWV,010,R,5.0,M,A"
     log = read(stream(wind, "GPZDA,120000,01,05,2026,,", wind, "GPZDA,120002,01,05,2026,,", wind))
-    assert [iso(t)[11:] for t in log.series.time.tolist()] == ["11:59:59Z", "12:00:01Z", "12:00:03Z"]
+    assert [iso(t)[11:] for t in log.series.time.tolist()] == [
+        "11:59:59Z",
+        "12:00:01Z",
+        "12:00:03Z",
+    ]
 
 
 def test_midnight_adds_a_day() -> None:
@@ -90,22 +110,36 @@ def test_midnight_adds_a_day() -> None:
         "GPGGA,000000,,,,,,,,,,,,,",
         "GPGGA,000001,,,,,,,,,,,,,",
     ]
-    log = read(stream(*(s for t in times for s in (t, "WIMWV,010,R,5.0,M,A"))), date=dt.date(2026, 12, 31))
-    assert [iso(t)[:10] for t in log.series.time.tolist()] == ["2026-12-31", "2026-12-31", "2027-01-01", "2027-01-01"]
+    log = read(
+        stream(*(s for t in times for s in (t, "WIMWV,010,R,5.0,M,A"))), date=dt.date(2026, 12, 31)
+    )
+    assert [iso(t)[:10] for t in log.series.time.tolist()] == [
+        "2026-12-31",
+        "2026-12-31",
+        "2027-01-01",
+        "2027-01-01",
+    ]
 
 
 def test_a_one_digit_hour_with_a_fraction_before_a_sentence_is_read() -> None:
     lines = stream(*("WIMWV,010,R,5.0,M,A",) * 3).splitlines()
     text = "\n".join(f"9:05:0{i}.250 {line}" for i, line in enumerate(lines))
     log = read(text, date=dt.date(2026, 5, 1), zone="UTC")
-    assert [iso(t) for t in log.series.time.tolist()] == [f"2026-05-01T09:05:0{i}.250Z" for i in range(3)]
+    assert [iso(t) for t in log.series.time.tolist()] == [
+        f"2026-05-01T09:05:0{i}.250Z" for i in range(3)
+    ]
 
 
 def test_a_night_without_rows_is_a_midnight_in_times_of_day() -> None:
     """Rows from 09:00 to 17:00, the next day from 09:00 on: a fall of eight hours."""
     sentence = stream("WIMWV,010,R,5.0,M,A").strip()
     hours = [*range(9, 18), *range(9, 18)]
-    ends = ["2026-05-01T09:00:00Z", "2026-05-01T17:00:00Z", "2026-05-02T09:00:00Z", "2026-05-02T17:00:00Z"]
+    ends = [
+        "2026-05-01T09:00:00Z",
+        "2026-05-01T17:00:00Z",
+        "2026-05-02T09:00:00Z",
+        "2026-05-02T17:00:00Z",
+    ]
     sentences = "\n".join(f"{hour:02d}:00:00 {sentence}" for hour in hours)
     rows = "".join(f"{hour:02d}:00:00,{4 + i % 3}\n" for i, hour in enumerate(hours))
     for text, columns in ((sentences, None), (rows, "time[%H:%M:%S],wind_speed[m/s]")):
@@ -128,10 +162,18 @@ def test_the_most_trusted_time_sentence_is_used() -> None:
     body = [
         sentence
         for i in range(10)
-        for sentence in (f"GPGLL,1,N,2,E,1200{i:02d},A", f"GPZDA,1200{i + 7:02d},01,05,2026,,", wind)
+        for sentence in (
+            f"GPGLL,1,N,2,E,1200{i:02d},A",
+            f"GPZDA,1200{i + 7:02d},01,05,2026,,",
+            wind,
+        )
     ]
     log = read(stream(*body))
-    assert next(f for f in log.findings if f.kind == "time-interpolated").what.split("between ")[1].startswith("10 ZDA")
+    assert (
+        next(f for f in log.findings if f.kind == "time-interpolated")
+        .what.split("between ")[1]
+        .startswith("10 ZDA")
+    )
     assert iso(int(log.series.time[0])).startswith("2026-05-01T12:00:07")
 
 
@@ -141,7 +183,9 @@ def test_tag_blocks_carry_whole_instants() -> None:
         return f"\\{tag}*{reduce(xor, tag.encode()):02X}\\" + sentence("WIMWV,010,R,5.0,M,A")
 
     log = read("\r\n".join(tagged(i) for i in range(5)))
-    assert [iso(t) for t in log.series.time.tolist()] == [f"2026-05-01T12:00:0{i}Z" for i in range(5)]
+    assert [iso(t) for t in log.series.time.tolist()] == [
+        f"2026-05-01T12:00:0{i}Z" for i in range(5)
+    ]
 
 
 def test_a_tag_block_with_a_wrong_checksum_is_ignored() -> None:
@@ -150,17 +194,25 @@ def test_a_tag_block_with_a_wrong_checksum_is_ignored() -> None:
 
 def times(*bodies: str) -> str:
     """One wind sentence a second."""
-    return stream(*(s for i, b in enumerate(bodies) for s in (f"GPZDA,1200{i:02d},01,05,2026,,", b)))
+    return stream(
+        *(s for i, b in enumerate(bodies) for s in (f"GPZDA,1200{i:02d},01,05,2026,,", b))
+    )
 
 
 def test_knots_kilometres_and_miles_become_metres_a_second() -> None:
-    log = read(times("WIMWV,1,R,10,N,A", "WIMWV,1,R,36,K,A", "WIMWV,1,R,10,M,A", "WIMWV,1,R,10,S,A"))
-    assert log.series.channels["apparent_wind_speed"] == pytest.approx([10 * 1852 / 3600, 10, 10, 4.4704])
+    log = read(
+        times("WIMWV,1,R,10,N,A", "WIMWV,1,R,36,K,A", "WIMWV,1,R,10,M,A", "WIMWV,1,R,10,S,A")
+    )
+    assert log.series.channels["apparent_wind_speed"] == pytest.approx(
+        [10 * 1852 / 3600, 10, 10, 4.4704]
+    )
 
 
 def test_of_a_speed_in_several_units_the_finest_is_read() -> None:
     log = read(times("WIVWR,80,L,20.5,N,10.5,M,38,K", "WIVWR,80,L,20.5,N,10.5,M,37.9,K"))
-    assert log.series.channels["apparent_wind_speed"] == pytest.approx([20.5 * 1852 / 3600, 37.9 / 3.6])
+    assert log.series.channels["apparent_wind_speed"] == pytest.approx(
+        [20.5 * 1852 / 3600, 37.9 / 3.6]
+    )
 
 
 def test_a_talker_without_values_is_left_out_beside_one_that_has_some() -> None:
@@ -186,7 +238,11 @@ def test_sentences_of_a_makers_own_are_sentences() -> None:
 
 def test_mwd_is_wind_over_ground() -> None:
     log = read(
-        times("WIMWD,090.0,T,087.0,M,10.0,N,5.14,M", "WIMWD,100.0,T,097.0,M,10.0,N,,M", "WIMWD,110.0,T,,M,,N,5.3,M")
+        times(
+            "WIMWD,090.0,T,087.0,M,10.0,N,5.14,M",
+            "WIMWD,100.0,T,097.0,M,10.0,N,,M",
+            "WIMWD,110.0,T,,M,,N,5.3,M",
+        )
     )
     assert log.series.channels["wind_speed"] == pytest.approx([5.14, 10 * 1852 / 3600, 5.3])
     assert np.degrees(log.series.channels["wind_direction"]) == pytest.approx([90, 100, 110])
@@ -195,7 +251,9 @@ def test_mwd_is_wind_over_ground() -> None:
 
 
 def test_a_fixed_mast_measures_wind_over_ground() -> None:
-    log = read(times("WIMWV,350,R,5,M,A", "WIMWV,020,R,6,M,A"), platform="fixed", azimuth=np.radians(30))
+    log = read(
+        times("WIMWV,350,R,5,M,A", "WIMWV,020,R,6,M,A"), platform="fixed", azimuth=np.radians(30)
+    )
     assert log.series.channels["wind_speed"] == pytest.approx([5, 6])
     assert np.degrees(log.series.channels["wind_direction"]) == pytest.approx([20, 50])
 
@@ -212,7 +270,11 @@ def test_an_azimuth_without_directions_is_refused() -> None:
 
 def test_an_azimuth_beside_wind_over_ground_is_refused() -> None:
     with pytest.raises(UsageError, match="over ground itself"):
-        read(times("WIMWD,090.0,T,087.0,M,10.0,N,5.1,M", "WIMWV,1,R,6,M,A"), platform="fixed", azimuth=0.5)
+        read(
+            times("WIMWD,090.0,T,087.0,M,10.0,N,5.1,M", "WIMWV,1,R,6,M,A"),
+            platform="fixed",
+            azimuth=0.5,
+        )
 
 
 def test_a_platform_given_as_moving_is_taken_as_moving() -> None:
@@ -247,11 +309,19 @@ def test_a_stream_of_two_kinds_of_wind_says_how_many_of_each_and_how_often() -> 
     log = read(stream(*bodies, "GPZDA,120040.00,01,05,2026,00,00"))
     (finding,) = [f for f in log.findings if f.kind == "wind-kinds"]
     assert finding.count == 20
-    assert "10 relative (MWV,R), one every 4 s; 10 theoretical (MWV,T), one every 4 s" in finding.what
+    assert (
+        "10 relative (MWV,R), one every 4 s; 10 theoretical (MWV,T), one every 4 s" in finding.what
+    )
 
 
 def test_a_stream_of_one_kind_of_wind_needs_no_such_count() -> None:
-    log = read(stream("GPZDA,120000.00,01,05,2026,00,00", "WIMWV,010.0,R,5.0,M,A", "GPZDA,120002.00,01,05,2026,00,00"))
+    log = read(
+        stream(
+            "GPZDA,120000.00,01,05,2026,00,00",
+            "WIMWV,010.0,R,5.0,M,A",
+            "GPZDA,120002.00,01,05,2026,00,00",
+        )
+    )
     assert "wind-kinds" not in {f.kind for f in log.findings}
 
 
@@ -288,11 +358,17 @@ def test_one_time_of_a_long_stream_is_not_enough() -> None:
         read(_signed(*rows, "GPZDA,120000,01,05,2026,00,00"))
 
 
-BURST = ["GPRMC,{clock},A,,,,,0.1,,230526,,", "WIMWV,{angle},R,5.0,M,A", "WIMWV,{angle},T,4.0,M,A", "GPHDT,1,T"]
+BURST = [
+    "GPRMC,{clock},A,,,,,0.1,,230526,,",
+    "WIMWV,{angle},R,5.0,M,A",
+    "WIMWV,{angle},T,4.0,M,A",
+    "GPHDT,1,T",
+]
 
 
 def bursts(order: tuple[int, ...], *, skipped: int = 0, step: int = 75, count: int = 8) -> str:
-    """Sentences of a burst in this order, the bursts `step` seconds apart; the first lacks its first lines."""
+    """Sentences of a burst in this order, the bursts `step` seconds apart; the first lacks its
+    first lines."""
     bodies: list[str] = []
     for at in range(count):
         seconds = at * step
@@ -321,22 +397,35 @@ def test_a_stream_that_begins_within_a_burst_is_timed_by_the_bursts_end() -> Non
 
 
 @pytest.mark.parametrize("bodies", [1, 6])
-def test_marks_a_second_apart_or_winds_that_come_more_often_are_still_interpolated(bodies: int) -> None:
+def test_marks_a_second_apart_or_winds_that_come_more_often_are_still_interpolated(
+    bodies: int,
+) -> None:
     wind = ["WIMWV,010,R,5.0,M,A"] * bodies
     step = 1 if bodies == 1 else 60
     clocks = [f"12{at * step // 60:02d}{at * step % 60:02d}" for at in range(6)]
-    log = read(stream(*(s for clock in clocks for s in (f"GPRMC,{clock},A,,,,,0.1,,010526,,", *wind))))
+    log = read(
+        stream(*(s for clock in clocks for s in (f"GPRMC,{clock},A,,,,,0.1,,010526,,", *wind)))
+    )
     assert "time-interpolated" in {finding.kind for finding in log.findings}
 
 
 def test_older_sentences_are_called_by_their_own_names() -> None:
     bodies = []
     for second in range(0, 20, 2):
-        bodies += [f"GPZDA,1200{second:02d}.00,01,05,2026,00,00", f"IIVWR,80,L,5.{second % 7},N,,,,"]
-        bodies += [f"IIVWT,70,L,4.{second % 7},N,,,,", f"IIMDA,,,,,,,,,,,,,260.3,T,249.9,M,{second}.8,N,,M"]
+        bodies += [
+            f"GPZDA,1200{second:02d}.00,01,05,2026,00,00",
+            f"IIVWR,80,L,5.{second % 7},N,,,,",
+        ]
+        bodies += [
+            f"IIVWT,70,L,4.{second % 7},N,,,,",
+            f"IIMDA,,,,,,,,,,,,,260.3,T,249.9,M,{second}.8,N,,M",
+        ]
     log = read(stream(*bodies, "GPZDA,120020.00,01,05,2026,00,00"))
     (finding,) = [f for f in log.findings if f.kind == "wind-kinds"]
-    assert all(name in finding.what for name in ("relative (VWR)", "theoretical (VWT)", "over ground (MDA)"))
+    assert all(
+        name in finding.what
+        for name in ("relative (VWR)", "theoretical (VWT)", "over ground (MDA)")
+    )
     assert "MW" not in finding.what
 
 
@@ -347,14 +436,27 @@ MDA = "WIMDA,29.8,I,1.0,B,22.0,C,,,78.3,,18.0,C,260.3,T,249.9,M,1.8,N,0.9,M"
     ("speed", "options", "says", "fix"),
     [
         ("", {}, "(MDA): if its platform moves", "--platform fixed"),
-        ("", {"platform": "moving"}, "(MDA) was computed by the instrument from heading and speed of a moving", ""),
-        ("6.0", {}, "(MDA) was computed by the instrument from heading and speed of a platform that moves at 6", ""),
+        (
+            "",
+            {"platform": "moving"},
+            "(MDA) was computed by the instrument from heading and speed of a moving",
+            "",
+        ),
+        (
+            "6.0",
+            {},
+            "(MDA) was computed by the instrument from heading and speed of a platform that moves "
+            "at 6",
+            "",
+        ),
     ],
 )
 def test_a_wind_over_ground_is_reported_as_computed_where_something_moves(
     speed: str, options: dict[str, str], says: str, fix: str
 ) -> None:
-    times = [f"GPRMC,12000{second}.00,A,5759.0,N,01144.3,E,{speed},28.27,010526,,,A" for second in (0, 1)]
+    times = [
+        f"GPRMC,12000{second}.00,A,5759.0,N,01144.3,E,{speed},28.27,010526,,,A" for second in (0, 1)
+    ]
     log = read(stream(times[0], MDA, times[1]), **options)
     (said,) = [f for f in log.findings if f.kind == "computed-true-wind"]
     assert says in said.what
@@ -371,10 +473,14 @@ def test_a_wind_that_the_stream_states_over_ground_is_called_so_on_a_fixed_platf
 @pytest.mark.parametrize(
     ("lines", "says"),
     [
-        (["$IIVWR,80,L,5.1,N,,,,"] * 3, "3 of the first 3 lines are NMEA 0183 sentences, none of them with a checksum"),
+        (
+            ["$IIVWR,80,L,5.1,N,,,,"] * 3,
+            "3 of the first 3 lines are NMEA 0183 sentences, none of them with a checksum",
+        ),
         (
             [sentence(MDA)] * 2,
-            "2 of the first 2 lines are NMEA 0183 sentences with right checksums; 0 more have a wrong",
+            "2 of the first 2 lines are NMEA 0183 sentences with right checksums; 0 more have a "
+            "wrong",
         ),
         (
             [sentence(MDA), f"${MDA}"],
@@ -390,7 +496,11 @@ def test_only_checksums_that_are_there_are_reported_as_right(lines: list[str], s
 
 WITHOUT_WIND = [
     sentence(body)
-    for body in ("GPRMC,120000.00,A,5759.0,N,01144.3,E,5.2,28.27,010526,,,A", "IIMTW,16.8,C", "IIMTW,16.9,C")
+    for body in (
+        "GPRMC,120000.00,A,5759.0,N,01144.3,E,5.2,28.27,010526,,,A",
+        "IIMTW,16.8,C",
+        "IIMTW,16.9,C",
+    )
 ]
 
 
@@ -402,7 +512,9 @@ def test_a_log_without_wind_is_refused_as_such() -> None:
 
 
 @pytest.mark.parametrize(("reader", "before"), [(Nmea, ""), (StampedNmea, "2026-05-01T12:00:00Z,")])
-def test_where_winds_may_come_later_the_format_can_be_named(reader: type[Nmea | StampedNmea], before: str) -> None:
+def test_where_winds_may_come_later_the_format_can_be_named(
+    reader: type[Nmea | StampedNmea], before: str
+) -> None:
     guess = reader().recognise(Head(lines=tuple(before + text for text in WITHOUT_WIND)))
     assert guess is not None
     assert str(guess.fix).endswith(f"--as {reader.name}")

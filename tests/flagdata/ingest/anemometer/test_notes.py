@@ -1,4 +1,5 @@
-"""Notes of how a log was read, one row a kind: each is reported where it applies, and states what was done."""
+"""Notes of how a log was read, one row a kind: each is reported where it applies, and states what
+was done."""
 
 from __future__ import annotations
 
@@ -21,15 +22,22 @@ TABLE = "time,wind_speed\n" + "".join(f"2026-05-01T12:00:{s:02d}Z,{4 + s % 5}\n"
 LINES = "".join(f"2026-05-01T12:00:{s:02d}Z {gill(s)}\n" for s in S)
 KINDS: Mapping[str, tuple[str, Mapping[str, object], str]] = {
     "bare-dates": (
-        "time,wind_speed\n" + "".join(f"2026-05-01 23:59:{40 + s},{4 + s % 5}\n" for s in S) + "2026-05-02,6\n",
+        "time,wind_speed\n"
+        + "".join(f"2026-05-01 23:59:{40 + s},{4 + s % 5}\n" for s in S)
+        + "2026-05-02,6\n",
         {"zone": "UTC", "recipe": "generic-csv"},
         "1 stamps are dates without a time",
     ),
-    "clock-not-set": (TABLE, {"recipe": "generic-csv", "clock": "first"}, "--clock first is not used"),
+    "clock-not-set": (
+        TABLE,
+        {"recipe": "generic-csv", "clock": "first"},
+        "--clock first is not used",
+    ),
     "zone-not-needed": (TABLE, {"recipe": "generic-csv", "zone": "+02:00"}, "+02:00 is not used"),
     "other-messages": (
         "".join(
-            f"2026-05-01T12:00:{k:02d}Z 0R1,Dm=2{k % 10}0D,Sm={4 + k % 5}.1M\n2026-05-01T12:00:{k:02d}Z 0R2,Ta=23.6C\n"
+            f"2026-05-01T12:00:{k:02d}Z "
+            f"0R1,Dm=2{k % 10}0D,Sm={4 + k % 5}.1M\n2026-05-01T12:00:{k:02d}Z 0R2,Ta=23.6C\n"
             for k in S
         ),
         {},
@@ -46,7 +54,9 @@ KINDS: Mapping[str, tuple[str, Mapping[str, object], str]] = {
         "2026-05-01T12:00:00Z, as given",
     ),
     "json-lines": (
-        "".join(f'{{"time": "2026-05-01T12:00:{s:02d}Z", "wind_speed (m/s)": {4 + s % 5}}}\n' for s in S),
+        "".join(
+            f'{{"time": "2026-05-01T12:00:{s:02d}Z", "wind_speed (m/s)": {4 + s % 5}}}\n' for s in S
+        ),
         {},
         "lines are counted with the names as the first",
     ),
@@ -57,6 +67,10 @@ KINDS: Mapping[str, tuple[str, Mapping[str, object], str]] = {
 
 def test_each_note_is_reported_where_it_applies() -> None:
     found = {kind: read(text, **options).findings for kind, (text, options, _) in KINDS.items()}
-    said = {kind: [one.what for one in findings if one.kind == kind] for kind, findings in found.items()}
-    lacking = {kind: said[kind] for kind, (*_, words) in KINDS.items() if words not in " ".join(said[kind])}
+    said = {
+        kind: [one.what for one in findings if one.kind == kind] for kind, findings in found.items()
+    }
+    lacking = {
+        kind: said[kind] for kind, (*_, words) in KINDS.items() if words not in " ".join(said[kind])
+    }
     assert lacking == {}

@@ -1,4 +1,5 @@
-"""Recipes that the heading of a file completes: a user's own and those of the catalog, and what a plan says of them."""
+"""Recipes that the heading of a file completes: a user's own and those of the catalog, and what a
+plan says of them."""
 
 from __future__ import annotations
 
@@ -46,7 +47,11 @@ name = "mast {wind_speed}"
     ("text", "speed", "label"),
     [
         ("time;Wind Speed (km/h);Dir [from]\n01.05.2026 12:00;18,0;90\n", 10.0, "Wind Speed"),
-        ("Logger 3\n\nt0\ntime,Avg Wind Speed (mph),x\n2026-05-01T12:00:00Z,10,1\n", 8.9408, "Avg Wind Speed"),
+        (
+            "Logger 3\n\nt0\ntime,Avg Wind Speed (mph),x\n2026-05-01T12:00:00Z,10,1\n",
+            8.9408,
+            "Avg Wind Speed",
+        ),
         ("time,Wind Speed,x\n2026-05-01T12:00:00Z,10,1\n", 2 * 10 * 1852 / 3600, "Wind Speed"),
     ],
 )
@@ -90,7 +95,9 @@ def test_what_an_open_recipe_or_the_file_lacks_is_refused_with_its_name(
 
 def test_a_range_beside_a_unit_of_the_heading_is_in_si(log_file: Write) -> None:
     recipe = str(log_file(RECIPE.replace("[0, 60]", "[0, 10]"), "mast.toml"))
-    rows = "".join(f"2026-05-01T12:00:0{at}Z,{speed},1\n" for at, speed in enumerate((17.0, 19.0, 5.0)))
+    rows = "".join(
+        f"2026-05-01T12:00:0{at}Z,{speed},1\n" for at, speed in enumerate((17.0, 19.0, 5.0))
+    )
     log = read_log(log_file(f"time,Wind Speed (km/h),x\n{rows}"), WindOptions(recipe=recipe))
     # twice 17, 19 and 5 km/h: 9.4, 10.6 and 2.8 m/s
     assert [finding.count for finding in log.findings if finding.kind == "out-of-range"] == [1]
@@ -102,7 +109,9 @@ KESTREL = (
 )
 
 
-def test_another_text_of_a_catalogs_format_is_another_plan(log_file: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_text_of_a_catalogs_format_is_another_plan(
+    log_file: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = log_file(KESTREL)
     text = (files("catalogs") / "sensors/formats/kestrel.toml").read_text(encoding="utf-8")
     first = read_log(path, WindOptions(zone="UTC"))
@@ -110,14 +119,24 @@ def test_another_text_of_a_catalogs_format_is_another_plan(log_file: Write, monk
     changed = text.replace("range = [0, 60]", "range = [0, 50]")
     opened = described.recipes.parse_open(changed, where="changed")
     real = described.open_format
-    monkeypatch.setattr(described, "open_format", lambda name: (changed, opened) if name == "kestrel" else real(name))
+    monkeypatch.setattr(
+        described,
+        "open_format",
+        lambda name: (changed, opened) if name == "kestrel" else real(name),
+    )
     second = read_log(path, WindOptions(zone="UTC"))
     assert second.plan["recipe"] == digest(changed)
-    assert second.series.channels["wind_speed"].tolist() == first.series.channels["wind_speed"].tolist()
+    assert (
+        second.series.channels["wind_speed"].tolist()
+        == first.series.channels["wind_speed"].tolist()
+    )
 
 
 def test_every_format_of_the_catalog_is_in_the_table_and_open() -> None:
-    names = {entry.name.removesuffix(".toml") for entry in (files("catalogs") / "sensors/formats").iterdir()}
+    names = {
+        entry.name.removesuffix(".toml")
+        for entry in (files("catalogs") / "sensors/formats").iterdir()
+    }
     assert names <= set(FORMATS)
     for name in names:
         text, recipe = described.open_format(name)
@@ -125,11 +144,16 @@ def test_every_format_of_the_catalog_is_in_the_table_and_open() -> None:
         assert from_toml(to_toml(recipe.data)) == from_toml(text)
 
 
-def test_a_recipe_of_the_catalogs_kind_may_be_given_for_a_file_that_no_format_claims(log_file: Write) -> None:
+def test_a_recipe_of_the_catalogs_kind_may_be_given_for_a_file_that_no_format_claims(
+    log_file: Write,
+) -> None:
     text = (files("catalogs") / "sensors/formats/davis.toml").read_text(encoding="utf-8")
     own = str(
         log_file(
-            text.replace("Avg Wind Speed", "Mittlerer Wind").replace("avg wind speed", "mittlerer wind"), "own.toml"
+            text.replace("Avg Wind Speed", "Mittlerer Wind").replace(
+                "avg wind speed", "mittlerer wind"
+            ),
+            "own.toml",
         )
     )
     path = log_file('"Date & Time","Mittlerer Wind - km/h"\n"5/13/26 12:05 AM","18.0"\n')

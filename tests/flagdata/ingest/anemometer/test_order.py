@@ -1,4 +1,5 @@
-"""Rows into strictly increasing time: none is lost without a word, none gets a time that the file does not state."""
+"""Rows into strictly increasing time: none is lost without a word, none gets a time that the file
+does not state."""
 
 from __future__ import annotations
 
@@ -39,8 +40,18 @@ SPREAD: dict[str, tuple[Sequence[float] | np.ndarray, float, Sequence[float] | n
         0.25 * np.arange(2, 13),
         "coarse-stamps",
     ),
-    "12 a minute under stamps of minutes": (np.repeat(60 * np.arange(20), 12), 60, 5 * np.arange(240), "held-stamps"),
-    "a timer of 16 ms": (np.arange(3000) // 3 * 0.016, MS, np.arange(3000) * 0.016 / 3, "held-stamps"),
+    "12 a minute under stamps of minutes": (
+        np.repeat(60 * np.arange(20), 12),
+        60,
+        5 * np.arange(240),
+        "held-stamps",
+    ),
+    "a timer of 16 ms": (
+        np.arange(3000) // 3 * 0.016,
+        MS,
+        np.arange(3000) * 0.016 / 3,
+        "held-stamps",
+    ),
     "every fiftieth row of 200 Hz with the stamp before it": (
         np.where(EVERY, FAST - 0.005, FAST),
         MS,
@@ -72,7 +83,8 @@ SPREAD: dict[str, tuple[Sequence[float] | np.ndarray, float, Sequence[float] | n
         "duplicate-stamps",
     ),
 }
-"""Stamps [s], their resolution [s], the instants that the rows get [s] and the finding that says so."""
+"""Stamps [s], their resolution [s], the instants that the rows get [s] and the finding that says
+so."""
 
 
 @pytest.mark.parametrize("name", SPREAD)
@@ -131,13 +143,17 @@ def test_rows_lost_between_coarse_stamps_are_a_gap_of_their_length() -> None:
     assert (gap.count, gap.value) == (1, pytest.approx(600.25, abs=1e-6))
 
 
-@pytest.mark.parametrize("copies", [[5] * 30, [2] * 3, [1, 1, 1, 1, 5, *[1] * 7], [1, 2, 1], [5], [3, 1, 2, 4]])
+@pytest.mark.parametrize(
+    "copies", [[5] * 30, [2] * 3, [1, 1, 1, 1, 5, *[1] * 7], [1, 2, 1], [5], [3, 1, 2, 4]]
+)
 def test_copies_of_a_row_are_left_out_and_never_spread(copies: Sequence[int]) -> None:
     plain = made(60 * np.arange(len(copies)))
     found = in_order(plain.take(np.repeat(np.arange(len(copies)), copies)), where="x")
     assert seconds(found) == (60 * np.arange(len(copies))).tolist()
     assert found.channels["wind_speed"].tolist() == plain.channels["wind_speed"].tolist()
-    assert [(one.kind, one.count) for one in found.findings] == [("duplicate-rows", sum(copies) - len(copies))]
+    assert [(one.kind, one.count) for one in found.findings] == [
+        ("duplicate-rows", sum(copies) - len(copies))
+    ]
 
 
 def test_readings_that_change_within_a_stamp_are_no_copies() -> None:
@@ -153,7 +169,9 @@ def test_a_download_that_overlaps_the_one_before_is_left_out() -> None:
     assert [(one.kind, one.count) for one in found.findings] == [("repeated-stretch", 100)]
 
 
-def test_an_empty_row_takes_no_reading_with_it_where_it_is_out_of_order_and_stays_where_it_is_not() -> None:
+def test_an_empty_row_takes_no_reading_with_it_where_it_is_out_of_order_and_stays_where_it_is_not() -> (
+    None
+):
     speed = np.arange(30.0)
     speed[[7, 21]] = np.nan
     stamps = np.arange(30)
@@ -182,7 +200,9 @@ WILD: dict[str, dict[int, float]] = {
 
 @pytest.mark.parametrize("choice", [None, "first", "last"])
 @pytest.mark.parametrize("name", WILD)
-def test_the_fewest_possible_rows_are_left_out_for_wild_stamps(name: str, choice: ClockChoice | None) -> None:
+def test_the_fewest_possible_rows_are_left_out_for_wild_stamps(
+    name: str, choice: ClockChoice | None
+) -> None:
     time = np.arange(100.0)
     for row, by in WILD[name].items():
         time[row] += by
@@ -221,7 +241,9 @@ def test_rows_out_of_order_are_asked_about_and_sorted_where_the_user_says_so(nam
     assert finding.count == N - len(longest_rise(order))
 
 
-def test_rows_that_come_unevenly_may_be_out_of_order_and_the_message_says_how_to_sort_them() -> None:
+def test_rows_that_come_unevenly_may_be_out_of_order_and_the_message_says_how_to_sort_them() -> (
+    None
+):
     plain = made(UNSTEADY)
     moved = np.r_[0:100, 140:200, 100:140, 200:N]
     try:
@@ -234,7 +256,8 @@ def test_rows_that_come_unevenly_may_be_out_of_order_and_the_message_says_how_to
 
 
 def test_a_table_is_sorted_by_its_wall_clock_before_daylight_saving_is_looked_at() -> None:
-    """The clocks of Amsterdam go back on 25 October 2026 at 03:00; rows of two hours, in an order of their own."""
+    """The clocks of Amsterdam go back on 25 October 2026 at 03:00; rows of two hours, in an order
+    of their own."""
     start = dt.datetime(2026, 10, 24, 13)  # noqa: DTZ001
     stamps = [start + dt.timedelta(minutes=120 * at) for at in range(30)]
     rows = [f"{stamps[at]},{3 + at / 10:.1f}\n" for at in [*range(10, 30), *range(10)]]
@@ -245,7 +268,9 @@ def test_a_table_is_sorted_by_its_wall_clock_before_daylight_saving_is_looked_at
 
 def test_a_word_on_the_clock_is_offered_only_where_it_would_have_the_rows_read() -> None:
     """So many steps back are of no clock that was set."""
-    many = np.cumsum([17, 61, 23, 140, 9, 88, 35, 201, 47, 12] * 4)[np.argsort((7 * np.arange(40)) % 41)]
+    many = np.cumsum([17, 61, 23, 140, 9, 88, 35, 201, 47, 12] * 4)[
+        np.argsort((7 * np.arange(40)) % 41)
+    ]
     for choice in (None, "first"):
         with pytest.raises(TimeError, match="rows would have to go") as caught:
             in_order(made(many), where="x", choice=choice)
@@ -269,7 +294,8 @@ def test_a_stream_has_no_rows_to_sort() -> None:
 def test_a_date_a_row_is_its_midnight(tmp_path: Path) -> None:
     recipe = tmp_path / "dates.toml"
     recipe.write_text(
-        'name = "dates"\nabout = "a"\nsource = "b"\n[time]\ncolumns = ["time"]\nformat = "%Y-%m-%d"\n'
+        'name = "dates"\nabout = "a"\nsource = "b"\n[time]\ncolumns = ["time"]\nformat = '
+        '"%Y-%m-%d"\n'
         '[channels.wind_speed]\ncolumn = "v"\nunit = "m/s"\n[sensor]\nname = "x"\n'
     )
     rows = "".join(f"2026-05-{at:02d},{3 + at / 10:.1f}\n" for at in range(1, 31))

@@ -1,4 +1,5 @@
-"""Laws of all parsers: what is written is read back; whatever is thrown at them, only FlagdataError comes out."""
+"""Laws of all parsers: what is written is read back; whatever is thrown at them, only FlagdataError
+comes out."""
 
 from __future__ import annotations
 
@@ -72,7 +73,9 @@ def test_a_written_toa5_is_read_back(values: Sequence[float], step: int, u: int)
     log = read((head + "".join(rows)).encode(), WindOptions(zone="UTC"))
     assert log.series.time.tolist() == times(len(values), step)
     assert log.series.channels["wind_y"].tolist() == list(values)
-    assert log.series.channels["wind_speed"] == pytest.approx([np.hypot(u / 100, v) for v in values], rel=1e-12)
+    assert log.series.channels["wind_speed"] == pytest.approx(
+        [np.hypot(u / 100, v) for v in values], rel=1e-12
+    )
 
 
 @QUICK
@@ -81,7 +84,9 @@ def test_a_written_toa5_is_read_back(values: Sequence[float], step: int, u: int)
     unit=st.sampled_from([("N", "kn"), ("K", "km/h"), ("M", "m/s"), ("S", "mph")]),
     angle=st.integers(0, 359),
 )
-def test_a_written_nmea_stream_is_read_back(values: Sequence[float], unit: tuple[str, str], angle: int) -> None:
+def test_a_written_nmea_stream_is_read_back(
+    values: Sequence[float], unit: tuple[str, str], angle: int
+) -> None:
     bodies = [
         body
         for i, value in enumerate(values)
@@ -95,19 +100,23 @@ def test_a_written_nmea_stream_is_read_back(values: Sequence[float], unit: tuple
     assert log.series.time.tolist() == [t + SECOND // 2 for t in times(len(values), 1000)]
     read_back = UNITS[unit[1]].from_si(log.series.channels["apparent_wind_speed"])
     assert read_back == pytest.approx(list(values), rel=1e-12)
-    assert np.degrees(log.series.channels["apparent_wind_direction"]) == pytest.approx([angle] * len(values))
+    assert np.degrees(log.series.channels["apparent_wind_direction"]) == pytest.approx(
+        [angle] * len(values)
+    )
 
 
 @QUICK
 @given(values=speeds, minutes=st.integers(1, 300))
 def test_a_written_kestrel_export_is_read_back(values: Sequence[float], minutes: int) -> None:
     head = (
-        "Device Name;K;;\nDevice Model;5500;;\nFORMATTED DATE-TIME;Direction ° True;Wind Speed;Temperature\n"
+        "Device Name;K;;\nDevice Model;5500;;\nFORMATTED DATE-TIME;Direction ° True;Wind "
+        "Speed;Temperature\n"
         "YYYY-MM-DD HH:MM:SS;Deg;km/h;°F\n"
     )
     stamps = [instant(i * minutes * 60_000) for i in range(len(values))]
     rows = [
-        f"{s.day}/{s.month}/{s.year} {s.hour}:{s.minute:02d};270;{v};50\n" for s, v in zip(stamps, values, strict=True)
+        f"{s.day}/{s.month}/{s.year} {s.hour}:{s.minute:02d};270;{v};50\n"
+        for s, v in zip(stamps, values, strict=True)
     ]
     log = read((head + "".join(rows)).encode(), WindOptions(zone="UTC", date_order="dmy"))
     assert log.series.time.tolist() == times(len(values), minutes * 60_000)
@@ -118,7 +127,9 @@ def test_a_written_kestrel_export_is_read_back(values: Sequence[float], minutes:
 @QUICK
 @given(values=speeds, step=steps, junk=st.integers(0, 3))
 def test_written_host_lines_are_read_back(values: Sequence[float], step: int, junk: int) -> None:
-    rows = [f"{instant(i * step).strftime('%Y-%m-%dT%H:%M:%S.%f')},{v}" for i, v in enumerate(values)]
+    rows = [
+        f"{instant(i * step).strftime('%Y-%m-%dT%H:%M:%S.%f')},{v}" for i, v in enumerate(values)
+    ]
     noise = ["2026-05-01T11:59:59.000,booting"] * junk
     text = "\n".join(["laptop_time,raw_line", *noise, *rows, ""]).encode()
     log = read(text, WindOptions(zone="UTC", recipe="serial-speed"))
@@ -149,7 +160,9 @@ FORMAT_OPTIONS = [
 @pytest.mark.parametrize("options", FORMAT_OPTIONS, ids=lambda o: o.format or o.recipe or "sniffed")
 @settings(max_examples=40, deadline=None)
 @given(content=st.binary(max_size=400))
-def test_arbitrary_bytes_raise_nothing_but_flagdata_errors(options: WindOptions, content: bytes) -> None:
+def test_arbitrary_bytes_raise_nothing_but_flagdata_errors(
+    options: WindOptions, content: bytes
+) -> None:
     swallow(content, options)
 
 
@@ -157,7 +170,8 @@ HEADERS = [
     "time,wind_speed\n",
     '"TOA5","a","b","c","d","e","f","g"\n"TIMESTAMP","RECORD","WS","diag"\n"TS","RN","m/s",""\n"","","",""\n',
     "$GPZDA,120000,01,05,2026,,\n$WIMWV,010,R,5,N,A\n$GPZDA,120001,01,05,2026,,\n",
-    "Device Name;K;;\nDevice Model;5;;\nFORMATTED DATE-TIME;Direction ° True;Wind Speed;Temperature\nx;Deg;m/s;C\n",
+    "Device Name;K;;\nDevice Model;5;;\nFORMATTED DATE-TIME;Direction ° True;Wind "
+    "Speed;Temperature\nx;Deg;m/s;C\n",
     "laptop_time,raw_line\n",
     "Date;Time;m/s;°C\n",
 ]

@@ -1,4 +1,5 @@
-"""Sensor recipes: what TOML says is what is read; what it should not say is refused with the fix."""
+"""Sensor recipes: what TOML says is what is read; what it should not say is refused with the
+fix."""
 
 from __future__ import annotations
 
@@ -50,10 +51,17 @@ def test_every_recipe_of_the_catalog_loads_and_names_its_source(name: str) -> No
 @pytest.mark.parametrize("unit", ["m/s", "km/h", "kn", "mph", "ft/s", "ft/min"])
 def test_any_speed_unit_becomes_metres_a_second(tmp_path: Path, unit: str) -> None:
     # 1 m/s is exactly 3.6 km/h, 3600/1852 kn, 1/0.44704 mph, 1/0.3048 ft/s, 60/0.3048 ft/min
-    one = {"m/s": 1, "km/h": 3.6, "kn": 3600 / 1852, "mph": 1 / 0.44704, "ft/s": 1 / 0.3048, "ft/min": 60 / 0.3048}[
-        unit
-    ]
-    log = by_recipe(tmp_path, PLAIN.replace('"m/s"', f'"{unit}"'), f"t,v\n2026-05-01T12:00:00Z,{one!r}\n")
+    one = {
+        "m/s": 1,
+        "km/h": 3.6,
+        "kn": 3600 / 1852,
+        "mph": 1 / 0.44704,
+        "ft/s": 1 / 0.3048,
+        "ft/min": 60 / 0.3048,
+    }[unit]
+    log = by_recipe(
+        tmp_path, PLAIN.replace('"m/s"', f'"{unit}"'), f"t,v\n2026-05-01T12:00:00Z,{one!r}\n"
+    )
     assert log.series.channels["wind_speed"] == pytest.approx([1.0])
 
 
@@ -66,10 +74,19 @@ def test_gain_and_offset_are_applied_in_the_files_unit(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("extra", "expected"),
-    [("", 90), ('convention = "to"', 270), ("rotation = 15", 105), ('convention = "to"\nrotation = 100', 10)],
+    [
+        ("", 90),
+        ('convention = "to"', 270),
+        ("rotation = 15", 105),
+        ('convention = "to"\nrotation = 100', 10),
+    ],
 )
-def test_directions_come_out_as_from_clockwise_from_north(tmp_path: Path, extra: str, expected: float) -> None:
-    recipe = PLAIN.replace("[sensor]", f'[channels.wind_direction]\ncolumn = "d"\nunit = "deg"\n{extra}\n[sensor]')
+def test_directions_come_out_as_from_clockwise_from_north(
+    tmp_path: Path, extra: str, expected: float
+) -> None:
+    recipe = PLAIN.replace(
+        "[sensor]", f'[channels.wind_direction]\ncolumn = "d"\nunit = "deg"\n{extra}\n[sensor]'
+    )
     log = by_recipe(tmp_path, recipe, "t,v,d\n2026-05-01T12:00:00Z,2,90\n")
     assert np.degrees(log.series.channels["wind_direction"]) == pytest.approx([expected])
 
@@ -77,8 +94,18 @@ def test_directions_come_out_as_from_clockwise_from_north(tmp_path: Path, extra:
 def test_missing_codes_are_missing_whatever_their_spelling(tmp_path: Path) -> None:
     recipe = PLAIN.replace("[time]", '[file]\nmissing = [-9999, "99.9", "ERR"]\n[time]')
     rows = ["-9999", "-9999.00", "99.9", "err", "3.5"]
-    log = by_recipe(tmp_path, recipe, "t,v\n" + "".join(f"2026-05-01T12:00:0{i}Z,{v}\n" for i, v in enumerate(rows)))
-    assert [bool(f & SampleFlag.MISSING) for f in log.series.flags] == [True, True, True, True, False]
+    log = by_recipe(
+        tmp_path,
+        recipe,
+        "t,v\n" + "".join(f"2026-05-01T12:00:0{i}Z,{v}\n" for i, v in enumerate(rows)),
+    )
+    assert [bool(f & SampleFlag.MISSING) for f in log.series.flags] == [
+        True,
+        True,
+        True,
+        True,
+        False,
+    ]
 
 
 def test_a_range_is_in_the_files_unit(tmp_path: Path) -> None:
@@ -109,7 +136,10 @@ name = "x"
 """
     text = "logger 5\n\n01.05.26  12:00:00.5   270  10\n# pause\n01.05.26  12:00:01.5   270  20\n"
     log = by_recipe(tmp_path, recipe, text)
-    assert [iso(t) for t in log.series.time] == ["2026-05-01T11:00:00.500Z", "2026-05-01T11:00:01.500Z"]
+    assert [iso(t) for t in log.series.time] == [
+        "2026-05-01T11:00:00.500Z",
+        "2026-05-01T11:00:01.500Z",
+    ]
     assert log.series.channels["wind_speed"] == pytest.approx([5.14444, 10.28889], abs=1e-5)
 
 
@@ -117,28 +147,44 @@ def test_the_users_zone_goes_before_the_recipes(tmp_path: Path) -> None:
     recipe = PLAIN.replace('format = "iso"', 'format = "iso"\nzone = "Europe/Amsterdam"')
     text = "t,v\n2026-07-01 12:00:00,2\n"
     assert iso(int(by_recipe(tmp_path, recipe, text).series.time[0])) == "2026-07-01T10:00:00Z"
-    assert iso(int(by_recipe(tmp_path, recipe, text, zone="UTC").series.time[0])) == "2026-07-01T12:00:00Z"
+    assert (
+        iso(int(by_recipe(tmp_path, recipe, text, zone="UTC").series.time[0]))
+        == "2026-07-01T12:00:00Z"
+    )
 
 
 def test_a_zero_offset_of_the_recipe_is_subtracted_and_reported(tmp_path: Path) -> None:
     recipe = PLAIN + "[quality]\nzero-offset = -0.35\n"
-    log = by_recipe(tmp_path, recipe, "t,v\n2026-05-01T12:00:00Z,-0.35\n2026-05-01T12:00:01Z,4.65\n")
+    log = by_recipe(
+        tmp_path, recipe, "t,v\n2026-05-01T12:00:00Z,-0.35\n2026-05-01T12:00:01Z,4.65\n"
+    )
     assert log.series.channels["wind_speed"] == pytest.approx([0.0, 5.0])
     assert [f.value for f in log.findings if f.kind == "zero-offset-given"] == [-0.35]
 
 
 def test_sensor_facts_reach_the_series(tmp_path: Path) -> None:
-    recipe = PLAIN + "height = 3.5\ndistance-constant = 2.7\naveraging = 1\nthreshold = 0.4\naccuracy-relative = 0.02\n"
+    recipe = (
+        PLAIN + "height = 3.5\ndistance-constant = 2.7\naveraging = 1\nthreshold = "
+        "0.4\naccuracy-relative = 0.02\n"
+    )
     sensor = by_recipe(tmp_path, recipe, "t,v\n2026-05-01T12:00:00Z,3\n").series.sensor
-    assert (sensor.height, sensor.distance_constant, sensor.averaging, sensor.threshold) == (3.5, 2.7, 1.0, 0.4)
+    assert (sensor.height, sensor.distance_constant, sensor.averaging, sensor.threshold) == (
+        3.5,
+        2.7,
+        1.0,
+        0.4,
+    )
     assert (sensor.accuracy, sensor.accuracy_relative) == (None, 0.02)
 
 
 def test_an_optional_column_may_be_absent(tmp_path: Path) -> None:
     recipe = PLAIN.replace(
-        "[sensor]", '[channels.air_temperature]\ncolumn = "T"\nunit = "degC"\noptional = true\n[sensor]'
+        "[sensor]",
+        '[channels.air_temperature]\ncolumn = "T"\nunit = "degC"\noptional = true\n[sensor]',
     )
-    assert list(by_recipe(tmp_path, recipe, "t,v\n2026-05-01T12:00:00Z,3\n").series.channels) == ["wind_speed"]
+    assert list(by_recipe(tmp_path, recipe, "t,v\n2026-05-01T12:00:00Z,3\n").series.channels) == [
+        "wind_speed"
+    ]
     with_it = by_recipe(tmp_path, recipe, "t,v,T\n2026-05-01T12:00:00Z,3,20\n")
     assert with_it.series.channels["air_temperature"] == pytest.approx([293.15])
 
@@ -153,21 +199,31 @@ def test_a_testo_style_export_is_identified_and_read() -> None:
 
 
 def test_a_skywatch_style_export_is_identified_and_read() -> None:
-    text = "Date,Time,Wind speed [km/h],Temperature [°C]\n2026-05-01,12:00:00,36.0,20\n2026-05-01,12:00:01,18.0,20\n"
+    text = (
+        "Date,Time,Wind speed [km/h],Temperature "
+        "[°C]\n2026-05-01,12:00:00,36.0,20\n2026-05-01,12:00:01,18.0,20\n"
+    )
     log = read(text, zone="UTC")
     assert "skywatch-csv" in log.reasons[0]
     assert log.series.channels["wind_speed"] == pytest.approx([10.0, 5.0])
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-8-sig", "utf-32"])
-def test_a_byte_order_mark_settles_the_encoding(log_file: Callable[[bytes], Path], encoding: str) -> None:
+def test_a_byte_order_mark_settles_the_encoding(
+    log_file: Callable[[bytes], Path], encoding: str
+) -> None:
     log = read_log(log_file("time,wind_speed [m/s]\n2026-05-01T12:00:00Z,3.25\n".encode(encoding)))
     assert log.series.channels["wind_speed"].tolist() == [3.25]
     assert log.findings == ()
 
 
 def test_line_ends_of_any_kind_count_lines_alike() -> None:
-    rows = ["time,wind_speed", "2026-05-01T12:00:00Z,3", "2026-05-01T12:00:01Z,x", "2026-05-01T12:00:02Z,4"]
+    rows = [
+        "time,wind_speed",
+        "2026-05-01T12:00:00Z,3",
+        "2026-05-01T12:00:01Z,x",
+        "2026-05-01T12:00:02Z,4",
+    ]
     for end in ("\n", "\r\n", "\r"):
         assert [f.where for f in read(end.join([*rows, ""])).findings] == ["line 3"]
 
@@ -201,12 +257,15 @@ def test_a_sonics_own_status_and_unit_decide_what_is_used() -> None:
 
 def test_a_checked_column_of_a_table_flags_the_rows_it_rejects(tmp_path: Path) -> None:
     recipe = PLAIN + '[[check]]\ncolumn = "ok"\nvalues = ["A"]\nabout = "status"\n'
-    log = by_recipe(tmp_path, recipe, "t,v,ok\n2026-05-01T12:00:00Z,3,A\n2026-05-01T12:00:01Z,4,V\n")
+    log = by_recipe(
+        tmp_path, recipe, "t,v,ok\n2026-05-01T12:00:00Z,3,A\n2026-05-01T12:00:01Z,4,V\n"
+    )
     assert log.series.flags.tolist() == [0, SampleFlag.SENSOR_FAULT]
 
 
 def test_a_log_that_lists_the_newest_row_first_is_read_from_its_end(tmp_path: Path) -> None:
-    # backwards through the hour that occurs twice: 03:00 CET, 02:59 … 02:00 CET, 02:59 … 02:00 CEST, 01:59 CEST
+    # backwards through the hour that occurs twice: 03:00 CET, 02:59 … 02:00 CET, 02:59 … 02:00
+    # CEST, 01:59 CEST
     hour = [f"2026-10-25 02:{m:02d}:00" for m in range(59, -1, -1)]
     walls = ["2026-10-25 03:00:00", *hour, *hour, "2026-10-25 01:59:00"]
     text = "t,v\n" + "".join(f"{w},{i}\n" for i, w in enumerate(walls))
@@ -246,9 +305,24 @@ BAD: list[tuple[str, str, str, str]] = [
     ("names-without-header", "[time]", "[file]\nheader = 0\n[time]", "no header names"),
     ("accuracy-negative", 'name = "mine"\n', 'name = "mine"\naccuracy = -1\n', "accuracy"),
     ("stale-after-zero", "[sensor]", "[quality]\nstale-after = 0\n[sensor]", "stale-after"),
-    ("zero-offset-word", "[sensor]", '[quality]\nzero-offset = "guess"\n[sensor]', "zero-offset is"),
-    ("frame-rate-of-unknown", "[sensor]", '[quality]\nframe-rate-of = ["fluter"]\n[sensor]', "unknown channel"),
-    ("check-without-values", "[sensor]", '[[check]]\ncolumn = 2\nabout = "x"\n[sensor]', "the key values is missing"),
+    (
+        "zero-offset-word",
+        "[sensor]",
+        '[quality]\nzero-offset = "guess"\n[sensor]',
+        "zero-offset is",
+    ),
+    (
+        "frame-rate-of-unknown",
+        "[sensor]",
+        '[quality]\nframe-rate-of = ["fluter"]\n[sensor]',
+        "unknown channel",
+    ),
+    (
+        "check-without-values",
+        "[sensor]",
+        '[[check]]\ncolumn = 2\nabout = "x"\n[sensor]',
+        "the key values is missing",
+    ),
     (
         "check-without-column",
         "[sensor]",
@@ -263,7 +337,9 @@ BAD: list[tuple[str, str, str, str]] = [
 
 
 @pytest.mark.parametrize(("old", "new", "says"), [b[1:] for b in BAD], ids=[b[0] for b in BAD])
-def test_a_wrong_recipe_is_refused_with_its_place(tmp_path: Path, old: str, new: str, says: str) -> None:
+def test_a_wrong_recipe_is_refused_with_its_place(
+    tmp_path: Path, old: str, new: str, says: str
+) -> None:
     at = PLAIN.rindex(old) if old == 'name = "mine"\n' else PLAIN.index(old)
     recipe = PLAIN[:at] + new + PLAIN[at + len(old) :]
     with pytest.raises(FlagdataError) as caught:

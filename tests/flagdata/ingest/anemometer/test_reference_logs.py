@@ -90,17 +90,30 @@ def test_900_seconds_of_20_hz_make_900_means_of_20(toa5: WindLog) -> None:
     assert means.speed == pytest.approx(speed.reshape(900, 20).mean(axis=1))
 
 
-def test_relative_and_theoretical_wind_of_7250_sentences_stay_apart(nmea: WindLog, wind: Path) -> None:
+def test_relative_and_theoretical_wind_of_7250_sentences_stay_apart(
+    nmea: WindLog, wind: Path
+) -> None:
     lines = (wind / "nmea0183_plaka.log").read_text().split()
-    valid = [line.split(",") for line in lines if line.startswith("$IIMWV") and line.split(",")[5][0] == "A"]
+    valid = [
+        line.split(",")
+        for line in lines
+        if line.startswith("$IIMWV") and line.split(",")[5][0] == "A"
+    ]
     relative = [float(f[3]) for f in valid if f[2] == "R"]
     theoretical = [float(f[3]) for f in valid if f[2] == "T"]
     assert len(nmea.series) == sum(1 for line in lines if line.startswith("$IIMWV")) == 7250
     channels = nmea.series.channels
-    knots = {name: channels[name][np.isfinite(channels[name])] * 3600 / 1852 for name in channels if "speed" in name}
+    knots = {
+        name: channels[name][np.isfinite(channels[name])] * 3600 / 1852
+        for name in channels
+        if "speed" in name
+    }
     assert knots["apparent_wind_speed"] == pytest.approx(relative)
     assert knots["theoretical_wind_speed"] == pytest.approx(theoretical)
-    assert not np.any(np.isfinite(channels["apparent_wind_speed"]) & np.isfinite(channels["theoretical_wind_speed"]))
+    assert not np.any(
+        np.isfinite(channels["apparent_wind_speed"])
+        & np.isfinite(channels["theoretical_wind_speed"])
+    )
 
 
 def test_every_checksum_of_the_stream_is_right(nmea: WindLog) -> None:
@@ -109,21 +122,26 @@ def test_every_checksum_of_the_stream_is_right(nmea: WindLog) -> None:
 
 def test_sentences_marked_void_are_faults(nmea: WindLog, wind: Path) -> None:
     void = sum(
-        1 for line in (wind / "nmea0183_plaka.log").read_text().split() if line.startswith("$IIMWV") and ",V*" in line
+        1
+        for line in (wind / "nmea0183_plaka.log").read_text().split()
+        if line.startswith("$IIMWV") and ",V*" in line
     )
     assert finding(nmea, "sensor-fault").count == void == 15
     assert int(((nmea.series.flags & SampleFlag.SENSOR_FAULT) != 0).sum()) == void
 
 
 def test_a_boats_wind_is_no_ground_truth(nmea: WindLog) -> None:
-    assert finding(nmea, "apparent-wind-only").value == pytest.approx(5.9, abs=0.1)  # kn over ground, by VTG
+    assert finding(nmea, "apparent-wind-only").value == pytest.approx(
+        5.9, abs=0.1
+    )  # kn over ground, by VTG
     with pytest.raises(InputError, match="no channel wind_speed"):
         average(nmea.series)
 
 
 def test_times_are_interpolated_between_time_sentences_and_marked(nmea: WindLog) -> None:
     assert bool(np.all(nmea.series.flags & SampleFlag.TIME_UNSURE))
-    # the log runs from 09:55:59 to 14:03:24 (ZDA), one MWV five lines before each ZDA of a 16-line cycle of 2 s
+    # the log runs from 09:55:59 to 14:03:24 (ZDA), one MWV five lines before each ZDA of a 16-line
+    # cycle of 2 s
     assert iso(int(nmea.series.time[0])).startswith("2014-08-15T09:55:58")
     assert iso(int(nmea.series.time[-1])).startswith("2014-08-15T14:0")
 
@@ -174,7 +192,9 @@ def test_the_tunnels_dead_zone_is_left_in_a_jump(tunnel: WindLog) -> None:
 
 
 def test_the_tunnels_zero_offset_is_subtracted_when_asked(wind: Path, tunnel: WindLog) -> None:
-    log = read_log(wind / "flag-camera-tunnel" / "gt_log.csv", WindOptions(zone="UTC", zero_offset="estimate"))
+    log = read_log(
+        wind / "flag-camera-tunnel" / "gt_log.csv", WindOptions(zone="UTC", zero_offset="estimate")
+    )
     shift = log.series.channels["wind_speed"] - tunnel.series.channels["wind_speed"]
     assert shift == pytest.approx(0.35, abs=0.005)
     assert "negative-speed" not in kinds(log)
@@ -238,7 +258,9 @@ def test_an_estimated_wind_is_no_reading(tracked: WindLog) -> None:
         ("fabric/drapetester_fabrics.csv", "unknown", "other"),
     ],
 )
-def test_a_real_file_is_identified_correctly(reference_data: Path, name: str, format_name: str, kind: str) -> None:
+def test_a_real_file_is_identified_correctly(
+    reference_data: Path, name: str, format_name: str, kind: str
+) -> None:
     best = sniff(reference_data / name)[0]
     assert (best.format, best.kind) == (format_name, kind)
     assert best.reasons

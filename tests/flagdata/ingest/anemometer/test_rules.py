@@ -41,7 +41,9 @@ def gusts(n: int, *, rate: float = 10, decimals: int = 2) -> np.ndarray:
     return np.round(6 + smooth, decimals)
 
 
-COARSE = 0.447 * np.concatenate([stream(6, "coarse").integers(0, 8, 400), np.ones(40), np.tile([2, 5, 3, 1], 100)])
+COARSE = 0.447 * np.concatenate(
+    [stream(6, "coarse").integers(0, 8, 400), np.ones(40), np.tile([2, 5, 3, 1], 100)]
+)
 FREE: dict[str, tuple[np.ndarray, float, Mapping[str, object]]] = {
     # repeats by chance are flagged with a probability of about 1e-3 a log: none in these
     **{f"wind shown with {d} decimals": (gusts(20_000, decimals=d), 0.1, {}) for d in (0, 1, 2)},
@@ -97,7 +99,8 @@ STALE: dict[str, tuple[np.ndarray, float, Mapping[str, object], range]] = {
     ),
     "another than the least speed of a coarse instrument": (HIGHER, 1, {}, range(401, 440)),
 }
-"""Speeds that stand still: their period [s], what else is known, and the rows that repeat the one before."""
+"""Speeds that stand still: their period [s], what else is known, and the rows that repeat the one
+before."""
 
 
 @pytest.mark.parametrize("name", STALE)
@@ -117,16 +120,22 @@ def test_calm_is_not_stale() -> None:
     assert kinds(rules.stale(calm)) == ["dead-zone"]
 
 
-@pytest.mark.parametrize(("interval", "resolution"), [(1.0, 0.1), (1.0, 0.5), (60.0, 0.1), (600.0, 0.5), (0.05, 0.01)])
-def test_light_wind_of_the_night_is_not_stale_beside_the_gusts_of_the_day(interval: float, resolution: float) -> None:
-    """Gusts of 20 % with a memory of 5 s about a mean of 1.2 m/s at night and up to 5.2 m/s by day."""
+@pytest.mark.parametrize(
+    ("interval", "resolution"), [(1.0, 0.1), (1.0, 0.5), (60.0, 0.1), (600.0, 0.5), (0.05, 0.01)]
+)
+def test_light_wind_of_the_night_is_not_stale_beside_the_gusts_of_the_day(
+    interval: float, resolution: float
+) -> None:
+    """Gusts of 20 % with a memory of 5 s about a mean of 1.2 m/s at night and up to 5.2 m/s by
+    day."""
     n = 20_000
     rho = np.exp(-interval / 5)
     noise = stream(11, "night", round(interval * 100)).normal(0, np.sqrt(1 - rho**2), n)
     gust = np.asarray(lfilter([1.0], [1.0, -rho], noise))
     mean = 1.2 + 4 * np.clip(np.sin(2 * np.pi * np.arange(n) / n), 0, None)
     speed = np.round(mean * (1 + 0.2 * gust) / resolution) * resolution
-    # runs of a light wind are correlated, which the bound leaves out: a few rows of 20,000 may be taken for stale
+    # runs of a light wind are correlated, which the bound leaves out: a few rows of 20,000 may be
+    # taken for stale
     assert len(flagged(rules.stale(made(interval * np.arange(n), np.abs(speed))))) < 100
 
 
@@ -197,7 +206,10 @@ def intense(mean: float, intensity: float) -> np.ndarray:
 def test_a_speed_that_hardly_varies_is_reported_unless_it_is_calm_or_the_log_short(
     mean: float, intensity: float, step: float, steady: bool
 ) -> None:
-    assert kinds(rules.steady(made(step * np.arange(60), intense(mean, intensity)))) == ["steady-wind"] * steady
+    assert (
+        kinds(rules.steady(made(step * np.arange(60), intense(mean, intensity))))
+        == ["steady-wind"] * steady
+    )
 
 
 def test_flutter_beside_the_nyquist_limit_is_flagged_with_its_alias_and_below_it_is_not() -> None:
@@ -208,13 +220,17 @@ def test_flutter_beside_the_nyquist_limit_is_flagged_with_its_alias_and_below_it
     assert flagged(found) == list(range(200, 300))
     assert "30.5 or 89.5 Hz" in found.findings[0].what
     below = np.tile([4.0, 4.333, 4.667, 5.0], 50)
-    assert not flagged(rules.at_nyquist(made(np.arange(200) / 30, flutter_frequency=below, rules=own)))
+    assert not flagged(
+        rules.at_nyquist(made(np.arange(200) / 30, flutter_frequency=below, rules=own))
+    )
 
 
 def test_rows_after_today_are_reported_and_kept() -> None:
     now = T0 + 3 * 86_400 * S
     found = rules.future(made([86_400, 3 * 86_400, 5 * 86_400]), now=now)
-    assert [(one.kind, one.count, one.where) for one in found.findings] == [("stamps-in-future", 1, "line 4")]
+    assert [(one.kind, one.count, one.where) for one in found.findings] == [
+        ("stamps-in-future", 1, "line 4")
+    ]
     assert len(found.time) == 3
 
 
@@ -222,8 +238,11 @@ HEAD = "time,wind_speed,wind_direction,air_temperature,air_pressure,relative_hum
 
 
 def table(*rows: str) -> str:
-    """A plain table with a row a second: speed, direction [deg], temperature [°C], pressure [hPa], humidity [%]."""
-    return HEAD + "".join(f"2026-05-01T12:00:{second:02d}Z,{row}\n" for second, row in enumerate(rows))
+    """A plain table with a row a second: speed, direction [deg], temperature [°C], pressure [hPa],
+    humidity [%]."""
+    return HEAD + "".join(
+        f"2026-05-01T12:00:{second:02d}Z,{row}\n" for second, row in enumerate(rows)
+    )
 
 
 def out_of_range(log: WindLog) -> list[tuple[int, str | None, str]]:
@@ -232,11 +251,22 @@ def out_of_range(log: WindLog) -> list[tuple[int, str | None, str]]:
 
 @pytest.mark.parametrize("speed", ["1e30", "-1e30", "1e308", "151", "999.9"])
 def test_an_impossible_speed_is_flagged_reported_and_in_no_mean(speed: str) -> None:
-    log = read(table("4,10,20,1013,50", f"{speed},10,20,1013,50", "5,10,20,1013,50", f"{speed},10,20,1013,50"))
-    assert [bool(flag & SampleFlag.OUT_OF_RANGE) for flag in log.series.flags] == [False, True, False, True]
+    log = read(
+        table(
+            "4,10,20,1013,50", f"{speed},10,20,1013,50", "5,10,20,1013,50", f"{speed},10,20,1013,50"
+        )
+    )
+    assert [bool(flag & SampleFlag.OUT_OF_RANGE) for flag in log.series.flags] == [
+        False,
+        True,
+        False,
+        True,
+    ]
     ((count, where, what),) = out_of_range(log)
     assert (count, where, "wind_speed" in what) == (2, "line 3", True)
-    assert average(log.series, 10.0).speed == pytest.approx([4, 5])  # bins that end at 12:00:00 and 12:00:10
+    assert average(log.series, 10.0).speed == pytest.approx(
+        [4, 5]
+    )  # bins that end at 12:00:00 and 12:00:10
 
 
 @pytest.mark.parametrize(
@@ -248,7 +278,9 @@ def test_an_impossible_speed_is_flagged_reported_and_in_no_mean(speed: str) -> N
         ("4,10,20,1013,400", "relative_humidity"),
     ],
 )
-def test_an_impossible_direction_or_air_is_left_out_and_leaves_the_wind_usable(row: str, channel: str) -> None:
+def test_an_impossible_direction_or_air_is_left_out_and_leaves_the_wind_usable(
+    row: str, channel: str
+) -> None:
     log = read(table("4,10,20,1013,50", row))
     assert np.isfinite(log.series.channels[channel]).tolist() == [True, False]
     ((count, where, what),) = out_of_range(log)
@@ -288,7 +320,9 @@ def test_a_recipe_narrows_what_is_possible_and_turns_a_vane_past_north(
 ) -> None:
     recipe = tmp_path / "vane.toml"
     recipe.write_text(RECIPE.format(vane=vane))
-    rows = "2026-05-01T12:00:00Z,59,350\n2026-05-01T12:00:01Z,61,350\n2026-05-01T12:00:02Z,1e9,350\n"
+    rows = (
+        "2026-05-01T12:00:00Z,59,350\n2026-05-01T12:00:01Z,61,350\n2026-05-01T12:00:02Z,1e9,350\n"
+    )
     log = read("time,speed,direction\n" + rows, recipe=str(recipe))
     assert [count for count, _, _ in out_of_range(log)] == [2]  # each value is reported once
     assert np.degrees(log.series.channels["wind_direction"]) == pytest.approx([turned] * 3)
@@ -335,7 +369,9 @@ def test_a_log_without_one_usable_wind_is_kept_for_what_else_it_measured() -> No
 @pytest.mark.parametrize("offset", [-0.35, 0.2])
 def test_the_zero_offset_of_an_idle_stretch_is_found_within_its_resolution(offset: float) -> None:
     idle = np.round(offset + stream(8, "idle").normal(0, 0.005, 3000), 2)
-    found = zero.estimate(T0 + np.arange(6000) * (S // 100), np.concatenate([idle, offset + gusts(3000)]))
+    found = zero.estimate(
+        T0 + np.arange(6000) * (S // 100), np.concatenate([idle, offset + gusts(3000)])
+    )
     assert found is not None
     assert found.offset == pytest.approx(offset, abs=0.01)
     # the gusts may pass through the idle band for moments, no more
@@ -347,7 +383,10 @@ NO_ZERO = {
     "steady wind": np.round(8 + stream(9, "steady").normal(0, 0.005, 6000), 2),
     "a log that is never idle": gusts(6000) - 5.5,
     "a steady breeze below which the wind often falls": np.concatenate(
-        [np.round(0.7 + stream(8, "steady").normal(0, 0.005, 3000), 2), np.abs(gusts(3000) - np.median(gusts(3000)))]
+        [
+            np.round(0.7 + stream(8, "steady").normal(0, 0.005, 3000), 2),
+            np.abs(gusts(3000) - np.median(gusts(3000))),
+        ]
     ),
 }
 
@@ -360,7 +399,9 @@ def test_what_is_no_calm_air_shows_no_zero_offset(name: str) -> None:
 @pytest.fixture
 def idle() -> Reading:
     """20 s idle at -0.35 m/s, then gusts that begin 0.4 m/s above it; a hundred rows a second."""
-    return made(0.01 * np.arange(4000), -0.35 + np.concatenate([np.zeros(2000), [0.4], gusts(1999)]))
+    return made(
+        0.01 * np.arange(4000), -0.35 + np.concatenate([np.zeros(2000), [0.4], gusts(1999)])
+    )
 
 
 @pytest.mark.parametrize(
@@ -393,11 +434,16 @@ def test_a_zero_offset_is_subtracted_only_where_asked_and_reported(
 def test_a_log_that_is_idle_all_along_never_leaves_its_zero() -> None:
     found = zero.estimate(T0 + np.arange(3000) * (S // 100), np.full(3000, 0.2))
     assert found is not None
-    assert (found.offset, bool(found.leaves.any()), bool(np.isnan(found.jump))) == (0.2, False, True)
+    assert (found.offset, bool(found.leaves.any()), bool(np.isnan(found.jump))) == (
+        0.2,
+        False,
+        True,
+    )
 
 
 def test_a_cap_that_is_taken_off_once_is_no_dead_zone() -> None:
-    """Two minutes at 0.04 m/s, then wind at once, of which the log has many readings below the first."""
+    """Two minutes at 0.04 m/s, then wind at once, of which the log has many readings below the
+    first."""
     wind = np.concatenate([[2.1], np.abs(gusts(11_999) - np.median(gusts(11_999))) + 0.3])
     log = made(0.1 * np.arange(13_200), np.concatenate([np.full(1200, 0.04), wind]))
     done = zero.settle(log, "report")
@@ -413,7 +459,9 @@ def test_a_minute_of_calm_may_hide_anything_below_the_jump_out_of_it(idle: Readi
     sensor = replace(calm.sensor, accuracy=0.0)
     series = WindSeries(time=calm.time, channels=calm.channels, flags=calm.flags, sensor=sensor)
     # a rectangular 0 to 0.4 m/s
-    assert TruthSeries.of(series).before(int(calm.time[-1])).sigma_sensor == pytest.approx(0.4 / np.sqrt(3))
+    assert TruthSeries.of(series).before(int(calm.time[-1])).sigma_sensor == pytest.approx(
+        0.4 / np.sqrt(3)
+    )
 
 
 @pytest.mark.parametrize("offset", [0.1, "estimate"])
@@ -435,8 +483,10 @@ def test_sonic_components_give_speed_and_direction() -> None:
         '"TS","RN","m/s","m/s","m/s"\r\n"","","","",""\r\n'
     )
     rows = '"2026-05-01 12:00:00",0,3,4,0\r\n"2026-05-01 12:00:00.1",1,5,0,0\r\n'
-    # the array points east (90°): wind along +x comes from east; y is to the left of x, so wind along +y comes from
-    # 90° less
+    # the array points east (90°): wind along +x comes from east; y is to the left of x, so wind
+    # along +y comes from 90° less
     log = read(head + rows, zone="UTC", azimuth=np.pi / 2)
     assert log.series.channels["wind_speed"] == pytest.approx([5.0, 5.0])
-    assert np.degrees(log.series.channels["wind_direction"]) == pytest.approx([90 - 53.130102, 90.0])
+    assert np.degrees(log.series.channels["wind_direction"]) == pytest.approx(
+        [90 - 53.130102, 90.0]
+    )

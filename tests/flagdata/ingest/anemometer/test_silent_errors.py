@@ -1,4 +1,5 @@
-"""The kinds of silent error that were found in real logs, one row each: refused, asked, or shown in the preview."""
+"""The kinds of silent error that were found in real logs, one row each: refused, asked, or shown in
+the preview."""
 
 from __future__ import annotations
 
@@ -20,9 +21,13 @@ REPORTED = "reported"
 
 
 def rows(form: str, count: int = 30) -> str:
-    """Rows of `form` at each second `s`, with a speed `v`, a second one `w`, a direction `d` and a count `n`."""
+    """Rows of `form` at each second `s`, with a speed `v`, a second one `w`, a direction `d` and a
+    count `n`."""
     return "".join(
-        form.format(s=s, v=f"{4 + s % 7 / 10:.1f}", w=f"{6 + s % 5 / 10:.1f}", d=200 + s % 9, n=s + 1) + "\n"
+        form.format(
+            s=s, v=f"{4 + s % 7 / 10:.1f}", w=f"{6 + s % 5 / 10:.1f}", d=200 + s % 9, n=s + 1
+        )
+        + "\n"
         for s in range(count)
     )
 
@@ -55,16 +60,22 @@ class Kind:
 
 KINDS: dict[str, Kind] = {
     "a mean cube as a wind": Kind(
-        text="time,WS_ms_Avg(5m),WS3_Avg(5m)\n" + rows(T + ",{v},{n}"), ends=ASKED, shows="WS3_Avg(5m)"
+        text="time,WS_ms_Avg(5m),WS3_Avg(5m)\n" + rows(T + ",{v},{n}"),
+        ends=ASKED,
+        shows="WS3_Avg(5m)",
     ),
     "JSON of stations at the first one's time": Kind(
-        text='{"stations": [{"t": "2026-05-01T12:00:00Z", "wind_speed": 4.0}]}\n', ends=REFUSED, shows="objects"
+        text='{"stations": [{"t": "2026-05-01T12:00:00Z", "wind_speed": 4.0}]}\n',
+        ends=REFUSED,
+        shows="objects",
     ),
     "JSON of two stations with a list of readings each": Kind(
         text='{"a": [{"t": 1}], "b": [{"t": 1}]}\n', ends=REFUSED, shows="objects"
     ),
     "a direction VDir[gr] as the speed": Kind(
-        text="time,VDir[gr],VVel[m/s]\n" + rows(T + ",{d},{v}"), ends=ASKED, shows="which column is the wind's speed"
+        text="time,VDir[gr],VVel[m/s]\n" + rows(T + ",{d},{v}"),
+        ends=ASKED,
+        shows="which column is the wind's speed",
     ),
     "hours across as winds": Kind(
         text="date,H1,H2,H3\n" + rows("2026-05-{n:02d},{v},{w},{v}", 20), ends=ASKED, shows="H1"
@@ -119,7 +130,9 @@ KINDS: dict[str, Kind] = {
         options={"date": dt.date(2026, 5, 1), "zone": "UTC"},
     ),
     "one station committed before another was refused": Kind(
-        text="time,wind A (m/s),wind B (m/s)\n" + rows(T + ",{v},{w}"), ends=ASKED, shows="2 anemometers"
+        text="time,wind A (m/s),wind B (m/s)\n" + rows(T + ",{v},{w}"),
+        ends=ASKED,
+        shows="2 anemometers",
     ),
     "0 beside 360 as north where it is calm": Kind(
         text="time,wind_speed (m/s),wind_direction (deg)\n"
@@ -130,10 +143,13 @@ KINDS: dict[str, Kind] = {
         shows="not calm air or a variable wind",
     ),
     "a heading of hours as a first sample": Kind(
-        text=",".join(map(str, range(5))) + "\n" + rows("{v},{w},{v},{w},{v}"), ends=REFUSED, shows="neither a table"
+        text=",".join(map(str, range(5))) + "\n" + rows("{v},{w},{v},{w},{v}"),
+        ends=REFUSED,
+        shows="neither a table",
     ),
     "two sonics under the same headings": Kind(
-        text="time,wind speed (m/s),wind dir (deg),wind speed (m/s),wind dir (deg)\n" + rows(T + ",{v},{d},{w},{n}"),
+        text="time,wind speed (m/s),wind dir (deg),wind speed (m/s),wind dir (deg)\n"
+        + rows(T + ",{v},{d},{w},{n}"),
         ends=SHOWN,
         first=ASKED,
         shows="not used: 'wind speed (m/s)' (number 2), 'wind dir (deg)' (number 3)",
@@ -145,20 +161,28 @@ KINDS: dict[str, Kind] = {
         shows="'dir_S (deg)', 'dir_N (deg)'",
     ),
     "rows without their last cells lost": Kind(
-        text="time,wind_speed (m/s),a,b\n" + rows(T + ",{v},1,2", 5) + rows("2026-05-01T12:01:{s:02d}Z,{v}"),
+        text="time,wind_speed (m/s),a,b\n"
+        + rows(T + ",{v},1,2", 5)
+        + rows("2026-05-01T12:01:{s:02d}Z,{v}"),
         ends=SHOWN,
         first=ASKED,
         shows="6 lines above are not read, as line 2 '2026-05-01T12:00:00Z,4.0,1,2'",
         options={"columns": "1=time,2=wind_speed[m/s]"},
     ),
     "a file of directions alone": Kind(
-        text="time,wind_direction (deg)\n" + rows(T + ",{d}"), ends=ASKED, shows="which column is the wind's speed"
+        text="time,wind_direction (deg)\n" + rows(T + ",{d}"),
+        ends=ASKED,
+        shows="which column is the wind's speed",
     ),
     "counts and no speed": Kind(
-        text="time,wind counts,roll (deg)\n" + rows(T + ",{n},{d}"), ends=ASKED, shows="which column"
+        text="time,wind counts,roll (deg)\n" + rows(T + ",{n},{d}"),
+        ends=ASKED,
+        shows="which column",
     ),
     "a lidar's file of nothing but zeros": Kind(
-        text="time,wind_speed (m/s),wind_direction (deg)\n" + rows(T + ",0,0"), ends=ASKED, shows="every speed is 0"
+        text="time,wind_speed (m/s),wind_direction (deg)\n" + rows(T + ",0,0"),
+        ends=ASKED,
+        shows="every speed is 0",
     ),
     "a direction of 0 at speeds up to 0.1 alone": Kind(
         text="time,wind_speed (m/s),wind_direction (deg)\n"
@@ -183,21 +207,26 @@ KINDS: dict[str, Kind] = {
         given=True,
     ),
     "the day's mean with the direction of the fastest": Kind(
-        text="date,wind speed mean (m/s),wind dir max (deg)\n" + rows("2026-05-{n:02d},{v},{d}", 20),
+        text="date,wind speed mean (m/s),wind dir max (deg)\n"
+        + rows("2026-05-{n:02d},{v},{d}", 20),
         ends=SHOWN,
         first=ASKED,
         shows="not used: 'wind dir max (deg)'",
         options={"zone": "UTC", "expect": ("coarse",)},
     ),
     "a table of fixed width with empty cells": Kind(
-        text="time wind temp\n" + rows(T + " {v} 20", 10) + rows("2026-05-01T12:01:{s:02d}Z {v}", 10),
+        text="time wind temp\n"
+        + rows(T + " {v} 20", 10)
+        + rows("2026-05-01T12:01:{s:02d}Z {v}", 10),
         ends=SHOWN,
         first=ASKED,
         shows="11 lines above are not read, as line 2 '2026-05-01T12:00:00Z 4.0 20'",
         options={"columns": "1=time,2=wind_speed[m/s]"},
     ),
     "rows over several lines": Kind(
-        text="time,wind_speed (m/s),note\n" + rows(T + ",{v},x", 40) + '2026-05-01T12:01:00Z,4.0,"a\nb"\n',
+        text="time,wind_speed (m/s),note\n"
+        + rows(T + ",{v},x", 40)
+        + '2026-05-01T12:01:00Z,4.0,"a\nb"\n',
         ends=ASKED,
         shows="1 lines (2%) were left out",
     ),
@@ -213,7 +242,10 @@ KINDS: dict[str, Kind] = {
         text="".join(
             f"20260501 1200{s:02d}+00:00 {line}\n"
             for s in range(5, 30)
-            for line in (sentence("WIMWV,200.0,R,3.5,M,A"), sentence(f"GPZDA,1200{s - 5:02d}.50,01,05,2026,00,00"))
+            for line in (
+                sentence("WIMWV,200.0,R,3.5,M,A"),
+                sentence(f"GPZDA,1200{s - 5:02d}.50,01,05,2026,00,00"),
+            )
         ),
         ends=REPORTED,
         shows="is 4.5 s behind the stamps of the lines, which are taken",
@@ -228,7 +260,9 @@ KINDS: dict[str, Kind] = {
         shows="within 30° of north",
     ),
     "a calm hour written as 0 among whole tens": Kind(
-        text="time,wind_speed (m/s),wind dir\n" + rows(T + ",0,0", 3) + rows("2026-05-01T12:01:{s:02d}Z,{v},20"),
+        text="time,wind_speed (m/s),wind dir\n"
+        + rows(T + ",0,0", 3)
+        + rows("2026-05-01T12:01:{s:02d}Z,{v},20"),
         ends=ASKED,
         shows="no unit is stated",
     ),
@@ -236,7 +270,9 @@ KINDS: dict[str, Kind] = {
         text=rows("2026,5,1,121,{v},{d}"), ends=ASKED, shows="which column"
     ),
     "fractions of a day in two digits": Kind(
-        text="day,wind_speed (m/s)\n" + rows("46143.{n:02d},{v}"), ends=ASKED, shows="no column reads as a time"
+        text="day,wind_speed (m/s)\n" + rows("46143.{n:02d},{v}"),
+        ends=ASKED,
+        shows="no column reads as a time",
     ),
     "vanes of a mast as three winds": Kind(
         text="time,98m WV [?],80m Avg [m/s]\n" + rows(T + ",{d},{v}"),
@@ -257,15 +293,21 @@ KINDS: dict[str, Kind] = {
         options={"zone": "UTC", "expect": ("coarse",)},
     ),
     "a station's peak gust as a wind of its own": Kind(
-        text="time,WS (m/s),WG (m/s)\n" + rows(T + ",{v},{w}"), ends=SHOWN, shows="not used: 'WG (m/s)'"
+        text="time,WS (m/s),WG (m/s)\n" + rows(T + ",{v},{w}"),
+        ends=SHOWN,
+        shows="not used: 'WG (m/s)'",
     ),
     "a lidar's availability as the direction": Kind(
-        text="time,WS (m/s),availability (%)\n" + rows(T + ",{v},100"), ends=SHOWN, shows="not used: 'availability (%)'"
+        text="time,WS (m/s),availability (%)\n" + rows(T + ",{v},100"),
+        ends=SHOWN,
+        shows="not used: 'availability (%)'",
     ),
     "a gust with the direction of another gust": Kind(
         text="<?xml version='1.0'?>\n<gust dir='200'>5</gust>\n", ends=REFUSED, shows="XML"
     ),
-    "a mean cube of few rows": Kind(text="time,WS3_Avg(5m)\n" + rows(T + ",{n}", 4), ends=ASKED, shows="WS3_Avg(5m)"),
+    "a mean cube of few rows": Kind(
+        text="time,WS3_Avg(5m)\n" + rows(T + ",{n}", 4), ends=ASKED, shows="WS3_Avg(5m)"
+    ),
     "names and values in Persian": Kind(
         text="زمان,نام,مقدار\n" + rows(T + ",باران,{v}"),
         ends=SHOWN,
@@ -292,7 +334,9 @@ def ended(path: Path, kind: Kind, options: Mapping[str, object]) -> tuple[str, s
     if not log.drafted:
         return REPORTED, "\n".join(f.what for f in log.findings)
     assert not log.stated or (kind.given and options)
-    return SHOWN, Drafted(path=path, source_hash="", readings=((log, WindOptions(**options)),)).preview()  # type: ignore[arg-type]
+    return SHOWN, Drafted(
+        path=path, source_hash="", readings=((log, WindOptions(**options)),)
+    ).preview()  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", KINDS)

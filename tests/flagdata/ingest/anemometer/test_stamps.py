@@ -49,14 +49,16 @@ def ns(text: str) -> int:
         ("epoch-s", "1.765296945e9", "2025-12-09T16:15:45"),
         ("epoch-ms", "1.765296945E+12", "2025-12-09T16:15:45"),
         ("epoch-ns", "1.765296945e+18", "2025-12-09T16:15:45"),
-        # LabVIEW's zero is 24107 days before 1970, Windows' 11644473600 s, .NET's 719162 days, noon of -4712 2440587.5
+        # LabVIEW's zero is 24107 days before 1970, Windows' 11644473600 s, .NET's 719162 days, noon
+        # of -4712 2440587.5
         ("labview-s", "3848141745", "2025-12-09T16:15:45"),
         ("filetime", "134097705450000000", "2025-12-09T16:15:45"),
         ("ticks", "639008937450000000", "2025-12-09T16:15:45"),
         ("excel-days-1904", "44681.520833", "2026-05-01T12:30:00"),
         ("julian-days", "2461162.020833", "2026-05-01T12:30:00"),
         ("julian-days-modified", "61161.520833", "2026-05-01T12:30:00"),
-        # 46143 is 2026-05-01 (1900-01-01 is 1, and 1900-02-29, which never was, is counted); 730486 is 2000-01-01
+        # 46143 is 2026-05-01 (1900-01-01 is 1, and 1900-02-29, which never was, is counted); 730486
+        # is 2000-01-01
         ("excel-days", "46143.520833", "2026-05-01T12:30:00"),
         ("datenum", "730486.75", "2000-01-01T18:00:00"),
     ],
@@ -68,7 +70,8 @@ def test_a_stamp_is_the_instant_it_says(form: str, text: str, expected: str) -> 
 
 
 @pytest.mark.parametrize(
-    ("text", "nanoseconds"), [("00.05", 50_000_000), ("00.1", 100_000_000), ("00", 0), ("00.123456789", 123_456_789)]
+    ("text", "nanoseconds"),
+    [("00.05", 50_000_000), ("00.1", 100_000_000), ("00", 0), ("00.123456789", 123_456_789)],
 )
 def test_dropped_trailing_zeros_do_not_change_a_fraction(text: str, nanoseconds: int) -> None:
     stamps = parse([f"2026-05-01 12:00:{text}"], "%Y-%m-%d %H:%M:%S%f")
@@ -81,7 +84,8 @@ def test_unix_time_keeps_its_last_digit() -> None:
 
 
 @pytest.mark.parametrize(
-    ("texts", "step"), [(["12:00:00.5", "12:00:01"], S // 10), (["12:00:01"], S), (["12:00:00"], 60 * S)]
+    ("texts", "step"),
+    [(["12:00:00.5", "12:00:01"], S // 10), (["12:00:01"], S), (["12:00:00"], 60 * S)],
 )
 def test_the_resolution_of_stamps_is_the_last_digit_ever_used(texts: list[str], step: int) -> None:
     assert parse([f"2026-05-01 {t}" for t in texts], "iso").step == step
@@ -104,7 +108,9 @@ def test_what_is_no_date_is_not_valid(text: str) -> None:
     assert parse([text], "iso").valid.tolist() == [False]
 
 
-@pytest.mark.parametrize("form", ["%Y-%m %H:%M", "%Y", "%Y-%m-%d %M", "%H:%M", "%K", "%Y-%m-%d %H:%M %Y", "%"])
+@pytest.mark.parametrize(
+    "form", ["%Y-%m %H:%M", "%Y", "%Y-%m-%d %M", "%H:%M", "%K", "%Y-%m-%d %H:%M %Y", "%"]
+)
 def test_a_format_without_a_whole_instant_is_refused(form: str) -> None:
     with pytest.raises(UsageError):
         parse(["2026-05-01"], form)
@@ -117,14 +123,23 @@ def test_days_agree_with_the_calendar_of_python(moment: dt.datetime) -> None:
     assert stamps.ns.tolist() == [expected]
 
 
-PLACES = ["Europe/Amsterdam", "America/New_York", "Australia/Lord_Howe", "Asia/Kathmandu", "America/St_Johns"]
+PLACES = [
+    "Europe/Amsterdam",
+    "America/New_York",
+    "Australia/Lord_Howe",
+    "Asia/Kathmandu",
+    "America/St_Johns",
+]
 
 
 @settings(deadline=None)
 @given(
-    st.lists(st.integers(ns("1996-01-01") // S, ns("2036-01-01") // S), min_size=1, max_size=5), st.sampled_from(PLACES)
+    st.lists(st.integers(ns("1996-01-01") // S, ns("2036-01-01") // S), min_size=1, max_size=5),
+    st.sampled_from(PLACES),
 )
-def test_wall_clocks_agree_with_zoneinfo_wherever_they_are_unique(seconds: list[int], name: str) -> None:
+def test_wall_clocks_agree_with_zoneinfo_wherever_they_are_unique(
+    seconds: list[int], name: str
+) -> None:
     place = ZoneInfo(name)
     walls = [dt.datetime.fromtimestamp(s, dt.UTC).replace(tzinfo=None) for s in sorted(seconds)]
     unique = [w for w in walls if wall_status(w, place) == "unique"]
@@ -153,7 +168,10 @@ def test_a_log_that_runs_through_the_repeated_hour_twice_is_an_hour_longer() -> 
 @pytest.mark.parametrize("step", [10, 15, 20, 30])
 def test_a_log_of_averages_runs_through_the_repeated_hour_twice(step: int) -> None:
     rows = 60 // step
-    wall = [*minutes("2026-10-25T01:00:00", 120)[::step], *minutes("2026-10-25T02:00:00", 120)[::step]]
+    wall = [
+        *minutes("2026-10-25T01:00:00", 120)[::step],
+        *minutes("2026-10-25T02:00:00", 120)[::step],
+    ]
     assert set(np.diff(utc(wall))) == {60 * S * step}
     assert len(wall) == 4 * rows
 
@@ -205,11 +223,23 @@ def test_the_order_of_a_date_is_decided_by_its_numbers_or_given(name: str) -> No
 
 UNDECIDED: dict[str, tuple[list[str], str | None, str]] = {
     "no number above 12": (["5/6/2026 10:00"], None, "give --date-order dmy or mdy"),
-    "dates that go on in one order alone": (["1/6/2026 0:00", "2/6/2026 0:00", "3/6/2026 0:00"], None, "dmy or mdy"),
+    "dates that go on in one order alone": (
+        ["1/6/2026 0:00", "2/6/2026 0:00", "3/6/2026 0:00"],
+        None,
+        "dmy or mdy",
+    ),
     "points beside a clock of twelve hours": (["5.6.2026 10:00 PM"], None, "dmy or mdy"),
     "two digits that may be a year or a day": (["26-03-14 10:00"], None, "dmy or ymd"),
-    "another order than the given one": (["2026-06-01 10:00"], "dmy", "leave out --date-order, it is ymd"),
-    "an order that a number contradicts": (["13/6/2026 10:00"], "mdy", "leave out --date-order, it is dmy"),
+    "another order than the given one": (
+        ["2026-06-01 10:00"],
+        "dmy",
+        "leave out --date-order, it is ymd",
+    ),
+    "an order that a number contradicts": (
+        ["13/6/2026 10:00"],
+        "mdy",
+        "leave out --date-order, it is dmy",
+    ),
     "two orders": (["13/6/2026 10:00", "6/13/2026 10:00"], None, "split it"),
     "no date": (["10:00", "10:01"], None, "recipe"),
 }
@@ -225,7 +255,9 @@ def test_what_nothing_decides_is_refused_with_the_option(name: str) -> None:
 
 @pytest.mark.parametrize("year", [1900, 1969, 2201, 3000])
 def test_a_year_outside_the_accepted_ones_is_distinguished_from_what_is_no_date(year: int) -> None:
-    stamps = parse([f"{year}-05-01T12:00:00Z", "2026-02-30T12:00:00Z", "2026-05-01T12:00:00Z", "noon"], "iso")
+    stamps = parse(
+        [f"{year}-05-01T12:00:00Z", "2026-02-30T12:00:00Z", "2026-05-01T12:00:00Z", "noon"], "iso"
+    )
     assert stamps.valid.tolist() == [False, False, True, False]
     assert stamps.distant.tolist() == [True, False, False, False]
 
@@ -236,7 +268,20 @@ def test_a_fraction_may_stand_behind_a_sign_that_is_no_point() -> None:
     assert (found.ns - ns("2015-01-01T00:10:00")).tolist() == [0, S // 4]
 
 
-MONTHS = ("Jan", "feb", "March", "APR", "may", "June", "Jul", "aug", "Sept", "October", "Nov", "December")
+MONTHS = (
+    "Jan",
+    "feb",
+    "March",
+    "APR",
+    "may",
+    "June",
+    "Jul",
+    "aug",
+    "Sept",
+    "October",
+    "Nov",
+    "December",
+)
 
 
 def test_months_are_read_by_their_english_names_whole_or_cut_short_and_by_no_others() -> None:
@@ -308,20 +353,32 @@ def test_a_clock_of_twelve_hours_without_am_or_pm_is_refused_and_no_other(form: 
     assert refused(days + twelve)
     assert refused((days + twelve)[30:144])
     assert not refused(days + clock)
-    mornings = np.concatenate([24 * at * ("%d" in form) + np.arange(8, 12.8, 1 / 6) for at in range(4)])
+    mornings = np.concatenate(
+        [24 * at * ("%d" in form) + np.arange(8, 12.8, 1 / 6) for at in range(4)]
+    )
     assert not refused(mornings)
     with pytest.raises(UsageError, match="hours of 12"):
         dates.check(form.replace("%H", "%I"))
 
 
 EVE = dt.datetime(2023, 12, 31, 22)  # noqa: DTZ001
-YEARLESS = ("%b %d %H:%M:%S", "%d-%b %H:%M", "%d/%m %H:%M", "%d %B %H:%M", "%b %d %I:%M %p", "%m %d %H %M", "%j %H:%M")
+YEARLESS = (
+    "%b %d %H:%M:%S",
+    "%d-%b %H:%M",
+    "%d/%m %H:%M",
+    "%d %B %H:%M",
+    "%b %d %I:%M %p",
+    "%m %d %H %M",
+    "%j %H:%M",
+)
 
 
 def completed(form: str, stamps: list[dt.datetime], date: dt.date | None) -> np.ndarray:
     found, _ = dates.parse([stamp.strftime(form) for stamp in stamps], form)
     assert found.valid.all()
-    time, (said,) = dates.complete_dates(found.ns, form, date=date, line=np.arange(2, 2 + len(stamps)), where="x")
+    time, (said,) = dates.complete_dates(
+        found.ns, form, date=date, line=np.arange(2, 2 + len(stamps)), where="x"
+    )
     assert "as given" in said.what
     return time
 
@@ -338,11 +395,15 @@ def test_the_first_rows_date_completes_all_over_a_new_year(form: str) -> None:
 
 
 @pytest.mark.parametrize("given_date", [dt.date(2023, 12, 30), dt.date(2024, 1, 1), None])
-def test_another_day_than_the_first_rows_is_refused_with_the_right_one(given_date: dt.date | None) -> None:
+def test_another_day_than_the_first_rows_is_refused_with_the_right_one(
+    given_date: dt.date | None,
+) -> None:
     for form in YEARLESS[:6]:
         with pytest.raises(TimeError) as caught:
             completed(form, every(10, 60), given_date)
-        assert f"--date {given_date.year if given_date else 'YYYY'}-12-31" in (caught.value.fix or "")
+        assert f"--date {given_date.year if given_date else 'YYYY'}-12-31" in (
+            caught.value.fix or ""
+        )
 
 
 @pytest.mark.parametrize("form", ["%b %d %H:%M", "%j %H:%M"])
@@ -354,7 +415,10 @@ def test_a_leap_day_is_of_a_leap_year_alone(form: str) -> None:
 
 
 def test_lines_of_an_instrument_after_dates_without_a_year() -> None:
-    text = "".join(f"{at:%b %d %H:%M:%S} $WIMWV,{k}.0,R,{3 + k % 2}.5,M,A\n" for k, at in enumerate(every(10, 20)))
+    text = "".join(
+        f"{at:%b %d %H:%M:%S} $WIMWV,{k}.0,R,{3 + k % 2}.5,M,A\n"
+        for k, at in enumerate(every(10, 20))
+    )
     with pytest.raises(TimeError, match="--date YYYY-12-31"):
         read(text, zone="UTC")
     found = read(text, zone="UTC", date=EVE.date())
@@ -387,10 +451,14 @@ def test_counts_go_on_from_the_start_that_the_user_gives(name: str) -> None:
     form, texts, expected = COUNTS[name]
     found, _ = dates.parse(texts, form)
     lines = np.arange(len(texts))
-    time, said = dates.since_start(found.ns, form, start=ns("2026-05-01T12:00:00"), line=lines, where="x")
+    time, said = dates.since_start(
+        found.ns, form, start=ns("2026-05-01T12:00:00"), line=lines, where="x"
+    )
     assert ((time - ns("2026-05-01T12:00:00")) / S).tolist() == expected
     assert ("counter-overflow" in [one.kind for one in said]) == ("run over" in name)
     with pytest.raises(TimeError, match="count from a start"):
         dates.since_start(found.ns, form, start=None, line=lines, where="x")
     with pytest.raises(TimeError, match="starts again once, first at line 5"):
-        dates.since_start(np.array([0, 1, 2, 3, 4, 0, 1]) * S, form, start=0, line=np.arange(7), where="x")
+        dates.since_start(
+            np.array([0, 1, 2, 3, 4, 0, 1]) * S, form, start=0, line=np.arange(7), where="x"
+        )

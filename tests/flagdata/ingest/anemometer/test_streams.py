@@ -24,7 +24,8 @@ T0 = 1_777_636_800 * S
 
 
 def burst_stream(seconds: range, speed: Callable[[int], float]) -> str:
-    """Each second a ZDA, then MWD, MWV R and MWV T right after each other, then sentences of something else."""
+    """Each second a ZDA, then MWD, MWV R and MWV T right after each other, then sentences of
+    something else."""
     lines: list[str] = []
     for s in seconds:
         lines.append(sentence(f"GPZDA,12{s // 60:02d}{s % 60:02d},01,05,2026,00,00"))
@@ -35,7 +36,9 @@ def burst_stream(seconds: range, speed: Callable[[int], float]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def test_three_sentences_in_a_burst_a_second_are_one_hertz_each_without_a_gap(log_file, tmp_path: Path) -> None:
+def test_three_sentences_in_a_burst_a_second_are_one_hertz_each_without_a_gap(
+    log_file, tmp_path: Path
+) -> None:
     path = log_file(burst_stream(range(600), lambda s: 8 + s % 7))
     lake = Lake.create(tmp_path / "lake")
     report = ingest_wind(lake, path).report
@@ -68,7 +71,9 @@ def test_a_gap_of_one_kind_of_wind_is_named_with_it() -> None:
 def test_channels_that_share_rows_are_one_kind_whatever_is_missing() -> None:
     speed = np.array([1.0, np.nan, 3.0, np.nan])
     direction = np.array([np.nan, 1.0, 1.0, np.nan])
-    ((names, rows),) = streams({"wind_speed": speed, "wind_direction": direction, "air_temperature": speed})
+    ((names, rows),) = streams(
+        {"wind_speed": speed, "wind_direction": direction, "air_temperature": speed}
+    )
     assert set(names) == {"wind_speed", "wind_direction"}
     assert rows.tolist() == [0, 1, 2, 3]
 
@@ -109,7 +114,9 @@ def track(metres: float, n: int = 120) -> str:
 
 
 def test_a_table_from_a_platform_given_as_moving_holds_apparent_wind() -> None:
-    found = read("time,wind_speed\n2026-05-01T12:00:00Z,3\n2026-05-01T12:00:01Z,4\n", platform="moving")
+    found = read(
+        "time,wind_speed\n2026-05-01T12:00:00Z,3\n2026-05-01T12:00:01Z,4\n", platform="moving"
+    )
     assert found.series.channels["apparent_wind_speed"].tolist() == [3.0, 4.0]
     assert "wind_speed" not in found.series.channels
     assert "apparent-wind-only" in [f.kind for f in found.findings]

@@ -69,5 +69,7 @@ def test_a_unit_is_asked_for_where_the_telegrams_state_none_and_refused_where_th
 
 
 def test_without_stamps_the_rate_and_the_start_are_asked_for_and_taken() -> None:
-    found = read(log(bodies("VD"), stamped=False), unit="m/s", rate=1.0, start=1_777_636_800_000_000_000)
+    found = read(
+        log(bodies("VD"), stamped=False), unit="m/s", rate=1.0, start=1_777_636_800_000_000_000
+    )
     assert np.diff(found.series.time).tolist() == [10**9] * 29

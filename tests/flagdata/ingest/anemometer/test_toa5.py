@@ -1,4 +1,5 @@
-"""TOA5: columns by the names that Campbell programs give them, units by the header, diagnostics by the manual."""
+"""TOA5: columns by the names that Campbell programs give them, units by the header, diagnostics by
+the manual."""
 
 from __future__ import annotations
 
@@ -12,17 +13,21 @@ from flagdata.core.schema import SampleFlag
 from tests.flagdata.ingest.anemometer.conftest import read
 
 
-def table(columns: Sequence[tuple[str, str, str]], rows: Sequence[Sequence[object]], *, rate: int = 1) -> str:
+def table(
+    columns: Sequence[tuple[str, str, str]], rows: Sequence[Sequence[object]], *, rate: int = 1
+) -> str:
     """A table of (name, unit, processing) columns with a row every 1/rate seconds."""
     names = [("TIMESTAMP", "TS", ""), ("RECORD", "RN", ""), *columns]
     head = ['"TOA5","site","CR1000X","1234","CR1000X.Std.07","CPU:wind.CR1X","1","Table1"']
     head += [",".join(f'"{column[i]}"' for column in names) for i in range(3)]
     start = dt.datetime(2026, 5, 1, 12, tzinfo=dt.UTC)
     stamps = [
-        (start + dt.timedelta(seconds=i / rate)).strftime("%F %T.%f").rstrip("0").rstrip(".") for i in range(len(rows))
+        (start + dt.timedelta(seconds=i / rate)).strftime("%F %T.%f").rstrip("0").rstrip(".")
+        for i in range(len(rows))
     ]
     body = [
-        f'"{stamp}",{i},' + ",".join(map(str, row)) for i, (stamp, row) in enumerate(zip(stamps, rows, strict=True))
+        f'"{stamp}",{i},' + ",".join(map(str, row))
+        for i, (stamp, row) in enumerate(zip(stamps, rows, strict=True))
     ]
     return "\r\n".join([*head, *body, ""])
 
@@ -49,29 +54,45 @@ WS = ("WS_ms_Avg", "meters/second", "Avg")
         ("Press", "kPa", "air_pressure", 101.3, 101_300),
     ],
 )
-def test_usual_column_names_find_their_channel(name: str, unit: str, channel: str, value: float, si: float) -> None:
+def test_usual_column_names_find_their_channel(
+    name: str, unit: str, channel: str, value: float, si: float
+) -> None:
     columns = [(name, unit, "Smp")] if channel == "wind_speed" else [WS, (name, unit, "Smp")]
     log = read(table(columns, [[5, value][-len(columns) :]] * 3), zone="UTC")
     assert log.series.channels[channel] == pytest.approx([si] * 3)
 
 
 def test_columns_that_are_not_read_are_listed_with_their_units() -> None:
-    log = read(table([WS, ("SlrW_Avg", "W/m^2", "Avg"), ("BattV", "Volts", "Min")], [[3, 500, 12.6]] * 2), zone="UTC")
+    log = read(
+        table([WS, ("SlrW_Avg", "W/m^2", "Avg"), ("BattV", "Volts", "Min")], [[3, 500, 12.6]] * 2),
+        zone="UTC",
+    )
     found = next(f for f in log.findings if f.kind == "columns-not-read")
     assert found.what == "SlrW_Avg [W/m^2], BattV [Volts]"
 
 
-@pytest.mark.parametrize(("processing", "averaging"), [("Smp", 0.0), ("Avg", 1.0), ("WVc", 1.0), ("Max", None)])
-def test_the_header_says_how_long_the_logger_averages(processing: str, averaging: float | None) -> None:
+@pytest.mark.parametrize(
+    ("processing", "averaging"), [("Smp", 0.0), ("Avg", 1.0), ("WVc", 1.0), ("Max", None)]
+)
+def test_the_header_says_how_long_the_logger_averages(
+    processing: str, averaging: float | None
+) -> None:
     log = read(table([("WS_ms", "m/s", processing)], [[3 + i % 3] for i in range(10)]), zone="UTC")
     assert log.series.sensor.averaging == averaging
 
 
-U = [("Ux", "m/s", "Smp"), ("Uy", "m/s", "Smp"), ("Uz", "m/s", "Smp"), ("diag_csat", "unitless", "Smp")]
+U = [
+    ("Ux", "m/s", "Smp"),
+    ("Uy", "m/s", "Smp"),
+    ("Uz", "m/s", "Smp"),
+    ("diag_csat", "unitless", "Smp"),
+]
 
 
 def csat(words: Sequence[int]) -> str:
-    return table(U, [[1.5 + 0.1 * (i % 7), 0.3, 0.1, word] for i, word in enumerate(words)], rate=20)
+    return table(
+        U, [[1.5 + 0.1 * (i % 7), 0.3, 0.1, word] for i, word in enumerate(words)], rate=20
+    )
 
 
 def test_the_csat3s_counter_is_no_fault() -> None:
@@ -92,7 +113,9 @@ def test_a_diagnostic_that_does_not_count_is_a_fault_wherever_it_is_not_zero() -
 
 
 def test_records_show_what_the_stamps_alone_would_hide() -> None:
-    text = table([("WS_ms", "m/s", "Smp")], [[3 + i % 3] for i in range(10)]).replace(",7,4", ",9,4")
+    text = table([("WS_ms", "m/s", "Smp")], [[3 + i % 3] for i in range(10)]).replace(
+        ",7,4", ",9,4"
+    )
     log = read(text, zone="UTC")
     lost = next(f for f in log.findings if f.kind == "records-lost")
     assert (lost.count, lost.where) == (2, "line 12")
@@ -105,7 +128,8 @@ def test_a_direction_that_was_averaged_as_a_number_is_a_warning() -> None:
         in {
             found.kind
             for found in read(
-                table([("WS_ms_Avg", "meters/second", how), ("WindDir_Avg", "degrees", how)], rows), zone="UTC"
+                table([("WS_ms_Avg", "meters/second", how), ("WindDir_Avg", "degrees", how)], rows),
+                zone="UTC",
             ).findings
         }
         for how in ("Avg", "WVc")

@@ -33,16 +33,27 @@ def test_rows_of_a_table_are_counted_from_the_start_at_the_rate(decimal: str) ->
     rows = "".join(f"{7.2 + at};{180 + at}\n".replace(".", decimal) for at in range(8))
     log = read(f"Wind speed (km/h);Direction\n{rows}", start=_START, rate=4.0)
     assert since_start(log) == [at / 4 for at in range(8)]
-    assert log.series.channels["wind_speed"].tolist() == pytest.approx([(7.2 + at) / 3.6 for at in range(8)])
-    assert np.degrees(log.series.channels["wind_direction"]).tolist() == pytest.approx([180.0 + at for at in range(8)])
-    assert [finding.kind for finding in log.findings if "as given" in finding.what] == ["rate-given"]
+    assert log.series.channels["wind_speed"].tolist() == pytest.approx(
+        [(7.2 + at) / 3.6 for at in range(8)]
+    )
+    assert np.degrees(log.series.channels["wind_direction"]).tolist() == pytest.approx(
+        [180.0 + at for at in range(8)]
+    )
+    assert [finding.kind for finding in log.findings if "as given" in finding.what] == [
+        "rate-given"
+    ]
 
 
 def test_sentences_of_the_most_frequent_wind_tick_and_the_others_come_with_them() -> None:
-    rows = "".join(sentence(f"WIMWV,{100 + at}.0,R,{4 + at}.0,N,A") + sentence("YXXDR,C,16.0,C,T") for at in range(6))
+    rows = "".join(
+        sentence(f"WIMWV,{100 + at}.0,R,{4 + at}.0,N,A") + sentence("YXXDR,C,16.0,C,T")
+        for at in range(6)
+    )
     log = read(rows, start=_START, rate=2.0, platform="fixed", azimuth=0.0)
     assert since_start(log) == [at / 2 for at in range(6)]
-    assert log.series.channels["wind_speed"].tolist() == pytest.approx([(4 + at) * 1852 / 3600 for at in range(6)])
+    assert log.series.channels["wind_speed"].tolist() == pytest.approx(
+        [(4 + at) * 1852 / 3600 for at in range(6)]
+    )
 
 
 def test_a_rate_needs_a_start(log_file: Write) -> None:
@@ -59,7 +70,9 @@ def test_a_rate_that_is_none_is_refused(rate: float) -> None:
 
 def test_a_rate_is_refused_for_what_is_no_log(log_file: Write) -> None:
     with pytest.raises(UsageError, match="neither a table nor sentences"):
-        read_log(log_file("Dear reader\nthis is\nno log\nat all\n"), WindOptions(rate=1.0, start=_START))
+        read_log(
+            log_file("Dear reader\nthis is\nno log\nat all\n"), WindOptions(rate=1.0, start=_START)
+        )
 
 
 def test_a_stream_without_a_time_says_what_is_needed(log_file: Write) -> None:
@@ -75,7 +88,9 @@ def test_options_without_a_rate_keep_their_hash() -> None:
 
 
 def test_generated_stamps_give_no_finding() -> None:
-    kinds = [f"$IIVWR,{80 + at},L,5.{at},N,,,,\n$IIVWT,{70 + at},L,4.{at},N,,,,\n" for at in range(6)]
+    kinds = [
+        f"$IIVWR,{80 + at},L,5.{at},N,,,,\n$IIVWT,{70 + at},L,4.{at},N,,,,\n" for at in range(6)
+    ]
     log = read("".join(kinds), start=_START, rate=1.0)
     assert since_start(log) == [at / 2 for at in range(12)]
     assert "they are on the clock that was given" in log.reasons[0]

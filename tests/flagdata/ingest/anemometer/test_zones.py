@@ -9,7 +9,8 @@ from flagdata.record.signals import WindLog
 from tests.flagdata.ingest.anemometer.conftest import read
 
 _NRG = (
-    "SymphoniePRO Desktop Application\tVersion 3\nTime Zone: UTC-05:00\nChannel: 1\nDescription: cup\n\n"
+    "SymphoniePRO Desktop Application\tVersion 3\nTime Zone: UTC-05:00\nChannel: 1\nDescription: "
+    "cup\n\n"
     "Timestamp\tCh1_Anem_30.00m_S_Avg_m/s\n"
     + "".join(f"2026-03-14 08:{minute:02d}:00\t{4 + minute / 10}\n" for minute in range(0, 60, 5))
 )
@@ -41,7 +42,13 @@ def test_a_zone_that_lines_above_the_rows_state_is_found(text: str, name: str) -
 
 @pytest.mark.parametrize(
     "text",
-    ["Time zone: local", "UTC Offset,99", "zone 5 of the site", "Time Zone: UTC\nGMT Offset: -5", "Timestamp,UTC"],
+    [
+        "Time zone: local",
+        "UTC Offset,99",
+        "zone 5 of the site",
+        "Time Zone: UTC\nGMT Offset: -5",
+        "Timestamp,UTC",
+    ],
 )
 def test_what_names_no_zone_or_two_states_none(text: str) -> None:
     assert stated_zone(text.split("\n")) is None

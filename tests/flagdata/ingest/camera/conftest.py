@@ -1,4 +1,5 @@
-"""Self-made camera files whose frames carry their own number, so that a test reads which source frame was chosen."""
+"""Self-made camera files whose frames carry their own number, so that a test reads which source
+frame was chosen."""
 
 from __future__ import annotations
 
@@ -19,7 +20,8 @@ START = 1_777_629_600_000_000_000  # 2026-05-01T10:00:00Z
 
 
 def numbered(number: int) -> UInt8Array:
-    """(96, 96) gray picture of 6 × 6 cells: `number` in binary in the upper rows, then a white and a black corner."""
+    """(96, 96) gray picture of 6 × 6 cells: `number` in binary in the upper rows, then a white and
+    a black corner."""
     cells = np.full((6, 6), 64, dtype=np.uint8)
     for bit in range(18):
         cells[bit // 6, bit % 6] = 255 if number >> bit & 1 else 0
@@ -71,7 +73,9 @@ def write_video(
         if aspect is not None:
             stream.codec_context.sample_aspect_ratio = aspect
         for number, stamp in enumerate(stamps):
-            frame = av.VideoFrame.from_ndarray(picture(number), format="gray").reformat(format=pixel_format, threads=1)
+            frame = av.VideoFrame.from_ndarray(picture(number), format="gray").reformat(
+                format=pixel_format, threads=1
+            )
             frame.pts, frame.time_base = stamp, tick
             out.mux(stream.encode(frame))
         out.mux(stream.encode())

@@ -31,7 +31,11 @@ def film(tmp_path: Path) -> Callable[..., Path]:
 
     def write(name: str, frames: int, created: str = CREATED) -> Path:
         return write_video(
-            tmp_path / name, range(frames), tick=Fraction(1, 25), container="mp4", metadata={"creation_time": created}
+            tmp_path / name,
+            range(frames),
+            tick=Fraction(1, 25),
+            container="mp4",
+            metadata={"creation_time": created},
         )
 
     return write
@@ -53,8 +57,12 @@ def started(path: Path, options: CameraOptions | None = None) -> tuple[float, di
         ("GOPR0042.MP4", "GP010042.MP4", "GP020042.MP4"),
     ],
 )
-def test_each_chapter_begins_where_the_earlier_ones_end(names: tuple[str, ...], film: Callable[..., Path]) -> None:
-    first, second, third = (film(name, frames) for name, frames in zip(names, (10, 20, 5), strict=True))
+def test_each_chapter_begins_where_the_earlier_ones_end(
+    names: tuple[str, ...], film: Callable[..., Path]
+) -> None:
+    first, second, third = (
+        film(name, frames) for name, frames in zip(names, (10, 20, 5), strict=True)
+    )
     assert started(first) == (0.0, {})
     assert started(second) == (pytest.approx(0.4), {"chapter-placed": Severity.NOTE})
     assert started(third) == (pytest.approx(1.2), {"chapter-placed": Severity.NOTE})
@@ -67,7 +75,9 @@ def test_each_chapter_begins_where_the_earlier_ones_end(names: tuple[str, ...], 
     assert started(third, CameraOptions(size=96, true_fps=50.0))[0] == pytest.approx(0.6)
 
 
-def test_a_chapter_whose_earlier_ones_are_not_there_is_reported_and_not_moved(film: Callable[..., Path]) -> None:
+def test_a_chapter_whose_earlier_ones_are_not_there_is_reported_and_not_moved(
+    film: Callable[..., Path],
+) -> None:
     film("GH010042.MP4", 10)
     assert started(film("GH030042.MP4", 5)) == (0.0, {"chapter-not-placed": Severity.WARNING})
     film("GH020042.MP4", 1).write_bytes(b"no film")
@@ -82,7 +92,9 @@ def test_a_file_with_a_time_of_its_own_is_not_moved(film: Callable[..., Path]) -
     assert started(film("GH020042.MP4", 5, "2026-05-01T09:59:00.000000Z"), given) == (7.0, {})
 
 
-def test_successive_numbers_of_one_creation_time_are_reported_and_none_is_moved(film: Callable[..., Path]) -> None:
+def test_successive_numbers_of_one_creation_time_are_reported_and_none_is_moved(
+    film: Callable[..., Path],
+) -> None:
     assert started(film("DJI_0009.MP4", 10)) == (0.0, {})
     assert started(film("DJI_0010.MP4", 10)) == (0.0, {"chapter-not-placed": Severity.WARNING})
     # Cameras that record side by side.
@@ -90,7 +102,9 @@ def test_successive_numbers_of_one_creation_time_are_reported_and_none_is_moved(
     assert started(film("left2.mp4", 10)) == (0.0, {})
 
 
-def test_a_chapter_is_another_artifact_once_the_earlier_one_is_there(tmp_path: Path, film: Callable[..., Path]) -> None:
+def test_a_chapter_is_another_artifact_once_the_earlier_one_is_there(
+    tmp_path: Path, film: Callable[..., Path]
+) -> None:
     lake = Lake.create(tmp_path / "lake")
     options = CameraIngest(camera=CameraOptions(size=96))
     second = film("GH020042.MP4", 5)
@@ -106,15 +120,22 @@ def test_a_chapter_is_another_artifact_once_the_earlier_one_is_there(tmp_path: P
 
 
 def joined(*paths: Path, true_fps: float | None = None) -> tuple[list[int], dict[str, Severity]]:
-    """Instants of the frames of chapters since the creation time [ns], and the findings about chapters."""
+    """Instants of the frames of chapters since the creation time [ns], and the findings about
+    chapters."""
     first, *later = in_order(paths)
-    with open_camera(first, CameraOptions(size=96, rate="native", chapters=tuple(later), true_fps=true_fps)) as stream:
+    with open_camera(
+        first, CameraOptions(size=96, rate="native", chapters=tuple(later), true_fps=true_fps)
+    ) as stream:
         times = [frame.time - TEN for frame in stream]
         return times, {f.kind: f.severity for f in stream.findings if f.kind.startswith("chapter")}
 
 
-def test_chapters_are_joined_frame_after_frame_whatever_their_order(film: Callable[..., Path]) -> None:
-    third, first, second = (film(f"{n}0042.MP4", k) for n, k in (("GP02", 5), ("GOPR", 10), ("GP01", 20)))
+def test_chapters_are_joined_frame_after_frame_whatever_their_order(
+    film: Callable[..., Path],
+) -> None:
+    third, first, second = (
+        film(f"{n}0042.MP4", k) for n, k in (("GP02", 5), ("GOPR", 10), ("GP01", 20))
+    )
     times, found = joined(third, first, second)
     assert times == [k * 40_000_000 for k in range(35)]
     assert found == {"chapters-joined": Severity.NOTE}
@@ -144,7 +165,9 @@ def test_what_is_not_one_recording_is_not_joined(film: Callable[..., Path], tmp_
         joined(tmp_path / "GH010042.MP4", tmp_path / "GH010042.MP4")
 
 
-def test_joined_chapters_are_one_artifact_of_all_their_bytes(tmp_path: Path, film: Callable[..., Path]) -> None:
+def test_joined_chapters_are_one_artifact_of_all_their_bytes(
+    tmp_path: Path, film: Callable[..., Path]
+) -> None:
     lake = Lake.create(tmp_path / "lake")
     first, second = film("GH010042.MP4", 10), film("GH020042.MP4", 15)
     options = CameraIngest(camera=CameraOptions(size=96, chapters=(second,)))
@@ -157,7 +180,9 @@ def test_joined_chapters_are_one_artifact_of_all_their_bytes(tmp_path: Path, fil
     assert ingest_camera(lake, first, options).artifact.frame_count == 26
 
 
-def test_only_video_files_are_joined_whichever_comes_first(tmp_path: Path, film: Callable[..., Path]) -> None:
+def test_only_video_files_are_joined_whichever_comes_first(
+    tmp_path: Path, film: Callable[..., Path]
+) -> None:
     lake = Lake.create(tmp_path / "lake")
     bag, folder = tmp_path / "a_1.mcap", tmp_path / "a_2"
     bag.write_bytes(MCAP)
@@ -187,7 +212,10 @@ def test_only_video_files_are_joined_whichever_comes_first(tmp_path: Path, film:
         ({"aspect": Fraction(4, 3)}, "shape of a pixel differs"),
         ({"codec": "mpeg4"}, "coding differs"),
         ({"rotation": 90}, "orientation differs"),
-        ({"picture": lambda number: np.full((48, 64), number, np.uint8)}, "size of the pictures differs"),
+        (
+            {"picture": lambda number: np.full((48, 64), number, np.uint8)},
+            "size of the pictures differs",
+        ),
     ],
 )
 def test_chapters_of_other_kinds_are_not_joined_and_the_difference_is_named(

@@ -1,4 +1,5 @@
-"""Counters that pass their end run on; clocks that start anew end the recording; wrong stamps are neither."""
+"""Counters that pass their end run on; clocks that start anew end the recording; wrong stamps are
+neither."""
 
 from __future__ import annotations
 
@@ -22,7 +23,9 @@ B_FRAMES = {"preset": "veryfast", "crf": "12", "bf": "2", "g": "10"}
 FULL = 1 << 33
 
 
-def counted(stamps: list[int | None], *, length: int | None = FULL, tick: Fraction = TICK) -> list[int | None]:
+def counted(
+    stamps: list[int | None], *, length: int | None = FULL, tick: Fraction = TICK
+) -> list[int | None]:
     counter = Counter(length=length, tick=tick)
     found = []
     for stamp in stamps:
@@ -92,7 +95,8 @@ def test_the_motion_of_a_film_is_found_though_no_seek_finds_its_place(
 ) -> None:
     joined = tmp_path / "joined.ts"
     joined.write_bytes(take(5000, 20).read_bytes() + take(4000, 12).read_bytes())
-    # Cells of 16 px: those of 1, 2, 4, 8 and 16, which change within 20 frames, are the first five of the upper row.
+    # Cells of 16 px: those of 1, 2, 4, 8 and 16, which change within 20 frames, are the first five
+    # of the upper row.
     for film in (joined, take((FULL - 10 * PERIOD) / 90_000, 20)):
         box = propose_crop(film).box
         assert box.x == 0
@@ -102,13 +106,32 @@ def test_the_motion_of_a_film_is_found_though_no_seek_finds_its_place(
 
 def test_stamps_run_on_across_the_end_of_their_counter_in_both_directions() -> None:
     across: list[int | None] = [FULL - 7200, FULL - 3600, 3600, 0, None, 7200, FULL - 1, 10_800]
-    assert counted(across) == [FULL - 7200, FULL - 3600, FULL + 3600, FULL, None, FULL + 7200, FULL - 1, FULL + 10_800]
+    assert counted(across) == [
+        FULL - 7200,
+        FULL - 3600,
+        FULL + 3600,
+        FULL,
+        None,
+        FULL + 7200,
+        FULL - 1,
+        FULL + 10_800,
+    ]
     # Flash video counts 32 bits of milliseconds.
-    assert counted([(1 << 32) - 40, 0, 40], length=1 << 32, tick=Fraction(1, 1000))[1:] == [1 << 32, (1 << 32) + 40]
+    assert counted([(1 << 32) - 40, 0, 40], length=1 << 32, tick=Fraction(1, 1000))[1:] == [
+        1 << 32,
+        (1 << 32) + 40,
+    ]
 
 
 def test_a_jump_that_is_no_frame_step_modulo_the_counter_is_left_as_it_is() -> None:
-    jumps: list[int | None] = [0, 3600, 450_000_000, 360_000_000, 360_003_600, FULL // 2 + 360_000_000]
+    jumps: list[int | None] = [
+        0,
+        3600,
+        450_000_000,
+        360_000_000,
+        360_003_600,
+        FULL // 2 + 360_000_000,
+    ]
     assert counted(jumps) == jumps
     assert counted([FULL - 3600, 0], length=None) == [FULL - 3600, 0]
 

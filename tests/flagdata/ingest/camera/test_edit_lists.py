@@ -1,4 +1,5 @@
-"""Frames of an edited MP4 or MOV come once each, at the times of their recording; a plain one is left to FFmpeg."""
+"""Frames of an edited MP4 or MOV come once each, at the times of their recording; a plain one is
+left to FFmpeg."""
 
 from __future__ import annotations
 
@@ -36,7 +37,9 @@ def edited(path: Path, entries: list[Entry], *, wide: bool = False) -> Path:
     medium = struct.unpack_from(">I", data, found(b"moov", b"trak", b"mdia", b"mdhd")[0] + 20)[0]
     layout = ">Qqi" if wide else ">Iii"
     packed = b"".join(
-        struct.pack(layout, round(shown * movie), -1 if at < 0 else round(at * medium), round(rate * 65536))
+        struct.pack(
+            layout, round(shown * movie), -1 if at < 0 else round(at * medium), round(rate * 65536)
+        )
         for shown, at, rate in entries
     )
     elst = struct.pack(">I4sII", 16 + len(packed), b"elst", wide << 24, len(entries)) + packed
@@ -54,7 +57,12 @@ def edited(path: Path, entries: list[Entry], *, wide: bool = False) -> Path:
 def film(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     encoder = {"preset": "veryfast", "bf": "2", "g": "12"}
     return write_video(
-        tmp_path / "film", range(FRAMES), tick=Fraction(1, 50), rate=50, container=request.param, encoder=encoder
+        tmp_path / "film",
+        range(FRAMES),
+        tick=Fraction(1, 50),
+        rate=50,
+        container=request.param,
+        encoder=encoder,
     )
 
 
@@ -78,7 +86,12 @@ def test_each_frame_of_an_edited_film_comes_once_at_its_time_and_the_edits_are_r
     assert [number_of(f.image) for f in frames] == list(range(FRAMES))
     assert [f.time - START for f in frames] == [k * 20 * MS for k in range(FRAMES)]
     assert says in found["edit-list-passed-over"].what
-    assert not found.keys() & {"frames-not-shown", "frames-missing", "stamps-duplicate", "frames-undecoded"}
+    assert not found.keys() & {
+        "frames-not-shown",
+        "frames-missing",
+        "stamps-duplicate",
+        "frames-undecoded",
+    }
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,9 @@ def repair(stamps: list[int | None]) -> tuple[list[tuple[int, int]], dict[str, i
     for index, stamp in enumerate(stamps):
         kept += fix.push(None if stamp is None else stamp * MS, index)
     kept += fix.finish()
-    return [(index, stamp // MS) for stamp, index in kept], {f.kind: f.count for f in fix.findings()}
+    return [(index, stamp // MS) for stamp, index in kept], {
+        f.kind: f.count for f in fix.findings()
+    }
 
 
 def test_good_stamps_pass_unchanged_and_unmentioned() -> None:
@@ -76,7 +78,9 @@ def test_a_gap_forward_is_believed() -> None:
 
 
 @given(st.lists(st.one_of(st.none(), st.integers(-10_000, 10_000)), max_size=80))
-def test_whatever_comes_in_what_comes_out_increases_and_is_counted(stamps: list[int | None]) -> None:
+def test_whatever_comes_in_what_comes_out_increases_and_is_counted(
+    stamps: list[int | None],
+) -> None:
     kept, found = repair(stamps)
     times = [stamp for _, stamp in kept]
     indices = [index for index, _ in kept]
@@ -142,7 +146,8 @@ def test_a_rate_is_never_made_up() -> None:
 
 
 def test_a_long_gap_does_not_bend_a_rate_of_rounded_stamps() -> None:
-    # 29.97 Hz in whole ms, 1000 of 3000 frames missing in one piece: the median step, 33 ms, is 1.1 % off the mean.
+    # 29.97 Hz in whole ms, 1000 of 3000 frames missing in one piece: the median step, 33 ms, is 1.1
+    # % off the mean.
     stamps = np.array([round(Fraction(1001, 30) * i) for i in range(3000) if not 1000 <= i < 2000])
     timing = survey(stamps, tick=Fraction(1, 1000), missing=0, fallback_rate=None)
     # Each of two pieces of 33 s has two rounded ends.
@@ -159,7 +164,9 @@ def test_the_packages_docstring_lists_every_kind_of_finding() -> None:
     # Findings are built by keyword, those of StampRepair from a table of kind: (severity, …).
     sources = [path.read_text() for path in Path(camera.__file__).parent.glob("*.py")]
     kinds = {
-        kind for text in sources for kind in re.findall(r'(?:kind=|^ +)"([a-z]+(?:-[a-z]+)+)"[,:]', text, re.MULTILINE)
+        kind
+        for text in sources
+        for kind in re.findall(r'(?:kind=|^ +)"([a-z]+(?:-[a-z]+)+)"[,:]', text, re.MULTILINE)
     }
     assert {"frames-missing", "clock-reset", "start-unsure"} <= kinds
     listed = set(re.findall(r"[a-z]+(?:-[a-z]+)+", camera.__doc__ or ""))

@@ -15,21 +15,29 @@ from flagdata.ingest.camera.grid import Pick, Resampler
 MS = 1_000_000
 
 
-def run(stamps: list[int], *, rate: Fraction, tolerance: int, tail: int = 0) -> tuple[list[Pick[int]], Resampler[int]]:
+def run(
+    stamps: list[int], *, rate: Fraction, tolerance: int, tail: int = 0
+) -> tuple[list[Pick[int]], Resampler[int]]:
     grid: Resampler[int] = Resampler(start=0, rate=rate, tolerance=tolerance, tail=tail)
     picks = [pick for index, stamp in enumerate(stamps) for pick in grid.push(stamp, index)]
     return [*picks, *grid.finish()], grid
 
 
 def test_60_hz_to_25_hz_picks_the_nearest_frame_by_hand_arithmetic() -> None:
-    # Grid 0, 40, …, 200 ms; frames every 16.667 ms: 40 / 16.667 = 2.4 → 2, 4.8 → 5, 7.2 → 7, 9.6 → 10, 12.
+    # Grid 0, 40, …, 200 ms; frames every 16.667 ms: 40 / 16.667 = 2.4 → 2, 4.8 → 5, 7.2 → 7, 9.6 →
+    # 10, 12.
     stamps = [round(i * 1e9 / 60) for i in range(13)]
     picks, grid = run(stamps, rate=Fraction(25), tolerance=20 * MS)
     assert [p.source for p in picks] == [0, 2, 5, 7, 10, 12]
     assert [p.time for p in picks] == [0, 40 * MS, 80 * MS, 120 * MS, 160 * MS, 200 * MS]
     # The worst is 0.4 of a frame period, 6.667 ms.
     assert grid.report.worst_error == pytest.approx(0.4 / 60 * 1e9, abs=1)
-    assert (grid.report.sources, grid.report.used, grid.report.unused, grid.report.repeats) == (13, 6, 7, 0)
+    assert (grid.report.sources, grid.report.used, grid.report.unused, grid.report.repeats) == (
+        13,
+        6,
+        7,
+        0,
+    )
 
 
 def test_an_instant_half_way_between_two_frames_takes_the_earlier() -> None:
@@ -39,7 +47,9 @@ def test_an_instant_half_way_between_two_frames_takes_the_earlier() -> None:
 
 def test_instants_in_a_gap_are_left_out_and_counted() -> None:
     # Frames 0…3 and 8…9 at 40 ms: the instants of 4…7 have nothing within 30 ms.
-    picks, grid = run([i * 40 * MS for i in (0, 1, 2, 3, 8, 9)], rate=Fraction(25), tolerance=30 * MS)
+    picks, grid = run(
+        [i * 40 * MS for i in (0, 1, 2, 3, 8, 9)], rate=Fraction(25), tolerance=30 * MS
+    )
     assert [p.time // (40 * MS) for p in picks] == [0, 1, 2, 3, 8, 9]
     assert (grid.report.left_out, grid.report.gaps, grid.report.first_left_out) == (4, 1, 4)
     assert grid.report.longest_gap == 200 * MS
@@ -104,8 +114,8 @@ def test_each_instant_gets_the_nearest_frame_within_tolerance_or_none(
         best = min(range(len(stamps)), key=lambda i: (abs(stamps[i] - time), i))
         if abs(stamps[best] - time) <= tolerance:
             expected.append((time, best, abs(stamps[best] - time)))
-    # Python rounds halves to even, the grid rounds them up; none of these rates has an instant on a half nanosecond
-    # but 30000/1001, whose instants are thirds.
+    # Python rounds halves to even, the grid rounds them up; none of these rates has an instant on a
+    # half nanosecond but 30000/1001, whose instants are thirds.
     assert [(p.time, p.source, p.error) for p in picks] == expected
     assert grid.report.picks == len(expected)
     assert grid.report.used == len({source for _, source, _ in expected})
@@ -118,8 +128,8 @@ def test_kept_and_left_out_instants_are_all_instants(steps: list[int]) -> None:
     for step in steps:
         stamps.append(stamps[-1] + step)
     picks, grid = run(stamps, rate=Fraction(25), tolerance=15 * MS)
-    # Between the first and the last frame there are ⌊span / 40 ms⌋ + 1 instants; those after the last pick that no
-    # later frame reaches are neither kept nor counted.
+    # Between the first and the last frame there are ⌊span / 40 ms⌋ + 1 instants; those after the
+    # last pick that no later frame reaches are neither kept nor counted.
     times = [p.time for p in picks]
     assert all(b - a >= 40 * MS and (b - a) % (40 * MS) == 0 for a, b in pairwise(times))
     counted = grid.report.picks + grid.report.left_out

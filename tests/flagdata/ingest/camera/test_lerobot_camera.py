@@ -26,18 +26,27 @@ def options(episode: int | None = 1, **others: Any) -> CameraOptions:
 
 
 @pytest.fixture(scope="module", params=["png", "av1"])
-def data_set(known: Any, tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest) -> Path:
+def data_set(
+    known: Any, tmp_path_factory: pytest.TempPathFactory, request: pytest.FixtureRequest
+) -> Path:
     folder = tmp_path_factory.mktemp("lerobot") / request.param
-    export(known.lake, Export(format="lerobot", where="kind = 'clip'", options={"frames": request.param}), folder)
+    export(
+        known.lake,
+        Export(format="lerobot", where="kind = 'clip'", options={"frames": request.param}),
+        folder,
+    )
     return folder
 
 
-def test_an_episode_of_ours_has_the_instants_and_grays_that_were_recorded(known: Any, data_set: Path) -> None:
+def test_an_episode_of_ours_has_the_instants_and_grays_that_were_recorded(
+    known: Any, data_set: Path
+) -> None:
     assert classify(data_set).kind == "camera"
     with open_camera(data_set, options()) as stream:
         frames = list(stream)
     assert [frame.time for frame in frames] == known.times[30:60].tolist()
-    # 48 rows of pictures stand in the middle of 64; JPEG, and AV1 at crf 30, keep their mean to a level or two.
+    # 48 rows of pictures stand in the middle of 64; JPEG, and AV1 at crf 30, keep their mean to a
+    # level or two.
     means = np.array([frame.image[8:56].mean() for frame in frames])
     np.testing.assert_allclose(means, known.images[30:60].mean(axis=(1, 2)), atol=2)
 
@@ -60,7 +69,9 @@ def test_a_choice_that_is_missing_or_wrong_is_refused_with_what_there_is(data_se
         open_camera(data_set, options(topic="observation.images.camra"))
 
 
-def test_without_instants_of_their_own_frames_count_from_the_start_that_is_given(data_set: Path) -> None:
+def test_without_instants_of_their_own_frames_count_from_the_start_that_is_given(
+    data_set: Path,
+) -> None:
     where = data_set / "meta" / "info.json"
     whole = where.read_text()
     info = json.loads(whole)
@@ -72,7 +83,9 @@ def test_without_instants_of_their_own_frames_count_from_the_start_that_is_given
         with open_camera(data_set, options(start=NOON)) as stream:
             times = [frame.time for frame in stream]
         assert "stamps-synthetic" in {finding.kind for finding in stream.findings}
-        np.testing.assert_allclose(np.array(times) - NOON, np.arange(30) / info["fps"] * 1e9, atol=200)
+        np.testing.assert_allclose(
+            np.array(times) - NOON, np.arange(30) / info["fps"] * 1e9, atol=200
+        )
         for change in ({"codebase_version": "v2.1"}, {"storage_format": "lance"}):
             where.write_text(json.dumps(info | change))
             with pytest.raises(InputError, match=next(iter(change.values()))):
@@ -82,7 +95,13 @@ def test_without_instants_of_their_own_frames_count_from_the_start_that_is_given
 
 
 @pytest.mark.parametrize(
-    "path", ["../{chunk_index}.parquet", "/etc/{file_index}", "data/{episode}.parquet", "{chunk_index:>999999999}"]
+    "path",
+    [
+        "../{chunk_index}.parquet",
+        "/etc/{file_index}",
+        "data/{episode}.parquet",
+        "{chunk_index:>999999999}",
+    ],
 )
 def test_a_path_of_the_description_that_leaves_the_data_set_or_names_no_file_is_refused(
     data_set: Path, tmp_path: Path, path: str
@@ -98,7 +117,9 @@ def test_a_description_without_a_frame_rate_is_refused(data_set: Path, tmp_path:
 
 
 @pytest.mark.parametrize("missing", ["data/file_index", "episode_index"])
-def test_a_table_of_episodes_that_lacks_a_number_is_damaged(data_set: Path, tmp_path: Path, missing: str) -> None:
+def test_a_table_of_episodes_that_lacks_a_number_is_damaged(
+    data_set: Path, tmp_path: Path, missing: str
+) -> None:
     folder = changed(data_set, tmp_path)
     path = folder / "meta" / "episodes" / "chunk-000" / "file-000.parquet"
     pq.write_table(pq.read_table(path).slice(1, 1).drop_columns([missing]), path)
@@ -115,7 +136,9 @@ def test_a_film_that_ends_before_it_begins_and_one_that_is_a_list_of_other_files
     table = folder / "meta" / "episodes" / "chunk-000" / "file-000.parquet"
     rows = pq.read_table(table)
     column = "videos/observation.images.camera/to_timestamp"
-    wrong = rows.set_column(rows.column_names.index(column), column, pa.array([0.0] * rows.num_rows))
+    wrong = rows.set_column(
+        rows.column_names.index(column), column, pa.array([0.0] * rows.num_rows)
+    )
     pq.write_table(wrong, table)
     with pytest.raises(CorruptError, match="its film lasts from"):
         open_camera(folder, options())
@@ -127,12 +150,20 @@ def test_a_film_that_ends_before_it_begins_and_one_that_is_a_list_of_other_files
 
 
 @pytest.mark.parametrize(
-    "values", [pa.array([0.0, float("nan")]), pa.array([0.0, None]), pa.array(["0", "1"]), pa.array([0.0, 1e300])]
+    "values",
+    [
+        pa.array([0.0, float("nan")]),
+        pa.array([0.0, None]),
+        pa.array(["0", "1"]),
+        pa.array([0.0, 1e300]),
+    ],
 )
 def test_stamps_that_are_no_instants_are_damage(values: pa.Array) -> None:
     with pytest.raises(CorruptError, match="no instants"):
         stamps_of(pa.table({"timestamp": values}), "here")
-    np.testing.assert_array_equal(stamps_of(pa.table({"timestamp": [0.0, 0.25]}), "here"), [0, 250_000_000])
+    np.testing.assert_array_equal(
+        stamps_of(pa.table({"timestamp": [0.0, 0.25]}), "here"), [0, 250_000_000]
+    )
 
 
 def changed(data_set: Path, tmp_path: Path, **description: Any) -> Path:

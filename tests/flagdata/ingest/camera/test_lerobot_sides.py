@@ -38,7 +38,9 @@ def fill(lake: Lake, **columns: Any) -> None:
                 with RecordWriter(staged, metadata={"camera": {"name": "made"}}) as record:
                     for k in range(FRAMES):
                         at = START + k * PERIOD
-                        record.frame(log_time=at, publish_time=at, timestamp=at, image=picture(number, k, 32))
+                        record.frame(
+                            log_time=at, publish_time=at, timestamp=at, image=picture(number, k, 32)
+                        )
                     record.truth({"wind_speed": 2.0 + number}, log_time=START)
                 stored = transaction.put(staged)
                 recording = Artifact(
@@ -66,7 +68,9 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Lake:
 def data_set(source: Lake) -> Path:
     """All sides in one data set."""
     folder = Path(str(source.path)).parent / "all"
-    export(source, Export(format="lerobot", where="kind = 'clip'", options={"frames": "png"}), folder)
+    export(
+        source, Export(format="lerobot", where="kind = 'clip'", options={"frames": "png"}), folder
+    )
     return folder
 
 
@@ -90,24 +94,37 @@ def came_in(folder: Path, lake: Lake, episode: int) -> Artifact:
 def test_a_description_states_the_episodes_of_each_side_and_who_decided(data_set: Path) -> None:
     info = described(data_set)
     assert info["splits"] == DIVIDED
-    assert (info["flagdata"]["split_by"]["rule"], info["flagdata"]["split_by"]["datasets"]) == ("stated", ["made"])
-    assert {side: size["clips"] for side, size in info["flagdata"]["split_by"]["sides"].items()} == {
+    assert (info["flagdata"]["split_by"]["rule"], info["flagdata"]["split_by"]["datasets"]) == (
+        "stated",
+        ["made"],
+    )
+    assert {
+        side: size["clips"] for side, size in info["flagdata"]["split_by"]["sides"].items()
+    } == {
         "train": 2,
         "test": 1,
     }
 
 
 @pytest.mark.parametrize(("side", "count"), [("train", 2), ("test", 1)])
-def test_an_export_of_one_side_states_that_side(source: Lake, tmp_path: Path, side: str, count: int) -> None:
+def test_an_export_of_one_side_states_that_side(
+    source: Lake, tmp_path: Path, side: str, count: int
+) -> None:
     request = Export(format="lerobot", where="kind = 'clip'", split=side, options={"frames": "png"})
     export(source, request, tmp_path / "out")
     assert described(tmp_path / "out")["splits"] == {side: f"0:{count}"}
 
 
-def test_films_of_no_side_are_stated_as_lerobot_does_and_come_in_without_one(tmp_path: Path) -> None:
+def test_films_of_no_side_are_stated_as_lerobot_does_and_come_in_without_one(
+    tmp_path: Path,
+) -> None:
     made = Lake.create(tmp_path / "lake")
     fill(made, dataset=None, side=None)
-    export(made, Export(format="lerobot", where="kind = 'clip'", options={"frames": "png"}), tmp_path / "out")
+    export(
+        made,
+        Export(format="lerobot", where="kind = 'clip'", options={"frames": "png"}),
+        tmp_path / "out",
+    )
     info = described(tmp_path / "out")
     assert (info["splits"], info["flagdata"]["split_by"]) == ({"train": "0:3"}, None)
     assert came_in(tmp_path / "out", Lake.create(tmp_path / "other"), 0).side is None
@@ -125,30 +142,40 @@ def test_a_hashed_side_is_the_side_of_what_comes_in(tmp_path: Path) -> None:
     assert (film.dataset, film.side) == ("hashed", side)
 
 
-def test_sides_come_in_and_stay_with_the_recordings_and_clips_that_are_made(data_set: Path, tmp_path: Path) -> None:
+def test_sides_come_in_and_stay_with_the_recordings_and_clips_that_are_made(
+    data_set: Path, tmp_path: Path
+) -> None:
     lake = Lake.create(tmp_path / "lake")
     for episode, side in enumerate(["train", "train", "test"]):
         film = came_in(data_set, lake, episode)
         assert (film.dataset, film.side) == ("made", side)
-        declared = invoke("declare", film.id, "--speed", "5", "--sigma", "0.1", "--lake", str(lake.path))
+        declared = invoke(
+            "declare", film.id, "--speed", "5", "--sigma", "0.1", "--lake", str(lake.path)
+        )
         assert declared.code == 0, declared.err
     catalog = lake.table(lake.view(None))
     clips = clips_of(catalog, None)
     assert clips.num_rows == 3
-    assert {side: len(on) for side, on in divide(catalog, clips, hashed=HashedSplit()).artifacts.items()} == {
+    assert {
+        side: len(on) for side, on in divide(catalog, clips, hashed=HashedSplit()).artifacts.items()
+    } == {
         "train": 2,
         "test": 1,
     }
 
 
-def test_the_splits_of_another_program_are_sides_of_the_folder(data_set: Path, tmp_path: Path) -> None:
+def test_the_splits_of_another_program_are_sides_of_the_folder(
+    data_set: Path, tmp_path: Path
+) -> None:
     folder = foreign(data_set, tmp_path / "theirs", {"train": "0:1", "val": "1:2"})
     lake = Lake.create(tmp_path / "lake")
     found = [came_in(folder, lake, episode) for episode in range(3)]
     assert [film.side for film in found] == ["train", "val", None]
 
 
-def test_one_split_of_all_episodes_states_nothing_and_is_reported(data_set: Path, tmp_path: Path) -> None:
+def test_one_split_of_all_episodes_states_nothing_and_is_reported(
+    data_set: Path, tmp_path: Path
+) -> None:
     folder = foreign(data_set, tmp_path / "theirs", {"train": "0:3"})
     film = came_in(folder, Lake.create(tmp_path / "lake"), 0)
     assert film.side is None
@@ -156,7 +183,15 @@ def test_one_split_of_all_episodes_states_nothing_and_is_reported(data_set: Path
 
 
 @pytest.mark.parametrize(
-    "splits", [{"train": "all"}, {"train": 3}, ["train"], {"": "0:1"}, {"a\nb": "0:1"}, {"train": f"0:{'9' * 5000}"}]
+    "splits",
+    [
+        {"train": "all"},
+        {"train": 3},
+        ["train"],
+        {"": "0:1"},
+        {"a\nb": "0:1"},
+        {"train": f"0:{'9' * 5000}"},
+    ],
 )
 def test_splits_that_are_no_ranges_are_damage(data_set: Path, tmp_path: Path, splits: Any) -> None:
     with pytest.raises(CorruptError, match="no ranges of episodes"):

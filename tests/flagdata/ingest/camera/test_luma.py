@@ -20,7 +20,9 @@ def frame(pixel_format: str, value: int, *, width: int = 34, height: int = 18) -
     """A frame of one luma value, chroma in the middle, in the format's own units."""
     gray = av.VideoFrame(width, height, "yuv444p16le")
     for index, plane in enumerate(gray.planes):
-        words = np.full(plane.buffer_size // 2, value * 256 if index == 0 else 128 * 256, dtype="<u2")
+        words = np.full(
+            plane.buffer_size // 2, value * 256 if index == 0 else 128 * 256, dtype="<u2"
+        )
         plane.update(words.tobytes())
     return gray.reformat(format=pixel_format, threads=1)
 
@@ -63,7 +65,9 @@ def test_the_full_range_of_jpeg_formats_is_not_stretched() -> None:
     assert (levels(gray) == 200).all()
 
 
-def test_a_gray_plane_is_full_in_a_picture_codec_and_limited_in_a_video_codec_unless_it_says() -> None:
+def test_a_gray_plane_is_full_in_a_picture_codec_and_limited_in_a_video_codec_unless_it_says() -> (
+    None
+):
     gray = av.VideoFrame.from_ndarray(np.full((16, 32), 235, dtype=np.uint8), format="gray")
     assert (levels(gray, "png") == 235).all()
     assert (levels(gray, "h264") == 255).all()
@@ -74,12 +78,20 @@ def test_a_gray_plane_is_full_in_a_picture_codec_and_limited_in_a_video_codec_un
 @pytest.mark.parametrize(
     ("rgb", "expected"),
     # Rec. 601 weights, as in JPEG (ITU-T T.871): 0.299, 0.587, 0.114.
-    [((255, 0, 0), 76.2), ((0, 255, 0), 149.7), ((0, 0, 255), 29.1), ((255, 255, 255), 255.0), ((10, 200, 90), 130.65)],
+    [
+        ((255, 0, 0), 76.2),
+        ((0, 255, 0), 149.7),
+        ((0, 0, 255), 29.1),
+        ((255, 255, 255), 255.0),
+        ((10, 200, 90), 130.65),
+    ],
 )
 def test_rgb_becomes_luma_by_rec_601(rgb: tuple[int, int, int], expected: float) -> None:
     image = np.tile(np.array(rgb, dtype=np.uint8), (16, 32, 1))
     for pixel_format in ("rgb24", "bgr24", "rgba", "gbrp"):
-        source = av.VideoFrame.from_ndarray(image, format="rgb24").reformat(format=pixel_format, threads=1)
+        source = av.VideoFrame.from_ndarray(image, format="rgb24").reformat(
+            format=pixel_format, threads=1
+        )
         # One step of rounding.
         assert np.abs(levels(source, "png") - expected).max() <= 0.6, pixel_format
 

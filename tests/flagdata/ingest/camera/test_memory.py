@@ -33,12 +33,17 @@ def test_memory_does_not_grow_with_the_length(tmp_path: Path) -> None:
             encoder={"preset": "ultrafast", "crf": "30", "bf": "0"},
         )
         result = subprocess.run(
-            [sys.executable, "-c", SCRIPT, str(path)], capture_output=True, text=True, check=True, timeout=500
+            [sys.executable, "-c", SCRIPT, str(path)],
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=500,
         )
         count, kilobytes = result.stdout.split()
         return int(count), int(kilobytes)
 
     short, long = peak(60), peak(660)
     assert (short[0], long[0]) == (30, 330)
-    # 600 more frames of 640 × 480 would be 184 MB decoded, 27 MB as output squares; stamps and an index are 0.1 MB.
+    # 600 more frames of 640 × 480 would be 184 MB decoded, 27 MB as output squares; stamps and an
+    # index are 0.1 MB.
     assert long[1] - short[1] < 15_000

@@ -29,7 +29,8 @@ def scene(
     seed: int = 0,
     height: float = 80.0,
 ) -> np.ndarray:
-    """(216, 384) still texture with waves, `height` gray levels high, in the square `flag` (x, y, side).
+    """(216, 384) still texture with waves, `height` gray levels high, in the square `flag` (x, y,
+    side).
 
     All of it gets brighter and darker by `flicker`.
     """
@@ -38,7 +39,9 @@ def scene(
     if flag:
         x, y, side = flag
         rows, columns = np.mgrid[:side, :side]
-        image[y : y + side, x : x + side] = 120 + height * np.sin(columns / 6 - number * 0.9 + rows / 15)
+        image[y : y + side, x : x + side] = 120 + height * np.sin(
+            columns / 6 - number * 0.9 + rows / 15
+        )
     if passer_by and 40 <= number < 80:
         at = 8 * (number - 40)
         image[150:210, at : at + 30] = 255
@@ -81,7 +84,9 @@ def test_the_proposal_is_a_square_just_around_the_moving_part(
 
 def test_flicker_of_the_whole_image_is_no_motion(film: Callable[..., Path]) -> None:
     flag = (200, 60, 80)
-    proposal = propose_crop(film("flicker.mp4", lambda n: scene(n, flag=flag, flicker=0.25, height=15), frames=120))
+    proposal = propose_crop(
+        film("flicker.mp4", lambda n: scene(n, flag=flag, flicker=0.25, height=15), frames=120)
+    )
     assert covers(proposal.box.as_tuple(), flag)
     assert proposal.box.width <= 1.6 * flag[2]
     with pytest.raises(RefusedError, match="no motion is found"):
@@ -90,19 +95,30 @@ def test_flicker_of_the_whole_image_is_no_motion(film: Callable[..., Path]) -> N
 
 def test_a_passer_by_is_forgotten(film: Callable[..., Path]) -> None:
     flag = (200, 30, 80)
-    proposal = propose_crop(film("passer.mp4", lambda n: scene(n, flag=flag, passer_by=True, height=15)))
+    proposal = propose_crop(
+        film("passer.mp4", lambda n: scene(n, flag=flag, passer_by=True, height=15))
+    )
     assert covers(proposal.box.as_tuple(), flag)
     assert proposal.box.y + proposal.box.height <= 150
 
 
 def test_motion_all_over_the_image_is_refused(film: Callable[..., Path]) -> None:
-    places = [(10, 10, 40), (180, 10, 40), (330, 10, 40), (10, 150, 40), (180, 150, 40), (330, 150, 40)]
+    places = [
+        (10, 10, 40),
+        (180, 10, 40),
+        (330, 10, 40),
+        (10, 150, 40),
+        (180, 150, 40),
+        (330, 150, 40),
+    ]
 
     def everywhere(number: int) -> np.ndarray:
         image = scene(number, flag=None)
         for place in places:
             x, y, side = place
-            image[y : y + side, x : x + side] = scene(number, flag=place)[y : y + side, x : x + side]
+            image[y : y + side, x : x + side] = scene(number, flag=place)[
+                y : y + side, x : x + side
+            ]
         return image
 
     with pytest.raises(RefusedError, match="all over"):
@@ -127,7 +143,9 @@ def test_an_automatic_crop_is_used_and_kept_with_its_picture(film: Callable[...,
     with open_camera(path, replace(PLAIN, crop="auto")) as stream:
         frames = list(stream)
         assert stream.proposal is not None
-        assert stream.info.crop == stream.proposal.box.as_tuple() == propose_crop(path).box.as_tuple()
+        assert (
+            stream.info.crop == stream.proposal.box.as_tuple() == propose_crop(path).box.as_tuple()
+        )
         assert {f.kind for f in stream.findings} >= {"crop-proposed"}
     assert len(frames) == 100
     with open_camera(path, PLAIN) as stream:
@@ -147,14 +165,17 @@ def test_an_automatic_crop_is_used_and_kept_with_its_picture(film: Callable[...,
 def test_a_crop_that_cuts_through_what_moves_is_reported_with_the_edges(
     crop: str, edges: dict[str, int], film: Callable[..., Path]
 ) -> None:
-    """The flag is from 200 to 280 px across and from 60 to 140 px down; blur and compression widen it by a few."""
+    """The flag is from 200 to 280 px across and from 60 to 140 px down; blur and compression widen
+    it by a few."""
     path = film("flag.mp4", lambda n: scene(n, flag=(200, 60, 80)), frames=60)
     with open_camera(path, replace(PLAIN, crop=parse_crop(crop))) as stream:
         found = [finding for finding in stream.findings if finding.kind == "crop-cuts-motion"]
         assert len(list(stream)) == 60
     assert len(found) == bool(edges)
     for finding in found:
-        reported = {edge: int(pixels) for pixels, edge in re.findall(r"(\d+) px at the (\w+)", finding.what)}
+        reported = {
+            edge: int(pixels) for pixels, edge in re.findall(r"(\d+) px at the (\w+)", finding.what)
+        }
         assert reported == {edge: pytest.approx(pixels, abs=8) for edge, pixels in edges.items()}
         given = re.search(r"--crop (\S+)", finding.fix or "")
         assert given is not None
@@ -190,19 +211,25 @@ def test_a_folder_of_images_gets_a_proposal_too(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("length", [34, 60])
-def test_a_faint_tip_that_swings_out_now_and_then_lies_in_the_proposal(length: int, film: Callable[..., Path]) -> None:
-    """A strip 6 px thin at the flag's free end, 30 gray levels beside its 80, seen in a quarter of the time."""
+def test_a_faint_tip_that_swings_out_now_and_then_lies_in_the_proposal(
+    length: int, film: Callable[..., Path]
+) -> None:
+    """A strip 6 px thin at the flag's free end, 30 gray levels beside its 80, seen in a quarter of
+    the time."""
     flag = (140, 60, 80)
 
     def picture(number: int) -> np.ndarray:
         image = scene(number, flag=flag).astype(float)
         if number % 60 >= 45:
             rows = 90 + number % 12
-            image[rows : rows + 6, 220 : 220 + length] += 30 * np.sin(number + np.arange(length) / 4)
+            image[rows : rows + 6, 220 : 220 + length] += 30 * np.sin(
+                number + np.arange(length) / 4
+            )
         return np.clip(np.rint(image), 0, 255).astype(np.uint8)
 
     box = propose_crop(film("tip.mp4", picture, frames=120)).box
     assert covers(box.as_tuple(), flag)
     assert box.x + box.width >= 220 + length
-    # with its tip the flag is 80 + length px long: the square with its padding stays below 1.6 times that
+    # with its tip the flag is 80 + length px long: the square with its padding stays below 1.6
+    # times that
     assert box.width <= 1.6 * (80 + length)

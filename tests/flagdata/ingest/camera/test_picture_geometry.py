@@ -35,7 +35,9 @@ ONE = 1 << 16
         (8, [[2, 4], [1, 3]], 270, False),
     ],
 )
-def test_the_eight_exif_orientations(value: int, upright: list[list[int]], clockwise: int, mirrored: bool) -> None:
+def test_the_eight_exif_orientations(
+    value: int, upright: list[list[int]], clockwise: int, mirrored: bool
+) -> None:
     orientation = Orientation.of_exif(value)
     assert orientation.apply(CORNERS).tolist() == upright
     assert orientation.mirrored is mirrored
@@ -70,7 +72,9 @@ def test_a_matrix_of_an_odd_angle_is_taken_to_the_nearest_and_says_so() -> None:
 
 
 @given(st.integers(1, 8), st.integers(0, 40), st.integers(0, 20), st.integers(8, 40))
-def test_cropping_then_turning_equals_turning_then_cropping(value: int, x: int, y: int, side: int) -> None:
+def test_cropping_then_turning_equals_turning_then_cropping(
+    value: int, x: int, y: int, side: int
+) -> None:
     stored = np.random.default_rng(5).integers(0, 256, (64, 96), dtype=np.uint8)
     orientation = Orientation.of_exif(value)
     upright = orientation.apply(stored)
@@ -108,11 +112,14 @@ def test_an_oblong_crop_is_padded_and_never_stretched() -> None:
     assert (out[75:225] > 0).all()
     bright = out > 157
     assert bright.any(axis=1).sum() == bright.any(axis=0).sum() == pytest.approx(120, abs=1)
-    np.testing.assert_array_equal(geometry.content(Image.fromarray(disk), black=0, white=255), out[75:225])
+    np.testing.assert_array_equal(
+        geometry.content(Image.fromarray(disk), black=0, white=255), out[75:225]
+    )
 
 
 def test_shrinking_averages_over_area_and_does_not_alias() -> None:
-    # One-pixel stripes at 1200 px are far beyond what 300 px can show: what is left is their mean, 127.5.
+    # One-pixel stripes at 1200 px are far beyond what 300 px can show: what is left is their mean,
+    # 127.5.
     stripes = np.tile(np.array([0, 255], dtype=np.uint8), (1200, 600))
     geometry = Geometry(
         width=1200,
@@ -123,7 +130,8 @@ def test_shrinking_averages_over_area_and_does_not_alias() -> None:
         size=300,
     )
     out = geometry.render(Image.fromarray(stripes), black=0, white=255).astype(float)
-    # The kernel's response to the alternating pattern is below 1 %; the outermost pixel sees half a kernel.
+    # The kernel's response to the alternating pattern is below 1 %; the outermost pixel sees half a
+    # kernel.
     assert np.abs(out[:, 2:-2] - 127.5).max() <= 3
 
 
@@ -144,7 +152,8 @@ def test_scaling_does_not_ring_at_an_edge() -> None:
 
 
 def test_a_moving_picture_moves_by_the_same_share() -> None:
-    # A step edge at column c of 600 px is at c/2 of 300 px: its mid-gray crossing is exact to a small part of a pixel.
+    # A step edge at column c of 600 px is at c/2 of 300 px: its mid-gray crossing is exact to a
+    # small part of a pixel.
     for column in (200, 251, 333):
         edge = np.zeros((600, 600), dtype=np.uint8)
         edge[:, column:] = 200
@@ -171,7 +180,14 @@ def test_limited_range_is_stretched_and_clipped_only_outside_it() -> None:
         size=6,
     )
     # (126 - 16) · 255 / 219 = 128.08; (17 - 16) · 255 / 219 = 1.16.
-    assert geometry.render(Image.fromarray(levels), black=16, white=235)[0].tolist() == [0, 255, 128, 0, 255, 1]
+    assert geometry.render(Image.fromarray(levels), black=16, white=235)[0].tolist() == [
+        0,
+        255,
+        128,
+        0,
+        255,
+        1,
+    ]
 
 
 def test_pixel_shape_widens_before_turning() -> None:

@@ -1,4 +1,5 @@
-"""The order of pictures is that of the recording, or refused; what their names state is how far apart they are."""
+"""The order of pictures is that of the recording, or refused; what their names state is how far
+apart they are."""
 
 from __future__ import annotations
 
@@ -23,17 +24,22 @@ LATE = utc(2026, 5, 1, 12, 0, 0, 520_000)
 
 
 def placed(names: Sequence[str], rate: int = 25) -> tuple[list[int], list[int], Ordered]:
-    """The numbers of `names`, which are in the right order, as they come out of a folder's; their places; and all."""
+    """The numbers of `names`, which are in the right order, as they come out of a folder's; their
+    places; and all."""
     mixed = list(range(len(names)))
     Random(1).shuffle(mixed)
     found = order_pictures([names[i] for i in mixed], rate=Fraction(rate), where="folder")
     return [mixed[i] for i in found.order], list(found.places), found
 
 
-def clocked(pattern: str, start: datetime = LATE, *, step: float = 0.04, count: int = N) -> list[str]:
+def clocked(
+    pattern: str, start: datetime = LATE, *, step: float = 0.04, count: int = N
+) -> list[str]:
     """Names by times `step` s apart; MS stands for the milliseconds in three digits."""
     times = [start + timedelta(milliseconds=round(1000 * step * k)) for k in range(count)]
-    return [time.strftime(pattern).replace("MS", f"{time.microsecond // 1000:03d}") for time in times]
+    return [
+        time.strftime(pattern).replace("MS", f"{time.microsecond // 1000:03d}") for time in times
+    ]
 
 
 def epochs(write: Callable[[int], str], count: int = 60) -> list[str]:
@@ -94,12 +100,18 @@ def test_pictures_are_in_the_order_of_recording_one_frame_apart(names: list[str]
             [*range(11), *range(13, N)],
         ),
         (
-            [name for k, name in enumerate(epochs(lambda ns: f"{ns + ns // 1000 % 9001}.png")) if k != 7],
+            [
+                name
+                for k, name in enumerate(epochs(lambda ns: f"{ns + ns // 1000 % 9001}.png"))
+                if k != 7
+            ],
             [*range(7), *range(8, 60)],
         ),
     ],
 )
-def test_what_is_missing_between_numbers_or_times_are_missing_frames(names: list[str], places: list[int]) -> None:
+def test_what_is_missing_between_numbers_or_times_are_missing_frames(
+    names: list[str], places: list[int]
+) -> None:
     assert placed(names)[:2] == (list(range(len(names))), places)
 
 
@@ -120,11 +132,23 @@ def test_what_is_missing_between_numbers_or_times_are_missing_frames(names: list
         ([f"DSC_{k:04d}.JPG" for k in (*range(1, 10), *range(9990, 10_000))], "went on counting"),
         ([f"f_{k}.png" for k in (0, 37, 91, 120, 171)], "neither one nor even"),
         (clocked("%H-%M-%S-MS.png", utc(2026, 4, 30, 23, 59, 59, 520_000)), "midnight"),
-        ([f"20260501_120000.{k}.png" if k > 9 else f"20260501_120001.{k}.png" for k in range(N)], "of several lengths"),
-        ([f"cam{c}_{name}" for c in (1, 2) for name in clocked("%Y%m%d_%H%M%S_MS.png")], "several numbers vary"),
-        ([f"{c}_{name}" for name in clocked("%Y%m%d_%H%M%S_MS.png") for c in ("a", "b")], "of 2 kinds"),
+        (
+            [f"20260501_120000.{k}.png" if k > 9 else f"20260501_120001.{k}.png" for k in range(N)],
+            "of several lengths",
+        ),
+        (
+            [f"cam{c}_{name}" for c in (1, 2) for name in clocked("%Y%m%d_%H%M%S_MS.png")],
+            "several numbers vary",
+        ),
+        (
+            [f"{c}_{name}" for name in clocked("%Y%m%d_%H%M%S_MS.png") for c in ("a", "b")],
+            "of 2 kinds",
+        ),
         (clocked("%M-%S-MS.png"), "several numbers vary"),
-        ([f"f_{k}.png" for k in (1, 2, 3, 10**30)], f"{10**30 - 4} frames are missing, the first after f_3.png"),
+        (
+            [f"f_{k}.png" for k in (1, 2, 3, 10**30)],
+            f"{10**30 - 4} frames are missing, the first after f_3.png",
+        ),
         ([f"f_{k}.png" for k in (1, 2, 3, 2**63)], "the first after f_3.png"),
         ([f"f_{k}.png" for k in (10**60, 1 + 10**60)], "longer than any count"),
     ],
@@ -168,7 +192,9 @@ def test_a_rate_unlike_the_times_in_the_names_is_reported() -> None:
     ten = clocked("IMG_%Y%m%d_%H%M%S.jpg", step=10)
     kinds = {finding.kind: finding for finding in placed(ten)[2].findings}
     assert kinds["rate-unlike-names"].value == 230
-    assert "rate-unlike-names" not in {finding.kind for finding in placed(clocked("%Y%m%d_%H%M%S_MS.png"))[2].findings}
+    assert "rate-unlike-names" not in {
+        finding.kind for finding in placed(clocked("%Y%m%d_%H%M%S_MS.png"))[2].findings
+    }
 
 
 def test_names_without_numbers_are_taken_by_name_and_one_picture_as_it_is() -> None:

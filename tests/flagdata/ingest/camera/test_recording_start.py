@@ -16,9 +16,15 @@ TEN = parse("2026-05-01T10:00:00Z")
 
 
 def find(
-    metadata: dict[str, str], *, option: int | None = None, recorded: str | None = None, place: str | None = None
+    metadata: dict[str, str],
+    *,
+    option: int | None = None,
+    recorded: str | None = None,
+    place: str | None = None,
 ) -> Start:
-    return find_start(option, metadata, recorded=recorded, zone_name=place, duration=60.0, where="a.mp4")
+    return find_start(
+        option, metadata, recorded=recorded, zone_name=place, duration=60.0, where="a.mp4"
+    )
 
 
 def test_the_option_wins_over_everything() -> None:
@@ -48,7 +54,10 @@ def test_creation_time_is_utc_and_its_uncertainty_spans_the_recording() -> None:
 
 def test_a_zone_is_for_times_that_name_none_and_moves_no_other() -> None:
     assert find({"creation_time": "2026-05-01T12:00:00"}, place="Europe/Amsterdam").instant == TEN
-    assert find({"creation_time": "2026-05-01T10:00:00.000000Z"}, place="Europe/Amsterdam").instant == TEN
+    assert (
+        find({"creation_time": "2026-05-01T10:00:00.000000Z"}, place="Europe/Amsterdam").instant
+        == TEN
+    )
     with pytest.raises(TimeError, match="no zone"):
         find({"creation_time": "2026-05-01T12:00:00"})
 
@@ -59,7 +68,9 @@ def test_the_streams_own_wall_clock_is_read_in_the_given_zone() -> None:
 
 
 def test_an_unusable_time_is_passed_over_and_mentioned() -> None:
-    start = find({"com.apple.quicktime.creationdate": "soon", "creation_time": "2026-05-01T10:00:00Z"})
+    start = find(
+        {"com.apple.quicktime.creationdate": "soon", "creation_time": "2026-05-01T10:00:00Z"}
+    )
     assert start.instant == TEN
     assert [f.kind for f in start.findings] == ["start-passed-over", "start-unsure"]
 
@@ -90,10 +101,15 @@ def test_a_wall_clock_in_the_repeated_hour_is_refused() -> None:
 
 def test_the_avchd_message_is_read_as_binary_coded_decimals() -> None:
     head = bytes.fromhex("17ee8c60f84d11d98cd60800200c9a66") + b"MDPM"
-    entries = bytes([3, 0x70, 1, 2, 3, 4, 0x18, 0x85, 0x20, 0x23, 0x12, 0x19, 0x31, 0x23, 0x59, 0x58])
+    entries = bytes(
+        [3, 0x70, 1, 2, 3, 4, 0x18, 0x85, 0x20, 0x23, 0x12, 0x19, 0x31, 0x23, 0x59, 0x58]
+    )
     assert recording_time(head + entries) == "2023-12-31T23:59:58"
     assert recording_time(head + entries[:-1]) is None
-    assert recording_time(head + bytes([2, 0x18, 0, 0x20, 0x23, 0x1F, 0x19, 0x31, 0x23, 0x59, 0x58])) is None
+    assert (
+        recording_time(head + bytes([2, 0x18, 0, 0x20, 0x23, 0x1F, 0x19, 0x31, 0x23, 0x59, 0x58]))
+        is None
+    )
     assert recording_time(b"\x00" * 40) is None
 
 
@@ -107,5 +123,9 @@ def test_an_unknown_start_is_flagged_and_goes_before_the_files_own() -> None:
         duration=10.0,
         where="film.mp4",
     )
-    assert (iso(found.instant), found.source, found.sigma) == ("2000-01-01T00:00:00Z", "unknown", None)
+    assert (iso(found.instant), found.source, found.sigma) == (
+        "2000-01-01T00:00:00Z",
+        "unknown",
+        None,
+    )
     assert quality_flags(found.findings) == ["start-unknown"]

@@ -1,4 +1,5 @@
-"""Real recordings. The figures are those of the files' own description (README of the reference data)."""
+"""Real recordings. The figures are those of the files' own description (README of the reference
+data)."""
 
 from __future__ import annotations
 
@@ -47,11 +48,17 @@ def test_a_tunnel_clip_at_its_true_rate(reference_data: Path) -> None:
         info = stream.info
     # 302 frames at 1000 Hz: 0 … 301 ms, so the instants 0, 40, …, 280 ms.
     assert times == [k * 40_000_000 for k in range(8)]
-    assert (info.container_rate, info.true_rate, info.duration) == (60.0, 1000.0, pytest.approx(0.301))
+    assert (info.container_rate, info.true_rate, info.duration) == (
+        60.0,
+        1000.0,
+        pytest.approx(0.301),
+    )
 
 
 def test_the_phones_rate_varies_between_23_and_43_ms(reference_data: Path) -> None:
-    with open_camera(reference_data / "video" / "dadamo-2024" / "phone_vfr.mp4", CameraOptions(start=0)) as stream:
+    with open_camera(
+        reference_data / "video" / "dadamo-2024" / "phone_vfr.mp4", CameraOptions(start=0)
+    ) as stream:
         frames = list(stream)
         info, found = stream.info, {f.kind: f for f in stream.findings}
     assert info.variable_rate
@@ -71,7 +78,8 @@ def test_the_dyntex_flag_has_wide_pixels_and_all_its_frames(reference_data: Path
     # 352 × 288 with pixels of 12:11 is 384 × 288.
     assert (info.width, info.height, info.container_rate) == (384, 288, 25.0)
     assert [f.time for f in frames] == [k * 40_000_000 for k in range(250)]
-    # Measured by eye in the upright image, the large flag spans columns 86 to 335 and rows 45 to 180.
+    # Measured by eye in the upright image, the large flag spans columns 86 to 335 and rows 45 to
+    # 180.
     x, y, width, height = info.crop
     assert x <= 86
     assert x + width >= 335

@@ -1,4 +1,5 @@
-"""A film with transparency: the picture below it is read, and that it was left aside is reported."""
+"""A film with transparency: the picture below it is read, and that it was left aside is
+reported."""
 
 from __future__ import annotations
 

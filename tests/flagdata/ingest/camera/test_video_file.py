@@ -40,8 +40,18 @@ SIXTY_TO_25 = [0, 2, 5, 7, 10, 12, 14, 17, 19, 22]
         ("mp4", "libx264", "gray", {"preset": "ultrafast", "crf": "12"}),
         ("matroska", "ffv1", "gray", {}),
         ("matroska", "ffv1", "yuva420p", {}),
-        ("matroska", "libvpx-vp9", "yuv420p", {"deadline": "realtime", "cpu-used": "8", "crf": "12"}),
-        ("mp4", "libx265", "yuv420p", {"preset": "ultrafast", "x265-params": "log-level=none", "crf": "12"}),
+        (
+            "matroska",
+            "libvpx-vp9",
+            "yuv420p",
+            {"deadline": "realtime", "cpu-used": "8", "crf": "12"},
+        ),
+        (
+            "mp4",
+            "libx265",
+            "yuv420p",
+            {"preset": "ultrafast", "x265-params": "log-level=none", "crf": "12"},
+        ),
         ("mov", "png", "rgb24", {}),
         ("gif", "gif", "pal8", {}),
     ],
@@ -73,11 +83,15 @@ def test_the_nearest_frame_by_stamp_comes_out_of_every_container(
     worst = 0.0 if container == "gif" else 0.4 / 60
     assert found["resampled"].value == pytest.approx(worst, abs=0.6e-3)
     assert found["resampled"].value == max(f.stamp_error for f in frames)
-    assert not {k for k, f in found.items() if f.severity is not Severity.NOTE} - {"alpha-ignored", "gif-delays"}
+    assert not {k for k, f in found.items() if f.severity is not Severity.NOTE} - {
+        "alpha-ignored",
+        "gif-delays",
+    }
 
 
 def test_variable_stamps_choose_by_time_and_not_by_index(tmp_path: Path) -> None:
-    # Nearest to 0, 40, …, 200 ms: 0; 43 (3 away); 76 (4); 119 (1); 142 (18, against 25 to 185); 185 (15, against 18).
+    # Nearest to 0, 40, …, 200 ms: 0; 43 (3 away); 76 (4); 119 (1); 142 (18, against 25 to 185); 185
+    # (15, against 18).
     stamps = [0, 23, 43, 76, 119, 142, 185, 218, 241]
     path = write_video(tmp_path / "vfr.mp4", stamps)
     info, frames, found = read(path, PLAIN)
@@ -94,7 +108,10 @@ def test_missing_frames_leave_holes_in_the_grid(tmp_path: Path) -> None:
     assert grid_of(frames, START) == stamps
     assert [number_of(f.image) for f in frames] == list(range(20))
     assert not info.variable_rate
-    assert (found["frames-missing"].count, found["frames-missing"].value) == (5, pytest.approx(6 * 0.04))
+    assert (found["frames-missing"].count, found["frames-missing"].value) == (
+        5,
+        pytest.approx(6 * 0.04),
+    )
 
 
 def test_the_native_rate_counts_missing_frames_too(tmp_path: Path) -> None:
@@ -113,7 +130,9 @@ def test_a_tolerance_wide_enough_bridges_a_gap_by_repeating(tmp_path: Path) -> N
     assert found["frames-repeated"].count == 2
 
 
-def test_the_first_frame_is_at_the_start_whatever_stamp_the_file_begins_with(tmp_path: Path) -> None:
+def test_the_first_frame_is_at_the_start_whatever_stamp_the_file_begins_with(
+    tmp_path: Path,
+) -> None:
     for name in ("offset.mp4", "offset.ts", "offset.mkv"):
         path = write_video(tmp_path / name, range(5000, 5000 + 400, 40))
         _, frames, _ = read(path, PLAIN)
@@ -122,7 +141,8 @@ def test_the_first_frame_is_at_the_start_whatever_stamp_the_file_begins_with(tmp
 
 
 def test_33_bit_stamps_that_wrap_run_on(tmp_path: Path) -> None:
-    # A transport stream counts to 2^33 at 90 kHz; the wrap falls into the middle of these 20 frames.
+    # A transport stream counts to 2^33 at 90 kHz; the wrap falls into the middle of these 20
+    # frames.
     first = 2**33 - 10 * 3600
     path = write_video(
         tmp_path / "wrap.ts",
@@ -146,7 +166,11 @@ def test_true_fps_rescales_the_times_of_a_high_speed_camera(tmp_path: Path) -> N
     # 201 frames at 1000 Hz are 0.2 s: instants 0, 40, …, 200 ms are frames 0, 40, …, 200.
     assert [number_of(f.image) for f in frames] == [0, 40, 80, 120, 160, 200]
     assert grid_of(frames, START) == list(range(6))
-    assert (info.container_rate, info.true_rate, info.duration) == (60.0, 1000.0, pytest.approx(0.2))
+    assert (info.container_rate, info.true_rate, info.duration) == (
+        60.0,
+        1000.0,
+        pytest.approx(0.2),
+    )
     assert all(f.stamp_error == 0 for f in frames)
     assert found["true-rate"].value == pytest.approx(0.06)
     assert found["frames-dropped"].count == 195
@@ -245,7 +269,12 @@ def test_odd_sizes_and_a_crop_keep_the_pixels_they_name(tmp_path: Path) -> None:
         return wide
 
     path = write_video(
-        tmp_path / "odd.mkv", range(3), tick=Fraction(1, 25), codec="ffv1", pixel_format="gray", picture=offset
+        tmp_path / "odd.mkv",
+        range(3),
+        tick=Fraction(1, 25),
+        codec="ffv1",
+        pixel_format="gray",
+        picture=offset,
     )
     info, frames, _ = read(path, replace(PLAIN, crop=CropBox(x=41, y=17, width=96, height=96)))
     assert (info.width, info.height, info.crop) == (163, 131, (41, 17, 96, 96))
@@ -262,7 +291,9 @@ def test_black_and_white_of_both_ranges_come_out_as_0_and_255(tmp_path: Path) ->
         ("full.avi", "mjpeg", "yuvj420p"),
         ("rgb.mov", "png", "rgb24"),
     ):
-        path = write_video(tmp_path / name, range(3), tick=Fraction(1, 25), codec=codec, pixel_format=pixel_format)
+        path = write_video(
+            tmp_path / name, range(3), tick=Fraction(1, 25), codec=codec, pixel_format=pixel_format
+        )
         _, frames, _ = read(path, PLAIN)
         difference = frames[1].image.astype(int) - numbered(1)
         # Lossy coding rings at the cells' edges; their middles are flat.
@@ -271,16 +302,22 @@ def test_black_and_white_of_both_ranges_come_out_as_0_and_255(tmp_path: Path) ->
 
 
 def write_with_sound(path: Path, numbers: range, numbered: Callable[..., np.ndarray]) -> Path:
-    with av.open(str(path), "w", options={"mpegts_copyts": "1"} if path.suffix == ".ts" else {}) as out:
+    with av.open(
+        str(path), "w", options={"mpegts_copyts": "1"} if path.suffix == ".ts" else {}
+    ) as out:
         video = out.add_stream("libx264", rate=25, options={"preset": "ultrafast", "crf": "12"})
         video.width = video.height = 96
         video.pix_fmt = "yuv420p"
         sound = out.add_stream("aac", rate=48_000)
         for i in numbers:
-            frame = av.VideoFrame.from_ndarray(numbered(i), format="gray").reformat(format="yuv420p", threads=1)
+            frame = av.VideoFrame.from_ndarray(numbered(i), format="gray").reformat(
+                format="yuv420p", threads=1
+            )
             frame.pts, frame.time_base = i, Fraction(1, 25)
             out.mux(video.encode(frame))
-            noise = av.AudioFrame.from_ndarray(np.zeros((1, 1920), dtype=np.float32), format="fltp", layout="mono")
+            noise = av.AudioFrame.from_ndarray(
+                np.zeros((1, 1920), dtype=np.float32), format="fltp", layout="mono"
+            )
             noise.sample_rate, noise.pts, noise.time_base = 48_000, i * 1920, Fraction(1, 48_000)
             out.mux(sound.encode(noise))
         out.mux(video.encode())
@@ -294,7 +331,8 @@ def test_sound_beside_the_video_changes_nothing(tmp_path: Path) -> None:
 
 
 def test_a_container_that_breaks_off_still_flushes_the_decoder(cfr60: Path) -> None:
-    # A stream that appears in the middle of a damaged transport stream makes PyAV raise IndexError at the end.
+    # A stream that appears in the middle of a damaged transport stream makes PyAV raise IndexError
+    # at the end.
     class Torn:
         def __init__(self, whole: InputContainer, error: Exception) -> None:
             self.whole, self.error, self.format = whole, error, whole.format
@@ -335,7 +373,10 @@ def test_without_any_start_the_file_is_refused_with_the_way_out(cfr60: Path) -> 
 
 def test_the_start_is_read_from_the_container(tmp_path: Path) -> None:
     path = write_video(
-        tmp_path / "dated.mp4", range(50), tick=Fraction(1, 25), metadata={"creation_time": "2026-05-01T10:00:00Z"}
+        tmp_path / "dated.mp4",
+        range(50),
+        tick=Fraction(1, 25),
+        metadata={"creation_time": "2026-05-01T10:00:00Z"},
     )
     info, frames, found = read(path, CameraOptions(size=96))
     assert info.start == START == frames[0].time

@@ -1,4 +1,5 @@
-"""Video files that are cut off, damaged, oddly stored or not video: what can be read is kept and marked."""
+"""Video files that are cut off, damaged, oddly stored or not video: what can be read is kept and
+marked."""
 
 from __future__ import annotations
 
@@ -58,7 +59,11 @@ def test_damage_in_the_middle_costs_only_frames_near_it(tmp_path: Path, cfr60: P
 
 def test_a_video_whose_size_changes_keeps_the_first_size(tmp_path: Path) -> None:
     small = write_video(
-        tmp_path / "a.ts", range(10), tick=Fraction(1, 25), encoder={"bf": "0"}, muxer={"mpegts_copyts": "1"}
+        tmp_path / "a.ts",
+        range(10),
+        tick=Fraction(1, 25),
+        encoder={"bf": "0"},
+        muxer={"mpegts_copyts": "1"},
     )
     large = write_video(
         tmp_path / "b.ts",
@@ -71,7 +76,8 @@ def test_a_video_whose_size_changes_keeps_the_first_size(tmp_path: Path) -> None
     both = tmp_path / "both.ts"
     both.write_bytes(small.read_bytes() + large.read_bytes())
     _, frames, found = read(both, PLAIN)
-    # The seam breaks the transport stream's count of packets, so the one before it may be left out as doubtful.
+    # The seam breaks the transport stream's count of packets, so the one before it may be left out
+    # as doubtful.
     assert [number_of(f.image) for f in frames] in ([*range(10)], [*range(8), 9])
     assert found["size-changed"].severity is Severity.ERROR
 
@@ -91,7 +97,9 @@ def test_a_cover_picture_is_no_video(tmp_path: Path) -> None:
     path = tmp_path / "sound.mkv"
     with av.open(str(path), "w") as out:
         sound = out.add_stream("aac", rate=48_000)
-        silence = av.AudioFrame.from_ndarray(np.zeros((1, 1024), dtype=np.float32), format="fltp", layout="mono")
+        silence = av.AudioFrame.from_ndarray(
+            np.zeros((1, 1024), dtype=np.float32), format="fltp", layout="mono"
+        )
         silence.sample_rate = 48_000
         out.mux(sound.encode(silence))
         out.mux(sound.encode())
@@ -108,7 +116,10 @@ def test_a_playlist_cannot_make_the_reader_open_other_files(tmp_path: Path, cfr6
     for name, text in (
         ("list.ffconcat", f"ffconcat version 1.0\nfile '{cfr60}'\n"),
         ("list.m3u8", f"#EXTM3U\n#EXT-X-TARGETDURATION:2\n#EXTINF:2,\n{cfr60}\n#EXT-X-ENDLIST\n"),
-        ("list.sdp", "v=0\no=- 0 0 IN IP4 127.0.0.1\nm=video 5004 RTP/AVP 96\na=rtpmap:96 H264/90000\n"),
+        (
+            "list.sdp",
+            "v=0\no=- 0 0 IN IP4 127.0.0.1\nm=video 5004 RTP/AVP 96\na=rtpmap:96 H264/90000\n",
+        ),
     ):
         path = tmp_path / name
         path.write_text(text)
@@ -118,14 +129,22 @@ def test_a_playlist_cannot_make_the_reader_open_other_files(tmp_path: Path, cfr6
 
 def test_a_probe_describes_the_file_without_needing_a_start(cfr60: Path) -> None:
     seen = probe(cfr60)
-    assert (seen.codec, seen.width, seen.height, seen.frames, seen.rate) == ("h264", 96, 96, 120, 60.0)
+    assert (seen.codec, seen.width, seen.height, seen.frames, seen.rate) == (
+        "h264",
+        96,
+        96,
+        120,
+        60.0,
+    )
     assert seen.duration == pytest.approx(119 / 60)
     assert not seen.variable_rate
     assert seen.start is None
     assert seen.as_dict()["start"] is None
 
 
-def test_a_transport_stream_joined_in_the_middle_keeps_time_from_its_first_packet(tmp_path: Path) -> None:
+def test_a_transport_stream_joined_in_the_middle_keeps_time_from_its_first_packet(
+    tmp_path: Path,
+) -> None:
     whole = write_video(
         tmp_path / "whole.ts",
         range(60),
@@ -152,7 +171,13 @@ def test_hidden_reference_frames_are_not_missed(tmp_path: Path) -> None:
         range(60),
         tick=Fraction(1, 25),
         codec="libvpx",
-        encoder={"auto-alt-ref": "1", "lag-in-frames": "16", "deadline": "good", "cpu-used": "5", "b": "2M"},
+        encoder={
+            "auto-alt-ref": "1",
+            "lag-in-frames": "16",
+            "deadline": "good",
+            "cpu-used": "5",
+            "b": "2M",
+        },
     )
     _, frames, found = read(path, PLAIN)
     assert [number_of(f.image) for f in frames] == list(range(60))
@@ -177,7 +202,8 @@ def test_what_an_edit_list_cuts_away_is_not_shown(tmp_path: Path) -> None:
     data = bytearray(path.read_bytes())
     with av.open(str(path)) as raw:
         ticks = int(1 / (25 * raw.streams.video[0].time_base))
-    # elst, version 0: flags, one entry of (duration, media time, rate); the player is to start at frame 12.
+    # elst, version 0: flags, one entry of (duration, media time, rate); the player is to start at
+    # frame 12.
     at = data.index(b"elst") + 12
     assert data[at - 8 : at] == bytes([0, 0, 0, 0, 0, 0, 0, 1])
     data[at + 4 : at + 8] = (12 * ticks).to_bytes(4, "big")
@@ -199,7 +225,11 @@ def test_a_small_crop_is_enlarged_and_says_so(cfr60: Path) -> None:
 
 def test_a_camcorders_m2ts_with_time_codes_between_packets_is_whole(tmp_path: Path) -> None:
     path = write_video(
-        tmp_path / "cam.mts", range(20), tick=Fraction(1, 25), container="mpegts", muxer={"mpegts_m2ts_mode": "1"}
+        tmp_path / "cam.mts",
+        range(20),
+        tick=Fraction(1, 25),
+        container="mpegts",
+        muxer={"mpegts_m2ts_mode": "1"},
     )
     assert path.read_bytes()[4:5] == b"\x47"
     _, frames, found = read(path, PLAIN)
@@ -214,7 +244,10 @@ def test_a_camcorders_m2ts_with_time_codes_between_packets_is_whole(tmp_path: Pa
 @pytest.mark.parametrize("hundredths", [0, 1])
 def test_a_gif_that_states_no_rate_is_no_camera_of_100_hz(hundredths: int, tmp_path: Path) -> None:
     path = tmp_path / "film.gif"
-    pictures = [Image.fromarray(np.random.default_rng(k).integers(0, 255, (32, 32), dtype=np.uint8)) for k in range(9)]
+    pictures = [
+        Image.fromarray(np.random.default_rng(k).integers(0, 255, (32, 32), dtype=np.uint8))
+        for k in range(9)
+    ]
     pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=10 * hundredths)
     with pytest.raises(TimeError, match="--true-fps"):
         open_camera(path, PLAIN)
@@ -224,7 +257,10 @@ def test_a_gif_that_states_no_rate_is_no_camera_of_100_hz(hundredths: int, tmp_p
 
 def test_a_gifs_rate_is_known_to_half_a_hundredth(tmp_path: Path) -> None:
     path = tmp_path / "film.gif"
-    pictures = [Image.fromarray(np.random.default_rng(k).integers(0, 255, (32, 32), dtype=np.uint8)) for k in range(9)]
+    pictures = [
+        Image.fromarray(np.random.default_rng(k).integers(0, 255, (32, 32), dtype=np.uint8))
+        for k in range(9)
+    ]
     pictures[0].save(path, save_all=True, append_images=pictures[1:], duration=30)
     with open_camera(path, PLAIN) as film:
         (finding,) = [f for f in film.findings if f.kind == "gif-delays"]

@@ -11,7 +11,11 @@ from flagdata.ingest import read_cloths
 from tests.refusals import unrefused
 
 HEADING = "film,fabric,area_weight,bending_stiffness,wind_level,wind_speed,wind_sigma"
-ROWS = ("a.mp4,Faux Fur,0.39,2.1e-5,W1,,", "b.mp4,Faux Fur,0.39,2.1e-5,W2,,", "c.mp4,silk,0.05,,,2.4,0.3")
+ROWS = (
+    "a.mp4,Faux Fur,0.39,2.1e-5,W1,,",
+    "b.mp4,Faux Fur,0.39,2.1e-5,W2,,",
+    "c.mp4,silk,0.05,,,2.4,0.3",
+)
 
 
 @pytest.fixture
@@ -46,7 +50,10 @@ def test_each_row_is_a_film_with_its_cloths_properties(folder: Path) -> None:
 def test_the_delimiter_and_a_byte_order_mark_change_nothing(folder: Path, delimiter: str) -> None:
     plain = read_cloths(written(folder, HEADING, *ROWS))
     marked = "\ufeff" + HEADING.replace(",", delimiter)
-    assert read_cloths(written(folder, marked, "", *(row.replace(",", delimiter) for row in ROWS))) == plain
+    assert (
+        read_cloths(written(folder, marked, "", *(row.replace(",", delimiter) for row in ROWS)))
+        == plain
+    )
 
 
 def test_a_row_that_does_not_fit_is_refused_with_its_line(folder: Path) -> None:
@@ -63,7 +70,9 @@ def test_a_row_that_does_not_fit_is_refused_with_its_line(folder: Path) -> None:
         ("b.mp4,Faux Fur,0.39,2.1e-5,W2,,", InputError, "twice"),
         ("c.mp4,Faux Fur,0.40,2.1e-5,W3,,", InputError, "Faux Fur"),
     ]
-    assert not unrefused(lambda row: read_cloths(written(folder, HEADING, *ROWS[:2], row)), cases, where="line 4")
+    assert not unrefused(
+        lambda row: read_cloths(written(folder, HEADING, *ROWS[:2], row)), cases, where="line 4"
+    )
 
 
 def test_a_misspelt_column_is_named_with_the_nearest(folder: Path) -> None:

@@ -52,9 +52,9 @@ def videos(codec: str) -> list[bytes]:
     context.options = {"tune": "zerolatency"}
     packets: list[bytes] = []
     for k, image in enumerate(pictures()):
-        frame = av.VideoFrame.from_ndarray(np.repeat(image[..., None], 3, axis=2), format="rgb24").reformat(
-            format="yuv420p"
-        )
+        frame = av.VideoFrame.from_ndarray(
+            np.repeat(image[..., None], 3, axis=2), format="rgb24"
+        ).reformat(format="yuv420p")
         frame.pts = k
         packets += [bytes(packet) for packet in context.encode(frame)]
     return packets + [bytes(packet) for packet in context.encode(None)]
@@ -62,13 +62,16 @@ def videos(codec: str) -> list[bytes]:
 
 @pytest.fixture(scope="session")
 def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A file of a robot: a PNG, a JPEG and a raw topic, H.264, a wind in JSON, a text; zstd, topics interleaved."""
+    """A file of a robot: a PNG, a JPEG and a raw topic, H.264, a wind in JSON, a text; zstd, topics
+    interleaved."""
     path = tmp_path_factory.mktemp("mcap") / "drive.mcap"
     packets = videos("libx264")
     with path.open("wb") as stream, ProtobufWriter(stream) as writer:
         for k, image in enumerate(pictures()):
             raw = RawImage(width=64, height=48, encoding="rgb8", step=200)
-            raw.data = np.pad(np.repeat(image[..., None], 3, axis=2).reshape(48, 192), ((0, 0), (0, 8))).tobytes()
+            raw.data = np.pad(
+                np.repeat(image[..., None], 3, axis=2).reshape(48, 192), ((0, 0), (0, 8))
+            ).tobytes()
             messages = {
                 "/png": CompressedImage(format="png", data=encoded(image, "PNG")),
                 "/jpeg": CompressedImage(format="jpeg", data=encoded(image, "JPEG")),
@@ -77,7 +80,9 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
             }
             for topic, message in messages.items():
                 at = NOON + k * STEP
-                writer.write_message(topic, stamped(message, k), log_time=at + LATE, publish_time=at + LATE)
+                writer.write_message(
+                    topic, stamped(message, k), log_time=at + LATE, publish_time=at + LATE
+                )
     return path
 
 
@@ -91,11 +96,17 @@ def write_json(tmp_path: Path) -> Callable[..., Path]:
             writer = Writer(stream, compression=CompressionType.LZ4)
             writer.start(profile="", library="test")
             for topic, messages in topics.items():
-                schema = writer.register_schema(name=topic.strip("/"), encoding="jsonschema", data=b"{}")
-                channel = writer.register_channel(topic=topic, message_encoding="json", schema_id=schema)
+                schema = writer.register_schema(
+                    name=topic.strip("/"), encoding="jsonschema", data=b"{}"
+                )
+                channel = writer.register_channel(
+                    topic=topic, message_encoding="json", schema_id=schema
+                )
                 for k, message in enumerate(messages):
                     at = NOON + k * 100_000_000
-                    writer.add_message(channel, log_time=at, publish_time=at, data=json.dumps(message).encode())
+                    writer.add_message(
+                        channel, log_time=at, publish_time=at, data=json.dumps(message).encode()
+                    )
             writer.finish()
         return path
 

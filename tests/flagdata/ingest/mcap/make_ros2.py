@@ -1,7 +1,9 @@
-"""Writes ros2.mcap beside it, by another program's encoder: `pip install mcap-ros2-support`, then run this file.
+"""Writes ros2.mcap beside it, by another program's encoder: `pip install mcap-ros2-support`, then
+run this file.
 
-Twelve messages a topic, one every 100 ms from noon, logged 5 ms late: a PNG of gray 50 + 5k, a mono8 image of 200 - 5k
-with four bytes of padding a row, a pressure of 101325 + k Pa, and a type of the writer's own with a wind.
+Twelve messages a topic, one every 100 ms from noon, logged 5 ms late: a PNG of gray 50 + 5k, a
+mono8 image of 200 - 5k with four bytes of padding a row, a pressure of 101325 + k Pa, and a type of
+the writer's own with a wind.
 """
 
 import io
@@ -28,7 +30,8 @@ TYPES = {
     ),
     "/image": (
         "sensor_msgs/msg/Image",
-        "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\nuint32 step\n"
+        "std_msgs/Header header\nuint32 height\nuint32 width\nstring encoding\nuint8 "
+        "is_bigendian\nuint32 step\n"
         "uint8[] data" + HEADER,
     ),
     "/pressure": (

@@ -1,4 +1,5 @@
-"""Bags as ROS writes them: plain CDR of ROS 2 and messages of ROS 1, by the mcap library's writer."""
+"""Bags as ROS writes them: plain CDR of ROS 2 and messages of ROS 1, by the mcap library's
+writer."""
 
 from __future__ import annotations
 
@@ -15,16 +16,23 @@ from flagdata.core.arrays import UInt8Array
 from tests.flagdata.ingest.mcap.conftest import NOON, STEP, encoded
 
 TIME = "=" * 80 + "\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
-HEADER = "std_msgs/Header header\n{}\n" + "=" * 80 + "\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\n"
+HEADER = (
+    "std_msgs/Header header\n{}\n"
+    + "=" * 80
+    + "\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\n"
+)
 HEADER += "string frame_id\n" + TIME
 COMPRESSED = HEADER.format("string format\nuint8[] data")
-PLAIN = HEADER.format("uint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\nuint32 step\nuint8[] data")
+PLAIN = HEADER.format(
+    "uint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\nuint32 step\nuint8[] data"
+)
 WIND = "builtin_interfaces/Time stamp\nfloat64 speed\nfloat64 direction\n" + TIME
 WARM_WIND = WIND.replace("float64 speed", "float64 temperature\nfloat64 speed")
 
 
 class Cdr:
-    """A message of ROS 2, little-endian; of ROS 1 without header, alignment and the NUL behind a text."""
+    """A message of ROS 2, little-endian; of ROS 1 without header, alignment and the NUL behind a
+    text."""
 
     def __init__(self, *, ros1: bool = False) -> None:
         self._data = bytearray()
@@ -61,7 +69,14 @@ def compressed(instant: int, k: int, *, form: str = "PNG", said: str = "png") ->
 
 
 def plain(instant: int, image: NDArray[np.generic], encoding: str) -> bytes:
-    made = Cdr().stamp(instant).text("cam").put("I", image.shape[0]).put("I", image.shape[1]).text(encoding)
+    made = (
+        Cdr()
+        .stamp(instant)
+        .text("cam")
+        .put("I", image.shape[0])
+        .put("I", image.shape[1])
+        .text(encoding)
+    )
     return made.put("B", 0).put("I", image.strides[0]).data(image.tobytes()).done()
 
 
@@ -93,7 +108,8 @@ def channel(writer: Writer, topic: str, name: str, definition: str) -> int:
 
 
 def film(path: Path, numbers: Sequence[int], *, topic: str = "/cam") -> Path:
-    """A bag of PNG pictures of these numbers, each 40 ms after the one before, counted from noon."""
+    """A bag of PNG pictures of these numbers, each 40 ms after the one before, counted from
+    noon."""
     with bag(path) as writer:
         camera = channel(writer, topic, "sensor_msgs/msg/CompressedImage", COMPRESSED)
         for k in numbers:

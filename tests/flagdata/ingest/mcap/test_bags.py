@@ -1,4 +1,5 @@
-"""A bag's folder is one recording; bags of other kinds are refused by name, with what leads to one that is read."""
+"""A bag's folder is one recording; bags of other kinds are refused by name, with what leads to one
+that is read."""
 
 from __future__ import annotations
 
@@ -30,7 +31,10 @@ from tests.flagdata.ingest.mcap.conftest import NOON
 from tests.flagdata.ingest.mcap.ros import WIND, bag, channel, film, wind
 from tests.flagdata.ingest.mcap.test_mcap_layout import COLUMNS, grays
 
-NAMED = "rosbag2_bagfile_information:\n  version: 8\n  storage_identifier: mcap\n  relative_file_paths:\n"
+NAMED = (
+    "rosbag2_bagfile_information:\n  version: 8\n  storage_identifier: mcap\n  "
+    "relative_file_paths:\n"
+)
 
 
 def recorded(folder: Path, parts: int = 12, *, described: bool = True) -> Path:
@@ -39,12 +43,16 @@ def recorded(folder: Path, parts: int = 12, *, described: bool = True) -> Path:
     for part in range(parts):
         film(folder / f"bag_{part}.mcap", range(part * 5, part * 5 + 5))
     if described:
-        (folder / "metadata.yaml").write_text(NAMED + "".join(f"    - bag_{k}.mcap\n" for k in range(parts)))
+        (folder / "metadata.yaml").write_text(
+            NAMED + "".join(f"    - bag_{k}.mcap\n" for k in range(parts))
+        )
     return folder
 
 
 @pytest.mark.parametrize("described", [True, False])
-def test_the_folder_of_a_bag_is_read_as_one_recording(tmp_path: Path, lake: Lake, described: bool) -> None:
+def test_the_folder_of_a_bag_is_read_as_one_recording(
+    tmp_path: Path, lake: Lake, described: bool
+) -> None:
     folder = recorded(tmp_path / "bag", described=described)
     (folder / "._bag_0.mcap").write_bytes(b"\0\5\x16\7 beside")
     assert classify(folder).kind == "camera"
@@ -80,7 +88,9 @@ def test_a_part_that_is_missing_is_named(tmp_path: Path) -> None:
     assert grays(folder)[0] == [0, 1, 2, 3, 4, 10, 11, 12, 13, 14]
 
 
-def test_files_of_a_folder_that_were_recorded_at_the_same_time_are_not_joined(tmp_path: Path) -> None:
+def test_files_of_a_folder_that_were_recorded_at_the_same_time_are_not_joined(
+    tmp_path: Path,
+) -> None:
     folder = tmp_path / "bag"
     folder.mkdir()
     film(folder / "left.mcap", range(0, 140, 2))
@@ -89,14 +99,21 @@ def test_files_of_a_folder_that_were_recorded_at_the_same_time_are_not_joined(tm
         grays(folder)
 
 
-def test_files_to_join_are_refused_with_the_commands_that_make_them_one(tmp_path: Path, lake: Lake) -> None:
+def test_files_to_join_are_refused_with_the_commands_that_make_them_one(
+    tmp_path: Path, lake: Lake
+) -> None:
     folder = recorded(tmp_path / "bag")
     run = CliRunner()
     parts = [str(folder / f"bag_{k}.mcap") for k in range(12)]
     done = run.invoke(root, ["ingest", *parts, "--join", "--lake", str(lake.path)])
     assert isinstance(done.exception, UsageError)
     assert f"flagdata ingest {folder}" in done.exception.fix
-    assert run.invoke(root, ["ingest", str(folder), "--rate", "native", "--lake", str(lake.path)]).exit_code == 0
+    assert (
+        run.invoke(
+            root, ["ingest", str(folder), "--rate", "native", "--lake", str(lake.path)]
+        ).exit_code
+        == 0
+    )
     assert [row["frame_count"] for row in lake.rows().to_pylist()] == [60]
     (folder / "metadata.yaml").unlink()
     with pytest.raises(UsageError) as raised:
@@ -107,12 +124,20 @@ def test_files_to_join_are_refused_with_the_commands_that_make_them_one(tmp_path
 
 
 @pytest.mark.parametrize("order", [("film", "log"), ("log", "film"), ("log", "log2")])
-def test_what_is_no_film_is_not_joined(video: Path, tmp_path: Path, lake: Lake, order: tuple[str, str]) -> None:
+def test_what_is_no_film_is_not_joined(
+    video: Path, tmp_path: Path, lake: Lake, order: tuple[str, str]
+) -> None:
     rows = "".join(f"2026-05-01T12:00:{k:02d}Z,{3 + k % 7 / 10}\n" for k in range(60))
-    paths = {"film": shutil.copy(video, tmp_path / "a.mp4"), "log": tmp_path / "b.csv", "log2": tmp_path / "c.csv"}
+    paths = {
+        "film": shutil.copy(video, tmp_path / "a.mp4"),
+        "log": tmp_path / "b.csv",
+        "log2": tmp_path / "c.csv",
+    }
     for name in ("log", "log2"):
         Path(paths[name]).write_text("time,wind_speed (m/s)\n" + rows)
-    done = CliRunner().invoke(root, ["ingest", *(str(paths[one]) for one in order), "--join", "--lake", str(lake.path)])
+    done = CliRunner().invoke(
+        root, ["ingest", *(str(paths[one]) for one in order), "--join", "--lake", str(lake.path)]
+    )
     assert isinstance(done.exception, UsageError)
     assert "a wind log cannot be joined" in done.exception.what
     assert lake.rows().num_rows == 0
@@ -120,8 +145,14 @@ def test_what_is_no_film_is_not_joined(video: Path, tmp_path: Path, lake: Lake, 
 
 def sqlite_bag(path: Path) -> Path:
     with sqlite3.connect(path) as base:
-        base.execute("create table topics(id integer primary key, name text, type text, serialization_format text)")
-        base.execute("create table messages(id integer primary key, topic_id integer, timestamp integer, data blob)")
+        base.execute(
+            "create table topics(id integer primary key, name text, type text, "
+            "serialization_format text)"
+        )
+        base.execute(
+            "create table messages(id integer primary key, topic_id integer, timestamp integer, "
+            "data blob)"
+        )
     base.close()
     return path
 

@@ -1,4 +1,5 @@
-"""Pictures of 16 bits show what is in them, or are refused as what they are; none comes out black."""
+"""Pictures of 16 bits show what is in them, or are refused as what they are; none comes out
+black."""
 
 from __future__ import annotations
 
@@ -38,7 +39,9 @@ def stills(path: Path, *, scale: int, said: str, white: int = 255) -> Path:
 
 
 @pytest.mark.parametrize(("scale", "reported"), [(257, False), (16, True), (4, True)])
-def test_grays_of_16_bits_that_fill_fewer_are_shown_and_reported(tmp_path: Path, scale: int, reported: bool) -> None:
+def test_grays_of_16_bits_that_fill_fewer_are_shown_and_reported(
+    tmp_path: Path, scale: int, reported: bool
+) -> None:
     found, kinds = grays(stills(tmp_path / "a.mcap", scale=scale, said="mono16; png compressed "))
     assert found == list(range(20))
     assert ("depth-by-content" in kinds) is reported
@@ -46,7 +49,9 @@ def test_grays_of_16_bits_that_fill_fewer_are_shown_and_reported(tmp_path: Path,
 
 @pytest.mark.parametrize("white", [100, 187, 255])
 @pytest.mark.parametrize("scale", [4, 16, 64, 257])
-def test_a_topic_and_a_folder_of_the_same_pictures_are_read_alike(tmp_path: Path, scale: int, white: int) -> None:
+def test_a_topic_and_a_folder_of_the_same_pictures_are_read_alike(
+    tmp_path: Path, scale: int, white: int
+) -> None:
     path = stills(tmp_path / "a.mcap", scale=scale, said="mono16; png compressed ", white=white)
     (tmp_path / "images").mkdir()
     for k in range(20):
@@ -65,14 +70,18 @@ def test_a_topic_and_a_folder_of_the_same_pictures_are_read_alike(tmp_path: Path
     np.testing.assert_array_equal(of_topic, of_folder)
 
 
-@pytest.mark.parametrize("said", ["16UC1; png compressed ", "16UC1; compressedDepth png", "32FC1; compressedDepth rvl"])
+@pytest.mark.parametrize(
+    "said", ["16UC1; png compressed ", "16UC1; compressedDepth png", "32FC1; compressedDepth rvl"]
+)
 def test_depths_are_refused_by_the_name_of_their_format(tmp_path: Path, said: str) -> None:
     with pytest.raises(InputError, match=said.strip().split(";")[0]):
         grays(stills(tmp_path / "a.mcap", scale=20, said=said))
 
 
 @pytest.mark.parametrize("encoding", ["mono16", "16UC1", "32FC1", "bayer_rggb8", "nv12"])
-def test_plain_pixels_that_are_not_read_are_refused_by_their_encoding(tmp_path: Path, encoding: str) -> None:
+def test_plain_pixels_that_are_not_read_are_refused_by_their_encoding(
+    tmp_path: Path, encoding: str
+) -> None:
     path = tmp_path / "a.mcap"
     with bag(path) as writer:
         camera = channel(writer, "/cam", "sensor_msgs/msg/Image", PLAIN)

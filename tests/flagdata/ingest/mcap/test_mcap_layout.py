@@ -35,13 +35,17 @@ def leave_chunks(writer: Writer) -> None:
 def half_outside(path: Path, *, pictures: bool) -> Path:
     """Forty messages, the last ten of them behind the last chunk."""
     with bag(path) as writer:
-        kind = ("sensor_msgs/msg/CompressedImage", COMPRESSED) if pictures else ("my/msg/Wind", WIND)
+        kind = (
+            ("sensor_msgs/msg/CompressedImage", COMPRESSED) if pictures else ("my/msg/Wind", WIND)
+        )
         one = channel(writer, "/one", *kind)
         for k in range(40):
             if k == 30:
                 leave_chunks(writer)
             at = NOON + k * (STEP if pictures else 10**9)
-            writer.add_message(one, at, compressed(at, k) if pictures else wind(at, 3 + k % 7 / 10), at)
+            writer.add_message(
+                one, at, compressed(at, k) if pictures else wind(at, 3 + k % 7 / 10), at
+            )
     return path
 
 
@@ -61,9 +65,19 @@ def test_readings_behind_the_last_chunk_are_read(tmp_path: Path) -> None:
     "how",
     [
         {"use_chunking": False},
-        {"use_statistics": False, "use_summary_offsets": False, "repeat_channels": False, "repeat_schemas": False},
+        {
+            "use_statistics": False,
+            "use_summary_offsets": False,
+            "repeat_channels": False,
+            "repeat_schemas": False,
+        },
         {"index_types": IndexType.NONE},
-        {"index_types": IndexType.NONE, "use_statistics": False, "repeat_channels": False, "repeat_schemas": False},
+        {
+            "index_types": IndexType.NONE,
+            "use_statistics": False,
+            "repeat_channels": False,
+            "repeat_schemas": False,
+        },
         {"chunk_size": 1},
     ],
 )
@@ -76,26 +90,36 @@ def test_a_file_is_read_whether_it_has_chunks_a_summary_and_an_index_or_none(
         writer.start()
         one = channel(writer, "/cam", "sensor_msgs/msg/CompressedImage", COMPRESSED)
         for k in range(12):
-            writer.add_message(one, NOON + k * STEP, compressed(NOON + k * STEP, k), NOON + k * STEP)
+            writer.add_message(
+                one, NOON + k * STEP, compressed(NOON + k * STEP, k), NOON + k * STEP
+            )
         writer.finish()
     assert grays(path)[0] == list(range(12))
 
 
-def test_messages_that_the_summary_counts_and_the_file_does_not_have_are_reported(tmp_path: Path) -> None:
+def test_messages_that_the_summary_counts_and_the_file_does_not_have_are_reported(
+    tmp_path: Path,
+) -> None:
     path = tmp_path / "a.mcap"
     with bag(path) as writer:
         one = channel(writer, "/cam", "sensor_msgs/msg/CompressedImage", COMPRESSED)
         for k in range(12):
-            writer.add_message(one, NOON + k * STEP, compressed(NOON + k * STEP, k), NOON + k * STEP)
+            writer.add_message(
+                one, NOON + k * STEP, compressed(NOON + k * STEP, k), NOON + k * STEP
+            )
         inner: Any = writer
         inner._Writer__statistics.channel_message_counts[one] += 5
     found, kinds = grays(path)
     assert found == list(range(12))
     assert "messages-missing" in kinds
-    assert [one.kind for one in examine(path).findings if one.kind.startswith("messages")] == ["messages-missing"]
+    assert [one.kind for one in examine(path).findings if one.kind.startswith("messages")] == [
+        "messages-missing"
+    ]
 
 
-def test_files_written_one_behind_another_are_refused_with_the_commands_that_cut_them(tmp_path: Path) -> None:
+def test_files_written_one_behind_another_are_refused_with_the_commands_that_cut_them(
+    tmp_path: Path,
+) -> None:
     first, second = film(tmp_path / "a.mcap", range(3)), film(tmp_path / "b.mcap", range(3, 6))
     both = tmp_path / "both.mcap"
     both.write_bytes(first.read_bytes() + second.read_bytes())

@@ -1,4 +1,5 @@
-"""Pictures of a topic: their grays and instants are those that were written, however they are coded."""
+"""Pictures of a topic: their grays and instants are those that were written, however they are
+coded."""
 
 from __future__ import annotations
 
@@ -12,7 +13,16 @@ import zstandard
 from mcap.writer import CompressionType, Writer
 
 from flagdata.errors import CorruptError, InputError, LimitError, UnknownNameError, UsageError
-from flagdata.ingest import CameraIngest, CameraOptions, classify, guesses, ingest_camera, messages, open_camera, topics
+from flagdata.ingest import (
+    CameraIngest,
+    CameraOptions,
+    classify,
+    guesses,
+    ingest_camera,
+    messages,
+    open_camera,
+    topics,
+)
 from flagdata.ingest.mcap.mcap_pictures import TopicSource
 from flagdata.ingest.mcap.topics import index
 from flagdata.lake import Lake
@@ -26,8 +36,12 @@ def options(topic: str | None = None) -> CameraOptions:
     return CameraOptions(topic=topic, rate="native", size=64)
 
 
-@pytest.mark.parametrize(("topic", "error"), [("/png", 0), ("/jpeg", 1), ("/raw", 0), ("/video", 2)])
-def test_each_picture_has_its_gray_and_the_instant_that_its_message_states(drive: Path, topic: str, error: int) -> None:
+@pytest.mark.parametrize(
+    ("topic", "error"), [("/png", 0), ("/jpeg", 1), ("/raw", 0), ("/video", 2)]
+)
+def test_each_picture_has_its_gray_and_the_instant_that_its_message_states(
+    drive: Path, topic: str, error: int
+) -> None:
     assert classify(drive, topic=topic).kind == "camera"
     with open_camera(drive, options(topic)) as stream:
         frames = list(stream)
@@ -65,12 +79,19 @@ def test_runs_are_spread_over_the_topic_whatever_its_coding(drive: Path) -> None
         firsts = [NOON + k * STEP for k in (0, 16, 33)]
         late = 10 * STEP if topic == "/video" else 0  # the next key frame
         assert [len(run) for run in runs] == [4, 4, 4]
-        assert all(first <= (run[0].stamp or 0) <= first + late for run, first in zip(runs, firsts, strict=True))
+        assert all(
+            first <= (run[0].stamp or 0) <= first + late
+            for run, first in zip(runs, firsts, strict=True)
+        )
         for run in runs:
-            assert [int((one.stamp or 0) - (run[0].stamp or 0)) for one in run] == [2 * k * STEP for k in range(4)]
+            assert [int((one.stamp or 0) - (run[0].stamp or 0)) for one in run] == [
+                2 * k * STEP for k in range(4)
+            ]
             for one in run:
                 gray = one.luma()
-                level = (np.asarray(gray.image).mean() - gray.black) / (gray.white - gray.black) * 255
+                level = (
+                    (np.asarray(gray.image).mean() - gray.black) / (gray.white - gray.black) * 255
+                )
                 assert level == pytest.approx(40 + 3 * ((one.stamp or 0) - NOON) / STEP, abs=2)
 
 
@@ -79,7 +100,9 @@ def test_a_topic_of_a_video_file_is_refused(video: Path) -> None:
         open_camera(video, options("/png"))
 
 
-def test_a_file_that_was_cut_off_is_refused_with_the_command_that_salvages_it(drive: Path, tmp_path: Path) -> None:
+def test_a_file_that_was_cut_off_is_refused_with_the_command_that_salvages_it(
+    drive: Path, tmp_path: Path
+) -> None:
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(drive.read_bytes()[:-2000])
     with pytest.raises(CorruptError) as raised:
@@ -92,14 +115,18 @@ def test_a_file_that_was_cut_off_is_refused_with_the_command_that_salvages_it(dr
         assert [frame.time for frame in stream] == [NOON + k * STEP for k in range(FRAMES)]
 
 
-def test_pictures_that_cannot_be_decoded_are_counted_and_left_out(write_json: Callable[..., Path], drive: Path) -> None:
+def test_pictures_that_cannot_be_decoded_are_counted_and_left_out(
+    write_json: Callable[..., Path], drive: Path
+) -> None:
     import base64
 
     from tests.flagdata.ingest.mcap.conftest import encoded, pictures
 
     good = [base64.b64encode(encoded(image, "PNG")).decode() for image in pictures()[:4]]
     data = [good[0], good[1][: len(good[1]) // 2], good[2], good[3]]
-    path = write_json({"/foxglove.CompressedImage": [{"format": "png", "data": one} for one in data]})
+    path = write_json(
+        {"/foxglove.CompressedImage": [{"format": "png", "data": one} for one in data]}
+    )
     with open_camera(path, options()) as stream:
         times = [frame.time for frame in stream]
     assert times == [NOON, NOON + 200_000_000, NOON + 300_000_000]
@@ -125,7 +152,9 @@ def test_plain_pixels_whose_numbers_or_bytes_make_no_sense_are_left_out(
     write_json: Callable[..., Path], wrong: dict[str, Any]
 ) -> None:
     sound = {"encoding": "mono8", "width": 2, "height": 2, "step": 2, "data": [9, 9, 9, 9]}
-    with open_camera(write_json({"/foxglove.RawImage": [sound, sound | wrong, sound]}), options()) as stream:
+    with open_camera(
+        write_json({"/foxglove.RawImage": [sound, sound | wrong, sound]}), options()
+    ) as stream:
         assert len(list(stream)) == 2
     assert [finding.count for finding in stream.findings if finding.kind == "corrupt-frames"] == [1]
 
@@ -144,7 +173,9 @@ def test_a_chunk_that_would_unpack_to_more_than_the_limit_is_refused_before_it_i
         topics(write_json({"/a": [{"x": 1.0}]}))
 
 
-def test_a_chunk_that_unpacks_to_more_than_it_states_is_damage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_chunk_that_unpacks_to_more_than_it_states_is_damage(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = tmp_path / "bomb.mcap"
     monkeypatch.setattr(zstandard, "compress", lambda data: zstd_compress(bytes(5000) + data))
     with path.open("wb") as stream:

@@ -1,4 +1,5 @@
-"""Numbers of a topic are read as an anemometer's table: its fields are columns, its messages rows."""
+"""Numbers of a topic are read as an anemometer's table: its fields are columns, its messages
+rows."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ COLUMNS = "time=time,air.speed=wind_speed[km/h],air.from.0=wind_direction[deg]"
 
 
 def wind(count: int = 60) -> list[dict[str, Any]]:
-    """Nested numbers: a speed about 20 km/h, a direction, a text, and a stamp of its own each second."""
+    """Nested numbers: a speed about 20 km/h, a direction, a text, and a stamp of its own each
+    second."""
     return [
         {
             "timestamp": {"sec": NOON // 10**9 + k, "nsec": 250_000_000},
@@ -39,23 +41,31 @@ def test_columns_are_given_by_the_path_of_a_field(write_json: Callable[..., Path
     series = read_log(path, WindOptions(topic="/mast", columns=COLUMNS)).series
     np.testing.assert_array_equal(series.time, NOON + 250_000_000 + 10**9 * np.arange(60))
     np.testing.assert_allclose(series.channels["wind_speed"], np.array(SPEED) / 3.6)
-    np.testing.assert_allclose(series.channels["wind_direction"], np.radians(90 + np.arange(60) % 7))
+    np.testing.assert_allclose(
+        series.channels["wind_direction"], np.radians(90 + np.arange(60) % 7)
+    )
 
 
 def test_several_topics_of_numbers_are_listed(write_json: Callable[..., Path]) -> None:
-    path = write_json({"/mast": wind(), "/battery": [{"volts": 12.5}], "/text": [{"text": "no number"}]})
+    path = write_json(
+        {"/mast": wind(), "/battery": [{"volts": 12.5}], "/text": [{"text": "no number"}]}
+    )
     with pytest.raises(InputError, match=r"2 topics hold numbers: /battery .*, /mast") as raised:
         read_log(path, WindOptions(columns=COLUMNS))
     assert "--topic" in raised.value.fix
     assert classify(path, topic="/mast").kind == "anemometer"
 
 
-def test_a_topic_of_numbers_becomes_a_log_of_the_lake(write_json: Callable[..., Path], lake: Lake) -> None:
+def test_a_topic_of_numbers_becomes_a_log_of_the_lake(
+    write_json: Callable[..., Path], lake: Lake
+) -> None:
     path = write_json({"/mast": wind()})
     made = ingest_wind(lake, path, WindIngest(wind=WindOptions(columns=COLUMNS)), confirm=CONFIRMED)
     assert made.created
     assert made.report["samples"] == 60
-    assert {"log-not-attached", "topic-read"} <= {finding["kind"] for finding in made.report["findings"]}
+    assert {"log-not-attached", "topic-read"} <= {
+        finding["kind"] for finding in made.report["findings"]
+    }
 
 
 def test_flagdatas_own_samples_in_another_programs_file_need_no_units(tmp_path: Path) -> None:
@@ -81,8 +91,12 @@ def test_flagdatas_own_samples_in_another_programs_file_need_no_units(tmp_path: 
             assert schema is not None
             if channel.topic not in numbers:
                 known = writer.register_schema(schema.name, schema.encoding, schema.data)
-                numbers[channel.topic] = writer.register_channel(channel.topic, channel.message_encoding, known)
-            writer.add_message(numbers[channel.topic], message.log_time, message.data, message.publish_time)
+                numbers[channel.topic] = writer.register_channel(
+                    channel.topic, channel.message_encoding, known
+                )
+            writer.add_message(
+                numbers[channel.topic], message.log_time, message.data, message.publish_time
+            )
         writer.finish()
     assert classify(filtered).kind == "anemometer"
     found = read_log(filtered).series

@@ -1,4 +1,5 @@
-"""Topics of ROS 2, encoded by another program (`make_ros2`): pictures and numbers are those that it was given."""
+"""Topics of ROS 2, encoded by another program (`make_ros2`): pictures and numbers are those that it
+was given."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ NOON, STEP = 1_777_636_800_000_000_000, 100_000_000
 
 
 @pytest.mark.parametrize(
-    ("topic", "grays"), [("/compressed", 50 + 5 * np.arange(12)), ("/image", 200 - 5 * np.arange(12))]
+    ("topic", "grays"),
+    [("/compressed", 50 + 5 * np.arange(12)), ("/image", 200 - 5 * np.arange(12))],
 )
 def test_pictures_are_read_by_the_stamp_of_their_header(topic: str, grays: np.ndarray) -> None:
     with open_camera(FILE, CameraOptions(topic=topic, rate="native", size=64)) as stream:
@@ -26,10 +28,14 @@ def test_pictures_are_read_by_the_stamp_of_their_header(topic: str, grays: np.nd
 
 
 def test_numbers_within_lists_of_messages_are_read_by_their_path() -> None:
-    columns = "time=time,readings.1.speed=wind_speed[m/s],readings.1.from_degrees=wind_direction[deg]"
+    columns = (
+        "time=time,readings.1.speed=wind_speed[m/s],readings.1.from_degrees=wind_direction[deg]"
+    )
     series = read_log(FILE, WindOptions(topic="/mast", columns=columns)).series
     np.testing.assert_array_equal(series.time, NOON + STEP * np.arange(12))
-    np.testing.assert_allclose(series.channels["wind_speed"], [6 + (k * 5 % 7) / 4 for k in range(12)])
+    np.testing.assert_allclose(
+        series.channels["wind_speed"], [6 + (k * 5 % 7) / 4 for k in range(12)]
+    )
     np.testing.assert_allclose(np.degrees(series.channels["wind_direction"]), 90.0 + np.arange(12))
 
 
@@ -56,14 +62,21 @@ def test_every_field_has_the_value_that_was_encoded() -> None:
 
 
 def test_a_big_endian_message_is_read_by_its_header() -> None:
-    # Plain CDR by hand: header 00 00 (big-endian), uint8 7, padding to 4, uint32 258, padding to 8, float64 1.0.
+    # Plain CDR by hand: header 00 00 (big-endian), uint8 7, padding to 4, uint32 258, padding to 8,
+    # float64 1.0.
     data = bytes.fromhex("00000000 07000000 00000102 3ff0000000000000")
-    assert cdr.decoder("a/msg/B", "uint8 x\nuint32 y\nfloat64 z")(data) == {"x": 7, "y": 258, "z": 1.0}
+    assert cdr.decoder("a/msg/B", "uint8 x\nuint32 y\nfloat64 z")(data) == {
+        "x": 7,
+        "y": 258,
+        "z": 1.0,
+    }
 
 
 def test_messages_that_end_too_soon_and_types_that_are_not_defined_are_refused() -> None:
     decode = cdr.decoder("a/msg/B", "string name\nfloat64[] values")
-    whole = bytes.fromhex("00010000 02000000 6100 0000 01000000 00000000 000000000000f03f".replace(" ", ""))
+    whole = bytes.fromhex(
+        "00010000 02000000 6100 0000 01000000 00000000 000000000000f03f".replace(" ", "")
+    )
     assert decode(whole)["name"] == "a"
     for end in (3, 8, 20):
         with pytest.raises(CorruptError):

@@ -1,4 +1,5 @@
-"""Frames that are not of one cloth in motion are reported: vertices that change places, jumps, other meshes."""
+"""Frames that are not of one cloth in motion are reported: vertices that change places, jumps,
+other meshes."""
 
 from __future__ import annotations
 
@@ -52,7 +53,9 @@ def test_a_cloth_in_motion_has_no_finding(uneven: bool) -> None:
 
 @pytest.mark.parametrize("pair", [(0, 1), (N + 1, N + 2), (24, 25), (5, 40), (0, (N + 1) ** 2 - 1)])
 @pytest.mark.parametrize("uneven", [False, True])
-def test_two_vertices_that_change_places_in_one_frame_are_reported(pair: tuple[int, int], uneven: bool) -> None:
+def test_two_vertices_that_change_places_in_one_frame_are_reported(
+    pair: tuple[int, int], uneven: bool
+) -> None:
     order = np.arange((N + 1) ** 2)
     order[list(pair)] = order[list(pair)[::-1]]
     (found,) = continuity(renumbered(sheet(uneven=uneven), 3, order))
@@ -72,8 +75,12 @@ def test_vertices_that_are_numbered_from_the_other_corner_are_reported() -> None
 
 def test_a_cloth_that_starts_to_move_does_not_jump() -> None:
     whole = sheet()
-    moved = np.where(np.arange(FRAMES)[:, None, None] < 4, 0.0, 0.02 * (np.arange(FRAMES) - 3)[:, None, None])
-    assert continuity(replace(whole, positions=(whole.positions[:1] + moved).astype(np.float32))) == ()
+    moved = np.where(
+        np.arange(FRAMES)[:, None, None] < 4, 0.0, 0.02 * (np.arange(FRAMES) - 3)[:, None, None]
+    )
+    assert (
+        continuity(replace(whole, positions=(whole.positions[:1] + moved).astype(np.float32))) == ()
+    )
 
 
 def frames(folder: Path, meshes: list[Obj], names: str = "s_{:03d}.obj") -> Path:
@@ -85,7 +92,11 @@ def frames(folder: Path, meshes: list[Obj], names: str = "s_{:03d}.obj") -> Path
 
 def objects(whole: MeshSequence) -> list[Obj]:
     return [
-        Obj(positions=p.astype(float), faces=whole.faces.astype(np.int64), rest=whole.rest.astype(float))
+        Obj(
+            positions=p.astype(float),
+            faces=whole.faces.astype(np.int64),
+            rest=whole.rest.astype(float),
+        )
         for p in whole.positions
     ]
 
@@ -93,7 +104,9 @@ def objects(whole: MeshSequence) -> list[Obj]:
 def test_faces_that_are_wound_the_other_way_in_one_frame_are_reported(tmp_path: Path) -> None:
     meshes = objects(sheet())
     meshes[3] = replace(meshes[3], faces=meshes[3].faces[:, ::-1])
-    found = {one.kind: one for one in findings(read_folder(frames(tmp_path / "flip", meshes), rate=25))}
+    found = {
+        one.kind: one for one in findings(read_folder(frames(tmp_path / "flip", meshes), rate=25))
+    }
     assert set(found) == {"faces-turned-over", "topology-changes"}
     assert found["faces-turned-over"].where == "frame 3"
     assert found["faces-turned-over"].count == 2 * N * N
@@ -117,7 +130,9 @@ def test_a_mesh_that_changes_is_noted_with_its_counts(tmp_path: Path) -> None:
         rest=np.r_[meshes[3].rest, [[1.15, 1.0]]],
         faces=np.r_[meshes[3].faces, [[(N + 1) ** 2 - 2, (N + 1) ** 2, (N + 1) ** 2 - 1]]],
     )
-    found = findings(read_folder(frames(tmp_path / "more", [*meshes[:3], more, *meshes[4:]]), rate=25))
+    found = findings(
+        read_folder(frames(tmp_path / "more", [*meshes[:3], more, *meshes[4:]]), rate=25)
+    )
     note = next(one for one in found if one.kind == "topology-changes")
     assert (note.count, note.where) == (2, "frame 3")
     assert f"{(N + 1) ** 2} to {(N + 1) ** 2 + 1} vertices" in note.what
@@ -126,7 +141,9 @@ def test_a_mesh_that_changes_is_noted_with_its_counts(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "names", ["flag_{}_high.obj", "{:04d}.obj", "take2_flag{}.obj", "v{:02d}-3.OBJ", "a (1) {}.obj"]
 )
-def test_one_number_that_varies_counts_the_frames_wherever_it_stands(tmp_path: Path, names: str) -> None:
+def test_one_number_that_varies_counts_the_frames_wherever_it_stands(
+    tmp_path: Path, names: str
+) -> None:
     found = frame_files(frames(tmp_path / "run", objects(sheet()) + objects(sheet()), names))
     assert [number for number, _ in found] == list(range(2 * FRAMES))
     assert [path.name for _, path in found] == [names.format(k) for k in range(2 * FRAMES)]

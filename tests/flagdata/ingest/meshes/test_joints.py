@@ -10,7 +10,8 @@ from flagdata.ingest import findings
 from flagdata.ingest.meshes.mesh_artifacts import t_joints
 from flagdata.lake import MeshSequence
 
-# A square metre of which the left half is one quad and the right half two, so that vertex 6 lies on the edge 1–2.
+# A square metre of which the left half is one quad and the right half two, so that vertex 6 lies on
+# the edge 1–2.
 REST = np.array([[0, 0], [0.5, 0], [0.5, 1], [0, 1], [1, 0], [1, 1], [0.5, 0.5], [1, 0.5]])
 JOINED = [[0, 1, 2], [0, 2, 3], [1, 4, 7], [1, 7, 6], [6, 7, 5], [6, 5, 2]]
 SPLIT = [[0, 1, 6], [0, 6, 2], [0, 2, 3], *JOINED[2:]]
@@ -38,7 +39,9 @@ def test_a_vertex_on_an_edge_of_another_face_is_reported(turn: float) -> None:
     assert "t-joints" in [one.kind for one in findings(sheet(JOINED, flat(turn)))]
 
 
-def test_an_edge_that_was_split_on_both_sides_and_pieces_that_meet_in_the_texture_alone_are_none() -> None:
+def test_an_edge_that_was_split_on_both_sides_and_pieces_that_meet_in_the_texture_alone_are_none() -> (
+    None
+):
     assert t_joints(sheet(SPLIT, flat())) == ()
     apart = flat()
     apart[6, 1] += 0.2  # beside the edge in space, on it in the texture

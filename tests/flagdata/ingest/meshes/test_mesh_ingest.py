@@ -1,4 +1,5 @@
-"""Mesh sequences into the lake: by content, once, with the scene's wind; a folder that is refused leaves no trace."""
+"""Mesh sequences into the lake: by content, once, with the scene's wind; a folder that is refused
+leaves no trace."""
 
 from __future__ import annotations
 
@@ -27,7 +28,12 @@ def test_a_folder_becomes_one_artifact_once(lake: Lake, make_folder: Callable[..
     assert (first.created, again.created) == (True, False)
     assert again.artifact.id == first.artifact.id
     artifact = first.artifact
-    assert (artifact.kind, artifact.frame_count, artifact.rate, artifact.wind) == (Kind.MESHES, 3, 25.0, 5.0)
+    assert (artifact.kind, artifact.frame_count, artifact.rate, artifact.wind) == (
+        Kind.MESHES,
+        3,
+        25.0,
+        5.0,
+    )
     assert json.loads(artifact.parameters or "") == {"wind_x": 3, "wind_y": 4, "wind_z": 0}
     sequence, expected = read_meshes(lake.object_path(artifact.object or "")), read_folder(folder)
     np.testing.assert_array_equal(sequence.positions, expected.positions)
@@ -44,7 +50,9 @@ def test_other_options_make_another_artifact(lake: Lake, make_folder: Callable[.
     assert len(lake.rows()) == 2
 
 
-def test_a_refused_folder_leaves_the_lake_as_it_was(lake: Lake, make_folder: Callable[..., Path]) -> None:
+def test_a_refused_folder_leaves_the_lake_as_it_was(
+    lake: Lake, make_folder: Callable[..., Path]
+) -> None:
     folder = make_folder()
     (folder / "0001_00.obj").write_text("v 0 0 nan\n")
     with pytest.raises(InputError, match="finite"):
@@ -62,11 +70,20 @@ def test_impossible_options_are_refused() -> None:
 
 
 def test_a_scene_without_a_wind_has_none() -> None:
-    cases = [None, {}, {"wind": 3}, {"wind": {}}, {"wind": {"velocity": [1, 2]}}, {"wind": {"velocity": [1, 2, "x"]}}]
+    cases = [
+        None,
+        {},
+        {"wind": 3},
+        {"wind": {}},
+        {"wind": {"velocity": [1, 2]}},
+        {"wind": {"velocity": [1, 2, "x"]}},
+    ]
     assert [scene_wind(scene) for scene in cases] == [None for scene in cases]
 
 
-def test_the_command_identifies_meshes_by_their_content(run: Run, make_folder: Callable[..., Path], lake: Lake) -> None:
+def test_the_command_identifies_meshes_by_their_content(
+    run: Run, make_folder: Callable[..., Path], lake: Lake
+) -> None:
     folder = make_folder()
     code, out, _ = run(folder, "--name", "square", "--session", "s1")
     assert code == 0
@@ -84,7 +101,10 @@ def test_the_command_identifies_meshes_by_their_content(run: Run, make_folder: C
     ("options", "word"),
     [
         (["--crop", "auto"], "--crop means nothing for a mesh sequence"),
-        (["--sensor", "generic-csv", "--as", "meshes"], "--sensor means nothing for a mesh sequence"),
+        (
+            ["--sensor", "generic-csv", "--as", "meshes"],
+            "--sensor means nothing for a mesh sequence",
+        ),
         (["--zone", "UTC"], "--zone means nothing for a mesh sequence"),
         (["--unit", "furlong"], "furlong"),
         (["--rate", "fast"], "--rate"),
@@ -118,10 +138,20 @@ def test_mixed_units_are_reported_with_a_fix(run: Run, make_folder: Callable[...
 @pytest.mark.reference
 @pytest.mark.parametrize(
     ("name", "type_", "frames", "least", "most"),
-    [("raw_fixed_mesh", MeshSequence, 51, 117, 117), ("raw_remeshed", RaggedMeshSequence, 13, 72, 2261)],
+    [
+        ("raw_fixed_mesh", MeshSequence, 51, 117, 117),
+        ("raw_remeshed", RaggedMeshSequence, 13, 72, 2261),
+    ],
 )
 def test_arcsims_own_folders_are_ingested(
-    run: Run, lake: Lake, reference_data: Path, name: str, type_: type, frames: int, least: int, most: int
+    run: Run,
+    lake: Lake,
+    reference_data: Path,
+    name: str,
+    type_: type,
+    frames: int,
+    least: int,
+    most: int,
 ) -> None:
     folder = reference_data / "arcsim" / name
     assert run(folder)[0] == 0
@@ -129,7 +159,8 @@ def test_arcsims_own_folders_are_ingested(
     report = json.loads(row["report"])
     # Counted in the files themselves: grep -c '^v ' NNNN_00.obj.
     counts = [
-        sum(line.startswith("v ") for line in f.read_text().splitlines()) for f in sorted(folder.glob("[0-9]*_00.obj"))
+        sum(line.startswith("v ") for line in f.read_text().splitlines())
+        for f in sorted(folder.glob("[0-9]*_00.obj"))
     ]
     assert (len(counts), min(counts), max(counts)) == (frames, least, most)
     assert report["vertices"] == [least, most]

@@ -13,7 +13,9 @@ from flagdata.ingest import classify, read_folder
 from flagdata.ingest.meshes.others import format_of
 from tests.flagdata.ingest.meshes.conftest import square
 
-STL = b"solid flag".ljust(80) + struct.pack("<I", 1) + struct.pack("<12fH", *[0.0] * 12, 0)  # binary all the same
+STL = (
+    b"solid flag".ljust(80) + struct.pack("<I", 1) + struct.pack("<12fH", *[0.0] * 12, 0)
+)  # binary all the same
 FILES = {
     "s.stl": (STL, "STL"),
     "s.STL": (b"solid x\nfacet normal 0 0 1\nendsolid\n", "STL"),
@@ -30,7 +32,9 @@ FILES = {
 }
 
 
-@pytest.mark.parametrize(("name", "content", "known"), [(name, *rest) for name, rest in FILES.items()])
+@pytest.mark.parametrize(
+    ("name", "content", "known"), [(name, *rest) for name, rest in FILES.items()]
+)
 def test_a_file_and_its_folder_are_refused_by_their_format_with_the_way_to_obj(
     tmp_path: Path, name: str, content: bytes, known: str
 ) -> None:

@@ -1,4 +1,5 @@
-"""Cloth whose triangles share no vertices is put together where that is exact, and reported where it is not."""
+"""Cloth whose triangles share no vertices is put together where that is exact, and reported where
+it is not."""
 
 from __future__ import annotations
 
@@ -79,18 +80,25 @@ def test_vertices_that_part_in_one_frame_stay_apart_and_are_reported() -> None:
 
 
 def test_a_seam_with_two_textures_stays_unlike_duplicates() -> None:
-    # Two panels that meet at x = 0.5: alike in space along N + 1 vertices each, apart in the texture.
+    # Two panels that meet at x = 0.5: alike in space along N + 1 vertices each, apart in the
+    # texture.
     whole = sheet()
     right = (whole.rest[whole.faces, 0].mean(axis=1) > 0.5)[:, None]
     faces = np.where(right, whole.faces + len(whole.rest), whole.faces).astype(np.int32)
     rest = np.concatenate([whole.rest, whole.rest + np.float32(2)])
     panels = MeshSequence(
-        time=whole.time, positions=np.concatenate([whole.positions] * 2, axis=1), faces=faces, rest=rest
+        time=whole.time,
+        positions=np.concatenate([whole.positions] * 2, axis=1),
+        faces=faces,
+        rest=rest,
     )
     assert weld_vertices(panels) == (panels, ())
     (finding,) = in_pieces(panels)
     assert finding.count == 2
-    assert f"{2 * (N + 1)} of its vertices lie where a vertex of another piece lies, 0 of these" in finding.what
+    assert (
+        f"{2 * (N + 1)} of its vertices lie where a vertex of another piece lies, 0 of these"
+        in finding.what
+    )
 
 
 @pytest.mark.parametrize(
@@ -102,9 +110,15 @@ def test_a_seam_with_two_textures_stays_unlike_duplicates() -> None:
         lambda faces: np.concatenate([faces, faces[:1, [0, 1, 1]]]),
     ],
 )
-def test_what_would_leave_no_surface_is_not_merged(faces: Callable[[NDArray[np.int32]], NDArray[np.int32]]) -> None:
+def test_what_would_leave_no_surface_is_not_merged(
+    faces: Callable[[NDArray[np.int32]], NDArray[np.int32]],
+) -> None:
     whole = sheet()
-    odd = soup(MeshSequence(time=whole.time, positions=whole.positions, rest=whole.rest, faces=faces(whole.faces)))
+    odd = soup(
+        MeshSequence(
+            time=whole.time, positions=whole.positions, rest=whole.rest, faces=faces(whole.faces)
+        )
+    )
     assert weld_vertices(odd) == (odd, ())
     assert in_pieces(odd)[0].count == len(odd.faces)
 
@@ -147,14 +161,21 @@ def test_both_reach_the_report_and_pieces_the_quality_of_the_artifact(tmp_path: 
     stored = read_meshes(lake.object_path(str(done.artifact.object)))
     assert stored.frame(0).rest.shape == ((N + 1) ** 2, 2)
     # Every triangle lies elsewhere in the texture.
-    rest = soup(sheet()).rest + np.repeat(np.arange(2 * N * N), 3)[:, None].astype(np.float32) * np.float32(0.01)
-    split = ingest_meshes(lake, _folder(tmp_path / "split", soup(sheet(), rest=rest)), MeshIngest(rate=25.0))
+    rest = soup(sheet()).rest + np.repeat(np.arange(2 * N * N), 3)[:, None].astype(
+        np.float32
+    ) * np.float32(0.01)
+    split = ingest_meshes(
+        lake, _folder(tmp_path / "split", soup(sheet(), rest=rest)), MeshIngest(rate=25.0)
+    )
     assert [f["kind"] for f in split.report["findings"]] == ["cloth-in-pieces"]
     assert list(split.artifact.quality) == ["cloth-in-pieces"]
 
 
-def parted(*, below: int, apart: float = 0.0, texture: float = 0.0, opens: float = 0.0) -> MeshSequence:
-    """The sheet with a row of vertices twice, up to a place: a slit from the border, or a seam across the sheet.
+def parted(
+    *, below: int, apart: float = 0.0, texture: float = 0.0, opens: float = 0.0
+) -> MeshSequence:
+    """The sheet with a row of vertices twice, up to a place: a slit from the border, or a seam
+    across the sheet.
 
     Args:
         below: how many vertices are there twice; fewer than all of the row make a slit.

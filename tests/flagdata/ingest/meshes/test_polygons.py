@@ -1,4 +1,5 @@
-"""Faces of many corners: whatever their shape, the triangles cover them once, or the face is refused by its line."""
+"""Faces of many corners: whatever their shape, the triangles cover them once, or the face is
+refused by its line."""
 
 from __future__ import annotations
 
@@ -22,7 +23,9 @@ def areas(points: FloatArray, triangles: IntArray) -> FloatArray:
     return ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
 
 
-def written(folder: Path, corners: list[tuple[float, float]], *, text: str = "vt {x} {y}\nv {x} {y} 0\n") -> Path:
+def written(
+    folder: Path, corners: list[tuple[float, float]], *, text: str = "vt {x} {y}\nv {x} {y} 0\n"
+) -> Path:
     path = folder / "mesh.obj"
     names = " ".join(f"{i}/{i}" if "vt" in text else str(i) for i in range(1, len(corners) + 1))
     path.write_text("".join(text.format(x=x, y=y) for x, y in corners) + f"f {names}\n")
@@ -31,7 +34,9 @@ def written(folder: Path, corners: list[tuple[float, float]], *, text: str = "vt
 
 @pytest.mark.parametrize("start", range(6))
 @pytest.mark.parametrize("turned", [1, -1])
-def test_a_concave_face_is_covered_once_wherever_it_begins(tmp_path: Path, start: int, turned: int) -> None:
+def test_a_concave_face_is_covered_once_wherever_it_begins(
+    tmp_path: Path, start: int, turned: int
+) -> None:
     # An L of three squares of 0.1 m: 0.03 m².
     mesh = read_obj(written(tmp_path, [*ELL[start:], *ELL[:start]][::turned]))
     found = areas(mesh.rest, mesh.faces)
@@ -49,14 +54,17 @@ def test_without_texture_the_plane_of_the_face_in_space_counts(tmp_path: Path, l
 
 
 def test_every_frame_is_split_alike_however_the_cloth_is_bent(tmp_path: Path) -> None:
-    # The square's corners are folded over in space, so that by the plane in space the split would be another one.
+    # The square's corners are folded over in space, so that by the plane in space the split would
+    # be another one.
     flat = read_obj(written(tmp_path, ELL))
     bent = read_obj(written(tmp_path, ELL, text="vt {x} {y}\nv {y} 0.1 {x}e-1\n"))
     np.testing.assert_array_equal(flat.faces, bent.faces)
 
 
 def test_corners_in_a_line_make_no_triangle_without_area(tmp_path: Path) -> None:
-    mesh = read_obj(written(tmp_path, [(0, 0), (1, 0), (2, 0), (2, 1), (2, 2), (1, 2), (0, 2), (0, 1)]))
+    mesh = read_obj(
+        written(tmp_path, [(0, 0), (1, 0), (2, 0), (2, 1), (2, 2), (1, 2), (0, 2), (0, 1)])
+    )
     found = areas(mesh.rest, mesh.faces)
     assert found.min() > 0.1
     assert found.sum() == pytest.approx(4)
@@ -83,10 +91,18 @@ def test_a_face_that_is_no_simple_polygon_is_refused_by_its_line(
     assert (caught.value.where or "").endswith(f"mesh.obj, line {2 * len(corners) + 1}")
 
 
-@given(st.lists(st.floats(0.1, 1.0), min_size=4, max_size=24), st.integers(0, 23), st.sampled_from([1, -1]))
-def test_any_star_shaped_polygon_is_covered_once(radii: list[float], first: int, turned: int) -> None:
+@given(
+    st.lists(st.floats(0.1, 1.0), min_size=4, max_size=24),
+    st.integers(0, 23),
+    st.sampled_from([1, -1]),
+)
+def test_any_star_shaped_polygon_is_covered_once(
+    radii: list[float], first: int, turned: int
+) -> None:
     angle = 2 * np.pi * np.arange(len(radii)) / len(radii)
-    corners = np.roll(np.stack([np.cos(angle), np.sin(angle)], axis=1) * np.array(radii)[:, None], first, axis=0)
+    corners = np.roll(
+        np.stack([np.cos(angle), np.sin(angle)], axis=1) * np.array(radii)[:, None], first, axis=0
+    )
     found = areas(corners[::turned], ears(corners[::turned]))
     own = np.array(radii) * np.roll(radii, -1) * np.sin(2 * np.pi / len(radii)) / 2
     assert len(found) == len(radii) - 2

@@ -36,7 +36,10 @@ def test_indices_below_zero_count_from_the_end(tmp_path: Path) -> None:
 
 
 def test_polygons_become_fans(tmp_path: Path) -> None:
-    text = "".join(f"v {x} {y} 0\n" for x, y in [(0, 0), (2, 0), (3, 1), (1, 2), (0, 1)]) + "f 1 2 3 4 5\n"
+    text = (
+        "".join(f"v {x} {y} 0\n" for x, y in [(0, 0), (2, 0), (3, 1), (1, 2), (0, 1)])
+        + "f 1 2 3 4 5\n"
+    )
     mesh = read(tmp_path, text)
     np.testing.assert_array_equal(mesh.faces, [[0, 1, 2], [0, 2, 3], [0, 3, 4]])
     assert not mesh.textured
@@ -44,7 +47,9 @@ def test_polygons_become_fans(tmp_path: Path) -> None:
 
 
 def test_velocities_belong_to_the_vertex_before_them(tmp_path: Path) -> None:
-    mesh = read(tmp_path, "v 0 0 0\nnv 1 2 3\nv 1 0 0\nv 0 1 0\nny 0 0 0\nnv 0 0 4\nf 1 2 3 # a comment\n\n")
+    mesh = read(
+        tmp_path, "v 0 0 0\nnv 1 2 3\nv 1 0 0\nv 0 1 0\nny 0 0 0\nnv 0 0 4\nf 1 2 3 # a comment\n\n"
+    )
     assert mesh.velocities is not None
     np.testing.assert_array_equal(mesh.velocities, [[1, 2, 3], [0, 0, 0], [0, 0, 4]])
 
@@ -68,16 +73,24 @@ def test_a_malformed_line_is_refused_by_its_number(tmp_path: Path) -> None:
         ("solid cube\n", "the keyword 'solid' is unknown", 1),
     ]
     for text, word, line in cases:
-        refused = unrefused(lambda text: read(tmp_path, text), [(text, word)], InputError, where=f"line {line}$")
+        refused = unrefused(
+            lambda text: read(tmp_path, text), [(text, word)], InputError, where=f"line {line}$"
+        )
         assert refused == []
 
 
 def test_a_mesh_that_is_none_is_refused(tmp_path: Path) -> None:
-    cases = [("v 0 0 0\n", "has no faces"), ("", "is empty"), (TRIANGLE + "f 1/1 2/2 3\n", "some corners")]
+    cases = [
+        ("v 0 0 0\n", "has no faces"),
+        ("", "is empty"),
+        (TRIANGLE + "f 1/1 2/2 3\n", "some corners"),
+    ]
     assert not unrefused(lambda text: read(tmp_path, text), cases, InputError)
 
 
-def test_a_file_too_large_or_missing_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_too_large_or_missing_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(wavefront, "SIZE_LIMIT", 10)
     with pytest.raises(LimitError):
         read(tmp_path, TRIANGLE)
@@ -96,4 +109,6 @@ def test_a_written_mesh_comes_back_to_the_bit_in_single_precision(tmp_path: Path
     write_obj(tmp_path / "mesh.obj", mesh)
     back = read_obj(tmp_path / "mesh.obj")
     for name in ("positions", "faces", "rest", "velocities"):
-        np.testing.assert_array_equal(np.float32(getattr(back, name)), np.float32(getattr(mesh, name)))
+        np.testing.assert_array_equal(
+            np.float32(getattr(back, name)), np.float32(getattr(mesh, name))
+        )

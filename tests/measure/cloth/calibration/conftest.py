@@ -1,4 +1,5 @@
-"""Simulations that cost nothing: observables that are a known function of the cloth, for laws of the statistics."""
+"""Simulations that cost nothing: observables that are a known function of the cloth, for laws of
+the statistics."""
 
 from __future__ import annotations
 
@@ -19,8 +20,8 @@ NOISE = 0.02
 
 
 def readings(values: dict[str, FloatArray], speed: FloatArray, *, seed: int) -> FloatArray:
-    """(flag, window, observable): the first follows weight over dynamic pressure, the second the damping, others none
-    of the cloth."""
+    """(flag, window, observable): the first follows weight over dynamic pressure, the second the
+    damping, others none of the cloth."""
     rng = stream(seed, "tests", "readings")
     out = NOISE * rng.standard_normal((len(values["area_weight"]), len(speed), len(OBSERVED)))
     ratio = values["area_weight"][:, None] / (values["gain"][:, None] * speed) ** 2

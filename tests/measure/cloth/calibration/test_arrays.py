@@ -1,4 +1,5 @@
-"""Calibration from Python: arrays are the table of the same numbers, and the answer that of the calibration."""
+"""Calibration from Python: arrays are the table of the same numbers, and the answer that of the
+calibration."""
 
 from __future__ import annotations
 
@@ -26,7 +27,8 @@ COLUMNS = {
 def test_arrays_are_the_table_of_the_same_numbers(tmp_path: Path) -> None:
     names = [name.replace("_", "-") for name in COLUMNS]
     rows = [
-        ",".join(f"{value!r}" for value in row) for row in zip(*(c.tolist() for c in COLUMNS.values()), strict=True)
+        ",".join(f"{value!r}" for value in row)
+        for row in zip(*(c.tolist() for c in COLUMNS.values()), strict=True)
     ]
     path = tmp_path / "t.csv"
     path.write_text("\n".join([",".join(names), *rows]) + "\n")
@@ -73,8 +75,14 @@ def test_a_flag_is_weighed_from_arrays(tmp_path: Path) -> None:
         "azimuth": np.array([math.radians(70)]),
     }
     seen = readings(values, wind, seed=9)[0]
-    table = {"time": 1.25 + 2.5 * np.arange(48), "wind": wind, **dict(zip(OBSERVED, seen.T, strict=True))}
-    found = flagdata.calibrate(table, flag_size=(1.5, 1.0), azimuth_deg="70±7", seed=4, cache=tmp_path)
+    table = {
+        "time": 1.25 + 2.5 * np.arange(48),
+        "wind": wind,
+        **dict(zip(OBSERVED, seen.T, strict=True)),
+    }
+    found = flagdata.calibrate(
+        table, flag_size=(1.5, 1.0), azimuth_deg="70±7", seed=4, cache=tmp_path
+    )
     assert found.area_weight == pytest.approx(0.17, rel=0.1)
     low, high = found.quantities["area_weight"].interval
     assert low < 0.17 < high

@@ -38,13 +38,20 @@ from tests.measure.cloth.calibration.conftest import readings
 from tests.studies.validation.looks import share, vtk
 
 _AZIMUTH = Uncertain(
-    name="azimuth", unit="rad", prior=Normal(mean=math.radians(70), sigma=math.radians(7)), source="stated"
+    name="azimuth",
+    unit="rad",
+    prior=Normal(mean=math.radians(70), sigma=math.radians(7)),
+    source="stated",
 )
-_OPTIONS = CalibrationOptions(flag=Flag(length=1.5, height=1.0), azimuth=_AZIMUTH, simulations=128, seed=4)
+_OPTIONS = CalibrationOptions(
+    flag=Flag(length=1.5, height=1.0), azimuth=_AZIMUTH, simulations=128, seed=4
+)
 _GUSTY = 5.0 + 1.5 * np.sin(np.arange(-60.0, 130.0) / 4)
 
 
-def _observed(weight: float, *, gain: float = 1.0, speed: FloatArray = _GUSTY, seed: int = 9) -> Observed:
+def _observed(
+    weight: float, *, gain: float = 1.0, speed: FloatArray = _GUSTY, seed: int = 9
+) -> Observed:
     log = Log(times=np.arange(-60.0, 130.0), speed=speed).cut(0.0, 120.0)
     starts = np.arange(48) * 2.5
     values = {
@@ -58,8 +65,8 @@ def _observed(weight: float, *, gain: float = 1.0, speed: FloatArray = _GUSTY, s
 
 
 def _sigma(places: int) -> float:
-    """Of the logarithm of the weight: twice the gain's 3 %, of each place anew, and an error of the droop by the mesh
-    of 0.0085, the same in all recordings, over 0.3."""
+    """Of the logarithm of the weight: twice the gain's 3 %, of each place anew, and an error of the
+    droop by the mesh of 0.0085, the same in all recordings, over 0.3."""
     return math.hypot(0.06 / math.sqrt(places), 0.0085 / 0.3)
 
 
@@ -92,7 +99,9 @@ def test_damping_is_determined_and_bending_is_not(plain: Calibration) -> None:
     _, bending, damping = plain.cloth
     assert bending.value is None
     assert damping.value == pytest.approx(0.01, rel=0.15)
-    assert any(finding.kind == "not-determined" and "bending" in finding.what for finding in plain.findings)
+    assert any(
+        finding.kind == "not-determined" and "bending" in finding.what for finding in plain.findings
+    )
 
 
 @pytest.mark.usefixtures("cheap")
@@ -119,10 +128,14 @@ def test_the_weight_of_a_flag_that_no_simulation_looks_like_is_withheld(plain: C
     (finding,) = [one for one in found.findings if one.kind == "unlike-simulations"]
     assert "frequency" in finding.what.partition("too large")[0]
     assert [one.value for one in found.cloth] == [None, None, None]
-    np.testing.assert_allclose(found.weight.interval, found.weight.assumed, rtol=1e-3)  # what was assumed, no number
+    np.testing.assert_allclose(
+        found.weight.interval, found.weight.assumed, rtol=1e-3
+    )  # what was assumed, no number
     assert found.stated is None
     assert (found.as_dict()["close_loop"], found.as_dict()["area_weight_stated"]) == (None, None)
-    assert found.sentence.startswith("area weight: withheld, since no simulated flag looks like strange: frequency")
+    assert found.sentence.startswith(
+        "area weight: withheld, since no simulated flag looks like strange: frequency"
+    )
     assert "unlike-simulations" not in {finding.kind for finding in plain.findings}
 
 
@@ -151,18 +164,29 @@ def test_of_a_cloth_beyond_the_prior_a_bound_is_reported_and_no_number(
 ) -> None:
     found = _found(_observed(true))
     assert found.weight.span.bound is side
-    assert found.weight.span.low <= true <= found.weight.span.high  # beyond the prior, and not left out
+    assert (
+        found.weight.span.low <= true <= found.weight.span.high
+    )  # beyond the prior, and not left out
     assert found.sentence.startswith(f"area weight {words}")
     assert " kg/m², 95 %, n = 48 windows" in found.sentence
     said = found.as_dict()
     weight = said["cloth"]["area_weight"]
-    assert (weight["value"], weight["sigma"], weight["constrained"], weight["level"]) == (None, None, True, 0.95)
+    assert (weight["value"], weight["sigma"], weight["constrained"], weight["level"]) == (
+        None,
+        None,
+        True,
+        0.95,
+    )
     assert weight["bound"] == side.value
-    assert weight["interval"][0 if side is Bound.LEAST else 1] == pytest.approx(float(end), rel=0.15)
+    assert weight["interval"][0 if side is Bound.LEAST else 1] == pytest.approx(
+        float(end), rel=0.15
+    )
     assert (said["area_weight_stated"], said["close_loop"], found.stated) == (None, None, None)
     assert found.weighs
     (leaning,) = [one for one in found.findings if one.kind == "leans-on-prior"]
-    assert leaning.what.startswith("area weight: 10% of the posterior or more lie within 3% of the end of what")
+    assert leaning.what.startswith(
+        "area weight: 10% of the posterior or more lie within 3% of the end of what"
+    )
     assert f"{end} kg/m²" in leaning.what
     assert "leans-on-prior" not in {finding.kind for finding in plain.findings}
     assert "not-determined" not in {f.kind for f in found.findings if "area weight" in f.what}
@@ -178,7 +202,9 @@ def test_a_bound_has_no_settled_box_and_no_line_to_copy_on_its_page(plain: Calib
 
 def _uniform(low: float, high: float, *, stated: bool) -> Uncertain:
     limits = (low, high) if stated else (-math.inf, math.inf)
-    return Uncertain(name="azimuth", unit="rad", prior=Range(low=low, high=high), source="", limits=limits)
+    return Uncertain(
+        name="azimuth", unit="rad", prior=Range(low=low, high=high), source="", limits=limits
+    )
 
 
 def test_a_range_that_the_user_states_ends_an_interval_and_one_that_is_assumed_does_not() -> None:
@@ -191,7 +217,8 @@ def test_a_range_that_the_user_states_ends_an_interval_and_one_that_is_assumed_d
 
 
 def test_a_normal_prior_has_no_end_that_a_posterior_could_lean_on() -> None:
-    """A view that was misjudged by three standard deviations is a value, far from what was assumed."""
+    """A view that was misjudged by three standard deviations is a value, far from what was
+    assumed."""
     found = module.quantity(_AZIMUTH, math.radians(91) + 0.01 * np.sin(np.arange(1000)), 0.9)
     assert found.value == pytest.approx(math.radians(91), abs=1e-3)
     assert found.span.bound is None
@@ -199,7 +226,11 @@ def test_a_normal_prior_has_no_end_that_a_posterior_could_lean_on() -> None:
 
 @pytest.mark.usefixtures("cheap")
 def test_a_constant_wind_is_reported_to_leave_weight_to_what_is_assumed() -> None:
-    (finding,) = [one for one in _found(_observed(0.17, speed=np.full(190, 5.0))).findings if "constant" in one.kind]
+    (finding,) = [
+        one
+        for one in _found(_observed(0.17, speed=np.full(190, 5.0))).findings
+        if "constant" in one.kind
+    ]
     assert "gain and the weight act alike" in finding.what
 
 
@@ -225,7 +256,9 @@ def test_the_answer_is_stated_as_measure_takes_it(plain: Calibration) -> None:
     stated = parse(plain.stated)
     assert stated.low == pytest.approx(plain.weight.value, rel=1e-3)
     assert stated.sigma == pytest.approx(plain.weight.sigma, rel=0.05)
-    assert parse(plain.as_dict()["close_loop"]["area-weight"]).low == pytest.approx(plain.weight.value, rel=1e-3)
+    assert parse(plain.as_dict()["close_loop"]["area-weight"]).low == pytest.approx(
+        plain.weight.value, rel=1e-3
+    )
 
 
 def test_too_few_simulations_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -252,7 +285,9 @@ def test_a_recording_that_simulations_do_not_show_is_left_out_of_two_and_named(
     found = _found(_observed(0.3), _observed(0.17))
     assert [one.observed.name for one in found.recordings] == ["flag 0.17"]
     (left,) = [one for one in found.findings if one.kind == "left-out"]
-    assert left.what.startswith("flag 0.3 is left out: 0 of 128 simulations show what the film shows")
+    assert left.what.startswith(
+        "flag 0.3 is left out: 0 of 128 simulations show what the film shows"
+    )
     assert found.weight.value == pytest.approx(plain.weight.value, rel=0.03)
 
 
@@ -266,7 +301,9 @@ def test_what_is_left_has_to_be_long_enough_too(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(module, "simulated", half)
     short = replace(_observed(0.17), readings=_observed(0.17).readings[:6])
-    with pytest.raises(InputError, match=r"15 s of film have a log beside them; flag 0\.3 is left out: 0 of 128"):
+    with pytest.raises(
+        InputError, match=r"15 s of film have a log beside them; flag 0\.3 is left out: 0 of 128"
+    ):
         _found(_observed(0.3), short)
 
 
@@ -280,10 +317,12 @@ def test_draws_fill_the_priors_range_evenly() -> None:
 
 @pytest.mark.usefixtures("cheap")
 def test_rows_of_one_place_share_the_anemometers_gain() -> None:
-    """Three winds of one place show the weight no better than the gain allows: to 6 %; of three places, to 6 %/√3. What
-    numerics may add is the same in all."""
+    """Three winds of one place show the weight no better than the gain allows: to 6 %; of three
+    places, to 6 %/√3. What numerics may add is the same in all."""
     winds = (4.0, 6.0, 9.0)
-    apart = [_observed(0.17, speed=np.full(190, wind), seed=number) for number, wind in enumerate(winds)]
+    apart = [
+        _observed(0.17, speed=np.full(190, wind), seed=number) for number, wind in enumerate(winds)
+    ]
     together = [replace(one, place="tunnel") for one in apart]
     shared = _found(*together)
     assert _spread(shared) / 0.17 == pytest.approx(_sigma(1), rel=0.2)
@@ -294,7 +333,10 @@ def test_rows_of_one_place_share_the_anemometers_gain() -> None:
 
 def test_ten_seconds_are_enough_beside_ten_others_and_not_alone() -> None:
     """As three winds of a tunnel, each filmed for ten seconds."""
-    short = [replace(one, readings=one.readings[:4]) for one in (_observed(0.17), _observed(0.17, seed=10))]
+    short = [
+        replace(one, readings=one.readings[:4])
+        for one in (_observed(0.17), _observed(0.17, seed=10))
+    ]
     assert [design.duration for design in designs_of(short, _OPTIONS)] == [10.0, 10.0]
     with pytest.raises(InputError, match="10 s of film have a log"):
         designs_of(short[:1], _OPTIONS)
@@ -309,7 +351,9 @@ def test_pixels_err_by_the_film_and_by_the_window() -> None:
     passing = 1 - observed.LASTING
     wanted = [observed.LASTING + passing / 48, passing / np.square(relative).sum()]
     assert np.square(drawn).mean(axis=0) == pytest.approx(np.array(wanted), rel=0.08)
-    of_pair = np.corrcoef(drawn[:, 0, OBSERVED.index("extension")], drawn[:, 0, OBSERVED.index("area")])[0, 1]
+    of_pair = np.corrcoef(
+        drawn[:, 0, OBSERVED.index("extension")], drawn[:, 0, OBSERVED.index("area")]
+    )[0, 1]
     assert of_pair == pytest.approx(0.77, abs=0.02)
     assert (_observed(0.2).pixels(3, seed=1) == 0).all()
 
@@ -318,7 +362,10 @@ def test_pixels_err_by_the_film_and_by_the_window() -> None:
 def test_two_films_of_a_flag_err_alike_as_far_as_its_look_goes(name: str) -> None:
     """Films of two minutes, each with what is its own of what lasts in it, and with what passes."""
     place = OBSERVED.index(name)
-    one, other = (replace(_observed(0.2), sigma=np.full(len(OBSERVED), 0.03), name=name) for name in ("a", "b"))
+    one, other = (
+        replace(_observed(0.2), sigma=np.full(len(OBSERVED), 0.03), name=name)
+        for name in ("a", "b")
+    )
     both = [film.pixels(4000, seed=1)[:, 0, place] for film in (one, other)]
     lasting = observed.LASTING[place]
     wanted = observed.COMMON * lasting / (lasting + (1 - lasting) / 48)

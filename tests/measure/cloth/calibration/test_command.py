@@ -26,7 +26,9 @@ from tests.golden_answers import changes
 from tests.measure.cloth.calibration.conftest import readings
 
 
-def _table(path: Path, *, windows: int = 48, heading: str | None = None, weight: float = 0.2, seed: int = 3) -> Path:
+def _table(
+    path: Path, *, windows: int = 48, heading: str | None = None, weight: float = 0.2, seed: int = 3
+) -> Path:
     speed = 5.0 + 1.5 * np.sin(np.arange(windows) / 1.7)
     values = {
         "area_weight": np.array([weight]),
@@ -53,7 +55,18 @@ def test_a_table_is_weighed_kept_and_shown(tmp_path: Path) -> None:
     lake, page = tmp_path / "lake", tmp_path / "page.html"
     Lake.create(lake)
     table = _table(tmp_path / "monday.csv")
-    given = (table, "--flag-size", "1.5x1.0", "--azimuth", "70±7", "--lake", lake, "--report", page, "--json")
+    given = (
+        table,
+        "--flag-size",
+        "1.5x1.0",
+        "--azimuth",
+        "70±7",
+        "--lake",
+        lake,
+        "--report",
+        page,
+        "--json",
+    )
     done = _run(*given)
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout)
@@ -81,12 +94,16 @@ def test_a_weight_that_is_withheld_is_exit_code_3_and_no_option(tmp_path: Path) 
     (tmp_path / "t.csv").write_text("\n".join(strange) + "\n")
     done = _run(tmp_path / "t.csv", "--flag-size", "1.5x1.0", "--azimuth", "70±7")
     assert done.exit_code == 3
-    assert done.stdout.startswith("area weight: withheld, since no simulated flag looks like t: area")
+    assert done.stdout.startswith(
+        "area weight: withheld, since no simulated flag looks like t: area"
+    )
     assert "--area-weight" not in done.output
 
 
 @pytest.mark.usefixtures("cheap")
-def test_a_cloth_lighter_than_any_of_the_prior_is_bounded_and_no_option_is_given(tmp_path: Path) -> None:
+def test_a_cloth_lighter_than_any_of_the_prior_is_bounded_and_no_option_is_given(
+    tmp_path: Path,
+) -> None:
     page = tmp_path / "page.html"
     table = _table(tmp_path / "t.csv", weight=0.045)
     done = _run(table, "--flag-size", "1.5x1.0", "--azimuth", "70±7", "--report", page)
@@ -109,12 +126,17 @@ def test_a_weight_that_is_not_determined_is_exit_code_3(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("cheap")
-def test_one_bad_recording_of_three_is_left_out_with_a_warning_that_names_it(tmp_path: Path) -> None:
+def test_one_bad_recording_of_three_is_left_out_with_a_warning_that_names_it(
+    tmp_path: Path,
+) -> None:
     page = tmp_path / "page.html"
     (tmp_path / "hidden.csv").write_text(
         "\n".join(["time,wind,droop", *(f"{2.5 * number},5.0," for number in range(20))]) + "\n"
     )
-    good = [_table(tmp_path / f"{name}.csv", seed=seed) for seed, name in ((3, "monday"), (4, "tuesday"))]
+    good = [
+        _table(tmp_path / f"{name}.csv", seed=seed)
+        for seed, name in ((3, "monday"), (4, "tuesday"))
+    ]
     given = (tmp_path / "hidden.csv", *good, "--flag-size", "1.5x1.0", "--azimuth", "70±7")
     done = _run(*given, "--json", "--report", page)
     assert done.exit_code == 0, done.output
@@ -122,14 +144,18 @@ def test_one_bad_recording_of_three_is_left_out_with_a_warning_that_names_it(tmp
     assert [one["name"] for one in found["recordings"]] == ["monday", "tuesday"]
     assert found["cloth"]["area_weight"]["value"] == pytest.approx(0.2, rel=0.08)
     (left,) = [one for one in found["findings"] if one["kind"] == "left-out"]
-    assert left["what"].startswith(f"{tmp_path}/hidden.csv is left out: no observable could be read in 60%")
+    assert left["what"].startswith(
+        f"{tmp_path}/hidden.csv is left out: no observable could be read in 60%"
+    )
     assert "hidden.csv is left out: no observable could be read" in page.read_text()
 
 
 def test_of_three_bad_recordings_no_weight_is_given_and_each_is_named(tmp_path: Path) -> None:
     paths = [tmp_path / f"{name}.csv" for name in ("monday", "tuesday", "wednesday")]
     for path in paths:
-        path.write_text("\n".join(["time,wind,droop", *(f"{2.5 * number},5.0," for number in range(20))]) + "\n")
+        path.write_text(
+            "\n".join(["time,wind,droop", *(f"{2.5 * number},5.0," for number in range(20))]) + "\n"
+        )
     done = _run(*paths, "--flag-size", "1.5x1.0")
     assert isinstance(done.exception, RefusedError)
     assert done.exception.exit_code == 3
@@ -137,7 +163,9 @@ def test_of_three_bad_recordings_no_weight_is_given_and_each_is_named(tmp_path: 
     assert all(f"{path}: no observable could be read" in done.exception.what for path in paths)
 
 
-def test_recordings_that_are_together_too_short_are_refused_before_anything_is_read(tmp_path: Path) -> None:
+def test_recordings_that_are_together_too_short_are_refused_before_anything_is_read(
+    tmp_path: Path,
+) -> None:
     done = _run(_table(tmp_path / "t.csv", windows=6), "--flag-size", "1.5x1.0")
     assert isinstance(done.exception, InputError)
     assert done.exception.what == "only 15 s of film have a log beside them"
@@ -204,7 +232,9 @@ def test_a_table_without_a_flag_is_refused(tmp_path: Path) -> None:
         (("--end", "30s"), "rows against wind have no times"),
     ],
 )
-def test_options_that_a_table_has_no_use_for_are_refused(tmp_path: Path, arguments: tuple[str, ...], said: str) -> None:
+def test_options_that_a_table_has_no_use_for_are_refused(
+    tmp_path: Path, arguments: tuple[str, ...], said: str
+) -> None:
     path = tmp_path / "t.csv"
     path.write_text("wind,duration,droop\n5.0,60,0.3\n")
     done = _run(path, "--flag-size", "1.5x1.0", *arguments)
@@ -212,7 +242,9 @@ def test_options_that_a_table_has_no_use_for_are_refused(tmp_path: Path, argumen
 
 
 @pytest.mark.usefixtures("cheap")
-def test_a_table_beside_a_log_of_the_lake_is_weighed_and_the_log_is_its_parent(tmp_path: Path) -> None:
+def test_a_table_beside_a_log_of_the_lake_is_weighed_and_the_log_is_its_parent(
+    tmp_path: Path,
+) -> None:
     seconds = np.arange(-30, 160, dtype=np.int64)
     series = WindSeries(
         time=(1_780_000_000 + seconds) * NANOSECONDS,
@@ -225,15 +257,32 @@ def test_a_table_beside_a_log_of_the_lake_is_weighed_and_the_log_is_its_parent(t
         staged = transaction.staging(".mcap")
         with RecordWriter(staged, metadata={}) as writer:
             writer.wind(series)
-        log = Artifact(kind=Kind.WIND, name="cup", object=transaction.put(staged), recipe={"of": "log"})
+        log = Artifact(
+            kind=Kind.WIND, name="cup", object=transaction.put(staged), recipe={"of": "log"}
+        )
         transaction.add(log)
     path = _table(tmp_path / "t.csv")
     rows = [line.split(",") for line in path.read_text().splitlines()]
-    without = [[rows[0][0], *rows[0][2:]], *([str(1_780_000_000 + float(row[0])), *row[2:]] for row in rows[1:])]
+    without = [
+        [rows[0][0], *rows[0][2:]],
+        *([str(1_780_000_000 + float(row[0])), *row[2:]] for row in rows[1:]),
+    ]
     path.write_text("\n".join(",".join(row) for row in without) + "\n")
-    given = (path, "--flag-size", "1.5x1.0", "--lake", tmp_path / "lake", "--log", log.id, "--clock-offset", "2.5±0.1")
+    given = (
+        path,
+        "--flag-size",
+        "1.5x1.0",
+        "--lake",
+        tmp_path / "lake",
+        "--log",
+        log.id,
+        "--clock-offset",
+        "2.5±0.1",
+    )
     done = _run(*given, "--json")
-    assert done.exit_code == 3, done.output  # the table's droop follows another wind than this log's
+    assert done.exit_code == 3, (
+        done.output
+    )  # the table's droop follows another wind than this log's
     found = json.loads(done.stdout)
     assert "the change of droop with the wind" in found["withheld"]
     assert list(Lake.open(tmp_path / "lake").artifact(found["artifact"]).parents) == [log.id]

@@ -20,7 +20,9 @@ def design(material: str | None, *, count: int = 64) -> Design:
     log = Log(times=times, speed=5.0 + np.sin(times / 5), distance=3.0)
     made_of = None if material is None else fabric(material, where="--material")
     options = CalibrationOptions(flag=FLAG, simulations=count, seed=3, material=made_of)
-    (found,) = designs_of([Observed(name="monday", source="a", readings=np.zeros((8, 8)), log=log)], options)
+    (found,) = designs_of(
+        [Observed(name="monday", source="a", readings=np.zeros((8, 8)), log=log)], options
+    )
     return found
 
 
@@ -50,7 +52,10 @@ def test_simulations_of_any_fabric_are_the_ones_that_were_kept() -> None:
     plain = design(None).batches()[0].content()
     assert "material" not in plain
     assert "material" not in CalibrationOptions(flag=FLAG).recipe()
-    assert CalibrationOptions(flag=FLAG, material=fabric("knit", where="")).recipe()["material"] == "knit"
+    assert (
+        CalibrationOptions(flag=FLAG, material=fabric("knit", where="")).recipe()["material"]
+        == "knit"
+    )
 
 
 def test_woven_cloths_are_the_ones_that_hardly_stretch() -> None:

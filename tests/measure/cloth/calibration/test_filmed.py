@@ -45,7 +45,9 @@ def shown(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def watched(film: object, size: FlagSize, *, first: float, last: float, advance: object) -> Any:
         count = int((last - first) / 2.5)
-        return SimpleNamespace(windows=tuple(None if k == 2 else k for k in range(count)), seconds=2.5)
+        return SimpleNamespace(
+            windows=tuple(None if k == 2 else k for k in range(count)), seconds=2.5
+        )
 
     monkeypatch.setattr(filmed, "watched", watched)
     fake = SimpleNamespace(of_film=lambda window: WindowReading(value=float(window)), sigma=0.01)
@@ -62,7 +64,9 @@ def test_two_minutes_are_read_with_the_log_on_the_films_clock() -> None:
     # The log rises by 2/199 m/s a second, and is at its 70th second where the part begins.
     assert found.speed[0] == pytest.approx(4.0 + 2 / 199 * 71.25, abs=0.01)
     assert found.first == 10.0
-    assert [(one.kind, one.what) for one in found.findings] == [("first-part", "of 290.0 s the first 120 are used")]
+    assert [(one.kind, one.what) for one in found.findings] == [
+        ("first-part", "of 290.0 s the first 120 are used")
+    ]
     assert found.sigma.tolist() == [0.01] * len(OBSERVED)
 
 
@@ -74,7 +78,9 @@ def test_a_log_that_ends_before_the_film_is_refused() -> None:
 
 @pytest.mark.usefixtures("shown")
 def test_a_camera_that_cannot_be_steadied_is_refused() -> None:
-    lost = Finding(kind="camera-lost", severity=Severity.WARNING, what="40 % of the frames", value=0.4)
+    lost = Finding(
+        kind="camera-lost", severity=Severity.WARNING, what="40 % of the frames", value=0.4
+    )
     with pytest.raises(RefusedError, match="the camera may move"):
         filmed.part_of(_subject(findings=(lost,)), first=0.0, last=None).read(_SIZE)
 
@@ -110,11 +116,16 @@ def test_films_that_are_together_too_short_are_refused_before_a_picture_is_read(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     _named(monkeypatch, {"monday": 15.0, "tuesday": 4.0})
-    with pytest.raises(InputError, match=r"15 s of film have a log beside them; tuesday is left out: only 4 s of film"):
+    with pytest.raises(
+        InputError,
+        match=r"15 s of film have a log beside them; tuesday is left out: only 4 s of film",
+    ):
         sources_of(("monday", "tuesday"), OfFlag(), _SIZE, None, at="main")
 
 
-def test_a_film_whose_length_is_enough_is_opened_and_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_film_whose_length_is_enough_is_opened_and_not_read(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     _named(monkeypatch, {"monday": 60.0})
     found = sources_of(("monday",), OfFlag(), _SIZE, None, at="main")
     assert [one.duration for one in found.opened] == [60.0]

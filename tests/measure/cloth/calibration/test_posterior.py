@@ -33,14 +33,22 @@ _FLAGS, _RECORDINGS = 128, 4
 
 def _designs(seed: int) -> list[Design]:
     return [
-        Design(flag=_FLAG, log=_LOG, duration=60.0, count=_FLAGS, seed=seed, recording=f"{k}", place=f"{k}")
+        Design(
+            flag=_FLAG,
+            log=_LOG,
+            duration=60.0,
+            count=_FLAGS,
+            seed=seed,
+            recording=f"{k}",
+            place=f"{k}",
+        )
         for k in range(_RECORDINGS)
     ]
 
 
 def _shown(seed: int) -> tuple[FloatArray, list[FloatArray]]:
-    """Weights (flag,), and what each recording shows of these (flag, 1): the weight's logarithm, with an error that all
-    recordings of a flag have in common and one of its own."""
+    """Weights (flag,), and what each recording shows of these (flag, 1): the weight's logarithm,
+    with an error that all recordings of a flag have in common and one of its own."""
     rng = stream(seed, "tests", "shown")
     (first, *_) = [design.values()["area_weight"] for design in _designs(seed)]
     common = _COMMON * rng.standard_normal((_FLAGS, 1))
@@ -52,7 +60,9 @@ def _sights(seed: int) -> list[Sight]:
     _, shown = _shown(seed)
     return [
         Sight(
-            emulator=Emulator.fit(design.values(), own, np.ones(1, dtype=np.bool_), name=design.recording),
+            emulator=Emulator.fit(
+                design.values(), own, np.ones(1, dtype=np.bool_), name=design.recording
+            ),
             azimuth=AZIMUTH,
             elevation=ELEVATION,
             place=design.place,
@@ -61,8 +71,11 @@ def _sights(seed: int) -> list[Sight]:
     ]
 
 
-def test_what_recordings_have_in_common_does_not_average_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Recordings that were independent would know the weight to 0.3/√4; what is common leaves √(0.3² + 0.1²/4)."""
+def test_what_recordings_have_in_common_does_not_average_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Recordings that were independent would know the weight to 0.3/√4; what is common leaves
+    √(0.3² + 0.1²/4)."""
     monkeypatch.setattr(cloth_posterior, "CHECK", (64, 200))
     sights = _sights(1)
     weights, shown = _shown(2)
@@ -71,7 +84,9 @@ def test_what_recordings_have_in_common_does_not_average_out(monkeypatch: pytest
     assert np.median(drawn.std(axis=1)) == pytest.approx(np.hypot(_COMMON, _OWN / 2), rel=0.15)
     low, high = np.quantile(drawn, [0.05, 0.95], axis=1)
     held = ((low <= np.log(weights[inner])) & (np.log(weights[inner]) <= high)).mean()
-    assert 0.8 <= held <= 0.98  # of some 46 flags, each in its interval of 90 %: two standard errors
+    assert (
+        0.8 <= held <= 0.98
+    )  # of some 46 flags, each in its interval of 90 %: two standard errors
 
 
 def test_the_scatter_of_several_recordings_is_the_predictive_one_of_all_their_summaries() -> None:
@@ -81,7 +96,8 @@ def test_the_scatter_of_several_recordings_is_the_predictive_one_of_all_their_su
     scale = np.linalg.inv(found.white.T @ found.white)
     covariance = scale * found.freedom / (found.freedom - 2)
     expected = _COMMON**2 + _OWN**2 * np.eye(_RECORDINGS)
-    # Of 128 simulations with 11 regressors and 4 summaries the residuals' covariance is known to 13 %.
+    # Of 128 simulations with 11 regressors and 4 summaries the residuals' covariance is known to 13
+    # %.
     np.testing.assert_allclose(covariance, expected, rtol=0.35)
     residuals = np.concatenate([one.residuals for one in emulators], axis=1)
     np.testing.assert_allclose(covariance, residuals.T @ residuals / (128 - 11 - 4 - 1), rtol=1e-9)

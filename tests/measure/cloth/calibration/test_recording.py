@@ -1,4 +1,5 @@
-"""A film and a log in a lake, from `flagdata observe` to the artifact of `flagdata calibrate`; nothing is simulated."""
+"""A film and a log in a lake, from `flagdata observe` to the artifact of `flagdata calibrate`;
+nothing is simulated."""
 
 from __future__ import annotations
 
@@ -29,7 +30,9 @@ _SECONDS = 22.6
 def lake(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A camera's film, and the recording that it was aligned to: both called "monday"."""
     pictures = painted(contrast=90.0, seconds=2.5).frames[:-1]
-    times = _START + np.round(np.arange(round(_SECONDS * RATE)) / RATE * NANOSECONDS).astype(np.int64)
+    times = _START + np.round(np.arange(round(_SECONDS * RATE)) / RATE * NANOSECONDS).astype(
+        np.int64
+    )
     seconds = np.arange(-70, 30, dtype=np.int64)
     folder = tmp_path_factory.mktemp("lakes") / "lake"
     made = Lake.create(folder)
@@ -57,7 +60,9 @@ def lake(tmp_path_factory: pytest.TempPathFactory) -> Path:
         }
         camera = Artifact(kind=Kind.CAMERA, recipe={"of": "camera"}, **shared)
         transaction.add(camera)
-        transaction.add(Artifact(kind=Kind.RECORDING, recipe={"of": "recording"}, parents=[camera.id], **shared))
+        transaction.add(
+            Artifact(kind=Kind.RECORDING, recipe={"of": "recording"}, parents=[camera.id], **shared)
+        )
     return folder
 
 
@@ -86,8 +91,11 @@ def test_a_recording_is_meant_by_the_name_that_its_film_has_too(lake: Path) -> N
 
 
 @pytest.mark.usefixtures("cheap")
-def test_a_film_is_calibrated_and_each_part_of_it_is_an_artifact(lake: Path, tmp_path: Path) -> None:
-    """No simulated flag looks like the painted one, whose weight is withheld; what was read is kept all the same."""
+def test_a_film_is_calibrated_and_each_part_of_it_is_an_artifact(
+    lake: Path, tmp_path: Path
+) -> None:
+    """No simulated flag looks like the painted one, whose weight is withheld; what was read is kept
+    all the same."""
     page = tmp_path / "page.html"
     whole = _said(calibrate, lake, "--end", "20s", "--report", str(page), code=3)
     assert whole["withheld"].startswith("monday: ")

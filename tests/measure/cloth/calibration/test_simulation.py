@@ -10,7 +10,16 @@ import numpy as np
 import pytest
 
 from flagdata.core.arrays import FloatArray
-from measure.cloth import OBSERVED, TABLES, Design, Flag, FlagBatch, Log, mean_bending, simulated_values
+from measure.cloth import (
+    OBSERVED,
+    TABLES,
+    Design,
+    Flag,
+    FlagBatch,
+    Log,
+    mean_bending,
+    simulated_values,
+)
 from measure.cloth.flag_simulation import cloth
 from sim.cloth.material import named_material
 from sim.integrate import BackwardEuler, Symplectic
@@ -36,7 +45,10 @@ def _batch(weights: list[float]) -> FlagBatch:
         duration=5.0,
         columns=8,
         seeds=tuple(range(count)),
-        values={"area_weight": np.array(weights), **{name: np.full(count, value) for name, value in fixed.items()}},
+        values={
+            "area_weight": np.array(weights),
+            **{name: np.full(count, value) for name, value in fixed.items()},
+        },
         places=np.tile([math.radians(80), 0.0, 15.0], (count, 1, 1)),
     )
 
@@ -58,14 +70,29 @@ def test_a_cloth_has_the_bending_it_is_given() -> None:
 
 def test_simulations_draw_their_fabrics() -> None:
     design = Design(flag=Flag(length=1.5, height=1.0), log=_LOG, duration=5.0, count=32, seed=1)
-    scenes = [one for batch in design.batches() for one in batch._scenes(design.flag.mesh(4), damped=0.0)]
+    scenes = [
+        one for batch in design.batches() for one in batch._scenes(design.flag.mesh(4), damped=0.0)
+    ]
     drawn = [scene.material.name for scene in scenes]
-    assert {drawn.count(name) for name in TABLES} <= {2, 3, 4, 5}  # of 32 each of ten evenly: a Sobol sequence
+    assert {drawn.count(name) for name in TABLES} <= {
+        2,
+        3,
+        4,
+        5,
+    }  # of 32 each of ten evenly: a Sobol sequence
 
 
 def test_recordings_of_a_flag_are_simulated_with_the_same_cloths_in_places_of_their_own() -> None:
     one, other = (
-        Design(flag=Flag(length=1.5, height=1.0), log=log, duration=5.0, count=32, seed=1, recording=name, place=name)
+        Design(
+            flag=Flag(length=1.5, height=1.0),
+            log=log,
+            duration=5.0,
+            count=32,
+            seed=1,
+            recording=name,
+            place=name,
+        )
         for name, log in (("one", _LOG), ("other", replace(_LOG, distance=None, clock=0.1)))
     )
     first, second = one.values(), other.values()
@@ -80,7 +107,11 @@ def test_recordings_of_a_flag_are_simulated_with_the_same_cloths_in_places_of_th
 def test_no_integrator_damps_more_than_its_cloths() -> None:
     """Backward Euler damps by its step, so that a damping below its shortest one takes leapfrog."""
     flags = _batch([0.1, 0.2])
-    cases = ((3e-4, Symplectic, 3e-4), (1.5e-3, BackwardEuler, 0.5e-3), (2e-2, BackwardEuler, 16e-3))
+    cases = (
+        (3e-4, Symplectic, 3e-4),
+        (1.5e-3, BackwardEuler, 0.5e-3),
+        (2e-2, BackwardEuler, 16e-3),
+    )
     for damping, kind, material in cases:
         damped = replace(flags, values={**flags.values, "damping": np.full(2, damping)})
         system, _, integrator = damped._assemble_flags(flags.flag.mesh(4))
@@ -89,14 +120,20 @@ def test_no_integrator_damps_more_than_its_cloths() -> None:
 
 
 def test_a_clock_moves_the_wind() -> None:
-    ramp = replace(_batch([0.2]), log=Log(times=_LOG.times, speed=5 + 0.1 * _LOG.times, distance=0.0))
+    ramp = replace(
+        _batch([0.2]), log=Log(times=_LOG.times, speed=5 + 0.1 * _LOG.times, distance=0.0)
+    )
     early = replace(ramp, values={**ramp.values, "clock_error": np.array([-2.0])})
     mesh = ramp.flag.mesh(4)
-    before, after = (one._wind(one._assemble_flags(mesh)[0]).samples[:, 0].mean().item() for one in (ramp, early))
+    before, after = (
+        one._wind(one._assemble_flags(mesh)[0]).samples[:, 0].mean().item() for one in (ramp, early)
+    )
     assert after - before == pytest.approx(0.2, abs=0.05)  # 0.1 m/s a second, for two seconds
 
 
-def test_kept_simulations_are_not_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_kept_simulations_are_not_made_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     made: list[int] = []
 
     def read(batch: FlagBatch) -> FloatArray:

@@ -15,7 +15,10 @@ def test_a_line_in_the_logarithm_of_the_wind_is_found_exactly_with_windows_missi
     readings[3:8, 0] = np.nan
     found = Projection(speed=speed, changes=True).of(readings[None])
     assert np.allclose(found[0], [[0.4, 1.5], [-0.7, 0.2]])
-    assert np.allclose(Projection(speed=speed, changes=True).at(found)[0, 3], [0.4 - 0.7 * relative[3], readings[3, 1]])
+    assert np.allclose(
+        Projection(speed=speed, changes=True).at(found)[0, 3],
+        [0.4 - 0.7 * relative[3], readings[3, 1]],
+    )
 
 
 def test_what_too_few_windows_show_is_left_out() -> None:

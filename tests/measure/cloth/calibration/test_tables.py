@@ -38,10 +38,13 @@ def _column(found: Observed, name: str) -> list[float]:
     return found.readings[:, OBSERVED.index(name)].tolist()
 
 
-def test_rows_of_half_a_second_are_averaged_into_windows_and_deviations_in_squares(tmp_path: Path) -> None:
+def test_rows_of_half_a_second_are_averaged_into_windows_and_deviations_in_squares(
+    tmp_path: Path,
+) -> None:
     """Window k has the rows 5k … 5k + 4."""
     rows: list[list[float | str]] = [
-        [0.25 + 0.5 * n, 5.0, 0.1 * (n // 5) + 0.01 * (n % 5), 3.0 if n % 5 else 1.0] for n in range(60)
+        [0.25 + 0.5 * n, 5.0, 0.1 * (n // 5) + 0.01 * (n % 5), 3.0 if n % 5 else 1.0]
+        for n in range(60)
     ]
     found = _one(_write(tmp_path / "t.csv", "time,wind,droop,amplitude-up", rows))
     assert _column(found, "droop") == pytest.approx([0.1 * k + 0.02 for k in range(12)])
@@ -52,12 +55,16 @@ def test_rows_of_half_a_second_are_averaged_into_windows_and_deviations_in_squar
 def test_rows_of_ten_seconds_are_longer_windows(tmp_path: Path) -> None:
     rows: list[list[float | str]] = [[5.0 + 10 * n, 4.0 + n, 0.1 * n] for n in range(5)]
     found = _one(_write(tmp_path / "t.csv", "time,wind,droop", rows))
-    assert _column(found, "droop") == pytest.approx(np.repeat([0.0, 0.1, 0.2, 0.3, 0.4], 4).tolist())
+    assert _column(found, "droop") == pytest.approx(
+        np.repeat([0.0, 0.1, 0.2, 0.3, 0.4], 4).tolist()
+    )
     assert found.duration == 50.0
     assert found.log.averaging == 10.0
 
 
-def test_a_window_that_rows_hardly_cover_has_no_value_and_the_others_are_where_they_were(tmp_path: Path) -> None:
+def test_a_window_that_rows_hardly_cover_has_no_value_and_the_others_are_where_they_were(
+    tmp_path: Path,
+) -> None:
     rows: list[list[float | str]] = [[0.5 + n, 5.0, n] for n in range(30) if not 10 <= n < 14]
     found = _one(_write(tmp_path / "t.csv", "time,wind,frequency", rows))
     own = _column(found, "frequency")
@@ -79,10 +86,18 @@ def test_a_window_that_rows_hardly_cover_has_no_value_and_the_others_are_where_t
     ],
 )
 def test_a_unit_in_a_heading_is_converted(tmp_path: Path, heading: str, factor: float) -> None:
-    """Of a flag of 2 m by 0.5 m: amplitudes are counted in heights, speeds and extensions in lengths."""
+    """Of a flag of 2 m by 0.5 m: amplitudes are counted in heights, speeds and extensions in
+    lengths."""
     rows: list[list[float | str]] = [[2500.0 * n, 18.0, 3.0] for n in range(12)]
     found = _one(_write(tmp_path / "t.csv", f"time [ms],wind [km/h],{heading}", rows))
-    name = heading.split(" [")[0].split(" (")[0].split(" /")[0].lower().replace("_", "-").replace(" ", "-")
+    name = (
+        heading.split(" [")[0]
+        .split(" (")[0]
+        .split(" /")[0]
+        .lower()
+        .replace("_", "-")
+        .replace(" ", "-")
+    )
     assert _column(found, name) == pytest.approx([3.0 * factor] * 12)
     assert found.speed == pytest.approx(5.0)
 
@@ -100,11 +115,21 @@ def test_semicolons_decimal_commas_and_stamps_are_read(tmp_path: Path) -> None:
 
 
 def test_rows_against_wind_are_recordings_of_one_place_each_in_its_own_wind(tmp_path: Path) -> None:
-    rows: list[list[float | str]] = [[4.0, 60, 24.0, 2.0], [6.0, 25, 13.0, 1.0], [10.0, 20, 7.0, ""]]
-    found = of_table(_write(tmp_path / "t.csv", "wind,duration,droop [deg],droop-sigma [deg]", rows), SIZE)
+    rows: list[list[float | str]] = [
+        [4.0, 60, 24.0, 2.0],
+        [6.0, 25, 13.0, 1.0],
+        [10.0, 20, 7.0, ""],
+    ]
+    found = of_table(
+        _write(tmp_path / "t.csv", "wind,duration,droop [deg],droop-sigma [deg]", rows), SIZE
+    )
     assert [one.speed.tolist() for one in found] == [[4.0] * 16, [6.0] * 10, [10.0] * 8]
-    assert [_column(one, "droop")[-1] for one in found] == pytest.approx([math.radians(d) for d in (24, 13, 7)])
-    assert [float(one.sigma[0]) for one in found] == pytest.approx([math.radians(d) for d in (2, 1, 0)])
+    assert [_column(one, "droop")[-1] for one in found] == pytest.approx(
+        [math.radians(d) for d in (24, 13, 7)]
+    )
+    assert [float(one.sigma[0]) for one in found] == pytest.approx(
+        [math.radians(d) for d in (2, 1, 0)]
+    )
     assert len({one.place for one in found}) == 1
     assert len({one.source for one in found}) == 3
     # Three steady winds are not one.
@@ -162,16 +187,23 @@ def _series(times: np.ndarray, speed: np.ndarray) -> WindSeries:
 
 
 @pytest.mark.parametrize("spacing", [0.2, 2.5])
-def test_a_table_whose_clock_is_off_is_joined_by_what_follows_the_wind(tmp_path: Path, spacing: float) -> None:
-    """The droop falls with the wind that blew 0.3 s before; the table's clock is 11.4 s behind the log's."""
+def test_a_table_whose_clock_is_off_is_joined_by_what_follows_the_wind(
+    tmp_path: Path, spacing: float
+) -> None:
+    """The droop falls with the wind that blew 0.3 s before; the table's clock is 11.4 s behind the
+    log's."""
     times, speed = _gusts(1200)
     at = np.arange(20.0, 1100.0, spacing)
-    smooth = np.array([speed[(times >= t - spacing / 2) & (times < t + spacing / 2)].mean() for t in at - 0.3])
+    smooth = np.array(
+        [speed[(times >= t - spacing / 2) & (times < t + spacing / 2)].mean() for t in at - 0.3]
+    )
     rows: list[list[float | str]] = [
         [START + t - 11.4, 1.2 - 0.1 * u] for t, u in zip(at.tolist(), smooth.tolist(), strict=True)
     ]
     table = rows_of(_write(tmp_path / "t.csv", "time,droop", rows), SIZE)
-    (segment,) = estimated_clock(table, _series(times, speed), names=("log", "t"), seed="x").segments
+    (segment,) = estimated_clock(
+        table, _series(times, speed), names=("log", "t"), seed="x"
+    ).segments
     assert segment.offset == pytest.approx(11.4, abs=0.1)
     assert abs(segment.offset - 11.4) < 2 * segment.sigma_offset < 0.6
 
@@ -191,8 +223,14 @@ def test_a_log_beside_a_table_is_on_its_clock_with_the_offsets_uncertainty(tmp_p
     )
     with pytest.raises(UsageError, match=r"as in 0\.3±0\.1"):
         declared_clock(rows_of(path, SIZE), parse("2.0"), names=("log", "t"))
-    own = _write(tmp_path / "own.csv", "time,wind,droop", [[START + 2.5 * n, 5.0, 0.3] for n in range(10)])
+    own = _write(
+        tmp_path / "own.csv", "time,wind,droop", [[START + 2.5 * n, 5.0, 0.3] for n in range(10)]
+    )
     with pytest.raises(InputError, match="in one of them"):
         _one(
-            own, wind_log=Beside(series=_series(times, times), clock=given("a", "b", start=0, end=9, offset=0, sigma=1))
+            own,
+            wind_log=Beside(
+                series=_series(times, times),
+                clock=given("a", "b", start=0, end=9, offset=0, sigma=1),
+            ),
         )

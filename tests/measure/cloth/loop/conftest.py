@@ -1,4 +1,5 @@
-"""Simulations that cost nothing: observables that are a known function of cloth, view and effects."""
+"""Simulations that cost nothing: observables that are a known function of cloth, view and
+effects."""
 
 from __future__ import annotations
 
@@ -35,13 +36,17 @@ EFFECTS = ("lift.coefficient", "shear.exponent", "tangential-linear-drag.coeffic
 ALIKE = ("air-density.change", "power-law-drag.exponent")
 """Two that act alike here."""
 AZIMUTH = Uncertain(
-    name="azimuth", unit="rad", prior=Normal(mean=math.radians(70), sigma=math.radians(7)), source="stated"
+    name="azimuth",
+    unit="rad",
+    prior=Normal(mean=math.radians(70), sigma=math.radians(7)),
+    source="stated",
 )
 
 
 def readings(batch: FlagBatch, *, foreign: float = 0.0) -> FloatArray:
-    """(flag, window, observable): droop follows weight over dynamic pressure, extension the damping, the third the
-    azimuth, the fourth bending; each effect moves others by a share of its strongest strength.
+    """(flag, window, observable): droop follows weight over dynamic pressure, extension the
+    damping, the third the azimuth, the fourth bending; each effect moves others by a share of its
+    strongest strength.
 
     Args:
         foreign: what something outside the library does.
@@ -51,7 +56,9 @@ def readings(batch: FlagBatch, *, foreign: float = 0.0) -> FloatArray:
     speed = batch.log.mean_speed(starts, starts + WINDOW)
     out = np.empty((len(seeds), batch.windows, len(OBSERVED)))
     for place, seed in enumerate(seeds):
-        out[place] = NOISE * stream(seed, "tests", f"{speed.mean():.3f}").standard_normal(out[place].shape)
+        out[place] = NOISE * stream(seed, "tests", f"{speed.mean():.3f}").standard_normal(
+            out[place].shape
+        )
     ratio = values["area_weight"][:, None] / (values["gain"][:, None] * speed) ** 2
     out[..., 0] += 0.3 * np.log(ratio / 0.006)
     out[..., 1] += 0.9 + 0.1 * np.log(values["damping"] / 0.01)[:, None]
@@ -84,7 +91,9 @@ def simulate_cheaply(patch: pytest.MonkeyPatch) -> list[int]:
     """Batches of two, simulated as `readings`; how many flags were asked for, each time."""
     asked: list[int] = []
 
-    def read(batches: Sequence[FlagBatch], *, folder: Path, workers: int, advance: object) -> FloatArray:
+    def read(
+        batches: Sequence[FlagBatch], *, folder: Path, workers: int, advance: object
+    ) -> FloatArray:
         asked.append(sum(len(batch.seeds) for batch in batches))
         return np.concatenate([readings(batch) for batch in batches])[:, None]
 
@@ -95,7 +104,12 @@ def simulate_cheaply(patch: pytest.MonkeyPatch) -> list[int]:
 
 
 def recording(
-    *, mean: float, seed: int, foreign: float = 0.0, effects: Mapping[str, float] | None = None, swing: float = 0.15
+    *,
+    mean: float,
+    seed: int,
+    foreign: float = 0.0,
+    effects: Mapping[str, float] | None = None,
+    swing: float = 0.15,
 ) -> Observed:
     """One recording of a cloth that no simulation has, with effects of strengths beyond null.
 
@@ -104,7 +118,13 @@ def recording(
     """
     times = np.arange(-30.0, WINDOWS * WINDOW + 1)
     log = Log(times=times, speed=mean * (1 + swing * np.sin(times / 6.0)), distance=3.0)
-    made = Design(flag=options().calibration.flag, log=log, duration=WINDOWS * WINDOW, azimuth=AZIMUTH, seed=seed)
+    made = Design(
+        flag=options().calibration.flag,
+        log=log,
+        duration=WINDOWS * WINDOW,
+        azimuth=AZIMUTH,
+        seed=seed,
+    )
     first = made.batches()[3]
     known = {one.name: one.column for one in weighable(made.flag)}
     one = FlagBatch(
@@ -114,14 +134,23 @@ def recording(
         values={k: v[:1] for k, v in first.values.items()},
         places=first.places[:1],
         seeds=(seed,),
-        effects=tuple((known[name], np.array([strength])) for name, strength in (effects or {}).items()),
+        effects=tuple(
+            (known[name], np.array([strength])) for name, strength in (effects or {}).items()
+        ),
     )
-    return Observed(name=f"{mean:g} m/s", source="", readings=readings(one, foreign=foreign)[0], log=log)
+    return Observed(
+        name=f"{mean:g} m/s", source="", readings=readings(one, foreign=foreign)[0], log=log
+    )
 
 
 def options(
-    *, kinds: int = 40, only: tuple[str, ...] = EFFECTS, area_weight: tuple[float, float] | None = None
+    *,
+    kinds: int = 40,
+    only: tuple[str, ...] = EFFECTS,
+    area_weight: tuple[float, float] | None = None,
 ) -> FilmLoopOptions:
     """Of a flag seen from a stated azimuth."""
-    calibration = CalibrationOptions(flag=Flag(length=1.5, height=1.0), azimuth=AZIMUTH, simulations=128)
+    calibration = CalibrationOptions(
+        flag=Flag(length=1.5, height=1.0), azimuth=AZIMUTH, simulations=128
+    )
     return FilmLoopOptions(calibration=calibration, kinds=kinds, only=only, area_weight=area_weight)

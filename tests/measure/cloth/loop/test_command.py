@@ -32,7 +32,9 @@ def table(path: Path, *, mean: float, effects: Mapping[str, float] | None = None
     one = recording(mean=mean, seed=5, effects=effects)
     rows = [
         ",".join(str(v) for v in (WINDOW * (number + 0.5), speed, *own))
-        for number, (speed, own) in enumerate(zip(one.speed.tolist(), one.readings.tolist(), strict=True))
+        for number, (speed, own) in enumerate(
+            zip(one.speed.tolist(), one.readings.tolist(), strict=True)
+        )
     ]
     path.write_text("\n".join([f"time,wind,{','.join(OBSERVED)}", *rows]) + "\n")
     return path
@@ -54,9 +56,20 @@ def test_tables_are_judged_written_and_kept(tmp_path: Path, cheap: list[int], fe
     Lake.create(lake)
     effects = {"tangential-linear-drag.coefficient": 0.9}
     tables = [
-        table(tmp_path / f"{name}.csv", mean=mean, effects=effects) for name, mean in (("calm", 4.0), ("brisk", 6.5))
+        table(tmp_path / f"{name}.csv", mean=mean, effects=effects)
+        for name, mean in (("calm", 4.0), ("brisk", 6.5))
     ]
-    given = (*tables, "--flag-size", "1.5x1.0", "--azimuth", "70±7", "--simulations", "64", "--lake", lake)
+    given = (
+        *tables,
+        "--flag-size",
+        "1.5x1.0",
+        "--azimuth",
+        "70±7",
+        "--simulations",
+        "64",
+        "--lake",
+        lake,
+    )
     done = run(*given, "--out", out, "--json")
     assert done.exit_code == 0, done.output
     verdict = json.loads(done.stdout)
@@ -64,10 +77,19 @@ def test_tables_are_judged_written_and_kept(tmp_path: Path, cheap: list[int], fe
     assert changes("verdict-of-films", verdict, relative=1e-5) == []
     assert verdict["named"] == ["tangential-linear-drag"]
     assert 0 < verdict["seconds"] < 300
-    assert {one["effect"] for one in verdict["power"]} == {"lift", "shear", "tangential-linear-drag"}
+    assert {one["effect"] for one in verdict["power"]} == {
+        "lift",
+        "shear",
+        "tangential-linear-drag",
+    }
     assert verdict["test"]["effective"] <= len(verdict["test"]["null"])
     assert verdict["provenance"]["criteria"]["hash"] == CRITERIA.hash
-    assert {path.name for path in out.iterdir()} == {"report.html", "verdict.json", "base.toml", "model.toml"}
+    assert {path.name for path in out.iterdir()} == {
+        "report.html",
+        "verdict.json",
+        "base.toml",
+        "model.toml",
+    }
     text = (out / "report.html").read_text()
     assert "Adding tangential-linear-drag (coefficient " in text
     assert "droop, recordings left out" in text
@@ -80,7 +102,9 @@ def test_tables_are_judged_written_and_kept(tmp_path: Path, cheap: list[int], fe
     again = json.loads(run(*given, "--out", tmp_path / "other", "--json").stdout)
     assert again["artifacts"]["existing"]
     assert again["artifacts"]["measurement"] == verdict["artifacts"]["measurement"]
-    suspected = json.loads(run(*given, "--suspect", "lift", "--out", tmp_path / "suspected", "--json").stdout)
+    suspected = json.loads(
+        run(*given, "--suspect", "lift", "--out", tmp_path / "suspected", "--json").stdout
+    )
     assert suspected["test"]["suspected"] == "lift+"
     assert not suspected["artifacts"]["existing"]
     words = run(*given, "--out", tmp_path / "third").stdout
@@ -100,7 +124,10 @@ def test_tables_are_judged_written_and_kept(tmp_path: Path, cheap: list[int], fe
         (("--flag-size", "1.5x1.0", "--nulls", "2"), "kinds"),
         (("--flag-size", "1.5x1.0", "--material", "bunting"), "woven-polyester, woven-cotton"),
         (("--flag-size", "1.5x1.0", "--suspect", "lifft"), "did you mean 'lift'"),
-        (("--flag-size", "1.5x1.0", "--suspect", "vertical-wind"), "vertical-wind+ or vertical-wind-"),
+        (
+            ("--flag-size", "1.5x1.0", "--suspect", "vertical-wind"),
+            "vertical-wind+ or vertical-wind-",
+        ),
         (("--flag-size", "1.5x1.0", "--start", "40s"), "s of film have a log beside them"),
     ],
 )
@@ -110,7 +137,9 @@ def test_what_makes_no_sense_is_refused_and_nothing_is_written(
     done = run(table(tmp_path / "t.csv", mean=5.0), *arguments, "--out", tmp_path / "out")
     assert done.exit_code != 0
     error = done.exception
-    assert said in f"{error} {getattr(error, 'where', '')} {getattr(error, 'fix', '')} {done.output}"
+    assert (
+        said in f"{error} {getattr(error, 'where', '')} {getattr(error, 'fix', '')} {done.output}"
+    )
     assert not (tmp_path / "out").exists()
 
 
@@ -122,7 +151,17 @@ def test_one_recording_that_cannot_be_used_is_left_out_and_the_stated_fabric_is_
     short = table(tmp_path / "short.csv", mean=5.0)
     short.write_text("\n".join(short.read_text().splitlines()[:4]) + "\n")
     out = tmp_path / "out"
-    given = ("--flag-size", "1.5x1.0", "--azimuth", "70±7", "--material", "woven-cotton", "--out", out, "--json")
+    given = (
+        "--flag-size",
+        "1.5x1.0",
+        "--azimuth",
+        "70±7",
+        "--material",
+        "woven-cotton",
+        "--out",
+        out,
+        "--json",
+    )
     done = run(*good, short, *given)
     assert done.exit_code == 0, done.output
     verdict = json.loads(done.stdout)
@@ -153,7 +192,8 @@ def test_films_and_markers_of_a_cloth_are_judged_together(
         levels.append(options.level)
         one = Estimate(value=1.0, low=0.8, high=1.2, unit="of nominal")
         fitted = [
-            Parameter(name=name, before=one, after=one, shift=0.0) for name in ("area_weight", "bending", "damping")
+            Parameter(name=name, before=one, after=one, shift=0.0)
+            for name in ("area_weight", "bending", "damping")
         ]
         return replace(verdict(Conclusion.EFFECT), parameters=tuple(fitted))
 
@@ -195,7 +235,12 @@ def test_films_and_markers_of_a_cloth_are_judged_together(
     assert joint["named"] == ["lift"]
     smaller = min(joint[kind]["test"]["p_value"]["value"] for kind in ("markers", "films"))
     assert joint["p_value"] == pytest.approx(2 * smaller)
-    assert {path.name for path in out.iterdir()} == {"report.html", "verdict.json", "markers", "films"}
+    assert {path.name for path in out.iterdir()} == {
+        "report.html",
+        "verdict.json",
+        "markers",
+        "films",
+    }
     for kind in ("markers", "films"):
         assert (out / kind / "report.html").exists()
         assert f'href="{kind}/report.html"' in (out / "report.html").read_text()
@@ -205,7 +250,9 @@ def test_films_and_markers_of_a_cloth_are_judged_together(
 
 def test_a_number_of_nulls_is_refused_beside_both_kinds(tmp_path: Path) -> None:
     tracks = write_tracks(tmp_path / "tracks.csv", "calm")
-    done = run(tracks, table(tmp_path / "t.csv", mean=5.0), "--nulls", "200", "--out", tmp_path / "out")
+    done = run(
+        tracks, table(tmp_path / "t.csv", mean=5.0), "--nulls", "200", "--out", tmp_path / "out"
+    )
     assert isinstance(done.exception, UsageError)
     assert done.exception.where == "--nulls"
 
@@ -224,7 +271,9 @@ def test_recordings_of_a_lake_are_films_and_its_markers_are_not(tmp_path: Path) 
         Artifact(kind=kind, name=name, parents=(), recipe={"name": name}, seed=0)
         for name, kind in (("calm", Kind.RECORDING), ("tracked", Kind.MARKERS))
     )
-    measured = Artifact(kind=Kind.MEASUREMENT, name="calm", parents=(calm.id,), recipe={"wind": 5}, seed=0)
+    measured = Artifact(
+        kind=Kind.MEASUREMENT, name="calm", parents=(calm.id,), recipe={"wind": 5}, seed=0
+    )
     with lake.transaction("three") as transaction:
         for artifact in (calm, tracked, measured):
             transaction.add(artifact)
@@ -240,10 +289,16 @@ def test_a_recording_that_is_not_there_is_named(tmp_path: Path) -> None:
     assert "unknown file or film of the lake 'calm'" in f"{done.exception}"
 
 
-def test_rows_against_wind_are_recordings_from_one_place(tmp_path: Path, cheap: list[int], few: None) -> None:
+def test_rows_against_wind_are_recordings_from_one_place(
+    tmp_path: Path, cheap: list[int], few: None
+) -> None:
     path = tmp_path / "paper.csv"
-    path.write_text("wind,duration,droop,extension\n4,60,0.38,0.9\n5,60,0.24,0.9\n6.5,60,0.09,0.9\n")
-    done = run(path, "--flag-size", "1.5x1.0", "--simulations", "64", "--out", tmp_path / "out", "--json")
+    path.write_text(
+        "wind,duration,droop,extension\n4,60,0.38,0.9\n5,60,0.24,0.9\n6.5,60,0.09,0.9\n"
+    )
+    done = run(
+        path, "--flag-size", "1.5x1.0", "--simulations", "64", "--out", tmp_path / "out", "--json"
+    )
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout)
     assert {one["what"] for one in found["comparisons"]} == {

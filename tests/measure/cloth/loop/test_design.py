@@ -1,4 +1,5 @@
-"""What is simulated: pairs of the base model's flags, null experiments, and batches with effects and other meshes."""
+"""What is simulated: pairs of the base model's flags, null experiments, and batches with effects
+and other meshes."""
 
 from __future__ import annotations
 
@@ -8,7 +9,18 @@ import numpy as np
 import pytest
 
 from flagdata.core.rng import stream
-from measure.cloth import TOGETHER, Design, Discretisation, Flag, FlagBatch, Log, lasting, nulls, pairs, weighable
+from measure.cloth import (
+    TOGETHER,
+    Design,
+    Discretisation,
+    Flag,
+    FlagBatch,
+    Log,
+    lasting,
+    nulls,
+    pairs,
+    weighable,
+)
 
 FLAG = Flag(length=1.5, height=1.0)
 EFFECTS = {one.name: one for one in weighable(FLAG)}
@@ -17,7 +29,12 @@ EFFECTS = {one.name: one for one in weighable(FLAG)}
 @pytest.fixture(scope="module")
 def design() -> Design:
     times = np.arange(-20.0, 62.0)
-    return Design(flag=FLAG, log=Log(times=times, speed=5.0 + np.sin(times / 5), distance=3.0), duration=60.0, count=64)
+    return Design(
+        flag=FLAG,
+        log=Log(times=times, speed=5.0 + np.sin(times / 5), distance=3.0),
+        duration=60.0,
+        count=64,
+    )
 
 
 def few(design: Design) -> FlagBatch:
@@ -33,7 +50,9 @@ def few(design: Design) -> FlagBatch:
     )
 
 
-def test_a_pair_shares_cloth_place_and_turbulence_with_a_flag_without_the_effect(design: Design) -> None:
+def test_a_pair_shares_cloth_place_and_turbulence_with_a_flag_without_the_effect(
+    design: Design,
+) -> None:
     made = pairs(design, EFFECTS["lift.coefficient"], until=40.0)
     seeds = [seed for batch in design.batches() for seed in batch.seeds]
     values = design.values()
@@ -84,7 +103,10 @@ def test_a_film_of_which_a_part_is_simulated_shows_the_same_in_it(design: Design
 
 
 def test_an_effect_moves_what_a_flag_shows_and_none_at_its_null_value(design: Design) -> None:
-    plain, column = replace(few(design), until=2.5), EFFECTS["tangential-linear-drag.coefficient"].column
+    plain, column = (
+        replace(few(design), until=2.5),
+        EFFECTS["tangential-linear-drag.coefficient"].column,
+    )
     none, strong = (replace(plain, effects=((column, np.array([s])),)).read() for s in (0.0, 1.0))
     assert np.array_equal(plain.read(), none, equal_nan=True)
     assert abs(strong - none)[0, 0, 0, 1] > 0.01  # extension
@@ -95,5 +117,8 @@ def test_another_mesh_covers_the_same_cloth() -> None:
     for seed in range(4):
         kind = Discretisation.drawn(stream(seed, "tests", "kind"), explicit=0.0)
         mesh = kind.mesh(fit)
-        assert np.allclose([mesh.rest.min(axis=0), mesh.rest.max(axis=0)], [fit.rest.min(axis=0), fit.rest.max(axis=0)])
+        assert np.allclose(
+            [mesh.rest.min(axis=0), mesh.rest.max(axis=0)],
+            [fit.rest.min(axis=0), fit.rest.max(axis=0)],
+        )
         assert len(FLAG.handles(mesh).vertices) == 2

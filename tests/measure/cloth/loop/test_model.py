@@ -13,7 +13,11 @@ from measure.cloth import AZIMUTH, CLOTH, ELEVATION, NUISANCES, Emulator, Flag, 
 from measure.cloth.emulator import regressors
 from measure.cloth.sight import Response, response_of
 
-DRAG = next(one for one in weighable(Flag(length=1.5, height=1.0)) if one.name == "tangential-linear-drag.coefficient")
+DRAG = next(
+    one
+    for one in weighable(Flag(length=1.5, height=1.0))
+    if one.name == "tangential-linear-drag.coefficient"
+)
 COUNT, PAIRS, SUMMARIES = 512, 512, 6
 
 
@@ -30,7 +34,9 @@ def response(rng: np.random.Generator, *, own: float, again: bool) -> Response:
     noise, other = rng.standard_normal((2, COUNT, SUMMARIES))
     emulator = Emulator.fit(values, exact + noise, np.ones(SUMMARIES, dtype=np.bool_), name="made")
     strengths = DRAG.prior.at(rng.random(PAIRS))
-    effect = 3 * (strengths / DRAG.high)[:, None] + math.sqrt(own) * rng.standard_normal((PAIRS, SUMMARIES))
+    effect = 3 * (strengths / DRAG.high)[:, None] + math.sqrt(own) * rng.standard_normal(
+        (PAIRS, SUMMARIES)
+    )
     with_it = exact[:PAIRS] + (other if again else noise)[:PAIRS] + effect
     paired: dict[str, FloatArray] = {name: drawn[:PAIRS] for name, drawn in values.items()}
     found = response_of(emulator, DRAG, strengths, paired, with_it, (exact + noise)[:PAIRS])
@@ -40,8 +46,9 @@ def response(rng: np.random.Generator, *, own: float, again: bool) -> Response:
 
 @pytest.mark.parametrize(("own", "again"), [(0.0, False), (0.5, False), (0.0, True), (0.5, True)])
 def test_flags_with_an_effect_scatter_by_what_they_scatter_more(own: float, again: bool) -> None:
-    # Of y = Xβ + n and y' = Xβ + Δ + n' + e: the pairs' variance is Var e, or Var e + 2 where n' is another n; that of
-    # the flag with the effect exceeds that of the one without by Var e in both cases.
+    # Of y = Xβ + n and y' = Xβ + Δ + n' + e: the pairs' variance is Var e, or Var e + 2 where n' is
+    # another n; that of the flag with the effect exceeds that of the one without by Var e in both
+    # cases.
     found = response(stream(3, "test"), own=own, again=again)
     assert found.excess == pytest.approx(own, abs=0.12)
     assert found.residual == pytest.approx(own + 2 * again, rel=0.1, abs=1e-3)

@@ -1,4 +1,5 @@
-"""Simulations of a verdict on films are kept by their design: an interrupted one goes on, another one reuses them."""
+"""Simulations of a verdict on films are kept by their design: an interrupted one goes on, another
+one reuses them."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ KINDS = 20
 
 @pytest.fixture
 def made(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Flags of each batch that was simulated; a negative first number is after how many batches it breaks off."""
+    """Flags of each batch that was simulated; a negative first number is after how many batches it
+    breaks off."""
     counted: list[int] = []
 
     def read(self: FlagBatch) -> FloatArray:
@@ -33,7 +35,9 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return counted
 
 
-def test_an_interrupted_verdict_goes_on_and_ends_as_one_that_was_not(made: list[int], tmp_path: Path) -> None:
+def test_an_interrupted_verdict_goes_on_and_ends_as_one_that_was_not(
+    made: list[int], tmp_path: Path
+) -> None:
     recordings = [recording(mean=5.0, seed=5)]
     whole = close_loop(recordings, options(kinds=KINDS), folder=tmp_path / "whole")
     assert sum(made) >= 64 + 3 * 16 + 2 * KINDS  # the base model, three effects, nulls
@@ -45,7 +49,9 @@ def test_an_interrupted_verdict_goes_on_and_ends_as_one_that_was_not(made: list[
     made.clear()
     again = close_loop(recordings, options(kinds=KINDS), folder=tmp_path / "twice")
     assert len(made) == batches - 40
-    assert str(as_document(replace(again, seconds=0.0))) == str(as_document(replace(whole, seconds=0.0)))
+    assert str(as_document(replace(again, seconds=0.0))) == str(
+        as_document(replace(whole, seconds=0.0))
+    )
 
 
 def test_another_verdict_on_the_same_recordings_simulates_nothing_and_more_kinds_only_these(
@@ -54,7 +60,11 @@ def test_another_verdict_on_the_same_recordings_simulates_nothing_and_more_kinds
     recordings = [recording(mean=5.0, seed=5)]
     close_loop(recordings, options(kinds=KINDS), folder=tmp_path)
     made.clear()
-    close_loop(recordings, replace(options(kinds=KINDS), level=0.2, area_weight=(0.2, 0.01)), folder=tmp_path)
+    close_loop(
+        recordings,
+        replace(options(kinds=KINDS), level=0.2, area_weight=(0.2, 0.01)),
+        folder=tmp_path,
+    )
     assert made == []
     other = replace(recordings[0], readings=recordings[0].readings + np.float64(0.01))
     close_loop([other], options(kinds=KINDS), folder=tmp_path)

@@ -24,9 +24,13 @@ from tests.measure.cloth.loop.conftest import ALIKE, EFFECTS, options, recording
 DRAG = {"tangential-linear-drag.coefficient": 0.9}
 
 
-def both(effects: Mapping[str, float] | None = None, *, foreign: float = 0.0, seed: int = 6) -> list[Observed]:
+def both(
+    effects: Mapping[str, float] | None = None, *, foreign: float = 0.0, seed: int = 6
+) -> list[Observed]:
     """Two recordings of one cloth."""
-    return [recording(mean=mean, seed=seed, foreign=foreign, effects=effects) for mean in (4.0, 6.5)]
+    return [
+        recording(mean=mean, seed=seed, foreign=foreign, effects=effects) for mean in (4.0, 6.5)
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +49,9 @@ def dragged(tmp_path_factory: pytest.TempPathFactory) -> Verdict:
 
 
 @pytest.mark.parametrize("weight", [155.0, 1.3, 0.018])
-def test_a_weight_that_no_null_flag_has_is_refused_before_anything_is_simulated(weight: float) -> None:
+def test_a_weight_that_no_null_flag_has_is_refused_before_anything_is_simulated(
+    weight: float,
+) -> None:
     with pytest.raises(UsageError, match=r"null experiments have flags of 0\.05 to 0\.45"):
         options(area_weight=(weight, 0.05 * weight))
     assert options(area_weight=(0.6, 0.03)).area_weight == (0.6, 0.03)
@@ -73,8 +79,12 @@ def test_an_effect_is_named_with_its_strength(dragged: Verdict) -> None:
     assert dragged.ranking[0].probability == pytest.approx(1.0, abs=0.05)
 
 
-def test_the_effect_lowers_the_error_on_unseen_windows_in_the_observables_own_unit(dragged: Verdict) -> None:
-    moved = {one.what: one for one in dragged.comparisons if one.what.startswith("amplitude-across")}
+def test_the_effect_lowers_the_error_on_unseen_windows_in_the_observables_own_unit(
+    dragged: Verdict,
+) -> None:
+    moved = {
+        one.what: one for one in dragged.comparisons if one.what.startswith("amplitude-across")
+    }
     assert set(moved) == {"amplitude-across, other halves", "amplitude-across, recordings left out"}
     for one in moved.values():
         assert one.before.unit == "1"
@@ -85,7 +95,9 @@ def test_the_effect_lowers_the_error_on_unseen_windows_in_the_observables_own_un
         assert one.control.value > 0.08
 
 
-def test_a_recording_that_shows_nothing_in_one_half_is_judged_as_a_whole(cheap: list[int], tmp_path: Path) -> None:
+def test_a_recording_that_shows_nothing_in_one_half_is_judged_as_a_whole(
+    cheap: list[int], tmp_path: Path
+) -> None:
     first, second = both(DRAG)
     lost = first.readings.copy()
     lost[:6] = np.nan  # of ten windows of its first half, and of twenty in all
@@ -99,21 +111,27 @@ def test_a_recording_that_shows_nothing_in_one_half_is_judged_as_a_whole(cheap: 
 
 
 def test_two_effects_that_act_alike_are_named_together(cheap: list[int], tmp_path: Path) -> None:
-    found = close_loop(both({"air-density.change": 0.5}), options(only=(*EFFECTS, *ALIKE)), folder=tmp_path)
+    found = close_loop(
+        both({"air-density.change": 0.5}), options(only=(*EFFECTS, *ALIKE)), folder=tmp_path
+    )
     assert found.conclusion is Conclusion.ONE_OF
     assert set(found.named) == {"air-density", "power-law-drag"}
 
 
 def test_what_no_effect_explains_is_none_of_the_library(cheap: list[int], tmp_path: Path) -> None:
     recordings = both(foreign=0.3)
-    found = close_loop(recordings, options(only=("tangential-linear-drag.coefficient",)), folder=tmp_path)
+    found = close_loop(
+        recordings, options(only=("tangential-linear-drag.coefficient",)), folder=tmp_path
+    )
     assert found.conclusion is Conclusion.OUTSIDE
     assert found.named == ()
 
 
 def test_an_effect_beside_something_else_is_a_part(cheap: list[int], tmp_path: Path) -> None:
     recordings = both(DRAG, foreign=0.1)
-    found = close_loop(recordings, options(only=("tangential-linear-drag.coefficient",)), folder=tmp_path)
+    found = close_loop(
+        recordings, options(only=("tangential-linear-drag.coefficient",)), folder=tmp_path
+    )
     assert found.conclusion is Conclusion.PARTLY
     assert found.named == ("tangential-linear-drag",)
 
@@ -124,8 +142,12 @@ def test_too_few_kinds_of_numerics_cannot_test(cheap: list[int], tmp_path: Path)
     assert "with 4 numerical set-ups no p is below 0.1" in found.words  # of eight flags at most
 
 
-def test_recordings_that_would_show_none_of_the_effects_decide_nothing(cheap: list[int], tmp_path: Path) -> None:
-    found = close_loop(both(), options(only=("hem-mass.line_density",)), folder=tmp_path)  # which moves nothing here
+def test_recordings_that_would_show_none_of_the_effects_decide_nothing(
+    cheap: list[int], tmp_path: Path
+) -> None:
+    found = close_loop(
+        both(), options(only=("hem-mass.line_density",)), folder=tmp_path
+    )  # which moves nothing here
     assert found.conclusion is Conclusion.UNDECIDED
     assert any("would have been seen with a chance of" in reason for reason in found.open)
     assert found.power[0].share < 0.1
@@ -161,19 +183,27 @@ def test_what_is_missing_is_stated_with_its_size_and_unit(dragged: Verdict) -> N
     assert "amplitude-across +0.12 (" in dragged.proposal  # 0.2 · 0.9/1.5
 
 
-def test_effects_that_the_recordings_would_not_show_are_listed(cheap: list[int], tmp_path: Path) -> None:
+def test_effects_that_the_recordings_would_not_show_are_listed(
+    cheap: list[int], tmp_path: Path
+) -> None:
     tiny = "hem-mass.line_density"
     verdict = close_loop(both(), options(only=(*EFFECTS, tiny)), folder=tmp_path)
-    assert any("even where they are strong, hem-mass would move" in text for text in verdict.assumptions)
+    assert any(
+        "even where they are strong, hem-mass would move" in text for text in verdict.assumptions
+    )
 
 
-def test_a_constant_wind_is_reported_to_hide_what_acts_as_another_weight_does(cheap: list[int], tmp_path: Path) -> None:
+def test_a_constant_wind_is_reported_to_hide_what_acts_as_another_weight_does(
+    cheap: list[int], tmp_path: Path
+) -> None:
     verdict = close_loop([recording(mean=5.0, seed=5, swing=0.0)], options(), folder=tmp_path)
     assert [kind for kind, _ in verdict.findings] == ["constant-wind"]
     assert any("one steady wind" in text for text in verdict.assumptions)
 
 
-def test_what_was_merely_noted_on_a_film_is_no_doubt_beside_the_verdict(cheap: list[int], tmp_path: Path) -> None:
+def test_what_was_merely_noted_on_a_film_is_no_doubt_beside_the_verdict(
+    cheap: list[int], tmp_path: Path
+) -> None:
     still, lost = (
         Finding(kind=kind, severity=severity, what=kind)
         for kind, severity in (("camera-still", Severity.NOTE), ("camera-lost", Severity.WARNING))
@@ -186,7 +216,9 @@ def test_what_was_merely_noted_on_a_film_is_no_doubt_beside_the_verdict(cheap: l
 
 def test_a_strength_beyond_what_is_assumed_is_a_bound(cheap: list[int], tmp_path: Path) -> None:
     """A drag of 3 where 1.5 is assumed at most: what is known is that it is large."""
-    found = close_loop(both({"tangential-linear-drag.coefficient": 3.0}), options(), folder=tmp_path)
+    found = close_loop(
+        both({"tangential-linear-drag.coefficient": 3.0}), options(), folder=tmp_path
+    )
     strength = found.ranking[0].strength
     assert found.named == ("tangential-linear-drag",)
     assert strength.bound == "at-least"
@@ -197,7 +229,9 @@ def test_a_strength_beyond_what_is_assumed_is_a_bound(cheap: list[int], tmp_path
 
 
 def test_a_strength_of_two_signs_leans_on_either_end() -> None:
-    shear = next(one for one in weighable(options().calibration.flag) if one.name == "shear.exponent")  # −0.3 to 0.8
+    shear = next(
+        one for one in weighable(options().calibration.flag) if one.name == "shear.exponent"
+    )  # −0.3 to 0.8
     null, factor = shear.column.described.null, np.exp(CRITERIA.reach * CRITERIA.strength_factor)
 
     def at(*shares: float) -> Estimate:

@@ -30,9 +30,15 @@ def law(weights: FloatArray) -> FloatArray:
     return UNITS * (np.arange(SIZE) + away * np.arange(1, SIZE + 1) - 0.5 * away**2)
 
 
-def flags(rng: np.random.Generator, count: int, *, weight: float | None = None, sigma: float = SIGMA) -> Experiments:
+def flags(
+    rng: np.random.Generator, count: int, *, weight: float | None = None, sigma: float = SIGMA
+) -> Experiments:
     """Of the base model; by default of all weights."""
-    weights = np.exp(rng.uniform(np.log(0.05), np.log(0.45), count)) if weight is None else np.full(count, weight)
+    weights = (
+        np.exp(rng.uniform(np.log(0.05), np.log(0.45), count))
+        if weight is None
+        else np.full(count, weight)
+    )
     noise = rng.multivariate_normal(np.zeros(SIZE), COVARIANCE, count)
     stated = weights * np.exp(sigma * rng.standard_normal(count))
     return Experiments(summaries=(law(weights) + noise,), stated=stated, sigma=sigma)
@@ -45,7 +51,9 @@ def moved(one: Experiments, by: FloatArray) -> Experiments:
 KIND: IntArray = np.repeat(np.arange(KINDS), EACH)
 
 
-def scene(own: Experiments, *, seed: int = 1, sigma: float = SIGMA, shift: FloatArray | None = None) -> Scene:
+def scene(
+    own: Experiments, *, seed: int = 1, sigma: float = SIGMA, shift: FloatArray | None = None
+) -> Scene:
     """Flags beside base and null flags.
 
     Args:
@@ -56,7 +64,9 @@ def scene(own: Experiments, *, seed: int = 1, sigma: float = SIGMA, shift: Float
     return Scene.of(own, base, null if shift is None else moved(null, shift), KIND, CHANGES)
 
 
-def judged(own: Experiments, *, seed: int = 1, along: Directions = ALONG, shift: FloatArray | None = None) -> Scored:
+def judged(
+    own: Experiments, *, seed: int = 1, along: Directions = ALONG, shift: FloatArray | None = None
+) -> Scored:
     """One flag by base and null flags, as `scene`."""
     rng = stream(seed, "score test")
     base, null = flags(rng, BASE), flags(rng, KINDS * EACH)
@@ -81,27 +91,37 @@ def test_an_effect_moves_its_z_by_its_separation(place: int) -> None:
     many = flags(stream(7, "own"), 2000, weight=MIDDLE)
     change = CHANGES[place]
     slope = UNITS * np.arange(1, SIZE + 1)
-    exact = float(np.sqrt(change @ np.linalg.solve(COVARIANCE + SIGMA**2 * np.outer(slope, slope), change)))
+    exact = float(
+        np.sqrt(change @ np.linalg.solve(COVARIANCE + SIGMA**2 * np.outer(slope, slope), change))
+    )
     still, acted = scene(many), scene(moved(many, change))
     found = (acted.axes().z(acted.observed) - still.axes().z(still.observed))[:, place]
     assert found == pytest.approx(exact, rel=0.1)
 
 
 def test_power_is_that_of_a_normal_distribution() -> None:
-    """Of one direction that was suspected beforehand: Φ(separation − critical value), in twenty worlds."""
+    """Of one direction that was suspected beforehand: Φ(separation − critical value), in twenty
+    worlds."""
     slope = UNITS * np.arange(1, SIZE + 1)
     scatter = COVARIANCE + SIGMA**2 * np.outer(slope, slope)
     for place, size in ((ONE, 0.8), (EITHER, 1.3)):
         change = size * CHANGES[place]
         along = replace(ALONG, changes=size * CHANGES, suspected=(place, 1))
-        found = [judged(flags(stream(s, "own"), 1, weight=MIDDLE), seed=s, along=along) for s in range(20)]
+        found = [
+            judged(flags(stream(s, "own"), 1, weight=MIDDLE), seed=s, along=along)
+            for s in range(20)
+        ]
         critical = [one.nulls.critical(LEVEL) for one in found]
         separation = float(np.sqrt(change @ np.linalg.solve(scatter, change)))
         exact = np.mean([norm.cdf(separation - (value or np.inf)) for value in critical])
         # Each stated by some 130 null flags that are alike: 0.04.
         assert np.mean([one.power[place] for one in found]) == pytest.approx(exact, abs=0.04)
         # Of so many flags the critical value is beyond that of 5 %, and hardly so.
-        assert norm.isf(LEVEL) < np.mean([value or np.inf for value in critical]) < norm.isf(LEVEL) + 0.25
+        assert (
+            norm.isf(LEVEL)
+            < np.mean([value or np.inf for value in critical])
+            < norm.isf(LEVEL) + 0.25
+        )
 
 
 def test_flags_of_the_base_model_are_rejected_at_the_level() -> None:
@@ -113,7 +133,8 @@ def test_flags_of_the_base_model_are_rejected_at_the_level() -> None:
 
 
 def test_an_effect_of_one_sign_is_not_found_in_its_absence() -> None:
-    """A change along d is found, and by its direction; the opposite is no sign of it, but of something."""
+    """A change along d is found, and by its direction; the opposite is no sign of it, but of
+    something."""
     for sign, place in ((1, ONE), (1, EITHER), (-1, EITHER)):
         found = judged(moved(flags(stream(2, "own"), 1, weight=MIDDLE), sign * 3 * CHANGES[place]))
         assert found.p_value <= LEVEL
@@ -146,14 +167,17 @@ def test_a_suspicion_sees_a_weaker_effect_and_nothing_else() -> None:
         for alone in found:
             found[alone] += judged(own, along=suspected if alone else ALONG).p_value <= LEVEL
     assert found[True] > found[False] + 2
-    other = moved(flags(stream(2, "own"), 1, weight=MIDDLE), 4 * CHANGES[EITHER] * np.array([1, 1, -1, 1, 1]))
+    other = moved(
+        flags(stream(2, "own"), 1, weight=MIDDLE), 4 * CHANGES[EITHER] * np.array([1, 1, -1, 1, 1])
+    )
     assert judged(other).p_value <= LEVEL
     opposite = replace(ALONG, suspected=(EITHER, 1))
     assert judged(other, along=opposite).p_value > 0.9
 
 
 def test_a_kind_that_is_odd_does_not_judge_itself() -> None:
-    """Its flags are as far from the other kinds' as they are, whatever V would be with them in it."""
+    """Its flags are as far from the other kinds' as they are, whatever V would be with them in
+    it."""
     shift = np.zeros((KINDS * EACH, SIZE))
     odd = KIND == 3
     shift[odd] = 4 * CHANGES[ONE]

@@ -24,7 +24,8 @@ _BLUE = (31, 111, 156)
 
 
 def film(*, scale: float = 40.0, side: float = 1.0) -> FilmWindow:
-    """A white bar that moves by two columns a frame; the hoist is at column 50, or 100 for a flag that flies left."""
+    """A white bar that moves by two columns a frame; the hoist is at column 50, or 100 for a flag
+    that flies left."""
     times = np.arange(round(WINDOW * 25)) / 25
     column, frames = 75 - 25 * side, np.zeros((len(times), 150, 150), np.uint8)
     for number, frame in enumerate(frames):
@@ -83,21 +84,31 @@ def test_cloth_is_drawn_as_large_as_in_the_film_and_from_the_films_hoist(side: f
     rows, columns = np.nonzero(picture[..., 2] - picture[..., 0] > 60)
     # Twice as large as the film's pixels: 1.5 m × 1 m at 80 px/m.
     assert (rows.min(), rows.max()) == pytest.approx((120, 200), abs=1)
-    assert (columns.min(), columns.max()) == pytest.approx((100, 220) if side > 0 else (80, 200), abs=1)
+    assert (columns.min(), columns.max()) == pytest.approx(
+        (100, 220) if side > 0 else (80, 200), abs=1
+    )
 
 
-def test_each_model_flies_in_the_windows_wind_beside_the_film(cheap: list[int], tmp_path: Path) -> None:
-    recordings = [with_film(recording(mean=4.0, seed=5, effects={"tangential-linear-drag.coefficient": 0.9}))]
+def test_each_model_flies_in_the_windows_wind_beside_the_film(
+    cheap: list[int], tmp_path: Path
+) -> None:
+    recordings = [
+        with_film(recording(mean=4.0, seed=5, effects={"tangential-linear-drag.coefficient": 0.9}))
+    ]
     outcome = solve(recordings, options(), folder=tmp_path)
     shown = side_by_side(outcome, 0, after="with drag")
     assert shown is not None
     assert shown.start == 16 * WINDOW
     assert shown.wind == pytest.approx(4 * (1 + 0.15 * math.sin(41.25 / 6)), rel=0.05)
     assert [one.label for one in shown.columns] == ["the film", "base model", "with drag"]
-    pictures = [np.stack([np.asarray(frame) for frame in frames_of(one.url)]) for one in shown.columns]
+    pictures = [
+        np.stack([np.asarray(frame) for frame in frames_of(one.url)]) for one in shown.columns
+    ]
     assert {len(one) for one in pictures} == {round(WINDOW * RATE)}
     bar = [float(np.flatnonzero(frame[150, :, 0] > 128).mean()) for frame in pictures[0]]
-    assert bar == pytest.approx(list(8 * np.arange(31) + 9.5), abs=1)  # at every other frame, twice as large
+    assert bar == pytest.approx(
+        list(8 * np.arange(31) + 9.5), abs=1
+    )  # at every other frame, twice as large
     brown, blue = (np.abs(np.diff(one.astype(int), axis=0)).sum() for one in pictures[1:])
     assert brown > 0
     assert blue > 0
@@ -119,6 +130,10 @@ def test_the_page_has_the_film_where_there_is_one(cheap: list[int], tmp_path: Pa
 def test_a_recording_without_halves_is_not_shown(cheap: list[int], tmp_path: Path) -> None:
     one = recording(mean=4.0, seed=5)
     count = 2 * LEAST_WINDOWS - 1
-    short = replace(with_film(one), readings=one.readings[:count], excerpt=Excerpt(number=count - 2, window=film()))
+    short = replace(
+        with_film(one),
+        readings=one.readings[:count],
+        excerpt=Excerpt(number=count - 2, window=film()),
+    )
     recordings = [short, recording(mean=6.5, seed=5)]  # one so short is not judged by itself
     assert side_by_side(solve(recordings, options(), folder=tmp_path), 0, after="") is None

@@ -43,7 +43,9 @@ def test_a_suspicion_is_an_effect_and_a_sign(text: str, name: str, sign: int, sa
         ("hem-mass-", UsageError, "give hem-mass without the sign"),
     ],
 )
-def test_what_is_no_such_effect_is_refused_with_what_is(text: str, kind: type[UsageError], fix: str) -> None:
+def test_what_is_no_such_effect_is_refused_with_what_is(
+    text: str, kind: type[UsageError], fix: str
+) -> None:
     with pytest.raises(kind) as refused:
         Suspicion.parse(text, weighable(FLAG))
     assert refused.value.where == "--suspect"
@@ -59,11 +61,15 @@ def test_an_effect_that_a_flag_cannot_have_is_no_suspicion() -> None:
 def test_it_is_tested_alone_and_the_page_and_the_words_say_that_it_was_stated_before(
     cheap: list[int], tmp_path: Path
 ) -> None:
-    recordings = [recording(mean=mean, seed=6, effects={"lift.coefficient": 4.0}) for mean in (4.0, 6.5)]
+    recordings = [
+        recording(mean=mean, seed=6, effects={"lift.coefficient": 4.0}) for mean in (4.0, 6.5)
+    ]
     found = {}
     for text in ("lift", "tangential-linear-drag"):
         outcome = solve(
-            recordings, replace(options(), suspected=Suspicion.parse(text, weighable(FLAG))), folder=tmp_path
+            recordings,
+            replace(options(), suspected=Suspicion.parse(text, weighable(FLAG))),
+            folder=tmp_path,
         )
         found[text] = verdict_of(outcome)
         for said in (" ".join(words(found[text]).split()), page(found[text], outcome)):
@@ -72,7 +78,10 @@ def test_it_is_tested_alone_and_the_page_and_the_words_say_that_it_was_stated_be
         assert found[text].provenance["options"]["suspected"] == f"{text}+"
     assert found["lift"].named == ("lift",)
     assert found["lift"].test.p_value.value <= 0.05
-    assert found["tangential-linear-drag"].conclusion in (Conclusion.SUFFICIENT, Conclusion.UNDECIDED)
+    assert found["tangential-linear-drag"].conclusion in (
+        Conclusion.SUFFICIENT,
+        Conclusion.UNDECIDED,
+    )
     either = close_loop(recordings, options(), folder=tmp_path)
     assert either.test.suspected == ""
     assert either.test.statistic >= found["lift"].test.statistic

@@ -1,7 +1,7 @@
 """Effects that are not in the library, written for challenges alone: the fit must not know them.
 
-They keep the library's contract (null value, frames of reference), which `tests/studies/challenge/test_outside.py`
-holds.
+They keep the library's contract (null value, frames of reference), which
+`tests/studies/challenge/test_outside.py` holds.
 """
 
 from __future__ import annotations

@@ -17,7 +17,8 @@ from sim.effects import NOT_NEGATIVE, Effect, Value, horizontal, norm, origin, s
 
 @dataclass(frozen=True, kw_only=True)
 class Attraction(Effect):
-    """Per area p e^(−r/ℓ), horizontally toward the vertical axis at a distance r through the middle of the attachments.
+    """Per area p e^(−r/ℓ), horizontally toward the vertical axis at a distance r through the middle
+    of the attachments.
 
     Attributes:
         pull: p.
@@ -30,15 +31,24 @@ class Attraction(Effect):
             unit="N/m²",
             prior=(0.0, 2.0),
             admissible=NOT_NEGATIVE,
-            source="charged insulators bear up to σ²/(2 ε₀) = 40 N/m² at breakdown of air; cloth keeps a tenth or less",
+            source="charged insulators bear up to σ²/(2 ε₀) = 40 N/m² at breakdown of air; cloth "
+            "keeps a tenth or less",
         ),
     ] = 0.0
     reach: Annotated[
-        Value, shape(unit="m", prior=(0.2, 1.0), admissible=(1e-2, 10.0), source="of the order of the cloth's size")
+        Value,
+        shape(
+            unit="m",
+            prior=(0.2, 1.0),
+            admissible=(1e-2, 10.0),
+            source="of the order of the cloth's size",
+        ),
     ] = 0.5
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
-        return replace(system, effects=(*system.effects, Axis(effect=self, origin=origin(system, state)))), state
+        return replace(
+            system, effects=(*system.effects, Axis(effect=self, origin=origin(system, state)))
+        ), state
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +58,9 @@ class Axis:
     effect: Attraction
     origin: Tensor
 
-    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+    def force(
+        self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor
+    ) -> Tensor:
         """(vertex, 3, batch) [N]."""
         arm = horizontal(position - self.origin, axis=1)
         distance = norm(arm)

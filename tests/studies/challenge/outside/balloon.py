@@ -21,7 +21,8 @@ _AIR = 1.225
 
 @dataclass(frozen=True, kw_only=True)
 class Balloon(ForceEffect):
-    """At one corner the lift F upward and the drag ½ ρ C_D S |u| u of the sphere that has it, S its cross section. The
+    """At one corner the lift F upward and the drag ½ ρ C_D S |u| u of the sphere that has it, S its
+    cross section. The
     cord is long: the wind u is not that relative to the cloth.
 
     Attributes:
@@ -38,7 +39,9 @@ class Balloon(ForceEffect):
         ),
     ] = 0.0
 
-    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+    def force(
+        self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor
+    ) -> Tensor:
         rest = cloth.mesh.rest
         corner = torch.tensor([int((rest[:, 0] + rest[:, 1]).argmax())], device=position.device)
         air = wind if wind.ndim == 2 else wind[int(corner)]

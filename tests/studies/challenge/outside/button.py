@@ -12,7 +12,8 @@ from sim.effects import NOT_NEGATIVE, ClothEffect, Value, strength
 from tests.studies.challenge.outside import places
 
 PLACE = (0.72, 0.3)
-"""Place of the button: from the hoist as a share of the width, from below as a share of the height."""
+"""Place of the button: from the hoist as a share of the width, from below as a share of the
+height."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,5 +38,6 @@ class Button(ClothEffect):
         share = places.shares(cloth.mesh, places.inside(cloth.mesh, *PLACE)[None])[0]
         return replace(
             cloth,
-            mass=cloth.mass + torch.as_tensor(share, dtype=cloth.dtype, device=cloth.device)[:, None] * self.mass,
+            mass=cloth.mass
+            + torch.as_tensor(share, dtype=cloth.dtype, device=cloth.device)[:, None] * self.mass,
         )

@@ -17,8 +17,8 @@ from tests.studies.challenge.outside import edges
 
 @dataclass(frozen=True, kw_only=True)
 class Drawstring(Effect):
-    """A cord that slides in the hem pulls along the fly with T (s − g)₊/(1 − g), s the length of the fly over that of
-    the flat cloth.
+    """A cord that slides in the hem pulls along the fly with T (s − g)₊/(1 − g), s the length of
+    the fly over that of the flat cloth.
 
     Attributes:
         tension: T, while the fly is as long as that of the flat cloth.
@@ -36,25 +36,35 @@ class Drawstring(Effect):
     ] = 0.0
     gathered: Annotated[
         Value,
-        shape(unit="1", prior=(0.4, 0.8), admissible=(0.0, 0.95), source="gathers of 1.25 to 2.5 to one in sewing"),
+        shape(
+            unit="1",
+            prior=(0.4, 0.8),
+            admissible=(0.0, 0.95),
+            source="gathers of 1.25 to 2.5 to one in sewing",
+        ),
     ] = 0.6
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
         pairs = edges.fly(system.cloth.mesh)
         length = float(edges.half_lengths(system.cloth, pairs).sum())
-        gather = Gather(effect=self, pairs=torch.as_tensor(pairs, device=state.position.device), length=length)
+        gather = Gather(
+            effect=self, pairs=torch.as_tensor(pairs, device=state.position.device), length=length
+        )
         return replace(system, effects=(*system.effects, gather)), state
 
 
 @dataclass(frozen=True, kw_only=True)
 class Gather:
-    """The cord's pull on the vertices (edge, 2) of edges that measure `length` on the flat cloth [m]."""
+    """The cord's pull on the vertices (edge, 2) of edges that measure `length` on the flat cloth
+    [m]."""
 
     effect: Drawstring
     pairs: Tensor
     length: float
 
-    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+    def force(
+        self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor
+    ) -> Tensor:
         """(vertex, 3, batch) [N]."""
         start, end = self.pairs.unbind(1)
         along = position[end] - position[start]

@@ -25,5 +25,7 @@ def half_lengths(cloth: Cloth, pairs: IntArray) -> Tensor:
     """(vertex,) half the rest length of these edges at each vertex [m]."""
     rest = cloth.mesh.rest
     half = np.hypot(*(rest[pairs[:, 1]] - rest[pairs[:, 0]]).T) / 2
-    total = np.bincount(pairs.ravel(), weights=np.repeat(half, 2), minlength=cloth.mesh.vertex_count)
+    total = np.bincount(
+        pairs.ravel(), weights=np.repeat(half, 2), minlength=cloth.mesh.vertex_count
+    )
     return torch.as_tensor(total, dtype=cloth.dtype, device=cloth.device)

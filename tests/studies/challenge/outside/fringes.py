@@ -30,14 +30,17 @@ class Fringes(Effect):
             unit="m",
             prior=(0.0, 0.2),
             admissible=NOT_NEGATIVE,
-            source="ribbons 0.1–1 m long have drag coefficients of 0.1–0.3 by their area (Carruthers and Filippone, "
+            source="ribbons 0.1–1 m long have drag coefficients of 0.1–0.3 by their area "
+            "(Carruthers and Filippone, "
             "J. Aircraft 42:976, 2005); tassels and fringes are several layers of them",
         ),
     ] = 0.0
     density: AirDensity = AIR_DENSITY
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
-        drag = EdgeDrag(effect=self, lengths=edges.half_lengths(system.cloth, edges.fly(system.cloth.mesh)))
+        drag = EdgeDrag(
+            effect=self, lengths=edges.half_lengths(system.cloth, edges.fly(system.cloth.mesh))
+        )
         return replace(system, effects=(*system.effects, drag)), state
 
 
@@ -48,7 +51,16 @@ class EdgeDrag:
     effect: Fringes
     lengths: Tensor
 
-    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+    def force(
+        self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor
+    ) -> Tensor:
         """(vertex, 3, batch) [N]."""
         relative = wind - velocity
-        return 0.5 * self.effect.density * self.effect.breadth * self.lengths[:, None, None] * norm(relative) * relative
+        return (
+            0.5
+            * self.effect.density
+            * self.effect.breadth
+            * self.lengths[:, None, None]
+            * norm(relative)
+            * relative
+        )

@@ -1,4 +1,5 @@
-"""A larger flag or sign upwind that swings at its own frequency and throws the wind from side to side."""
+"""A larger flag or sign upwind that swings at its own frequency and throws the wind from side to
+side."""
 
 from __future__ import annotations
 
@@ -14,7 +15,8 @@ from sim.effects import NOT_NEGATIVE, FlowEffect, Value, horizontal, left_of, no
 
 @dataclass(frozen=True, kw_only=True)
 class Neighbour(FlowEffect):
-    """The wind u gains q |u| sin 2π f (t − x/|u|) to its left, x downstream of the middle of the attachments.
+    """The wind u gains q |u| sin 2π f (t − x/|u|) to its left, x downstream of the middle of the
+    attachments.
 
     Attributes:
         share: q.
@@ -27,7 +29,8 @@ class Neighbour(FlowEffect):
             unit="1",
             prior=(0.0, 0.4),
             admissible=NOT_NEGATIVE,
-            source="vortices behind a pitching foil: some tenths of the free stream (Koochesfahani, AIAA J. "
+            source="vortices behind a pitching foil: some tenths of the free stream "
+            "(Koochesfahani, AIAA J. "
             "27:1200, 1989)",
         ),
     ] = 0.0
@@ -37,7 +40,8 @@ class Neighbour(FlowEffect):
             unit="Hz",
             prior=(0.8, 3.0),
             admissible=(1e-2, 50.0),
-            source="hanging signs of 0.1–0.4 m swing as pendulums at 0.8–1.6 Hz, banners on spring arms at 1–3 Hz",
+            source="hanging signs of 0.1–0.4 m swing as pendulums at 0.8–1.6 Hz, banners on spring "
+            "arms at 1–3 Hz",
         ),
     ] = 1.4
 

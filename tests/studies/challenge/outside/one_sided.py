@@ -13,7 +13,8 @@ from sim.effects.effect import PressureEffect
 
 @dataclass(frozen=True, kw_only=True)
 class OneSided(PressureEffect):
-    """The normal force is multiplied by 1 + q where the wind blows along the normals, by 1 − q where against them.
+    """The normal force is multiplied by 1 + q where the wind blows along the normals, by 1 − q
+    where against them.
 
     Attributes:
         share: q.
@@ -25,7 +26,8 @@ class OneSided(PressureEffect):
             unit="1",
             prior=(-0.5, 0.5),
             admissible=(-1.0, 1.0),
-            source="hollow against convex sides of curved plates: drag coefficients 1.4 and 0.7–1.2 (Hoerner 1965)",
+            source="hollow against convex sides of curved plates: drag coefficients 1.4 and "
+            "0.7–1.2 (Hoerner 1965)",
         ),
     ] = 0.0
 

@@ -1,4 +1,5 @@
-"""Something that passes upwind, again and again, and takes the wind away from a part of the flag."""
+"""Something that passes upwind, again and again, and takes the wind away from a part of the
+flag."""
 
 from __future__ import annotations
 
@@ -16,8 +17,8 @@ PERIOD = 3.7
 
 @dataclass(frozen=True, kw_only=True)
 class PassingObstacle(FlowEffect):
-    """The wind is multiplied by 1 − q e^(−((y − y₀)² + (z + 0.3 m)²)/(2 s²)), y to its left and z above the middle of
-    the attachments; y₀ runs from −1.5 m to 1.5 m once in 3.7 s.
+    """The wind is multiplied by 1 − q e^(−((y − y₀)² + (z + 0.3 m)²)/(2 s²)), y to its left and z
+    above the middle of the attachments; y₀ runs from −1.5 m to 1.5 m once in 3.7 s.
 
     Attributes:
         share: q.
@@ -27,11 +28,20 @@ class PassingObstacle(FlowEffect):
     share: Annotated[
         Value,
         strength(
-            unit="1", prior=(0.0, 0.8), admissible=(0.0, 1.0), source="velocity deficits of near wakes: 0.3 to 0.8"
+            unit="1",
+            prior=(0.0, 0.8),
+            admissible=(0.0, 1.0),
+            source="velocity deficits of near wakes: 0.3 to 0.8",
         ),
     ] = 0.0
     size: Annotated[
-        Value, shape(unit="m", prior=(0.2, 0.8), admissible=(1e-2, 10.0), source="persons, signs, small vehicles")
+        Value,
+        shape(
+            unit="m",
+            prior=(0.2, 0.8),
+            admissible=(1e-2, 10.0),
+            source="persons, signs, small vehicles",
+        ),
     ] = 0.4
 
     def field(self, time: float, offset: Tensor, wind: Tensor) -> Tensor:

@@ -11,7 +11,8 @@ _TOLERANCE = 1e-9
 
 
 def shares(mesh: Mesh, points: FloatArray) -> FloatArray:
-    """(point, vertex) barycentric weights at points (point, 2) of the cloth [m]: a point's centre of mass is kept."""
+    """(point, vertex) barycentric weights at points (point, 2) of the cloth [m]: a point's centre
+    of mass is kept."""
     corners = mesh.rest[mesh.faces]
     relative = points[:, None] - corners[None, :, 0]
     inner = np.einsum("fac,pfa->pfc", mesh.gradients, relative)

@@ -31,7 +31,8 @@ class Seam(ClothEffect):
             unit="kg/m",
             prior=(0.0, 0.1),
             admissible=NOT_NEGATIVE,
-            source="four layers over 20 mm of cloth of 0.3 kg/m² with thread and webbing: 0.02–0.1 kg/m",
+            source="four layers over 20 mm of cloth of 0.3 kg/m² with thread and webbing: 0.02–0.1 "
+            "kg/m",
         ),
     ] = 0.0
 

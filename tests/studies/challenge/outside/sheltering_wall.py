@@ -16,7 +16,8 @@ CREST = -0.1
 
 @dataclass(frozen=True, kw_only=True)
 class ShelteringWall(FlowEffect):
-    """The wind is multiplied by 1 − q/(1 + e^((z + 0.1 m)/s)), z the height above the middle of the attachments.
+    """The wind is multiplied by 1 − q/(1 + e^((z + 0.1 m)/s)), z the height above the middle of the
+    attachments.
 
     Attributes:
         share: q, of the wind that is lost far below the crest.
@@ -29,7 +30,8 @@ class ShelteringWall(FlowEffect):
             unit="1",
             prior=(0.0, 0.9),
             admissible=(0.0, 1.0),
-            source="mean speeds a few heights behind fences and walls: 0.3–0.7 of the open wind less for porous ones, "
+            source="mean speeds a few heights behind fences and walls: 0.3–0.7 of the open wind "
+            "less for porous ones, "
             "all of it for solid ones (Plate, Agricultural Meteorology 8:203, 1971)",
         ),
     ] = 0.0

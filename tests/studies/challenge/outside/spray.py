@@ -1,4 +1,5 @@
-"""Drops that hit the cloth and give up their momentum: a cloudburst, a sprinkler, spray from breaking waves."""
+"""Drops that hit the cloth and give up their momentum: a cloudburst, a sprinkler, spray from
+breaking waves."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ from sim.effects import NOT_NEGATIVE, ForceEffect, Value, shape, strength
 
 @dataclass(frozen=True, kw_only=True)
 class Spray(ForceEffect):
-    """Drops fly with the wind and fall at V through it. On a face of rest area a with unit normal n that they meet at
+    """Drops fly with the wind and fall at V through it. On a face of rest area a with unit normal n
+    that they meet at
     a relative velocity c: f = L a |c·n| c. They run off, and weigh nothing.
 
     Attributes:
@@ -29,7 +31,8 @@ class Spray(ForceEffect):
             unit="kg/m³",
             prior=(0.0, 0.05),
             admissible=NOT_NEGATIVE,
-            source="rain of 25–300 mm/h over its fall speed: 0.001–0.012; jets of sprinklers and hoses ten times that",
+            source="rain of 25–300 mm/h over its fall speed: 0.001–0.012; jets of sprinklers and "
+            "hoses ten times that",
         ),
     ] = 0.0
     fall: Annotated[
@@ -42,9 +45,13 @@ class Spray(ForceEffect):
         ),
     ] = 7.0
 
-    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+    def force(
+        self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor
+    ) -> Tensor:
         seen = face_wind(cloth, position, velocity, wind)
-        down = torch.zeros_like(seen.relative).index_fill(1, torch.tensor(2, device=position.device), -1.0)
+        down = torch.zeros_like(seen.relative).index_fill(
+            1, torch.tensor(2, device=position.device), -1.0
+        )
         meeting = seen.relative + self.fall * down
         caught = self.content * (meeting * seen.normal).sum(1, keepdim=True).abs()
         return cloth.shared_out((cloth.areas / 3)[:, None, None] * caught * meeting)

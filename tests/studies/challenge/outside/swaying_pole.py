@@ -15,8 +15,8 @@ from sim.effects import NOT_NEGATIVE, ForceEffect, Value, left_of, norm, shape, 
 
 @dataclass(frozen=True, kw_only=True)
 class SwayingPole(ForceEffect):
-    """Inertial force m A ω² sin ω t to the left of the wind, ω = 2π f, in the frame of a pole that is A sin ω t to the
-    left of where it stands. The wind is that of the swaying frame.
+    """Inertial force m A ω² sin ω t to the left of the wind, ω = 2π f, in the frame of a pole that
+    is A sin ω t to the left of where it stands. The wind is that of the swaying frame.
 
     Attributes:
         amplitude: A.
@@ -29,7 +29,8 @@ class SwayingPole(ForceEffect):
             unit="m",
             prior=(0.0, 0.1),
             admissible=NOT_NEGATIVE,
-            source="masts in lock-in with their vortices sway by 0.1–1 of their diameter of 50–150 mm, rods held by "
+            source="masts in lock-in with their vortices sway by 0.1–1 of their diameter of 50–150 "
+            "mm, rods held by "
             "hand by more (Blevins, Flow-Induced Vibration, 1990, ch. 3)",
         ),
     ] = 0.0
@@ -43,9 +44,13 @@ class SwayingPole(ForceEffect):
         ),
     ] = 1.7
 
-    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+    def force(
+        self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor
+    ) -> Tensor:
         left = left_of(wind, axis=-2)
         left = left / norm(left, axis=-2).clamp(min=torch.finfo(position.dtype).tiny)
-        rate = torch.as_tensor(2 * math.pi * self.frequency, dtype=position.dtype, device=position.device)
+        rate = torch.as_tensor(
+            2 * math.pi * self.frequency, dtype=position.dtype, device=position.device
+        )
         push = self.amplitude * rate**2 * torch.sin(rate * time)
         return cloth.mass.unsqueeze(1) * push * left

@@ -19,7 +19,8 @@ DROP = 1.0
 
 @dataclass(frozen=True, kw_only=True)
 class Tether(Effect):
-    """An elastic cord −k (|d| − ℓ)₊ d/|d| between the lower fly corner and a point 1 m below the attachments.
+    """An elastic cord −k (|d| − ℓ)₊ d/|d| between the lower fly corner and a point 1 m below the
+    attachments.
 
     Attributes:
         stiffness: k.
@@ -29,17 +30,28 @@ class Tether(Effect):
     stiffness: Annotated[
         Value,
         strength(
-            unit="N/m", prior=(0.0, 10.0), admissible=NOT_NEGATIVE, source="elastic cords of 1–5 mm at lengths of 1 m"
+            unit="N/m",
+            prior=(0.0, 10.0),
+            admissible=NOT_NEGATIVE,
+            source="elastic cords of 1–5 mm at lengths of 1 m",
         ),
     ] = 0.0
     length: Annotated[
-        Value, shape(unit="m", prior=(0.8, 1.5), admissible=NOT_NEGATIVE, source="taut now and then on such a flag")
+        Value,
+        shape(
+            unit="m",
+            prior=(0.8, 1.5),
+            admissible=NOT_NEGATIVE,
+            source="taut now and then on such a flag",
+        ),
     ] = 1.2
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
         rest = system.cloth.mesh.rest
         corner = int((rest[:, 0] - rest[:, 1]).argmax())
-        down = torch.tensor([[0.0], [0.0], [-DROP]], dtype=state.position.dtype, device=state.position.device)
+        down = torch.tensor(
+            [[0.0], [0.0], [-DROP]], dtype=state.position.dtype, device=state.position.device
+        )
         cord = Cord(effect=self, vertex=corner, end=origin(system, state) + down)
         return replace(system, effects=(*system.effects, cord)), state
 
@@ -52,11 +64,18 @@ class Cord:
     vertex: int
     end: Tensor
 
-    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+    def force(
+        self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor
+    ) -> Tensor:
         """(vertex, 3, batch) [N]."""
         stretch = position[self.vertex] - self.end
         distance = norm(stretch, axis=0)
         taut = (distance - self.effect.length).clamp(min=0)
-        pull = -self.effect.stiffness * taut * stretch / distance.clamp(min=torch.finfo(position.dtype).tiny)
+        pull = (
+            -self.effect.stiffness
+            * taut
+            * stretch
+            / distance.clamp(min=torch.finfo(position.dtype).tiny)
+        )
         index = torch.tensor([self.vertex], device=position.device)
         return torch.zeros_like(position).index_add(0, index, pull.unsqueeze(0))

@@ -22,10 +22,15 @@ class Updraft(FlowEffect):
 
     speed: Annotated[
         Value,
-        strength(unit="m/s", prior=(-2.0, 2.0), source="plumes over sunlit roofs and vents: 0.3–2 m/s"),
+        strength(
+            unit="m/s", prior=(-2.0, 2.0), source="plumes over sunlit roofs and vents: 0.3–2 m/s"
+        ),
     ] = 0.0
     thickness: Annotated[
-        Value, shape(unit="m", prior=(0.05, 0.3), admissible=(1e-3, 10.0), source="of the edge of a plume")
+        Value,
+        shape(
+            unit="m", prior=(0.05, 0.3), admissible=(1e-3, 10.0), source="of the edge of a plume"
+        ),
     ] = 0.15
 
     def field(self, time: float, offset: Tensor, wind: Tensor) -> Tensor:

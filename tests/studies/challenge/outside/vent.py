@@ -18,7 +18,8 @@ from sim.cloth.system import System
 from sim.effects import Effect, Value, strength
 
 LOW, HIGH = (0.4, 0.1), (0.9, 0.75)
-"""Corners of the panel: from the hoist as a share of the width, from below as a share of the height."""
+"""Corners of the panel: from the hoist as a share of the width, from below as a share of the
+height."""
 _FINE = 8
 
 
@@ -36,27 +37,33 @@ class Vent(Effect):
             unit="1",
             prior=(0.0, 1.0),
             admissible=(0.0, 1.0),
-            source="wind slits and nets of banners: 0.2–0.7 of the solid's drag is lost at solidities of 0.8–0.3, all "
+            source="wind slits and nets of banners: 0.2–0.7 of the solid's drag is lost at "
+            "solidities of 0.8–0.3, all "
             "of it where a piece is cut out (Hoerner 1965, ch. 3)",
         ),
     ] = 0.0
 
     def apply(self, system: System, state: State) -> tuple[System, State]:
         within = covered(system.cloth.mesh)
-        areas = system.cloth.areas * torch.as_tensor(within, dtype=system.cloth.dtype, device=system.cloth.device)
+        areas = system.cloth.areas * torch.as_tensor(
+            within, dtype=system.cloth.dtype, device=system.cloth.device
+        )
         panel = Panel(effect=self, areas=areas, density=system.air.plain.density)
         return replace(system, effects=(*system.effects, panel)), state
 
 
 @dataclass(frozen=True, kw_only=True)
 class Panel:
-    """What is missing of the normal force ρ a |w_n| w_n, for a density ρ [kg/m³] and (face,) areas of net [m²]."""
+    """What is missing of the normal force ρ a |w_n| w_n, for a density ρ [kg/m³] and (face,) areas
+    of net [m²]."""
 
     effect: Vent
     areas: Tensor
     density: float
 
-    def force(self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor) -> Tensor:
+    def force(
+        self, cloth: Cloth, time: float, position: Tensor, velocity: Tensor, wind: Tensor
+    ) -> Tensor:
         """(vertex, 3, batch) [N]."""
         seen = face_wind(cloth, position, velocity, wind)
         size = (self.areas / 3)[:, None, None] * self.density * self.effect.share

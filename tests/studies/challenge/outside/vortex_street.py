@@ -19,8 +19,8 @@ _CARRIED = 0.85
 
 @dataclass(frozen=True, kw_only=True)
 class VortexStreet(FlowEffect):
-    """The wind u gains q |u| sin 2π(f t − f x/(0.85 |u|)) e^(−(y/(3D))²) x/(x + D) to its left, f = 0.2 |u|/D, where
-    x > 0 is downstream of the middle of the attachments and y across.
+    """The wind u gains q |u| sin 2π(f t − f x/(0.85 |u|)) e^(−(y/(3D))²) x/(x + D) to its left, f =
+    0.2 |u|/D, where x > 0 is downstream of the middle of the attachments and y across.
 
     Attributes:
         share: q.
@@ -33,11 +33,18 @@ class VortexStreet(FlowEffect):
             unit="1",
             prior=(0.05, 0.5),
             admissible=NOT_NEGATIVE,
-            source="cross velocities near a cylinder's wake axis reach half the free stream (Cantwell and Coles 1983)",
+            source="cross velocities near a cylinder's wake axis reach half the free stream "
+            "(Cantwell and Coles 1983)",
         ),
     ] = 0.0
     diameter: Annotated[
-        Value, shape(unit="m", prior=(0.08, 0.3), admissible=(1e-3, 5.0), source="masts and lamp posts: 80–300 mm")
+        Value,
+        shape(
+            unit="m",
+            prior=(0.08, 0.3),
+            admissible=(1e-3, 5.0),
+            source="masts and lamp posts: 80–300 mm",
+        ),
     ] = 0.15
 
     def field(self, time: float, offset: Tensor, wind: Tensor) -> Tensor:

@@ -17,7 +17,8 @@ PLACE = (0.7, 0.4)
 
 @dataclass(frozen=True, kw_only=True)
 class Whirl(FlowEffect):
-    """The wind gains Γ/(2π r) (1 − e^(−(r/c)²)) around the axis at a distance r from it: the vortex of Lamb and Oseen.
+    """The wind gains Γ/(2π r) (1 − e^(−(r/c)²)) around the axis at a distance r from it: the vortex
+    of Lamb and Oseen.
 
     Attributes:
         circulation: Γ, counter-clockwise seen from above.
@@ -29,13 +30,19 @@ class Whirl(FlowEffect):
         strength(
             unit="m²/s",
             prior=(-5.0, 5.0),
-            source="eddies as wide as the corner or parapet they stand behind, 0.5–2 m, that turn at a third to a half "
+            source="eddies as wide as the corner or parapet they stand behind, 0.5–2 m, that turn "
+            "at a third to a half "
             "of the wind: π D U/2 of 1–10 m²/s (Oke, Boundary Layer Climates, 1987, ch. 8)",
         ),
     ] = 0.0
     core: Annotated[
         Value,
-        shape(unit="m", prior=(0.1, 0.5), admissible=(1e-2, 10.0), source="a fifth to a half of the eddy's width"),
+        shape(
+            unit="m",
+            prior=(0.1, 0.5),
+            admissible=(1e-2, 10.0),
+            source="a fifth to a half of the eddy's width",
+        ),
     ] = 0.3
 
     def field(self, time: float, offset: Tensor, wind: Tensor) -> Tensor:

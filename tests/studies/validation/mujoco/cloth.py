@@ -44,7 +44,8 @@ class Air:
         quadratic: q |w_t| w_t [kg/m³].
         side: m |w| (vertical × w) [kg/m³].
         lag: s, the share of the pressure that lags as Wagner's function has it.
-        carried: c of the mass of air c/((k/2)^(3/2) + (4/(π H))^(3/2))^(2/3) [kg/m³]; on a grid, by Euler.
+        carried: c of the mass of air c/((k/2)^(3/2) + (4/(π H))^(3/2))^(2/3) [kg/m³]; on a grid, by
+            Euler.
     """
 
     pressure: float = 1.0
@@ -197,5 +198,7 @@ def _run(command: Sequence[str]) -> None:
     if done.returncode:
         said = done.stderr.strip().splitlines()
         raise UnusableError(
-            said[-1] if said else "the worker printed nothing", where="MuJoCo", fix="take smaller steps"
+            said[-1] if said else "the worker printed nothing",
+            where="MuJoCo",
+            fix="take smaller steps",
         )

@@ -1,8 +1,10 @@
-"""Experiments of a flag by MuJoCo: drawn from a seed, simulated, and written as a user would bring them.
+"""Experiments of a flag by MuJoCo: drawn from a seed, simulated, and written as a user would bring
+them.
 
-What is declared is one nominal cloth, level winds along +x and nothing else. What is simulated is another cloth by
-another method: area weight, stretching, bending and damping differ from the nominal ones, and an undeclared effect
-may act.
+What is declared is one nominal cloth, level winds along +x and nothing else. What is simulated is
+another cloth by
+another method: area weight, stretching, bending and damping differ from the nominal ones, and an
+undeclared effect may act.
 """
 
 from __future__ import annotations
@@ -42,7 +44,8 @@ NOMINAL = Sheet(
     bending=9e-6,
     damping=0.25e-3,
 )
-"""About Camel Ponte Roma, isotropic: its area weight, tension at small strain, and k/4 of its bending table."""
+"""About Camel Ponte Roma, isotropic: its area weight, tension at small strain, and k/4 of its
+bending table."""
 SPREAD: Mapping[str, tuple[float, float]] = {
     "area_weight": (0.85, 1.18),
     "stretching": (0.7, 1.5),
@@ -79,10 +82,17 @@ class Undeclared:
 
 NOTHING = Undeclared(title="nothing")
 UNDECLARED: Mapping[str, Undeclared] = {
-    "pressure": Undeclared(title="pressure × 1.6", effect="air-density", strength=0.6, air=Air(pressure=1.6)),
-    "lift": Undeclared(title="lift", effect="lift", strength=2.0, air=Air(lift=0.5 * AIR_DENSITY * 2.0)),
+    "pressure": Undeclared(
+        title="pressure × 1.6", effect="air-density", strength=0.6, air=Air(pressure=1.6)
+    ),
+    "lift": Undeclared(
+        title="lift", effect="lift", strength=2.0, air=Air(lift=0.5 * AIR_DENSITY * 2.0)
+    ),
     "linear-drag": Undeclared(
-        title="linear tangential drag", effect="tangential-linear-drag", strength=0.4, air=Air(linear=0.4)
+        title="linear tangential drag",
+        effect="tangential-linear-drag",
+        strength=0.4,
+        air=Air(linear=0.4),
     ),
     "quadratic-drag": Undeclared(
         title="quadratic tangential drag",
@@ -90,7 +100,9 @@ UNDECLARED: Mapping[str, Undeclared] = {
         strength=0.05,
         air=Air(quadratic=AIR_DENSITY * 0.05),
     ),
-    "rising-wind": Undeclared(title="wind that rises by 0.15 rad", effect="vertical-wind", strength=0.15, rise=0.15),
+    "rising-wind": Undeclared(
+        title="wind that rises by 0.15 rad", effect="vertical-wind", strength=0.15, rise=0.15
+    ),
     "hem": Undeclared(title="hem of 20 g/m", effect="hem-mass", strength=0.02, hem=0.02),
     "inertia": Undeclared(
         title="inertia of the air, a share of 0.2",
@@ -103,8 +115,8 @@ UNDECLARED: Mapping[str, Undeclared] = {
     "magnus": Undeclared(title="force across the wind (Magnus)", air=Air(side=0.12)),
     "wake": Undeclared(title="a pressure that lags by Wagner's function", air=Air(lag=1.0)),
 }
-"""By name. Damping is calibrated and not an effect; the last two are none that a verdict may name. The inertia of the
-air needs MuJoCo's explicit steps, and so little damping."""
+"""By name. Damping is calibrated and not an effect; the last two are none that a verdict may name.
+The inertia of the air needs MuJoCo's explicit steps, and so little damping."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -134,14 +146,20 @@ class Truth:
 
     @property
     def damping(self) -> float:
-        """Of slow modes [s]: the cloth's, and that of an implicit step, which damps as so much does."""
-        return self.sheet.damping + (self.method.step if self.method.integrator is Integrator.DISCRETE else 0.0)
+        """Of slow modes [s]: the cloth's, and that of an implicit step, which damps as so much
+        does."""
+        return self.sheet.damping + (
+            self.method.step if self.method.integrator is Integrator.DISCRETE else 0.0
+        )
 
 
 def draw(name: str, undeclared: Undeclared, *, seed: int) -> Truth:
     """An experiment by its name and seed: all but what acts is drawn."""
     rng = stream(seed, "foreign", name)
-    factor = {key: math.exp(rng.uniform(math.log(low), math.log(high))) for key, (low, high) in SPREAD.items()}
+    factor = {
+        key: math.exp(rng.uniform(math.log(low), math.log(high)))
+        for key, (low, high) in SPREAD.items()
+    }
     damping = math.exp(rng.uniform(*np.log(DAMPINGS)))
     diagonals = list(Diagonals)[rng.integers(2)]
     step = _STEPS[rng.integers(2)]
@@ -169,7 +187,8 @@ def draw(name: str, undeclared: Undeclared, *, seed: int) -> Truth:
 
 
 def write(truth: Truth, folder: Path, *, python: Path, seed: int) -> Path:
-    """Simulate an experiment and write it: a marker table for each wind, the material, and the recipe that is returned.
+    """Simulate an experiment and write it: a marker table for each wind, the material, and the
+    recipe that is returned.
 
     Raises:
         UnusableError: the simulation failed.
@@ -193,7 +212,9 @@ def write(truth: Truth, folder: Path, *, python: Path, seed: int) -> Path:
             settle=round(SETTLE * RATE),
         )
         positions = made.positions[:, seen]
-        jitter = stream(seed, "foreign", truth.name, "noise", _file(speed)).standard_normal(positions.shape)
+        jitter = stream(seed, "foreign", truth.name, "noise", _file(speed)).standard_normal(
+            positions.shape
+        )
         _table(folder / _file(speed), rest[seen], positions + NOISE * jitter)
     (folder / "cloth.toml").write_text(material_text(), encoding="utf-8")
     recipe = folder / "experiment.toml"
@@ -204,14 +225,20 @@ def write(truth: Truth, folder: Path, *, python: Path, seed: int) -> Path:
 def material_text() -> str:
     """The nominal cloth as a material file: entries that act as this membrane and these hinges do.
 
-    The tables' entries count twice in the membrane, whose energy density is (k0 G00² + 2 k1 G00 G11 + k2 G11² +
-    2 k3 G01²)/2, and hinges of an entry k store k/4 κ²/2 in a cylinder.
+    The tables' entries count twice in the membrane, whose energy density is (k0 G00² + 2 k1 G00 G11
+    + k2 G11² + 2 k3 G01²)/2, and hinges of an entry k store k/4 κ²/2 in a cylinder.
     """
     plain = NOMINAL.stretching / (1 - NOMINAL.poisson**2)
-    row = [plain / 2, NOMINAL.poisson * plain / 2, plain / 2, NOMINAL.stretching / (1 + NOMINAL.poisson) / 2]
+    row = [
+        plain / 2,
+        NOMINAL.poisson * plain / 2,
+        plain / 2,
+        NOMINAL.stretching / (1 + NOMINAL.poisson) / 2,
+    ]
     bending = [4 * NOMINAL.bending] * 5
     return (
-        f'source = "constant stiffness"\narea-weight = {NOMINAL.area_weight}\ndamping = {NOMINAL.damping}\n'
+        f'source = "constant stiffness"\narea-weight = {NOMINAL.area_weight}\ndamping = '
+        f"{NOMINAL.damping}\n"
         f"stretching = {[row] * 6}\nbending = {[bending] * 3}\n"
     )
 
@@ -222,7 +249,8 @@ def _recipe(speeds: Sequence[float]) -> str:
         '[attachment]\nat = "hoist-corners"\nrigid = true\n'
     )
     parts = [
-        f'\n[[recording]]\nsource = "{_file(speed)}"\nname = "{speed:.3g} m/s"\nrate = {RATE}\nnoise = {NOISE}\n'
+        f'\n[[recording]]\nsource = "{_file(speed)}"\nname = "{speed:.3g} m/s"\nrate = '
+        f"{RATE}\nnoise = {NOISE}\n"
         f"wind = {{ speed = {speed!r} }}\n"
         for speed in speeds
     ]
@@ -236,13 +264,15 @@ def _file(speed: float) -> str:
 def _markers(rest: FloatArray) -> IntArray:
     """Every `SEEN`-th vertex of the grid, by its place."""
     column, row = (
-        np.rint(rest[:, axis] / size * cells) for axis, size, cells in ((0, WIDTH, COLUMNS), (1, HEIGHT, ROWS))
+        np.rint(rest[:, axis] / size * cells)
+        for axis, size, cells in ((0, WIDTH, COLUMNS), (1, HEIGHT, ROWS))
     )
     return np.flatnonzero((column % SEEN == 0) & (row % SEEN == 0))
 
 
 def _hem(rest: FloatArray, area_weight: float) -> FloatArray | None:
-    """(vertex,) mass of a hem around the cloth, of so much for each metre, half of each edge at its ends [kg]."""
+    """(vertex,) mass of a hem around the cloth, of so much for each metre, half of each edge at its
+    ends [kg]."""
     if not area_weight:
         return None
     length = np.zeros(len(rest))

@@ -1,7 +1,8 @@
-"""Intermediate results on disk, named by a hash of all that went in: a study that was interrupted goes on from there.
+"""Intermediate results on disk, named by a hash of all that went in: a study that was interrupted
+goes on from there.
 
-What went in includes the source of the modules that computed it: a changed method never meets old results. Each file
-ends with its checksum; a damaged one is computed anew, with a warning.
+What went in includes the source of the modules that computed it: a changed method never meets old
+results. Each file ends with its checksum; a damaged one is computed anew, with a warning.
 """
 
 from __future__ import annotations
@@ -45,7 +46,8 @@ def cached(
             with np.load(target) as stored:
                 return {name: stored[name] for name in stored.files}
         _LOG.warning(
-            "flagdata: warning: an intermediate result is damaged, or of an older version; it is computed anew"
+            "flagdata: warning: an intermediate result is damaged, or of an older version; it is "
+            "computed anew"
             "\n  where: %s",
             target,
         )

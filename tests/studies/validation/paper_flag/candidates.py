@@ -1,8 +1,9 @@
-"""What may have been missing: each candidate as a load on the sheet, with the strengths that are tried.
+"""What may have been missing: each candidate as a load on the sheet, with the strengths that are
+tried.
 
-A model of the paper flag is a candidate and a factor s on the logged speed, which is 1 or free: the sheet hangs in the
-jet's shear layer and meets s U. The declared hypothesis is the reactive loading; the others are the wrong-effect
-controls, which are given the same freedom.
+A model of the paper flag is a candidate and a factor s on the logged speed, which is 1 or free: the
+sheet hangs in the jet's shear layer and meets s U. The declared hypothesis is the reactive loading;
+the others are the wrong-effect controls, which are given the same freedom.
 """
 
 from __future__ import annotations
@@ -15,7 +16,14 @@ from enum import StrEnum
 import numpy as np
 import torch
 
-from sim.effects import AddedMass, Effect, InternalDamping, Lift, ReactiveLoading, TangentialLinearDrag
+from sim.effects import (
+    AddedMass,
+    Effect,
+    InternalDamping,
+    Lift,
+    ReactiveLoading,
+    TangentialLinearDrag,
+)
 from tests.studies.validation.paper_flag.sheet import Sheet
 
 
@@ -65,12 +73,17 @@ class Load:
             "lift": "C {}",
             "friction": "c {} kg/(m² s)",
         }
-        parts = [text.format(f"{value:.2g}") for name, text in units.items() if (value := getattr(self, name))]
+        parts = [
+            text.format(f"{value:.2g}")
+            for name, text in units.items()
+            if (value := getattr(self, name))
+        ]
         return ", ".join(parts) or "–"
 
 
 def tried(candidate: Candidate) -> tuple[Load, ...]:
-    """Loads of a candidate for linear stability: the priors of `sim.effects`, from where they do next to nothing."""
+    """Loads of a candidate for linear stability: the priors of `sim.effects`, from where they do
+    next to nothing."""
     masses = np.geomspace(0.03, 1.0, 29).tolist()
     lifts = np.geomspace(0.04, 6.3, 25).tolist()
     match candidate:
@@ -87,7 +100,9 @@ def tried(candidate: Candidate) -> tuple[Load, ...]:
         case Candidate.FRICTION:
             return tuple(Load(friction=c) for c in np.geomspace(5e-4, 0.2, 13).tolist())
         case Candidate.REACTIVE_AND_LIFT:
-            return tuple(Load(reactive=m, lift=c) for m, c in itertools.product(masses[::4], lifts[::4]))
+            return tuple(
+                Load(reactive=m, lift=c) for m, c in itertools.product(masses[::4], lifts[::4])
+            )
 
 
 def loaded(load: Load, *, bare: Sheet, length: float, density: float) -> Sheet:

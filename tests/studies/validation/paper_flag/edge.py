@@ -1,12 +1,13 @@
-"""The centre line of a sheet seen edge-on: a dark line on a bright ground, one height a column, to parts of a pixel.
+"""The centre line of a sheet seen edge-on: a dark line on a bright ground, one height a column, to
+parts of a pixel.
 
-In every column the line is the run of dark pixels around the darkest one, and its height is that run's centroid,
-weighted with darkness above a floor. A line that moves during the exposure is smeared into a band, whose centroid is
-the line's place at mid-exposure as long as it moves evenly; its width says how far it moved. What cannot be located is
-flagged and left out, never filled.
+In every column the line is the run of dark pixels around the darkest one, and its height is that
+run's centroid, weighted with darkness above a floor. A line that moves during the exposure is
+smeared into a band, whose centroid is the line's place at mid-exposure as long as it moves evenly;
+its width says how far it moved. What cannot be located is flagged and left out, never filled.
 
-The error of a height is estimated from the track itself: `scatter` compares every column with the parabola through its
-neighbours, which a sheet with bending stiffness follows over a few pixels.
+The error of a height is estimated from the track itself: `scatter` compares every column with the
+parabola through its neighbours, which a sheet with bending stiffness follows over a few pixels.
 """
 
 from __future__ import annotations
@@ -26,10 +27,12 @@ from flagdata.ingest import CameraOptions, open_camera
 from flagdata.timebase import NANOSECONDS
 
 _SPAN = 15
-"""Columns of the parabola in `scatter`: 2 mm at 0.138 mm a pixel, over which a sheet of 75 µm paper is smooth."""
+"""Columns of the parabola in `scatter`: 2 mm at 0.138 mm a pixel, over which a sheet of 75 µm paper
+is smooth."""
 
 _STRIDE = 4
-"""Each so many-th row counts for the median that is the ground of a column: a line covers few of them."""
+"""Each so many-th row counts for the median that is the ground of a column: a line covers few of
+them."""
 
 
 class Seen(IntEnum):
@@ -38,7 +41,8 @@ class Seen(IntEnum):
     LINE = 0
     """One line, its height measured."""
     NOTHING = 1
-    """No pixel darker than the ground by the least contrast: no line, or one smeared until it vanishes."""
+    """No pixel darker than the ground by the least contrast: no line, or one smeared until it
+    vanishes."""
     DOUBLE = 2
     """Two lines: the sheet is folded over, or something else is in view."""
     SMEARED = 3
@@ -55,7 +59,8 @@ class EdgeOptions:
         contrast: least darkness against the ground [gray levels].
         floor: share of a column's greatest darkness below which a pixel does not count.
         widest: widest band that counts as a line, measured across the line [px].
-        step: greatest distance between the heights of neighbouring columns of one line [px]; a slope of `step`.
+        step: greatest distance between the heights of neighbouring columns of one line [px]; a
+            slope of `step`.
         bridge: widest gap within one line [columns].
     """
 
@@ -67,7 +72,9 @@ class EdgeOptions:
 
     def __post_init__(self) -> None:
         if not (0 < self.floor < 1 and min(self.contrast, self.widest, self.step, self.bridge) > 0):
-            raise UsageError(f"{self} finds nothing", where="edge", fix="give positive values, a floor below 1")
+            raise UsageError(
+                f"{self} finds nothing", where="edge", fix="give positive values, a floor below 1"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +97,8 @@ class EdgeTrack:
         frames = (len(self.time), self.height.shape[-1])
         if not (self.height.shape == self.width.shape == self.seen.shape == frames):
             raise InputError(
-                f"times {self.time.shape}, heights {self.height.shape}, widths {self.width.shape} do not fit",
+                f"times {self.time.shape}, heights {self.height.shape}, widths {self.width.shape} "
+                "do not fit",
                 where="edge track",
                 fix="give (frame,) times and (frame, column) arrays",
             )
@@ -148,7 +156,8 @@ def _run_around(counted: BoolArray, middle: int) -> BoolArray:
 
 
 def _joined(height: FloatArray, line: BoolArray, options: EdgeOptions) -> BoolArray:
-    """The columns of the longest chain in which neighbours lie within `step` a column and gaps within `bridge`."""
+    """The columns of the longest chain in which neighbours lie within `step` a column and gaps
+    within `bridge`."""
     columns = np.flatnonzero(line)
     sheet = np.zeros_like(line)
     if not len(columns):
@@ -169,11 +178,13 @@ def _slope(height: FloatArray) -> FloatArray:
 
 
 def scatter(track: EdgeTrack) -> FloatArray:
-    """Standard error of single heights, (frame,) [px]: residuals of the parabola through 15 columns around each.
+    """Standard error of single heights, (frame,) [px]: residuals of the parabola through 15 columns
+    around each.
 
-    The residual of the middle point of a parabola through k points, with independent errors σ, has the variance
-    σ² (1 − c), c the middle weight of the quadratic Savitzky–Golay filter; smooth parts of the error (lens, codec
-    blocks) are not seen. NaN for frames with fewer than 15 whole windows.
+    The residual of the middle point of a parabola through k points, with independent errors σ, has
+    the variance σ² (1 − c), c the middle weight of the quadratic Savitzky–Golay filter; smooth
+    parts of the error (lens, codec blocks) are not seen. NaN for frames with fewer than 15 whole
+    windows.
     """
     half = _SPAN // 2
     offset = np.arange(-half, half + 1)
@@ -192,7 +203,11 @@ def scatter(track: EdgeTrack) -> FloatArray:
 
 
 def track_edge(
-    path: Path, *, true_rate: float, rate: float | Literal["native"] = "native", options: EdgeOptions | None = None
+    path: Path,
+    *,
+    true_rate: float,
+    rate: float | Literal["native"] = "native",
+    options: EdgeOptions | None = None,
 ) -> EdgeTrack:
     """The line in all frames of a clip, in its own pixels.
 
@@ -216,9 +231,15 @@ def track_edge(
             times.append(frame.time / NANOSECONDS)
         damage = [finding for finding in stream.findings if finding.severity is Severity.ERROR]
     if damage:
-        raise InputError(damage[0].what, where=str(path), fix=damage[0].fix or "give an undamaged copy of the clip")
+        raise InputError(
+            damage[0].what,
+            where=str(path),
+            fix=damage[0].fix or "give an undamaged copy of the clip",
+        )
     if len(times) < 2:
-        raise InputError("a clip of fewer than two frames", where=str(path), fix="give a moving picture")
+        raise InputError(
+            "a clip of fewer than two frames", where=str(path), fix="give a moving picture"
+        )
     time = np.array(times)
     return EdgeTrack(
         time=time - time[0],

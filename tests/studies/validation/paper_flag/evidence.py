@@ -1,7 +1,9 @@
-"""Before and after on data no fit has seen: what models predict for each condition, and how wrong they are.
+"""Before and after on data no fit has seen: what models predict for each condition, and how wrong
+they are.
 
-Errors are natural logarithms of predicted over measured, so that twice too fast and half as fast weigh alike, and 0.1
-is 10 %. A model without flutter where flutter was measured has no prediction: that counts as a factor of ten.
+Errors are natural logarithms of predicted over measured, so that twice too fast and half as fast
+weigh alike, and 0.1 is 10 %. A model without flutter where flutter was measured has no prediction:
+that counts as a factor of ten.
 """
 
 from __future__ import annotations
@@ -65,7 +67,8 @@ class Predictor(Protocol):
     def loads(self) -> Sequence[Load]: ...
 
     def predict(self, load: int, factors: FloatArray, condition: Condition) -> FloatArray:
-        """(factor,) what the load at this index gives at `factors` times the tunnel's speed; NaN without flutter."""
+        """(factor,) what the load at this index gives at `factors` times the tunnel's speed; NaN
+        without flutter."""
         ...
 
 
@@ -77,14 +80,19 @@ class LinearTable:
         lengths: at which stop speeds will be asked for [m].
     """
 
-    def __init__(self, loads: Sequence[Load], *, bare: Sheet, density: float, lengths: Sequence[float]) -> None:
+    def __init__(
+        self, loads: Sequence[Load], *, bare: Sheet, density: float, lengths: Sequence[float]
+    ) -> None:
         self.loads = tuple(loads)
         self._bare = bare
         self._density = density
         self._lengths = np.array(sorted(set(lengths)))
 
     def _sheets(self, length: float) -> list[Sheet]:
-        return [loaded(load, bare=self._bare, length=length, density=self._density) for load in self.loads]
+        return [
+            loaded(load, bare=self._bare, length=length, density=self._density)
+            for load in self.loads
+        ]
 
     @cached_property
     def _frequencies(self) -> FloatArray:
@@ -100,7 +108,10 @@ class LinearTable:
     @cached_property
     def _onsets(self) -> FloatArray:
         """(load, length) [m/s], NaN without."""
-        columns = [[onset(sheet, highest=_HIGHEST) for sheet in self._sheets(float(h))] for h in self._lengths]
+        columns = [
+            [onset(sheet, highest=_HIGHEST) for sheet in self._sheets(float(h))]
+            for h in self._lengths
+        ]
         return np.array(columns).T
 
     def predict(self, load: int, factors: FloatArray, condition: Condition) -> FloatArray:
@@ -115,25 +126,34 @@ class LinearTable:
             column = int(np.abs(self._lengths - condition.at).argmin())
             if abs(self._lengths[column] - condition.at) < 1e-6:
                 return self._onsets[load, column] / factors
-            raise UsageError(f"no onset at {condition.at:g} m", where="linear table", fix="name the length")
-        raise UsageError(f"no {condition.kind} in linear stability", where="linear table", fix="simulate in time")
+            raise UsageError(
+                f"no onset at {condition.at:g} m", where="linear table", fix="name the length"
+            )
+        raise UsageError(
+            f"no {condition.kind} in linear stability", where="linear table", fix="simulate in time"
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fitted:
-    """A load and a factor that were fitted, and the mean square errors of the kinds fitted to, summed."""
+    """A load and a factor that were fitted, and the mean square errors of the kinds fitted to,
+    summed."""
 
     load: int
     factor: float
     loss: float
 
 
-def errors(predictor: Predictor, load: int, factor: float, conditions: Sequence[Condition]) -> FloatArray:
+def errors(
+    predictor: Predictor, load: int, factor: float, conditions: Sequence[Condition]
+) -> FloatArray:
     """(condition,) logarithms of predicted over measured; NEVER where there is no prediction."""
     return _errors(predictor, load, np.array([factor]), conditions)[:, 0]
 
 
-def _errors(predictor: Predictor, load: int, factors: FloatArray, conditions: Sequence[Condition]) -> FloatArray:
+def _errors(
+    predictor: Predictor, load: int, factors: FloatArray, conditions: Sequence[Condition]
+) -> FloatArray:
     """(condition, factor)."""
     predicted = np.array([predictor.predict(load, factors, condition) for condition in conditions])
     predicted = predicted.reshape(len(conditions), len(factors))
@@ -143,12 +163,17 @@ def _errors(predictor: Predictor, load: int, factors: FloatArray, conditions: Se
 
 
 def fit(predictor: Predictor, shear: Shear, conditions: Sequence[Condition]) -> Fitted:
-    """The load and, where it is free, the factor with the least loss; each kind of condition weighs alike."""
+    """The load and, where it is free, the factor with the least loss; each kind of condition weighs
+    alike."""
     factors = FACTORS if shear is Shear.FREE else np.ones(1)
     kinds = [[c for c in conditions if c.kind is kind] for kind in Kind]
     loss = np.array(
         [
-            sum((_errors(predictor, load, factors, part) ** 2).mean(axis=0) for part in kinds if part)
+            sum(
+                (_errors(predictor, load, factors, part) ** 2).mean(axis=0)
+                for part in kinds
+                if part
+            )
             for load in range(len(predictor.loads))
         ]
     )
@@ -156,8 +181,11 @@ def fit(predictor: Predictor, shear: Shear, conditions: Sequence[Condition]) -> 
     return Fitted(load=int(load), factor=float(factors[factor]), loss=float(loss.min()))
 
 
-def factor_that_meets(predictor: Predictor, load: int, conditions: Sequence[Condition], *, within: float) -> float:
-    """The factor at which the mean log error vanishes; NaN where none brings it within this of 0."""
+def factor_that_meets(
+    predictor: Predictor, load: int, conditions: Sequence[Condition], *, within: float
+) -> float:
+    """The factor at which the mean log error vanishes; NaN where none brings it within this of
+    0."""
     mean = np.abs(_errors(predictor, load, FACTORS, conditions).mean(axis=0))
     best = int(mean.argmin())
     return float(FACTORS[best]) if mean[best] < within else math.nan
@@ -165,7 +193,8 @@ def factor_that_meets(predictor: Predictor, load: int, conditions: Sequence[Cond
 
 @dataclass(frozen=True, kw_only=True)
 class Interval:
-    """A mean over conditions and Student's interval at 90 % about it; infinite for a single condition."""
+    """A mean over conditions and Student's interval at 90 % about it; infinite for a single
+    condition."""
 
     mean: float
     low: float
@@ -176,7 +205,9 @@ class Interval:
     def of(cls, values: FloatArray) -> Interval:
         half = math.inf
         if len(values) > 1:
-            half = float(stats.t.ppf(0.95, len(values) - 1) * values.std(ddof=1) / math.sqrt(len(values)))
+            half = float(
+                stats.t.ppf(0.95, len(values) - 1) * values.std(ddof=1) / math.sqrt(len(values))
+            )
         mean = float(values.mean())
         return cls(mean=mean, low=mean - half, high=mean + half, count=len(values))
 

@@ -1,7 +1,9 @@
-"""The sheet at large amplitude, in time: our simulator on a strip of the sheet, clamped along its hoist.
+"""The sheet at large amplitude, in time: our simulator on a strip of the sheet, clamped along its
+hoist.
 
-A strip one cell high moves in its plane of bending alone, as the filmed sheets do. It goes through scenes, effects and
-integrators as a user's cloth does; here is only its geometry, its start and what is read off.
+A strip one cell high moves in its plane of bending alone, as the filmed sheets do. It goes through
+scenes, effects and integrators as a user's cloth does; here is only its geometry, its start and
+what is read off.
 """
 
 from __future__ import annotations
@@ -24,7 +26,8 @@ from sim.effects import Effect, apply
 from sim.integrate import Symplectic
 
 _GRID_RIGIDITY = 5.0
-"""A grid with alternating diagonals has a fifth of its table's rigidity (verified on the heavy elastica)."""
+"""A grid with alternating diagonals has a fifth of its table's rigidity (verified on the heavy
+elastica)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +36,8 @@ class StripRun:
 
     Attributes:
         columns: cells along the sheet.
-        stretching: in-plane stiffness [N/m]: stiff against the air's tension, soft enough for long steps.
+        stretching: in-plane stiffness [N/m]: stiff against the air's tension, soft enough for long
+            steps.
         damping: internal, of the base model [s].
         settle: time before anything is kept [s].
         duration: time kept [s].
@@ -50,9 +54,15 @@ class StripRun:
     push: float = 0.05
 
     def __post_init__(self) -> None:
-        if self.columns < 4 or min(self.stretching, self.duration, self.rate) <= 0 or self.settle < 0:
+        if (
+            self.columns < 4
+            or min(self.stretching, self.duration, self.rate) <= 0
+            or self.settle < 0
+        ):
             raise InputError(
-                f"{self} cannot be simulated", where="strip", fix="give positive values, 4 columns or more"
+                f"{self} cannot be simulated",
+                where="strip",
+                fix="give positive values, 4 columns or more",
             )
 
 
@@ -62,8 +72,8 @@ class StripMotion:
 
     Attributes:
         time: (frame,) [s].
-        along, across: (frame, point, member) of the middle line from clamp to tip, in the stream's direction and
-            across it [m]; NaN after a member's simulation has diverged.
+        along, across: (frame, point, member) of the middle line from clamp to tip, in the stream's
+            direction and across it [m]; NaN after a member's simulation has diverged.
         arc: (point,) distance from the clamp along the sheet [m].
     """
 
@@ -83,7 +93,8 @@ def simulate(
     effects: Sequence[Effect],
     run: StripRun,
 ) -> StripMotion:
-    """One member a stream speed [m/s], with the base model's air of this density [kg/m³] and these effects.
+    """One member a stream speed [m/s], with the base model's air of this density [kg/m³] and these
+    effects.
 
     The cells beside the clamp are held, which clamps the strip at their middle.
     """
@@ -115,7 +126,9 @@ def simulate(
     ]
     system, state = apply(effects, *assemble(scenes, dtype=torch.float64))
     integrator = Symplectic()
-    order = np.argsort(mesh.rest[:, 0], kind="stable").reshape(-1, 2)  # the two vertices of each cross line
+    order = np.argsort(mesh.rest[:, 0], kind="stable").reshape(
+        -1, 2
+    )  # the two vertices of each cross line
     interval = 1 / run.rate
     kept = round(run.duration * run.rate)
     skipped = round(run.settle * run.rate)
@@ -136,7 +149,8 @@ def simulate(
 
 
 def as_columns(motion: StripMotion, member: int, columns: FloatArray) -> FloatArray:
-    """The member's line as a camera sees it: heights at fixed distances from the clamp along the stream [m].
+    """The member's line as a camera sees it: heights at fixed distances from the clamp along the
+    stream [m].
 
     Args:
         columns: (column,) [m].
@@ -145,7 +159,9 @@ def as_columns(motion: StripMotion, member: int, columns: FloatArray) -> FloatAr
         (frame, column) [m]; NaN beyond the tip, and in frames in which the line is folded over.
     """
     heights = np.full((len(motion.time), len(columns)), np.nan)
-    for frame, (along, across) in enumerate(zip(motion.along[..., member], motion.across[..., member], strict=True)):
+    for frame, (along, across) in enumerate(
+        zip(motion.along[..., member], motion.across[..., member], strict=True)
+    ):
         if (np.diff(along) > 0).all():
             heights[frame] = np.interp(columns, along, across, right=np.nan)
     return heights

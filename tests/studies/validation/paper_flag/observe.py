@@ -44,10 +44,10 @@ class Clip:
         tip: (5 %, 50 %, 95 %) of the last column seen.
         waves: in metres where the scale is known (whole sheets), in columns elsewhere.
         stretch: of whole sheets.
-        lines: (line, column) heights over one cycle, at the columns of `waves`, above the clamp where it is in view:
-            to be drawn; NaN where not seen.
-        still: scatter of the height beside the clamp, over time [px]: an upper bound of the error that neighbouring
-            columns share; None where it is not in view.
+        lines: (line, column) heights over one cycle, at the columns of `waves`, above the clamp
+            where it is in view: to be drawn; NaN where not seen.
+        still: scatter of the height beside the clamp, over time [px]: an upper bound of the error
+            that neighbouring columns share; None where it is not in view.
     """
 
     spec: ClipSpec
@@ -81,7 +81,8 @@ class Observations:
     thresholds: Thresholds
 
     def conditions(self, case: Case, group: Group, kinds: Sequence[Kind]) -> tuple[Condition, ...]:
-        """The conditions of a group, of these kinds; wave speeds and amplitudes only of clips with the whole sheet."""
+        """The conditions of a group, of these kinds; wave speeds and amplitudes only of clips with
+        the whole sheet."""
         found = []
         for clip in self.clips:
             if clip.spec.group is group:
@@ -89,8 +90,16 @@ class Observations:
                 if clip.spec.whole:
                     parts[Kind.WAVE] = clip.waves.speed
                     parts[Kind.AMPLITUDE] = clip.waves.amplitude.scaled(1 / case.sheet.length)
-                found += [_condition(kind, clip.spec.speed, parts[kind]) for kind in kinds if kind in parts]
-        lengths = {Group.FIT: case.fit_lengths, Group.HELD_OUT: case.held_out_lengths, Group.OTHER: ()}[group]
+                found += [
+                    _condition(kind, clip.spec.speed, parts[kind])
+                    for kind in kinds
+                    if kind in parts
+                ]
+        lengths = {
+            Group.FIT: case.fit_lengths,
+            Group.HELD_OUT: case.held_out_lengths,
+            Group.OTHER: (),
+        }[group]
         if Kind.STOP in kinds:
             found += [self.stop(length) for length in lengths]
         return tuple(found)
@@ -103,8 +112,18 @@ class Observations:
         """
         speeds = [t.speed for t in self.thresholds.stop if abs(t.length - length) < 1e-6]
         if not speeds:
-            raise NotFoundError(f"no stop speed at {length:g} m", where="stop speeds", fix="name a length of the table")
-        return Condition(kind=Kind.STOP, at=length, value=float(np.median(speeds)), low=min(speeds), high=max(speeds))
+            raise NotFoundError(
+                f"no stop speed at {length:g} m",
+                where="stop speeds",
+                fix="name a length of the table",
+            )
+        return Condition(
+            kind=Kind.STOP,
+            at=length,
+            value=float(np.median(speeds)),
+            low=min(speeds),
+            high=max(speeds),
+        )
 
 
 def _condition(kind: Kind, at: float, estimate: Estimate) -> Condition:
@@ -164,7 +183,11 @@ def observe(case: Case, data: Path, *, keep: Path | None = None) -> Observations
     for spec in case.clips:
         path = data / case.folder / f"{spec.name}{case.suffix}"
         if not path.is_file():
-            raise NotFoundError("no such clip", where=str(path), fix="give the folder that holds video/ and flutter/")
+            raise NotFoundError(
+                "no such clip",
+                where=str(path),
+                fix="give the folder that holds video/ and flutter/",
+            )
         clips.append(measure_clip(_tracked(path, case, keep), spec, case))
     return Observations(clips=tuple(clips), thresholds=thresholds)
 
@@ -172,10 +195,17 @@ def observe(case: Case, data: Path, *, keep: Path | None = None) -> Observations
 def _tracked(path: Path, case: Case, keep: Path | None) -> EdgeTrack:
     def make() -> dict[str, AnyArray]:
         track = track_edge(path, true_rate=case.true_rate)
-        return {"time": track.time, "height": track.height, "width": track.width, "seen": track.seen}
+        return {
+            "time": track.time,
+            "height": track.height,
+            "width": track.width,
+            "seen": track.seen,
+        }
 
     arrays = cached(keep, {"clip": file_hash(path), "true_rate": case.true_rate}, (edge,), make)
-    return EdgeTrack(time=arrays["time"], height=arrays["height"], width=arrays["width"], seen=arrays["seen"])
+    return EdgeTrack(
+        time=arrays["time"], height=arrays["height"], width=arrays["width"], seen=arrays["seen"]
+    )
 
 
 def read_thresholds(case: Case, data: Path) -> Thresholds:
@@ -197,4 +227,7 @@ def read_thresholds(case: Case, data: Path) -> Thresholds:
 def median_by_length(thresholds: Sequence[Threshold]) -> tuple[tuple[float, float], ...]:
     """(length, median speed), by rising length."""
     lengths = sorted({t.length for t in thresholds})
-    return tuple((h, float(np.median([t.speed for t in thresholds if math.isclose(t.length, h)]))) for h in lengths)
+    return tuple(
+        (h, float(np.median([t.speed for t in thresholds if math.isclose(t.length, h)])))
+        for h in lengths
+    )

@@ -37,7 +37,9 @@ def page(case: Case, seen: Observations, study: Study, verdict: Verdict) -> str:
         "case": case,
         "verdict": verdict,
         "words": verdict_words(seen, study, verdict),
-        "images": {name: figure_url(figure) for name, figure in zip(_PICTURES, figures, strict=True)},
+        "images": {
+            name: figure_url(figure) for name, figure in zip(_PICTURES, figures, strict=True)
+        },
         "clips": [_clip_row(clip, case) for clip in seen.clips],
         "stretches": [(c.spec.name, c.stretch) for c in seen.clips if c.stretch is not None],
         "far": _far(case, seen),
@@ -57,7 +59,8 @@ def page(case: Case, seen: Observations, study: Study, verdict: Verdict) -> str:
 
 
 def as_json(case: Case, seen: Observations, study: Study, verdict: Verdict) -> dict[str, Any]:
-    """Everything on the page, as JSON values; errors are natural logarithms, None where a model has no flutter."""
+    """Everything on the page, as JSON values; errors are natural logarithms, None where a model has
+    no flutter."""
     return {
         "case": case.name,
         "seed": case.seed,
@@ -105,7 +108,9 @@ def as_json(case: Case, seen: Observations, study: Study, verdict: Verdict) -> d
 
 def model_name(outcome: Outcome) -> str:
     """The candidate, and the speed it is in."""
-    return f"{outcome.candidate.value}, {'s free' if outcome.shear is Shear.FREE else 'logged speed'}"
+    return (
+        f"{outcome.candidate.value}, {'s free' if outcome.shear is Shear.FREE else 'logged speed'}"
+    )
 
 
 def _outcome(o: Outcome) -> dict[str, Any]:
@@ -149,14 +154,17 @@ def _model_row(o: Outcome) -> dict[str, Any]:
     factor = "1" if o.shear is Shear.LOGGED else f"{o.factor:.2f} [{low:.2f}, {high:.2f}]"
     flutters = not all((values == NEVER).all() for values in o.fit.values())
     gains = {
-        kind.value: f"{_times(gain.mean)} [{_times(gain.low)}, {_times(gain.high)}]" for kind, gain in o.gains.items()
+        kind.value: f"{_times(gain.mean)} [{_times(gain.low)}, {_times(gain.high)}]"
+        for kind, gain in o.gains.items()
     }
     return {
         "name": model_name(o),
         "load": str(o.load) if flutters else "any",
         "factor": factor if flutters else "any",
         "mean": {kind.value: _mean(values) for kind, values in o.held_out.items()},
-        "each": {kind.value: [_percent(float(v)) for v in values] for kind, values in o.held_out.items()},
+        "each": {
+            kind.value: [_percent(float(v)) for v in values] for kind, values in o.held_out.items()
+        },
         "gain": gains,
         "flutters": flutters,
         "others": _mean(o.others),
@@ -171,7 +179,11 @@ def _times(gain: float) -> str:
 def _clip_row(clip: Clip, case: Case) -> list[str]:
     w, f = clip.waves, clip.waves.frequency
     whole = clip.spec.whole
-    interval = f" [{f.low:.2f}, {f.high:.2f}], n = {f.count}" if math.isfinite(f.low) else ", too few cycles"
+    interval = (
+        f" [{f.low:.2f}, {f.high:.2f}], n = {f.count}"
+        if math.isfinite(f.low)
+        else ", too few cycles"
+    )
     return [
         clip.spec.name,
         f"{clip.spec.speed:g}",
@@ -181,7 +193,9 @@ def _clip_row(clip: Clip, case: Case) -> list[str]:
         f"{clip.scatter:.2f}",
         f"{f.value:.2f}{interval}",
         f"{100 * w.explained:.0f} %",
-        f"{w.speed.value:.2f} [{w.speed.low:.2f}, {w.speed.high:.2f}]" if whole else "scale unknown",
+        f"{w.speed.value:.2f} [{w.speed.low:.2f}, {w.speed.high:.2f}]"
+        if whole
+        else "scale unknown",
         f"{w.amplitude.value / case.sheet.length:.3f}" if whole else "scale unknown",
     ]
 
@@ -206,7 +220,8 @@ def _declared_row(cell: Cell) -> list[str]:
 
 
 def _far(case: Case, seen: Observations) -> dict[str, str]:
-    """The tip's travel along the stream: of the clip without a clamp in which it is widest, and of a whole sheet's."""
+    """The tip's travel along the stream: of the clip without a clamp in which it is widest, and of
+    a whole sheet's."""
     far = max((c for c in seen.clips if not c.spec.whole), key=lambda c: c.tip[2] - c.tip[0])
     near = _whole_held_out(case, seen)
     span = far.tip[2] - far.tip[0]

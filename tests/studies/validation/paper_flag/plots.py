@@ -29,17 +29,31 @@ _MET = 0.03  # of a mean log error: half again the step of the factors
 
 
 def lines(case: Case, clip: Clip, study: Study) -> Figure:
-    """The sheet over one cycle: as filmed, and as each model in time moves at the same tunnel speed."""
+    """The sheet over one cycle: as filmed, and as each model in time moves at the same tunnel
+    speed."""
     panels: list[tuple[str, str, list[tuple[FloatArray, FloatArray]]]] = [
-        (f"filmed, {clip.spec.speed:g} m/s", _INK, [(clip.waves.columns, line) for line in clip.lines])
+        (
+            f"filmed, {clip.spec.speed:g} m/s",
+            _INK,
+            [(clip.waves.columns, line) for line in clip.lines],
+        )
     ]
     for candidate, motion in study.shapes.items():
         model = _free(study, candidate)
         speed = model.factor * clip.spec.speed
-        step = max(1, round(1 / clip.waves.frequency.value / 16 * len(motion.time) / float(motion.time[-1])))
+        step = max(
+            1,
+            round(1 / clip.waves.frequency.value / 16 * len(motion.time) / float(motion.time[-1])),
+        )
         shown = range(len(motion.time) - 16 * step, len(motion.time), step)
         drawn = [(motion.along[frame, :, 0], motion.across[frame, :, 0]) for frame in shown]
-        panels.append((f"{candidate.value}\n{model.load}, {speed:.2g} m/s at the sheet", _COLOURS[candidate], drawn))
+        panels.append(
+            (
+                f"{candidate.value}\n{model.load}, {speed:.2g} m/s at the sheet",
+                _COLOURS[candidate],
+                drawn,
+            )
+        )
     figure = Figure(figsize=(3.1 * len(panels), 3.3), layout="constrained")
     for axes, (title, colour, drawn) in zip(
         np.ravel(figure.subplots(1, len(panels), sharey=True)), panels, strict=True
@@ -56,7 +70,8 @@ def _free(study: Study, candidate: Candidate) -> Outcome:
 
 
 def speeds(case: Case, seen: Observations, study: Study) -> Figure:
-    """Frequency, wave speed and amplitude over the tunnel's speed: measured, and by the models in time."""
+    """Frequency, wave speed and amplitude over the tunnel's speed: measured, and by the models in
+    time."""
     figure = Figure(figsize=(12, 4.2), layout="constrained")
     tunnel = np.linspace(6.5, 12.8, 64)
     kinds = (Kind.FREQUENCY, Kind.WAVE, Kind.AMPLITUDE)
@@ -67,14 +82,27 @@ def speeds(case: Case, seen: Observations, study: Study) -> Figure:
             table = study.tables[candidate]
             curve = table.curve(kind, table.loads.index(model.load), model.factor * tunnel)
             axes.plot(
-                tunnel, curve, color=_COLOURS[candidate], lw=1.3, label=f"{candidate.value}, s = {model.factor:.2f}"
+                tunnel,
+                curve,
+                color=_COLOURS[candidate],
+                lw=1.3,
+                label=f"{candidate.value}, s = {model.factor:.2f}",
             )
-        for group, face, name in ((Group.FIT, _INK, "fitted to"), (Group.HELD_OUT, "white", "held out")):
+        for group, face, name in (
+            (Group.FIT, _INK, "fitted to"),
+            (Group.HELD_OUT, "white", "held out"),
+        ):
             judged = "not fitted to" if kind is not Kind.FREQUENCY else name
             _points(axes, seen.conditions(case, group, (kind,)), face=face, label=judged)
         if kind is Kind.FREQUENCY:
             others = seen.conditions(case, Group.OTHER, (kind,))
-            axes.plot([c.at for c in others], [c.value for c in others], "x", color=_QUIET, label="segmented edges")
+            axes.plot(
+                [c.at for c in others],
+                [c.value for c in others],
+                "x",
+                color=_QUIET,
+                label="segmented edges",
+            )
         axes.set(xlabel="speed of the tunnel [m/s]", ylabel=label, ylim=(0, None))
     figure.axes[0].legend(frameon=False, fontsize=7.5)
     return figure
@@ -84,19 +112,38 @@ def _points(axes: Axes, conditions: Sequence[Condition], *, face: str, label: st
     for condition in conditions:
         if np.isfinite(condition.low):
             axes.plot([condition.at] * 2, [condition.low, condition.high], color=_INK, lw=1)
-    axes.plot([c.at for c in conditions], [c.value for c in conditions], "o", color=_INK, mfc=face, ms=5, label=label)
+    axes.plot(
+        [c.at for c in conditions],
+        [c.value for c in conditions],
+        "o",
+        color=_INK,
+        mfc=face,
+        ms=5,
+        label=label,
+    )
 
 
 def along(seen: Observations, study: Study, case: Case) -> Figure:
-    """Amplitude and phase along the stream, of the clips that show the whole sheet and of the models in time."""
+    """Amplitude and phase along the stream, of the clips that show the whole sheet and of the
+    models in time."""
     figure = Figure(figsize=(10, 3.8), layout="constrained")
     size, phase = np.ravel(figure.subplots(1, 2))
     for clip, style in zip([c for c in seen.clips if c.spec.whole], ("-", "--"), strict=False):
-        _profile(size, phase, clip.waves.columns, clip.waves.profile, _INK, style, f"filmed, {clip.spec.speed:g} m/s")
+        _profile(
+            size,
+            phase,
+            clip.waves.columns,
+            clip.waves.profile,
+            _INK,
+            style,
+            f"filmed, {clip.spec.speed:g} m/s",
+        )
     columns = np.linspace(0.04, 1.0, 90) * case.sheet.length
     for candidate, motion in study.shapes.items():
         found = waves(motion.time, columns, as_columns(motion, 0, columns))
-        _profile(size, phase, found.columns, found.profile, _COLOURS[candidate], "-", candidate.value)
+        _profile(
+            size, phase, found.columns, found.profile, _COLOURS[candidate], "-", candidate.value
+        )
     size.set(xlabel="from the clamp [mm]", ylabel="first harmonic [mm]")
     phase.set(xlabel="from the clamp [mm]", ylabel="phase [rad]; falling: towards the tip")
     size.legend(frameon=False, fontsize=8)
@@ -119,7 +166,8 @@ def _profile(
 
 
 def lengths(case: Case, seen: Observations, study: Study) -> Figure:
-    """Speeds at which flutter stops and starts over the sheet's length, with the models and the published theory."""
+    """Speeds at which flutter stops and starts over the sheet's length, with the models and the
+    published theory."""
     figure = Figure(figsize=(12, 4.6), layout="constrained")
     tunnel, theory = np.ravel(figure.subplots(1, 2))
     every = np.array(sorted({*case.fit_lengths, *case.held_out_lengths}))
@@ -159,7 +207,10 @@ def lengths(case: Case, seen: Observations, study: Study) -> Figure:
         table = study.linear_tables[candidate]
         row = table.loads.index(model.load)
         one = np.array([model.factor])
-        values = [table.predict(row, one, Condition(kind=Kind.STOP, at=float(h), value=1.0))[0] for h in every]
+        values = [
+            table.predict(row, one, Condition(kind=Kind.STOP, at=float(h), value=1.0))[0]
+            for h in every
+        ]
         tunnel.plot(
             1e3 * every,
             values,
@@ -177,7 +228,8 @@ def lengths(case: Case, seen: Observations, study: Study) -> Figure:
 
 
 def _published(axes: Axes, case: Case, curves: Mapping[str, Sequence[tuple[float, float]]]) -> None:
-    """The digitised curves, for this sheet at each length, at the logged speed and at the declared share of it."""
+    """The digitised curves, for this sheet at each length, at the logged speed and at the declared
+    share of it."""
     sheet, density = case.sheet, case.density
     for name, pairs in curves.items():
         if name == "experiments":
@@ -189,7 +241,12 @@ def _published(axes: Axes, case: Case, curves: Mapping[str, Sequence[tuple[float
         speed = reduced * np.sqrt(sheet.rigidity / (density * length**3))
         first = name.endswith("00")
         axes.plot(
-            1e3 * length, speed, "-", color="#3b7d6b", lw=1, label="their curves, logged speed" if first else None
+            1e3 * length,
+            speed,
+            "-",
+            color="#3b7d6b",
+            lw=1,
+            label="their curves, logged speed" if first else None,
         )
         axes.plot(
             1e3 * length,
@@ -206,10 +263,20 @@ def plane(case: Case, seen: Observations, table: SimulatedTable) -> Figure:
     figure = Figure(figsize=(6.4, 4.6), layout="constrained")
     (axes,) = np.ravel(figure.subplots(1, 1, squeeze=False))
     strengths = [load.reactive for load in table.loads]
-    colours = {Kind.FREQUENCY: "#1f6f9c", Kind.WAVE: "#3b7d6b", Kind.AMPLITUDE: "#7a4a9a", Kind.STOP: "#b4531a"}
+    colours = {
+        Kind.FREQUENCY: "#1f6f9c",
+        Kind.WAVE: "#3b7d6b",
+        Kind.AMPLITUDE: "#7a4a9a",
+        Kind.STOP: "#b4531a",
+    }
     for kind, colour in colours.items():
-        conditions = [c for g in (Group.FIT, Group.HELD_OUT) for c in seen.conditions(case, g, (kind,))]
-        met = [factor_that_meets(table, row, conditions, within=_MET) for row in range(len(table.loads))]
+        conditions = [
+            c for g in (Group.FIT, Group.HELD_OUT) for c in seen.conditions(case, g, (kind,))
+        ]
+        met = [
+            factor_that_meets(table, row, conditions, within=_MET)
+            for row in range(len(table.loads))
+        ]
         axes.plot(strengths, met, "o-", color=colour, ms=3.5, lw=1.3, label=kind.value)
     axes.axhline(case.shear_factor, color=_QUIET, lw=0.8, ls=":")
     axes.axvline(case.reactive_share, color=_QUIET, lw=0.8, ls=":")

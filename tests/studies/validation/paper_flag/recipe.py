@@ -1,4 +1,5 @@
-"""What a case states before it is measured: the sheet, the air, the camera, which clips and lengths may be fitted.
+"""What a case states before it is measured: the sheet, the air, the camera, which clips and lengths
+may be fitted.
 
 It stands in `paper-flag.toml`.
 """
@@ -56,8 +57,8 @@ class Case:
         fit_lengths, held_out_lengths: [m].
         reactive_share: declared M / (ρ L).
         shear_factor: declared speed at the sheet over the tunnel's.
-        shares, lifts, speeds: at which the strip is simulated: M / (ρ L), slopes of the lift coefficient, and [m/s] at
-            the sheet; `pair_shares` with each of `pair_lifts` likewise.
+        shares, lifts, speeds: at which the strip is simulated: M / (ρ L), slopes of the lift
+            coefficient, and [m/s] at the sheet; `pair_shares` with each of `pair_lifts` likewise.
     """
 
     name: str

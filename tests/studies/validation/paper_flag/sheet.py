@@ -1,19 +1,21 @@
-"""Small deflections of a sheet, clamped at its leading edge, in an axial stream: growth rates and frequencies.
+"""Small deflections of a sheet, clamped at its leading edge, in an axial stream: growth rates and
+frequencies.
 
 Per width, with mass m, flexural rigidity B (1 + d ∂t), length L and a stream U,
 
     m w_tt + B (1 + d ∂t) w_xxxx + M (∂t + U ∂x)² w + M₀ w_tt + ½ ρ C U (∂t + U ∂x) w − c (τ w_x)_x = 0
     w = w_x = 0 at x = 0,                               w_xx = w_xxx = 0 at x = L
 
-M is the air's mass of the reactive loading (`sim.effects.reactive_loading`), M₀ that of still-air inertia alone
-(`sim.effects.added_mass`), C the slope of the lift coefficient (`sim.effects.lift`), and τ = U (L − x) the tension by
-friction of coefficient c (`sim.effects.tangential_linear_drag`), which turns with the sheet: its load is −c U (L − x)
-w_xx. The base model's air, ρ |w_n| w_n, is of second order in the deflection and so has no part here: to first order
-the base model is a sheet in a vacuum, at every speed.
+M is the air's mass of the reactive loading (`sim.effects.reactive_loading`), M₀ that of still-air
+inertia alone (`sim.effects.added_mass`), C the slope of the lift coefficient (`sim.effects.lift`),
+and τ = U (L − x) the tension by friction of coefficient c (`sim.effects.tangential_linear_drag`),
+which turns with the sheet: its load is −c U (L − x) w_xx. The base model's air, ρ |w_n| w_n, is of
+second order in the deflection and so has no part here: to first order the base model is a sheet in
+a vacuum, at every speed.
 
-Solved by Galerkin's method on the sheet's modes in a vacuum; M only, it is the equation of a pipe that conveys fluid
-(Gregory and Païdoussis, Proc. R. Soc. A 293:512, 1966), and of a flag in Argentina and Mahadevan, PNAS 102:1829 (2005),
-without their wake.
+Solved by Galerkin's method on the sheet's modes in a vacuum; M only, it is the equation of a pipe
+that conveys fluid (Gregory and Païdoussis, Proc. R. Soc. A 293:512, 1966), and of a flag in
+Argentina and Mahadevan, PNAS 102:1829 (2005), without their wake.
 """
 
 from __future__ import annotations
@@ -60,7 +62,11 @@ class Sheet:
 
     def __post_init__(self) -> None:
         if not (self.length > 0 and self.mass > 0 and self.rigidity > 0):
-            raise InputError("a sheet without length, mass or rigidity", where="sheet", fix="give positive values")
+            raise InputError(
+                "a sheet without length, mass or rigidity",
+                where="sheet",
+                fix="give positive values",
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,13 +88,16 @@ def _root(function: Callable[[float], float], low: float, high: float) -> float:
 
 @functools.cache
 def _integrals() -> dict[str, FloatArray]:
-    """∫ f g dξ of the modes in a vacuum and their derivatives: (MODES, MODES) each, and the roots λ."""
+    """∫ f g dξ of the modes in a vacuum and their derivatives: (MODES, MODES) each, and the roots
+    λ."""
 
     def characteristic(root: float) -> float:
         return float(np.cos(root) + 1 / np.cosh(root))
 
     middles = [np.pi * (n + 0.5) for n in range(MODES)]
-    roots = np.array([_root(characteristic, middle - 0.4, middle + 0.4) for middle in middles])[:, None]
+    roots = np.array([_root(characteristic, middle - 0.4, middle + 0.4) for middle in middles])[
+        :, None
+    ]
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
     xi, weight = (nodes + 1) / 2, weights / 2
     below = np.sinh(roots) + np.sin(roots)
@@ -135,7 +144,8 @@ def rates(sheet: Sheet, speed: float) -> NDArray[np.complex128]:
 
 
 def leading(sheet: Sheet, speed: float) -> Leading:
-    """The fastest growing mode in a stream `speed` [m/s]; without growth, the least damped one that oscillates."""
+    """The fastest growing mode in a stream `speed` [m/s]; without growth, the least damped one that
+    oscillates."""
     found = rates(sheet, speed)
     found = found[found.imag >= 0]
     best = found[np.argmax(found.real)]

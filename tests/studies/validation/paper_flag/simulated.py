@@ -1,4 +1,5 @@
-"""What the strip does in time over loads and speeds: frequency, wave speed and amplitude, read off as from a clip."""
+"""What the strip does in time over loads and speeds: frequency, wave speed and amplitude, read off
+as from a clip."""
 
 from __future__ import annotations
 
@@ -52,7 +53,9 @@ def observed(motion: StripMotion, member: int) -> Flutter:
     length = float(motion.arc[-1])
     tip = motion.across[:, -1, member]
     travel = float(np.ptp(tip)) / 2 / length
-    nothing = Flutter(frequency=math.nan, wave=math.nan, amplitude=math.nan, tip=travel, periodic=False)
+    nothing = Flutter(
+        frequency=math.nan, wave=math.nan, amplitude=math.nan, tip=travel, periodic=False
+    )
     if not (math.isfinite(travel) and travel > _STILL):
         return nothing
     columns = np.linspace(0.04, 1.0, _COLUMNS) * length
@@ -69,7 +72,9 @@ def observed(motion: StripMotion, member: int) -> Flutter:
     )
 
 
-def flutters(loads: Sequence[Load], speeds: Sequence[float], *, case: Case, keep: Path | None) -> list[Flutter]:
+def flutters(
+    loads: Sequence[Load], speeds: Sequence[float], *, case: Case, keep: Path | None
+) -> list[Flutter]:
     """One member a pair of load and speed at the sheet [m/s], in batches.
 
     Args:
@@ -82,7 +87,9 @@ def flutters(loads: Sequence[Load], speeds: Sequence[float], *, case: Case, keep
     ]
 
 
-def _batch(loads: Sequence[Load], speeds: Sequence[float], case: Case, keep: Path | None) -> list[Flutter]:
+def _batch(
+    loads: Sequence[Load], speeds: Sequence[float], case: Case, keep: Path | None
+) -> list[Flutter]:
     def make() -> dict[str, AnyArray]:
         motion = simulate(
             length=case.sheet.length,
@@ -117,14 +124,19 @@ def _batch(loads: Sequence[Load], speeds: Sequence[float], case: Case, keep: Pat
 
 
 class SimulatedTable:
-    """A candidate over loads and speeds at the sheet; its stop speeds are those of linear stability.
+    """A candidate over loads and speeds at the sheet; its stop speeds are those of linear
+    stability.
 
     Args:
         table: (load, speed) of what was simulated, loads and speeds rising.
     """
 
     def __init__(
-        self, loads: Sequence[Load], speeds: Sequence[float], table: Sequence[Sequence[Flutter]], linear: LinearTable
+        self,
+        loads: Sequence[Load],
+        speeds: Sequence[float],
+        table: Sequence[Sequence[Flutter]],
+        linear: LinearTable,
     ) -> None:
         self.loads = tuple(loads)
         self.speeds = np.array(speeds)
@@ -132,16 +144,21 @@ class SimulatedTable:
         self._linear = linear
         parts = {Kind.FREQUENCY: "frequency", Kind.WAVE: "wave", Kind.AMPLITUDE: "amplitude"}
         self._values = {
-            kind: np.array([[getattr(one, name) if one.periodic else math.nan for one in row] for row in table])
+            kind: np.array(
+                [[getattr(one, name) if one.periodic else math.nan for one in row] for row in table]
+            )
             for kind, name in parts.items()
         }
 
     def predict(self, load: int, factors: FloatArray, condition: Condition) -> FloatArray:
-        """As `Predictor.predict`; linear between the speeds simulated, NaN beyond them and next to no flutter."""
+        """As `Predictor.predict`; linear between the speeds simulated, NaN beyond them and next to
+        no flutter."""
         if condition.kind is Kind.STOP:
             return self._linear.predict(load, factors, condition)
         return self.curve(condition.kind, load, factors * condition.at)
 
     def curve(self, kind: Kind, load: int, speeds: FloatArray) -> FloatArray:
         """(speed,) of one load, at speeds at the sheet [m/s]."""
-        return np.interp(speeds, self.speeds, self._values[kind][load], left=math.nan, right=math.nan)
+        return np.interp(
+            speeds, self.speeds, self._values[kind][load], left=math.nan, right=math.nan
+        )

@@ -1,9 +1,11 @@
-"""Is a filmed sheet as long in every frame? Checks the scales of a picture with what paper cannot do: stretch.
+"""Is a filmed sheet as long in every frame? Checks the scales of a picture with what paper cannot
+do: stretch.
 
-A sheet that is in view from its clamp to its tip has the same arc length in every frame, if rows and columns are given
-their true ratio. Where its tip is smeared away the seen line is too short, never too long: so the arc lengths of all
-frames pile up at their upper end, and the ratio is the one at which they pile up most sharply. The upper end itself is
-the sheet's length, and gives the scale.
+A sheet that is in view from its clamp to its tip has the same arc length in every frame, if rows
+and columns are given their true ratio. Where its tip is smeared away the seen line is too short,
+never too long: so the arc lengths of all frames pile up at their upper end, and the ratio is the
+one at which they pile up most sharply. The upper end itself is the sheet's length, and gives the
+scale.
 """
 
 from __future__ import annotations
@@ -44,7 +46,8 @@ class Stretch:
 
 
 def arc_lengths(track: EdgeTrack, ratios: FloatArray, *, least: int = 50) -> FloatArray:
-    """(frame, ratio) from the first to the last column seen [columns]; NaN for frames with fewer than `least`."""
+    """(frame, ratio) from the first to the last column seen [columns]; NaN for frames with fewer
+    than `least`."""
     found = np.full((len(track.height), len(ratios)), np.nan)
     for index, height in enumerate(track.height):
         seen = np.flatnonzero(np.isfinite(height))
@@ -62,12 +65,16 @@ def stretch(track: EdgeTrack, rng: np.random.Generator) -> Stretch:
         InputError: fewer than 100 frames show a line.
     """
     ratios = np.arange(0.4, 1.2001, 0.01)
-    every = EdgeTrack(time=track.time[::2], height=track.height[::2], width=track.width[::2], seen=track.seen[::2])
+    every = EdgeTrack(
+        time=track.time[::2], height=track.height[::2], width=track.width[::2], seen=track.seen[::2]
+    )
     arcs = arc_lengths(every, ratios)
     arcs = arcs[np.isfinite(arcs).all(axis=1)]
     if len(arcs) < 100:
         raise InputError(
-            f"a line in {len(arcs)} frames", where="stretch", fix="give a clip of 200 frames or more with the sheet"
+            f"a line in {len(arcs)} frames",
+            where="stretch",
+            fix="give a clip of 200 frames or more with the sheet",
         )
     spreads = _spread(arcs)
     best = int(spreads.argmin())

@@ -1,11 +1,14 @@
 """The study of a case: base model before, candidates after, on speeds and lengths no fit has seen.
 
-1. Declared: M = ρL/2 and half the tunnel's speed, nothing fitted, each with and without the other (two by two).
-2. Fitted by linear stability: every candidate, with the logged speed and with a free factor, on the frequencies and
-   stop speeds of the group "fit"; errors on the group "held-out", paired with the base model's.
-3. Crossed: fitted to one kind of measurement alone, predicting the other: what one number of each must explain.
-4. In time: candidates that flutter, at large amplitude; fitted to the same, judged also by the speed of the waves and
-   the amplitude, which nothing was fitted to.
+1. Declared: M = ρL/2 and half the tunnel's speed, nothing fitted, each with and without the other
+   (two by two).
+2. Fitted by linear stability: every candidate, with the logged speed and with a free factor, on the
+   frequencies and stop speeds of the group "fit"; errors on the group "held-out", paired with the
+   base model's.
+3. Crossed: fitted to one kind of measurement alone, predicting the other: what one number of each
+   must explain.
+4. In time: candidates that flutter, at large amplitude; fitted to the same, judged also by the
+   speed of the waves and the amplitude, which nothing was fitted to.
 """
 
 from __future__ import annotations
@@ -47,7 +50,8 @@ class Cell:
 
     Attributes:
         errors: kind → of all the whole sheet's clips, or all lengths.
-        tips: tunnel speed [m/s] → half the tip's travel over the length, simulated; NaN where it diverged.
+        tips: tunnel speed [m/s] → half the tip's travel over the length, simulated; NaN where it
+            diverged.
     """
 
     load: Load
@@ -63,7 +67,8 @@ class Outcome:
     Attributes:
         fitted_to: kinds.
         factors: (least, greatest) s of refits that each leave one condition out.
-        fit, held_out: kind → log errors, condition by condition; wave speeds and amplitudes are never fitted to.
+        fit, held_out: kind → log errors, condition by condition; wave speeds and amplitudes are
+            never fitted to.
         others: log errors of the frequencies of other sheets.
         gains: kind → how much smaller held-out errors are than the base model's, paired.
     """
@@ -95,7 +100,8 @@ class Study:
     """Everything in the report.
 
     Attributes:
-        shapes: candidate → the motion of its model in time with a free factor, at the first whole clip held out.
+        shapes: candidate → the motion of its model in time with a free factor, at the first whole
+            clip held out.
         floor: kind → largest |log| by which a coarser mesh moves the best model in time.
     """
 
@@ -112,7 +118,9 @@ class Study:
 class _Simulated(Protocol):
     """`flutters` for a case; another one of the same sheet may be given."""
 
-    def __call__(self, loads: Sequence[Load], speeds: Sequence[float], of: Case = ..., /) -> list[Flutter]: ...
+    def __call__(
+        self, loads: Sequence[Load], speeds: Sequence[float], of: Case = ..., /
+    ) -> list[Flutter]: ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,8 +149,12 @@ class _Evidence:
     ) -> Outcome:
         training = self.of(Group.FIT, fitted_to)
         best = fit(predictor, shear, training)
-        jack = [fit(predictor, shear, training[:i] + training[i + 1 :]) for i in range(len(training))]
-        unseen = {kind: errors(predictor, best.load, best.factor, self.unseen(kind)) for kind in judged_by}
+        jack = [
+            fit(predictor, shear, training[:i] + training[i + 1 :]) for i in range(len(training))
+        ]
+        unseen = {
+            kind: errors(predictor, best.load, best.factor, self.unseen(kind)) for kind in judged_by
+        }
         never = {kind: np.full(len(found), math.log(10.0)) for kind, found in unseen.items()}
         return Outcome(
             candidate=candidate,
@@ -152,9 +164,14 @@ class _Evidence:
             factor=best.factor,
             factors=(min(one.factor for one in jack), max(one.factor for one in jack)),
             loads=tuple(dict.fromkeys(predictor.loads[one.load] for one in jack)),
-            fit={k: errors(predictor, best.load, best.factor, self.of(Group.FIT, (k,))) for k in fitted_to},
+            fit={
+                k: errors(predictor, best.load, best.factor, self.of(Group.FIT, (k,)))
+                for k in fitted_to
+            },
             held_out=unseen,
-            others=errors(predictor, best.load, best.factor, self.of(Group.OTHER, (Kind.FREQUENCY,))),
+            others=errors(
+                predictor, best.load, best.factor, self.of(Group.OTHER, (Kind.FREQUENCY,))
+            ),
             gains={kind: paired(never[kind], found) for kind, found in unseen.items()},
         )
 
@@ -166,7 +183,9 @@ def study(case: Case, seen: Observations, *, keep: Path | None = None) -> Study:
         keep: folder of intermediate results; None keeps none.
     """
 
-    def simulated(loads: Sequence[Load], speeds: Sequence[float], of: Case = case, /) -> list[Flutter]:
+    def simulated(
+        loads: Sequence[Load], speeds: Sequence[float], of: Case = case, /
+    ) -> list[Flutter]:
         return flutters(loads, speeds, case=of, keep=keep)
 
     evidence = _Evidence(case=case, seen=seen)
@@ -179,14 +198,20 @@ def study(case: Case, seen: Observations, *, keep: Path | None = None) -> Study:
     crossed: list[Outcome] = []
     linear_tables = {candidate: linear_table(tried(candidate)) for candidate in Candidate}
     for candidate, table in linear_tables.items():
-        linear += [evidence.outcome(candidate, s, table, fitted_to=_FITTED, judged_by=_FITTED) for s in Shear]
+        linear += [
+            evidence.outcome(candidate, s, table, fitted_to=_FITTED, judged_by=_FITTED)
+            for s in Shear
+        ]
         if candidate in IN_TIME:
             crossed += [
-                evidence.outcome(candidate, Shear.FREE, table, fitted_to=(k,), judged_by=_FITTED) for k in _FITTED
+                evidence.outcome(candidate, Shear.FREE, table, fitted_to=(k,), judged_by=_FITTED)
+                for k in _FITTED
             ]
     tables = _simulated_tables(case, linear_table, simulated)
     in_time = [
-        evidence.outcome(candidate, shear, tables[candidate], fitted_to=_FITTED, judged_by=(*_FITTED, *_JUDGED))
+        evidence.outcome(
+            candidate, shear, tables[candidate], fitted_to=_FITTED, judged_by=(*_FITTED, *_JUDGED)
+        )
         for candidate, shear in itertools.product(IN_TIME, Shear)
     ]
     best = min(in_time, key=lambda outcome: outcome.score)
@@ -210,16 +235,21 @@ def _simulated_tables(
         Candidate.REACTIVE: [Load(reactive=m) for m in case.shares],
         Candidate.LIFT: [Load(lift=c) for c in case.lifts],
         Candidate.REACTIVE_AND_LIFT: [
-            Load(reactive=m, lift=c) for m, c in itertools.product(case.pair_shares, case.pair_lifts)
+            Load(reactive=m, lift=c)
+            for m, c in itertools.product(case.pair_shares, case.pair_lifts)
         ],
     }
     return {
-        candidate: SimulatedTable(part, case.speeds, _over(part, case.speeds, simulated), linear_table(part))
+        candidate: SimulatedTable(
+            part, case.speeds, _over(part, case.speeds, simulated), linear_table(part)
+        )
         for candidate, part in loads.items()
     }
 
 
-def _over(loads: Sequence[Load], speeds: Sequence[float], simulated: _Simulated) -> list[list[Flutter]]:
+def _over(
+    loads: Sequence[Load], speeds: Sequence[float], simulated: _Simulated
+) -> list[list[Flutter]]:
     """(load, speed) of every pair."""
     pairs = list(itertools.product(loads, speeds))
     found = simulated([load for load, _ in pairs], [speed for _, speed in pairs])
@@ -227,12 +257,18 @@ def _over(loads: Sequence[Load], speeds: Sequence[float], simulated: _Simulated)
 
 
 def _declared(
-    case: Case, evidence: _Evidence, linear_table: Callable[[Sequence[Load]], LinearTable], simulated: _Simulated
+    case: Case,
+    evidence: _Evidence,
+    linear_table: Callable[[Sequence[Load]], LinearTable],
+    simulated: _Simulated,
 ) -> tuple[Cell, ...]:
     """Base and declared loading, at the logged speed and at the declared share of it."""
     loads = (Load(), Load(reactive=case.reactive_share))
     table = linear_table(loads)
-    kinds = {kind: (*evidence.of(Group.FIT, (kind,)), *evidence.of(Group.HELD_OUT, (kind,))) for kind in _FITTED}
+    kinds = {
+        kind: (*evidence.of(Group.FIT, (kind,)), *evidence.of(Group.HELD_OUT, (kind,)))
+        for kind in _FITTED
+    }
     speeds = sorted(condition.at for condition in kinds[Kind.FREQUENCY])
     factors = (1.0, case.shear_factor)
     rows = _over(loads, [factor * speed for factor in factors for speed in speeds], simulated)
@@ -241,7 +277,9 @@ def _declared(
             load=load,
             factor=factor,
             errors={kind: errors(table, index, factor, part) for kind, part in kinds.items()},
-            tips={speed: rows[index][half * len(speeds) + at].tip for at, speed in enumerate(speeds)},
+            tips={
+                speed: rows[index][half * len(speeds) + at].tip for at, speed in enumerate(speeds)
+            },
         )
         for index, load in enumerate(loads)
         for half, factor in enumerate(factors)
@@ -249,7 +287,8 @@ def _declared(
 
 
 def _shapes(case: Case, in_time: Sequence[Outcome]) -> dict[Candidate, StripMotion]:
-    """What the models in time with a free factor do at the speed of a whole clip that is held out."""
+    """What the models in time with a free factor do at the speed of a whole clip that is held
+    out."""
     models = [outcome for outcome in in_time if outcome.shear is Shear.FREE]
     speed = next(clip.speed for clip in case.of(Group.HELD_OUT) if clip.whole)
     motion = simulate(
@@ -258,26 +297,40 @@ def _shapes(case: Case, in_time: Sequence[Outcome]) -> dict[Candidate, StripMoti
         rigidity=case.sheet.rigidity,
         density=case.density,
         speeds=[model.factor * speed for model in models],
-        effects=effects([model.load for model in models], length=case.sheet.length, density=case.density),
+        effects=effects(
+            [model.load for model in models], length=case.sheet.length, density=case.density
+        ),
         run=case.run,
     )
     return {
-        model.candidate: replace(motion, along=motion.along[..., [i]], across=motion.across[..., [i]])
+        model.candidate: replace(
+            motion, along=motion.along[..., [i]], across=motion.across[..., [i]]
+        )
         for i, model in enumerate(models)
     }
 
 
 def _floor(case: Case, best: Outcome, simulated: _Simulated) -> dict[Kind, float]:
-    """Largest |log| by which half as many cells and half the in-plane stiffness move the best model, by kind.
+    """Largest |log| by which half as many cells and half the in-plane stiffness move the best
+    model, by kind.
 
-    More than what still finer cells would, since a mesh's errors shrink with its cells. Over the held-out speeds at
-    which both can be read off; a kind without any is left out.
+    More than what still finer cells would, since a mesh's errors shrink with its cells. Over the
+    held-out speeds at which both can be read off; a kind without any is left out.
     """
     speeds = [best.factor * clip.speed for clip in case.of(Group.HELD_OUT)]
-    coarse = replace(case, run=replace(case.run, columns=case.run.columns // 2, stretching=case.run.stretching / 2))
+    coarse = replace(
+        case,
+        run=replace(case.run, columns=case.run.columns // 2, stretching=case.run.stretching / 2),
+    )
     loads = [best.load] * len(speeds)
     pairs = list(zip(simulated(loads, speeds), simulated(loads, speeds, coarse), strict=True))
     names = {Kind.FREQUENCY: "frequency", Kind.WAVE: "wave", Kind.AMPLITUDE: "amplitude"}
-    moved = {kind: [getattr(a, name) / getattr(b, name) for a, b in pairs] for kind, name in names.items()}
-    known = {kind: [abs(math.log(r)) for r in ratios if math.isfinite(r) and r > 0] for kind, ratios in moved.items()}
+    moved = {
+        kind: [getattr(a, name) / getattr(b, name) for a, b in pairs]
+        for kind, name in names.items()
+    }
+    known = {
+        kind: [abs(math.log(r)) for r in ratios if math.isfinite(r) and r > 0]
+        for kind, ratios in moved.items()
+    }
     return {kind: max(sizes) for kind, sizes in known.items() if sizes}

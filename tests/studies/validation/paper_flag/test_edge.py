@@ -12,16 +12,26 @@ import pytest
 from flagdata.core.arrays import FloatArray, UInt8Array
 from flagdata.core.rng import stream
 from flagdata.errors import InputError, UsageError
-from tests.studies.validation.paper_flag.edge import EdgeOptions, EdgeTrack, Seen, line_in, scatter, track_edge
+from tests.studies.validation.paper_flag.edge import (
+    EdgeOptions,
+    EdgeTrack,
+    Seen,
+    line_in,
+    scatter,
+    track_edge,
+)
 
 ROWS, COLUMNS = 240, 320
 
 
 def drawn(height: FloatArray, *, thickness: float = 2.0, smear: float = 0.0) -> FloatArray:
-    """A bright picture with a dark line: a Gaussian profile, its place averaged over an even motion of `smear` rows."""
+    """A bright picture with a dark line: a Gaussian profile, its place averaged over an even motion
+    of `smear` rows."""
     rows = np.arange(ROWS)[:, None]
     places = [0.0] if smear == 0 else np.linspace(-smear / 2, smear / 2, 41)
-    dark = sum(np.exp(-(((rows - height - place) / thickness) ** 2) / 2) for place in places) / len(places)
+    dark = sum(np.exp(-(((rows - height - place) / thickness) ** 2) / 2) for place in places) / len(
+        places
+    )
     return 250 - 200.0 * np.nan_to_num(dark)
 
 
@@ -38,14 +48,16 @@ def sheet(phase: float = 0.0) -> FloatArray:
 def tracked(images: list[UInt8Array], rate: float = 1000.0) -> EdgeTrack:
     found = [line_in(image, EdgeOptions()) for image in images]
     height, width, seen = (np.stack([one[part] for one in found]) for part in range(3))
-    return EdgeTrack(time=np.arange(len(images)) / rate, height=height, width=width, seen=seen.astype(np.uint8))
+    return EdgeTrack(
+        time=np.arange(len(images)) / rate, height=height, width=width, seen=seen.astype(np.uint8)
+    )
 
 
 def test_a_line_is_found_to_a_fraction_of_a_pixel() -> None:
     height, _, seen = line_in(picture(drawn(sheet())), EdgeOptions())
     assert (seen == Seen.LINE).all()
-    # Rounding to whole grays (σ 0.29) over ~9 pixels of a line 200 deep: some hundredths of a pixel; the floor that is
-    # subtracted is symmetrical only to half a pixel, which adds as much.
+    # Rounding to whole grays (σ 0.29) over ~9 pixels of a line 200 deep: some hundredths of a
+    # pixel; the floor that is subtracted is symmetrical only to half a pixel, which adds as much.
     assert np.abs(height - sheet()).max() < 0.1
 
 
@@ -53,13 +65,15 @@ def test_the_stated_error_is_the_error_that_was_made() -> None:
     phases = np.linspace(0, 6, 12)
     track = tracked([picture(drawn(sheet(p)), 4.0, i) for i, p in enumerate(phases)])
     made = np.sqrt(np.mean((track.height - np.stack([sheet(p) for p in phases])) ** 2))
-    # From 12 × 300 columns the spread is known to some percent; a third covers the parts of the error that neighbouring
-    # columns share.
+    # From 12 × 300 columns the spread is known to some percent; a third covers the parts of the
+    # error that neighbouring columns share.
     assert np.median(scatter(track)) == pytest.approx(made, rel=0.33)
 
 
 def test_a_line_smeared_by_even_motion_is_where_it_was_at_mid_exposure() -> None:
-    height, width, seen = line_in(picture(drawn(np.full(COLUMNS, 100.4), smear=20.0)), EdgeOptions())
+    height, width, seen = line_in(
+        picture(drawn(np.full(COLUMNS, 100.4), smear=20.0)), EdgeOptions()
+    )
     assert (seen == Seen.LINE).all()
     assert np.abs(height - 100.4).max() < 0.1  # a symmetrical band: rounding alone
     assert np.median(width) > 18
@@ -69,7 +83,9 @@ def test_what_cannot_be_located_is_flagged_and_left_out() -> None:
     height = sheet()
     height[200:230] = np.nan  # faded
     values = drawn(height)
-    values[:, 250:270] -= 180 * np.exp(-(((np.arange(ROWS)[:, None] - 60) / 2.0) ** 2) / 2)  # a second line, far off
+    values[:, 250:270] -= 180 * np.exp(
+        -(((np.arange(ROWS)[:, None] - 60) / 2.0) ** 2) / 2
+    )  # a second line, far off
     values[:, :12] = drawn(np.full(12, 200.0))  # the holder
     measured, _, seen = line_in(picture(values), EdgeOptions(bridge=40))
     assert (seen[200:230] == Seen.NOTHING).all()
@@ -80,7 +96,9 @@ def test_what_cannot_be_located_is_flagged_and_left_out() -> None:
 
 
 def test_a_band_wider_than_allowed_is_no_line() -> None:
-    _, _, seen = line_in(picture(drawn(np.full(COLUMNS, 100.0), smear=50.0)), EdgeOptions(widest=30.0))
+    _, _, seen = line_in(
+        picture(drawn(np.full(COLUMNS, 100.0), smear=50.0)), EdgeOptions(widest=30.0)
+    )
     assert (seen == Seen.SMEARED).all()
 
 
@@ -97,7 +115,9 @@ def test_options_that_find_nothing_are_refused() -> None:
 def film(path: Path, frames: int, frequency: float, rate: float = 1000.0) -> None:
     """A clip whose container says 60 fps."""
     with av.open(str(path), "w") as container:
-        video = container.add_stream("libx264", rate=60, options={"crf": "12", "preset": "veryfast"})
+        video = container.add_stream(
+            "libx264", rate=60, options={"crf": "12", "preset": "veryfast"}
+        )
         video.width, video.height, video.pix_fmt = COLUMNS, ROWS, "yuv420p"
         video.codec_context.time_base = Fraction(1, 60)
         for number in range(frames):

@@ -29,11 +29,14 @@ def planted(load: Load, factor: float) -> list[Condition]:
     """What a sheet with this load shows at `factor` times the tunnel's speed."""
     sheet = loaded(load, bare=BARE, length=BARE.length, density=1.1)
     found = [
-        Condition(kind=Kind.FREQUENCY, at=u, value=leading(sheet, factor * u).frequency) for u in (7.0, 8.0, 9.0, 10.0)
+        Condition(kind=Kind.FREQUENCY, at=u, value=leading(sheet, factor * u).frequency)
+        for u in (7.0, 8.0, 9.0, 10.0)
     ]
     for length in LENGTHS:
         shorter = loaded(load, bare=BARE, length=length, density=1.1)
-        found.append(Condition(kind=Kind.STOP, at=length, value=onset(shorter, highest=30.0) / factor))
+        found.append(
+            Condition(kind=Kind.STOP, at=length, value=onset(shorter, highest=30.0) / factor)
+        )
     return found
 
 
@@ -43,7 +46,8 @@ def test_a_planted_load_and_factor_are_found() -> None:
     found = fit(table, Shear.FREE, planted(truth, 0.6))
     assert table.loads[found.load] == truth
     assert found.factor == pytest.approx(0.6, rel=0.015)  # factors are 2 % apart
-    # By linear interpolation of frequencies between speeds 0.1 m/s apart, and half a step of the factors.
+    # By linear interpolation of frequencies between speeds 0.1 m/s apart, and half a step of the
+    # factors.
     assert found.loss < 1e-3
 
 
@@ -65,8 +69,15 @@ def test_a_length_that_was_not_named_and_a_kind_without_prediction_are_refused()
 def test_gains_are_paired_by_condition() -> None:
     # |before| − |after| = 0.1, 0.3: mean 0.2, standard error 0.1, Student's t(0.95, 1) = 6.3138.
     gain = paired(np.array([0.2, -0.5]), np.array([-0.1, 0.2]))
-    assert (gain.mean, gain.low, gain.high) == pytest.approx((0.2, 0.2 - 0.63138, 0.2 + 0.63138), rel=1e-4)
-    assert Interval.of(np.array([0.3])).as_dict() == {"mean": 0.3, "low": None, "high": None, "count": 1}
+    assert (gain.mean, gain.low, gain.high) == pytest.approx(
+        (0.2, 0.2 - 0.63138, 0.2 + 0.63138), rel=1e-4
+    )
+    assert Interval.of(np.array([0.3])).as_dict() == {
+        "mean": 0.3,
+        "low": None,
+        "high": None,
+        "count": 1,
+    }
 
 
 def test_the_logged_speed_is_not_fitted() -> None:

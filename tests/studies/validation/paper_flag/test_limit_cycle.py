@@ -7,7 +7,12 @@ import pytest
 
 from flagdata.errors import InputError
 from tests.studies.validation.paper_flag.candidates import Load, effects
-from tests.studies.validation.paper_flag.limit_cycle import StripMotion, StripRun, as_columns, simulate
+from tests.studies.validation.paper_flag.limit_cycle import (
+    StripMotion,
+    StripRun,
+    as_columns,
+    simulate,
+)
 
 LENGTH, DENSITY = 0.1385, 1.0888
 RUN = StripRun(columns=12, stretching=40.0, settle=0.35, duration=0.25, rate=250.0)
@@ -28,7 +33,8 @@ def test_a_push_dies_in_the_base_model_and_grows_to_a_limit_cycle_with_reactive_
     # Pushed by 5 % of the length; the onset with M = ρL/4 is at 3.6 m/s by linear stability.
     assert (travel[:3] < 0.05).all()
     assert 0.2 < travel[3] < 0.45  # measured flags of any kind: 0.2–0.4 L
-    # Paper does not stretch: the strip is as long as its rest shape, to the strain of its softened membrane.
+    # Paper does not stretch: the strip is as long as its rest shape, to the strain of its softened
+    # membrane.
     steps = np.hypot(np.diff(motion.along, axis=1), np.diff(motion.across, axis=1)).sum(axis=1)
     assert steps[:, 3] == pytest.approx(LENGTH + LENGTH / (2 * 11.5), rel=0.06)
 

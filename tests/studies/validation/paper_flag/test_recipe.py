@@ -16,7 +16,9 @@ def test_the_paper_flag_keeps_what_is_fitted_apart_from_what_is_held_out() -> No
     case = load_case()
     assert not {c.name for c in case.of(Group.FIT)} & {c.name for c in case.of(Group.HELD_OUT)}
     assert not set(case.fit_lengths) & set(case.held_out_lengths)
-    assert [c.speed for c in case.of(Group.HELD_OUT)] == sorted(c.speed for c in case.of(Group.HELD_OUT))
+    assert [c.speed for c in case.of(Group.HELD_OUT)] == sorted(
+        c.speed for c in case.of(Group.HELD_OUT)
+    )
     assert any(clip.whole for clip in case.of(Group.HELD_OUT))
     assert len({clip.name for clip in case.clips}) == len(case.clips)
     assert case.row_scale / case.column_scale == pytest.approx(9 / 16)
@@ -31,7 +33,9 @@ def test_what_was_computed_is_computed_once_for_the_same_inputs(tmp_path: Path) 
 
     method = (sys.modules["tests.studies.validation.paper_flag.cached"],)
     for inputs in ({"a": 1}, {"a": 1}, {"a": 2}):
-        assert np.array_equal(cached(tmp_path, inputs, method, make)["x"], [1.0, np.nan], equal_nan=True)
+        assert np.array_equal(
+            cached(tmp_path, inputs, method, make)["x"], [1.0, np.nan], equal_nan=True
+        )
     assert len(made) == 2
     assert len(list(tmp_path.iterdir())) == 2  # and nothing unfinished
     cached(None, {"a": 1}, method, make)

@@ -1,4 +1,5 @@
-"""Linear stability against published numbers, by hand, and against an independent calculation in another basis."""
+"""Linear stability against published numbers, by hand, and against an independent calculation in
+another basis."""
 
 from __future__ import annotations
 
@@ -17,7 +18,8 @@ BARE = Sheet(length=1.0, mass=1.0, rigidity=1.0)
 
 
 def test_without_air_the_frequencies_are_those_of_a_cantilever() -> None:
-    # Roots of cos λ cosh λ = −1: λ² = 3.51602, 22.0345, 61.6972, 120.902 (any textbook on vibration).
+    # Roots of cos λ cosh λ = −1: λ² = 3.51602, 22.0345, 61.6972, 120.902 (any textbook on
+    # vibration).
     found = np.sort(rates(BARE, 0.0).imag)
     assert found[found > 0][:4] == pytest.approx([3.51602, 22.0345, 61.6972, 120.902], rel=1e-5)
 
@@ -32,13 +34,19 @@ def test_the_reactive_onset_agrees_with_an_independent_calculation(beta: float) 
     sheet = Sheet(length=1.0, mass=1 - beta, rigidity=1.0, reactive_mass=beta)
     other = beam_onset(Strip(mass=1 - beta, rigidity=1.0, air_mass=beta), highest=40.0)
     found = onset(sheet, highest=40.0)
-    assert found == pytest.approx(other.speed, rel=2e-3)  # ten modes of a vacuum against fourteen polynomials
-    assert leading(sheet, found).frequency == pytest.approx(other.frequency / (2 * math.pi), rel=5e-3)
+    assert found == pytest.approx(
+        other.speed, rel=2e-3
+    )  # ten modes of a vacuum against fourteen polynomials
+    assert leading(sheet, found).frequency == pytest.approx(
+        other.frequency / (2 * math.pi), rel=5e-3
+    )
 
 
 def test_damping_and_friction_act_as_in_the_independent_calculation() -> None:
     sheet = Sheet(length=1.2, mass=0.7, rigidity=0.9, reactive_mass=0.3, damping=2e-3, friction=0.4)
-    strip = Strip(length=1.2, mass=0.7, rigidity=0.9, air_mass=0.3, damping=2e-3, friction=0.4, speed=9.0)
+    strip = Strip(
+        length=1.2, mass=0.7, rigidity=0.9, air_mass=0.3, damping=2e-3, friction=0.4, speed=9.0
+    )
     other = beam_leading(strip)
     found = leading(sheet, 9.0)
     assert found.growth == pytest.approx(other.real, rel=0.02)

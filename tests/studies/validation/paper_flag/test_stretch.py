@@ -14,7 +14,8 @@ LENGTH, RATIO = 300.0, 0.5625
 
 
 def inextensible(frames: int = 300) -> EdgeTrack:
-    """Lines of `LENGTH` columns; rows are `RATIO` of a column; in a third of the frames the tip is smeared away."""
+    """Lines of `LENGTH` columns; rows are `RATIO` of a column; in a third of the frames the tip is
+    smeared away."""
     rng = stream(5, "sheet")
     arc = np.linspace(0, LENGTH, 1201)
     heights = np.full((frames, 320), np.nan)
@@ -26,14 +27,22 @@ def inextensible(frames: int = 300) -> EdgeTrack:
         columns = np.arange(320)
         lost = rng.uniform(5, 60) if frame % 3 == 0 else 0.0
         seen = columns <= x[-1] - lost
-        heights[frame, seen] = 200 + np.interp(columns[seen], x, y) / RATIO + 0.1 * rng.standard_normal(int(seen.sum()))
+        heights[frame, seen] = (
+            200
+            + np.interp(columns[seen], x, y) / RATIO
+            + 0.1 * rng.standard_normal(int(seen.sum()))
+        )
     kinds = np.where(np.isfinite(heights), Seen.LINE, Seen.NOTHING).astype(np.uint8)
-    return EdgeTrack(time=np.arange(frames) / 1000, height=heights, width=np.ones_like(heights), seen=kinds)
+    return EdgeTrack(
+        time=np.arange(frames) / 1000, height=heights, width=np.ones_like(heights), seen=kinds
+    )
 
 
 def test_the_ratio_at_which_paper_keeps_its_length_is_that_of_the_pixels() -> None:
     found = stretch(inextensible(), stream(1, "resample"))
-    assert found.ratio == pytest.approx(RATIO, abs=0.03)  # the grid of ratios is 0.01; noise does the rest
+    assert found.ratio == pytest.approx(
+        RATIO, abs=0.03
+    )  # the grid of ratios is 0.01; noise does the rest
     assert found.low <= RATIO + 0.02
     assert found.high >= RATIO - 0.02
     assert found.length == pytest.approx(LENGTH, rel=0.01)  # the last column is up to one short

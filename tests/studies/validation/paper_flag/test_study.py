@@ -39,7 +39,9 @@ def drawn_clip(spec: ClipSpec, case: Case) -> Clip:
     y = 0.2 * case.sheet.length * (x / 0.126) ** 2 * np.cos(angle)
     height = np.where(columns < 4, np.nan, 200 - y / case.row_scale)
     seen = np.where(np.isfinite(height), Seen.LINE, Seen.NOTHING).astype(np.uint8)
-    return measure_clip(EdgeTrack(time=time, height=height, width=np.ones_like(height), seen=seen), spec, case)
+    return measure_clip(
+        EdgeTrack(time=time, height=height, width=np.ones_like(height), seen=seen), spec, case
+    )
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +65,10 @@ def case() -> Case:
 
 @pytest.fixture(scope="module")
 def seen(case: Case) -> Observations:
-    stops = tuple(Threshold(length=h, speed=v) for h, v in ((0.08, 9.0), (0.10, 8.0), (0.12, 7.5), (0.14, 7.0)))
+    stops = tuple(
+        Threshold(length=h, speed=v)
+        for h, v in ((0.08, 9.0), (0.10, 8.0), (0.12, 7.5), (0.14, 7.0))
+    )
     tables = Thresholds(
         stop=stops,
         onset=stops,
@@ -71,7 +76,9 @@ def seen(case: Case) -> Observations:
         flutter=stops,
         curves={"curve_00": ((0.9, 40.0), (2.2, 28.0)), "experiments": ((2.7, 25.0),)},
     )
-    return Observations(clips=tuple(drawn_clip(spec, case) for spec in case.clips), thresholds=tables)
+    return Observations(
+        clips=tuple(drawn_clip(spec, case) for spec in case.clips), thresholds=tables
+    )
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +86,13 @@ def found(case: Case, seen: Observations) -> studied.Study:
     def flutters(loads: Sequence[Load], speeds: Sequence[float], **_: Any) -> list[Flutter]:
         still = Flutter(frequency=np.nan, wave=np.nan, amplitude=np.nan, tip=0.001, periodic=False)
         return [
-            Flutter(frequency=frequency(one, speed), wave=0.6 * speed, amplitude=0.2, tip=0.2, periodic=True)
+            Flutter(
+                frequency=frequency(one, speed),
+                wave=0.6 * speed,
+                amplitude=0.2,
+                tip=0.2,
+                periodic=True,
+            )
             if one.reactive or one.lift
             else still
             for one, speed in zip(loads, speeds, strict=True)
@@ -89,7 +102,9 @@ def found(case: Case, seen: Observations) -> studied.Study:
         time, arc = np.arange(250) / 500, np.linspace(0, length, 24)
         wave = 0.02 * np.cos(2 * np.pi * 12 * (time[:, None] - arc / 3)) * arc / length
         across = np.repeat(wave[..., None], len(speeds), axis=2)
-        return StripMotion(time=time, along=np.broadcast_to(arc[:, None], across.shape), across=across, arc=arc)
+        return StripMotion(
+            time=time, along=np.broadcast_to(arc[:, None], across.shape), across=across, arc=arc
+        )
 
     def tried(candidate: Candidate) -> tuple[Load, ...]:
         few = {
@@ -106,18 +121,24 @@ def found(case: Case, seen: Observations) -> studied.Study:
         return studied.study(case, seen)
 
 
-def test_a_clip_is_measured_in_metres_with_its_own_scale_of_rows_and_columns(seen: Observations, case: Case) -> None:
+def test_a_clip_is_measured_in_metres_with_its_own_scale_of_rows_and_columns(
+    seen: Observations, case: Case
+) -> None:
     clip = next(one for one in seen.clips if one.spec.name == "middle")
     assert clip.waves.frequency.value == pytest.approx(12.0, abs=0.02)  # 2.4 · 10/2
     assert clip.waves.speed.value == pytest.approx(3.0, rel=0.03)  # 0.3 · 10
-    assert clip.waves.amplitude.value == pytest.approx(0.2 * case.sheet.length, rel=0.12)  # at the last of 8 columns
+    assert clip.waves.amplitude.value == pytest.approx(
+        0.2 * case.sheet.length, rel=0.12
+    )  # at the last of 8 columns
     assert clip.clamp == 4
     other = next(one for one in seen.clips if one.spec.name == "other")
     assert other.clamp is None
     assert other.stretch is None
 
 
-def test_only_whole_sheets_give_lengths_and_nothing_held_out_is_fitted(seen: Observations, case: Case) -> None:
+def test_only_whole_sheets_give_lengths_and_nothing_held_out_is_fitted(
+    seen: Observations, case: Case
+) -> None:
     fitted = seen.conditions(case, Group.FIT, list(Kind))
     held = seen.conditions(case, Group.HELD_OUT, list(Kind))
     assert [c.at for c in fitted if c.kind is Kind.FREQUENCY] == [8.0, 12.0]
@@ -130,7 +151,9 @@ def test_the_base_model_does_not_flutter_and_the_planted_one_is_found(found: stu
     for outcome in found.linear:
         if outcome.candidate is Candidate.NONE:
             assert all((values == NEVER).all() for values in outcome.held_out.values())
-    best = next(o for o in found.in_time if o.candidate is Candidate.REACTIVE and o.shear is Shear.FREE)
+    best = next(
+        o for o in found.in_time if o.candidate is Candidate.REACTIVE and o.shear is Shear.FREE
+    )
     assert np.abs(best.held_out[Kind.WAVE]).max() < 0.5
     assert {cell.factor for cell in found.declared} == {1.0, 0.5}
 

@@ -1,4 +1,5 @@
-"""Frequency, amplitude and speed of drawn waves, and whether the intervals have their nominal coverage."""
+"""Frequency, amplitude and speed of drawn waves, and whether the intervals have their nominal
+coverage."""
 
 from __future__ import annotations
 
@@ -18,9 +19,13 @@ TIME = np.arange(500) / RATE
 
 
 def travelling(frequency: float, speed: float, *, amplitude: float = 0.03) -> FloatArray:
-    """(frame, column) a wave that grows towards the tip and runs there, with a second harmonic of a tenth."""
+    """(frame, column) a wave that grows towards the tip and runs there, with a second harmonic of a
+    tenth."""
     angle = 2 * np.pi * frequency * (TIME[:, None] - X / speed)
-    return amplitude * (0.2 + X / X[-1]) / 1.2 * (np.cos(angle) + 0.1 * np.cos(2 * angle + 1)) + 0.01 * X
+    return (
+        amplitude * (0.2 + X / X[-1]) / 1.2 * (np.cos(angle) + 0.1 * np.cos(2 * angle + 1))
+        + 0.01 * X
+    )
 
 
 def test_a_travelling_wave_is_measured_through_gaps() -> None:
@@ -40,7 +45,9 @@ def test_a_motion_is_not_taken_for_its_harmonic_or_half_of_it() -> None:
 
 def test_a_standing_wave_does_not_travel_and_a_long_travelling_one_does() -> None:
     standing = np.sin(np.pi * X / 0.14) * np.cos(2 * np.pi * 10 * TIME[:, None])
-    running = np.cos(2 * np.pi * (10 * TIME[:, None] - X / 0.07))  # two wavelengths in view: a circle
+    running = np.cos(
+        2 * np.pi * (10 * TIME[:, None] - X / 0.07)
+    )  # two wavelengths in view: a circle
     assert waves(TIME, X, standing).travelling < 0.01
     assert waves(TIME, X, running).travelling > 0.9
 
@@ -50,7 +57,8 @@ def test_a_wave_towards_the_clamp_has_a_negative_speed() -> None:
 
 
 def test_the_interval_of_the_frequency_covers_it_as_often_as_it_says() -> None:
-    # The phase does a random walk, as a real flutter's does: each cycle lasts 3 % longer or shorter than the mean.
+    # The phase does a random walk, as a real flutter's does: each cycle lasts 3 % longer or shorter
+    # than the mean.
     draws, held = 60, 0
     x = X[::5]
     for draw in range(draws):
@@ -70,7 +78,9 @@ def test_noise_alone_gives_no_interval_that_pretends() -> None:
 
 
 def test_two_modes_hold_a_travelling_wave() -> None:
-    assert waves(TIME, X, np.cos(2 * np.pi * (10 * TIME[:, None] - X / 0.1))).two_modes == pytest.approx(1, abs=1e-9)
+    assert waves(
+        TIME, X, np.cos(2 * np.pi * (10 * TIME[:, None] - X / 0.1))
+    ).two_modes == pytest.approx(1, abs=1e-9)
 
 
 def test_too_few_cycles_and_too_few_columns_are_refused() -> None:
@@ -83,4 +93,7 @@ def test_too_few_cycles_and_too_few_columns_are_refused() -> None:
 def test_an_estimate_changes_unit_with_its_interval() -> None:
     found = Estimate(value=2.0, error=0.5, low=1.0, high=3.0, count=5).scaled(10)
     assert (found.value, found.error, found.low, found.high, found.count) == (20, 5, 10, 30, 5)
-    assert Estimate(value=1.0, error=math.nan, low=math.nan, high=math.nan, count=1).as_dict()["low"] is None
+    assert (
+        Estimate(value=1.0, error=math.nan, low=math.nan, high=math.nan, count=1).as_dict()["low"]
+        is None
+    )

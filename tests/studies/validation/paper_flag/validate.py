@@ -18,7 +18,8 @@ _WORK = _ROOT / "out" / "paper-flag"
 
 
 def run(*, seed: int, out: Path) -> dict[str, Any]:
-    """The study; the page goes to docs/cases. That it was left out, and why, where the recordings are absent."""
+    """The study; the page goes to docs/cases. That it was left out, and why, where the recordings
+    are absent."""
     if not REFERENCE.is_dir():
         return dict(ABSENT)
     case = replace(load_case(), seed=seed)

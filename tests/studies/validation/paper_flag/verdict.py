@@ -1,4 +1,5 @@
-"""What the study says, by stated rules: which candidates remain, and whether what remains is enough."""
+"""What the study says, by stated rules: which candidates remain, and whether what remains is
+enough."""
 
 from __future__ import annotations
 
@@ -34,7 +35,8 @@ class Verdict:
 
     Attributes:
         best: the model in time with the least error on what was not fitted.
-        remaining_fitted: models in time that the fitted kinds cannot distinguish from the best of them.
+        remaining_fitted: models in time that the fitted kinds cannot distinguish from the best of
+            them.
         remaining: those that all kinds cannot distinguish from the best.
         insufficient: kinds in which the best misses what was measured, by its mean |log error|.
         tolerance: kind → mean |log error| that measurement and mesh leave open.
@@ -51,16 +53,21 @@ class Verdict:
 def judge(case: Case, seen: Observations, study: Study) -> Verdict:
     """The verdict.
 
-    A candidate remains unless the best has smaller errors on held-out conditions by more than two standard errors of
-    the paired difference. What remains is enough if no kind's mean error exceeds what the measurements' intervals and
-    the mesh leave open.
+    A candidate remains unless the best has smaller errors on held-out conditions by more than two
+    standard errors of the paired difference. What remains is enough if no kind's mean error exceeds
+    what the measurements' intervals and the mesh leave open.
     """
     fitted = study.in_time[0].fitted_to
     best = min(study.in_time, key=lambda outcome: outcome.score)
     tolerance = {
-        kind: max(_half_width(_conditions(case, seen, kind)), study.floor.get(kind, 0.0)) for kind in best.held_out
+        kind: max(_half_width(_conditions(case, seen, kind)), study.floor.get(kind, 0.0))
+        for kind in best.held_out
     }
-    missed = {kind: best.held_out_error(kind) for kind in best.held_out if best.held_out_error(kind) > tolerance[kind]}
+    missed = {
+        kind: best.held_out_error(kind)
+        for kind in best.held_out
+        if best.held_out_error(kind) > tolerance[kind]
+    }
     remaining = _remaining(study.in_time, tuple(best.held_out))
     names = {outcome.candidate for outcome in remaining}
     if not any(outcome.gains[kind].low > 0 for outcome in remaining for kind in fitted):
@@ -95,12 +102,16 @@ def _remaining(outcomes: Sequence[Outcome], kinds: Sequence[Kind]) -> tuple[Outc
 
 
 def _conditions(case: Case, seen: Observations, kind: Kind) -> tuple[Condition, ...]:
-    return tuple(c for group in (Group.FIT, Group.HELD_OUT) for c in seen.conditions(case, group, (kind,)))
+    return tuple(
+        c for group in (Group.FIT, Group.HELD_OUT) for c in seen.conditions(case, group, (kind,))
+    )
 
 
 def _half_width(conditions: Sequence[Condition]) -> float:
     """Mean half-width of the measured intervals, as logarithms."""
-    widths = [math.log(c.high / c.low) / 2 for c in conditions if math.isfinite(c.low) and c.low > 0]
+    widths = [
+        math.log(c.high / c.low) / 2 for c in conditions if math.isfinite(c.low) and c.low > 0
+    ]
     return float(np.mean(widths)) if widths else 0.0
 
 

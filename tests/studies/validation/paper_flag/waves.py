@@ -1,9 +1,12 @@
-"""What a fluttering line does: frequency, amplitude, envelope, speed of its waves and shape, with intervals.
+"""What a fluttering line does: frequency, amplitude, envelope, speed of its waves and shape, with
+intervals.
 
-Heights y(x, t) are modelled, column by column, as m(x) + Re Σ_k a_k(x) exp(2πi k f t), fitted by least squares to what
-was seen; gaps are left out, not filled. The spectrum's residual, summed over columns, gives f. Intervals are Student's
-about blocks of whole cycles: each cycle has its own frequency (from the phase of the motion on the mean shape),
-amplitude and wave speed, and neighbouring cycles are joined to blocks since they resemble each other.
+Heights y(x, t) are modelled, column by column, as m(x) + Re Σ_k a_k(x) exp(2πi k f t), fitted by
+least squares to what was seen; gaps are left out, not filled. The spectrum's residual, summed over
+columns, gives f. Intervals are Student's
+about blocks of whole cycles: each cycle has its own frequency (from the phase of the motion on the
+mean shape), amplitude and wave speed, and neighbouring cycles are joined to blocks since they
+resemble each other.
 """
 
 from __future__ import annotations
@@ -65,14 +68,17 @@ class Waves:
         frequency: [Hz].
         explained: share of the heights' variance that the periodic model explains.
         amplitude: largest of |a_1(x)|.
-        speed: of the travelling wave, positive towards larger x: ω over the slope of its phase, in units of x a second.
-        travelling: 1 for a wave that only travels, 0 for one that only stands: the smaller over the larger axis of the
-            ellipse that the complex heights fill (Feeny, J. Sound Vib. 310:90, 2008).
+        speed: of the travelling wave, positive towards larger x: ω over the slope of its phase, in
+            units of x a second.
+        travelling: 1 for a wave that only travels, 0 for one that only stands: the smaller over the
+            larger axis of the ellipse that the complex heights fill (Feeny, J. Sound Vib. 310:90,
+            2008).
         columns: (column,) x of what follows.
         profile: (column,) complex a_1.
         mean: (column,) m.
         lowest, highest: (column,) 2 % and 98 % of the heights seen: the envelope.
-        two_modes: share of the variance in the first two proper orthogonal modes, of frames seen whole; NaN without.
+        two_modes: share of the variance in the first two proper orthogonal modes, of frames seen
+            whole; NaN without.
     """
 
     frequency: Estimate
@@ -124,7 +130,9 @@ def waves(
     duration = float(time[-1] - time[0])
     if frequency * duration < _FEWEST:
         raise InputError(
-            f"{frequency * duration:.1f} cycles at {frequency:.3g} Hz", where="waves", fix="give a longer clip"
+            f"{frequency * duration:.1f} cycles at {frequency:.3g} Hz",
+            where="waves",
+            fix="give a longer clip",
         )
     offset, coefficients = _fit(time, heights, frequency, harmonics)
     profile = coefficients[0]
@@ -151,7 +159,8 @@ def waves(
 
 
 def wave_speed(columns: FloatArray, profile: NDArray[np.complex128], frequency: float) -> float:
-    """ω / (−d arg a / dx), the slope weighted with |a|²: columns where nothing moves say nothing."""
+    """ω / (−d arg a / dx), the slope weighted with |a|²: columns where nothing moves say
+    nothing."""
     phase = np.unwrap(np.angle(profile))
     weight = profile.real**2 + profile.imag**2
     slope = _slope(columns, phase, weight)
@@ -163,10 +172,14 @@ def _slope(x: FloatArray, y: FloatArray, weight: FloatArray) -> float:
     return float((weight * (x - centre) * y).sum() / (weight * (x - centre) ** 2).sum())
 
 
-def _frequency(time: FloatArray, heights: FloatArray, band: tuple[float, float], harmonics: int) -> float:
-    """Least residual: of the fundamental alone on a coarse grid, of the whole model on a fine one around the best.
+def _frequency(
+    time: FloatArray, heights: FloatArray, band: tuple[float, float], harmonics: int
+) -> float:
+    """Least residual: of the fundamental alone on a coarse grid, of the whole model on a fine one
+    around the best.
 
-    Of the fundamental alone first, since a motion of frequency f is also one of f/2 with twice the harmonics.
+    Of the fundamental alone first, since a motion of frequency f is also one of f/2 with twice the
+    harmonics.
     """
     duration = float(time[-1] - time[0])
     grid = np.arange(band[0], band[1], 0.1 / duration)
@@ -183,7 +196,8 @@ def _design(time: FloatArray, frequency: float, harmonics: int) -> FloatArray:
 
 
 def _residual(time: FloatArray, heights: FloatArray, frequency: float, harmonics: int) -> float:
-    """Sum of squares that the model leaves of all columns, each fitted to its own frames by the normal equations."""
+    """Sum of squares that the model leaves of all columns, each fitted to its own frames by the
+    normal equations."""
     design = _design(time, frequency, harmonics)
     seen = np.isfinite(heights).astype(np.float64)
     known = np.nan_to_num(heights)
@@ -207,7 +221,9 @@ def _fit(
     return found[0], found[1 : harmonics + 1] - 1j * found[harmonics + 1 :]
 
 
-def _harmonic(time: FloatArray, coefficients: NDArray[np.complex128], frequency: float) -> FloatArray:
+def _harmonic(
+    time: FloatArray, coefficients: NDArray[np.complex128], frequency: float
+) -> FloatArray:
     turning = np.exp(2j * np.pi * frequency * time[:, None] * np.arange(1, len(coefficients) + 1))
     return (turning @ coefficients).real
 
@@ -219,7 +235,8 @@ def _cycles(
     profile: NDArray[np.complex128],
     frequency: float,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Phase and amplitude of each whole cycle on the mean shape, relative to the mean motion, and its wave speed."""
+    """Phase and amplitude of each whole cycle on the mean shape, relative to the mean motion, and
+    its wave speed."""
     phases, amplitudes, speeds = [], [], []
     cycle = np.floor((time - time[0]) * frequency + 1e-9).astype(int)
     for number in range(int((time[-1] - time[0]) * frequency)):

@@ -18,27 +18,39 @@ from tests.studies.validation.paper_flag.verdict import Verdict, free
 def verdict_words(seen: Observations, study: Study, verdict: Verdict) -> list[str]:
     """Sentences, the conclusion first."""
     best = verdict.best
-    still = max((tip for cell in study.declared if not cell.load.reactive for tip in cell.tips.values()), default=0.0)
-    clips = sorted((c for c in seen.clips if c.spec.group is not Group.OTHER), key=lambda c: c.spec.speed)
+    still = max(
+        (tip for cell in study.declared if not cell.load.reactive for tip in cell.tips.values()),
+        default=0.0,
+    )
+    clips = sorted(
+        (c for c in seen.clips if c.spec.group is not Group.OTHER), key=lambda c: c.spec.speed
+    )
     slow, fast = clips[0], clips[-1]
     found = (
-        f"The sheet flutters at {slow.waves.frequency.value:.1f} Hz at {slow.spec.speed:g} m/s, up to "
-        f"{fast.waves.frequency.value:.1f} Hz at {fast.spec.speed:g} m/s. The base model, which has neither fluid "
-        f"inertia nor lift, never does: its tip ends up moving by {100 * still:.1f} % of the length at most."
+        f"The sheet flutters at {slow.waves.frequency.value:.1f} Hz at {slow.spec.speed:g} m/s, up "
+        "to "
+        f"{fast.waves.frequency.value:.1f} Hz at {fast.spec.speed:g} m/s. The base model, which "
+        "has neither fluid "
+        f"inertia nor lift, never does: its tip ends up moving by {100 * still:.1f} % of the "
+        "length at most."
     )
     closest = (
-        f"Closest on what was not fitted comes {best.candidate.value} ({best.load}) at {best.factor:.2f} of the "
+        f"Closest on what was not fitted comes {best.candidate.value} ({best.load}) at "
+        f"{best.factor:.2f} of the "
         f"tunnel's speed: {_kinds(best)}."
     )
     fitted, every = _names(verdict.remaining_fitted), _names(verdict.remaining)
     remark = (
-        f"By frequencies and stop speeds alone, what remains within two standard errors of the best: {fitted}. With "
-        f"the speed of the wave along the sheet and the amplitude, to which nothing was fitted: {every}."
+        "By frequencies and stop speeds alone, what remains within two standard errors of the "
+        f"best: {fitted}. With "
+        "the speed of the wave along the sheet and the amplitude, to which nothing was fitted: "
+        f"{every}."
     )
     words = [found, closest, remark]
     if verdict.insufficient:
         misses = "; ".join(
-            f"{kind.value} by {_percent(size)} (measurement and mesh leave {_percent(verdict.tolerance[kind])} open)"
+            f"{kind.value} by {_percent(size)} (measurement and mesh leave "
+            f"{_percent(verdict.tolerance[kind])} open)"
             for kind, size in verdict.insufficient.items()
         )
         words.append(f"It is not enough. The best model still misses, on average, {misses}.")
@@ -61,7 +73,8 @@ def _tension(study: Study) -> str:
         if o.candidate is Candidate.REACTIVE
     ]
     return (
-        f"The reactive loading by itself is not one number: {'; '.join(parts)}. Frequencies and the tunnel's log alone "
+        f"The reactive loading by itself is not one number: {'; '.join(parts)}. Frequencies and "
+        "the tunnel's log alone "
         "cannot separate the air's mass from the speed at the sheet: both scale the same load."
     )
 
@@ -75,18 +88,33 @@ def candidates_tried(study: Study, verdict: Verdict) -> list[tuple[str, str, str
         if candidate in IN_TIME:
             model = free(study.in_time, candidate)
             judged = (
-                "best" if candidate is verdict.best.candidate else "not excluded" if candidate in kept else "rejected"
+                "best"
+                if candidate is verdict.best.candidate
+                else "not excluded"
+                if candidate in kept
+                else "rejected"
             )
-            rows.append((candidate.value, judged, f"in time, s = {model.factor:.2f}, {model.load}: {_kinds(model)}"))
+            rows.append(
+                (
+                    candidate.value,
+                    judged,
+                    f"in time, s = {model.factor:.2f}, {model.load}: {_kinds(model)}",
+                )
+            )
         elif all((values == NEVER).all() for values in linear.held_out.values()):
-            rows.append((candidate.value, "rejected", "linear: no strength and no s make the sheet flutter"))
+            rows.append(
+                (candidate.value, "rejected", "linear: no strength and no s make the sheet flutter")
+            )
         else:
             rows.append((candidate.value, "rejected", f"linear: {_kinds(linear)}"))
     return rows
 
 
 def _names(outcomes: Sequence[Outcome]) -> str:
-    names = [f"{o.candidate.value} ({'s free' if o.shear is Shear.FREE else 'logged speed'})" for o in outcomes]
+    names = [
+        f"{o.candidate.value} ({'s free' if o.shear is Shear.FREE else 'logged speed'})"
+        for o in outcomes
+    ]
     return _joined(names)
 
 

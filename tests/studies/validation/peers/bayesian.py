@@ -1,7 +1,9 @@
-"""The paper's optimiser: a Gaussian process with Matérn 5/2 and expected improvement, from the centre.
+"""The paper's optimiser: a Gaussian process with Matérn 5/2 and expected improvement, from the
+centre.
 
-Runia et al. 2020, sections 3.2 and 6. Expected improvement is maximised by its logarithm (Ament et al., NeurIPS 2023),
-which has the same maximum and gradients that do not vanish; several points at once by its batched form.
+Runia et al. 2020, sections 3.2 and 6. Expected improvement is maximised by its logarithm (Ament et
+al., NeurIPS 2023), which has the same maximum and gradients that do not vanish; several points at
+once by its batched form.
 """
 
 from __future__ import annotations
@@ -39,16 +41,21 @@ class BayesianOptimisation:
         analytic = library("botorch.acquisition.analytic", of="botorch")
         sampling = library("botorch.sampling.normal", of="botorch")
         optim = library("botorch.optim", of="botorch")
-        bounds = torch.tensor([[0.0] * self._dimension, [1.0] * self._dimension], dtype=torch.double)
+        bounds = torch.tensor(
+            [[0.0] * self._dimension, [1.0] * self._dimension], dtype=torch.double
+        )
         with torch_draws(self._seed, "peers", "bayesian", count), warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of starts that did not converge; the best of them is taken
+            warnings.simplefilter(
+                "ignore"
+            )  # of starts that did not converge; the best of them is taken
             model = fitted(self._points, self._values)
             best = model.outcome_transform.untransform(model.train_targets[:, None])[0].max()
             if self._batch == 1:
                 acquisition = analytic.LogExpectedImprovement(model, best_f=best)
             else:
                 sampler = sampling.SobolQMCNormalSampler(
-                    torch.Size([128]), seed=child_seed(self._seed, "peers", "bayesian", "sampler", count) % 2**31
+                    torch.Size([128]),
+                    seed=child_seed(self._seed, "peers", "bayesian", "sampler", count) % 2**31,
                 )
                 acquisition = logei.qLogExpectedImprovement(model, best_f=best, sampler=sampler)
             found, _ = optim.optimize_acqf(

@@ -1,4 +1,5 @@
-"""CMA-ES: evolution with an adapted covariance, from its author's library (Hansen, arXiv 1604.00772)."""
+"""CMA-ES: evolution with an adapted covariance, from its author's library (Hansen, arXiv
+1604.00772)."""
 
 from __future__ import annotations
 
@@ -17,8 +18,8 @@ _FAILED = 1e12  # of a failed simulation: farther than any
 class CmaEs:
     """See `tests.studies.validation.peers.registry.Optimiser`.
 
-    It asks for a whole generation at once, 4 + ⌊3 ln d⌋ points, in place of `batch`, after the centre. Of a generation
-    that the budget cuts it gets no values.
+    It asks for a whole generation at once, 4 + ⌊3 ln d⌋ points, in place of `batch`, after the
+    centre. Of a generation that the budget cuts it gets no values.
     """
 
     def __init__(self, dimension: int, *, seed: int, batch: int) -> None:
@@ -28,7 +29,11 @@ class CmaEs:
         self._strategy: Any = cma.CMAEvolutionStrategy(
             np.zeros(dimension),
             _STEP,
-            {"bounds": [-1.0, 1.0], "seed": 1 + child_seed(seed, "peers", "cma-es") % (2**31 - 2), "verbose": -9},
+            {
+                "bounds": [-1.0, 1.0],
+                "seed": 1 + child_seed(seed, "peers", "cma-es") % (2**31 - 2),
+                "verbose": -9,
+            },
         )
 
     def ask(self) -> FloatArray:
@@ -41,4 +46,6 @@ class CmaEs:
             self._begun = True
             return
         if len(points) == self._strategy.popsize:
-            self._strategy.tell(list(points), np.where(np.isfinite(values), values, _FAILED).tolist())
+            self._strategy.tell(
+                list(points), np.where(np.isfinite(values), values, _FAILED).tolist()
+            )

@@ -1,7 +1,8 @@
 """The Gaussian process under Bayesian optimisation and TuRBO: BoTorch's, with a Matérn-5/2 kernel.
 
-Matérn 5/2 with a length scale for each dimension (Snoek, Larochelle and Adams 2012, as the paper), fitted by the
-marginal likelihood with BoTorch's priors, which scale with the dimension (Hvarfner, Hellsten and Nardi 2024).
+Matérn 5/2 with a length scale for each dimension (Snoek, Larochelle and Adams 2012, as the paper),
+fitted by the marginal likelihood with BoTorch's priors, which scale with the dimension (Hvarfner,
+Hellsten and Nardi 2024).
 """
 
 from __future__ import annotations
@@ -18,14 +19,15 @@ from flagdata.core.arrays import FloatArray
 from tests.studies.validation.peers.library import library
 
 _OF = "botorch"
-_STEPS = 100  # of the fit; more change the length scales by little, and a noise-free surface takes them all
+# of the fit; more change the length scales by little, and a noise-free surface takes them all
+_STEPS = 100
 
 
 def fitted(points: FloatArray, values: FloatArray) -> Any:
     """A SingleTaskGP of −log(1 + value), larger being better, on [0, 1]ᵈ.
 
-    Squared distances vary by orders of magnitude; their logarithm is nearer to a Gaussian process. Failed evaluations
-    count as the farthest that did not fail.
+    Squared distances vary by orders of magnitude; their logarithm is nearer to a Gaussian process.
+    Failed evaluations count as the farthest that did not fail.
 
     Args:
         points: (n, d) of [−1, 1]ᵈ.
@@ -48,8 +50,12 @@ def fitted(points: FloatArray, values: FloatArray) -> Any:
         lengthscale_constraint=constraints.GreaterThan(2.5e-2, initial_value=prior.mode),
     )
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of the linear algebra's jitter, and the deprecations of torch's own tracing
-        model = models.SingleTaskGP(x, y, covar_module=kernel, outcome_transform=transforms.Standardize(m=1))
+        warnings.simplefilter(
+            "ignore"
+        )  # of the linear algebra's jitter, and the deprecations of torch's own tracing
+        model = models.SingleTaskGP(
+            x, y, covar_module=kernel, outcome_transform=transforms.Standardize(m=1)
+        )
         fit.fit_gpytorch_mll(
             likelihoods.ExactMarginalLogLikelihood(model.likelihood, model),
             optimizer_kwargs={"options": {"maxiter": _STEPS}},

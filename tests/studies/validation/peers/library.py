@@ -12,7 +12,8 @@ from flagdata.errors import InputError
 def library(module: str, *, of: str) -> ModuleType:
     """A module of an optional library.
 
-    gpytorch's imports call a function of torch that newer versions call deprecated; that warning is theirs.
+    gpytorch's imports call a function of torch that newer versions call deprecated; that warning is
+    theirs.
 
     Args:
         module: to import.

@@ -40,7 +40,9 @@ Evaluate = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 """Points (q, d) → values (q,) and the seconds that each took when it was made (q,)."""
 
 
-def minimise(method: str, evaluate: Evaluate, *, dimension: int, budget: int, seed: int, batch: int = 1) -> Trace:
+def minimise(
+    method: str, evaluate: Evaluate, *, dimension: int, budget: int, seed: int, batch: int = 1
+) -> Trace:
     """Run an optimiser for `budget` evaluations.
 
     Args:
@@ -71,4 +73,9 @@ def minimise(method: str, evaluate: Evaluate, *, dimension: int, budget: int, se
             points.append(point)
             values.append(value)
             seconds.append(spent)
-    return Trace(method=method, points=np.array(points), distances=np.array(values), seconds=np.array(seconds))
+    return Trace(
+        method=method,
+        points=np.array(points),
+        distances=np.array(values),
+        seconds=np.array(seconds),
+    )

@@ -1,8 +1,10 @@
-"""TuRBO: Bayesian optimisation within a trust region that grows with success and shrinks with failure.
+"""TuRBO: Bayesian optimisation within a trust region that grows with success and shrinks with
+failure.
 
-Eriksson, Pearce, Gardner, Turner and Poloczek, Scalable global optimization via local Bayesian optimization, NeurIPS
-2019: one region, Thompson sampling over perturbed Sobol candidates, on BoTorch's Gaussian process. Lengths and
-tolerances are that paper's.
+Eriksson, Pearce, Gardner, Turner and Poloczek, Scalable global optimization via local Bayesian
+optimization, NeurIPS
+2019: one region, Thompson sampling over perturbed Sobol candidates, on BoTorch's Gaussian process.
+Lengths and tolerances are that paper's.
 """
 
 from __future__ import annotations
@@ -43,7 +45,9 @@ class Turbo:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             sobol = torch.quasirandom.SobolEngine(
-                self._dimension, scramble=True, seed=child_seed(self._seed, "peers", "turbo", self._restart) % 2**31
+                self._dimension,
+                scramble=True,
+                seed=child_seed(self._seed, "peers", "turbo", self._restart) % 2**31,
             )
             self._initial = list(signed(sobol.draw(_INITIAL).double()))
         if self._restart == 0:
@@ -59,7 +63,10 @@ class Turbo:
     def _thompson(self) -> FloatArray:
         generation = library("botorch.generation", of="botorch")
         rng = stream(self._seed, "peers", "turbo", "candidates", self._asked)
-        with torch_draws(self._seed, "peers", "turbo", "fit", self._asked), warnings.catch_warnings():
+        with (
+            torch_draws(self._seed, "peers", "turbo", "fit", self._asked),
+            warnings.catch_warnings(),
+        ):
             warnings.simplefilter("ignore")  # of the linear algebra's jitter
             model = fitted(self._points, self._values)
             centre = unit(self._points[[int(np.argmin(self._values))]])[0]
@@ -67,12 +74,20 @@ class Turbo:
             weights = weights / weights.log().mean().exp()
             low = (centre - weights * self._length / 2).clamp(0.0, 1.0)
             high = (centre + weights * self._length / 2).clamp(0.0, 1.0)
-            drawn = low + (high - low) * torch.from_numpy(rng.random((_CANDIDATES, self._dimension)))
-            moved = torch.from_numpy(rng.random((_CANDIDATES, self._dimension))) <= min(20 / self._dimension, 1.0)
+            drawn = low + (high - low) * torch.from_numpy(
+                rng.random((_CANDIDATES, self._dimension))
+            )
+            moved = torch.from_numpy(rng.random((_CANDIDATES, self._dimension))) <= min(
+                20 / self._dimension, 1.0
+            )
             still = (~moved).all(dim=1)
-            moved[still, torch.from_numpy(rng.integers(self._dimension, size=int(still.sum())))] = True
+            moved[still, torch.from_numpy(rng.integers(self._dimension, size=int(still.sum())))] = (
+                True
+            )
             candidates = torch.where(moved, drawn, centre)
-            chosen = generation.MaxPosteriorSampling(model, replacement=False)(candidates, num_samples=self._batch)
+            chosen = generation.MaxPosteriorSampling(model, replacement=False)(
+                candidates, num_samples=self._batch
+            )
         return signed(chosen)
 
     def tell(self, points: FloatArray, values: FloatArray) -> None:

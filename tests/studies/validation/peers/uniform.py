@@ -1,4 +1,5 @@
-"""Random search: the centre, then uniform draws (Bergstra and Bengio, J. Machine Learning Research 13, 2012)."""
+"""Random search: the centre, then uniform draws (Bergstra and Bengio, J. Machine Learning Research
+13, 2012)."""
 
 from __future__ import annotations
 

@@ -47,7 +47,12 @@ three on the effect is known to change the number.
 
 
 def page(
-    base: Predictions, after: Predictions, fit: Fit, controls: Sequence[Fit], unfitted: FloatArray, paper: Paper
+    base: Predictions,
+    after: Predictions,
+    fit: Fit,
+    controls: Sequence[Fit],
+    unfitted: FloatArray,
+    paper: Paper,
 ) -> str:
     """The page in Markdown."""
     return "\n".join(
@@ -71,7 +76,9 @@ def page(
 def _numbers(base: Predictions, after: Predictions) -> list[str]:
     rows = []
     for one in PUBLISHED:
-        pairs = list(zip(one.bands.items(), with_errors(one, base), with_errors(one, after), strict=False))
+        pairs = list(
+            zip(one.bands.items(), with_errors(one, base), with_errors(one, after), strict=False)
+        )
         for (name, band), first, second in pairs:
             change, error = second[0] - first[0], math.hypot(first[1], second[1])
             rows.append(
@@ -89,16 +96,40 @@ def _numbers(base: Predictions, after: Predictions) -> list[str]:
             )
         if not pairs:
             bands = "; ".join(_band(band) for band in one.bands.values() if math.isfinite(band[1]))
-            rows.append([one.name, one.quantity, one.role, bands, "", "not comparable", "", "not comparable", ""])
-    head = ["name", "quantity", "used to", "published", "base", "", f"with {NAMED}", "", "change/error"]
+            rows.append(
+                [
+                    one.name,
+                    one.quantity,
+                    one.role,
+                    bands,
+                    "",
+                    "not comparable",
+                    "",
+                    "not comparable",
+                    "",
+                ]
+            )
+    head = [
+        "name",
+        "quantity",
+        "used to",
+        "published",
+        "base",
+        "",
+        f"with {NAMED}",
+        "",
+        "change/error",
+    ]
     return [table(head, rows), ""]
 
 
 def _sources() -> list[str]:
     rows = [[one.name, one.condition, one.source, one.sure] for one in PUBLISHED]
     opened = (
-        "None of the sources could be opened in full: the codes and the books are not free, and of the articles the "
-        "abstracts were read. Scatter and conditions of the measurements are missing; a band says no more than its "
+        "None of the sources could be opened in full: the codes and the books are not free, and of "
+        "the articles the "
+        "abstracts were read. Scatter and conditions of the measurements are missing; a band says "
+        "no more than its "
         "row.\n"
     )
     return [table(["name", "condition", "source", "how sure"], rows), "", opened]
@@ -111,24 +142,39 @@ def _verdict(
     parameter = CANDIDATES[NAMED][0]
     counts = {name: _held(model) for name, model in (("base", base), ("after", after))}
     found = (
-        f"Fitted to the drag of AS 1170.2 and the wavelength, **{NAMED}** has the {parameter} {fit.strength:.2f} "
-        f"[{low:.2f}, {high:.2f}]. The interval is that of fits that leave one flag of one number out. Of "
-        f"the predictions that judge, {counts['after'][0]} of {counts['after'][1]} are held with it and "
+        f"Fitted to the drag of AS 1170.2 and the wavelength, **{NAMED}** has the {parameter} "
+        f"{fit.strength:.2f} "
+        f"[{low:.2f}, {high:.2f}]. The interval is that of fits that leave one flag of one number "
+        "out. Of "
+        f"the predictions that judge, {counts['after'][0]} of {counts['after'][1]} are held with "
+        "it and "
         f"{counts['base'][0]} of {counts['base'][1]} without. "
         "[Decision 052](../decisions/052-the-inertia-of-the-air-beside-a-flag.md) "
         "says what follows.\n"
     )
     about = (
-        "Controls have the same freedom, one strength, and are fitted to the same numbers. The misfit is the root mean "
-        "square of what predictions are off the middle of their bands by, in halves of the width: 1 is the edge. It is "
-        "of the four flags at 6 and 10 m/s, two starts each, linear between the strengths simulated.\n"
+        "Controls have the same freedom, one strength, and are fitted to the same numbers. The "
+        "misfit is the root mean "
+        "square of what predictions are off the middle of their bands by, in halves of the width: "
+        "1 is the edge. It is "
+        "of the four flags at 6 and 10 m/s, two starts each, linear between the strengths "
+        "simulated.\n"
     )
     rows = [["none", "", "", *scores(unfitted)]] + [
-        [one.name, f"{one.strength:.3g}", f"{one.interval[0]:.3g} to {one.interval[1]:.3g}", *scores(one.readings)]
+        [
+            one.name,
+            f"{one.strength:.3g}",
+            f"{one.interval[0]:.3g} to {one.interval[1]:.3g}",
+            *scores(one.readings),
+        ]
         for one in (fit, *controls)
     ]
     by_number = [
-        [one.name, one.role, *(f"{np.sqrt(np.mean(misfit(one, model.mean) ** 2)):.2f}" for model in (base, after))]
+        [
+            one.name,
+            one.role,
+            *(f"{np.sqrt(np.mean(misfit(one, model.mean) ** 2)):.2f}" for model in (base, after)),
+        ]
         for one in PUBLISHED
         if one.predicted is not None
     ]
@@ -158,37 +204,70 @@ def _paper(paper: Paper) -> list[str]:
     models = (paper.base, paper.found, paper.free)
     clips = measured()
     rows = [
-        [name, group, f"{speed:g}", f"{hz:.1f}", *(f"{model.errors[name][0]:+.1%}" for model in models)]
+        [
+            name,
+            group,
+            f"{speed:g}",
+            f"{hz:.1f}",
+            *(f"{model.errors[name][0]:+.1%}" for model in models),
+        ]
         for name, (speed, hz, group) in clips.items()
     ]
     counts = [
-        " and ".join(f"{found} of {of} {group.value}" for group in Group for found, of in [model.within(group, 0.07)])
+        " and ".join(
+            f"{found} of {of} {group.value}"
+            for group in Group
+            for found, of in [model.within(group, 0.07)]
+        )
         for model in models
     ]
     about = (
-        "The paper flag of the tunnel (`python -m tests.studies paper-flag`), as a sheet of 138.5 × 97 mm clamped "
-        "along its hoist; the height is 0.7 of the length, by a figure of the authors. The speed at the sheet is a "
-        "factor s of the tunnel's, a nuisance between 0.4 and 0.7. Frequencies, predicted over measured less 1, of the "
+        "The paper flag of the tunnel (`python -m tests.studies paper-flag`), as a sheet of 138.5 "
+        "× 97 mm clamped "
+        "along its hoist; the height is 0.7 of the length, by a figure of the authors. The speed "
+        "at the sheet is a "
+        "factor s of the tunnel's, a nuisance between 0.4 and 0.7. Frequencies, predicted over "
+        "measured less 1, of the "
         "base "
-        f"model at s = 0.5; with the share of real flags, {paper.found.share:.2f}, and s = {paper.found.factor:.2f} "
-        f'fitted to the group "fit"; and with both fitted to it, {paper.free.share:.2f} and {paper.free.factor:.2f}.\n'
+        f"model at s = 0.5; with the share of real flags, {paper.found.share:.2f}, and s = "
+        f"{paper.found.factor:.2f} "
+        f'fitted to the group "fit"; and with both fitted to it, {paper.free.share:.2f} and '
+        f"{paper.free.factor:.2f}.\n"
     )
     largest = "; ".join(f"{name}: {change:.1%}" for name, change in paper.numerics.items())
     within = (
-        f"Within 7 %: {counts[0]} without the effect; {counts[1]} with the share of real flags; {counts[2]} with both "
+        f"Within 7 %: {counts[0]} without the effect; {counts[1]} with the share of real flags; "
+        f"{counts[2]} with both "
         f"fitted. Largest change of the last at the clips held out by numerics: {largest}.\n"
     )
-    head = ["clip", "group", "tunnel [m/s]", "measured [Hz]", "base", "share of real flags", "share and s fitted"]
+    head = [
+        "clip",
+        "group",
+        "tunnel [m/s]",
+        "measured [Hz]",
+        "base",
+        "share of real flags",
+        "share and s fitted",
+    ]
     lengths = [
         [f"{1e3 * length:.0f}", f"{seen:.1f}"]
-        + ([f"{found:.1f}", f"{found / seen - 1:+.0%}"] if math.isfinite(found) else ["none found", ""])
+        + (
+            [f"{found:.1f}", f"{found / seen - 1:+.0%}"]
+            if math.isfinite(found)
+            else ["none found", ""]
+        )
         for length, (seen, found) in paper.stops.items()
     ]
     other = (
-        "Where sheets of other lengths stop to flutter, by the last model, which was fitted to no length: the least "
+        "Where sheets of other lengths stop to flutter, by the last model, which was fitted to no "
+        "length: the least "
         "speed simulated that flutters, to 5 %.\n"
     )
-    stops = [other, table(["length [mm]", "measured [m/s]", "predicted [m/s]", ""], lengths), ""] if lengths else []
+    stops = (
+        [other, table(["length [mm]", "measured [m/s]", "predicted [m/s]", ""], lengths), ""]
+        if lengths
+        else []
+    )
     return [about, table(head, rows), "", within, *stops]
 
 
@@ -200,7 +279,8 @@ def _numerics(base: Predictions, after: Predictions) -> list[str]:
                 values = model.changes[variant][index]
                 rows.append([label(flag), variant, name, *(f"{value:.3g}" for value in values)])
     about = (
-        "Means of four starts of nine seconds. Of each model the largest change, less what starts alone would change, "
+        "Means of four starts of nine seconds. Of each model the largest change, less what starts "
+        "alone would change, "
         "counts in the errors above.\n"
     )
     return [about, table(["flag", "numerics", "model", *READINGS], rows), ""]
@@ -222,11 +302,18 @@ def picture(base: Predictions, after: Predictions, target: Path) -> None:
     for axes, one in zip(panels, comparable, strict=False):
         for at, (low, high) in enumerate(one.bands.values()):
             axes.bar(at, high - low, bottom=low, width=0.7, color=_BAND)
-        for model, colour, shift, name in ((base, _BASE, -0.15, "base"), (after, _AFTER, 0.15, NAMED)):
+        for model, colour, shift, name in (
+            (base, _BASE, -0.15, "base"),
+            (after, _AFTER, 0.15, NAMED),
+        ):
             values, errors = np.array(with_errors(one, model)).T
             places = np.arange(len(values)) + shift
-            axes.errorbar(places, values, yerr=errors, fmt="o", color=colour, ms=4, capsize=2, label=name)
-        axes.set_xticks(range(len(one.bands)), [name.replace(", ", "\n") for name in one.bands], fontsize=7)
+            axes.errorbar(
+                places, values, yerr=errors, fmt="o", color=colour, ms=4, capsize=2, label=name
+            )
+        axes.set_xticks(
+            range(len(one.bands)), [name.replace(", ", "\n") for name in one.bands], fontsize=7
+        )
         axes.set_title(f"{one.name}: {one.quantity}", fontsize=9)
     panels[0].legend(frameon=False, fontsize=7)
     for axes in panels[len(comparable) :]:
@@ -235,5 +322,8 @@ def picture(base: Predictions, after: Predictions, target: Path) -> None:
 
 
 def scores(values: FloatArray) -> list[str]:
-    """Root mean square misfits of what fits and of what judges, of readings of the flags that stream."""
-    return [f"{np.sqrt(np.nanmean(misfits(values, role) ** 2)):.2f}" for role in (Role.FIT, Role.JUDGE)]
+    """Root mean square misfits of what fits and of what judges, of readings of the flags that
+    stream."""
+    return [
+        f"{np.sqrt(np.nanmean(misfits(values, role) ** 2)):.2f}" for role in (Role.FIT, Role.JUDGE)
+    ]

@@ -1,14 +1,17 @@
-"""The paper flag in the tunnel with the effect that real flags ask for: frequencies at speeds that were not fitted to.
+"""The paper flag in the tunnel with the effect that real flags ask for: frequencies at speeds that
+were not fitted to.
 
-A sheet of paper clamped along its hoist, as `validation.paper_flag` states it, 0.7 as high as long, which is what
-a figure of the authors says. The speed at the sheet is a factor s of the tunnel's, since the sheet hangs in the jet's
-shear layer; the authors take a half. It is a nuisance between 0.4 and 0.7. Two models, decided before the first was
-simulated:
+A sheet of paper clamped along its hoist, as `validation.paper_flag` states it, 0.7 as high as long,
+which is what a figure of the authors says. The speed at the sheet is a factor s of the tunnel's,
+since the sheet hangs in the jet's shear layer; the authors take a half. It is a nuisance between
+0.4 and 0.7. Two models, decided before the first was simulated:
 
-- *found*: the share of real flags; s alone is fitted, to the frequencies of the clips of the group "fit".
+- *found*: the share of real flags; s alone is fitted, to the frequencies of the clips of the group
+  "fit".
 - *free*: share and s are fitted to them.
 
-The measured frequencies are those that `tests.studies.validation.paper_flag` has read off the clips (docs/results).
+The measured frequencies are those that `tests.studies.validation.paper_flag` has read off the clips
+(docs/results).
 """
 
 from __future__ import annotations
@@ -76,8 +79,11 @@ VARIANTS = {
 }
 
 
-def frequencies(case: Case, shares: Sequence[float], speeds: Sequence[float], how: Sheet) -> FloatArray:
-    """(member,) [Hz] of a share and a speed at the sheet [m/s] each; NaN without flutter or after divergence."""
+def frequencies(
+    case: Case, shares: Sequence[float], speeds: Sequence[float], how: Sheet
+) -> FloatArray:
+    """(member,) [Hz] of a share and a speed at the sheet [m/s] each; NaN without flutter or after
+    divergence."""
     length, height = case.sheet.length, HEIGHT
     cell = length / (how.columns - 0.5)
     mesh = grid(width=cell * how.columns, height=height, columns=how.columns, rows=how.rows)
@@ -97,7 +103,9 @@ def frequencies(case: Case, shares: Sequence[float], speeds: Sequence[float], ho
             mesh=mesh,
             position=np.stack([x, across, mesh.rest[:, 1]], axis=1),
             material=paper,
-            handles=Handles(vertices=tuple(int(i) for i in np.flatnonzero(x < cell)), stiffness=math.inf),
+            handles=Handles(
+                vertices=tuple(int(i) for i in np.flatnonzero(x < cell)), stiffness=math.inf
+            ),
             wind=(float(speed), 0.0, 0.0),
             gravity=(0.0, 0.0, 0.0),
             air=QuadraticNormal(density=case.density),
@@ -105,7 +113,9 @@ def frequencies(case: Case, shares: Sequence[float], speeds: Sequence[float], ho
         for speed in speeds
     ]
     system, state = assemble(scenes, dtype=torch.float64)
-    loading = FiniteSpanLoading(share=torch.tensor(shares, dtype=torch.float64), density=case.density)
+    loading = FiniteSpanLoading(
+        share=torch.tensor(shares, dtype=torch.float64), density=case.density
+    )
     system, state = apply([loading], system, state)
     middle = np.flatnonzero(np.abs(mesh.rest[:, 1] - height / 2) < 1e-9)
     middle = middle[np.argsort(mesh.rest[middle, 0])]
@@ -131,7 +141,8 @@ class Model:
 
     Attributes:
         share, factor: of the air's inertia, and s.
-        errors: clip → (ratio predicted/measured less 1, group); NaN where the model does not flutter.
+        errors: clip → (ratio predicted/measured less 1, group); NaN where the model does not
+            flutter.
     """
 
     share: float
@@ -145,7 +156,8 @@ class Model:
 
 
 def stop(hz: FloatArray) -> float:
-    """Share of the measured stop speed, of `STOPS`, midway below the least from which on all flutter; NaN for none."""
+    """Share of the measured stop speed, of `STOPS`, midway below the least from which on all
+    flutter; NaN for none."""
     still = np.flatnonzero(~np.isfinite(hz))
     first = int(still[-1]) + 1 if len(still) else 0
     return float(STOPS[first - 1 : first + 1].mean()) if 0 < first < len(STOPS) else math.nan
@@ -169,12 +181,18 @@ def fitted(table: FloatArray, shares: Sequence[float]) -> Model:
     for share in shares:
         row = _at(table, share)
         for factor in FACTORS:
-            misses = [_miss(row, factor, *clip[:2]) for clip in clips.values() if clip[2] == Group.FIT.value]
+            misses = [
+                _miss(row, factor, *clip[:2])
+                for clip in clips.values()
+                if clip[2] == Group.FIT.value
+            ]
             badness = float(np.square(misses).sum())
             if math.isfinite(badness) and (best is None or badness < best[0]):
                 best = (badness, share, float(factor))
     if best is None:
-        return Model(share=shares[0], factor=math.nan, errors={n: (math.nan, c[2]) for n, c in clips.items()})
+        return Model(
+            share=shares[0], factor=math.nan, errors={n: (math.nan, c[2]) for n, c in clips.items()}
+        )
     return predicted(table, *best[1:])
 
 
@@ -182,7 +200,8 @@ def predicted(table: FloatArray, share: float, factor: float) -> Model:
     """A model's errors at all clips, of a table as `fitted` takes it."""
     row = _at(table, share)
     errors = {
-        name: (math.expm1(_miss(row, factor, speed, hz)), group) for name, (speed, hz, group) in measured().items()
+        name: (math.expm1(_miss(row, factor, speed, hz)), group)
+        for name, (speed, hz, group) in measured().items()
     }
     return Model(share=share, factor=factor, errors=errors)
 
@@ -193,7 +212,9 @@ def _at(table: FloatArray, share: float) -> FloatArray:
 
 def _miss(row: FloatArray, factor: float, speed: float, hz: float) -> float:
     """ln of predicted over measured."""
-    return math.log(float(np.interp(factor * speed, SPEEDS, row, left=math.nan, right=math.nan)) / hz)
+    return math.log(
+        float(np.interp(factor * speed, SPEEDS, row, left=math.nan, right=math.nan)) / hz
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -201,11 +222,13 @@ class Paper:
     """What the page says of the paper flag.
 
     Attributes:
-        base: errors of the model without the effect at half the tunnel's speed, clip → (error, group).
+        base: errors of the model without the effect at half the tunnel's speed, clip → (error,
+            group).
         found, free: see the module's head.
-        numerics: variant → largest relative change of the free model's frequencies at the clips held out.
-        stops: length [m] → (measured, predicted by the free model) tunnel speed at which flutter stops [m/s]; empty
-            where the tables are absent. No length was fitted to.
+        numerics: variant → largest relative change of the free model's frequencies at the clips
+            held out.
+        stops: length [m] → (measured, predicted by the free model) tunnel speed at which flutter
+            stops [m/s]; empty where the tables are absent. No length was fitted to.
     """
 
     base: Model
@@ -224,7 +247,9 @@ def study(case: Case, share: float, keep: Path | None) -> Paper:
         keep: folder of intermediate results.
     """
 
-    def simulated(shares: Sequence[float], speeds: Sequence[float], how: Sheet, of: Case = case) -> FloatArray:
+    def simulated(
+        shares: Sequence[float], speeds: Sequence[float], how: Sheet, of: Case = case
+    ) -> FloatArray:
         given = {
             "sheet": asdict(of.sheet),
             "density": of.density,
@@ -235,23 +260,40 @@ def study(case: Case, share: float, keep: Path | None) -> Paper:
             "height": HEIGHT,
         }
         method = (sys.modules[__name__], waves_module)
-        return cached(keep, given, method, lambda: {"hz": frequencies(of, shares, speeds, how)})["hz"]
+        return cached(keep, given, method, lambda: {"hz": frequencies(of, shares, speeds, how)})[
+            "hz"
+        ]
 
     pairs = [(one, speed) for one in SHARES for speed in SPEEDS]
-    table = simulated([one for one, _ in pairs], [speed for _, speed in pairs], Sheet()).reshape(len(SHARES), -1)
+    table = simulated([one for one, _ in pairs], [speed for _, speed in pairs], Sheet()).reshape(
+        len(SHARES), -1
+    )
     free = fitted(table, np.linspace(SHARES[1], SHARES[-1], 81).tolist())
-    speeds = [free.factor * speed for speed, _, group in measured().values() if group == Group.HELD_OUT.value]
+    speeds = [
+        free.factor * speed
+        for speed, _, group in measured().values()
+        if group == Group.HELD_OUT.value
+    ]
     shares = [free.share] * len(speeds)
     reference, *others = (simulated(shares, speeds, how) for how in (Sheet(), *VARIANTS.values()))
     stops = {}
-    for one in speeds_by_length(REFERENCE / case.tables["stop"], column="Ustop") if REFERENCE.is_dir() else ():
+    for one in (
+        speeds_by_length(REFERENCE / case.tables["stop"], column="Ustop")
+        if REFERENCE.is_dir()
+        else ()
+    ):
         sheet = replace(case, sheet=replace(case.sheet, length=one.length))
-        hz = simulated([free.share] * len(STOPS), (STOPS * free.factor * one.speed).tolist(), Sheet(), sheet)
+        hz = simulated(
+            [free.share] * len(STOPS), (STOPS * free.factor * one.speed).tolist(), Sheet(), sheet
+        )
         stops[one.length] = one.speed, one.speed * stop(hz)
     return Paper(
         stops=stops,
         base=predicted(table, 0.0, 0.5),
         found=fitted(table, [share]),
         free=free,
-        numerics={name: float(np.abs(hz / reference - 1).max()) for name, hz in zip(VARIANTS, others, strict=True)},
+        numerics={
+            name: float(np.abs(hz / reference - 1).max())
+            for name, hz in zip(VARIANTS, others, strict=True)
+        },
     )

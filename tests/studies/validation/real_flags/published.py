@@ -1,8 +1,9 @@
-"""What has been published of real flags, as bands that a prediction of the same number is laid beside.
+"""What has been published of real flags, as bands that a prediction of the same number is laid
+beside.
 
-A band is the published value with the tolerance of the aim where the source gives one number: 30 % of the codes' drag,
-15 % of wavelength and wave speed. `role` says which numbers a model may be fitted to and which judge it; it was fixed
-before any model beside the base model was fitted.
+A band is the published value with the tolerance of the aim where the source gives one number: 30 %
+of the codes' drag, 15 % of wavelength and wave speed. `role` says which numbers a model may be
+fitted to and which judge it; it was fixed before any model beside the base model was fitted.
 """
 
 from __future__ import annotations
@@ -42,7 +43,8 @@ class Published:
         role: what it is used for.
         unit: of the bands.
         bands: what it is predicted for, in words → (low, high).
-        predicted: values (flag, reading) of `FLAGS` → one prediction a band; None where nothing here is comparable.
+        predicted: values (flag, reading) of `FLAGS` → one prediction a band; None where nothing
+            here is comparable.
     """
 
     name: str
@@ -76,12 +78,15 @@ def _each(reading: str, flags: tuple[Flag, ...]) -> Callable[[FloatArray], list[
     return lambda values: values[rows, column].tolist()
 
 
-def _of(flags: tuple[Flag, ...], band: Callable[[Flag], tuple[float, float]]) -> dict[str, tuple[float, float]]:
+def _of(
+    flags: tuple[Flag, ...], band: Callable[[Flag], tuple[float, float]]
+) -> dict[str, tuple[float, float]]:
     return {label(flag): band(flag) for flag in flags}
 
 
 def _speed_of_droop(values: FloatArray) -> list[float]:
-    """The wind [m/s] at which the droop is 45°, by density; the slowest simulated where it is less there."""
+    """The wind [m/s] at which the droop is 45°, by density; the slowest simulated where it is less
+    there."""
     column = READINGS.index("droop")
     found = []
     for density in DENSITIES:
@@ -94,7 +99,10 @@ def _speed_of_droop(values: FloatArray) -> list[float]:
 def _exponents(values: FloatArray) -> list[float]:
     """n of F ∝ Uⁿ from 6 to 10 m/s, by density."""
     column = READINGS.index("drag")
-    drags = [[values[FLAGS.index(Flag(area_weight=d, speed=u)), column] for u in (6.0, 10.0)] for d in DENSITIES]
+    drags = [
+        [values[FLAGS.index(Flag(area_weight=d, speed=u)), column] for u in (6.0, 10.0)]
+        for d in DENSITIES
+    ]
     return [2 + math.log(fast / slow) / math.log(10 / 6) for slow, fast in drags]
 
 
@@ -102,7 +110,10 @@ def _amplitude_exponents(values: FloatArray) -> list[float]:
     """n of amplitude ∝ mⁿ, by wind."""
     column = READINGS.index("amplitude")
     heavy, light = DENSITIES
-    sizes = [[values[FLAGS.index(Flag(area_weight=d, speed=u)), column] for d in DENSITIES] for u in (6.0, 10.0)]
+    sizes = [
+        [values[FLAGS.index(Flag(area_weight=d, speed=u)), column] for d in DENSITIES]
+        for u in (6.0, 10.0)
+    ]
     return [math.log(a / b) / math.log(heavy / light) for a, b in sizes]
 
 

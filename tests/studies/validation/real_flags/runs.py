@@ -1,7 +1,8 @@
-"""Flags of the table, simulated: what is compared with a published number is read off the cloth and its attachments.
+"""Flags of the table, simulated: what is compared with a published number is read off the cloth and
+its attachments.
 
-Drag is the mean force on the attachments along the wind, which by the balance of momentum is all that the air gives.
-Waves are read off the middle line of the cloth, at points fixed in the cloth.
+Drag is the mean force on the attachments along the wind, which by the balance of momentum is all
+that the air gives. Waves are read off the middle line of the cloth, at points fixed in the cloth.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ _NOISE = 1e-3
 
 @dataclass(frozen=True, kw_only=True)
 class Flag:
-    """A flag in a wind: 1.5 × 1.0 m of Camel Ponte Roma, two hoist corners held, of some area weight.
+    """A flag in a wind: 1.5 × 1.0 m of Camel Ponte Roma, two hoist corners held, of some area
+    weight.
 
     Attributes:
         area_weight: [kg/m²].
@@ -45,7 +47,8 @@ class Numerics:
     """How a flag is simulated.
 
     Attributes:
-        columns: cells along the length, so many that those over the height are even: there is a middle line.
+        columns: cells along the length, so many that those over the height are even: there is a
+            middle line.
         safety: share of the stability limit that a step takes.
         contact: whether layers keep apart.
         starts: how many runs, which differ by 1 mm of noise in the start.
@@ -77,7 +80,11 @@ def material(area_weight: float) -> Material:
 def scenes_of(one: Flag, numerics: Numerics) -> list[Scene]:
     """Its starts."""
     scene = flag(
-        material=material(one.area_weight), wind_speed=one.speed, width=LENGTH, height=HEIGHT, columns=numerics.columns
+        material=material(one.area_weight),
+        wind_speed=one.speed,
+        width=LENGTH,
+        height=HEIGHT,
+        columns=numerics.columns,
     )
     if numerics.contact:
         scene = replace(scene, contact=Contact())
@@ -88,7 +95,10 @@ def scenes_of(one: Flag, numerics: Numerics) -> list[Scene]:
 
 
 def simulated(
-    flags: Sequence[Flag], *, effects: Mapping[str, Mapping[str, float]] | None = None, numerics: Numerics | None = None
+    flags: Sequence[Flag],
+    *,
+    effects: Mapping[str, Mapping[str, float]] | None = None,
+    numerics: Numerics | None = None,
 ) -> FloatArray:
     """(flag, start, reading) of flags with effects, name → parameters, the same for all."""
     how = numerics or Numerics()
@@ -119,7 +129,9 @@ def simulated(
     return np.array(rows).reshape(len(flags), how.starts, len(READINGS))
 
 
-def read(course: FloatArray, force: FloatArray, along: FloatArray, one: Flag, rate: float) -> tuple[float, ...]:
+def read(
+    course: FloatArray, force: FloatArray, along: FloatArray, one: Flag, rate: float
+) -> tuple[float, ...]:
     """The readings of one run.
 
     Args:

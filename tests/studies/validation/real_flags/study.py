@@ -1,9 +1,10 @@
-"""The base model and candidates beside the published numbers: readings, their errors, a fit on some, the others judged.
+"""The base model and candidates beside the published numbers: readings, their errors, a fit on
+some, the others judged.
 
-The error of a prediction is made of two parts, added in squares: the standard error over starts, and the largest change
-by another mesh (18 or 24 cells along the length for 30), another step (0.9 or 0.5 of the stability limit for 0.7), each
-less what starts alone would change. Numerics are varied at `PROBED`, and a reading's largest relative change there
-counts for all flags.
+The error of a prediction is made of two parts, added in squares: the standard error over starts,
+and the largest change by another mesh (18 or 24 cells along the length for 30), another step (0.9
+or 0.5 of the stability limit for 0.7), each less what starts alone would change. Numerics are
+varied at `PROBED`, and a reading's largest relative change there counts for all flags.
 """
 
 from __future__ import annotations
@@ -18,7 +19,13 @@ import numpy as np
 from flagdata.core.arrays import FloatArray
 from tests.studies.validation.paper_flag.cached import cached
 from tests.studies.validation.real_flags import runs, waves
-from tests.studies.validation.real_flags.published import FLAGS, PUBLISHED, STREAMING, Published, Role
+from tests.studies.validation.real_flags.published import (
+    FLAGS,
+    PUBLISHED,
+    STREAMING,
+    Published,
+    Role,
+)
 from tests.studies.validation.real_flags.runs import READINGS, Flag, Numerics, simulated
 
 Effects = Mapping[str, Mapping[str, float]]
@@ -31,9 +38,10 @@ CANDIDATES: Mapping[str, tuple[str, tuple[float, ...]]] = {
     "tangential-quadratic-drag": ("coefficient", (0.02,)),
     "wagner-lag": ("share", (0.5, 1.0)),
 }
-"""Effect → its strength, and the values at which it is simulated beside 0, the base model. The first is the one that
-the waves ask for; the others are wrong-effect controls with the same freedom. The last was added after the others were
-fitted; its values were written down before any flag was simulated with it."""
+"""Effect → its strength, and the values at which it is simulated beside 0, the base model. The
+first is the one that the waves ask for; the others are wrong-effect controls with the same freedom.
+The last was added after the others were fitted; its values were written down before any flag was
+simulated with it."""
 TWO, _FOUR = Numerics(columns=30, starts=2), Numerics(columns=30, starts=4)
 PROBED = tuple(flag for flag in STREAMING if flag.speed == 10)
 VARIANTS: Mapping[str, Numerics] = {
@@ -52,7 +60,8 @@ class Fit:
     Attributes:
         strength: at the least misfit.
         interval: of the strengths that fit when one number of one flag is left out.
-        readings: (flag, reading) there, of `STREAMING`, linear between the strengths simulated; NaN for other flags.
+        readings: (flag, reading) there, of `STREAMING`, linear between the strengths simulated; NaN
+            for other flags.
     """
 
     name: str
@@ -96,9 +105,16 @@ class Bench:
     def run(self, flags: Sequence[Flag], effects: Effects, numerics: Numerics) -> FloatArray:
         """(flag, start, reading)."""
         numerics = replace(numerics, seed=self.seed)
-        inputs = {"flags": [asdict(flag) for flag in flags], "effects": effects, "numerics": asdict(numerics)}
+        inputs = {
+            "flags": [asdict(flag) for flag in flags],
+            "effects": effects,
+            "numerics": asdict(numerics),
+        }
         made = cached(
-            self.keep, inputs, (runs, waves), lambda: {"values": simulated(flags, effects=effects, numerics=numerics)}
+            self.keep,
+            inputs,
+            (runs, waves),
+            lambda: {"values": simulated(flags, effects=effects, numerics=numerics)},
         )
         return made["values"]
 
@@ -107,7 +123,9 @@ class Bench:
         values = self.run(FLAGS, effects, TWO)
         probed = {name: self.run(PROBED, effects, how) for name, how in VARIANTS.items()}
         mean = values.mean(1)
-        relative = np.hypot(scatter(values) / math.sqrt(values.shape[1]), numerical_error(list(probed.values())))
+        relative = np.hypot(
+            scatter(values) / math.sqrt(values.shape[1]), numerical_error(list(probed.values()))
+        )
         changes = {name: one.mean(1) for name, one in probed.items()}
         return Predictions(mean=mean, error=relative * np.abs(mean), changes=changes)
 
@@ -115,7 +133,9 @@ class Bench:
         """The strength of a candidate that suits the numbers of the role "fit" best."""
         parameter, strengths = CANDIDATES[name]
         grid = np.array([0.0, *strengths])
-        tables = [self.run(STREAMING, {name: {parameter: s}} if s else {}, TWO).mean(1) for s in grid]
+        tables = [
+            self.run(STREAMING, {name: {parameter: s}} if s else {}, TWO).mean(1) for s in grid
+        ]
         return fitted(name, grid, np.array([on_all(table) for table in tables]))
 
 
@@ -127,12 +147,14 @@ def on_all(values: FloatArray) -> FloatArray:
 
 
 def scatter(values: FloatArray) -> FloatArray:
-    """(reading,) relative standard deviation between starts, of all flags (flag, start, reading) that show it."""
+    """(reading,) relative standard deviation between starts, of all flags (flag, start, reading)
+    that show it."""
     return np.sqrt(np.nanmean(values.var(1, ddof=1) / values.mean(1) ** 2, axis=0))
 
 
 def numerical_error(probed: Sequence[FloatArray]) -> FloatArray:
-    """(reading,) largest relative change by a variant, less what starts alone would change; the first is the reference.
+    """(reading,) largest relative change by a variant, less what starts alone would change; the
+    first is the reference.
 
     Args:
         probed: (flag, start, reading) of each variant.
@@ -141,8 +163,14 @@ def numerical_error(probed: Sequence[FloatArray]) -> FloatArray:
     chance = reference.var(1, ddof=1) / reference.shape[1]
     largest = np.zeros(reference.shape[-1])
     for other in others:
-        change = (other.mean(1) - reference.mean(1)) ** 2 - chance - other.var(1, ddof=1) / other.shape[1]
-        largest = np.maximum(largest, np.sqrt(np.clip(change, 0, None) / reference.mean(1) ** 2).max(0))
+        change = (
+            (other.mean(1) - reference.mean(1)) ** 2
+            - chance
+            - other.var(1, ddof=1) / other.shape[1]
+        )
+        largest = np.maximum(
+            largest, np.sqrt(np.clip(change, 0, None) / reference.mean(1) ** 2).max(0)
+        )
     return largest
 
 
@@ -155,7 +183,9 @@ def misfit(one: Published, values: FloatArray) -> FloatArray:
 
 def misfits(values: FloatArray, role: Role) -> FloatArray:
     """The same of all numbers of a role that are comparable, one after the other."""
-    return np.concatenate([misfit(one, values) for one in PUBLISHED if one.role is role and one.predicted is not None])
+    return np.concatenate(
+        [misfit(one, values) for one in PUBLISHED if one.role is role and one.predicted is not None]
+    )
 
 
 def fitted(name: str, grid: FloatArray, tables: FloatArray) -> Fit:
@@ -173,7 +203,9 @@ def fitted(name: str, grid: FloatArray, tables: FloatArray) -> Fit:
         between.append((1 - share) * tables[upper - 1] + share * tables[upper])
         rows.append(misfits(between[-1], Role.FIT))
     squares = np.array(rows) ** 2
-    left_out = [fine[int(np.argmin(np.delete(squares, i, axis=1).mean(1)))] for i in range(squares.shape[1])]
+    left_out = [
+        fine[int(np.argmin(np.delete(squares, i, axis=1).mean(1)))] for i in range(squares.shape[1])
+    ]
     best = int(np.argmin(squares.mean(1)))
     return Fit(
         name=name,
@@ -193,7 +225,8 @@ class Verdict:
 
 
 def judged(prediction: float, error: float, band: tuple[float, float]) -> str:
-    """Held within the band, not held where it lies outside by more than three of its errors, else open."""
+    """Held within the band, not held where it lies outside by more than three of its errors, else
+    open."""
     low, high = band
     outside = max(low - prediction, prediction - high)
     if not math.isfinite(prediction):
@@ -204,7 +237,8 @@ def judged(prediction: float, error: float, band: tuple[float, float]) -> str:
 
 
 def with_errors(one: Published, predictions: Predictions) -> list[tuple[float, float]]:
-    """The predictions of a published number, each with one standard error, by moving each reading by its own."""
+    """The predictions of a published number, each with one standard error, by moving each reading
+    by its own."""
     if one.predicted is None:
         return []
     middle = np.array(one.predicted(predictions.mean))

@@ -17,14 +17,28 @@ def predictions(drag: float) -> Predictions:
     """All readings 0.5 ± 0.01 but for the drag."""
     mean = np.full((len(FLAGS), len(READINGS)), 0.5)
     mean[:, READINGS.index("drag")] = drag
-    return Predictions(mean=mean, error=np.full_like(mean, 0.01), changes=dict.fromkeys(VARIANTS, mean[: len(PROBED)]))
+    return Predictions(
+        mean=mean,
+        error=np.full_like(mean, 0.01),
+        changes=dict.fromkeys(VARIANTS, mean[: len(PROBED)]),
+    )
 
 
 def test_the_page_has_every_number_with_its_verdicts_and_what_changed(tmp_path: Path) -> None:
     base, after = predictions(0.05), predictions(0.12)
     fit = Fit(name="finite-span-loading", strength=0.3, interval=(0.2, 0.4), readings=after.mean)
-    model = Model(share=0.3, factor=0.6, errors={name: (0.05, group) for name, (_, _, group) in measured().items()})
-    paper = Paper(base=model, found=model, free=model, numerics={"27 × 14 cells": 0.011}, stops={0.12: (8.0, 9.0)})
+    model = Model(
+        share=0.3,
+        factor=0.6,
+        errors={name: (0.05, group) for name, (_, _, group) in measured().items()},
+    )
+    paper = Paper(
+        base=model,
+        found=model,
+        free=model,
+        numerics={"27 × 14 cells": 0.011},
+        stops={0.12: (8.0, 9.0)},
+    )
     text = page(base, after, fit, [], base.mean, paper)
     assert all(f"| {one.name} |" in text for one in PUBLISHED)
     # EN 1991-1-4 for 284 g/m²: 0.12 ± 30 %; a change of 0.07 is 4.9 times √2 · 0.01.

@@ -40,7 +40,9 @@ def test_a_wave_towards_the_hoist_has_no_length() -> None:
 def test_readings_have_the_units_that_they_state() -> None:
     flag = Flag(area_weight=0.2, speed=5.0)
     across = 0.1 * ALONG * np.cos(2 * np.pi * (2 * TIMES[:, None] - ALONG / 1.5))
-    course = np.stack([np.tile(1.5 * ALONG, (300, 1)), across, np.tile(-0.75 * ALONG, (300, 1))], axis=2)
+    course = np.stack(
+        [np.tile(1.5 * ALONG, (300, 1)), across, np.tile(-0.75 * ALONG, (300, 1))], axis=2
+    )
     force = np.tile([2.25, 0.0, 0.0], (300, 1))
     found = dict(zip(READINGS, read(course, force, ALONG, flag, 50.0), strict=True))
     # ½ 1.2 25 1.5 = 22.5 N; half as far down as along; 2 Hz · 1.5 m / 5 m/s; 0.1 m / √2 over 1.5 m.
@@ -57,7 +59,9 @@ def test_readings_have_the_units_that_they_state() -> None:
 
 def test_the_codes_drag_is_that_of_a_worked_example() -> None:
     """0.284/1.2 = 0.2367; 1.5^−1.25 = 0.6024; 0.7 of their product is 0.0998."""
-    assert code_drag(Flag(area_weight=0.284, speed=6.0), constant=0.02) == pytest.approx(0.1198, abs=1e-4)
+    assert code_drag(Flag(area_weight=0.284, speed=6.0), constant=0.02) == pytest.approx(
+        0.1198, abs=1e-4
+    )
 
 
 def test_at_least_ten_numbers_are_comparable_and_none_both_fits_and_judges() -> None:
@@ -77,7 +81,9 @@ def test_the_strength_of_a_fit_is_the_one_whose_predictions_are_the_published_on
     right[:, READINGS.index("wavelength")] = 1.87
     right[:, READINGS.index("drag")] = [code_drag(flag, constant=0.05) for flag in FLAGS]
     grid = np.array([0.0, 0.2, 0.5])
-    found = fitted("finite-span-loading", grid, np.array([right * (1 + 0.5 * (s - 0.3)) for s in grid]))
+    found = fitted(
+        "finite-span-loading", grid, np.array([right * (1 + 0.5 * (s - 0.3)) for s in grid])
+    )
     assert found.strength == pytest.approx(0.3, abs=0.003)
     assert found.interval == pytest.approx((0.3, 0.3), abs=0.003)
     np.testing.assert_allclose(misfits(found.readings, Role.FIT), 0, atol=0.02)
@@ -92,7 +98,12 @@ def test_numerics_count_only_beyond_what_starts_alone_would_change() -> None:
 
 @pytest.mark.parametrize(
     ("prediction", "error", "word"),
-    [(1.1, 0.01, "held"), (1.2, 0.01, "not held"), (1.2, 0.03, "within the error"), (math.nan, 0.1, "not comparable")],
+    [
+        (1.1, 0.01, "held"),
+        (1.2, 0.01, "not held"),
+        (1.2, 0.03, "within the error"),
+        (math.nan, 0.1, "not comparable"),
+    ],
 )
 def test_a_prediction_outside_its_band_is_not_held_from_three_errors_on(
     prediction: float, error: float, word: str
@@ -109,15 +120,23 @@ def test_the_error_of_a_derived_number_is_that_of_its_readings() -> None:
     assert error == pytest.approx(0.03 * math.sqrt(2) / math.log(10 / 6), rel=0.03)
 
 
-def test_the_paper_flags_share_and_factor_are_those_of_made_frequencies(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Frequencies of 2 (1 + share) Hz for each m/s at the sheet, measured at a factor of 0.55 with a share of 0.5."""
-    clips = {f"clip-{u}": (u, 3.0 * 0.55 * u, "fit" if u < 10 else "held-out") for u in (7.0, 8.0, 9.0, 11.0, 12.0)}
+def test_the_paper_flags_share_and_factor_are_those_of_made_frequencies(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Frequencies of 2 (1 + share) Hz for each m/s at the sheet, measured at a factor of 0.55 with
+    a share of 0.5."""
+    clips = {
+        f"clip-{u}": (u, 3.0 * 0.55 * u, "fit" if u < 10 else "held-out")
+        for u in (7.0, 8.0, 9.0, 11.0, 12.0)
+    }
     monkeypatch.setattr(paper, "measured", lambda: clips)
     rows = np.array([[2 * (1 + share) * speed for speed in paper.SPEEDS] for share in paper.SHARES])
     known = paper.fitted(rows, [0.5])
     assert known.factor == pytest.approx(0.55, abs=0.002)
     assert known.within(Group.HELD_OUT, 0.01) == (2, 2)
-    assert paper.predicted(rows, 0.0, 0.55).errors["clip-12.0"][0] == pytest.approx(-1 / 3, abs=1e-6)
+    assert paper.predicted(rows, 0.0, 0.55).errors["clip-12.0"][0] == pytest.approx(
+        -1 / 3, abs=1e-6
+    )
 
 
 def test_a_paper_flag_that_does_not_flutter_has_no_factor(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -129,7 +148,12 @@ def test_a_paper_flag_that_does_not_flutter_has_no_factor(monkeypatch: pytest.Mo
 
 @pytest.mark.parametrize(
     ("fluttering", "share"),
-    [([0, 0, 0, 1, 1, 1, 1, 1], 0.75), ([0, 1, 0, 0, 1, 1, 1, 1], 0.85), ([1] * 8, math.nan), ([0] * 8, math.nan)],
+    [
+        ([0, 0, 0, 1, 1, 1, 1, 1], 0.75),
+        ([0, 1, 0, 0, 1, 1, 1, 1], 0.85),
+        ([1] * 8, math.nan),
+        ([0] * 8, math.nan),
+    ],
 )
 def test_flutter_stops_midway_below_the_least_speed_from_which_on_all_flutter(
     fluttering: list[int], share: float

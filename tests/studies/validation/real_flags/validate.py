@@ -1,4 +1,5 @@
-"""Real flags beside published measurements: the whole study, its page and its picture for the documentation."""
+"""Real flags beside published measurements: the whole study, its page and its picture for the
+documentation."""
 
 from __future__ import annotations
 
@@ -10,7 +11,15 @@ from tests.studies.validation.paper_flag.recipe import load_case
 from tests.studies.validation.real_flags.page import page, picture
 from tests.studies.validation.real_flags.paper import study
 from tests.studies.validation.real_flags.published import PUBLISHED, STREAMING
-from tests.studies.validation.real_flags.study import CANDIDATES, NAMED, TWO, Bench, judged, on_all, with_errors
+from tests.studies.validation.real_flags.study import (
+    CANDIDATES,
+    NAMED,
+    TWO,
+    Bench,
+    judged,
+    on_all,
+    with_errors,
+)
 
 KEEP = Path(__file__).parents[4] / "out" / "real-flags"
 
@@ -30,7 +39,9 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     paper = study(load_case(), fit.strength, KEEP)
     folder = out.parent / "cases"
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "real-flags.md").write_text(page(base, after, fit, controls, unfitted, paper), encoding="utf-8")
+    (folder / "real-flags.md").write_text(
+        page(base, after, fit, controls, unfitted, paper), encoding="utf-8"
+    )
     picture(base, after, folder / "real-flags.png")
     numbers = [
         {
@@ -52,7 +63,10 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     ]
     fits = (fit, *controls)
     return {
-        "fits": [{"effect": one.name, "strength": one.strength, "refits": list(one.interval)} for one in fits],
+        "fits": [
+            {"effect": one.name, "strength": one.strength, "refits": list(one.interval)}
+            for one in fits
+        ],
         "numbers": numbers,
         "paper_flag": {
             name: {
@@ -64,6 +78,8 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         }
         | {
             "numerics": paper.numerics,
-            "stops": [[length, seen, known(found)] for length, (seen, found) in paper.stops.items()],
+            "stops": [
+                [length, seen, known(found)] for length, (seen, found) in paper.stops.items()
+            ],
         },
     }

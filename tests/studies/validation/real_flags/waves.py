@@ -1,8 +1,9 @@
 """The wave along a sheet's middle line: its leading complex orthogonal mode.
 
-The deflection y(t, s) at points s fixed in the cloth is made complex by its Hilbert transform in time; the leading
-eigenvector of its covariance over s is the travelling shape (Feeny, J. Sound Vib. 310:169, 2008). Its phase falls along
-s by 2π in a wavelength; the mode's own phase in time turns by 2π in a period.
+The deflection y(t, s) at points s fixed in the cloth is made complex by its Hilbert transform in
+time; the leading eigenvector of its covariance over s is the travelling shape (Feeny, J. Sound Vib.
+310:169, 2008). Its phase falls along s by 2π in a wavelength; the mode's own phase in time turns by
+2π in a period.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from scipy.signal import hilbert
 from flagdata.core.arrays import FloatArray
 
 FROM = 0.3
-"""Share of the length from which on the phase is read: nearer to the hoist the wave hardly moves."""
+"""Share of the length from which on the phase is read: nearer to the hoist the wave hardly
+moves."""
 
 
 @dataclass(frozen=True, kw_only=True)

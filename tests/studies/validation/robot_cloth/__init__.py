@@ -1,8 +1,9 @@
 """A real cloth that a robot holds and swings in still air, tracked at about 10 Hz.
 
-Calibrated on the repeats of two programmes, judged on those of two others. The cloth's mass is not known, so that its
-density stands for the ratio of mass to drag. What the calibrated model lacks is sought among effects of the tracker and
-of the cloth, on the fitted programmes alone, added, and judged on the others. Reported are the errors
+Calibrated on the repeats of two programmes, judged on those of two others. The cloth's mass is not
+known, so that its density stands for the ratio of mass to drag. What the calibrated model lacks is
+sought among effects of the tracker and of the cloth, on the fitted programmes alone, added, and
+judged on the others. Reported are the errors
 that remain: what is constant at a node, what a frame's nodes share, and the rest.
 """
 
@@ -19,7 +20,14 @@ from tests.evidence import ABSENT, REFERENCE
 from tests.studies.validation.robot_cloth.attribution import LEAD, Round
 from tests.studies.validation.robot_cloth.calibrate import at_bounds
 from tests.studies.validation.robot_cloth.model import described
-from tests.studies.validation.robot_cloth.study import LEVEL, MOVED, SHUFFLES, Error, HeldCloth, study
+from tests.studies.validation.robot_cloth.study import (
+    LEVEL,
+    MOVED,
+    SHUFFLES,
+    Error,
+    HeldCloth,
+    study,
+)
 
 FITTED, HELD_OUT = ("range30", "range90"), ("range60", "range120")
 MATERIAL = "camel-ponte-roma"
@@ -34,7 +42,12 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
     found = study(folder, named_material(MATERIAL), fitted=FITTED, held_out=HELD_OUT, seed=seed)
     (out / "validate-robot-cloth.md").write_text(page(found), encoding="utf-8")
     settings = {"nominal": MATERIAL, "level": LEVEL, "moved": MOVED}
-    return {**settings, **asdict(found), "apart": found.apart.as_dict(), "apart_moved": found.apart_moved.as_dict()}
+    return {
+        **settings,
+        **asdict(found),
+        "apart": found.apart.as_dict(),
+        "apart_moved": found.apart_moved.as_dict(),
+    }
 
 
 def page(found: HeldCloth) -> str:
@@ -42,17 +55,24 @@ def page(found: HeldCloth) -> str:
     own, last, moved = found.parameters, found.completed, found.apart_moved
     wide, high = found.size
     split = (
-        f"Calibrated on all repeats of {' and '.join(found.fitted)}, judged on all of {' and '.join(found.held_out)}. "
-        "Runs start at the tool's first pose and are never corrected. Errors are root mean square distances of the "
+        f"Calibrated on all repeats of {' and '.join(found.fitted)}, judged on all of "
+        f"{' and '.join(found.held_out)}. "
+        "Runs start at the tool's first pose and are never corrected. Errors are root mean square "
+        "distances of the "
         "nodes in mm; in brackets the least and the largest of single recordings."
     )
     compared = (
         f"{found.apart.hits} of {found.apart.count} pairs differ at {LEVEL:g} "
-        f"(90 % bounds {found.apart.low:.2f}–{found.apart.high:.2f}, too narrow since pairs share recordings). As many "
-        f"or more are by chance with p = {found.p_pairs:.2f}, by {SHUFFLES} shuffles of the repeats' segments. "
-        f"With the stamps of one of them moved by {1e3 * MOVED:.0f} ms {moved.hits} of {moved.count} do."
+        f"(90 % bounds {found.apart.low:.2f}–{found.apart.high:.2f}, too narrow since pairs share "
+        "recordings). As many "
+        f"or more are by chance with p = {found.p_pairs:.2f}, by {SHUFFLES} shuffles of the "
+        "repeats' segments. "
+        f"With the stamps of one of them moved by {1e3 * MOVED:.0f} ms {moved.hits} of "
+        f"{moved.count} do."
     )
-    extents = " and ".join(f"{1e3 * w:.0f} × {1e3 * h:.0f} mm {name}" for name, (w, h) in found.extents.items())
+    extents = " and ".join(
+        f"{1e3 * w:.0f} × {1e3 * h:.0f} mm {name}" for name, (w, h) in found.extents.items()
+    )
     at_bound = (
         f"At a bound: {', '.join(found.bounds) or 'none'}; with all that was added: "
         f"{', '.join(at_bounds(last)) or 'none'}."
@@ -64,9 +84,13 @@ def page(found: HeldCloth) -> str:
         "",
         "| model | fitted programmes | held-out programmes |",
         "|---|---|---|",
-        *(f"| {name} | {_mm(found.of_fitted[name])} | {_mm(found.of_held_out[name])} |" for name in found.of_held_out),
+        *(
+            f"| {name} | {_mm(found.of_fitted[name])} | {_mm(found.of_held_out[name])} |"
+            for name in found.of_held_out
+        ),
         "",
-        f"The median distance of the held-out nodes is {1e3 * found.median:.0f} mm after calibration.",
+        f"The median distance of the held-out nodes is {1e3 * found.median:.0f} mm after "
+        "calibration.",
         "",
         *_lacking(found),
         "| parameter | calibrated | with all that was added |",
@@ -75,7 +99,10 @@ def page(found: HeldCloth) -> str:
         f"| bending, of nominal | {own.bending:.2f} | {last.bending:.2f} |",
         f"| internal damping | {1e3 * own.damping:.1f} ms | {1e3 * last.damping:.1f} ms |",
         f"| camera behind the tool's clock | {1e3 * own.lag:.0f} ms | {1e3 * last.lag:.0f} ms |",
-        *(f"| {name} [{described(name).unit}] | – | {value:.3g} |" for name, value in last.strengths.items()),
+        *(
+            f"| {name} [{described(name).unit}] | – | {value:.3g} |"
+            for name, value in last.strengths.items()
+        ),
         "",
         at_bound,
         "",
@@ -83,7 +110,8 @@ def page(found: HeldCloth) -> str:
         "|---|---|",
         *(f"| {name} | {1e3 * value:.1f} |" for name, value in found.parts.items()),
         "",
-        f"At rest the square of nodes is {1e3 * wide:.0f} × {1e3 * high:.0f} mm. In motion it is {extents}.",
+        f"At rest the square of nodes is {1e3 * wide:.0f} × {1e3 * high:.0f} mm. In motion it is "
+        f"{extents}.",
         "",
         "## Repeats of one programme (A/A)",
         "",
@@ -91,7 +119,10 @@ def page(found: HeldCloth) -> str:
         "",
         "| repeats | p | p with stamps moved |",
         "|---|---|---|",
-        *(f"| {pair.first}, {pair.second} | {pair.p:.3f} | {pair.p_moved:.3f} |" for pair in found.pairs),
+        *(
+            f"| {pair.first}, {pair.second} | {pair.p:.3f} | {pair.p_moved:.3f} |"
+            for pair in found.pairs
+        ),
     ]
     return "\n".join(lines) + "\n"
 
@@ -99,11 +130,15 @@ def page(found: HeldCloth) -> str:
 def _lacking(found: HeldCloth) -> list[str]:
     """What was sought on the fitted programmes, what was added, and what it does on the others."""
     how = (
-        f"Each candidate is fitted on one of {' and '.join(found.fitted)} and judged on the other, both ways, by the "
-        "mean square error [mm²] that it takes off the lower half of the nodes, with its standard error over "
-        f"recordings. The largest beyond {LEAD:g} standard errors is added, and the others are tried again beside it. "
+        f"Each candidate is fitted on one of {' and '.join(found.fitted)} and judged on the other, "
+        "both ways, by the "
+        "mean square error [mm²] that it takes off the lower half of the nodes, with its standard "
+        "error over "
+        f"recordings. The largest beyond {LEAD:g} standard errors is added, and the others are "
+        "tried again beside it. "
         "An effect of the cloth must also gain more than twice as fine a mesh changes, "
-        f"{', '.join(f'{1e6 * max(gain.floor for gain in own.gains):.0f}' for own in found.rounds)} mm² by rounds."
+        f"{', '.join(f'{1e6 * max(gain.floor for gain in own.gains):.0f}' for own in found.rounds)} "
+        "mm² by rounds."
     )
     lines = [
         "## What the calibrated model lacks",
@@ -119,7 +154,8 @@ def _lacking(found: HeldCloth) -> list[str]:
         "| model | error [mm] | mean square taken off [mm²] |",
         "|---|---|---|",
         *(
-            f"| {own.model} | {1e3 * own.lower:.1f} | {_squares(own.gain, own.error) if place else '–'} |"
+            f"| {own.model} | {1e3 * own.lower:.1f} | "
+            f"{_squares(own.gain, own.error) if place else '–'} |"
             for place, own in enumerate(found.reductions)
         ),
         "",
@@ -127,17 +163,21 @@ def _lacking(found: HeldCloth) -> list[str]:
     if any(value for row in found.camera for value in row):
         rows = "; ".join(", ".join(f"{value:+.3f}" for value in row) for row in found.camera)
         remark = (
-            f"The camera's map A, by rows (across, in depth, up): {rows}. Its first column is of places across the "
-            "swing, where the tool hardly moves: there the map and the nodes' offsets take each other's place, and "
+            f"The camera's map A, by rows (across, in depth, up): {rows}. Its first column is of "
+            "places across the "
+            "swing, where the tool hardly moves: there the map and the nodes' offsets take each "
+            "other's place, and "
             "it carries no information."
         )
         lines += [remark, ""]
     if (own := found.late) is not None:
         remark = (
-            f"Latencies have a standard deviation of {1e3 * own.deviation:.0f} ms. Their rank correlation with the "
+            f"Latencies have a standard deviation of {1e3 * own.deviation:.0f} ms. Their rank "
+            "correlation with the "
             "interval of stamps before the frame, which the fit knows nothing of, is "
             f"{own.rank_correlation:.2f} (p = {own.p:.3f} by shuffles). The lower halves err by "
-            f"{_root(own.without)} mm without latencies, by {_root(own.with_)} mm with them, and by "
+            f"{_root(own.without)} mm without latencies, by {_root(own.with_)} mm with them, and "
+            "by "
             f"{_root(own.control)} mm with as free a vertical shift of each frame instead."
         )
         lines += [remark, ""]

@@ -1,10 +1,12 @@
-"""What a calibrated model of a held cloth lacks: effects of the tracker and of the cloth, added one after another.
+"""What a calibrated model of a held cloth lacks: effects of the tracker and of the cloth, added one
+after another.
 
-Each candidate is fitted beside the cloth's parameters on all programmes but one of those that are known, and judged on
-that one, each in turn. It leads where the mean square error of the lower halves falls by more than `LEAD` standard
-errors over recordings, and, for an effect of the cloth, by more than a finer mesh of the same model changes it. The one
-that gains most of those that lead is added, and all others are tried again beside it, until none leads. Programmes that
-are held out take no part in this.
+Each candidate is fitted beside the cloth's parameters on all programmes but one of those that are
+known, and judged on that one, each in turn. It leads where the mean square error of the lower
+halves falls by more than `LEAD` standard errors over recordings, and, for an effect of the cloth,
+by more than a finer mesh of the same model changes it. The one that gains most of those that lead
+is added, and all others are tried again beside it, until none leads. Programmes that are held out
+take no part in this.
 """
 
 from __future__ import annotations
@@ -34,8 +36,8 @@ OF_CLOTH = (
     "hem-stiffness",
     "rest-curvature",
 )
-"""Effects of the library with one strength that act in still air. `air-density` is left out: the calibrated density
-stands for the ratio of mass to drag."""
+"""Effects of the library with one strength that act in still air. `air-density` is left out: the
+calibrated density stands for the ratio of mass to drag."""
 LEAD = 2.0
 """Standard errors over recordings by which a candidate must gain."""
 _TRIED = 2  # iterations of a candidate's fit, which begins at the fit without it
@@ -44,7 +46,8 @@ _SHUFFLES = 1000
 
 @dataclass(frozen=True, kw_only=True)
 class Gain:
-    """Mean square error that a candidate takes off the lower halves of programmes it was not fitted to [m²].
+    """Mean square error that a candidate takes off the lower halves of programmes it was not fitted
+    to [m²].
 
     Attributes:
         name: of the candidate.
@@ -88,7 +91,10 @@ def sought(
         advance: called after each candidate.
     """
     folds = [
-        ([swing for name, own in swings.items() if name != left_out for swing in own], list(swings[left_out]))
+        (
+            [swing for name, own in swings.items() if name != left_out for swing in own],
+            list(swings[left_out]),
+        )
         for left_out in swings
     ]
     fits = [calibrated(cloth, known, start) for known, _ in folds]
@@ -106,7 +112,10 @@ def sought(
                 advance(1)
         squares = {name: _judged(cloth, folds, own) for name, own in tried.items()}
         floor = _numerics(cloth, folds, fits, before)
-        found = (_gain(name, before - own, 0.0 if name in TRACKER else floor) for name, own in squares.items())
+        found = (
+            _gain(name, before - own, 0.0 if name in TRACKER else floor)
+            for name, own in squares.items()
+        )
         gains = sorted(found, key=lambda own: -own.value)
         chosen = next((gain.name for gain in gains if gain.leads), "")
         rounds.append(Round(gains=tuple(gains), added=chosen))
@@ -116,16 +125,25 @@ def sought(
         fits, before = tried[chosen], squares[chosen]
 
 
-def _judged(cloth: Cloth, folds: Sequence[tuple[list[Swing], list[Swing]]], fits: Sequence[Fit]) -> FloatArray:
+def _judged(
+    cloth: Cloth, folds: Sequence[tuple[list[Swing], list[Swing]]], fits: Sequence[Fit]
+) -> FloatArray:
     return np.concatenate(
-        [lower(left_errors(cloth, unseen, fit)) for (_, unseen), fit in zip(folds, fits, strict=True)]
+        [
+            lower(left_errors(cloth, unseen, fit))
+            for (_, unseen), fit in zip(folds, fits, strict=True)
+        ]
     )
 
 
 def _numerics(
-    cloth: Cloth, folds: Sequence[tuple[list[Swing], list[Swing]]], fits: Sequence[Fit], before: FloatArray
+    cloth: Cloth,
+    folds: Sequence[tuple[list[Swing], list[Swing]]],
+    fits: Sequence[Fit],
+    before: FloatArray,
 ) -> float:
-    """By how much twice as fine a mesh changes the mean square error of the lower halves [m²], up or down."""
+    """By how much twice as fine a mesh changes the mean square error of the lower halves [m²], up
+    or down."""
     finer = _judged(replace(cloth, cells=2 * cloth.cells), folds, fits)
     return abs(float((finer - before).mean()))
 
@@ -136,8 +154,14 @@ def _gain(name: str, gained: FloatArray, floor: float) -> Gain:
 
 
 def left_errors(cloth: Cloth, swings: Sequence[Swing], fit: Fit) -> list[FloatArray]:
-    """(frame, node, 3) errors on each recording [m], with its own latencies where the model has any."""
-    return left(swings, predicted(cloth, swings, [fit.parameters] * len(swings)), fit.tracker, fit.parameters.lag)
+    """(frame, node, 3) errors on each recording [m], with its own latencies where the model has
+    any."""
+    return left(
+        swings,
+        predicted(cloth, swings, [fit.parameters] * len(swings)),
+        fit.tracker,
+        fit.parameters.lag,
+    )
 
 
 def lower(of: Sequence[FloatArray]) -> FloatArray:
@@ -152,10 +176,12 @@ class Late:
 
     Attributes:
         deviation: standard deviation of the latencies [s].
-        rank_correlation: Spearman's, of a frame's latency with the interval of stamps before it, mean over recordings.
-            Stamps that are late one by one follow long intervals; the fit knows nothing of intervals.
+        rank_correlation: Spearman's, of a frame's latency with the interval of stamps before it,
+            mean over recordings. Stamps that are late one by one follow long intervals; the fit
+            knows nothing of intervals.
         p: chance of as large a one if latencies are shuffled within their recordings.
-        control: mean square error of the lower halves with as free a vertical shift of each frame instead [m²].
+        control: mean square error of the lower halves with as free a vertical shift of each frame
+            instead [m²].
         without, with_: mean square error without latencies, and with them [m²].
     """
 
@@ -175,7 +201,10 @@ def late(cloth: Cloth, swings: Sequence[Swing], fit: Fit, *, without: Fit, seed:
         seed: of the shuffles.
     """
     runs = predicted(cloth, swings, [fit.parameters] * len(swings))
-    found = [latencies(s, run, fit.tracker, fit.parameters.lag)[1:] for s, run in zip(swings, runs, strict=True)]
+    found = [
+        latencies(s, run, fit.tracker, fit.parameters.lag)[1:]
+        for s, run in zip(swings, runs, strict=True)
+    ]
     intervals = [np.diff(swing.times) for swing in swings]
     rng = stream(seed, "held", "latencies")
 
@@ -184,7 +213,9 @@ def late(cloth: Cloth, swings: Sequence[Swing], fit: Fit, *, without: Fit, seed:
         return float(np.mean([np.corrcoef(*pair)[0, 1] for pair in ranks]))
 
     own = correlation(found)
-    as_large = sum(correlation([rng.permutation(values) for values in found]) >= own for _ in range(_SHUFFLES))
+    as_large = sum(
+        correlation([rng.permutation(values) for values in found]) >= own for _ in range(_SHUFFLES)
+    )
     plain = predicted(cloth, swings, [without.parameters] * len(swings))
     lag = without.parameters.lag
     shifted: list[FloatArray] = []

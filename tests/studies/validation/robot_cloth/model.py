@@ -1,4 +1,5 @@
-"""A held cloth by the base model: its corners go where the tool takes them, still air resists it, gravity pulls."""
+"""A held cloth by the base model: its corners go where the tool takes them, still air resists it,
+gravity pulls."""
 
 from __future__ import annotations
 
@@ -34,8 +35,8 @@ class Parameters:
     """What is calibrated.
 
     Attributes:
-        density, bending: factors on the nominal cloth. In still air only forces by mass show: a density stands for the
-            ratio of mass to the air's drag, bending for its own to the mass.
+        density, bending: factors on the nominal cloth. In still air only forces by mass show: a
+            density stands for the ratio of mass to the air's drag, bending for its own to the mass.
         damping: internal [s].
         lag: by which the camera's stamps are later than the tool's [s].
         strengths: effect of the library → its strength, in its own unit; none is there without.
@@ -48,7 +49,8 @@ class Parameters:
     strengths: Mapping[str, float] = field(default_factory=dict)
 
     def moved(self, steps: Sequence[float]) -> Parameters:
-        """By steps in ln density, ln bending, ln damping, seconds of lag and, in their order, the effects' strengths.
+        """By steps in ln density, ln bending, ln damping, seconds of lag and, in their order, the
+        effects' strengths.
 
         A strength stays among those that make sense.
         """
@@ -75,7 +77,9 @@ def described(effect: str) -> Parameter:
     kind = EFFECTS[effect]
     if len(kind.strengths()) != 1:
         raise UsageError(
-            f"{len(kind.strengths())} strengths", where=f"effect {effect!r}", fix="name one with a single one"
+            f"{len(kind.strengths())} strengths",
+            where=f"effect {effect!r}",
+            fix="name one with a single one",
         )
     return kind.parameters()[kind.strengths()[0]]
 
@@ -101,8 +105,9 @@ class Cloth:
 
     @classmethod
     def seen(cls, swings: Sequence[Swing], material: Material) -> Cloth:
-        """Its size and its attachments are those of the square of nodes as they hang at rest, medians over recordings:
-        the robot's grip is the same in all of them, and the tracker's corners are off by centimetres in some."""
+        """Its size and its attachments are those of the square of nodes as they hang at rest,
+        medians over recordings: the robot's grip is the same in all of them, and the tracker's
+        corners are off by centimetres in some."""
         hanging = np.median([swing.hanging - swing.tool[0] for swing in swings], axis=0)
         side = swings[0].side
         places = hanging.reshape(side, side, 3)
@@ -121,7 +126,9 @@ class Cloth:
 
     def carried(self, swing: Swing, nodes: Sequence[int]) -> FloatArray:
         """(pose, node, 3) where the tool takes nodes as if they were fixed to it [m]."""
-        return np.einsum("tij,nj->tni", swing.turns, self.hanging[list(nodes)]) + swing.tool[:, None]
+        return (
+            np.einsum("tij,nj->tni", swing.turns, self.hanging[list(nodes)]) + swing.tool[:, None]
+        )
 
     @property
     def mesh(self) -> Mesh:
@@ -137,10 +144,14 @@ class Cloth:
         return np.linalg.norm(mesh.rest[None] - wanted[:, None], axis=2).argmin(axis=1)
 
 
-def predicted(cloth: Cloth, swings: Sequence[Swing], parameters: Sequence[Parameters]) -> list[CubicSpline]:
-    """The nodes' places by a model of each recording, over the tool's time: splines to (node, 3) [m].
+def predicted(
+    cloth: Cloth, swings: Sequence[Swing], parameters: Sequence[Parameters]
+) -> list[CubicSpline]:
+    """The nodes' places by a model of each recording, over the tool's time: splines to (node, 3)
+    [m].
 
-    All recordings run side by side as members of a batch. The cloth hangs still before the tool's first pose.
+    All recordings run side by side as members of a batch. The cloth hangs still before the tool's
+    first pose.
     """
     mesh = cloth.mesh
     held = handles.top_corners(mesh.rest)
@@ -150,7 +161,9 @@ def predicted(cloth: Cloth, swings: Sequence[Swing], parameters: Sequence[Parame
             mesh=mesh,
             position=own,
             handles=Handles(vertices=held, stiffness=math.inf),
-            material=replace(cloth.material.scaled(area_weight=p.density, bending=p.bending), damping=p.damping),
+            material=replace(
+                cloth.material.scaled(area_weight=p.density, bending=p.bending), damping=p.damping
+            ),
         )
         for own, p in zip(start, parameters, strict=True)
     ]
@@ -158,9 +171,16 @@ def predicted(cloth: Cloth, swings: Sequence[Swing], parameters: Sequence[Parame
     last = max(float(swing.tool_times[-1]) for swing in swings)
     times = np.arange(math.ceil(last / PERIOD) + 1, dtype=np.float64) * PERIOD
     tracks = np.stack([_track(cloth, swing, times) for swing in swings], axis=-1)
-    motion = AnchorTracks(start=0.0, period=PERIOD, samples=torch.as_tensor(tracks, dtype=state.position.dtype))
-    system, state = apply(_effects(parameters, state.position.dtype), replace(system, motion=motion), state)
-    integrator, nodes = SplitEuler(base=BackwardEuler(step=_STEP, tolerance=1e-4)), torch.as_tensor(cloth.nodes(mesh))
+    motion = AnchorTracks(
+        start=0.0, period=PERIOD, samples=torch.as_tensor(tracks, dtype=state.position.dtype)
+    )
+    system, state = apply(
+        _effects(parameters, state.position.dtype), replace(system, motion=motion), state
+    )
+    integrator, nodes = (
+        SplitEuler(base=BackwardEuler(step=_STEP, tolerance=1e-4)),
+        torch.as_tensor(cloth.nodes(mesh)),
+    )
     state = replace(integrator.advance(system, replace(state, time=-_SETTLE), _SETTLE), time=0.0)
     frames = [state.position[nodes].double()]
     with torch.no_grad():
@@ -172,7 +192,8 @@ def predicted(cloth: Cloth, swings: Sequence[Swing], parameters: Sequence[Parame
 
 
 def rigid(cloth: Cloth, swing: Swing, lag: float) -> FloatArray:
-    """(frame, node, 3) observed less what a board would do that hangs from the tool as the cloth does at rest [m]."""
+    """(frame, node, 3) observed less what a board would do that hangs from the tool as the cloth
+    does at rest [m]."""
     board = CubicSpline(swing.tool_times, cloth.carried(swing, range(cloth.side**2)))
     return swing.positions - board(instants(swing, lag))
 
@@ -182,14 +203,18 @@ def _effects(parameters: Sequence[Parameters], dtype: torch.dtype) -> list[Effec
     made: list[Effect] = []
     for name in dict.fromkeys(name for own in parameters for name in own.strengths):
         values = [own.strengths.get(name, described(name).null) for own in parameters]
-        made.append(EFFECTS[name](**{EFFECTS[name].strengths()[0]: torch.tensor(values, dtype=dtype)}))
+        made.append(
+            EFFECTS[name](**{EFFECTS[name].strengths()[0]: torch.tensor(values, dtype=dtype)})
+        )
     return made
 
 
 def _track(cloth: Cloth, swing: Swing, times: FloatArray) -> FloatArray:
     """(n, 2, 3) displacement of the corners at times [m]; still after the last pose."""
     corners = cloth.carried(swing, cloth.upper)
-    return CubicSpline(swing.tool_times, corners)(np.minimum(times, swing.tool_times[-1])) - corners[0]
+    return (
+        CubicSpline(swing.tool_times, corners)(np.minimum(times, swing.tool_times[-1])) - corners[0]
+    )
 
 
 def _hung(mesh: Mesh, held: tuple[int, int], left: FloatArray, right: FloatArray) -> FloatArray:

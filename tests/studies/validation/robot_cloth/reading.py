@@ -1,10 +1,11 @@
-"""Recordings of a cloth that a robot holds: nodes seen by a depth camera, and the pose of the robot's tool.
+"""Recordings of a cloth that a robot holds: nodes seen by a depth camera, and the pose of the
+robot's tool.
 
-`NAME_mesh.csv` has a row for each frame: a stamp in its third column [ns], then all x, all y and all z of the nodes in
-the camera's optical frame [m]; the nodes are columns of the cloth from left to right, each from top to bottom.
-`NAME_tcp.csv` has the tool's pose in the robot's frame, z up: stamp, position and quaternion (x, y, z, w).
-`calibration_campose.csv` has the camera's pose in the robot's frame, without a stamp. The format is that of the cloth
-recordings of tfm_matlab (A. Luque).
+`NAME_mesh.csv` has a row for each frame: a stamp in its third column [ns], then all x, all y and
+all z of the nodes in the camera's optical frame [m]; the nodes are columns of the cloth from left
+to right, each from top to bottom. `NAME_tcp.csv` has the tool's pose in the robot's frame, z up:
+stamp, position and quaternion (x, y, z, w). `calibration_campose.csv` has the camera's pose in the
+robot's frame, without a stamp. The format is that of the cloth recordings of tfm_matlab (A. Luque).
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ _STAMP = 2
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Swing:
-    """One recording, in the robot's frame, z up; times are since the tool's first pose, on the stamps' clock.
+    """One recording, in the robot's frame, z up; times are since the tool's first pose, on the
+    stamps' clock.
 
     Attributes:
         name: of it.
@@ -69,9 +71,18 @@ def names(folder: Path, programme: str) -> tuple[str, ...]:
     Raises:
         NotFoundError: there are none.
     """
-    found = tuple(sorted(path.name.removesuffix("_mesh.csv") for path in folder.glob(f"{programme}_rep*_mesh.csv")))
+    found = tuple(
+        sorted(
+            path.name.removesuffix("_mesh.csv")
+            for path in folder.glob(f"{programme}_rep*_mesh.csv")
+        )
+    )
     if not found:
-        raise NotFoundError("no recordings", where=f"{folder}, programme {programme}", fix="check folder and programme")
+        raise NotFoundError(
+            "no recordings",
+            where=f"{folder}, programme {programme}",
+            fix="check folder and programme",
+        )
     return found
 
 
@@ -80,7 +91,8 @@ def read(folder: Path, name: str) -> Swing:
 
     Raises:
         NotFoundError: a file is not there.
-        InputError: a file with other columns, fewer than two usable rows, or nodes that make no square.
+        InputError: a file with other columns, fewer than two usable rows, or nodes that make no
+            square.
     """
     camera = _rows(folder / "calibration_campose.csv", 8)[:, 1:].mean(axis=0)
     stamps, seen = _stamped(folder / f"{name}_mesh.csv")
@@ -97,7 +109,9 @@ def read(folder: Path, name: str) -> Swing:
     tool_stamps, poses = _stamped(folder / f"{name}_tcp.csv")
     if poses.shape[1] != 11:
         raise InputError(
-            f"{poses.shape[1]} columns", where=f"{name}_tcp.csv", fix="give stamp, position and quaternion"
+            f"{poses.shape[1]} columns",
+            where=f"{name}_tcp.csv",
+            fix="give stamp, position and quaternion",
         )
     rotations = Rotation.from_quat(poses[:, 7:])
     return Swing(
@@ -113,7 +127,10 @@ def read(folder: Path, name: str) -> Swing:
 
 def read_all(folder: Path, programmes: Sequence[str]) -> dict[str, list[Swing]]:
     """All repeats of programmes."""
-    return {programme: [read(folder, name) for name in names(folder, programme)] for programme in programmes}
+    return {
+        programme: [read(folder, name) for name in names(folder, programme)]
+        for programme in programmes
+    }
 
 
 def _stamped(path: Path) -> tuple[IntArray, FloatArray]:
@@ -126,8 +143,14 @@ def _stamped(path: Path) -> tuple[IntArray, FloatArray]:
 
 def _rows(path: Path, least: int) -> FloatArray:
     if not path.is_file():
-        raise NotFoundError("no such file", where=str(path), fix="give the folder of the recordings")
+        raise NotFoundError(
+            "no such file", where=str(path), fix="give the folder of the recordings"
+        )
     table = np.genfromtxt(path, delimiter=",", skip_header=1)
     if table.ndim != 2 or len(table) < 2 or table.shape[1] < least:
-        raise InputError(f"a table of shape {table.shape}", where=str(path), fix="see the format in the docstring")
+        raise InputError(
+            f"a table of shape {table.shape}",
+            where=str(path),
+            fix="see the format in the docstring",
+        )
     return table

@@ -1,5 +1,5 @@
-"""The study of a held cloth: calibrated on some programmes, what the model lacks added, errors on others before and
-after, repeats against each other."""
+"""The study of a held cloth: calibrated on some programmes, what the model lacks added, errors on
+others before and after, repeats against each other."""
 
 from __future__ import annotations
 
@@ -15,8 +15,21 @@ from flagdata.core.console import progress
 from flagdata.core.rng import stream
 from measure.shares import Share
 from sim.cloth.material import Material
-from tests.studies.validation.robot_cloth.attribution import Late, Round, late, left_errors, lower, sought
-from tests.studies.validation.robot_cloth.calibrate import Fit, Linear, at_bounds, calibrated, linear
+from tests.studies.validation.robot_cloth.attribution import (
+    Late,
+    Round,
+    late,
+    left_errors,
+    lower,
+    sought,
+)
+from tests.studies.validation.robot_cloth.calibrate import (
+    Fit,
+    Linear,
+    at_bounds,
+    calibrated,
+    linear,
+)
 from tests.studies.validation.robot_cloth.model import Cloth, Parameters, rigid
 from tests.studies.validation.robot_cloth.reading import Swing, read_all
 from tests.studies.validation.robot_cloth.repeats import features, shuffled, tail_probability
@@ -25,7 +38,8 @@ from tests.studies.validation.robot_cloth.tracker import LATENCY
 LEVEL = 0.05
 """Level at which each pair of repeats is tested."""
 MOVED = 0.06
-"""By which one of a pair's stamps are moved for the control [s]: less than a frame of the camera."""
+"""By which one of a pair's stamps are moved for the control [s]: less than a frame of the
+camera."""
 SHUFFLES = 200
 """How often the repeats' segments are shuffled, to find how many pairs differ by chance."""
 _START = 0.3  # s of lag that the calibration starts from
@@ -33,7 +47,8 @@ _START = 0.3  # s of lag that the calibration starts from
 
 @dataclass(frozen=True, kw_only=True)
 class Error:
-    """Root mean square distance of nodes [m], with the least and the largest of single recordings."""
+    """Root mean square distance of nodes [m], with the least and the largest of single
+    recordings."""
 
     value: float
     least: float
@@ -60,7 +75,8 @@ class Reduction:
 
 @dataclass(frozen=True, kw_only=True)
 class Pair:
-    """Two repeats of one programme: p of no difference, and p with the second one's stamps moved by `MOVED`."""
+    """Two repeats of one programme: p of no difference, and p with the second one's stamps moved by
+    `MOVED`."""
 
     first: str
     second: str
@@ -80,11 +96,13 @@ class HeldCloth:
         rounds: how what the model lacks was chosen, on the fitted programmes alone.
         completed: calibrated with all that was added.
         camera: (3, 3) the map A of it, as rows; zero where it was not added.
-        reductions: on the held-out programmes, as one effect after another is added; the first is the calibrated model.
-        late: what separates latencies from another freedom of each frame; None where they were not added.
+        reductions: on the held-out programmes, as one effect after another is added; the first is
+            the calibrated model.
+        late: what separates latencies from another freedom of each frame; None where they were not
+            added.
         of_fitted, of_held_out: model → error, before and after.
-        parts: of the held-out errors with all that was added: what is the same all the time at a node, what a frame's
-            nodes share beside it, and the rest, root mean squares [m].
+        parts: of the held-out errors with all that was added: what is the same all the time at a
+            node, what a frame's nodes share beside it, and the rest, root mean squares [m].
         median: of the held-out errors of the calibrated model [m].
         extents: width and height in motion, tracked and predicted [m], held out.
         pairs: of repeats.
@@ -111,7 +129,8 @@ class HeldCloth:
 
     @property
     def apart(self) -> Share:
-        """Pairs of repeats that differ at `LEVEL`; they share recordings, so that the bounds are too narrow."""
+        """Pairs of repeats that differ at `LEVEL`; they share recordings, so that the bounds are
+        too narrow."""
         return Share.of(pair.p <= LEVEL for pair in self.pairs)
 
     @property
@@ -120,7 +139,9 @@ class HeldCloth:
         return Share.of(pair.p_moved <= LEVEL for pair in self.pairs)
 
 
-def study(folder: Path, material: Material, *, fitted: Sequence[str], held_out: Sequence[str], seed: int) -> HeldCloth:
+def study(
+    folder: Path, material: Material, *, fitted: Sequence[str], held_out: Sequence[str], seed: int
+) -> HeldCloth:
     """Calibrate on the repeats of some programmes, predict those of others, and compare repeats.
 
     Args:
@@ -164,11 +185,15 @@ def study(folder: Path, material: Material, *, fitted: Sequence[str], held_out: 
         extents=_extents(unseen, after),
         of_fitted=_compared(cloth, known, plain, found.lag),
         of_held_out=_compared(cloth, unseen, plain, found.lag),
-        median=float(np.nanmedian(np.concatenate([np.linalg.norm(e, axis=2).ravel() for e in after]))),
+        median=float(
+            np.nanmedian(np.concatenate([np.linalg.norm(e, axis=2).ravel() for e in after]))
+        ),
     )
 
 
-def _completed(cloth: Cloth, known: Sequence[Swing], base: Fit, added: Sequence[str]) -> dict[str, Fit]:
+def _completed(
+    cloth: Cloth, known: Sequence[Swing], base: Fit, added: Sequence[str]
+) -> dict[str, Fit]:
     """The calibrated model, and those with one effect after another, each by all that is known."""
     fits = {"calibrated": base}
     for name in added:
@@ -176,7 +201,9 @@ def _completed(cloth: Cloth, known: Sequence[Swing], base: Fit, added: Sequence[
     return fits
 
 
-def _reductions(cloth: Cloth, unseen: Sequence[Swing], fits: Mapping[str, Fit]) -> tuple[Reduction, ...]:
+def _reductions(
+    cloth: Cloth, unseen: Sequence[Swing], fits: Mapping[str, Fit]
+) -> tuple[Reduction, ...]:
     made: list[Reduction] = []
     before: FloatArray | None = None
     for name, fit in fits.items():
@@ -195,7 +222,11 @@ def _reductions(cloth: Cloth, unseen: Sequence[Swing], fits: Mapping[str, Fit]) 
 
 
 def _late(
-    cloth: Cloth, unseen: Sequence[Swing], known: Sequence[Swing], fits: Mapping[str, Fit], seed: int
+    cloth: Cloth,
+    unseen: Sequence[Swing],
+    known: Sequence[Swing],
+    fits: Mapping[str, Fit],
+    seed: int,
 ) -> Late | None:
     """Of the model with all that was added, against the same fitted without latencies."""
     last = list(fits.values())[-1]
@@ -207,7 +238,9 @@ def _late(
     return late(cloth, unseen, last, without=calibrated(cloth, known, without), seed=seed)
 
 
-def _compared(cloth: Cloth, swings: Sequence[Swing], models: Mapping[str, Fit], lag: float) -> dict[str, Error]:
+def _compared(
+    cloth: Cloth, swings: Sequence[Swing], models: Mapping[str, Fit], lag: float
+) -> dict[str, Error]:
     """Error by model; a board that hangs from the tool stands for no model at all."""
     made = {"a rigid board, with the lag": _error([rigid(cloth, swing, lag) for swing in swings])}
     return made | {name: _error(left_errors(cloth, swings, fit)) for name, fit in models.items()}
@@ -217,7 +250,10 @@ def _error(of: Sequence[FloatArray]) -> Error:
     squares = [np.nanmean((error**2).sum(axis=2)) for error in of]
     each = np.sqrt(squares)
     return Error(
-        value=float(np.sqrt(np.mean(squares))), least=float(each.min()), largest=float(each.max()), recordings=len(of)
+        value=float(np.sqrt(np.mean(squares))),
+        least=float(each.min()),
+        largest=float(each.max()),
+        recordings=len(of),
     )
 
 
@@ -230,12 +266,17 @@ def _parts(left: Sequence[FloatArray]) -> dict[str, float]:
         steady.append((mean**2).sum(axis=1).mean())
         shared.append((frame**2).sum(axis=2).mean())
         rest.append(np.nanmean(((whole - frame) ** 2).sum(axis=2)))
-    parts = {"the same all the time at a node": steady, "shared by a frame's nodes": shared, "the rest": rest}
+    parts = {
+        "the same all the time at a node": steady,
+        "shared by a frame's nodes": shared,
+        "the rest": rest,
+    }
     return {name: float(np.sqrt(np.mean(values))) for name, values in parts.items()}
 
 
 def _extents(swings: Sequence[Swing], left: Sequence[FloatArray]) -> dict[str, tuple[float, float]]:
-    """Distances of the upper corners, and of the ends of the nodes' columns, over frames in which the tool moves."""
+    """Distances of the upper corners, and of the ends of the nodes' columns, over frames in which
+    the tool moves."""
     tracked, modelled = [], []
     for swing, error in zip(swings, left, strict=True):
         moving = np.linalg.norm(np.gradient(swing.tool, axis=0), axis=1) > 1e-3
@@ -251,8 +292,11 @@ def _extents(swings: Sequence[Swing], left: Sequence[FloatArray]) -> dict[str, t
     }
 
 
-def _pairs(cloth: Cloth, swings: Mapping[str, Sequence[Swing]], fit: Fit, seed: int) -> tuple[tuple[Pair, ...], float]:
-    """All pairs of repeats, and the chance that as many differ if the repeats' segments may change places."""
+def _pairs(
+    cloth: Cloth, swings: Mapping[str, Sequence[Swing]], fit: Fit, seed: int
+) -> tuple[tuple[Pair, ...], float]:
+    """All pairs of repeats, and the chance that as many differ if the repeats' segments may change
+    places."""
     every = [swing for own in swings.values() for swing in own]
     beside = dict(zip((swing.name for swing in every), linear(cloth, every, fit)[0], strict=True))
     lag = fit.parameters.lag
@@ -273,11 +317,14 @@ def _pairs(cloth: Cloth, swings: Mapping[str, Sequence[Swing]], fit: Fit, seed: 
     as_many = 0
     for _ in range(SHUFFLES):
         mixed = [shuffled([known[swing.name] for swing in own], rng) for own in swings.values()]
-        found = sum(tail_probability(a, b, scale) <= LEVEL for own in mixed for a, b in combinations(own, 2))
+        found = sum(
+            tail_probability(a, b, scale) <= LEVEL for own in mixed for a, b in combinations(own, 2)
+        )
         as_many += found >= count
     return pairs, (1 + as_many) / (1 + SHUFFLES)
 
 
 def _later(beside: Linear) -> Linear:
-    """Errors as they would be if the camera lagged by `MOVED` more, by the sensitivity to the lag."""
+    """Errors as they would be if the camera lagged by `MOVED` more, by the sensitivity to the
+    lag."""
     return replace(beside, error=beside.error + MOVED * beside.change[-1])

@@ -1,7 +1,8 @@
 """Films that nobody can measure a wind by, each for one known reason: thirteen kinds, six of each.
 
-Most are made of the films of `designs`, as a careless recording would be; of some VTK draws a scene of its own. The
-list was fixed before the first of them was judged. Those of even number are for choosing thresholds, the others judge.
+Most are made of the films of `designs`, as a careless recording would be; of some VTK draws a scene
+of its own. The list was fixed before the first of them was judged. Those of even number are for
+choosing thresholds, the others judge.
 """
 
 from __future__ import annotations
@@ -67,7 +68,10 @@ class Makings:
         usual = [
             one
             for one in designs()
-            if one.part == "coverage" and one.size == (640, 480) and float(one.rate) <= 30 and not one.shutter
+            if one.part == "coverage"
+            and one.size == (640, 480)
+            and float(one.rate) <= 30
+            and not one.shutter
         ]
         return usual[int(self.rng.integers(len(usual)))]
 
@@ -100,7 +104,12 @@ def _moving(frames: UInt8Array) -> BoolArray:
     """(n, height, width) where a frame differs from the median in time."""
     gray = frames.mean(axis=3, dtype=np.float32)
     away = np.abs(gray - np.median(gray[::5], axis=0)) > _MOVES
-    return np.stack([cv2.morphologyEx(one.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3))) > 0 for one in away])
+    return np.stack(
+        [
+            cv2.morphologyEx(one.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3))) > 0
+            for one in away
+        ]
+    )
 
 
 def _box(moving: BoolArray) -> tuple[int, int, int, int]:
@@ -153,20 +162,27 @@ def close_up(makings: Makings) -> Source:
     left, top, right, bottom = _box(_moving(film.frames))
     wide, high = 0.3 * (right - left), 0.3 * (bottom - top)
     x, y = (left + right) / 2 + makings.rng.uniform(-0.1, 0.1) * wide, (top + bottom) / 2
-    part = film.frames[:, round(y - high / 2) : round(y + high / 2), round(x - wide / 2) : round(x + wide / 2)]
+    part = film.frames[
+        :, round(y - high / 2) : round(y + high / 2), round(x - wide / 2) : round(x + wide / 2)
+    ]
     return film.of(_even(part))
 
 
 def moving_camera(makings: Makings) -> Source:
-    """A hand-held or a panning camera, and behind the flag an even sky that shows no motion; no pole."""
+    """A hand-held or a panning camera, and behind the flag an even sky that shows no motion; no
+    pole."""
     scene = makings.scene(texture="stripes")
     times = np.arange(scene.frames) / float(scene.rate)
     turned = shaking(times, float(makings.rng.uniform(6, 15)), makings.rng)
     if makings.number % 2:
-        turned = np.stack([makings.rng.choice([-1, 1]) * 40 * (times - times.mean()), *turned.T[1:]], axis=1)
+        turned = np.stack(
+            [makings.rng.choice([-1, 1]) * 40 * (times - times.mean()), *turned.T[1:]], axis=1
+        )
     sky = np.full((64, 64, 3), makings.rng.uniform(130, 220), dtype=np.uint8)
     view = replace(scene.view, turned=turned)
-    return makings.drawn(replace(scene, view=view, subframes=1, bodies=[view.plate(sky), scene.bodies[2]]))
+    return makings.drawn(
+        replace(scene, view=view, subframes=1, bodies=[view.plate(sky), scene.bodies[2]])
+    )
 
 
 def repeated(makings: Makings) -> Source:
@@ -185,17 +201,23 @@ def slow(makings: Makings) -> Source:
     film = makings.film()
     rate = int(makings.rng.integers(8, 13))
     index = np.arange(math.floor(_SECONDS * rate)) * float(film.rate) / rate
-    return Source(frames=film.frames[np.round(index).astype(int).clip(0, len(film.frames) - 1)], rate=Fraction(rate))
+    return Source(
+        frames=film.frames[np.round(index).astype(int).clip(0, len(film.frames) - 1)],
+        rate=Fraction(rate),
+    )
 
 
 def dark(makings: Makings) -> Source:
-    """Five to eight stops under-exposed, with a sensor's noise at high gain, at times brightened afterwards."""
+    """Five to eight stops under-exposed, with a sensor's noise at high gain, at times brightened
+    afterwards."""
     film = makings.film()
     stops, gain = makings.rng.uniform(5, 8), 2.0 ** makings.rng.choice([0.0, 3.0])
     shown = []
     for frame in film.frames:
         light = (frame.astype(np.float32) / 255) ** 2.2 * 2.0**-stops
-        noise = np.sqrt(0.004**2 + 0.0006 * light) * makings.rng.standard_normal(light.shape, dtype=np.float32)
+        noise = np.sqrt(0.004**2 + 0.0006 * light) * makings.rng.standard_normal(
+            light.shape, dtype=np.float32
+        )
         shown.append(np.rint(255 * np.clip((light + noise) * gain, 0, 1) ** (1 / 2.2)))
     return film.of(np.stack(shown).astype(np.uint8))
 
@@ -205,7 +227,11 @@ def overlapping(makings: Makings) -> Source:
     scene = makings.scene(texture="cross")
     cloth = scene.bodies[2]
     aside = float(makings.rng.uniform(0.4, 0.8)) * (1 if makings.number % 2 else -1)
-    place = aside * scene.view.right - 0.9 * scene.view.outward + np.array([0.0, 0.0, makings.rng.uniform(-0.3, 0.3)])
+    place = (
+        aside * scene.view.right
+        - 0.9 * scene.view.outward
+        + np.array([0.0, 0.0, makings.rng.uniform(-0.3, 0.3)])
+    )
     other = Body(
         positions=cloth.positions[::-1] + place,
         faces=cloth.faces,
@@ -214,13 +240,17 @@ def overlapping(makings: Makings) -> Source:
     )
     stand = scene.bodies[1]
     return makings.drawn(
-        replace(scene, bodies=[*scene.bodies, other, replace(stand, positions=stand.positions + place)])
+        replace(
+            scene, bodies=[*scene.bodies, other, replace(stand, positions=stand.positions + place)]
+        )
     )
 
 
 def small(makings: Makings) -> Source:
     """A flag whose length is 12 to 22 px of the picture."""
-    return makings.drawn(makings.scene(share=float(makings.rng.uniform(12, 22)) / 480, aside=(0.0, 0.0)))
+    return makings.drawn(
+        makings.scene(share=float(makings.rng.uniform(12, 22)) / 480, aside=(0.0, 0.0))
+    )
 
 
 def no_flag(makings: Makings) -> Source:
@@ -230,9 +260,12 @@ def no_flag(makings: Makings) -> Source:
         times = np.arange(scene.frames) / float(scene.rate)
         trees = [one for _ in range(2) for one in tree(times, scene.view, makings.rng)]
         moved = [
-            replace(one, positions=one.positions - 0.7 * scene.view.extent * scene.view.right) for one in trees[2:]
+            replace(one, positions=one.positions - 0.7 * scene.view.extent * scene.view.right)
+            for one in trees[2:]
         ]
-        return makings.drawn(replace(scene, subframes=1, bodies=[scene.bodies[0], *trees[:2], *moved]))
+        return makings.drawn(
+            replace(scene, subframes=1, bodies=[scene.bodies[0], *trees[:2], *moved])
+        )
     if makings.number % 3 == 1:
         return Source(frames=_water(makings.rng), rate=Fraction(25))
     gray = _longer(makings.rng)
@@ -250,12 +283,19 @@ def _water(rng: np.random.Generator) -> UInt8Array:
     """Waves that run over the lower part of a picture, finer towards the horizon."""
     shown = cv2.resize(background("field", rng), (640, 480), interpolation=cv2.INTER_AREA)
     horizon = int(rng.uniform(0.3, 0.6) * 480)
-    y, x = np.meshgrid(np.arange(horizon, 480) - horizon + 8.0, np.arange(640) - 320.0, indexing="ij")
+    y, x = np.meshgrid(
+        np.arange(horizon, 480) - horizon + 8.0, np.arange(640) - 320.0, indexing="ij"
+    )
     far, across = 4000 / y, 12 * x / y
     frames = []
-    waves = [(*rng.normal(0, (0.06, 0.5)), rng.uniform(0.4, 2.0), rng.uniform(0, 6)) for _ in range(24)]
+    waves = [
+        (*rng.normal(0, (0.06, 0.5)), rng.uniform(0.4, 2.0), rng.uniform(0, 6)) for _ in range(24)
+    ]
     for k in range(round(_SECONDS * 25)):
-        level = sum(np.sin(a * far + b * across - 2 * np.pi * f * k / 25 + p) for a, b, f, p in waves) / 5
+        level = (
+            sum(np.sin(a * far + b * across - 2 * np.pi * f * k / 25 + p) for a, b, f, p in waves)
+            / 5
+        )
         frame = shown.copy()
         frame[horizon:] = np.clip(np.array([60, 85, 105]) * (1 + 0.35 * level[..., None]), 0, 255)
         frames.append(frame)
@@ -265,14 +305,20 @@ def _water(rng: np.random.Generator) -> UInt8Array:
 def still(makings: Makings) -> Source:
     """One picture of a flag, with the camera's noise."""
     film = makings.film()
-    noise = makings.rng.standard_normal((len(film.frames), *film.frames.shape[1:3], 1), dtype=np.float32)
-    return film.of(np.clip(film.frames[:1] + makings.rng.uniform(0.5, 2) * noise, 0, 255).astype(np.uint8))
+    noise = makings.rng.standard_normal(
+        (len(film.frames), *film.frames.shape[1:3], 1), dtype=np.float32
+    )
+    return film.of(
+        np.clip(film.frames[:1] + makings.rng.uniform(0.5, 2) * noise, 0, 255).astype(np.uint8)
+    )
 
 
 def scenes(makings: Makings) -> Source:
     """A cut to another film every 0.6 to 1 s."""
     one, other = makings.film(), makings.film()
-    while (one.frames[0].shape == other.frames[0].shape) and np.array_equal(one.frames[0], other.frames[0]):
+    while (one.frames[0].shape == other.frames[0].shape) and np.array_equal(
+        one.frames[0], other.frames[0]
+    ):
         other = makings.film()
     count = min(len(one.frames), len(other.frames))
     each = round(float(makings.rng.uniform(0.6, 1.0)) * float(one.rate))

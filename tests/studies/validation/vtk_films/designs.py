@@ -1,8 +1,10 @@
-"""The films that the measuring is judged by, as a list that was fixed before the first of them was measured.
+"""The films that the measuring is judged by, as a list that was fixed before the first of them was
+measured.
 
-Three parts: `RATES`, one view of a run at every frame rate; `COVERAGE`, all undisturbed runs from four views each, and
-some in denser air; `STRESSED`, a film and what a careless recording makes of it. All is drawn from one seed, by names,
-so that a further film moves no other. A cameraman frames the flag by what it visits; nothing else is looked at.
+Three parts: `RATES`, one view of a run at every frame rate; `COVERAGE`, all undisturbed runs from
+four views each, and some in denser air; `STRESSED`, a film and what a careless recording makes of
+it. All is drawn from one seed, by names, so that a further film moves no other. A cameraman frames
+the flag by what it visits; nothing else is looked at.
 """
 
 from __future__ import annotations
@@ -106,7 +108,8 @@ class Design:
 
 
 def _rates() -> list[Design]:
-    """One view of a run at 5 m/s at all rates, and of runs at 3 and 7 m/s at those that are compared."""
+    """One view of a run at 5 m/s at all rates, and of runs at 3 and 7 m/s at those that are
+    compared."""
     return [
         Design(
             name=f"rates-w{wind}-{name}",
@@ -174,7 +177,9 @@ def _coverage() -> list[Design]:
         rate = _COVERAGE_RATES[number % len(_COVERAGE_RATES)]
         fast = rate in _SHORTER
         length = 3.6 if short == "flag_w4_dt05" else _SHORTER.get(rate, _DURATION)
-        spare = {"flag_w4_dt05": 4.0, "flag_w4_dt5": 16.0, "flag_w8_dt5": 16.0}.get(short, 10.0) - length
+        spare = {"flag_w4_dt05": 4.0, "flag_w4_dt5": 16.0, "flag_w8_dt5": 16.0}.get(
+            short, 10.0
+        ) - length
         found.append(
             Design(
                 name=f"coverage-{short}-{view}",
@@ -243,7 +248,11 @@ def _stressed() -> list[Design]:
         ),
     )
     return [
-        replace(one, name=f"stressed-w{one.run[-1]}-{name.replace(' ', '-').replace('%', 'percent')}", **change)  # type: ignore[arg-type]
+        replace(
+            one,
+            name=f"stressed-w{one.run[-1]}-{name.replace(' ', '-').replace('%', 'percent')}",
+            **change,
+        )  # type: ignore[arg-type]
         for one in base
         for name, change in STRESSORS.items()
     ]
@@ -252,7 +261,9 @@ def _stressed() -> list[Design]:
 def stressor_of(design: Design) -> str:
     """Name of what was done to the film of a stressor."""
     ending = design.name.split("-", 2)[2]
-    return next(name for name in STRESSORS if name.replace(" ", "-").replace("%", "percent") == ending)
+    return next(
+        name for name in STRESSORS if name.replace(" ", "-").replace("%", "percent") == ending
+    )
 
 
 def designs() -> list[Design]:
@@ -287,8 +298,14 @@ def scene_of(design: Design, motion: Motion) -> Scene:
     )
     bodies = [
         view.plate(background(design.background, rng)),
-        pole(0.022 + 0.016 * rng.random(), top=1.0 + 0.2 * rng.random(), gray=float(rng.uniform(0.25, 0.9))),
-        Body(positions=cloth, faces=motion.faces, texture=texture(design.texture, rng), uv=motion.uv),
+        pole(
+            0.022 + 0.016 * rng.random(),
+            top=1.0 + 0.2 * rng.random(),
+            gray=float(rng.uniform(0.25, 0.9)),
+        ),
+        Body(
+            positions=cloth, faces=motion.faces, texture=texture(design.texture, rng), uv=motion.uv
+        ),
     ]
     if design.tree:
         bodies += tree(times, view, stream(SEED, "films", design.alike, "tree"))
@@ -306,8 +323,16 @@ def scene_of(design: Design, motion: Motion) -> Scene:
 
 
 def _second(motion: Motion, times: np.ndarray, view: View, rng: np.random.Generator) -> list[Body]:
-    """The same cloth at another time, behind the first; its pole stands at the picture's edge, upwind of the first."""
-    half = 0.5 * view.extent * view.size[0] / min(view.size) * (view.distance + _BEHIND) / view.distance
+    """The same cloth at another time, behind the first; its pole stands at the picture's edge,
+    upwind of the first."""
+    half = (
+        0.5
+        * view.extent
+        * view.size[0]
+        / min(view.size)
+        * (view.distance + _BEHIND)
+        / view.distance
+    )
     place = np.array(view.target) - _BEHIND * view.outward + 0.95 * view.side * half * view.right
     place[2] -= 0.5
     turned = motion.duration - 0.04 - (times - times.min())  # backwards, so that it is no copy

@@ -1,4 +1,5 @@
-"""Makes the films of the list that are missing: `python -m tests.studies vtk-films [BEGINNING_OF_NAME ...]`.
+"""Makes the films of the list that are missing: `python -m tests.studies vtk-films
+[BEGINNING_OF_NAME ...]`.
 
 The folder is FLAGDATA_FILMS, by default `out/films`.
 """

@@ -1,4 +1,5 @@
-"""Textures of flags and what lies behind them, drawn from a seed: nothing of them is in the project's own assets."""
+"""Textures of flags and what lies behind them, drawn from a seed: nothing of them is in the
+project's own assets."""
 
 from __future__ import annotations
 
@@ -67,7 +68,8 @@ TEXTURES: dict[str, Callable[[np.random.Generator, FloatArray, FloatArray], Floa
 
 
 def texture(kind: str, rng: np.random.Generator) -> UInt8Array:
-    """(400, 600, 3) of a flag: u from the hoist, v from the top, with the weave's faint unevenness."""
+    """(400, 600, 3) of a flag: u from the hoist, v from the top, with the weave's faint
+    unevenness."""
     v, u = np.meshgrid((np.arange(400) + 0.5) / 400, (np.arange(600) + 0.5) / 600, indexing="ij")
     shown = TEXTURES[kind](rng, u, v) * (1 + 0.04 * _noise(rng, (400, 600), 1.2)[..., None])
     return _bytes(shown)
@@ -85,14 +87,23 @@ def _noise(rng: np.random.Generator, size: tuple[int, int], slope: float) -> Flo
 
 def _sky(rng: np.random.Generator) -> FloatArray:
     height = np.linspace(1, 0, _SIDE)[:, None, None]
-    top, low = np.array([50, 105, 190]) * rng.uniform(0.8, 1.15), np.array([175, 200, 228]) * rng.uniform(0.85, 1.05)
+    top, low = (
+        np.array([50, 105, 190]) * rng.uniform(0.8, 1.15),
+        np.array([175, 200, 228]) * rng.uniform(0.85, 1.05),
+    )
     shown = low + (top - low) * height
-    clouds = np.clip(_noise(rng, (_SIDE, _SIDE), rng.uniform(1.5, 2.0)) - rng.uniform(-0.4, 1.2), 0, 1.5) / 1.5
+    clouds = (
+        np.clip(_noise(rng, (_SIDE, _SIDE), rng.uniform(1.5, 2.0)) - rng.uniform(-0.4, 1.2), 0, 1.5)
+        / 1.5
+    )
     return shown + (np.array([238, 240, 243]) - shown) * clouds[..., None] * 0.9
 
 
 def _overcast(rng: np.random.Generator) -> FloatArray:
-    return np.array([190, 195, 200]) * rng.uniform(0.75, 1.1) + 9 * _noise(rng, (_SIDE, _SIDE), 1.8)[..., None]
+    return (
+        np.array([190, 195, 200]) * rng.uniform(0.75, 1.1)
+        + 9 * _noise(rng, (_SIDE, _SIDE), 1.8)[..., None]
+    )
 
 
 def _foliage(rng: np.random.Generator, rows: int) -> FloatArray:
@@ -115,9 +126,13 @@ def _houses(rng: np.random.Generator) -> FloatArray:
     while left < _SIDE:
         wide, high = int(rng.uniform(90, 240)), int(rng.uniform(0.35, 0.75) * _SIDE)
         wall = rng.uniform(70, 210) * rng.uniform(0.85, 1.0, 3) * np.array([1.05, 0.97, 0.88])
-        front = np.broadcast_to(wall, (high, wide, 3)) * (1 + 0.05 * _noise(rng, (high, wide), 0.6)[..., None])
+        front = np.broadcast_to(wall, (high, wide, 3)) * (
+            1 + 0.05 * _noise(rng, (high, wide), 0.6)[..., None]
+        )
         y, x = np.meshgrid(np.arange(high), np.arange(wide), indexing="ij")
-        front[((x % 45) > 14) & ((x % 45) < 36) & ((y % 62) > 18) & ((y % 62) < 50)] *= rng.uniform(0.3, 0.6)
+        front[((x % 45) > 14) & ((x % 45) < 36) & ((y % 62) > 18) & ((y % 62) < 50)] *= rng.uniform(
+            0.3, 0.6
+        )
         shown[_SIDE - high :, left : left + wide] = front[:, : _SIDE - left]
         left += wide
     return shown
@@ -127,9 +142,13 @@ def _field(rng: np.random.Generator) -> FloatArray:
     """A meadow up to the horizon, hills, the sky."""
     shown, horizon = _sky(rng), int(_SIDE * rng.uniform(0.6, 0.85))
     hills = horizon - 60 - 25 * _noise(rng, (1, _SIDE), 1.7)[0]
-    shown[(np.arange(_SIDE)[:, None] > hills[None])] = np.array([96, 118, 112]) * rng.uniform(0.7, 1.1)
+    shown[(np.arange(_SIDE)[:, None] > hills[None])] = np.array([96, 118, 112]) * rng.uniform(
+        0.7, 1.1
+    )
     rows = _SIDE - horizon
-    shown[horizon:] = np.array([92, 112, 58]) * (1 + 0.16 * _noise(rng, (rows, _SIDE), 0.7)[..., None])
+    shown[horizon:] = np.array([92, 112, 58]) * (
+        1 + 0.16 * _noise(rng, (rows, _SIDE), 0.7)[..., None]
+    )
     return shown
 
 

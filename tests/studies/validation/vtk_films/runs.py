@@ -1,8 +1,9 @@
 """ArcSim's runs as motions in time: the cloth of a film.
 
-The runs are stored at 25 Hz. Between their frames the vertices follow splines of the fifth degree, so that all films of
-a run show one motion whatever their rate; it has nothing above 12.5 Hz, and what moved faster is folded into it. Of the
-vertices' velocity at 7 m/s 5 % of the power lies above 8 Hz, and half way between two frames the spline lacks 0.8 %.
+The runs are stored at 25 Hz. Between their frames the vertices follow splines of the fifth degree,
+so that all films of a run show one motion whatever their rate; it has nothing above 12.5 Hz, and
+what moved faster is folded into it. Of the vertices' velocity at 7 m/s 5 % of the power lies above
+8 Hz, and half way between two frames the spline lacks 0.8 %.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ UNDISTURBED = (
     "flag_w4_dt05",
     "flag_w8_dt5",
 )
-"""Runs in which nothing acts that a flag in the wind has not; the wind of some is turned, or varies about its mean."""
+"""Runs in which nothing acts that a flag in the wind has not; the wind of some is turned, or varies
+about its mean."""
 OTHER_AIR = tuple(f"jittered/pressure-x1.6_w{wind}" for wind in (3, 5, 7))
 """Runs in air that is 1.6 times as dense."""
 _FROM_REST = {"flag_w4_dt05": 2.0, "flag_w4_dt5": 4.0, "flag_w8_dt5": 4.0}

@@ -92,7 +92,9 @@ class View:
     def outward(self) -> FloatArray:
         """(3,) unit vector from the target to the camera."""
         yaw, up = math.radians(self.yaw), math.radians(self.elevation)
-        return np.array([math.sin(yaw) * math.cos(up), self.side * math.cos(yaw) * math.cos(up), math.sin(up)])
+        return np.array(
+            [math.sin(yaw) * math.cos(up), self.side * math.cos(yaw) * math.cos(up), math.sin(up)]
+        )
 
     @property
     def right(self) -> FloatArray:
@@ -104,7 +106,9 @@ class View:
     def view_angle(self) -> float:
         """Of the picture's height [degrees]."""
         width, height = self.size
-        return math.degrees(2 * math.atan(self.extent * height / min(width, height) / (2 * self.distance)))
+        return math.degrees(
+            2 * math.atan(self.extent * height / min(width, height) / (2 * self.distance))
+        )
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -118,15 +122,27 @@ class View:
 
     def degrees(self) -> FloatArray:
         """(subframe, 3) of `turned`."""
-        return self.turned * np.array([self.view_angle / self.size[1], self.view_angle / self.size[1], 1.0])
+        return self.turned * np.array(
+            [self.view_angle / self.size[1], self.view_angle / self.size[1], 1.0]
+        )
 
     def plate(self, picture: UInt8Array) -> Body:
         """What lies behind."""
         inward, right = -self.outward, self.right
         up = np.cross(right, inward)
-        half = 0.5 * _WIDER * self.extent / min(self.size) * max(self.size) * (self.distance + _PLATE) / self.distance
+        half = (
+            0.5
+            * _WIDER
+            * self.extent
+            / min(self.size)
+            * max(self.size)
+            * (self.distance + _PLATE)
+            / self.distance
+        )
         middle = np.array(self.target) + _PLATE * inward
-        corners = [middle + half * (x * right + y * up) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        corners = [
+            middle + half * (x * right + y * up) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))
+        ]
         return Body(
             positions=np.array(corners)[None],
             faces=np.array([[0, 1, 2], [0, 2, 3]]),
@@ -145,7 +161,8 @@ class Camera:
 
     Attributes:
         exposure: of the light.
-        blur: deviation of the lens's point spread [px]; it smooths the steps that VTK draws along edges.
+        blur: deviation of the lens's point spread [px]; it smooths the steps that VTK draws along
+            edges.
         noise: of each pixel [gray levels].
         crf: rate factor of H.264.
         mirrored: left and right exchanged.
@@ -188,7 +205,10 @@ def pictures(python: Path, scene: Scene) -> Iterator[UInt8Array]:
     bodies = []
     for number, body in enumerate(scene.bodies):
         name = f"body{number}"
-        arrays |= {f"{name}_positions": body.positions.astype(np.float32), f"{name}_faces": body.faces}
+        arrays |= {
+            f"{name}_positions": body.positions.astype(np.float32),
+            f"{name}_faces": body.faces,
+        }
         if body.texture is not None:
             arrays |= {f"{name}_texture": body.texture, f"{name}_uv": body.uv}
         bodies.append(
@@ -229,7 +249,9 @@ def pictures(python: Path, scene: Scene) -> Iterator[UInt8Array]:
                 else:
                     return
             log.seek(0)
-            raise UnusableError(log.read().decode(errors="replace")[-800:], where="VTK", fix="run make vtk")
+            raise UnusableError(
+                log.read().decode(errors="replace")[-800:], where="VTK", fix="run make vtk"
+            )
 
 
 def film(python: Path, scene: Scene, path: Path, rng: np.random.Generator) -> None:

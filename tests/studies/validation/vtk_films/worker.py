@@ -1,7 +1,8 @@
-"""Draws a scene by VTK, in VTK's environment: `python -I worker.py JOB.npz`; raw frames, RGB, go to standard output.
+"""Draws a scene by VTK, in VTK's environment: `python -I worker.py JOB.npz`; raw frames, RGB, go to
+standard output.
 
-Without a display VTK draws by EGL or OSMesa in software. JOB.npz holds `settings` (JSON) and the arrays that it names;
-see `tests.studies.validation.vtk_films.scene` for what they mean.
+Without a display VTK draws by EGL or OSMesa in software. JOB.npz holds `settings` (JSON) and the
+arrays that it names; see `tests.studies.validation.vtk_films.scene` for what they mean.
 """
 
 from __future__ import annotations
@@ -42,7 +43,9 @@ class Body:
         cells = vtkCellArray()
         cells.SetCells(
             len(self.faces),
-            numpy_to_vtkIdTypeArray(np.insert(self.faces, 0, self.faces.shape[1], axis=1).ravel(), deep=True),
+            numpy_to_vtkIdTypeArray(
+                np.insert(self.faces, 0, self.faces.shape[1], axis=1).ravel(), deep=True
+            ),
         )
         self.mesh.SetPolys(cells)
         mapper = vtkPolyDataMapper()
@@ -75,7 +78,11 @@ class Body:
         across = np.cross(second - first, third - first)
         normals = np.stack(
             [
-                np.bincount(self.faces.ravel(), np.repeat(across[:, k], self.faces.shape[1]), minlength=len(places))
+                np.bincount(
+                    self.faces.ravel(),
+                    np.repeat(across[:, k], self.faces.shape[1]),
+                    minlength=len(places),
+                )
                 for k in range(3)
             ],
             axis=1,
@@ -90,7 +97,9 @@ def texture(picture: np.ndarray) -> vtkTexture:
     height, width, _ = picture.shape
     image = vtkImageData()
     image.SetDimensions(width, height, 1)
-    image.GetPointData().SetScalars(numpy_to_vtk(np.ascontiguousarray(picture[::-1]).reshape(-1, 3), deep=True))
+    image.GetPointData().SetScalars(
+        numpy_to_vtk(np.ascontiguousarray(picture[::-1]).reshape(-1, 3), deep=True)
+    )
     made = vtkTexture()
     made.SetInputData(image)
     made.InterpolateOn()
@@ -150,7 +159,9 @@ def main() -> None:
             window.Render()
             grab.Modified()
             grab.Update()
-            picture = vtk_to_numpy(grab.GetOutput().GetPointData().GetScalars()).reshape(height, width, 3)[::-1]
+            picture = vtk_to_numpy(grab.GetOutput().GetPointData().GetScalars()).reshape(
+                height, width, 3
+            )[::-1]
             if each > 1:
                 total += _LINEAR[picture]
         shown = picture if each == 1 else _SHOWN[total // each]
