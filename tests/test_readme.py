@@ -205,8 +205,10 @@ def test_the_accuracy_of_a_weight_is_that_of_the_sheet() -> None:
         flags
     )  # "most estimates are too low"
     assert rows()["area weight, wind known"] == (
-        f"[{len(flags)} films](docs/results/validate-weighed.md) of {result['seconds']:g} s, two "
-        "simulators",
+        (
+            f"[{len(flags)} films](docs/results/validate-weighed.md) of {result['seconds']:g} s, two "
+            "simulators"
+        ),
         (
             f"median error {100 * films['median_error']:.0f} %, {films['held']} of {len(flags)} in "
             "their intervals; "

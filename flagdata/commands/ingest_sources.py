@@ -122,8 +122,10 @@ def _device_lines(report: Mapping[str, Any]) -> list[tuple[str, str]]:
         lines.append(
             (
                 "frames",
-                f"{report['frames']} at {rate}, worst stamp error "
-                f"{report['worst_stamp_error'] * 1e3:.3f} ms",
+                (
+                    f"{report['frames']} at {rate}, worst stamp error "
+                    f"{report['worst_stamp_error'] * 1e3:.3f} ms"
+                ),
             )
         )
         source = (

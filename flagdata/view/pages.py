@@ -43,10 +43,14 @@ ROWS, SECONDS, CHARACTERS = 200, 5.0, 10_000
 """Most that a query of the page may show, take and have."""
 EXAMPLES = (
     "select kind, count(*) n, sum(object_bytes) bytes from catalog group by kind order by n desc",
-    "select artifact, name, start_time, wind, wind_sigma from catalog where kind = 'clip' order by "
-    "wind desc",
-    "select session, day, count(*) clips, round(avg(wind), 2) wind from catalog where kind = "
-    "'clip' group by all",
+    (
+        "select artifact, name, start_time, wind, wind_sigma from catalog where kind = 'clip' order by "
+        "wind desc"
+    ),
+    (
+        "select session, day, count(*) clips, round(avg(wind), 2) wind from catalog where kind = "
+        "'clip' group by all"
+    ),
 )
 ICON = (
     b'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 16 16">'
@@ -364,8 +368,10 @@ def _versions(site: Site, row: Mapping[str, Any]) -> list[tuple[int, str]]:
     return [
         (
             number,
-            f"{result.id[:SHORT]} by code "
-            f"{result.code_version}{', this one' if result.id == row['artifact'] else ''}",
+            (
+                f"{result.id[:SHORT]} by code "
+                f"{result.code_version}{', this one' if result.id == row['artifact'] else ''}"
+            ),
         )
         for number, result in enumerate(
             result_versions if len(result_versions) > 1 else (), start=1

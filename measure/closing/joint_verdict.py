@@ -264,16 +264,20 @@ def _sentences(joint: Joint) -> list[str]:
         ]
     if joint.conclusion is Conclusion.SUFFICIENT:
         return [
-            f"The base model is not rejected by markers and films together ({test}): no effect is "
-            "needed."
+            (
+                f"The base model is not rejected by markers and films together ({test}): no effect is "
+                "needed."
+            )
         ]
     if joint.conclusion is Conclusion.UNDECIDED:
         why = "; ".join(
             reason for verdict in (joint.markers, joint.films) for reason in verdict.open
         )
         return [
-            "Nothing is decided: the base model is not rejected by markers and films together "
-            f"({test}), but {why}."
+            (
+                "Nothing is decided: the base model is not rejected by markers and films together "
+                f"({test}), but {why}."
+            )
         ]
     sentences = [f"The base model is rejected by markers and films together ({test})."]
     if joint.conclusion is Conclusion.OUTSIDE:

@@ -93,10 +93,14 @@ def assumptions(
     """Returns what was taken as given."""
     steady = bool(constant_wind(recordings))
     sentences = [
-        "the flag has the stated size and is held as stated, and the camera is where it is stated "
-        "to be",
-        "area weight, bending and damping are calibrated, so that what only changes them is not an "
-        "effect",
+        (
+            "the flag has the stated size and is held as stated, and the camera is where it is stated "
+            "to be"
+        ),
+        (
+            "area weight, bending and damping are calibrated, so that what only changes them is not an "
+            "effect"
+        ),
     ]
     if not has_weight:
         sentences.append(

@@ -279,8 +279,10 @@ def _second(film: _Film) -> Figure | None:
         return None
     return (
         found.going_on,
-        f"it runs along {found.going_on:.0%} of its height, in one flag along less than "
-        f"{_SECOND:.0%}",
+        (
+            f"it runs along {found.going_on:.0%} of its height, in one flag along less than "
+            f"{_SECOND:.0%}"
+        ),
     )
 
 
@@ -309,8 +311,10 @@ def _no_flags_hoist(hoist: Hoist, *, height: float) -> Figure | None:
     if hoist.held < _HELD:
         return (
             hoist.held,
-            f"cloth is beside {_below(hoist.held)} of what is most like one, of flags {_HELD:.0%} "
-            "or more",
+            (
+                f"cloth is beside {_below(hoist.held)} of what is most like one, of flags {_HELD:.0%} "
+                "or more"
+            ),
         )
     share = HALVED * hoist.length / height
     if not _SHORT <= share <= _LONG:
@@ -326,8 +330,10 @@ def _padding_figure(film: _Film) -> Figure | None:
         return None
     return (
         beyond,
-        f"{beyond:.0%} of the square about it lie beyond the picture, {_PADDED:.0%} at most can be "
-        "measured",
+        (
+            f"{beyond:.0%} of the square about it lie beyond the picture, {_PADDED:.0%} at most can be "
+            "measured"
+        ),
     )
 
 

@@ -12,8 +12,10 @@ _NEAREST = 4
 def words(outcome: ProposalOutcome) -> str:
     """Describes what was tried, what was found, what became of it."""
     lines = [
-        f"{outcome.decision.value}: {outcome.reason} ({outcome.tried} terms were tried; nulls: "
-        f"{outcome.nulls})"
+        (
+            f"{outcome.decision.value}: {outcome.reason} ({outcome.tried} terms were tried; nulls: "
+            f"{outcome.nulls})"
+        )
     ]
     for step in outcome.steps:
         verb = "taken" if step.taken else f"not taken: {step.reason}"

@@ -67,8 +67,10 @@ def overview(comparisons: Sequence[Comparison], *, after: str) -> Markup:
 def _row(comparison: Comparison, scale: Linear, top: float) -> list[str]:
     """Draws what is compared, its bars, and the floor behind them."""
     parts = [
-        f'<text class="label" x="{_LEFT - 8:g}" y="{top + 17:g}" '
-        f'text-anchor="end">{_short(comparison.what)}</text>'
+        (
+            f'<text class="label" x="{_LEFT - 8:g}" y="{top + 17:g}" '
+            f'text-anchor="end">{_short(comparison.what)}</text>'
+        )
     ]
     if known(comparison.floor):
         width = (

@@ -90,14 +90,18 @@ def by_draw(test: NullTest) -> tuple[str, ...]:
         return ()
     if test.settling is None:
         return (
-            f"The evidence is borderline; more than {MOST_KINDS} numerical set-ups would be needed "
-            "to decide.",
+            (
+                f"The evidence is borderline; more than {MOST_KINDS} numerical set-ups would be needed "
+                "to decide."
+            ),
         )
     nulls = banks.WINDS * test.settling
     more = command_line("--nulls", nulls)
     return (
-        f"The evidence is borderline; rerun with {more} ({test.settling} numerical set-ups) to "
-        "decide.",
+        (
+            f"The evidence is borderline; rerun with {more} ({test.settling} numerical set-ups) to "
+            "decide."
+        ),
     )
 
 
@@ -266,16 +270,26 @@ def assumptions(experiment: Experiment) -> tuple[str, ...]:
         f"the cloth is {size[0]:.3g} m × {size[1]:.3g} m of {cloth}, whose stretching is known",
         *_how_well_weighed(specimen),
         f"it is held at {len(specimen.held)} points {attachment}{places}",
-        "the base model's air pushes along the cloth's normal with ρ w² per area, ρ = "
-        f"{number(air.density)} kg/m³",
+        (
+            "the base model's air pushes along the cloth's normal with ρ w² per area, ρ = "
+            f"{number(air.density)} kg/m³"
+        ),
         logged,
-        f"predictions are made {number(1e3 * cut.period, digits=2)} ms ahead, at {which_frames} of "
-        "the recordings",
-        "area weight, bending and internal damping are calibrated, so that what only changes them "
-        "is not an effect",
+        (
+            f"predictions are made {number(1e3 * cut.period, digits=2)} ms ahead, at {which_frames} of "
+            "the recordings"
+        ),
+        (
+            "area weight, bending and internal damping are calibrated, so that what only changes them "
+            "is not an effect"
+        ),
         between,
-        f"a strength may be off by a factor of {factor} by the fit's mesh and a mistold cloth: its "
-        "interval says so",
-        "the effect was chosen on all recordings; the errors before and after come from fits "
-        "without them",
+        (
+            f"a strength may be off by a factor of {factor} by the fit's mesh and a mistold cloth: its "
+            "interval says so"
+        ),
+        (
+            "the effect was chosen on all recordings; the errors before and after come from fits "
+            "without them"
+        ),
     )

@@ -137,7 +137,7 @@ def write_line(path: Path, line: str, *, below: str) -> None:
 
 
 def test_the_log_format_of_the_walk_is_read_once_its_steps_are_done(checkout: Path) -> None:
-    described, registry = f"{FORMATS}/described.py", f"{FORMATS}/registry.py"
+    described, registry = f"{FORMATS}/described.py", f"{FORMATS}/log_formats.py"
     file = "catalogs/sensors/formats/harbour.toml"
     (checkout / file).write_text(block(file), encoding="utf-8")
     write_line(checkout / described, block(described), below="Zentra = ")

@@ -126,8 +126,10 @@ CASES = [
         "if the sensor is on a ma",
         "ingest a.csv --columns time,apparent_wind_speed[m/s],apparent_wind_direction[deg]",
         (
-            "ingest a.csv --columns time,apparent_wind_speed[m/s],apparent_wind_direction[deg] "
-            "--platform fixed",
+            (
+                "ingest a.csv --columns time,apparent_wind_speed[m/s],apparent_wind_direction[deg] "
+                "--platform fixed"
+            ),
         ),
         files={"a.csv": ZONED},
     ),
@@ -357,8 +359,10 @@ DRAFTED = [
         "to read the others, too,",
         "ingest a.dat --zone UTC",
         (
-            "ingest a.dat --zone UTC --as delimited --columns '1=time,4=wind_speed[m/s]' --name "
-            "other",
+            (
+                "ingest a.dat --zone UTC --as delimited --columns '1=time,4=wind_speed[m/s]' --name "
+                "other"
+            ),
         ),
         files={"a.dat": TWO_SPEEDS},
         untried="--unit",

@@ -144,8 +144,10 @@ CASES = [
         "choose a part of the fil",
         f"calibrate long.csv {SIZED} --log mast --clock-offset 1777629605±0.1",
         (
-            f"calibrate long.csv {SIZED} --log mast --clock-offset 1777629605±0.1 --start 0s --end "
-            "100s",
+            (
+                f"calibrate long.csv {SIZED} --log mast --clock-offset 1777629605±0.1 --start 0s --end "
+                "100s"
+            ),
         ),
         files={"long.csv": table("time,droop,extension,middle-speed", shown(gusts(60)))},
         shows=WEIGHED,

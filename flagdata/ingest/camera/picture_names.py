@@ -115,8 +115,10 @@ def clock_of(stems: Sequence[str]) -> Clock | None:
 def _problem(*, overnight: bool, loose: bool, mark: str | None) -> tuple[str, str] | None:
     if overnight:
         return (
-            "the names state times of day of both sides of midnight and no day: their order is not "
-            "known",
+            (
+                "the names state times of day of both sides of midnight and no day: their order is not "
+                "known"
+            ),
             "put the date before the time in the names, as 20260501_235959",
         )
     if loose and mark in (".", ","):

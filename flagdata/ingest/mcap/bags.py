@@ -87,8 +87,10 @@ def other_bag(path: Path) -> tuple[str, str] | None:
     if head.startswith(_ZSTD) and _inside_zstd(head).startswith((MCAP, _SQLITE)):
         return (
             "a bag that was compressed as a whole by zstd",
-            f"unpack it: {command_line('zstd', '-d', path, '-o', bare)}; then "
-            f"{command_line('ingest', bare)}",
+            (
+                f"unpack it: {command_line('zstd', '-d', path, '-o', bare)}; then "
+                f"{command_line('ingest', bare)}"
+            ),
         )
     if head.startswith(_GZIP) and _inside_gzip(path).startswith(MCAP):
         unpack = (

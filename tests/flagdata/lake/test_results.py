@@ -82,8 +82,10 @@ def test_the_same_code_again_adds_nothing(lake: Lake, recording: Artifact) -> No
     ]
     assert lake.resolve(None) == head
     assert [one.sentence for one in again] == [
-        f"there already as version 1 of 'flag'; version 2, {second.artifact.id[:12]}, is by code "
-        f"{NEW}",
+        (
+            f"there already as version 1 of 'flag'; version 2, {second.artifact.id[:12]}, is by code "
+            f"{NEW}"
+        ),
         "there already",
     ]
 

@@ -221,8 +221,10 @@ def test_artifacts_are_the_parents_of_what_is_read(folder: Path, table: Path, tm
             "did you mean 'hoist'",
         ),
         (
-            "[material]\nmass-unknown = true\ndensity-uncertainty = 0.1\n[[recording]]\nsource = "
-            "'a'",
+            (
+                "[material]\nmass-unknown = true\ndensity-uncertainty = 0.1\n[[recording]]\nsource = "
+                "'a'"
+            ),
             UsageError,
             "both mass-unknown and an uncertainty",
         ),
@@ -237,8 +239,10 @@ def test_artifacts_are_the_parents_of_what_is_read(folder: Path, table: Path, tm
             "density-uncertainty",
         ),
         (
-            "[material]\narea-weight = '0.2±0.01'\ndensity-uncertainty = "
-            "0.1\n[[recording]]\nsource = 'a'",
+            (
+                "[material]\narea-weight = '0.2±0.01'\ndensity-uncertainty = "
+                "0.1\n[[recording]]\nsource = 'a'"
+            ),
             UsageError,
             "given twice",
         ),

@@ -494,8 +494,10 @@ def page(known: Mapping[str, Any]) -> str:
         where = next(iter(known.values()))["circumstances"]
         lines += [
             "",
-            f"{where['processor']}, {where['cores']} cores; Python {where['python']}; moto's "
-            "server.",
+            (
+                f"{where['processor']}, {where['cores']} cores; Python {where['python']}; moto's "
+                "server."
+            ),
         ]
     return "\n".join([*lines, ""])
 

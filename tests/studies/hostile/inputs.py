@@ -61,7 +61,10 @@ _MARKERS = "\n".join(
         *(f"{m},{m % 3},{m // 3},0.1,0.2,0.3,{f}" for f in range(3) for m in range(9)),
     ]
 )
-_CLOTHS = "film,fabric,area_weight,bending_stiffness,wind_level,wind_speed,wind_sigma\nfilm.mp4,felt,0.24,3e-5,,2.4,0.3\n"
+_CLOTHS = (
+    "film,fabric,area_weight,bending_stiffness,wind_level,wind_speed,wind_sigma\n"
+    "film.mp4,felt,0.24,3e-5,,2.4,0.3\n"
+)
 ABOUT: dict[str, Any] = {
     "flag": {
         "width": 1.5,

@@ -216,12 +216,18 @@ def page(sheet: Mapping[str, Any]) -> str:
         "# The flag as an anemometer",
         "",
         f"Seed {sheet['seed']}; calibrated on the first half of the film `{FIRST}`.",
-        "RMSE in m/s over windows: against the cup (its mean over the window, linear between "
-        "samples), against the",
-        "samples in the window, as `flagdata measure` compares, and against the true wind at the "
-        "flag. Within: share",
-        f"of windows whose interval of {LEVEL:.0%} contains that. Last, the network alone against "
-        "the cup",
+        (
+            "RMSE in m/s over windows: against the cup (its mean over the window, linear between "
+            "samples), against the"
+        ),
+        (
+            "samples in the window, as `flagdata measure` compares, and against the true wind at the "
+            "flag. Within: share"
+        ),
+        (
+            f"of windows whose interval of {LEVEL:.0%} contains that. Last, the network alone against "
+            "the cup"
+        ),
         "(`python -m tests.studies anemometer`).",
         "",
     ]
@@ -238,8 +244,10 @@ def page(sheet: Mapping[str, Any]) -> str:
 
 def _table(films: Sequence[Mapping[str, Any]]) -> list[str]:
     lines = [
-        "| film | windows | wind [m/s] | refused | cup | samples | flag | within, cup | within, "
-        "flag | network alone |",
+        (
+            "| film | windows | wind [m/s] | refused | cup | samples | flag | within, cup | within, "
+            "flag | network alone |"
+        ),
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for row in films:

@@ -231,8 +231,10 @@ def _table(heading: str, verdicts: Mapping[str, Any]) -> list[str]:
     lines = [
         f"## {heading}",
         "",
-        "| what acted | verdict | p | area weight, of nominal | bending, of nominal | damping [ms] "
-        "| right | s |",
+        (
+            "| what acted | verdict | p | area weight, of nominal | bending, of nominal | damping [ms] "
+            "| right | s |"
+        ),
         "|---|---|---|---|---|---|---|---|",
     ]
     for name, own in verdicts.items():

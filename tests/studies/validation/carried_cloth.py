@@ -148,8 +148,10 @@ def page(document: dict[str, Any]) -> str:
         "",
         _DATA.format(**document),
         "",
-        "| data | conclusion | p | statistic | nulls' largest | error of forecasts [mm] | density, "
-        "bending, damping |",
+        (
+            "| data | conclusion | p | statistic | nulls' largest | error of forecasts [mm] | density, "
+            "bending, damping |"
+        ),
         "|---|---|---|---|---|---|---|",
         *(f"| {name} | {_cells(row)} |" for name, row in document["verdicts"].items()),
         "",

@@ -281,8 +281,10 @@ def page(sheet: Mapping[str, Any]) -> str:
             for row in sheet["films"]
         ),
         "",
-        "An interval in bold does not contain the true value. Of refused films the estimate is "
-        "that of `--anyway`.",
+        (
+            "An interval in bold does not contain the true value. Of refused films the estimate is "
+            "that of `--anyway`."
+        ),
     ]
     return "\n".join(lines) + "\n"
 

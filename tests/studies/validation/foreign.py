@@ -263,8 +263,10 @@ def page(found: Mapping[str, Any]) -> str:
         "",
         f"{found['refused']} were refused. The bank holds {found['kinds']} kinds of numerics.",
         "",
-        "| experiment | acted | cloth: area weight, stretching, bending; damping | method | said | "
-        "p | grade |",
+        (
+            "| experiment | acted | cloth: area weight, stretching, bending; damping | method | said | "
+            "p | grade |"
+        ),
         "|---|---|---|---|---|---|---|",
         *(_line(row) for row in found["experiments"]),
     ]

@@ -194,8 +194,10 @@ def _page(result: dict[str, Any]) -> str:
     if "windows" in real:
         refused = sum(not window["familiar"] for window in real["windows"])
         text += [
-            f"The real recording {real['clip']}: {refused} of {len(real['windows'])} windows "
-            "refused. The first:",
+            (
+                f"The real recording {real['clip']}: {refused} of {len(real['windows'])} windows "
+                "refused. The first:"
+            ),
             "",
         ]
         text += [f"- {sentence}" for sentence in real["windows"][0]["reasons"]]

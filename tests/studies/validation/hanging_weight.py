@@ -222,10 +222,14 @@ def page(sheet: dict[str, Any]) -> str:
         "",
         "| | |",
         "|---|---|",
-        f"| films on which the weight's 90 % interval contains the truth | {sheet['covered']} of "
-        f"{of} |",
-        "| median width of that interval over the prior's | "
-        f"{sheet['median_width_over_prior']:.2f} |",
+        (
+            f"| films on which the weight's 90 % interval contains the truth | {sheet['covered']} of "
+            f"{of} |"
+        ),
+        (
+            "| median width of that interval over the prior's | "
+            f"{sheet['median_width_over_prior']:.2f} |"
+        ),
         (
             "| the same with the true wind stated | "
             f"{sheet['median_width_over_prior_wind_known']:.2f}, "

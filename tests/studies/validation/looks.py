@@ -407,10 +407,14 @@ def page(sheet: Mapping[str, Any]) -> str:
     lines = [
         "# Looks: what lasts of the errors of films' observables",
         "",
-        "Pixels less geometry, less the bias, split into what lasts in a film and what passes from "
-        "window to window.",
-        "Standard deviations are in the observables' units, shares with 90 % by a bootstrap of "
-        "films.",
+        (
+            "Pixels less geometry, less the bias, split into what lasts in a film and what passes from "
+            "window to window."
+        ),
+        (
+            "Standard deviations are in the observables' units, shares with 90 % by a bootstrap of "
+            "films."
+        ),
         "`python -m tests.studies looks` makes it.",
         "",
     ]
@@ -427,10 +431,14 @@ def page(sheet: Mapping[str, Any]) -> str:
     lines += [
         "## Two films of one look",
         "",
-        "The raster renderer's; each look was filmed in two winds and two lights: share of what "
-        "lasts in a film that",
-        f"is common to both. Of all observables together it is {middle:.2f} (90 %: {low:.2f} to "
-        f"{high:.2f}).",
+        (
+            "The raster renderer's; each look was filmed in two winds and two lights: share of what "
+            "lasts in a film that"
+        ),
+        (
+            f"is common to both. Of all observables together it is {middle:.2f} (90 %: {low:.2f} to "
+            f"{high:.2f})."
+        ),
         "",
         _row(sheet["observables"]),
         _row(["---"] * len(sheet["observables"])),
@@ -438,10 +446,14 @@ def page(sheet: Mapping[str, Any]) -> str:
         "",
         "## A fitted flag filmed once, and its error taken off",
         "",
-        "Variance of films' mean errors, after over before, and the mean of its logarithm over the "
-        "observables.",
-        f"The factors are {', '.join(f'{one:.2f}' for one in sheet['factors'])}, of the raster "
-        "renderer's films.",
+        (
+            "Variance of films' mean errors, after over before, and the mean of its logarithm over the "
+            "observables."
+        ),
+        (
+            f"The factors are {', '.join(f'{one:.2f}' for one in sheet['factors'])}, of the raster "
+            "renderer's films."
+        ),
         "",
         _row(["films, taken off", "films", *sheet["observables"], "mean of the logarithm"]),
         _row(["---"] * (len(sheet["observables"]) + 3)),

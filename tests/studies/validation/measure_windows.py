@@ -189,8 +189,10 @@ def page(found: Mapping[str, Any]) -> str:
         "",
         _about(found),
         "",
-        "| windows | wind: RMSE [m/s] | width of the 90 % interval [m/s] | covered at 50 % | at 80 "
-        "% | at 90 % |",
+        (
+            "| windows | wind: RMSE [m/s] | width of the 90 % interval [m/s] | covered at 50 % | at 80 "
+            "% | at 90 % |"
+        ),
         "|---|---|---|---|---|---|",
         *(_of_wind(count, of[WIND]) for count, of in found["together"].items()),
         "",
@@ -201,8 +203,10 @@ def page(found: Mapping[str, Any]) -> str:
         )
         + ".",
         "",
-        "| target, one window | covered at 50 % | at 80 % | at 90 % | rank bins out of the 99 % "
-        "band, of 10 |",
+        (
+            "| target, one window | covered at 50 % | at 80 % | at 90 % | rank bins out of the 99 % "
+            "band, of 10 |"
+        ),
         "|---|---|---|---|---|",
         *(
             f"| {name} | "

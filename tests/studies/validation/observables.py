@@ -167,8 +167,10 @@ def page(sheet: Mapping[str, Any]) -> str:
             "(`python -m tests.studies observables`)."
         ),
         "",
-        "| observable | unit | films | windows | not shown | bias | error | sigma | median | "
-        "robust sigma |",
+        (
+            "| observable | unit | films | windows | not shown | bias | error | sigma | median | "
+            "robust sigma |"
+        ),
         "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for name, own in sheet["summary"].items():

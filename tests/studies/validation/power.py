@@ -231,8 +231,10 @@ def page(sheet: Mapping[str, Any]) -> str:
         lines += reference_table(sheet)
     lines += [
         "",
-        f"In bold: {_TOLD:g} or more, of ArcSim's {_SHORT:g}. A dash: fewer than half of the "
-        "windows show it.",
+        (
+            f"In bold: {_TOLD:g} or more, of ArcSim's {_SHORT:g}. A dash: fewer than half of the "
+            "windows show it."
+        ),
     ]
     return "\n".join(lines) + "\n"
 

@@ -222,8 +222,10 @@ def page(result: Mapping[str, Any]) -> str:
     verdict = {True: "met", False: "**not met**"}
     lines += [
         "",
-        f"Faces within {FACES[0]} and {FACES[1]} of ArcSim's at every frame: "
-        f"{verdict[faces['passed']]}.",
+        (
+            f"Faces within {FACES[0]} and {FACES[1]} of ArcSim's at every frame: "
+            f"{verdict[faces['passed']]}."
+        ),
         "",
         "| figure | to ArcSim [mm] | accepted [mm] | moved [mm] | |",
         "|---|---|---|---|---|",

@@ -340,8 +340,10 @@ def page(cloth: Cloth, sheet: Mapping[str, Any]) -> str:
             f"{cloth.study}`)."
         ),
         "",
-        "| wind [m/s] | weight | refused | lowest | highest | spread | mean | largest error | "
-        "intervals contain it |",
+        (
+            "| wind [m/s] | weight | refused | lowest | highest | spread | mean | largest error | "
+            "intervals contain it |"
+        ),
         "|---|---|---|---|---|---|---|---|---|",
     ]
     for name, winds in sheet["summary"].items():

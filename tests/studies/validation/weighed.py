@@ -462,8 +462,10 @@ def page(sheet: Mapping[str, Any]) -> str:
     """The sheet in Markdown."""
     lines = ["# Simulated flags weighed", "", f"{sheet['seconds']:g} s each.", ""]
     lines += [
-        "| seen as | flags | nothing | weights | median error | in the 90 % interval | bounds | "
-        "true |"
+        (
+            "| seen as | flags | nothing | weights | median error | in the 90 % interval | bounds | "
+            "true |"
+        )
     ]
     lines += ["|---|---|---|---|---|---|---|---|"]
     for name in ("geometry", "films"):

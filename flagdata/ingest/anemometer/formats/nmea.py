@@ -135,8 +135,10 @@ class Nmea:
         )
         wrong_ones = f"; {wrong} more have a wrong one" if wrong or checked else ""
         reasons = (
-            f"{right} of the first {len(head.lines)} lines are NMEA 0183 "
-            f"sentences{sure}{wrong_ones}",
+            (
+                f"{right} of the first {len(head.lines)} lines are NMEA 0183 "
+                f"sentences{sure}{wrong_ones}"
+            ),
             f"{wind} of them are wind ({', '.join(WINDS)})",
         )
         fix = None if wind else no_wind(head.lines, self.name)

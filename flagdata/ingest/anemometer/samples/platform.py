@@ -134,8 +134,10 @@ def settle(
         return _rename(reading, names, "fixed-platform", text, severity=Severity.NOTE)
     if given_platform == "corrected":
         text, names = (
-            "wind over ground was computed from a moving platform's motion before it was logged, "
-            "as given",
+            (
+                "wind over ground was computed from a moving platform's motion before it was logged, "
+                "as given"
+            ),
             {},
         )
         if "wind_speed" not in has and "theoretical_wind_speed" in has:

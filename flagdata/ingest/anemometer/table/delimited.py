@@ -211,7 +211,9 @@ def _match(recipe: Recipe, name: str, head: Head) -> Guess | None:
         recipe=name,
         score=min(0.95, 0.6 + 0.05 * (len(columns) + len(recipe.time.columns))),
         reasons=(
-            f"line {layout.preamble + 1} names the columns of recipe {name}: "
-            f"{', '.join(map(str, needed))}",
+            (
+                f"line {layout.preamble + 1} names the columns of recipe {name}: "
+                f"{', '.join(map(str, needed))}"
+            ),
         ),
     )

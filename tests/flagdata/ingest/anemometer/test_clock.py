@@ -41,8 +41,8 @@ BACK = [
     # rows, row of the jump, seconds, period [s], in words
     (9000, 4000, -3600, 1, "set back 1 h"), (9000, 4000, -3600, 60, "set back 1 h"),
     (9000, 4000, -37, 1, "set back 37 s"), (9000, 4000, -2220, 60, "set back 37 min"),
-    (9000, 4000, -5400, 60, "set back 1 h 30 min"), (200, 80, -2, 1, "set back 2 s"), (30, 15, -2, 1, "set "
-        "back 2 s"),
+    (9000, 4000, -5400, 60, "set back 1 h 30 min"), (200, 80, -2, 1, "set back 2 s"), (30, 15, -2, 1, ("set "
+        "back 2 s")),
     (14, 7, -2, 1, "set back 2 s"), (24, 18, -1, 0.5, "set back 1 s"),
 ]  # fmt: skip
 

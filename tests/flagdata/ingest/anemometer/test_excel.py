@@ -230,7 +230,7 @@ def _add_link(path: Path, name: str) -> None:
         (End.SIGNAL, "SIGABRT", r"the process that reads it has ended: SIGABRT"),
     ],
 )
-def test_only_what_was_refused_memory_is_said_to_take_too_much(
+def test_only_what_was_refused_memory_takes_too_much(
     book: Book, monkeypatch: pytest.MonkeyPatch, end: End, detail: str, said: str
 ) -> None:
     def ended(*_: object, **__: object) -> None:

@@ -58,9 +58,7 @@ SAMPLES = {
     "icos": "#Site;SamplingHeight;Year;Month;Day;Hour;Minute;WS;WD\nLIN;40.0;2026;05;01;12;00;4.2;210\n",
     "icos-ecosystem": "TIMESTAMP,WS_1_1_1\n20260501120000,4.2\n20260501120010,4.4\n",
     "surfrad": " X\n 40.05 -88.37 230 m version 1\n"
-    + " 2026 121 5 1 12 0 12.0 40.0"
-    + " 1.0 0" * 20
-    + "\n",
+    " 2026 121 5 1 12 0 12.0 40.0" + " 1.0 0" * 20 + "\n",
 }
 
 

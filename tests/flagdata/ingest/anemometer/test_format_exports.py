@@ -129,8 +129,10 @@ def zentra(rows: list[str], *, padded: bool = True) -> str:
     head = [
         "\ufeffz6-01234,Port1,,,Port7,",
         f"# Records: {len(rows)},ATMOS 22 Ultrasonic Anemometer,,,Barometer,",
-        "Timestamps,° Wind Direction, m/s Wind Speed, m/s Gust Speed, kPa Reference Pressure, °C "
-        "Logger Temperature",
+        (
+            "Timestamps,° Wind Direction, m/s Wind Speed, m/s Gust Speed, kPa Reference Pressure, °C "
+            "Logger Temperature"
+        ),
     ]
     return "\r\n".join([*head, *([",,,,,"] if padded else []), *rows, ""])
 

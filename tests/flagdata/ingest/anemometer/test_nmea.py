@@ -445,8 +445,10 @@ MDA = "WIMDA,29.8,I,1.0,B,22.0,C,,,78.3,,18.0,C,260.3,T,249.9,M,1.8,N,0.9,M"
         (
             "6.0",
             {},
-            "(MDA) was computed by the instrument from heading and speed of a platform that moves "
-            "at 6",
+            (
+                "(MDA) was computed by the instrument from heading and speed of a platform that moves "
+                "at 6"
+            ),
             "",
         ),
     ],
@@ -479,8 +481,10 @@ def test_a_wind_that_the_stream_states_over_ground_is_called_so_on_a_fixed_platf
         ),
         (
             [sentence(MDA)] * 2,
-            "2 of the first 2 lines are NMEA 0183 sentences with right checksums; 0 more have a "
-            "wrong",
+            (
+                "2 of the first 2 lines are NMEA 0183 sentences with right checksums; 0 more have a "
+                "wrong"
+            ),
         ),
         (
             [sentence(MDA), f"${MDA}"],

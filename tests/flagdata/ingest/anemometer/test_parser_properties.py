@@ -170,8 +170,10 @@ HEADERS = [
     "time,wind_speed\n",
     '"TOA5","a","b","c","d","e","f","g"\n"TIMESTAMP","RECORD","WS","diag"\n"TS","RN","m/s",""\n"","","",""\n',
     "$GPZDA,120000,01,05,2026,,\n$WIMWV,010,R,5,N,A\n$GPZDA,120001,01,05,2026,,\n",
-    "Device Name;K;;\nDevice Model;5;;\nFORMATTED DATE-TIME;Direction ° True;Wind "
-    "Speed;Temperature\nx;Deg;m/s;C\n",
+    (
+        "Device Name;K;;\nDevice Model;5;;\nFORMATTED DATE-TIME;Direction ° True;Wind "
+        "Speed;Temperature\nx;Deg;m/s;C\n"
+    ),
     "laptop_time,raw_line\n",
     "Date;Time;m/s;°C\n",
 ]

@@ -89,8 +89,10 @@ def page(found: HeldCloth) -> str:
             for name in found.of_held_out
         ),
         "",
-        f"The median distance of the held-out nodes is {1e3 * found.median:.0f} mm after "
-        "calibration.",
+        (
+            f"The median distance of the held-out nodes is {1e3 * found.median:.0f} mm after "
+            "calibration."
+        ),
         "",
         *_lacking(found),
         "| parameter | calibrated | with all that was added |",
@@ -110,8 +112,10 @@ def page(found: HeldCloth) -> str:
         "|---|---|",
         *(f"| {name} | {1e3 * value:.1f} |" for name, value in found.parts.items()),
         "",
-        f"At rest the square of nodes is {1e3 * wide:.0f} × {1e3 * high:.0f} mm. In motion it is "
-        f"{extents}.",
+        (
+            f"At rest the square of nodes is {1e3 * wide:.0f} × {1e3 * high:.0f} mm. In motion it is "
+            f"{extents}."
+        ),
         "",
         "## Repeats of one programme (A/A)",
         "",
