@@ -321,9 +321,8 @@ def _convert_value(bare: Any, notes: list[Any], content: Any, *, key: str, where
 
 def _refusal(bare: Any, bounds: list[Meta], content: Any, *, key: str, where: str) -> Exception:
     if isinstance(bare, EnumMeta):
-        return UnknownNameError.of(
-            key, str(content), [option.value for option in bare], where=where
-        )  # pyright: ignore[reportAttributeAccessIssue]
+        values = [option.value for option in bare]  # pyright: ignore[reportAttributeAccessIssue]
+        return UnknownNameError.of(key, str(content), values, where=where)
     most = min((bound.le for bound in bounds if bound.le is not None), default=math.inf)
     if bare is int and isinstance(content, int) and content > most:
         return LimitError(f"{key} is {_excerpt(content)}", where=where, fix=f"give at most {most}")

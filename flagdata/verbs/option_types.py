@@ -80,9 +80,9 @@ class Listed(click.ParamType):
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> list[str]:
         """Returns the texts, without blanks around them."""
-        return (
-            [text.strip() for text in value.split(",")] if isinstance(value, str) else list(value)
-        )  # type: ignore[call-overload]
+        if isinstance(value, str):
+            return [text.strip() for text in value.split(",")]
+        return list(value)  # type: ignore[call-overload]
 
 
 DURATION = Duration()

@@ -182,9 +182,8 @@ def overview(site: Site, *, kind: str | None, name: str | None, page: int) -> st
     if kind is not None and kind not in list(Kind):
         raise UnknownNameError.of("kind", kind, [known_kind.value for known_kind in Kind])
     rows = site.rows()
-    counts = {
-        entry["values"]: entry["counts"] for entry in pc.value_counts(rows["kind"]).to_pylist()
-    }  # type: ignore[attr-defined]
+    counted = pc.value_counts(rows["kind"])  # type: ignore[attr-defined]
+    counts = {entry["values"]: entry["counts"] for entry in counted.to_pylist()}
     chosen = pc.field("kind") != Kind.CLIP.value if kind is None else pc.field("kind") == kind
     if name:
         chosen &= pc.match_substring(pc.field("name"), name, ignore_case=True)  # type: ignore[attr-defined]
@@ -446,9 +445,8 @@ def _answer(site: Site, text: str) -> PageTable:
         if isinstance(value, str) and len(value) == _ID
     }
     ids = rows["artifact"]
-    identities = set(
-        ids.filter(pc.is_in(ids, value_set=pa.array(sorted(texts), pa.string()))).to_pylist()
-    )  # type: ignore[attr-defined]
+    named = pc.is_in(ids, value_set=pa.array(sorted(texts), pa.string()))  # type: ignore[attr-defined]
+    identities = set(ids.filter(named).to_pylist())
     columns = [[_cell(site, value, identities) for value in column] for column in values]
     return PageTable(
         header=[printable(name) for name in answer.column_names],

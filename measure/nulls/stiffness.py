@@ -55,7 +55,8 @@ def drawn(rng: np.random.Generator) -> StiffnessFactors:
     stretching = float(np.exp(rng.uniform(*np.log(_STRETCHING))))
     logs = rng.uniform(-math.log(_APART), math.log(_APART), 6)
     logs[3:] -= logs[3:].mean()
-    warp, weft, shear, *bending = (float(factor) for factor in np.exp(logs))
+    warp, weft, shear, first, second, third = (float(factor) for factor in np.exp(logs))
+    bending = (first, second, third)
     return StiffnessFactors(
-        stretching=stretching, warp=warp, weft=weft, shear=shear, bending=tuple(bending)
-    )  # type: ignore[arg-type]
+        stretching=stretching, warp=warp, weft=weft, shear=shear, bending=bending
+    )
