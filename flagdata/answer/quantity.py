@@ -128,7 +128,7 @@ class Quantity:
         recording adds nothing to it.
         """
         if not self.constrained and self.assumed is not None:
-            low, high = (f"{end:.4g}" for end in self.assumed)
+            low, high = (f"{end:.3g}" for end in self.assumed)
             stated = low if low == high else f"{low} to {high}"
             return (
                 f"{stated}{self.suffix}, as given"
@@ -136,12 +136,12 @@ class Quantity:
                 else self._open(f"{stated}{self.suffix}")
             )
         if self.is_bound:
-            return f"{self.span.word(lambda end: f'{end:.4g}', self.suffix)}, {self.span.percent}"
+            return f"{self.span.word(lambda end: f'{end:.3g}', self.suffix)}, {self.span.percent}"
         if self.value is None:
             return self._open(
-                "nothing" if self.assumed is None else "{:.4g} to {:.4g}".format(*self.assumed)
+                "nothing" if self.assumed is None else "{:.3g} to {:.3g}".format(*self.assumed)
             )
-        return f"{self.value:.4g} [{self.span.low:.4g}, {self.span.high:.4g}]{self.suffix}"
+        return f"{self.value:.3g} [{self.span.low:.3g}, {self.span.high:.3g}]{self.suffix}"
 
     @staticmethod
     def _open(assumed: str) -> str:
