@@ -211,7 +211,7 @@ def simulated(patch: pytest.MonkeyPatch, shows: Any) -> None:
     def changed(design: Design, *, folder: Any, workers: int, advance: object) -> FloatArray:
         return shows(design, known(design, folder=folder, workers=workers, advance=advance))
 
-    patch.setattr(calibrate, "simulated", changed)
+    patch.setattr(calibrate, "simulated_values", changed)
 
 
 @pytest.mark.usefixtures("cheap")

@@ -124,8 +124,8 @@ def _silent(kind: str) -> Callable[[pytest.MonkeyPatch], None]:
         return [left for left in _UNFINISHED(lake, needed) if left.kind != kind]
 
     def put(patches: pytest.MonkeyPatch) -> None:
-        patches.setattr(health, "unfinished", unfinished)
-        patches.setattr(collection, "unfinished", unfinished)
+        patches.setattr(health, "find_unfinished", unfinished)
+        patches.setattr(collection, "find_unfinished", unfinished)
 
     return put
 

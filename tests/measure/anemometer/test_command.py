@@ -170,7 +170,7 @@ def test_a_recording_that_cannot_be_looked_at_is_left_out_of_two_and_named(
             )
         return plain(subject, *given, **named)
 
-    monkeypatch.setattr(making, "recorded", recorded)
+    monkeypatch.setattr(making, "windows_of_recording", recorded)
     given = (
         "monday",
         "monday",

@@ -166,7 +166,7 @@ def aligned(
         shell = Transcript(folder=tmp_path)
         (shell.folder / "alignment.png").write_bytes(b"png")
         clock = Recovered(offset=-12.3, low=-13.1, high=-11.5, confidence=1.0, truth=-12.0)
-        monkeypatch.setattr(story, "recovered", lambda *_: clock)
+        monkeypatch.setattr(story, "compare_clock", lambda *_: clock)
         lake = SimpleNamespace(rows=lambda *_, **__: SimpleNamespace(to_pylist=lambda: [{}]))
         monkeypatch.setattr(story.Lake, "open", lambda _: lake)
         made = cast(Any, SimpleNamespace(noted=SimpleNamespace(clock=-12.34), clock_offset=-12.0))

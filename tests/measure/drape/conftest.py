@@ -65,7 +65,7 @@ def scan(coefficient: float, *, lobe: float = 0.0) -> Obj:
 @pytest.fixture
 def cheap(monkeypatch: pytest.MonkeyPatch) -> None:
     """Simulations by the known function."""
-    monkeypatch.setattr(drape_answer, "simulated", simulated)
+    monkeypatch.setattr(drape_answer, "simulated_drapes", simulated)
 
 
 @pytest.fixture

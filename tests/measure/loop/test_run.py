@@ -365,7 +365,7 @@ def test_nulls_are_simulated_by_the_workers_of_a_scheduler(
         asked.append(scheduler)
         return nullcontext(Workers())
 
-    monkeypatch.setattr(banks, "connected", connected)
+    monkeypatch.setattr(banks, "connect_workers", connected)
     banks.build(tmp_path, batches(specimen)[:2], scheduler="tcp://host:8786")
     banks.build(
         tmp_path, batches(specimen)[:2], scheduler="tcp://host:8786"

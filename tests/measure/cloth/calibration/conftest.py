@@ -52,8 +52,8 @@ def cheap() -> Iterator[list[Design]]:
         return known(design, folder=folder, workers=workers, advance=advance)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(calibrate, "simulated", simulated)
-        patch.setattr(calibrate, "corrected", lambda *_, **__: MEASURED)
+        patch.setattr(calibrate, "simulated_values", simulated)
+        patch.setattr(calibrate, "measure_correction", lambda *_, **__: MEASURED)
         patch.setattr(cloth_posterior, "WALKERS", 96)
         patch.setattr(cloth_posterior, "STEPS", 300)
         patch.setattr(cloth_posterior, "CHECK", (32, 120))

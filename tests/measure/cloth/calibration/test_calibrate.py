@@ -265,7 +265,7 @@ def test_too_few_simulations_are_refused(monkeypatch: pytest.MonkeyPatch) -> Non
     def failed(design: Design, **_: object) -> FloatArray:
         return np.full((design.count, 48, len(OBSERVED)), np.nan)
 
-    monkeypatch.setattr(module, "simulated", failed)
+    monkeypatch.setattr(module, "simulated_values", failed)
     with pytest.raises(RefusedError, match="0 of 128 simulations show what the film shows"):
         _found(_observed(0.17))
 
@@ -281,7 +281,7 @@ def test_a_recording_that_simulations_do_not_show_is_left_out_of_two_and_named(
         every = cheaply(design, **given)
         return np.full_like(every, np.nan) if "0.3" in design.recording else every
 
-    monkeypatch.setattr(module, "simulated", half)
+    monkeypatch.setattr(module, "simulated_values", half)
     found = _found(_observed(0.3), _observed(0.17))
     assert [one.observed.name for one in found.recordings] == ["flag 0.17"]
     (left,) = [one for one in found.findings if one.kind == "left-out"]
@@ -299,7 +299,7 @@ def test_what_is_left_has_to_be_long_enough_too(monkeypatch: pytest.MonkeyPatch)
         every = cheaply(design, **given)
         return np.full_like(every, np.nan) if "0.3" in design.recording else every
 
-    monkeypatch.setattr(module, "simulated", half)
+    monkeypatch.setattr(module, "simulated_values", half)
     short = replace(_observed(0.17), readings=_observed(0.17).readings[:6])
     with pytest.raises(
         InputError, match=r"15 s of film have a log beside them; flag 0\.3 is left out: 0 of 128"

@@ -49,7 +49,7 @@ def shown(monkeypatch: pytest.MonkeyPatch) -> None:
             windows=tuple(None if k == 2 else k for k in range(count)), seconds=2.5
         )
 
-    monkeypatch.setattr(filmed, "watched", watched)
+    monkeypatch.setattr(filmed, "watch_film", watched)
     fake = SimpleNamespace(of_film=lambda window: WindowReading(value=float(window)), sigma=0.01)
     monkeypatch.setattr(filmed, "OBSERVABLES", dict.fromkeys(OBSERVED, fake))
 
@@ -109,7 +109,7 @@ def _named(patch: pytest.MonkeyPatch, durations: dict[str, float]) -> None:
         raise AssertionError("pictures are read")
 
     patch.setattr(filmed, "subjects", subjects)
-    patch.setattr(filmed, "watched", watched)
+    patch.setattr(filmed, "watch_film", watched)
 
 
 def test_films_that_are_together_too_short_are_refused_before_a_picture_is_read(
