@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from tests.flagdata.lake.test_healing import cut, flip, lose
+from tests.flagdata.lake.test_remaking import cut, flip, lose
 
 from flagdata.core.schema import Kind
 from flagdata.lake import Artifact, Catalog, Lake, Objects, clone, expire, transfer

@@ -160,7 +160,7 @@ def test_a_recording_that_cannot_be_looked_at_is_left_out_of_two_and_named(
     lake: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Before the first film is looked at its camera is found to be lost."""
-    plain, asked = making.recorded, list[str]()
+    plain, asked = making.windows_of_recording, list[str]()
 
     def recorded(subject: Any, *given: Any, **named: Any) -> Any:
         asked.append(subject.film.name)

@@ -275,7 +275,7 @@ def test_a_recording_that_simulations_do_not_show_is_left_out_of_two_and_named(
     monkeypatch: pytest.MonkeyPatch, plain: Calibration
 ) -> None:
     """The weight is that of the other alone."""
-    cheaply = module.simulated
+    cheaply = module.simulated_values
 
     def half(design: Design, **given: Any) -> FloatArray:
         every = cheaply(design, **given)
@@ -293,7 +293,7 @@ def test_a_recording_that_simulations_do_not_show_is_left_out_of_two_and_named(
 
 @pytest.mark.usefixtures("cheap")
 def test_what_is_left_has_to_be_long_enough_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    cheaply = module.simulated
+    cheaply = module.simulated_values
 
     def half(design: Design, **given: Any) -> FloatArray:
         every = cheaply(design, **given)
