@@ -8,11 +8,11 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from tests.flagdata.lake.test_remaking import cut, flip, lose
 
 from flagdata.core.schema import Kind
 from flagdata.lake import Artifact, Catalog, Lake, Objects, clone, expire, transfer
 from tests.flagdata.lake.conftest import overwrite, put_older_ref
+from tests.flagdata.lake.test_remaking import cut, flip, lose
 from tests.flagdata.lake.test_transfer import no_bar
 from tests.flagdata.lake.test_unfinished import stopped
 from tests.remedies.user import User
