@@ -125,7 +125,7 @@ flags = flagdata.simulate(
     scene={"columns": 4}, wind={"speed": 3.0}, time={"settle": 0.0, "frames": 2},
     effects={"lift": {"coefficient": 1.0}},
 )
-own = import_module("flagdata._packages.sim.effects.files").load("own.py:Denser")
+own = import_module("flagdata._packages.sim.effects.effect_files").load("own.py:Denser")
 film = flagdata.render(flags[0], width=32, height=32, parameters={"raster_samples": 1})
 try:
     flagdata.measure(film)
