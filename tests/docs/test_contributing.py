@@ -129,20 +129,20 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return copy
 
 
-def write_line(path: Path, line: str, *, below: str) -> None:
-    """Write a line of the walk below the only line that begins so."""
+def write_line(path: Path, line: str, *, above: str) -> None:
+    """Write a line of the walk above the only line that begins so."""
     text = path.read_text(encoding="utf-8")
-    (first,) = re.findall(rf"^ *{re.escape(below)}.*$", text, flags=re.MULTILINE)
-    path.write_text(text.replace(first, f"{first}\n{line.rstrip()}", 1), encoding="utf-8")
+    (first,) = re.findall(rf"^ *{re.escape(above)}.*$", text, flags=re.MULTILINE)
+    path.write_text(text.replace(first, f"{line.rstrip()}\n{first}", 1), encoding="utf-8")
 
 
 def test_the_log_format_of_the_walk_is_read_once_its_steps_are_done(checkout: Path) -> None:
     described, registry = f"{FORMATS}/described.py", f"{FORMATS}/log_formats.py"
     file = "catalogs/sensors/formats/harbour.toml"
     (checkout / file).write_text(block(file), encoding="utf-8")
-    write_line(checkout / described, block(described), below="Zentra = ")
-    write_line(checkout / registry, f"    {block(f'FORMATS in {registry}')}", below='"zentra": ')
-    write_line(checkout / CLAIMS, f"    {block(f'SAMPLES in {CLAIMS}')}", below='"zentra": ')
+    write_line(checkout / described, block(described), above="Zentra = ")
+    write_line(checkout / registry, f"    {block(f'FORMATS in {registry}')}", above='"zentra": ')
+    write_line(checkout / CLAIMS, f"    {block(f'SAMPLES in {CLAIMS}')}", above='"zentra": ')
     (line,) = re.findall(r"`(shows\(.*?\))`", walk("A log format"))
     (checkout / "tests/flagdata/ingest/anemometer/test_harbour.py").write_text(
         VALUES.format(line=line)
