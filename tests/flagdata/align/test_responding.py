@@ -48,7 +48,7 @@ def test_what_the_user_states_counts(
 
     def estimate(*given: Any, search: LagSearch, generator: object) -> Any:
         searched.append(search)
-        return SimpleNamespace(accepted=False)
+        return SimpleNamespace(is_accepted=False)
 
     times = np.array([0, 150]) * NANOSECONDS
     average = SimpleNamespace(speed=np.array([2.0, 4.0]), time=times, period=1.0)
