@@ -52,7 +52,7 @@ def test_one_of_several_topics_is_chosen(user: User) -> None:
 def test_another_topic_is_ingested_from_the_same_file(user: User) -> None:
     two_cameras(user.folder / "a.mcap")
     user.meets(
-        "mcap/pictures.py",
+        "mcap/mcap_pictures.py",
         "ingest the file again wi",
         "ingest",
         "a.mcap",
@@ -69,7 +69,7 @@ def test_another_topic_is_ingested_from_the_same_file(user: User) -> None:
 def test_a_topic_of_depths_is_left_for_one_of_grays(user: User) -> None:
     two_cameras(user.folder / "a.mcap", depth=True)
     user.meets(
-        "mcap/pictures.py",
+        "mcap/mcap_pictures.py",
         "choose a topic of grays",
         "ingest",
         "a.mcap",
@@ -83,7 +83,7 @@ def test_a_topic_of_depths_is_left_for_one_of_grays(user: User) -> None:
 def test_pictures_with_stamps_need_no_rate(user: User) -> None:
     film(user.folder / "a.mcap", range(20))
     user.meets(
-        "mcap/pictures.py",
+        "mcap/mcap_pictures.py",
         "leave out --sequence-fps",
         "ingest",
         "a.mcap",
@@ -211,7 +211,13 @@ def test_another_stream_of_a_film_is_chosen(user: User) -> None:
             container.mux(stream.encode(None))
     start = ("--start", "2026-05-01T12:00:00Z")
     user.meets(
-        "camera/video.py", "choose another with --st", "ingest", "two.mkv", *start, "--stream", 0
+        "camera/video_file.py",
+        "choose another with --st",
+        "ingest",
+        "two.mkv",
+        *start,
+        "--stream",
+        0,
     )
     user.leaves(["--stream"])
     user.succeeds("ingest", "two.mkv", *start, "--stream", 1, shows="stream 1 was taken")
@@ -227,7 +233,7 @@ def test_the_rate_that_a_phone_took_is_given(user: User) -> None:
             image = np.full((48, 64), 40 + 3 * k, np.uint8)
             container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="gray")))
         container.mux(stream.encode(None))
-    fix = user.meets("camera/video.py", "give the camera's rate:", "ingest", "slow.mov")
+    fix = user.meets("camera/video_file.py", "give the camera's rate:", "ingest", "slow.mov")
     user.again(*fix[fix.index("--true-fps") :].split())
 
 

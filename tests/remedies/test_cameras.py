@@ -27,7 +27,7 @@ SET = "export lerobot --to set --frames png --where \"name in ('first', 'second'
 """A data set of two episodes."""
 CASES = [
     Case(
-        "camera/start.py",
+        "camera/recording_start.py",
         "declare its wind (flagdata declare)",
         "ingest second.mp4 --start unknown",
         (
@@ -37,14 +37,14 @@ CASES = [
         ),
     ),
     Case(
-        "camera/lerobot.py",
+        "camera/lerobot_camera.py",
         "choose one: --episode 0 to",
         "ingest set --rate native",
         ("ingest set --rate native --episode 1",),
         before=("ingest second.mp4", SET),
     ),
     Case(
-        "camera/lerobot.py",
+        "camera/lerobot_camera.py",
         "leave out --sequence-fps",
         "ingest set --rate native --episode 0 --sequence-fps 25",
         ("ingest set --rate native --episode 0",),
@@ -67,7 +67,9 @@ def test_one_of_several_cameras_of_a_data_set_is_chosen(user: User) -> None:
     (camera,) = (name for name, one in described["features"].items() if one["dtype"] == "image")
     described["features"][f"{camera}.other"] = described["features"][camera]
     info.write_text(json.dumps(described))
-    user.meets("camera/lerobot.py", "choose one: --topic NAME", "ingest", "set", "--rate", "native")
+    user.meets(
+        "camera/lerobot_camera.py", "choose one: --topic NAME", "ingest", "set", "--rate", "native"
+    )
     user.again("--topic", camera)
 
 
@@ -109,7 +111,12 @@ def pictures(folder: Path, *, taken: str = "") -> None:
 def test_the_zone_of_a_cameras_clock_is_named(user: User) -> None:
     pictures(user.folder / "pics", taken="2026:05:01 12:00:00")
     user.meets(
-        "camera/start.py", ", or --zone, the zone of", "ingest", "pics", "--sequence-fps", 25
+        "camera/recording_start.py",
+        ", or --zone, the zone of",
+        "ingest",
+        "pics",
+        "--sequence-fps",
+        25,
     )
     user.again("--zone", "+02:00", shows="2026-05-01T10:00:00Z")
 
@@ -130,7 +137,9 @@ def test_a_rate_that_lets_pictures_last_for_days_is_given_anew(user: User) -> No
 
 def test_the_start_of_a_film_whose_gps_had_no_fix_is_given(user: User) -> None:
     with_telemetry(user.folder / "a.mp4", [until_hero10(second, fix=0) for second in range(2)])
-    user.meets("camera/video.py", "if that clock was not se", "ingest", "a.mp4", "--rate", "native")
+    user.meets(
+        "camera/video_file.py", "if that clock was not se", "ingest", "a.mp4", "--rate", "native"
+    )
     user.again(*START, shows="2026-05-01T12:00:00Z, from option")
 
 
@@ -150,7 +159,7 @@ def test_a_take_after_the_clock_started_anew_is_ingested_by_itself(user: User) -
 
     first, second = take("one.ts", 5000), take("two.ts", 4000)
     (user.folder / "both.ts").write_bytes(first + second)
-    user.meets("camera/clock.py", "cut the file there and i", "ingest", "both.ts", *START)
+    user.meets("camera/container_clock.py", "cut the file there and i", "ingest", "both.ts", *START)
     user.follows("ingest", "two.ts", "--start", "2026-05-01T12:01:00Z", shows="frames +20 ")
 
 
@@ -165,7 +174,7 @@ def test_a_topic_whose_pictures_are_whole_is_chosen(user: User) -> None:
                     camera, at, broken if topic == "/left" else compressed(at, k, said="png"), at
                 )
     command = ("ingest", "a.mcap", "--rate", "native", "--topic")
-    user.meets("mcap/pictures.py", "choose another topic: --", *command, "/left")
+    user.meets("mcap/mcap_pictures.py", "choose another topic: --", *command, "/left")
     user.follows(*command, "/right")
 
 
@@ -190,7 +199,7 @@ def test_what_is_whole_of_a_damaged_bag_is_saved(user: User, damage: str) -> Non
     command = ("ingest", "a.mcap", "--rate", "native")
     if damage == "cut":
         Path("a.mcap").write_bytes(data[:-500])
-        user.meets("mcap/layout.py", "salvage what is whole: f", *command)
+        user.meets("mcap/mcap_layout.py", "salvage what is whole: f", *command)
     else:
         chunks = [at for at in range(len(data)) if data[at : at + 4] == ZSTANDARD]
         middle = chunks[len(chunks) // 2] + 40

@@ -41,14 +41,20 @@ def cloth(user: User, monkeypatch: pytest.MonkeyPatch) -> str:
 
 def test_a_speed_has_an_axis(user: User, cloth: str) -> None:
     command = ("close-loop", cloth, *PINS, *MATERIAL, "--wind", 5)
-    user.meets("closing/sources.py", "give --axis, not --north", *command, "--north", 10)
+    user.meets("closing/verdict_sources.py", "give --axis, not --north", *command, "--north", 10)
     user.follows(*command, *AXIS, code=3, shows=BEGINS)
 
 
 def test_options_of_a_log_are_left_out_where_none_is(user: User, cloth: str) -> None:
     command = ("close-loop", cloth, *PINS, *MATERIAL, *AXIS)
     user.meets(
-        "closing/sources.py", "leave it out, or name a", *command, "--wind", 5, "--zone", "UTC"
+        "closing/verdict_sources.py",
+        "leave it out, or name a",
+        *command,
+        "--wind",
+        5,
+        "--zone",
+        "UTC",
     )
     user.follows(*command, "--wind", "second.csv", "--zone", "UTC", code=3, shows=BEGINS)
 
@@ -66,7 +72,9 @@ def test_what_is_not_known_of_a_cloth_is_named(user: User, cloth: str) -> None:
 
 def test_what_is_no_mesh_sequence_is_one_that_is_listed(user: User, cloth: str) -> None:
     rest = ("--wind", 5, *AXIS, *PINS, *MATERIAL)
-    user.meets("observe/meshes.py", "name a mesh sequence; fl", "close-loop", "mast", *rest)
+    user.meets(
+        "observe/mesh_observations.py", "name a mesh sequence; fl", "close-loop", "mast", *rest
+    )
     user.follows("ls", shows=f"meshes +{cloth}")
     ended = user.types("close-loop", cloth, *rest)
     assert BEGINS in ended.err

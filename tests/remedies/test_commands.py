@@ -19,7 +19,7 @@ AWAY = "".join(
 """A log whose zone is not in it."""
 CASES = [
     Case(
-        "commands/catalog.py",
+        "commands/catalog_names.py",
         "says what each is",
         "catalog exports csv",
         ("catalog exports",),
@@ -33,14 +33,14 @@ CASES = [
         shows="camera +first",
     ),
     Case(
-        "align/recording.py",
+        "align/film_recording.py",
         "flagdata align CAMERA WIND takes",
         "align mast first --by stamps --offset-sigma 0.1",
         ("ls", STAMPS),
         shows="camera +first(.|\n)*wind +mast",
     ),
     Case(
-        "align/recording.py",
+        "align/film_recording.py",
         "see flagdata ls --kind recording",
         "realign mast --by stamps --offset-sigma 1",
         ("ls --kind recording", "realign first --by given --clock-offset 1 --offset-sigma 0.1"),
@@ -49,7 +49,7 @@ CASES = [
         untried="align",
     ),
     Case(
-        "align/recording.py",
+        "align/film_recording.py",
         "say by --session which",
         "align one two --by stamps --offset-sigma 0.1",
         ("align one two --by stamps --offset-sigma 0.1 --session both",),
@@ -120,7 +120,12 @@ CASES = [
         "ingest second.mp4 --crop-picture crop.png",
         ("ingest second.mp4 --crop-picture crop.png --crop auto",),
     ),
-    Case("commands/lake.py", "give FOLDER or --lake, not both", "init x --lake y", ("init x",)),
+    Case(
+        "commands/lake_versions.py",
+        "give FOLDER or --lake, not both",
+        "init x --lake y",
+        ("init x",),
+    ),
     Case(
         "api/lake_verbs.py",
         "leave it out, or see --help",
@@ -136,7 +141,7 @@ CASES = [
         shows="--discard",
     ),
     Case(
-        "commands/lake.py",
+        "commands/lake_versions.py",
         "leave out --branch",
         "withdraw mast --everywhere --branch side -m x",
         ("withdraw mast --everywhere -m x",),
@@ -178,20 +183,20 @@ CASES = [
         shows="healthy",
     ),
     Case(
-        "export/plan.py",
+        "export/export_plan.py",
         "try the filter with flagdata query",
         "export csv --to out --where \"name = 'mist'\"",
         ("query --where \"name like 'm%'\"", "export csv --to out --where \"name = 'mast'\""),
         shows="mast",
     ),
     Case(
-        "export/plan.py",
+        "export/export_plan.py",
         "choose what it holds: --where",
         "export csv --to out",
         ("export csv --to out --where \"kind in ('clip', 'recording', 'wind')\"",),
     ),
     Case(
-        "export/plan.py",
+        "export/export_plan.py",
         "choose what it holds: --where",
         "export mp4 --to out",
         ("export mp4 --to out --where \"kind in ('camera')\"",),
@@ -303,7 +308,7 @@ def test_salt_is_of_a_side(user: User) -> None:
     user.leaves(["--split"])
     (user.folder / "out").rename(user.folder / "all")
     user.meets(
-        "export/plan.py",
+        "export/export_plan.py",
         "choose another side by --split",
         *command,
         "--salt",

@@ -28,7 +28,9 @@ def changed(user: User, name: str, data: bytes | None = None) -> str:
 
 def test_a_damaged_frame_is_listed_by_verify_and_the_others_are_saved(user: User) -> None:
     name = changed(user, "first")
-    user.meets("record/checksums.py", "save the rest of it: flagdata recover", *STAMPS.split())
+    user.meets(
+        "record/record_checksums.py", "save the rest of it: flagdata recover", *STAMPS.split()
+    )
     user.follows("verify", code=3, shows=f"object-changed: the bytes of {name}")
     user.follows("recover", name, "saved.mcap", shows="recovered: 14 messages")
 
@@ -39,7 +41,9 @@ def test_a_record_that_is_damaged_outside_a_lake_comes_in_once_its_rest_is_saved
     user.succeeds("export", "mcap", "--to", "out", "--where", "name = 'first'")
     (record,) = (user.folder / "out").glob("*.mcap")
     record.write_bytes(flipped(record.read_bytes()))
-    user.meets("record/checksums.py", "save the rest of it: flagdata recover", "ingest", record)
+    user.meets(
+        "record/record_checksums.py", "save the rest of it: flagdata recover", "ingest", record
+    )
     user.follows("recover", record, "saved.mcap")
     user.succeeds("ingest", "saved.mcap")
     user.leaves(["verify"])
@@ -48,7 +52,7 @@ def test_a_record_that_is_damaged_outside_a_lake_comes_in_once_its_rest_is_saved
 def test_a_record_that_was_cut_off_is_saved(user: User) -> None:
     cut = (user.folder / "cut.mcap").read_bytes()
     name = changed(user, "first", cut)
-    user.meets("record/container.py", "run `flagdata recover` on the file", *STAMPS.split())
+    user.meets("record/mcap_container.py", "run `flagdata recover` on the file", *STAMPS.split())
     user.follows("recover", name, "saved.mcap", shows="recovered")
 
 

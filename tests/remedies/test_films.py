@@ -18,9 +18,11 @@ FILM = "ingest second.mp4"
 CASES = [
     Case("camera/stream.py", "leave out --topic", f"{FILM} --topic x", (FILM,)),
     Case("camera/stream.py", "leave out --episode", f"{FILM} --episode 2", (FILM,)),
-    Case("camera/container.py", "give --stream ", f"{FILM} --stream 3", (f"{FILM} --stream 0",)),
     Case(
-        "camera/container.py",
+        "camera/video_container.py", "give --stream ", f"{FILM} --stream 3", (f"{FILM} --stream 0",)
+    ),
+    Case(
+        "camera/video_container.py",
         "or give --true-fps HZ if a high-speed camera",
         f"{FILM} --sequence-fps 25",
         (FILM, OR, f"{FILM} --true-fps 100"),
@@ -32,7 +34,7 @@ CASES = [
         (f"{FILM} --crop auto",),
     ),
     Case(
-        "camera/start.py",
+        "camera/recording_start.py",
         "or align the recording by its contents",
         FILM,
         (f"{FILM} --start 2026-05-01T10:00:00Z",),
@@ -44,14 +46,14 @@ CASES = [
         (f"{FILM} --exposure 0.002", OR, f"{FILM} --exposure 0.1 --true-fps 5"),
     ),
     Case(
-        "markers/table.py",
+        "markers/marker_table.py",
         "give the frames per second by --rate",
         "ingest frames.csv",
         ("ingest frames.csv --rate 25",),
     ),
     Case("meshes/folder.py", "give it by --rate", "ingest meshes", ("ingest meshes --rate 25",)),
     Case(
-        "meshes/store.py",
+        "meshes/mesh_artifacts.py",
         "name the unit of the positions by --unit",
         "ingest meshes --rate 25 --unit mm",
         ("ingest meshes --rate 25 --unit m",),
@@ -97,7 +99,7 @@ def test_a_cloth_whose_texture_is_in_millimetres_is_exported_in_metres(user: Use
     assert "a cloth of 500 m by its texture coordinates" in refused.err
     assert "fix:   export it with texture coordinates in metres\n" in refused.err
     export("mm", "m")
-    user.meets("meshes/store.py", "name the unit of the positions by --unit", *command)
+    user.meets("meshes/mesh_artifacts.py", "name the unit of the positions by --unit", *command)
     user.again("--unit", "mm")
     export("m", "m")
     user.succeeds(*command)
@@ -127,7 +129,9 @@ def test_pictures_need_a_rate_and_a_start(user: User, pictures: list[Image.Image
         "2026-05-01T12:00:00+02:00",
     )
     user.again(*rate)
-    fix = user.meets("camera/start.py", "give --start with a zone, e.g.", "ingest", "pics", *rate)
+    fix = user.meets(
+        "camera/recording_start.py", "give --start with a zone, e.g.", "ingest", "pics", *rate
+    )
     user.again(*fix[fix.index("--start 2") :].split()[:2])
     user.meets(
         "camera/stream.py",
@@ -147,12 +151,12 @@ def test_the_rate_of_a_gif_is_given(user: User, pictures: list[Image.Image]) -> 
     pictures[0].save(user.folder / "a.gif", save_all=True, append_images=pictures[1:], duration=40)
     start = ("--start", "2026-05-01T12:00:00Z")
     user.meets(
-        "camera/video.py", "if the camera's rate is known, give it", "ingest", "a.gif", *start
+        "camera/video_file.py", "if the camera's rate is known, give it", "ingest", "a.gif", *start
     )
     user.again("--true-fps", 25)
     pictures[0].save(user.folder / "b.gif", save_all=True, append_images=pictures[1:], duration=0)
     user.meets(
-        "camera/video.py", "give the rate at which the camera ran", "ingest", "b.gif", *start
+        "camera/video_file.py", "give the rate at which the camera ran", "ingest", "b.gif", *start
     )
     user.again("--true-fps", 25)
 
@@ -172,7 +176,7 @@ def test_a_raw_stream_is_a_film_whose_rate_is_given(user: User, form: tuple[str,
             container.mux(stream.encode(image.reformat(format=pixels)))
         container.mux(stream.encode(None))
     start = ("--start", "2026-05-01T12:00:00Z")
-    user.meets("camera/container.py", "give the camera's frame", "ingest", name, *start)
+    user.meets("camera/video_container.py", "give the camera's frame", "ingest", name, *start)
     user.again("--sequence-fps", 50, shows=r"\(0.560 s\)")
 
 

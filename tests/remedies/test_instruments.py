@@ -201,7 +201,7 @@ CASES = [
         files={"a.log": UNSTAMPED},
     ),
     Case(
-        "instants/clock.py",
+        "instants/log_clock.py",
         "to let those rows end wh",
         "ingest a.csv",
         ("ingest a.csv --clock last",),
@@ -269,14 +269,14 @@ CASES = [
         files={"a.csv": ELAPSED, "FILE.toml": by("elapsed-s")},
     ),
     Case(
-        "anemometer/log.py",
+        "anemometer/anemometer_log.py",
         "give the day of the firs",
         "ingest a.log",
         ("ingest a.log --date 2026-05-01 --zone UTC",),
         files={"a.log": OF_DAY},
     ),
     Case(
-        "anemometer/log.py",
+        "anemometer/anemometer_log.py",
         "give the day of the firs",
         "ingest a.log",
         ("ingest a.log --date 2026-02-28 --zone UTC",),
@@ -501,6 +501,6 @@ def test_letters_of_another_encoding_are_read_by_the_one_that_is_named(user: Use
         PLAIN.replace("Z,4.0", "Z,4.0,25 \N{DEGREE SIGN}C").encode("cp1252")
     )
     user.meets(
-        "text/source.py", "name the encoding, e.g.", "ingest", "a.csv", "--sensor", "generic-csv"
+        "text/text_file.py", "name the encoding, e.g.", "ingest", "a.csv", "--sensor", "generic-csv"
     )
     user.again("--encoding", "cp1252")

@@ -53,7 +53,7 @@ def cut(user: User, film: str) -> str:
 
 def test_a_refinement_needs_the_size_of_the_flag(user: User) -> None:
     user.meets(
-        "estimate/options.py",
+        "estimate/measuring_options.py",
         "give --flag-size, length along the wind",
         "measure",
         "second.mp4",
@@ -66,7 +66,14 @@ def test_a_refinement_needs_the_size_of_the_flag(user: User) -> None:
 def test_a_weight_that_the_model_does_not_know_is_given_within_its_range(
     user: User, command: tuple[str, ...]
 ) -> None:
-    user.meets("estimate/options.py", ", and --flag-size", *command, "--area-weight", 9, "--anyway")
+    user.meets(
+        "estimate/measuring_options.py",
+        ", and --flag-size",
+        *command,
+        "--area-weight",
+        9,
+        "--anyway",
+    )
     user.follows(*command, *SIZED, "--area-weight", 0.12, "--anyway", shows=WIND)
 
 
@@ -87,7 +94,7 @@ def test_a_weight_that_only_some_sizes_allow_needs_the_size(
     user: User, command: tuple[str, ...]
 ) -> None:
     user.meets(
-        "estimate/measuring.py",
+        "estimate/film_measuring.py",
         "give --flag-size LENGTHxHEIGHT",
         *command,
         "--area-weight",
@@ -115,7 +122,7 @@ def test_a_fabric_of_two_weights_is_given_by_its_weight(
                 )
             )
     given = (*command, *SIZED, "--anyway")
-    user.meets("estimate/material.py", "give --area-weight", *given, "--material", "linen")
+    user.meets("estimate/named_cloth.py", "give --area-weight", *given, "--material", "linen")
     user.follows(*given, "--area-weight", 0.12, shows=WIND)
 
 
@@ -156,7 +163,11 @@ def test_one_of_several_flags_is_chosen(user: User, command: tuple[str, ...]) ->
         beside(pictures(48, height=40, width=56), pictures(48, height=40, width=56, seed=4)),
     )
     user.meets(
-        "film/conditioned.py", "choose another by --flag, as numbered", *command, *SIZED, "--anyway"
+        "film/conditioned_film.py",
+        "choose another by --flag, as numbered",
+        *command,
+        *SIZED,
+        "--anyway",
     )
     user.succeeds(*command, *SIZED, "--anyway", "--report", "page.html")
     assert (user.folder / "page.html").exists()

@@ -41,21 +41,21 @@ CASES = [
         code=1,
     ),
     Case(
-        "film/source.py",
+        "film/film_source.py",
         "see flagdata measure --help",
         "measure",
         ("measure --help",),
         shows="--query",
     ),
     Case(
-        "film/source.py",
+        "film/film_source.py",
         "look with flagdata query --where",
         "measure --query \"name = 'mist'\"",
         ("query --where \"name = 'first'\"",),
         shows="first",
     ),
     Case(
-        "datasets/recipe.py",
+        "datasets/dataset_recipe.py",
         "or more: ",
         f"{BUILD} --sequences 2",
         (f"{BUILD} --sequences 3",),
@@ -63,7 +63,7 @@ CASES = [
         code=2,
     ),
     Case(
-        "datasets/recipe.py",
+        "datasets/dataset_recipe.py",
         "or more, or --sequences",
         f"{BUILD} --films 300",
         (f"{BUILD} --films 400", OR, f"{BUILD} --films 300 --sequences 300"),
@@ -71,7 +71,7 @@ CASES = [
         code=2,
     ),
     Case(
-        "datasets/command.py",
+        "datasets/build_command.py",
         "leave --card out",
         f"{BUILD} --shard 1/2 --card card.html",
         (f"{BUILD} --shard 1/2",),
@@ -79,7 +79,7 @@ CASES = [
         code=2,
     ),
     Case(
-        "evaluation/report.py",
+        "evaluation/evaluation_report.py",
         "give a name, and the fol",
         "evaluate shipped --name out/table",
         ("evaluate shipped --name table --out out",),
@@ -113,7 +113,7 @@ def test_what_a_remedy_says_heals(case: Case, user: User, monkeypatch: pytest.Mo
 
 def test_a_film_without_a_log_is_aligned_before_it_is_calibrated(user: User) -> None:
     user.meets(
-        "cloth/sources.py",
+        "cloth/flag_recordings.py",
         "and name the recording that comes out",
         "calibrate",
         "first",
@@ -130,5 +130,5 @@ def test_a_film_without_a_log_is_aligned_before_it_is_calibrated(user: User) -> 
 def test_a_query_of_clips_needs_a_lake(user: User, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("FLAGDATA_LAKE")
     command = ("measure", "--query", "kind = 'clip'")
-    user.meets("film/source.py", "name the lake by --lake", *command)
+    user.meets("film/film_source.py", "name the lake by --lake", *command)
     user.follows(*command, "--lake", "lake", code=1, shows="no clip matches")

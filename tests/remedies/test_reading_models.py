@@ -79,11 +79,19 @@ def test_a_film_is_read_by_the_model_that_was_calibrated(
     command = ("measure", "monday", "--model", "garden")
     user.follows(*command, shows=READ)
     user.meets(
-        "anemometer/measuring.py", "out, or choose a networ", *command, "--area-weight", "0.1"
+        "anemometer/anemometer_measuring.py",
+        "out, or choose a networ",
+        *command,
+        "--area-weight",
+        "0.1",
     )
     user.again(without="--area-weight", shows=READ)
     user.meets(
-        "anemometer/measuring.py", "check --flag-size, or ca", *command, "--flag-size", "3x1"
+        "anemometer/anemometer_measuring.py",
+        "check --flag-size, or ca",
+        *command,
+        "--flag-size",
+        "3x1",
     )
     user.again(without="--flag-size", shows=READ)
     shown(monkeypatch, seed=1, where=place(seed=9))
@@ -99,7 +107,9 @@ def test_what_does_not_follow_the_wind_may_be_another_flag(
     user: User, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shown(monkeypatch, seed=5)
-    user.meets("anemometer/calibration.py", "check the flag with --cr", *CALIBRATE, "garden")
+    user.meets(
+        "anemometer/reading_calibration.py", "check the flag with --cr", *CALIBRATE, "garden"
+    )
     shown(monkeypatch, seed=1)
     user.follows(*CALIBRATE, "garden", "--flag", 2, shows="--model garden")
     user.leaves(["--crop", "align"])
@@ -110,7 +120,11 @@ def test_a_film_is_calibrated_beside_its_log(user: User) -> None:
     film("tuesday", Kind.CAMERA)
     options = ("--only", "anemometer", *SIZED)
     user.meets(
-        "anemometer/calibration.py", "align a film and a log (", "calibrate", "tuesday", *options
+        "anemometer/reading_calibration.py",
+        "align a film and a log (",
+        "calibrate",
+        "tuesday",
+        *options,
     )
     aligned = user.follows(
         "align", "tuesday", "mast", "--by", "stamps", "--offset-sigma", "0.1", "--json"

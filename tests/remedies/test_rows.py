@@ -89,9 +89,9 @@ MADE = {
 }
 """What makes each kind that is changed; a clip is `add_clip`'s."""
 CHANGES = [
-    (Case("export/source.py", "run flagdata doctor", EXPORT), Kind.CAMERA, "object", None),
+    (Case("export/export_source.py", "run flagdata doctor", EXPORT), Kind.CAMERA, "object", None),
     (
-        Case("export/source.py", "names the rows that are damaged", EXPORT),
+        Case("export/export_source.py", "names the rows that are damaged", EXPORT),
         Kind.CLIP,
         "frame_count",
         9000,

@@ -92,7 +92,7 @@ CASES = [
         shows=WEIGHED,
     ),
     Case(
-        "cloth/sources.py",
+        "cloth/flag_recordings.py",
         "name the log: --log ARTIFACT --lake LAKE",
         f"calibrate t.csv {SIZED} --clock-offset 1777629605±0.1",
         (f"{JOINED} --lake lake",),
@@ -100,7 +100,7 @@ CASES = [
         shows=WEIGHED,
     ),
     Case(
-        "cloth/tables.py",
+        "cloth/tables_of_observables.py",
         "give the wind in the table or as a log",
         f"calibrate t.csv {SIZED}",
         (JOINED,),
@@ -108,7 +108,7 @@ CASES = [
         shows=WEIGHED,
     ),
     Case(
-        "cloth/sources.py",
+        "cloth/flag_recordings.py",
         "leave both out; flagdata observe takes them",
         f"calibrate t.csv {SIZED} --crop 0,0,9,9",
         ("observe --help", f"calibrate t.csv {SIZED}"),
@@ -116,7 +116,7 @@ CASES = [
         shows="--crop",
     ),
     Case(
-        "drape/answer.py",
+        "drape/drape_answer.py",
         "or leave --area-weight out",
         "calibrate t.csv --area-weight 0.2",
         (f"calibrate t.csv {SIZED}",),
@@ -132,7 +132,7 @@ CASES = [
         shows=WEIGHED,
     ),
     Case(
-        "cloth/recording.py",
+        "cloth/observed_recording.py",
         "add recordings in other winds",
         f"calibrate t.csv {SIZED}",
         (f"calibrate t.csv u.csv {SIZED}",),
@@ -140,7 +140,7 @@ CASES = [
         shows=WEIGHED,
     ),
     Case(
-        "cloth/wind.py",
+        "cloth/blown_wind.py",
         "choose a part of the fil",
         f"calibrate long.csv {SIZED} --log mast --clock-offset 1777629605±0.1",
         (
@@ -153,7 +153,7 @@ CASES = [
         shows=WEIGHED,
     ),
     Case(
-        "cloth/wind.py",
+        "cloth/blown_wind.py",
         "choose a part without ga",
         f"calibrate t.csv {SIZED} --log gap --clock-offset 1777629605±0.1",
         (f"calibrate t.csv {SIZED} --log gap --clock-offset 1777629605±0.1 --start 0s --end 60s",),
@@ -165,7 +165,7 @@ CASES = [
         shows=WEIGHED,
     ),
     Case(
-        "cloth/recording.py",
+        "cloth/observed_recording.py",
         "choose others with --start and --end",
         f"calibrate t.csv {SIZED}",
         (f"calibrate t.csv {SIZED} --start 60s --end 150s",),
@@ -184,7 +184,9 @@ def test_what_a_remedy_says_heals(case: Case, user: User) -> None:
 def test_a_log_of_a_table_is_in_a_lake(user: User, monkeypatch: pytest.MonkeyPatch) -> None:
     (user.folder / "t.csv").write_text(DROOPING)
     monkeypatch.delenv("FLAGDATA_LAKE")
-    user.meets("cloth/sources.py", "name the lake that it was ingested into", *JOINED.split())
+    user.meets(
+        "cloth/flag_recordings.py", "name the lake that it was ingested into", *JOINED.split()
+    )
     user.again("--lake", "lake")
 
 
@@ -268,7 +270,7 @@ def test_more_simulations_widen_intervals_that_are_too_narrow(
     monkeypatch.setattr(calibrate, "check_coverage", checked)
     (user.folder / "t.csv").write_text(GUSTY)
     user.meets(
-        "cloth/calibration.py",
+        "cloth/cloth_calibration.py",
         "give more simulations with --simulations",
         "calibrate",
         "t.csv",
@@ -284,7 +286,7 @@ def test_a_flag_from_another_side_looks_like_no_simulated_one(user: User) -> Non
     (user.folder / "t.csv").write_text(GUSTY)
     command = ("calibrate", "t.csv", "--flag-size", "1.5x1.0")
     user.meets(
-        "cloth/calibration.py",
+        "cloth/cloth_calibration.py",
         "look at the readings with flagdata observe",
         *command,
         "--azimuth",

@@ -98,7 +98,7 @@ CASES = [
         files={"a.csv": PLAIN_NAKED},
     ),
     Case(
-        "anemometer/log.py",
+        "anemometer/anemometer_log.py",
         "or state it in a recipe, as [time] zone",
         "ingest a.csv --sensor generic-csv",
         ("ingest a.csv --sensor FILE.toml",),
@@ -198,21 +198,21 @@ CASES = [
         untried="--sensor",
     ),
     Case(
-        "table/table.py",
+        "table/log_table.py",
         "leave out --azimuth; a turned vane",
         "ingest a.csv --azimuth 20",
         ("ingest a.csv",),
         files={"a.csv": ZONED},
     ),
     Case(
-        "text/source.py",
+        "text/opening.py",
         "leave out --topic",
         "ingest a.csv --topic /x",
         ("ingest a.csv",),
         files={"a.csv": ZONED},
     ),
     Case(
-        "text/source.py",
+        "text/text_file.py",
         "name the encoding it is in, e.g. --encoding cp1252",
         "ingest a.csv --encoding ascii --sensor generic-csv",
         ("ingest a.csv --encoding utf-8 --sensor generic-csv",),
@@ -295,7 +295,7 @@ CASES = [
         files={"a.csv": BACK.replace("wind_speed", "wind_speed (m/s)")},
     ),
     Case(
-        "ingest/store.py",
+        "ingest/source_artifacts.py",
         "or take the old one off with flagdata withdraw and ingest again",
         "ingest a.csv --name b",
         ("ingest a.csv", OR, "withdraw a -m name", "ingest a.csv --name b"),
@@ -303,7 +303,7 @@ CASES = [
         before=("ingest a.csv",),
     ),
     Case(
-        "ingest/store.py",
+        "ingest/source_artifacts.py",
         "or take the old one off with flagdata withdraw and ingest again",
         "ingest a.csv --session b",
         ("ingest a.csv", OR, "withdraw a -m name", "ingest a.csv --session b"),
@@ -367,7 +367,9 @@ def test_a_draft_is_confirmed_by_the_hash_that_the_refusal_shows_or_described_by
     user: User,
 ) -> None:
     (user.folder / "a.csv").write_text(COMPONENTS)
-    fix = user.meets("anemometer/confirm.py", "repeat the command with --accept", "ingest", "a.csv")
+    fix = user.meets(
+        "anemometer/log_confirmation.py", "repeat the command with --accept", "ingest", "a.csv"
+    )
     user.follows("ingest", "a.csv", *fix[fix.index("--accept") :].split(";")[0].split())
     ended = user.follows("ingest", "--sniff", "a.csv", shows="the recipe")
     lines = ended.out.partition("name = ")[1] + ended.out.partition("name = ")[2]
@@ -378,15 +380,15 @@ def test_a_draft_is_confirmed_by_the_hash_that_the_refusal_shows_or_described_by
 def test_the_direction_of_components_needs_an_azimuth(user: User) -> None:
     (user.folder / "a.csv").write_text(COMPONENTS)
     command = ("ingest", "a.csv", "--columns", "1=time,2=wind_x[m/s],3=wind_y[m/s]")
-    user.meets("table/table.py", "give the sensor's azimuth for a direction", *command)
+    user.meets("table/log_table.py", "give the sensor's azimuth for a direction", *command)
     user.again("--azimuth", 270)
 
 
 def test_utf_16_without_a_mark_is_read_as_the_encoding_that_is_named(user: User) -> None:
     (user.folder / "a.csv").write_bytes(ZONED.encode("utf-16-le"))
-    user.meets("text/source.py", "name it: --encoding utf-16-le", "ingest", "a.csv")
+    user.meets("text/text_file.py", "name it: --encoding utf-16-le", "ingest", "a.csv")
     user.again("--encoding", "utf-16-le")
-    user.meets("text/source.py", "name it: --encoding utf-16-le", "ingest", "--sniff", "a.csv")
+    user.meets("text/text_file.py", "name it: --encoding utf-16-le", "ingest", "--sniff", "a.csv")
     user.again("--encoding", "utf-16-le")
 
 
@@ -437,7 +439,7 @@ def test_a_table_of_which_most_is_not_read_is_looked_at_by_sniff(user: User) -> 
     (user.folder / "FILE.toml").write_text(recipe)
     (user.folder / "a.csv").write_text(PLAIN + "01.05.2026 13:00:00,4.0\n")
     user.meets(
-        "table/table.py",
+        "table/log_table.py",
         "look at it with flagdata ingest --sniff",
         "ingest",
         "a.csv",

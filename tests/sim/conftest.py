@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import torch
 
+from sim.cloth import Cloth
 from sim.cloth.air import AirForce, QuadraticNormal
-from sim.cloth.cloth_batch import Cloth
 from sim.cloth.handles import Handles
 from sim.cloth.material import Material, isotropic
 from sim.cloth.mesh import Mesh, grid

@@ -30,7 +30,7 @@ from measure.probes import projected_statistics
 from measure.report import as_document, from_document, lead, page
 from measure.report.verdict_words import words
 from measure.verdict import NOT_REJECTED, Conclusion, Verdict, number
-from sim.cloth.cloth_batch import Cloth
+from sim.cloth import Cloth
 from sim.effects import EFFECTS, Effect, ForceEffect, Value, strength
 from sim.workers import Job
 

@@ -18,7 +18,7 @@ from measure.inference import Nulls
 from measure.nulls import NullBank, NullBatch, evaluate
 from measure.observe import Experiment, Specimen
 from measure.propose import Term, columns_of
-from sim.cloth.cloth_batch import Cloth
+from sim.cloth import Cloth
 from sim.effects import Effect, ForceEffect, Value, strength
 
 RATE, DURATION, NOISE, SPEEDS = 25.0, 4.64, 5e-4, (3.5, 4.3, 5.1, 6.0)

@@ -17,9 +17,9 @@ MEASURE = Path(__file__).resolve().parents[3] / "measure"
 STAGES = ("verdict", "forecasting", "probes", "inference", "nulls", "loop", "closing")
 
 METHOD = {
-    "closing/joint": {"_CERTAIN"},
+    "closing/joint_verdict": {"_CERTAIN"},
     "forecasting/alignment": {"_CALM"},
-    "forecasting/calibration": {
+    "forecasting/calibrated_parameters": {
         "_AREA_WEIGHT",
         "_BENDING",
         "_DAMPING",
@@ -31,12 +31,12 @@ METHOD = {
     "forecasting/regressors": {"_MODES", "_MOTIONS"},
     "forecasting/strengths": {"_RANGES", "_SLACK"},
     "forecasting/segments": {"HORIZON", "_SEGMENT", "_SHORTEST", "_WARM_UP"},
-    "probes/course": {"ALONG", "LEFT", "_WINDOW"},
+    "probes/wind_course": {"ALONG", "LEFT", "_WINDOW"},
     "probes/lines": {"REDUCED", "STROUHAL", "_POINTS", "_NEAR", "_EDGE"},
     "probes/settled": {"_EDGE", "_LEAST"},
     "probes/statistics": {"_CHUNK", "_CLIP", "_NEVER", "_NOISE"},
     "probes/wind_log": {"NUISANCES", "DIRECTION", "_STEPS", "_REACH", "_LAGS", "_CALM"},
-    "inference/evidence": {"_HERE"},
+    "inference/segment_evidence": {"_HERE"},
     "inference/random_effect": {"_SHIFTS", "_POWERS", "_UNSEEN"},
     "nulls/bank": {"WINDS", "_VERSION", "_AREA_WEIGHT", "_BENDING", "_DAMPING"},
     "nulls/conformal": {"MOST_KINDS"},
@@ -44,7 +44,7 @@ METHOD = {
     "nulls/stiffness": {"_STRETCHING", "_APART"},
     "nulls/directions": {"APPEARS", "NOTHING"},
     "nulls/reference": {"_GROUPS"},
-    "nulls/simulation": {
+    "nulls/null_simulation": {
         "SETTLE",
         "_FINER",
         "_STEPS",
@@ -62,12 +62,12 @@ METHOD = {
     "loop/refit": {"COUNT", "BEYOND", "_WITHIN_THE_END", "_AT_THE_END"},
     "loop/residuals": {"_SHOWN"},
     "loop/run": {"_FLOOR_COPIES", "_LOOKS"},
-    "loop/selection": {"GUST_COLUMN"},
+    "loop/effect_selection": {"GUST_COLUMN"},
     "loop/validation": {"_DURATION", "_ENOUGH"},
     "verdict/quantity": {"_DIGITS", "_MOST_DIGITS", "_WIDEST", "_NARROWEST"},
-    "nulls/workload": {"_PACE", "_JUDGED"},
-    "closing/artifacts": {"_FORMAT"},
-    "closing/models": {"_SETTLE", "_FRAMES", "_ROUGH"},
+    "nulls/null_workload": {"_PACE", "_JUDGED"},
+    "closing/verdict_artifacts": {"_FORMAT"},
+    "closing/model_recipes": {"_SETTLE", "_FRAMES", "_ROUGH"},
 }
 """Numbers that say what is simulated, how errors are brought down and how it is shown; no verdict
 is decided by one."""
@@ -132,7 +132,7 @@ def test_no_threshold_lives_outside_the_criteria() -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        "loop/selection",
+        "loop/effect_selection",
         "loop/run",
         "loop/refit",
         "nulls/conformal",

@@ -266,7 +266,8 @@ def test_json_and_markdown_hold_the_same_scores(found: Evaluation, tmp_path: Pat
 
 def test_the_tables_are_what_they_were(found: Evaluation) -> None:
     assert changes("evaluate", as_document(found), relative=1e-5) == []
-    assert changes("evaluate-words", {"lines": markdown(found).splitlines()}, relative=0.0) == []
+    lines = [line for line in markdown(found).splitlines() if not line.startswith("flagdata 0.1")]
+    assert changes("evaluate-words", {"lines": lines}, relative=0.0) == []
 
 
 def test_points_of_curves_that_make_no_sense_are_refused() -> None:

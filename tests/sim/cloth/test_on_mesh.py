@@ -6,9 +6,8 @@ import pytest
 import torch
 from torch import Tensor
 
-from sim.cloth import bending, inertia, on_mesh
+from sim.cloth import Cloth, bending, inertia, on_mesh
 from sim.cloth.air import NO_AIR, QuadraticNormal, Stokes, face_wind
-from sim.cloth.cloth_batch import Cloth
 from sim.cloth.material import named_material
 from sim.effects import Permeability, PowerLawDrag
 from tests.sim.conftest import make_system

@@ -11,7 +11,7 @@ import torch
 from scipy.special import k0, k1
 
 from flagdata.core.arrays import FloatArray
-from sim.cloth.cloth_batch import Cloth
+from sim.cloth import Cloth
 from sim.cloth.material import named_material
 from sim.cloth.mesh import grid
 from sim.cloth.scene import assemble, flag

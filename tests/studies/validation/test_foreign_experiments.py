@@ -11,7 +11,7 @@ import torch
 
 from measure.observe import parse
 from measure.verdict import Conclusion
-from sim.cloth.cloth_batch import Cloth
+from sim.cloth import Cloth
 from sim.cloth.material import named_material
 from sim.cloth.membrane import energy as stretching
 from sim.cloth.mesh import grid

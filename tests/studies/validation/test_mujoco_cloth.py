@@ -18,7 +18,7 @@ from scipy.special import j0
 
 from flagdata.core.arrays import FloatArray
 from flagdata.errors import NotFoundError
-from sim.cloth.cloth_batch import Cloth
+from sim.cloth import Cloth
 from sim.cloth.material import named_material
 from sim.cloth.mesh import grid
 from sim.effects import FiniteSpanLoading

@@ -9,7 +9,7 @@ from typing import Annotated
 import torch
 from torch import Tensor
 
-from sim.cloth.cloth_batch import Cloth
+from sim.cloth import Cloth
 from sim.effects import NOT_NEGATIVE, ForceEffect, Value, norm, strength
 
 NET = 10.4

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from flagdata.core.arrays import IntArray
-from sim.cloth.cloth_batch import Cloth
+from sim.cloth import Cloth
 from sim.cloth.mesh import Mesh
 from sim.effects.cloth_geometry import boundary_edges
 

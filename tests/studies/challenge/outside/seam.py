@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 import torch
 
-from sim.cloth.cloth_batch import Cloth
+from sim.cloth import Cloth
 from sim.effects import NOT_NEGATIVE, ClothEffect, Value, strength
 from tests.studies.challenge.outside import places
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import torch
 from torch import Tensor
 
-from sim.cloth.cloth_batch import Cloth
+from sim.cloth import Cloth
 from sim.cloth.state import State
 from sim.cloth.system import System
 from sim.effects import NOT_NEGATIVE, Effect, Value, norm, origin, shape, strength

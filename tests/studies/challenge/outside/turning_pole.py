@@ -7,7 +7,7 @@ from typing import Annotated
 
 from torch import Tensor
 
-from sim.cloth.cloth_batch import Cloth
+from sim.cloth import Cloth
 from sim.cloth.state import State
 from sim.cloth.system import System
 from sim.effects import Effect, Value, horizontal, left_of, origin, strength

@@ -10,8 +10,8 @@ import torch
 from torch import Tensor
 
 from flagdata.core.arrays import FloatArray
+from sim.cloth import Cloth
 from sim.cloth.air import face_wind
-from sim.cloth.cloth_batch import Cloth
 from sim.cloth.mesh import Mesh
 from sim.cloth.state import State
 from sim.cloth.system import System

@@ -9,8 +9,8 @@ from typing import Annotated
 import torch
 from torch import Tensor
 
+from sim.cloth import Cloth
 from sim.cloth.air import face_wind
-from sim.cloth.cloth_batch import Cloth
 from sim.effects import NOT_NEGATIVE, ForceEffect, Value, norm, strength
 
 
