@@ -53,7 +53,7 @@ class Closed:
 
     def _repr_html_(self) -> str:
         effects = {
-            name: f"{strength.name} {strength.text}, {strength.span.percent}"
+            name: f"{strength.name} {strength.text_with_level}"
             for name, strength in self.strengths.items()
         }
         return html.table(

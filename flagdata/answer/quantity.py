@@ -127,25 +127,26 @@ class Quantity:
         """Value and interval, or the bound with its level; what was given or assumed where the
         recording adds nothing to it.
         """
-        if not self.constrained and self.assumed is not None:
-            low, high = (f"{end:.3g}" for end in self.assumed)
-            stated = low if low == high else f"{low} to {high}"
-            return (
-                f"{stated}{self.suffix}, as given"
-                if self.given
-                else self._open(f"{stated}{self.suffix}")
-            )
-        if self.is_bound:
-            return f"{self.span.word(lambda end: f'{end:.3g}', self.suffix)}, {self.span.percent}"
+        if not self.constrained or (self.value is None and not self.is_bound):
+            return self._assumed_text
         if self.value is None:
-            return self._open(
-                "nothing" if self.assumed is None else "{:.3g} to {:.3g}".format(*self.assumed)
-            )
-        return f"{self.value:.3g} [{self.span.low:.3g}, {self.span.high:.3g}]{self.suffix}"
+            return f"{self.span.word(_short, self.suffix)}, {self.span.percent}"
+        low, high = map(_short, self.interval)
+        return f"{_short(self.value)} [{low}, {high}]{self.suffix}"
 
-    @staticmethod
-    def _open(assumed: str) -> str:
-        return f"not determined (assumed: {assumed})"
+    @property
+    def text_with_level(self) -> str:
+        """The same, with the level of an interval too."""
+        is_interval = self.constrained and self.value is not None
+        return f"{self.text}, {self.span.percent}" if is_interval else self.text
+
+    @property
+    def _assumed_text(self) -> str:
+        if self.assumed is None:
+            return "not determined"
+        low, high = map(_short, self.assumed)
+        assumed = f"{low if low == high else f'{low} to {high}'}{self.suffix}"
+        return f"{assumed}, as given" if self.given else f"not determined (assumed: {assumed})"
 
     def as_dict(self) -> dict[str, Any]:
         """Returns JSON values; an end of the interval that nothing bounds is null."""
@@ -161,3 +162,7 @@ class Quantity:
             "constrained": self.constrained,
             "given": self.given,
         }
+
+
+def _short(number: float) -> str:
+    return f"{number:.3g}"

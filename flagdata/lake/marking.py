@@ -99,7 +99,7 @@ def mark(lake: Store, *, grace: timedelta, first: int | None = None) -> Marked:
         try:
             view = lake.view(name)
             refs[name] = lake.table(view)
-            objects |= _objects(unerase(lake, refs[name], view))
+            objects |= _objects(rows_not_erased(lake, refs[name], view))
         except FlagdataError as error:
             findings.append(_unreadable(error, f"ref {name}"))
     try:
@@ -114,7 +114,7 @@ def mark(lake: Store, *, grace: timedelta, first: int | None = None) -> Marked:
     return Marked(refs=refs, objects=frozenset(objects), findings=tuple(findings))
 
 
-def unerase(lake: Store, rows: pa.Table, view: View) -> pa.Table:
+def rows_not_erased(lake: Store, rows: pa.Table, view: View) -> pa.Table:
     """Returns the rows that no version after those of a view erased."""
     newest = max(part.version for part in view)
     erased = {
@@ -246,7 +246,7 @@ def _rows_with_data(lake: Store, rows: pa.Table, view: View) -> pa.Table:
         for name in (*removal.expired[1], *removal.erased.values())
         if name is not None
     }
-    rows = unerase(lake, rows, view)
+    rows = rows_not_erased(lake, rows, view)
     return (
         rows.filter(~pc.field("object").isin(pa.array(sorted(gone), pa.string()))) if gone else rows
     )

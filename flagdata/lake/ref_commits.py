@@ -25,7 +25,7 @@ from flagdata.errors import ConflictError, NotFoundError, UnknownNameError, Usag
 from flagdata.lake.attempts import persist
 from flagdata.lake.commits import Change, commit
 from flagdata.lake.lineage import removals
-from flagdata.lake.marking import unerase
+from flagdata.lake.marking import rows_not_erased
 from flagdata.lake.refs import ERASED, MAIN, NOUNS, Ref, View, as_json, check_name
 from flagdata.lake.removal import descendants, lost
 from flagdata.lake.store import Store
@@ -91,14 +91,14 @@ def _check_whole(lake: Store, view: View, head: int) -> frozenset[str]:
     Raises:
         ConflictError: some of its data went, with versions that expired or since gc collected them.
     """
-    branches = [lake.refs.view(name, head) for name in (MAIN, *lake.refs.branches())]
+    branches = lake.refs.views(head).values()
     if view in branches:
         return frozenset()
     rows = lake.columns(view, _WITH_DATA)
-    whole = unerase(lake, rows, view)
+    whole = rows_not_erased(lake, rows, view)
     on_branches = [lake.columns(each, _WITH_DATA) for each in branches]
     of_tags = [
-        unerase(lake, lake.columns(tag.view, _WITH_DATA), tag.view)
+        rows_not_erased(lake, lake.columns(tag.view, _WITH_DATA), tag.view)
         for tag in lake.refs.tags().values()
     ]
     needed = {name for table in (*on_branches, *of_tags) for name in table["object"].to_pylist()}

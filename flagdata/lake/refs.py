@@ -346,7 +346,24 @@ class Refs:
         refs = self.branches()
         if branch not in refs:
             raise _not_there("branch", branch, [MAIN, *refs])
-        return (Slice(branch=branch, version=head), *self.checked("branches", refs[branch], head))
+        return self._from_fork(refs[branch], head)
+
+    def views(self, head: int) -> dict[str, View]:
+        """Returns what `main` and each branch show when the table is at version `head`, by name;
+        the refs are looked for once.
+
+        Raises:
+            CorruptError: see `checked`.
+        """
+        branches = self.branches().items()
+        return {
+            MAIN: self.view(MAIN, head),
+            **{name: self._from_fork(ref, head) for name, ref in branches},
+        }
+
+    def _from_fork(self, branch: Ref, head: int) -> View:
+        own = Slice(branch=branch.name, version=head)
+        return (own, *self.checked("branches", branch, head))
 
     def checked(self, kind: str, ref: Ref, head: int) -> View:
         """Returns the view of a tag or branch, once it is known to name versions that there are.

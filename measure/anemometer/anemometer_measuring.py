@@ -109,17 +109,8 @@ def measured_from(
     low, high = (
         float(end) for end in np.quantile(draws, [(1 - options.level) / 2, (1 + options.level) / 2])
     )
-    learned = information(draws, model.winds)
-    mean_wind = Quantity(
-        name=WIND,
-        unit="m/s",
-        value=float(draws.mean()),
-        sigma=float(draws.std()),
-        span=Span(low=low, high=high, level=options.level, bound=None, estimated=True),
-        assumed=model.range,
-        constrained=learned >= LEAST_INFORMATION,
-        information=learned,
-    )
+    span = Span(low=low, high=high, level=options.level, bound=None, estimated=True)
+    mean_wind = _wind(float(draws.mean()), float(draws.std()), span, draws, model)
     middle = read[len(read) // 2]
     scale = model.size.scale(trained_on(estimator.targets))
     return Measurement(
@@ -230,29 +221,37 @@ def _window(
     least, _ = limits_of(WIND)
     value = max(wind, least)
     position = int(np.count_nonzero(features.whole[:k]))
-    learned = information(wind + model.errors, model.winds)
-    quantity = Quantity(
-        name=WIND,
-        unit="m/s",
-        value=value,
-        sigma=model.rmse,
-        span=Span(
-            low=max(wind - half, least),
-            high=wind + half,
-            level=options.level,
-            bound=None,
-            estimated=True,
-        ),
-        assumed=model.range,
-        constrained=learned >= LEAST_INFORMATION,
-        information=learned,
+    span = Span(
+        low=max(wind - half, least),
+        high=wind + half,
+        level=options.level,
+        bound=None,
+        estimated=True,
     )
+    quantity = _wind(value, model.rmse, span, wind + model.errors, model)
     start = float(features.starts[k])
     return WindowAnswer(
         start=start,
         end=start + features.layout.length,
         quantities=(quantity,),
         p=verdict.window_p[position],
+    )
+
+
+def _wind(
+    value: float, sigma: float, span: Span, draws: FloatArray, model: ReadingModel
+) -> Quantity:
+    """Returns a wind that is read, with what its draws (n,) add to the winds of the calibration."""
+    learned = information(draws, model.winds)
+    return Quantity(
+        name=WIND,
+        unit="m/s",
+        value=value,
+        sigma=sigma,
+        span=span,
+        assumed=model.range,
+        constrained=learned >= LEAST_INFORMATION,
+        information=learned,
     )
 
 

@@ -410,7 +410,7 @@ def quantity(about: Uncertain, draws: FloatArray, level: float) -> Quantity:
         sigma=float(draws.std()) if interval.estimated else None,
         span=interval,
         assumed=(assumed[0], assumed[1]),
-        constrained=determined and interval.bound is not Bound.NOTHING,
+        constrained=determined and (interval.estimated or interval.bound is not Bound.NOTHING),
     )
 
 

@@ -153,8 +153,7 @@ class Refinement:
         parts = []
         for entry, title in zip(self.intervals, ("wind", "area weight"), strict=False):
             parts.append(
-                f"{title} {entry.phrase(digits[entry.name], f' {entry.unit}')} "
-                f"{entry.span.level * 100:.3g} %"
+                f"{title} {entry.phrase(digits[entry.name], f' {entry.unit}')} {entry.span.percent}"
             )
         return f"{', '.join(parts)}, n = {self.evaluations} simulated clips"
 
