@@ -50,7 +50,7 @@ from flagdata.core.files.regular_files import is_beside, open_regular
 from flagdata.core.provenance import file_hash
 from flagdata.core.schema import CATALOG, FORMAT_VERSION, catalog_schema
 from flagdata.errors import ConflictError, CorruptError, FlagdataError
-from flagdata.lake.attempts import Moved
+from flagdata.lake.attempts import Looks, Moved
 from flagdata.lake.delta_log import (
     CHECKPOINT,
     FILE_HASH,
@@ -114,6 +114,7 @@ class Catalog:
         self._entries = Log(self._log, marks)
         self._summaries = Summaries(marks.parent / "history", self._entries)
         self._lock = threading.RLock()
+        self.looks = Looks()
         self._table: DeltaTable | None = None
         self._files = RowFiles(path, self._noted_hashes)
         self._hashes: dict[str, frozenset[str]] = {}
@@ -159,7 +160,7 @@ class Catalog:
         Raises:
             LogGapError: an entry of the log, or all of it, is missing.
         """
-        return self._entries.head()
+        return self.looks.find("head", self._entries.head)
 
     @_one_at_a_time
     def rows(self, version: int) -> pa.Table:
@@ -251,6 +252,7 @@ class Catalog:
             if noted is not None and hashlib.sha256(content).hexdigest() != noted:
                 raise changed_file(file)
             put_if_absent(self.path / name, content)
+        self.looks.forget()
         if not self._entries.adopt(version, entry):
             raise ConflictError(
                 f"version {version} was committed here by another",
@@ -467,6 +469,7 @@ class Catalog:
         # Not by the Delta library, which reads the log again after it has put the entry, and may
         # fail then.
         actions = [{"commitInfo": written}, *added, *({"remove": action} for action in dropped)]
+        self.looks.forget()
         if not self._entries.put(version, actions):
             path.unlink(missing_ok=True)
             raise Moved
@@ -640,6 +643,7 @@ class Catalog:
             deltalake.Field.from_arrow(schema.field(name).with_nullable(True)) for name in missing
         ]
         version = table.version() + 1
+        self.looks.forget()
         try:
             table.alter.add_columns(
                 fields,

@@ -95,4 +95,4 @@ def put(
     for name, value in values.items():
         _check(name, value)
     with lake.changing("labelling"):
-        return persist(attempt, where=lake.catalog.path)
+        return persist(attempt, looks=lake.catalog.looks, where=lake.catalog.path)

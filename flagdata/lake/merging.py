@@ -67,7 +67,11 @@ def merge(lake: Store, branch: str, message: str, *, into: str) -> MergeResult:
     if branch == into:
         raise UsageError(f"{branch!r} cannot be merged into itself", fix="name two branches")
     with lake.changing("merging"):
-        return persist(lambda: _attempt(lake, branch, message, into), where=lake.catalog.path)
+        return persist(
+            lambda: _attempt(lake, branch, message, into),
+            looks=lake.catalog.looks,
+            where=lake.catalog.path,
+        )
 
 
 def _attempt(lake: Store, branch: str, message: str, into: str) -> MergeResult:

@@ -75,7 +75,7 @@ def make_ref(lake: Store, kind: str, name: str, *, at: str | None, notes: Mappin
         return ref
 
     with lake.changing("naming a version"):
-        ref = persist(attempt, where=lake.catalog.path)
+        ref = persist(attempt, looks=lake.catalog.looks, where=lake.catalog.path)
         with confirming(f"the {noun} {name}", lake.refs.root):
             lake.refs.cache(kind, ref)
     return ref
@@ -183,7 +183,7 @@ def delete_ref(lake: Store, kind: str, name: str, message: str | None, *, discar
             f"{MAIN} cannot be deleted", fix="withdraw what is on it, or begin a new lake"
         )
     with lake.changing(f"deleting the {noun} {name}", alone=True):
-        version = persist(attempt, where=lake.catalog.path)
+        version = persist(attempt, looks=lake.catalog.looks, where=lake.catalog.path)
         with confirming(f"the deletion of the {noun} {name}", lake.refs.root):
             lake.refs.remove(kind, name)
     return version

@@ -47,6 +47,7 @@ from flagdata.errors import (
     UnknownNameError,
     UsageError,
 )
+from flagdata.lake.attempts import Looks
 from flagdata.recipes.documents import from_json
 from flagdata.storage import Place
 from flagdata.timebase import NANOSECONDS, from_datetime, names_zone, parse
@@ -206,11 +207,13 @@ class Refs:
     Args:
         root: the folder `refs/`, whose files repeat what the log states.
         history: gives what the log states of each version, newest first.
+        looks: within an attempt the files are listed once.
     """
 
-    def __init__(self, root: Place, history: Callable[[], Sequence[Entry]]) -> None:
+    def __init__(self, root: Place, history: Callable[[], Sequence[Entry]], looks: Looks) -> None:
         self.root = root
         self._history = history
+        self._looks = looks
         self._lives: tuple[int, Mapping[Key, Ref | Deletion]] = (-1, {})
 
     def tags(self) -> dict[str, Ref]:
@@ -420,10 +423,8 @@ class Refs:
     def _files(self, kind: str) -> list[Place]:
         """Lists the files of refs of a kind. What has no ref's name is none: it may be of any
         program."""
-        files = [
-            path for path in (self.root / kind).glob("[!.]*.json") if _NAME.fullmatch(path.stem)
-        ]
-        return sorted(files)  # type: ignore[type-var]
+        listed = self._looks.find(kind, lambda: list((self.root / kind).glob("[!.]*.json")))
+        return sorted(path for path in listed if _NAME.fullmatch(path.stem))  # type: ignore[type-var]
 
     @staticmethod
     def _read(path: Place) -> Ref:

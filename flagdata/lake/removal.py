@@ -87,7 +87,7 @@ def withdraw(lake: Store, artifacts: Collection[str], message: str, *, branch: s
         return Withdrawal(version=version, asked=tuple(sorted(asked)), clips=tuple(sorted(clips)))
 
     with lake.changing("withdrawing"):
-        return persist(attempt, where=lake.catalog.path)
+        return persist(attempt, looks=lake.catalog.looks, where=lake.catalog.path)
 
 
 def clips_of(rows: pa.Table, artifacts: Collection[str]) -> frozenset[str]:
@@ -202,7 +202,7 @@ def erase(
             )
 
         if branches or not going <= before.keys():
-            version = persist(attempt, where=lake.catalog.path)
+            version = persist(attempt, looks=lake.catalog.looks, where=lake.catalog.path)
         objects = {name for name in (*erased.values(), *before.values()) if name is not None}
         removed, kept_objects = _delete(lake, objects, check)
     return Erasure(
@@ -426,7 +426,9 @@ def expire(lake: Store, up_to: int, message: str | None = None, *, dry_run: bool
             message=message or f"expire versions up to {up_to}", notes={"expired": noted}
         )
         version = persist(
-            lambda: commit(lake, change, base=lake.catalog.head()), where=lake.catalog.path
+            lambda: commit(lake, change, base=lake.catalog.head()),
+            looks=lake.catalog.looks,
+            where=lake.catalog.path,
         )
         for error in lake.objects.delete_all(going.objects, check).values():
             raise error

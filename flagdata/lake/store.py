@@ -51,7 +51,7 @@ class Store:
         self.path = path
         self.catalog = Catalog(path / "catalog", path / "refs" / "newest")
         self.objects = RemoteObjects(path) if isinstance(path, RemotePath) else Objects(path)
-        self.refs = Refs(path / "refs", self.catalog.history)
+        self.refs = Refs(path / "refs", self.catalog.history, self.catalog.looks)
         self.staging = path / STAGING
         self._lineage: tuple[int, dict[str, View], Lineage] | None = None
         self._identities: tuple[View, frozenset[str]] | None = None

@@ -349,7 +349,7 @@ class Transaction:
                 )
             return self._result
 
-        return persist(attempt, where=self._lake.catalog.path)
+        return persist(attempt, looks=self._lake.catalog.looks, where=self._lake.catalog.path)
 
     def _labels_left(self, fresh: Collection[str], version: int) -> dict[str, dict[str, None]]:
         """Takes off what is left of labels of artifacts that were withdrawn: one that comes anew

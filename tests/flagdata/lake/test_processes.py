@@ -4,8 +4,10 @@ dangles."""
 from __future__ import annotations
 
 import random
+import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -15,6 +17,8 @@ import pytest
 from flagdata.core.findings import Severity
 from flagdata.errors import ConflictError
 from flagdata.lake import Lake, attempts, collect, doctor, object_names, verify
+from flagdata.lake.commits import Change, commit
+from flagdata.lake.delta_log import Log
 from tests.flagdata.lake.conftest import put_text
 
 NOW = timedelta(0)
@@ -73,13 +77,60 @@ def test_a_commit_that_waited_for_a_collection_does_not_give_up_at_the_first_oth
             raise moved
         return "published"
 
-    assert attempts.persist(attempt, where=Path("catalog")) == "published"
+    assert attempts.persist(attempt, looks=attempts.Looks(), where=Path("catalog")) == "published"
 
     def overtaken() -> str:
         raise attempts.Moved
 
     with pytest.raises(ConflictError, match="kept committing"):
-        attempts.persist(overtaken, where=Path("catalog"))
+        attempts.persist(overtaken, looks=attempts.Looks(), where=Path("catalog"))
+
+
+def test_an_attempt_looks_for_the_newest_version_once(
+    lake: Lake, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    put_text(lake, "one")
+    looked: list[str] = []
+    head = Log.head
+
+    def counting(log: Log) -> int:
+        looked.append(threading.current_thread().name)
+        return head(log)
+
+    monkeypatch.setattr(Log, "head", counting)
+    lake.tag("v1")
+    assert len(looked) <= 3  # before it, within it, after its commit
+    looked.clear()
+    lake.catalog.head()
+    lake.catalog.head()
+    assert len(looked) == 2  # outside an attempt nothing is kept
+
+
+def test_an_attempt_that_another_overtook_looks_anew(lake: Lake) -> None:
+    put_text(lake, "one")
+    other, seen = Lake.open(lake.path), list[int]()
+
+    def attempt() -> int:
+        seen.append(lake.catalog.head())
+        if len(seen) == 1:
+            put_text(other, "two")
+        assert lake.catalog.head() == seen[-1]
+        return commit(lake, Change(message="of one moment"), base=seen[-1])
+
+    version = attempts.persist(attempt, looks=lake.catalog.looks, where=lake.path)
+    assert seen[1] > seen[0]
+    assert version == seen[1] + 1 == lake.catalog.head()
+
+
+def test_what_an_attempt_found_is_its_threads_own(lake: Lake) -> None:
+    put_text(lake, "one")
+    with lake.catalog.looks.once():
+        before = lake.catalog.head()
+        put_text(Lake.open(lake.path), "two")
+        with ThreadPoolExecutor(1) as other:
+            assert other.submit(lake.catalog.head).result() > before
+        assert lake.catalog.head() == before
+    assert lake.catalog.head() > before
 
 
 def test_a_process_reads_what_others_committed_once_and_finds_the_history_that_a_fresh_one_does(
