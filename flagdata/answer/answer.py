@@ -1,0 +1,174 @@
+"""What a question to a recording is answered by: a sentence, quantities, findings, and sections with
+tables and figures.
+
+The same answer is shown in a terminal, as JSON, as a page, in a notebook and as an artifact, each by
+one renderer. A question brings its sentences, tables and figures, and no renderer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from flagdata.answer.charts import Chart
+from flagdata.answer.quantity import Quantity
+from flagdata.core.findings import Finding
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
+
+Cell: TypeAlias = "str | Markup | Quantity | None"
+"""A cell of a table: text, a part of a page, a quantity with its interval, or nothing."""
+
+
+class Tone(StrEnum):
+    """Whether the question is settled."""
+
+    SETTLED = "settled"
+    OPEN = "open"
+    MISSED = "missed"
+    """It was refused, or nothing of the library answers it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """Rows below named columns.
+
+    Attributes:
+        columns: with their units, "wind [m/s]"; none of a table of names and values.
+        rows: each as long as `columns`.
+        caption: below it.
+    """
+
+    columns: Sequence[str] = ()
+    rows: Sequence[Sequence[Cell]]
+    caption: str = ""
+
+    @classmethod
+    def of_values(cls, values: Mapping[str, Cell], *, caption: str = "") -> Table:
+        """Makes a table of names and their values."""
+        return cls(rows=[*values.items()], caption=caption)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Figure:
+    """A chart or picture with what it shows in words.
+
+    Attributes:
+        title: for who does not see it.
+        content: a chart, the address of a picture (which may hold it), or a part of a page, or what
+            makes one of these when it is shown.
+        caption: below it.
+        width: of a picture [px]; as wide as the page if None.
+    """
+
+    title: str
+    content: Chart | str | Markup | Callable[[], Chart | str | Markup]
+    caption: str = ""
+    width: int | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Gallery:
+    """Small figures side by side."""
+
+    figures: Sequence[Figure]
+
+
+Part: TypeAlias = "str | Markup | Table | Figure | Gallery | Sequence[Finding]"
+"""What a section is made of: paragraphs of text, parts of a page, tables, figures, findings."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Section:
+    """A part of an answer.
+
+    Attributes:
+        title: its heading.
+        parts: in order.
+        anchor: by which a page is linked to it; none where it is empty.
+        folded: whether a page shows its heading alone until it is opened.
+    """
+
+    title: str
+    parts: Sequence[Part]
+    anchor: str = ""
+    folded: bool = False
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Head:
+    """What is on the first screen of a page, so that it can be sent to somebody.
+
+    Attributes:
+        figures: the film, and the wind of film and log; at most two.
+        facts: what there is to know of it: date, place, clock, size, sensor, in this order.
+        limits: what limits the answer, in sentences.
+        remarks: further paragraphs below the sentence.
+    """
+
+    figures: Sequence[Figure] = ()
+    facts: Mapping[str, str] = field(default_factory=dict)
+    limits: Sequence[str] = ()
+    remarks: Sequence[str | Markup] = ()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Answer:
+    """The answer to a question.
+
+    Attributes:
+        question: verb that asks it, "measure".
+        subject: what was asked: the name of a film or of recordings.
+        sentence: the answer in one sentence.
+        tone: whether it is settled.
+        quantities: name → quantity.
+        findings: what a reader has to know.
+        document: everything as JSON values, as the verb writes it with --json.
+        head: the first screen of its page.
+        make_sections: makes what follows there, folded or not.
+        provenance: name → what it was made from and by.
+    """
+
+    question: str
+    subject: str
+    sentence: str
+    tone: Tone = Tone.SETTLED
+    quantities: Mapping[str, Quantity] = field(default_factory=dict)
+    findings: Sequence[Finding] = ()
+    document: Mapping[str, Any] = field(default_factory=dict)
+    head: Head = field(default_factory=Head)
+    make_sections: Callable[[], Sequence[Section]] = tuple
+    provenance: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def page(self) -> str:
+        """The page, HTML that refers to no other file."""
+        from flagdata.pages.answer_page import render_answer
+
+        return render_answer(self)
+
+    def save(self, path: Path | str) -> Path:
+        """Write the page to a file, in place of an earlier page there. Returns its path.
+
+        Raises:
+            ConflictError: something else is there.
+            FlagdataError: it cannot be written.
+        """
+        from flagdata.core.files.outputs import write_file
+
+        write_file(Path(path), self.page, command=self.question)
+        return Path(path)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.sentence})"
+
+    def _repr_html_(self) -> str:
+        from flagdata.core.html import table
+
+        rows = {name.replace("_", " "): one.text for name, one in self.quantities.items()}
+        found = {f"{one.severity.value} {one.kind}": one.what for one in self.findings}
+        return table(self.sentence, rows | found)

@@ -1,0 +1,71 @@
+"""The page of an answer: one template for all questions. What comes out is one file that refers to
+no other."""
+
+from __future__ import annotations
+
+import re
+from itertools import count
+
+from markupsafe import Markup, escape
+
+from flagdata.answer.answer import Answer, Figure, Gallery, Part, Section, Table
+from flagdata.answer.charts import Chart
+from flagdata.core.provenance import code_version
+from flagdata.pages.render import render
+
+
+def render_answer(answer: Answer) -> str:
+    """Renders the page, HTML."""
+    provenance = {**answer.provenance, "code": code_version()}
+    sections = list(answer.make_sections())
+    if answer.findings:
+        title = f"What was noticed: {len(answer.findings)}"
+        sections.append(
+            Section(title=title, parts=[answer.findings], anchor="findings", folded=True)
+        )
+    where = Section(
+        title="Where it is from",
+        parts=[Table.of_values(provenance)],
+        anchor="provenance",
+        folded=True,
+    )
+    numbers = count()
+    values = {
+        "answer": answer,
+        "facts": Table.of_values(answer.head.facts),
+        "sections": [*sections, where],
+        "kind_of": _kind_of,
+        "draw": lambda figure: _draw(figure, f"figure-{next(numbers)}"),
+    }
+    return render("flagdata.pages", "answer.html.j2", values)
+
+
+def _kind_of(part: Part) -> str:
+    """Tells how a part is shown."""
+    match part:
+        case Table():
+            return "table"
+        case Figure():
+            return "figure"
+        case Gallery():
+            return "gallery"
+        case Markup():
+            return "markup"
+        case str():
+            return "text"
+        case _:
+            return "findings"
+
+
+def _draw(figure: Figure, name: str) -> Markup:
+    """Draws a figure's content."""
+    content = figure.content() if callable(figure.content) else figure.content
+    if isinstance(content, Chart):
+        from flagdata.pages.chart_drawing import svg
+
+        title = Markup('role="img" aria-label="{}"').format(figure.title)
+        return Markup(re.sub("<svg", lambda _: f"<svg {title}", svg(content, name=name), count=1))
+    if isinstance(content, Markup):
+        return content
+    width = "" if figure.width is None else Markup(' width="{}"').format(figure.width)
+    return Markup('<img alt="{}" src="{}"{}>').format(figure.title, escape(content), width)
