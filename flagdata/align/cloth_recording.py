@@ -23,6 +23,7 @@ from flagdata.align.film_recording import (
 )
 from flagdata.align.present import find_made, provenance
 from flagdata.core.findings import Finding, quality_flags
+from flagdata.core.json_values import json_values
 from flagdata.core.provenance import canonical
 from flagdata.core.schema import TRUTH_WINDOW, Kind
 from flagdata.dataset.clips import clip_rows
@@ -162,7 +163,7 @@ def _without_wind(
         "frames": len(times),
         "start": iso(start),
         "end": iso(end),
-        "findings": [declaration.as_dict()],
+        "findings": [json_values(declaration)],
     }
     with lake.transaction(f"declare the cloth of {camera.name}", branch=branch) as transaction:
         staged = transaction.staging(".mcap")

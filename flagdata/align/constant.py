@@ -32,6 +32,7 @@ from flagdata.align.film_recording import (
 )
 from flagdata.align.present import find_made, provenance
 from flagdata.core.findings import Finding, Severity, quality_flags
+from flagdata.core.json_values import json_values
 from flagdata.core.schema import Kind
 from flagdata.errors import UsageError
 from flagdata.lake import Artifact, Lake, Transaction
@@ -207,7 +208,7 @@ def _add_wind(
         "sigma": wind.sigma,
         "start": iso(start),
         "end": iso(end),
-        "findings": [finding.as_dict()],
+        "findings": [json_values(finding)],
     }
     staged = transaction.staging(".mcap")
     with RecordWriter(

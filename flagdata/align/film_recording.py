@@ -24,6 +24,7 @@ from flagdata.align.present import find_made, provenance
 from flagdata.core.arrays import IntArray, UInt8Array
 from flagdata.core.clock_model import ClockModel
 from flagdata.core.findings import Finding, quality_flags
+from flagdata.core.json_values import json_values
 from flagdata.core.provenance import canonical
 from flagdata.core.schema import TRUTH_WINDOW, Kind
 from flagdata.dataset.clips import clip_rows
@@ -481,7 +482,7 @@ def _artifact(
         "start": iso(start),
         "end": iso(end),
         **alignment.details,
-        "findings": [finding.as_dict() for finding in findings],
+        "findings": json_values(findings),
     }
     return Artifact(
         kind=Kind.RECORDING,

@@ -16,6 +16,7 @@ from flagdata.api.recording_verbs import FromCamera, Ingesting
 from flagdata.commands.ingest_options import KINDS, IngestRequest, check_applies
 from flagdata.core.console import document, echo, echo_lines, fail, progress, say
 from flagdata.core.findings import Finding
+from flagdata.core.json_values import json_values
 from flagdata.core.shell import command_line
 from flagdata.errors import FlagdataError, InputError, UsageError
 
@@ -546,11 +547,11 @@ def _winds(lake: Lake, source: Path, given: IngestRequest) -> tuple[IngestResult
             f"the anemometer {label!r}: {error.what}",
             where=error.where,
             fix=error.fix,
-        ).as_dict()
+        )
         for label, error in dead
     ]
     first = results[0]
-    report = {**first.report, "findings": [*first.report["findings"], *left_out]}
+    report = {**first.report, "findings": [*first.report["findings"], *json_values(left_out)]}
     return (replace(first, report=report), *results[1:])
 
 

@@ -9,6 +9,7 @@ from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
 from flagdata.core.console import echo, say, table
+from flagdata.core.json_values import json_values
 from flagdata.core.printable import SHORT, count_of, size_text
 from flagdata.verbs.shared_options import AtVersion, InFull, OnLake
 from flagdata.verbs.verb_options import Result, argument, option, options, verb
@@ -119,7 +120,7 @@ def show(chosen: Showing) -> Iterator[Result]:
             "parents": parents,
             "children": children,
             "versions": stated,
-            "findings": [finding.as_dict() for finding in doubts],
+            "findings": json_values(doubts),
         },
     )
     for name, text in _gist(lake, row):
@@ -145,7 +146,7 @@ def show(chosen: Showing) -> Iterator[Result]:
             echo(f"{label:<15} … and {more} more (--all lists them)")
     for finding in (
         *(row["report"] or {}).get("findings", []),
-        *(finding.as_dict() for finding in doubts),
+        *json_values(doubts),
     ):
         echo(f"{finding.get('severity', 'note'):<15} {finding.get('kind')}: {finding.get('what')}")
 

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from flagdata.core.console import echo, progress, say, say_finding
+from flagdata.core.json_values import json_values
 from flagdata.core.printable import count_of, size_text
 from flagdata.verbs.shared_options import OnLake
 from flagdata.verbs.verb_options import Result, argument, options, verb
@@ -93,7 +94,7 @@ def _reporting(tag: str, address: str, done: Transfer) -> Iterator[Result]:
             "objects": list(done.objects),
             "bytes": done.size,
             "refs": list(done.refs),
-            "findings": [finding.as_dict() for finding in done.findings],
+            "findings": json_values(done.findings),
             "healed": [asdict(taken) for taken in done.healed],
         },
     )

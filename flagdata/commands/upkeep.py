@@ -10,6 +10,7 @@ from flagdata.core.console import LocalPath, echo, progress, say, table
 from flagdata.core.files.addresses import local_path
 from flagdata.core.files.regular_files import check_input
 from flagdata.core.findings import Finding, Severity
+from flagdata.core.json_values import json_values
 from flagdata.core.printable import count_of, size_text
 from flagdata.errors import UsageError
 from flagdata.timebase import iso
@@ -156,7 +157,7 @@ def heal(chosen: Healing) -> Iterator[Result]:
     content = {
         "lake": str(lake.path),
         "taken": [asdict(taken) for taken in done.taken],
-        "left": [finding.as_dict() for finding in done.left],
+        "left": json_values(done.left),
     }
     yield Result("heal", content, _GATE_NOT_MET if done.left else 0)
     for taken in done.taken:
@@ -282,7 +283,7 @@ def recover(chosen: Recovering) -> Iterator[Result]:
     check_input(path, noun="record")
     with fresh_file(target) as scratch:
         findings = salvage(path, scratch)
-    found = [finding.as_dict() for finding in findings]
+    found = json_values(findings)
     yield Result("recover", {"source": str(path), "target": str(target), "findings": found})
     _print(findings)
     echo(target)
@@ -295,7 +296,7 @@ def _concluding(tag: str, findings: Sequence[Finding], checked: str) -> Iterator
     content = {
         "healthy": healthy,
         "checked": checked,
-        "findings": [finding.as_dict() for finding in findings],
+        "findings": json_values(findings),
     }
     yield Result(tag, content, 0 if healthy else _GATE_NOT_MET)
     _print_health(findings, checked)

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
 
 
 class Severity(StrEnum):
@@ -60,17 +59,6 @@ class Finding:
             value=value,
             fix=fix,
         )
-
-    def as_dict(self) -> dict[str, Any]:
-        return {
-            "kind": self.kind,
-            "severity": self.severity.value,
-            "what": self.what,
-            "where": self.where,
-            "count": self.count,
-            "value": self.value,
-            "fix": self.fix,
-        }
 
 
 _KINDS = {

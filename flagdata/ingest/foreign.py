@@ -18,6 +18,7 @@ import pyarrow.compute as pc
 from flagdata.core.arrays import IntArray
 from flagdata.core.files.regular_files import is_lerobot
 from flagdata.core.findings import Finding, Severity
+from flagdata.core.json_values import json_values
 from flagdata.core.schema import FRAME_RATE, FRAME_SIZE
 from flagdata.errors import CorruptError, FlagdataError, InputError
 from flagdata.ingest.mcap.bags import is_bag, other_bag
@@ -284,5 +285,5 @@ def as_dict(examination: Examination) -> dict[str, Any]:
             {**vars(stream), "start": iso(stream.start), "end": iso(stream.end)}
             for stream in examination.streams
         ],
-        "findings": [finding.as_dict() for finding in examination.findings],
+        "findings": json_values(examination.findings),
     }

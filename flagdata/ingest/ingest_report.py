@@ -3,7 +3,7 @@ by `--json`."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from flagdata.core.findings import Finding
+from flagdata.core.json_values import json_values
 from flagdata.core.schema import CHANNELS, Kind
 from flagdata.ingest.anemometer.log_reading import streams
 from flagdata.record.signals import CameraInfo, WindLog
@@ -46,7 +47,7 @@ def _span(start: int, end: int) -> dict[str, Any]:
 
 
 def camera_report(
-    info: CameraInfo, times: FrameTimes, findings: Iterable[Finding], reasons: Sequence[str]
+    info: CameraInfo, times: FrameTimes, findings: Sequence[Finding], reasons: Sequence[str]
 ) -> dict[str, Any]:
     """Reports a camera; times in UTC, durations in seconds, rates in Hz."""
     return {
@@ -59,12 +60,12 @@ def camera_report(
         "rate": times.rate,
         "worst_stamp_error": times.worst_error,
         "camera": {**vars(info), "crop": list(info.crop), "start": iso(info.start)},
-        "findings": [finding.as_dict() for finding in findings],
+        "findings": json_values(findings),
     }
 
 
 def wind_report(
-    log: WindLog, findings: Iterable[Finding], *, recipe_file: str | None
+    log: WindLog, findings: Sequence[Finding], *, recipe_file: str | None
 ) -> dict[str, Any]:
     """Reports a log; of a recipe file that was named, only its base name stays."""
     series = log.series
@@ -94,5 +95,5 @@ def wind_report(
         if speed is not None and np.isfinite(speed).any()
         else None,
         "sensor": sensor,
-        "findings": [finding.as_dict() for finding in findings],
+        "findings": json_values(findings),
     }

@@ -23,6 +23,7 @@ from flagdata.align.film_recording import truth_window
 from flagdata.core.clock_model import ClockModel
 from flagdata.core.files.bounded_parquet import read_parquet
 from flagdata.core.findings import Finding, quality_flags
+from flagdata.core.json_values import json_values
 from flagdata.core.printable import SHORT
 from flagdata.core.schema import CATALOG, TOPIC_IMAGE, TOPIC_WIND, Kind
 from flagdata.dataset.clips import clip_rows
@@ -311,5 +312,5 @@ def _report(artifact: Artifact, record: Record, findings: tuple[Finding, ...]) -
         "frames": record.frame_count if TOPIC_IMAGE in record.topics else 0,
         "rate": artifact.rate,
         "wind": TOPIC_WIND in record.topics,
-        "findings": [finding.as_dict() for finding in findings],
+        "findings": json_values(findings),
     }

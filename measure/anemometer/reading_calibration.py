@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from flagdata.core.arrays import BoolArray, FloatArray
 from flagdata.core.findings import Finding
+from flagdata.core.json_values import json_values
 from flagdata.errors import InputError, RefusedError
 from flagdata.record.signals import Sensor
 from measure.anemometer.intervals import half_width
@@ -145,7 +146,7 @@ class Calibrated:
                 }
                 for recording in self.recordings
             ],
-            "findings": [finding.as_dict() for finding in self.findings],
+            "findings": json_values(self.findings),
         }
 
 

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from flagdata.core.findings import Finding, quality_flags
+from flagdata.core.json_values import json_values
 from flagdata.core.provenance import array_hash, canonical, digest, file_hash
 from flagdata.core.schema import Kind
 from flagdata.lake import Artifact, Lake, results
@@ -221,7 +222,7 @@ def _measurement(answer: VerdictAnswer) -> Artifact:
         "words": verdict.words,
         "p_value": verdict.test.p_value.value,
         "separating": verdict.separating,
-        "findings": [finding.as_dict() for finding in answer.findings],
+        "findings": json_values(answer.findings),
     }
     return Artifact(
         kind=Kind.MEASUREMENT,

@@ -14,6 +14,7 @@ import numpy as np
 from flagdata.answer import Bound, Quantity
 from flagdata.core.arrays import BoolArray, FloatArray, IntArray
 from flagdata.core.findings import Finding, Severity
+from flagdata.core.json_values import json_values
 from flagdata.core.rng import child_seed, stream
 from flagdata.core.workload import one_thread
 from measure.cloth.cloth_posterior import Posterior, Sight, posterior, weigh_cloths
@@ -224,7 +225,7 @@ class Calibration:
             "check": self.check.as_dict(),
             "options": self.options.recipe(),
             "level": self.options.level,
-            "findings": [finding.as_dict() for finding in self.findings],
+            "findings": json_values(self.findings),
         }
 
 

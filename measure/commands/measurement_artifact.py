@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from flagdata.core.findings import quality_flags
+from flagdata.core.json_values import json_values
 from flagdata.core.provenance import canonical
 from flagdata.core.schema import Kind
 from flagdata.lake import Artifact, Lake, results
@@ -89,7 +90,7 @@ def report(measured: Measurement) -> Mapping[str, Any]:
         "quantities": {q.name: q.as_dict() for q in measured.quantities},
         "gate": measured.verdict.as_dict(),
         "combined": measured.combined,
-        "findings": [finding.as_dict() for finding in measured.notices(anyway=True)],
+        "findings": json_values(measured.notices(anyway=True)),
     }
 
 

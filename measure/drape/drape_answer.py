@@ -15,6 +15,7 @@ from flagdata.api.measuring_verbs import Calibrating
 from flagdata.core.arrays import FloatArray
 from flagdata.core.files.addresses import local_path
 from flagdata.core.findings import Finding, Severity
+from flagdata.core.json_values import json_values
 from flagdata.core.rng import stream
 from flagdata.core.stated import Stated
 from flagdata.errors import InputError, NotFoundError, RefusedError, UsageError
@@ -90,7 +91,7 @@ class Draped:
             "direction_deg": float(np.degrees(self.fit.direction)),
             "misfit": self.fit.tail,
             "effective_draws": self.fit.effective,
-            "findings": [finding.as_dict() for finding in self.findings],
+            "findings": json_values(self.findings),
         }
 
 

@@ -14,6 +14,7 @@ import torch
 from flagdata.answer import Quantity
 from flagdata.core.arrays import Float32Array, FloatArray, UInt8Array
 from flagdata.core.findings import Finding
+from flagdata.core.json_values import json_values
 from flagdata.core.rng import child_seed, stream
 from flagdata.errors import FlagdataError, RefusedError, UsageError
 from flagdata.ingest.films.film import Film
@@ -138,7 +139,7 @@ class Measurement:
                 "source": self.dependence.source,
             },
             "gusts": None if self.gusts is None or not reported else self.gusts.as_dict(),
-            "findings": [finding.as_dict() for finding in self.notices(anyway=anyway)],
+            "findings": json_values(self.notices(anyway=anyway)),
         }
 
 

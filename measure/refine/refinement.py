@@ -11,6 +11,7 @@ import numpy as np
 from flagdata.answer import Span
 from flagdata.core.arrays import FloatArray
 from flagdata.core.findings import Finding
+from flagdata.core.json_values import json_values
 from flagdata.recipes.typed_tables import Range
 from measure.posterior_ends import span
 from measure.refine.evaluator import Evaluator
@@ -178,7 +179,7 @@ class Refinement:
             "effective_draws": self.posterior.effective,
             "seconds": self.seconds,
             "seed": self.seed,
-            "findings": [finding.as_dict() for finding in self.findings],
+            "findings": json_values(self.findings),
         }
 
 

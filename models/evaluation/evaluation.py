@@ -11,6 +11,7 @@ import numpy as np
 
 from flagdata.core import rng
 from flagdata.core.findings import Finding, Severity
+from flagdata.core.json_values import json_values
 from flagdata.errors import UnknownNameError
 from models.evaluation import paper, score_table, triplets
 from models.evaluation.bootstrap import DRAWS, Resamples
@@ -319,7 +320,7 @@ def as_document(evaluation: Evaluation) -> dict[str, Any]:
                 {"frames": frames, "accuracy": accuracy} for frames, accuracy in paper.TRIPLETS
             ],
         },
-        "findings": [finding.as_dict() for finding in evaluation.findings],
+        "findings": json_values(evaluation.findings),
     }
 
 

@@ -11,6 +11,7 @@ import av.error
 
 from flagdata.core.files.addresses import local_path
 from flagdata.core.findings import Finding
+from flagdata.core.json_values import json_values
 from flagdata.errors import TimeError
 from flagdata.ingest.camera.camera_options import CameraOptions
 from flagdata.ingest.camera.chapters import chapter_of
@@ -62,7 +63,7 @@ class CameraProbe:
             "start": iso(self.start.instant) if self.start else None,
             "start_from": self.start.source if self.start else None,
             "start_sigma": self.start.sigma if self.start else None,
-            "findings": [finding.as_dict() for finding in self.findings],
+            "findings": json_values(self.findings),
         }
 
 

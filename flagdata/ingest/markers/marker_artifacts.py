@@ -9,6 +9,7 @@ from typing import Any
 
 from flagdata.core.files.durable import disk_errors
 from flagdata.core.findings import Finding, quality_flags
+from flagdata.core.json_values import json_values
 from flagdata.core.schema import Kind
 from flagdata.ingest.ingest_report import REPORT_SCHEMA
 from flagdata.ingest.markers.marker_table import MarkerOptions, read_table
@@ -110,5 +111,5 @@ def _report(
         "rate": (len(sequence.time) - 1) / span if span else None,
         "markers": len(sequence.names),
         "tracked": sequence.tracked,
-        "findings": [finding.as_dict() for finding in findings],
+        "findings": json_values(findings),
     }

@@ -27,6 +27,7 @@ from scipy.spatial import KDTree
 from flagdata.core.arrays import FloatArray, IntArray
 from flagdata.core.files.durable import disk_errors
 from flagdata.core.findings import Finding, Severity, quality_flags
+from flagdata.core.json_values import json_values
 from flagdata.core.provenance import canonical
 from flagdata.core.schema import Kind
 from flagdata.core.units import unit
@@ -172,7 +173,7 @@ def _report(
         "topology": "fixed" if isinstance(sequence, MeshSequence) else "remeshed",
         "vertices": [int(vertices.min()), int(vertices.max())],
         "faces": [int(faces.min()), int(faces.max())],
-        "findings": [finding.as_dict() for finding in all_findings],
+        "findings": json_values(all_findings),
     }
 
 

@@ -20,6 +20,7 @@ from PIL import Image
 
 import flagdata
 from flagdata.core.console import progress
+from flagdata.core.json_values import json_values
 from flagdata.core.schema import Kind
 from flagdata.core.stated import Stated
 from flagdata.dataset import clip_rows
@@ -127,7 +128,7 @@ def test_python_gives_the_answer_of_the_command_as_arrays(film: Path, model_fold
     )
     assert found.sentence == said["sentence"]
     assert found.refused == said["gate"]["refused"]  # type: ignore[index]
-    assert [finding.as_dict() for finding in found.findings] == said["findings"]
+    assert json_values(found.findings) == said["findings"]
     assert found.figures == said["conditioning"]
     for name, own in said["quantities"].items():  # type: ignore[attr-defined]
         estimate = found.quantities[name]
