@@ -156,13 +156,17 @@ def ingest(chosen: IngestCommand) -> None:
     table without a recipe is to be read is drafted from its own text; such a draft is shown, and
     enters only when it is confirmed at the terminal or by --accept.
 
-    \b flagdata ingest --sniff DSC_0001.MP4 TOA5_1234.dat flagdata ingest DSC_0001.MP4 --start
-      2026-05-01T12:00:00+02:00 --crop auto --crop-picture crop.png flagdata ingest GH010042.MP4
-      GH020042.MP4 --join flagdata ingest mast.csv --sensor generic-csv --zone +01:00 --session
-      field-1 flagdata ingest station.csv --unit km/h --zone Europe/Amsterdam flagdata ingest
-      arcsim-output --name reference-4ms flagdata ingest drive.mcap --topic /camera/front flagdata
-      ingest pusht --episode 3 --start 2026-05-01T12:00:00Z flagdata ingest drive.mcap --topic /mast
-      --columns 'time=time,speed=wind_speed[m/s]'
+    \b
+      flagdata ingest --sniff DSC_0001.MP4 TOA5_1234.dat
+      flagdata ingest DSC_0001.MP4 --start 2026-05-01T12:00:00+02:00 \\
+          --crop auto --crop-picture crop.png
+      flagdata ingest GH010042.MP4 GH020042.MP4 --join
+      flagdata ingest mast.csv --sensor generic-csv --zone +01:00 --session field-1
+      flagdata ingest station.csv --unit km/h --zone Europe/Amsterdam
+      flagdata ingest arcsim-output --name reference-4ms
+      flagdata ingest drive.mcap --topic /camera/front
+      flagdata ingest pusht --episode 3 --start 2026-05-01T12:00:00Z
+      flagdata ingest drive.mcap --topic /mast --columns 'time=time,speed=wind_speed[m/s]'
 
     `flagdata ingest film | wind | meshes | markers SOURCE...` takes sources of that kind and its
     options alone.

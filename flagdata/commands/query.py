@@ -94,9 +94,12 @@ def query(chosen: QueryCommand) -> None:
     The SQL is DuckDB's, over one read-only table, catalog. Times are compared through start_time
     and end_time:
 
-    \b flagdata query --where "kind = 'clip' and wind between 3 and 6" --order "wind desc" flagdata
-      query --where "start_time >= '2026-05-01 12:00+02:00'" --columns name,wind,wind_sigma flagdata
-      query --sql "select session, count(*) n, avg(wind) wind from catalog group by session" --json
+    \b
+      flagdata query --where "kind = 'clip' and wind between 3 and 6" --order "wind desc"
+      flagdata query --where "start_time >= '2026-05-01 12:00+02:00'" \\
+          --columns name,wind,wind_sigma
+      flagdata query --json \\
+          --sql "select session, count(*) n, avg(wind) wind from catalog group by session"
     """
     if sum((chosen.as_json, chosen.as_csv, chosen.arrow is not None)) > 1:
         raise UsageError(

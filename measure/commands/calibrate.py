@@ -104,11 +104,15 @@ def calibrate(chosen: CalibrateCommand) -> None:
     texture coordinates of the flat disc) of pieces of one cloth, discs of 0.3 m over a pedestal of
     0.18 m. They show its bending; a second folder is of drapes with the other face up.
 
-    \b flagdata calibrate recording-7 --lake lake --flag-size 1.5x1.0 --azimuth 70±7 --report
-      page.html flagdata calibrate monday.csv tuesday.csv --flag-size 1.5x1.0 --lake lake --json
-      flagdata calibrate tracked.csv --log 3f2a9c --clock-offset 0.3±0.1 --lake lake --flag-size
-      0.9x0.6 flagdata calibrate recording-7 --lake lake --flag-size 1.5x1.0 --only anemometer
-      --name garden flagdata calibrate drapes/up drapes/down --area-weight 0.192±0.004
+    \b
+      flagdata calibrate recording-7 --lake lake --flag-size 1.5x1.0 --azimuth 70±7 \\
+          --report page.html
+      flagdata calibrate monday.csv tuesday.csv --flag-size 1.5x1.0 --lake lake --json
+      flagdata calibrate tracked.csv --log 3f2a9c --clock-offset 0.3±0.1 --lake lake \\
+          --flag-size 0.9x0.6
+      flagdata calibrate recording-7 --lake lake --flag-size 1.5x1.0 --only anemometer \\
+          --name garden
+      flagdata calibrate drapes/up drapes/down --area-weight 0.192±0.004
     """
     _check_only(chosen)
     if chosen.area_weight is not None:

@@ -194,9 +194,12 @@ def close_loop(chosen: CloseLoopCommand) -> None:
     A SOURCE that ends in .toml is a recipe of cloth, pins, wind and test, which may name the
     recordings of markers and meshes as well; --draft writes one.
 
-    \b flagdata close-loop run-4ms/ run-8ms/ --wind 4 --wind 8 flagdata close-loop tracks.csv --wind
-      anemometer.csv --material camel-ponte-roma --attachment corners flagdata close-loop run-4ms/
-      run-8ms/ --wind 4 --wind 8 --draft flag.toml flagdata close-loop flag.toml --lake lake
+    \b
+      flagdata close-loop run-4ms/ run-8ms/ --wind 4 --wind 8
+      flagdata close-loop tracks.csv --wind anemometer.csv --material camel-ponte-roma \\
+          --attachment corners
+      flagdata close-loop run-4ms/ run-8ms/ --wind 4 --wind 8 --draft flag.toml
+      flagdata close-loop flag.toml --lake lake
       flagdata close-loop monday tuesday --lake lake --flag-size 1.5x1.0 --azimuth 70±7
     """
     from flagdata.core.files.outputs import check_files
