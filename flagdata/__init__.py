@@ -8,7 +8,8 @@ keeps them.
 
 The calls below are the public interface; each is imported when it is first used. `flagdata.dataset`
 has the types of training data, `flagdata.errors` what is raised, `flagdata.extend` what a package
-that adds to flagdata imports, and `flagdata.__version__` the version.
+that adds to flagdata imports, `flagdata.timebase` UTC nanoseconds, and `flagdata.__version__` the
+version. Other modules may move.
 """
 
 from __future__ import annotations

@@ -61,7 +61,8 @@ def pairs(
 
     Args:
         lake: an open lake, or where it is.
-        where, at, split, split_by, window, tolerance, seed, cache: as for `Source.pairs`.
+        window: length of the mean that is the ground truth [s].
+        where, at, split, split_by, tolerance, seed, cache: as for `Source.pairs`.
 
     Raises:
         MissingExtraError: torch is not installed.

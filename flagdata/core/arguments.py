@@ -111,8 +111,27 @@ def check_arguments(call: Callable[P, R]) -> Callable[P, R]:
             bound.arguments[name] = converts[name](bound.arguments[name], name)
         return call(*bound.args, **bound.kwargs)
 
-    vars(door)["converts"] = frozenset(converts)
+    vars(door).update(converts=frozenset(converts), __signature__=unquoted(signature))
     return door
+
+
+class _Kind(str):
+    """The text of an annotation, which `help` shows without quotes."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
+def unquoted(signature: inspect.Signature) -> inspect.Signature:
+    """Returns a signature that shows its annotations, which are texts, without quotes."""
+    return signature.replace(
+        parameters=[
+            one.replace(annotation=_Kind(one.annotation)) for one in signature.parameters.values()
+        ],
+        return_annotation=_Kind(signature.return_annotation),
+    )
 
 
 def converter(annotation: str) -> Convert | None:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import inspect
+import textwrap
 from importlib import import_module
 from types import ModuleType
 from typing import Any
@@ -19,7 +20,11 @@ class VerbPackage(ModuleType):
 
     @property
     def __doc__(self) -> str | None:  # type: ignore[override]
-        return self._call.__doc__
+        """The call's docstring below its signature, which `help` shows of no module."""
+        shown = f"{self.__name__}{inspect.signature(self)}"
+        return (
+            f"{textwrap.fill(shown, 92, subsequent_indent='    ')}\n\n{inspect.getdoc(self._call)}"
+        )
 
     @property
     def __signature__(self) -> inspect.Signature:

@@ -361,7 +361,7 @@ def make_call(form: Callable[P, object]) -> Callable[[Callable[[Any], R]], Calla
     are described in the call's docstring, before what it raises. Errors about an option name it as
     the call does.
     """
-    from flagdata.core.arguments import converter  # loads NumPy
+    from flagdata.core.arguments import converter, unquoted  # loads NumPy
 
     build: Any = form
     rows = described_fields(build)
@@ -403,8 +403,8 @@ def make_call(form: Callable[P, object]) -> Callable[[Callable[[Any], R]], Calla
                     )
                 raise
 
-        shown = signature.replace(
-            parameters=ordered, return_annotation=run.__annotations__.get("return")
+        shown = unquoted(
+            signature.replace(parameters=ordered, return_annotation=run.__annotations__["return"])
         )
         bind: Any = shown.bind
         head, raised, rest = (inspect.getdoc(run) or "").partition("\nRaises:")

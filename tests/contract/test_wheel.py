@@ -34,13 +34,18 @@ def tracked(*folders: str) -> list[str]:
     return [name for name in listed.stdout.split("\0") if name and (ROOT / name).is_file()]
 
 
+def copy_tracked(target: Path) -> None:
+    """Copy what a build reads."""
+    for name in tracked(*PACKAGES, "pyproject.toml", "README.md", "LICENSE"):
+        (target / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, target / name)
+
+
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> zipfile.ZipFile:
     """Built from a copy of the tracked files, with data files of models beside them."""
     source, made = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
-    for name in tracked(*PACKAGES, "pyproject.toml", "README.md", "LICENSE"):
-        (source / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(ROOT / name, source / name)
+    copy_tracked(source)
     for name in ("weights.safetensors", "card.json", "recipe.toml"):
         (source / "models" / "trained").mkdir(exist_ok=True)
         (source / "models" / "trained" / name).write_bytes(b"")
@@ -239,3 +244,48 @@ def test_a_checkout_keeps_its_names_where_no_file_of_a_user_has_one(tmp_path: Pa
         check=True,
     )
     assert done.stdout.split() == ["False", "sim.effects"]
+
+
+BUILD = "import sys; from setuptools.build_meta import build_editable; build_editable(sys.argv[1])"
+
+
+@pytest.fixture(scope="module")
+def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A clone, in a folder of its own."""
+    folder = tmp_path_factory.mktemp("beside") / "flagdata"
+    copy_tracked(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def editable(clone: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
+    """What an installation of the clone, to be edited, adds to the path of modules."""
+    made = tmp_path_factory.mktemp("editable")
+    subprocess.run([sys.executable, "-c", BUILD, made], cwd=clone, check=True, capture_output=True)
+    (built,) = (zipfile.ZipFile(path) for path in made.glob("flagdata-*.whl"))
+    (line,) = (built.read(name).decode() for name in built.namelist() if name.endswith(".pth"))
+    return line.strip()
+
+
+@pytest.mark.parametrize("installation", ["wheel", "editable"])
+def test_a_clone_beside_a_script_does_not_shadow_the_installation(
+    installation: str, clone: Path, request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
+    """The clone's folder is called flagdata and holds no code itself; an installation that is not
+    on the path of modules comes after it."""
+    site = tmp_path / "site"
+    if installation == "wheel":
+        request.getfixturevalue("wheel").extractall(site)
+    else:
+        site = Path(request.getfixturevalue("editable"))
+    script = clone.parent / "script.py"
+    script.write_text("import flagdata\nprint(flagdata.__file__, flagdata.measure.__name__)\n")
+    done = subprocess.run(
+        [sys.executable, script.name],
+        cwd=clone.parent,
+        env={**os.environ, "PYTHONPATH": str(site)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stdout.split() == [str(site / "flagdata" / "__init__.py"), "measure"], done.stderr

@@ -14,14 +14,18 @@ def lines(name: str) -> int:
     return 1 + len([line for line in example(name).splitlines() if line.strip()])
 
 
+def descriptions(name: str) -> dict[str, str]:
+    """Parameter of a call → what its docstring says of it."""
+    _, _, arguments = (inspect.getdoc(getattr(flagdata, name)) or "").partition("Args:\n")
+    entries = re.findall(
+        r"^    (\w[\w, ]*): (.*(?:\n {5,}.*)*)", arguments.partition("\n\n")[0], re.MULTILINE
+    )
+    return {one.strip(): text for names, text in entries for one in names.split(",")}
+
+
 def undocumented(name: str) -> set[str]:
     """Parameters of a call that its docstring says nothing of."""
-    function = getattr(flagdata, name)
-    _, _, arguments = (inspect.getdoc(function) or "").partition("Args:\n")
-    told = re.findall(r"^    (\w[\w, ]*): ", arguments.partition("\n\n")[0], re.MULTILINE)
-    return set(inspect.signature(function).parameters) - {
-        one.strip() for names in told for one in names.split(",")
-    }
+    return set(inspect.signature(getattr(flagdata, name)).parameters) - set(descriptions(name))
 
 
 def example(name: str) -> str:

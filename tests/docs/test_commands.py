@@ -34,7 +34,9 @@ def of_studies(start: str) -> dict[str, click.Command]:
     """The studies and what is below them, by what is typed after `start`."""
     found: dict[str, click.Command] = {}
     for name in studies.verbs:
-        command = found[f"{start} {name}"] = studies.get_command(click.Context(studies), name)
+        command = studies.get_command(click.Context(studies), name)
+        assert command is not None
+        found[f"{start} {name}"] = command
         below = command.commands if isinstance(command, click.Group) else {}
         found |= {f"{start} {name} {verb}": one for verb, one in below.items()}
     return found
