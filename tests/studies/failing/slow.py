@@ -13,6 +13,7 @@ import pickle
 from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -187,7 +188,7 @@ def kept_verdict(kept: str) -> None:
         banks.load(options.bank, words="kept")
         return verdict
 
-    measure.closing.close.close_loop = closed
+    _replace(measure.closing.close, close_loop=closed)
 
 
 def kept_outcome(kept: str) -> None:
@@ -200,7 +201,7 @@ def kept_outcome(kept: str) -> None:
         banks.load(options.bank, words="kept")
         return outcome
 
-    measure.propose.term_search.propose = proposed
+    _replace(measure.propose.term_search, propose=proposed)
 
 
 def kept_jobs(kept: str) -> None:
@@ -217,7 +218,7 @@ def kept_jobs(kept: str) -> None:
 
         return done
 
-    build_jobs.simulate, build_jobs.film = keeping(build_jobs.simulate), keeping(build_jobs.film)
+    _replace(build_jobs, simulate=keeping(build_jobs.simulate), film=keeping(build_jobs.film))
 
 
 def kept_windows(kept: str) -> None:
@@ -232,19 +233,25 @@ def kept_windows(kept: str) -> None:
             path.write_bytes(pickle.dumps(plain(film, size, **others)))
         return pickle.loads(path.read_bytes())
 
-    measure.observables.watching.watch_film = watched
+    _replace(measure.observables.watching, watch_film=watched)
 
 
 def known_flags(kept: str) -> None:
     """Simulated flags are a known function of their cloth, and few walkers weigh it."""
-    import measure.cloth.cloth_calibration
-    import measure.cloth.cloth_posterior
-    from tests.measure.cloth.calibration.conftest import known
+    from measure.cloth import cloth_calibration, cloth_posterior
+    from tests.measure.cloth.calibration.conftest import MEASURED, known
 
     del kept
-    measure.cloth.cloth_calibration.simulated = known
-    measure.cloth.cloth_posterior.WALKERS, measure.cloth.cloth_posterior.STEPS = 96, 300
-    measure.cloth.cloth_posterior.CHECK = (32, 120)
+    _replace(cloth_calibration, simulated_values=known)
+    _replace(cloth_calibration, measure_correction=lambda *_, **__: MEASURED)
+    _replace(cloth_posterior, WALKERS=96, STEPS=300, CHECK=(32, 120))
+
+
+def _replace(module: ModuleType, **others: object) -> None:
+    """Puts others in place of what a module has."""
+    for name, value in others.items():
+        assert hasattr(module, name), f"{module.__name__} has no {name}"
+        setattr(module, name, value)
 
 
 def _name(arguments: Sequence[object]) -> str:
