@@ -238,8 +238,8 @@ def kept_windows(kept: str) -> None:
 
 def known_flags(kept: str) -> None:
     """Simulated flags are a known function of their cloth, and few walkers weigh it."""
-    from measure.cloth import cloth_calibration, cloth_posterior
-    from tests.measure.cloth.calibration.conftest import MEASURED, known
+    from measure.cloth import MEASURED, cloth_calibration, cloth_posterior
+    from tests.measure.cloth.calibration.conftest import known
 
     del kept
     _replace(cloth_calibration, simulated_values=known)
