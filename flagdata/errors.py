@@ -1,7 +1,7 @@
 """Errors that say what, where and the fix, each with a stable kind.
 
 Every error a user can cause is a `FlagdataError`. The command line prints it as three lines and
-exits with `exit_code`; `--json` prints `as_dict()`. Programs match on `kind`, an `ErrorKind` that
+exits with `exit_code`; `--json` prints its `JSON_NAMES`. Programs match on `kind`, an `ErrorKind` that
 never changes once released, not on the wording.
 """
 
@@ -57,6 +57,7 @@ class FlagdataError(Exception):
 
     kind: ClassVar[ErrorKind] = ErrorKind.FAILED
     exit_code: ClassVar[int] = 1
+    JSON_NAMES: ClassVar[tuple[str, ...]] = ("kind", "what", "where", "fix")
 
     def __init__(self, what: str, *, where: str | None = None, fix: str) -> None:
         self.what = what
@@ -66,9 +67,6 @@ class FlagdataError(Exception):
 
     def __reduce__(self) -> tuple[object, ...]:
         return (_rebuild, (type(self), self.what, self.where, self.fix))
-
-    def as_dict(self) -> dict[str, str | None]:
-        return {"kind": str(self.kind), "what": self.what, "where": self.where, "fix": self.fix}
 
 
 def _rebuild(cls: type[FlagdataError], what: str, where: str | None, fix: str) -> FlagdataError:

@@ -12,9 +12,9 @@ import json
 import math
 import mimetypes
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -167,14 +167,7 @@ class RecordingResult:
     clips: tuple[str, ...]
     created: bool
     healed: Remade | None = None
-
-    def as_dict(self) -> dict[str, Any]:
-        return {
-            "recording": self.recording.id,
-            "clips": list(self.clips),
-            "created": self.created,
-            "healed": None if self.healed is None else asdict(self.healed),
-        }
+    JSON_NAMES: ClassVar = ("recording=recording.id", "clips", "created", "healed")
 
     @property
     def line(self) -> str:

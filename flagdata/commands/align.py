@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from flagdata.api.recording_verbs import Aligning, ByClock, Realigning
 from flagdata.core.console import LocalPath, document, echo, progress, say, say_finding
+from flagdata.core.json_values import json_values
 from flagdata.core.printable import SHORT
 from flagdata.timebase import NANOSECONDS
 from flagdata.verbs.verb_options import AsJson, command, option, options
@@ -362,7 +363,7 @@ def _report(made: RecordingResult | None, outcome: Outcome | None) -> Report:
     content: dict[str, Any] = {"recording": None, "clips": [], "created": False}
     lines = []
     if made is not None:
-        content = made.as_dict()
+        content = json_values(made)
     if outcome is not None:
         content["clock"] = dict(outcome.alignment.details)
         lines.append(_sentence(outcome))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from flagdata.core.console import echo, progress
+from flagdata.core.json_values import json_values
 from flagdata.verbs.shared_options import RECORDING, NamedRecording, OnBranch, OnLake
 from flagdata.verbs.verb_options import Result, argument, option, options, verb
 
@@ -47,6 +48,6 @@ def declare(chosen: Declaring) -> Iterator[Result]:
             branch=chosen.branch,
             progress=advance,
         )
-    yield Result("declare", {"wind": stated.id, **made.as_dict()})
+    yield Result("declare", {"wind": stated.id, **json_values(made)})
     echo(f"wind {wind.speed:g} ± {wind.sigma:g} m/s declared: {stated.id}")
     echo(made.line)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from flagdata.core.console import LocalPath, echo, in_steps, progress
 from flagdata.core.files.addresses import local_path
+from flagdata.core.json_values import json_values
 from flagdata.verbs.shared_options import OnBranch, OnLake
 from flagdata.verbs.verb_options import Result, argument, option, options, verb
 
@@ -65,7 +66,8 @@ def declare_cloths(chosen: DeclaringCloths) -> Iterator[Result]:
             made.append((cloth, cloth_recording(lake, film.artifact, cloth, branch=branch)))
             advance(1)
     recordings = [
-        {**one.as_dict(), "parameters": cloth.parameters, "wind": cloth.wind} for cloth, one in made
+        {**json_values(one), "parameters": cloth.parameters, "wind": cloth.wind}
+        for cloth, one in made
     ]
     yield Result("declare-cloths", {"recordings": recordings})
     for cloth, one in made:

@@ -216,7 +216,7 @@ def ingest_sources(lake: Lake, given: IngestRequest, *, as_json: bool) -> None:
             "ingest",
             {
                 "lake": str(lake.path),
-                "results": [result.as_dict() for of_source in results for result in of_source],
+                "results": [json_values(result) for of_source in results for result in of_source],
                 "failures": _failures(failures),
             },
         )
@@ -361,9 +361,9 @@ def _look(source: Path, ranked: Sequence[Guess], given: IngestRequest) -> dict[s
     if ranked[0].kind != "camera":
         return entry
     try:
-        entry["camera"] = probe(source, given.camera.camera).as_dict()
+        entry["camera"] = json_values(probe(source, given.camera.camera))
     except FlagdataError as error:
-        entry["problem"] = error.as_dict()
+        entry["problem"] = json_values(error)
         return entry
     if given.camera.camera.crop == "auto":
         proposal = propose_crop(source, given.camera.camera)
@@ -433,7 +433,7 @@ def _each(
 
 
 def _failures(failures: Sequence[tuple[Path, FlagdataError]]) -> list[dict[str, str | None]]:
-    return [{"source": str(source), **error.as_dict()} for source, error in failures]
+    return [{"source": str(source), **json_values(error)} for source, error in failures]
 
 
 def _exit_on(failures: Sequence[tuple[Path, FlagdataError]], sources: Sequence[Path]) -> None:

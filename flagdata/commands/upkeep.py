@@ -105,12 +105,12 @@ def doctor(chosen: Examining) -> Iterator[Result]:
 
 
 def _examining(source: Path) -> Iterator[Result]:
-    from flagdata.ingest.foreign import as_dict, examine
+    from flagdata.ingest.foreign import examine
     from flagdata.lake.health import is_healthy
 
     found = examine(source)
     healthy = is_healthy(found.findings)
-    content = {"source": str(source), **as_dict(found), "healthy": healthy}
+    content = {"source": str(source), **json_values(found), "healthy": healthy}
     yield Result("foreign", content, 0 if healthy else _GATE_NOT_MET)
     header = ("stream", "holds", "messages", "rate [Hz]", "from", "to")
     rows = [

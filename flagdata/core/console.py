@@ -25,6 +25,7 @@ import click
 from flagdata.core.extras import missing
 from flagdata.core.files.addresses import lake_place, local_path
 from flagdata.core.findings import Finding
+from flagdata.core.json_values import json_values
 from flagdata.core.printable import printable, printable_lines
 from flagdata.errors import FlagdataError, LimitError, UnforeseenError
 from flagdata.storage import Place, StoreError
@@ -282,7 +283,7 @@ def in_steps(published: Callable[[], str]) -> Iterator[None]:
 def fail(error: FlagdataError, *, as_json: bool) -> int:
     """Report an error the way the command's user asked for; returns the exit code."""
     if as_json:
-        document("error", error.as_dict())
+        document("error", json_values(error))
     _report(error.what, error)
     return error.exit_code
 

@@ -1,13 +1,20 @@
 """Results as JSON values, by one rule for all types.
 
-A dataclass becomes an object of its fields. One of which JSON states other things says so as data,
-in `JSON_NAMES`: the names of fields and properties, in order. JSON has no NaN and no infinities: a
-number that is missing is null.
+A dataclass becomes an object of its fields. A type of which JSON states other things says so as
+data, in two class variables:
+
+- `JSON_NAMES`: the names of fields and properties, in order; "key=path.of.names" for one that stands
+  under another key or lies within a part. Where a part is null, all within it is.
+- `JSON_OPTIONAL`: keys that are left out where they say nothing: null, false, no entries. What came
+  after a document was first written is one of these, so that older ones keep their hash.
+
+JSON has no NaN and no infinities: a number that is missing is null. A date is its ISO 8601 text.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import datetime as dt
 import math
 from collections.abc import Mapping
 from enum import Enum
@@ -36,17 +43,35 @@ def json_values(value: Any) -> Any:
             return json_values(value.tolist())
         case PurePath():
             return str(value)
+        case dt.date():
+            return value.isoformat()
         case Mapping():
             return {str(json_values(key)): json_values(one) for key, one in value.items()}
         case list() | tuple():
             return [json_values(one) for one in value]
-        case _ if dataclasses.is_dataclass(value) and not isinstance(value, type):
-            return {name: json_values(getattr(value, name)) for name in _names(value)}
+        case _ if names := _names(value):
+            optional = getattr(type(value), "JSON_OPTIONAL", ())
+            entries = ((key, json_values(_part(value, path))) for key, path in names.items())
+            return {
+                key: one
+                for key, one in entries
+                if key not in optional or not (one is None or one is False or one == [])
+            }
         case _:
             raise TypeError(f"JSON has no form of {type(value).__name__}")
 
 
-def _names(value: Any) -> tuple[str, ...]:
-    """Lists what JSON states of a dataclass."""
-    names = getattr(type(value), "JSON_NAMES", None)
-    return names or tuple(one.name for one in dataclasses.fields(value))
+def _names(value: Any) -> dict[str, str]:
+    """Lists what JSON states of a value of a type with `JSON_NAMES` or of a dataclass: key →
+    path."""
+    if names := getattr(type(value), "JSON_NAMES", None):
+        return {key: path or key for key, _, path in (name.partition("=") for name in names)}
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {one.name: one.name for one in dataclasses.fields(value)}
+    return {}
+
+
+def _part(value: Any, path: str) -> Any:
+    for name in path.split("."):
+        value = None if value is None else getattr(value, name)
+    return value

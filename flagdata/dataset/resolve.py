@@ -34,7 +34,7 @@ class Resolved:
     """The pairs of a query and those it refused.
 
     Attributes:
-        split_by: how sides were decided, see `Division.as_dict`; `None` where none was asked for.
+        split_by: how sides were decided, see `Division.statement`; `None` where none was asked for.
     """
 
     table: PairTable
@@ -88,7 +88,7 @@ def resolve(
         if len(wanted) == clips.num_rows:
             division.warn_whole()
         table = table.take(np.isin(table.artifact, np.array(sorted(wanted), dtype=np.str_)))
-        statement = division.as_dict()
+        statement = division.statement
     windows = _windows(clips, table)
     table = _with_window(lake, table, windows, _common(windows) if window is None else window)
     refused = judge(

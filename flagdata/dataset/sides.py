@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from flagdata.core.json_values import json_values
 from flagdata.core.schema import Kind
 from flagdata.dataset.clip_lineage import origins_of
 from flagdata.dataset.splits import (
@@ -89,13 +90,10 @@ class Division:
         if self.is_whole:
             _LOG.warning("warning: %s: the others are empty", self.grouping)
 
-    def as_dict(self) -> dict[str, Any]:
-        """Returns what manifests, cards and tags state of a split, as JSON."""
-        return {
-            "rule": self.rule,
-            **self.about,
-            "sides": {side: asdict(size) for side, size in self.sizes.items()},
-        }
+    @property
+    def statement(self) -> dict[str, Any]:
+        """What manifests, cards and tags state of a split, as JSON."""
+        return {"rule": self.rule, **self.about, "sides": json_values(self.sizes)}
 
 
 def divide(

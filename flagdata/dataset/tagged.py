@@ -17,7 +17,7 @@ from flagdata.recipes.documents import from_json
 
 NOTE = "split"
 """Note of a tag that states how clips are divided, JSON: "stated" by data sets, and "hashed" where
-they state nothing; each as in `Division.as_dict`."""
+they state nothing; each as in `Division.statement`."""
 
 
 def tag(lake: Lake, name: str, *, at: str | None = None) -> Ref:
@@ -38,9 +38,9 @@ def describe(catalog: Catalog) -> dict[str, Any]:
     clips = clips_of(catalog, None)
     stated = stated_sides(catalog, clips)
     others = clips.filter(pc.field("side").is_null())
-    divided = {} if stated is None else {"stated": stated.as_dict()}
+    divided = {} if stated is None else {"stated": stated.statement}
     if others.num_rows:
-        divided["hashed"] = hashed_sides(catalog, others, HashedSplit()).as_dict()
+        divided["hashed"] = hashed_sides(catalog, others, HashedSplit()).statement
     return divided
 
 

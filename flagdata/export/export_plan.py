@@ -279,7 +279,7 @@ def prepare(lake: Lake, request: Export) -> Prepared:
         rows=rows,
         labels=labels,
         side=request.split,
-        split_by=None if division is None else division.as_dict(),
+        split_by=None if division is None else division.statement,
     )
     return Prepared(
         request=request, exporter=exporter, version=version, source=source, superseded=replaced

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 import pyarrow.compute as pc
@@ -18,7 +18,6 @@ import pyarrow.compute as pc
 from flagdata.core.arrays import IntArray
 from flagdata.core.files.regular_files import is_lerobot
 from flagdata.core.findings import Finding, Severity
-from flagdata.core.json_values import json_values
 from flagdata.core.schema import FRAME_RATE, FRAME_SIZE
 from flagdata.errors import CorruptError, FlagdataError, InputError
 from flagdata.ingest.mcap.bags import is_bag, other_bag
@@ -50,6 +49,20 @@ class Stream:
     gaps: int
     longest: float
     backward: int
+    JSON_NAMES: ClassVar = (
+        *("name", "holds", "count", "start=start_text", "end=end_text"),
+        *("rate", "gaps", "longest", "backward"),
+    )
+
+    @property
+    def start_text(self) -> str:
+        """The first stamp in ISO 8601."""
+        return iso(self.start)
+
+    @property
+    def end_text(self) -> str:
+        """The last stamp in ISO 8601."""
+        return iso(self.end)
 
     @classmethod
     def of(cls, name: str, holds: str, stamps: IntArray) -> Stream:
@@ -275,15 +288,3 @@ def _unread(name: str, error: FlagdataError) -> Finding:
     return Finding(
         kind="topic-unread", severity=severity, where=name, what=error.what, fix=error.fix
     )
-
-
-def as_dict(examination: Examination) -> dict[str, Any]:
-    """Returns JSON values; instants as ISO 8601, rates in Hz."""
-    return {
-        "format": examination.format,
-        "streams": [
-            {**vars(stream), "start": iso(stream.start), "end": iso(stream.end)}
-            for stream in examination.streams
-        ],
-        "findings": json_values(examination.findings),
-    }

@@ -11,14 +11,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import pyarrow.compute as pc
 
 from flagdata.align.paired import PairedClocks, host_clock
 from flagdata.core.findings import Finding, Severity, quality_flags
+from flagdata.core.json_values import json_values
 from flagdata.core.provenance import digest, recipe_hash
 from flagdata.core.schema import Kind
 from flagdata.errors import ConflictError, FlagdataError, InputError, NothingMeasuredError
@@ -83,7 +84,7 @@ class WindIngest:
     def recipe(self) -> dict[str, Any]:
         """Returns the options; a sensor recipe by its name and content, since its file may change
         or lie elsewhere tomorrow."""
-        options = dict(self.wind.as_dict())
+        options = json_values(self.wind)
         if self.wind.recipe is not None:
             options["recipe"] = Path(self.wind.recipe).name
             options["recipe_hash"] = digest(
@@ -107,21 +108,12 @@ class IngestResult:
     created: bool
     report: Mapping[str, Any]
     healed: Remade | None = None
-
-    def as_dict(self) -> dict[str, Any]:
-        return {
-            "artifact": self.artifact.id,
-            "kind": self.artifact.kind.value,
-            "name": self.artifact.name,
-            "created": self.created,
-            "healed": None if self.healed is None else asdict(self.healed),
-            "object": self.artifact.object,
-            "source_name": self.artifact.source_name,
-            "source_hash": self.artifact.source_hash,
-            "session": self.artifact.session,
-            "quality": list(self.artifact.quality),
-            "report": dict(self.report),
-        }
+    JSON_NAMES: ClassVar = (
+        *("artifact=artifact.id", "kind=artifact.kind", "name=artifact.name", "created", "healed"),
+        *("object=artifact.object", "source_name=artifact.source_name"),
+        *("source_hash=artifact.source_hash", "session=artifact.session"),
+        *("quality=artifact.quality", "report"),
+    )
 
 
 def ingest_camera(

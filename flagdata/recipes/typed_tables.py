@@ -79,9 +79,6 @@ class Range:
             return math.exp(math.log(self.low) + share * (math.log(self.high) - math.log(self.low)))
         return self.low + share * (self.high - self.low)
 
-    def as_dict(self) -> dict[str, Any]:
-        return {"low": self.low, "high": self.high, "scale": self.scale.value}
-
 
 Quantity: TypeAlias = float | Range
 """One value for all members, or a range that each draws its own from."""
@@ -135,11 +132,6 @@ def in_radians(quantity: Quantity) -> Quantity:
             low=math.radians(quantity.low), high=math.radians(quantity.high), scale=quantity.scale
         )
     return math.radians(quantity)
-
-
-def plain(quantity: Quantity | None) -> Any:
-    """As JSON."""
-    return quantity.as_dict() if isinstance(quantity, Range) else quantity
 
 
 def within(kind: Any, least: float = -math.inf, most: float = math.inf) -> Any:

@@ -21,11 +21,12 @@ import struct
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import IO, Any
+from typing import IO, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.core.json_values import json_values
 from flagdata.core.schema import TOPIC_IMAGE
 from flagdata.errors import CorruptError
 from flagdata.record.mcap_file import McapFile, MessageBlock
@@ -58,6 +59,13 @@ class ChannelChecksums:
     heads: int
     data: int | None
     messages: NDArray[np.uint32] | None
+    JSON_NAMES: ClassVar = ("count", "heads", "data", "messages=messages_hex")
+    JSON_OPTIONAL: ClassVar = frozenset({"data", "messages"})
+
+    @property
+    def messages_hex(self) -> str | None:
+        """The checksums of the messages, in the order of the wire."""
+        return None if self.messages is None else self.messages.astype(">u4").tobytes().hex()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,11 +135,16 @@ class _Tally:
         else:
             self._messages.append(zlib.crc32(data))
 
-    def as_dict(self) -> dict[str, Any]:
-        entry: dict[str, Any] = {"count": self._count, "heads": self._heads}
-        if self._messages is None:
-            return {**entry, "data": self._data}
-        return {**entry, "messages": np.array(self._messages, dtype=">u4").tobytes().hex()}
+    @property
+    def checksums(self) -> ChannelChecksums:
+        """Those of what was added so far."""
+        listed = self._messages is not None
+        return ChannelChecksums(
+            count=self._count,
+            heads=self._heads,
+            data=None if listed else self._data,
+            messages=np.array(self._messages, dtype=np.uint32) if listed else None,
+        )
 
 
 class ChecksummedFile(McapFile):
@@ -192,7 +205,9 @@ class ChecksummedFile(McapFile):
         """Finishes the file, see `McapFile`."""
         document = {
             "schema": SCHEMA,
-            "channels": {tally.topic: tally.as_dict() for tally in self._tallies.values()},
+            "channels": {
+                tally.topic: json_values(tally.checksums) for tally in self._tallies.values()
+            },
             "metadata": self._checksums,
         }
         content = json.dumps(document, sort_keys=True)

@@ -20,6 +20,7 @@ import torch
 from flagdata.core.arrays import FloatArray, UInt8Array, read_arrays
 from flagdata.core.files.checksums import is_sealed, seal_bytes
 from flagdata.core.files.outputs import rewrite
+from flagdata.core.json_values import json_values
 from flagdata.core.provenance import canonical, digest
 from flagdata.core.rng import child_seed
 from flagdata.errors import CorruptError
@@ -174,7 +175,7 @@ def fingerprint(estimator: Estimator) -> str:
     """Hashes an estimator's weights and front end."""
     parts = [
         canonical(
-            {"front_end": asdict(estimator.front_end), "cropping": estimator.cropping.as_dict()}
+            {"front_end": asdict(estimator.front_end), "cropping": json_values(estimator.cropping)}
         )
     ]
     for learner in estimator.learners:

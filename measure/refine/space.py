@@ -16,9 +16,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flagdata.core.arrays import FloatArray
+from flagdata.core.json_values import json_values
 from flagdata.core.provenance import canonical, digest
 from flagdata.errors import InputError
-from flagdata.recipes.typed_tables import Range, Scale, plain
+from flagdata.recipes.typed_tables import Range, Scale
 from sim.cloth.material import BENDING_SHAPE, Material
 from sim.run.simulation_recipe import Recipe, Shape
 
@@ -260,8 +261,8 @@ class Space:
     @property
     def identity(self) -> str:
         """A hash of the box; the prior within it changes no evaluation."""
-        ranges = [plain(entry) for entry in (self.factor, self.area_weight, self.wind)]
-        ranges += [] if self.common is None else [plain(self.common)]
+        ranges = [json_values(entry) for entry in (self.factor, self.area_weight, self.wind)]
+        ranges += [] if self.common is None else [json_values(self.common)]
         return digest(canonical({"material": self.material.fingerprint, "ranges": ranges}))
 
 

@@ -16,6 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from flagdata.core.arrays import UInt8Array
+from flagdata.core.json_values import json_values
 from flagdata.core.provenance import canonical, digest
 from flagdata.core.rng import child_seed, stream
 from flagdata.errors import InputError
@@ -97,7 +98,9 @@ class FixedView:
 
     @property
     def identity(self) -> str:
-        return digest(canonical({"zeta": self.zeta.as_dict(), "camera": vars(self.camera).copy()}))
+        return digest(
+            canonical({"zeta": json_values(self.zeta), "camera": vars(self.camera).copy()})
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,7 +122,7 @@ class DrawnView:
             canonical(
                 {
                     "prior": self.prior.identity(),
-                    "camera": {k: r.as_dict() for k, r in RANGES.items()},
+                    "camera": json_values(RANGES),
                 }
             )
         )

@@ -8,8 +8,8 @@ cloth, and networks estimate nothing that has a side.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import torch
@@ -61,16 +61,7 @@ class Cropping:
     scales: tuple[float, ...] = (1.0, 0.9, 0.8)
     mirror: bool = True
     conditioned: bool = False
-
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values; the entry `conditioned` is left out where it is false, so that older
-        recipes keep their hash."""
-        entries = asdict(self)
-        return (
-            entries
-            if self.conditioned
-            else {key: value for key, value in entries.items() if key != "conditioned"}
-        )
+    JSON_OPTIONAL: ClassVar = frozenset({"conditioned"})
 
     def __post_init__(self) -> None:
         if not self.scales or not all(LEAST_SCALE <= scale <= 1 for scale in self.scales):

@@ -32,6 +32,7 @@ from flagdata.core.arrays import AnyArray, BoolArray, FloatArray, IntArray, UInt
 from flagdata.core.files.checksums import is_sealed, seal_bytes
 from flagdata.core.files.file_locks import alone_in
 from flagdata.core.files.outputs import rewrite
+from flagdata.core.json_values import json_values
 from flagdata.core.provenance import canonical, digest
 from flagdata.core.rng import stream
 from flagdata.core.workload import one_thread
@@ -207,7 +208,7 @@ def prepare_films(
         key_parts = {
             "film": pairs.table.recording[row],
             "variants": variants,
-            "crops": cropping.as_dict(),
+            "crops": json_values(cropping),
         }
         if not cropping.conditioned:
             return key_parts if own_rate[row] else {**key_parts, **_VERSION}

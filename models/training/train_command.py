@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from flagdata.api.learning import Training
 from flagdata.core.console import echo, progress, say
 from flagdata.core.files.checksums import write_sums
+from flagdata.core.json_values import json_values
 from flagdata.core.provenance import canonical, code_version
 from flagdata.core.schema import Kind
 from flagdata.core.workload import announce_work
@@ -96,7 +97,7 @@ def card_of(
         "seed": recipe.seed,
         "batches": batches,
         "front_end": asdict(recipe.front_end),
-        "cropping": recipe.cropping.as_dict(),
+        "cropping": json_values(recipe.cropping),
         "parameters": sum(weights.numel() for weights in learner.network.parameters()),
         "epochs": len(trained.course.epochs),
         "best": None if best is None else asdict(best),

@@ -26,6 +26,7 @@ from typing import Annotated, Any, TypeAlias, cast
 import torch
 from msgspec import Meta
 
+from flagdata.core.json_values import json_values
 from flagdata.core.provenance import recipe_hash
 from flagdata.core.schema import Kind
 from flagdata.core.shell import command_line
@@ -214,7 +215,7 @@ class TrainingRecipe:
             "seed": self.seed,
             "data": self.data.identity(),
             "front_end": asdict(self.front_end),
-            "cropping": self.cropping.as_dict(),
+            "cropping": json_values(self.cropping),
             "variants": self.variants,
             **(
                 {"augment": self.augment.identity(), "conditioning": VERSION}

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from flagdata.api.learning import Building
 from flagdata.core.console import echo, following, in_steps, progress, say, say_beside_bars, table
 from flagdata.core.files.addresses import lake_place
+from flagdata.core.json_values import json_values
 from flagdata.core.printable import count_of
 from flagdata.verbs.verb_options import Result, verb
 
@@ -62,7 +63,7 @@ def build(chosen: Building) -> Iterator[Result]:
         planned = plan(
             loaded, lake, workers=_workers(chosen), branch=branch, device=device, shard=shard
         )
-        yield Result("build-plan", planned.as_dict())
+        yield Result("build-plan", json_values(planned))
         _print_plan(planned)
         return
 
@@ -154,7 +155,7 @@ def _print_plan(planned: Plan) -> None:
     rates = planned.rates
     say(
         f"to be made: {planned.missing_sequences} sequences and {planned.missing_films} films, "
-        f"{planned.size / 1e9:.2f} GB, {planned.seconds / 3600:.2f} h on {planned.workers} workers"
+        f"{planned.size / 1e9:.2f} GB, {planned.hours:.2f} h on {planned.workers} workers"
     )
     say(
         f"measured here: {rates.sequence_seconds:.2f} s and {rates.sequence_bytes / 1e6:.2f} MB a "

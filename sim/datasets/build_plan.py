@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import ClassVar, TypeVar
 
 from flagdata.core.files.checksums import files_of
 from flagdata.core.schema import CLIP_FRAMES
@@ -69,6 +69,10 @@ class Plan:
     missing_films: int
     rates: Rates
     workers: int
+    JSON_NAMES: ClassVar = (
+        *("recipe=recipe.name", "recipe_hash=recipe.hash", "renderer=recipe.renderer"),
+        *("sequences", "films", "clips", "missing", "rates", "workers", "bytes=size", "hours"),
+    )
 
     @property
     def seconds(self) -> float:
@@ -80,27 +84,22 @@ class Plan:
         return work / self.workers
 
     @property
-    def size(self) -> float:
+    def hours(self) -> float:
+        """Wall time [h]."""
+        return self.seconds / 3600
+
+    @property
+    def size(self) -> int:
         """Size of what is missing [B]."""
-        return (
+        return round(
             self.missing_sequences * self.rates.sequence_bytes
             + self.missing_films * self.rates.film_bytes
         )
 
-    def as_dict(self) -> dict[str, Any]:
-        return {
-            "recipe": self.recipe.name,
-            "recipe_hash": self.recipe.hash,
-            "renderer": self.recipe.renderer,
-            "sequences": self.sequences,
-            "films": self.films,
-            "clips": self.clips,
-            "missing": {"sequences": self.missing_sequences, "films": self.missing_films},
-            "rates": vars(self.rates),
-            "workers": self.workers,
-            "bytes": round(self.size),
-            "hours": self.seconds / 3600,
-        }
+    @property
+    def missing(self) -> dict[str, int]:
+        """How many are missing of each kind."""
+        return {"sequences": self.missing_sequences, "films": self.missing_films}
 
 
 def plan(

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 
 from msgspec import Meta
 
+from flagdata.core.json_values import json_values
 from flagdata.core.provenance import canonical, digest, file_hash, recipe_hash
 from flagdata.core.rng import child_seed
 from flagdata.core.shell import command_line
@@ -21,7 +22,6 @@ from flagdata.recipes.typed_tables import (
     NotNegativeQuantity,
     Positive,
     Quantity,
-    plain,
 )
 from flagdata.record.writer import Coding
 from sim.assets.photos import Photos
@@ -190,20 +190,19 @@ class DatasetRecipe:
             "photos": None if self.photos is None else _content(self.photos),
             "camera": {
                 **_coding(camera),
-                "read_noise": plain(camera.read_noise),
-                "shot_noise": plain(camera.shot_noise),
+                "read_noise": json_values(camera.read_noise),
+                "shot_noise": json_values(camera.shot_noise),
                 "frame_slot": camera.frame_slot,
             },
             "anemometer": {
                 "truth": anemometer.truth.value,
                 "rate": anemometer.rate,
                 "before": anemometer.before,
-                "noise": plain(anemometer.noise),
+                "noise": json_values(anemometer.noise),
                 "resolution": anemometer.resolution,
                 "accuracy": anemometer.accuracy,
                 "effects": {
-                    name: {key: plain(value) for key, value in parameters.items()}
-                    for name, parameters in anemometer.effects.items()
+                    name: json_values(parameters) for name, parameters in anemometer.effects.items()
                 },
             },
         }
@@ -236,7 +235,7 @@ def _group_description(groups: GroupSpec | None, batch: int) -> dict[str, Any]:
     return {
         "groups": {
             "size": batch,
-            "height": plain(groups.height),
+            "height": json_values(groups.height),
             "rates": list(groups.rates),
             "attachments": [attachment.value for attachment in groups.attachments],
         }
@@ -245,8 +244,8 @@ def _group_description(groups: GroupSpec | None, batch: int) -> dict[str, Any]:
 
 def _coding(camera: CameraSpec) -> dict[str, Any]:
     if camera.coding is Coding.JPEG:
-        return {"jpeg_quality": plain(camera.jpeg_quality)}
-    return {"coding": camera.coding.value, "rate_factor": plain(camera.rate_factor)}
+        return {"jpeg_quality": json_values(camera.jpeg_quality)}
+    return {"coding": camera.coding.value, "rate_factor": json_values(camera.rate_factor)}
 
 
 @cache

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from flagdata.core.json_values import json_values
 from flagdata.core.provenance import canonical, recipe_hash
 from flagdata.record import RecordWriter
 from flagdata.record.metadata import CAMERA, PROVENANCE, camera_metadata
@@ -112,7 +113,7 @@ def parameters_of(
         numbers |= _numbers(
             MEAN_WIND if name == "wind_speed" and truth is Truth.MEASURED else name, value
         )
-    for name, value in zeta.as_dict().items():
+    for name, value in json_values(zeta).items():
         numbers |= _numbers(f"render.{name}", value)
     return {**numbers, **drawn}
 
@@ -127,7 +128,7 @@ def _numbers(name: str, value: Parameter) -> dict[str, float]:
 
 def texts_of(member: Member, zeta: RenderParameters) -> dict[str, str]:
     """Returns the parameters that are names."""
-    drawn = {f"render.{name}": value for name, value in zeta.as_dict().items()}
+    drawn = {f"render.{name}": value for name, value in json_values(zeta).items()}
     return {
         name: value
         for name, value in {**member.parameters, **drawn}.items()

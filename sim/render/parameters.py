@@ -11,7 +11,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from typing import Annotated, Any, get_type_hints
 
 from flagdata.core.schema import FRAME_SIZE
@@ -154,10 +154,6 @@ class RenderParameters:
     @classmethod
     def _types(cls) -> Mapping[str, type]:
         return _number_types(cls)
-
-    def as_dict(self) -> dict[str, Any]:
-        """As JSON."""
-        return asdict(self)
 
 
 @functools.cache

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from flagdata.core.json_values import json_values
 from flagdata.core.rng import stream
 from flagdata.errors import InputError, UnknownNameError
 from flagdata.recipes.shelves import Shelf, parse_recipe
@@ -19,7 +20,6 @@ from flagdata.recipes.typed_tables import (
     ends,
     entries,
     in_radians,
-    plain,
 )
 from sim.assets import Assets
 from sim.render.parameters import RenderParameters
@@ -126,7 +126,7 @@ class RenderPrior:
     def identity(self) -> dict[str, Any]:
         """Returns all that shapes a draw beside its seed and the assets, as JSON."""
         return {
-            "quantities": {name: plain(quantity) for name, quantity in self.quantities.items()},
+            "quantities": json_values(self.quantities),
             "textures": list(self.textures),
             "backgrounds": list(self.backgrounds),
             "least_angle": self.least_angle,

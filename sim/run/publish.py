@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
 from typing import Any, TypeAlias
@@ -57,17 +57,6 @@ class RunReport:
     steps: Mapping[str, float]
     seconds: float
     rate: float
-
-    def as_dict(self) -> dict[str, Any]:
-        return {
-            "added": list(self.added),
-            "existing": list(self.existing),
-            "healed": {artifact: asdict(how) for artifact, how in self.healed.items()},
-            "failed": [dict(f) for f in self.failed],
-            "steps": dict(self.steps),
-            "seconds": self.seconds,
-            "rate": self.rate,
-        }
 
 
 def simulate(

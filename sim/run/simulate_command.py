@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from flagdata.api.physics import Members
 from flagdata.core.console import echo, in_steps, progress, say
+from flagdata.core.json_values import json_values
 from flagdata.core.printable import count_of
 from flagdata.verbs.shared_options import Computed, OnBranch, OnLake
 from flagdata.verbs.verb_options import Result, argument, options, verb
@@ -55,7 +56,7 @@ def simulate(chosen: SimulateCommand) -> Iterator[Result]:
     steps = in_steps(added_since(lake, branch))
     with steps, progress(loaded.count, label=loaded.name, unit="flag") as advance:
         report = run(lake, loaded, branch=branch, device=device, workers=workers, progress=advance)
-    content = {"lake": str(lake.path), "recipe": loaded.name, **report.as_dict()}
+    content = {"lake": str(lake.path), "recipe": loaded.name, **json_values(report)}
     yield Result("simulate", content, 1 if report.failed else 0)
     _print(report)
 

@@ -13,10 +13,11 @@ from typing import Annotated, Any
 
 import torch
 
+from flagdata.core.json_values import json_values
 from flagdata.core.provenance import canonical, digest
 from flagdata.errors import LimitError, UsageError
 from flagdata.recipes.retired_names import hashed_name
-from flagdata.recipes.typed_tables import Count, Named, NotNegative, Positive, Quantity, plain
+from flagdata.recipes.typed_tables import Count, Named, NotNegative, Positive, Quantity
 from sim.arcsim import ArcsimScene
 from sim.cloth.air import AIR_FORCES, AirForce, QuadraticNormal
 from sim.cloth.contact import Contact
@@ -332,16 +333,16 @@ class Recipe:
             },
             "material": {
                 "bases": [_base(base) for base in material.bases],
-                hashed_name("area_weight"): plain(material.area_weight),
-                "stretching_factor": plain(material.stretching),
-                "bending_factor": plain(material.bending),
-                "bending_factors": plain(material.bending_each),
-                "damping": plain(material.damping),
+                hashed_name("area_weight"): json_values(material.area_weight),
+                "stretching_factor": json_values(material.stretching),
+                "bending_factor": json_values(material.bending),
+                "bending_factors": json_values(material.bending_each),
+                "damping": json_values(material.damping),
                 **_area_weight_factor_entry(material),
             },
             "wind": {
-                "speed": plain(wind.speed),
-                "toward": plain(wind.toward),
+                "speed": json_values(wind.speed),
+                "toward": json_values(wind.toward),
                 "vertical": wind.vertical,
                 "force": _force(wind.force),
                 **({} if wind.samples is None else {"samples": wind.samples.content()}),
@@ -358,7 +359,7 @@ class Recipe:
             "time": vars(self.time).copy(),
             "effects": {
                 name: {
-                    **{key: plain(value) for key, value in effect.parameters.items()},
+                    **json_values(effect.parameters),
                     **({} if effect.length is None else {"length": effect.length}),
                 }
                 for name, effect in self.effects.items()
@@ -382,7 +383,7 @@ def _stiffness_entry(scene: SceneSpec) -> dict[str, Any]:
 def _area_weight_factor_entry(material: MaterialSpec) -> dict[str, Any]:
     """Describes the factor on the area weight, where there is one."""
     factor = material.area_weight_factor
-    return {} if factor == 1.0 else {hashed_name("area_weight_factor"): plain(factor)}
+    return {} if factor == 1.0 else {hashed_name("area_weight_factor"): json_values(factor)}
 
 
 def _base(base: Material) -> dict[str, Any]:

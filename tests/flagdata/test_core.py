@@ -18,6 +18,7 @@ import pytest
 import flagdata
 from flagdata.core import provenance, rng, schema, units
 from flagdata.core.findings import Finding, Severity, quality_flags
+from flagdata.core.json_values import json_values
 from flagdata.errors import ErrorKind, FlagdataError, RefusedError, UnknownNameError
 from flagdata.recipes.registry import Registry
 from tests.contract.imports import modules, tree
@@ -33,7 +34,7 @@ def test_error_kinds_are_distinct_and_errors_survive_a_process_boundary() -> Non
     assert len({e.kind for e in errors}) == len(errors)
     error = pickle.loads(pickle.dumps(RefusedError("a", where="b", fix="c")))
     assert isinstance(error, RefusedError)
-    assert error.as_dict() == {"kind": "refused", "what": "a", "where": "b", "fix": "c"}
+    assert json_values(error) == {"kind": "refused", "what": "a", "where": "b", "fix": "c"}
 
 
 def test_every_kind_of_error_is_that_of_one_class_and_keeps_its_text() -> None:
@@ -60,7 +61,7 @@ def test_every_kind_of_error_is_that_of_one_class_and_keeps_its_text() -> None:
     assert sorted(value for values in used for value in values if value in kinds) == sorted(kinds)
     assert len(used) == len(kinds) > 20
     assert json.loads(json.dumps(RefusedError.kind)) == "refused"
-    assert type(RefusedError("a", fix="b").as_dict()["kind"]) is str
+    assert type(json_values(RefusedError("a", fix="b"))["kind"]) is str
 
 
 def test_the_version_is_that_of_the_installed_package() -> None:

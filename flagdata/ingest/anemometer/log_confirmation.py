@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, TypeVar
 
+from flagdata.core.json_values import json_values
 from flagdata.core.provenance import canonical, digest
 from flagdata.core.shell import command_line
 from flagdata.errors import ErrorKind, RefusedError
@@ -47,7 +48,7 @@ class Drafted:
         content = {
             "source": self.source_hash,
             "drafts": [
-                [log.drafted, dict(log.plan), dict(options.as_dict())]
+                [log.drafted, dict(log.plan), json_values(options)]
                 for log, options in self.readings
             ],
         }
@@ -114,9 +115,6 @@ class UnconfirmedError(RefusedError):
             "--sensor FILE.toml "
             "(flagdata ingest --sniff prints a recipe to begin with)",
         )
-
-    def as_dict(self) -> dict[str, str | None]:
-        return {**super().as_dict(), "accept": self.accept, "preview": self.preview}
 
 
 class Confirm(Protocol):

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import datetime as dt
-from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any, Literal, TypeAlias
+from typing import ClassVar, Literal, TypeAlias
 
 from flagdata.core.units import unit
 from flagdata.errors import UsageError
 from flagdata.ingest.anemometer.instants.log_clock import ClockChoice
 
-_LATER = frozenset(
-    {"clock", "unit", "start", "wind", "rate", "columns", "missing", "expect", "topic"}
-)
 ZeroOffset: TypeAlias = float | Literal["report", "estimate"]
 """What to do with a reading that is not zero in calm air: subtract this many m/s, report what the
 idle stretches show and change nothing, or subtract what they show."""
@@ -98,6 +94,15 @@ class WindOptions:
     topic: str | None = None
     zero_offset: ZeroOffset | None = None
     limits: Limits = field(default_factory=Limits)
+    JSON_NAMES: ClassVar = (
+        *("format", "recipe", "zone", "encoding", "date", "date_order", "platform", "talker"),
+        *("azimuth", "clock", "unit", "start", "rate", "wind", "columns", "missing", "expect"),
+        *("topic", "zero_offset"),
+    )
+    """Everything that shapes the result, for a recipe hash; limits do not (they only refuse)."""
+    JSON_OPTIONAL: ClassVar = frozenset(
+        {"clock", "unit", "start", "wind", "rate", "columns", "missing", "expect", "topic"}
+    )
 
     def __post_init__(self) -> None:
         if self.date_order not in (None, "dmy", "mdy", "ymd"):
@@ -157,22 +162,6 @@ class WindOptions:
     def _is_given(self, name: str) -> bool:
         value = getattr(self, name)
         return bool(value) if isinstance(value, tuple) else value is not None
-
-    def as_dict(self) -> Mapping[str, Any]:
-        """Returns everything that shapes the result, for a recipe hash; limits do not (they only
-        refuse).
-
-        Options that came later are there only where they are given, so that older artifacts keep
-        their hash.
-        """
-        content = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "limits"}
-        content = {
-            name: value
-            for name, value in content.items()
-            if name not in _LATER or self._is_given(name)
-        }
-        content["date"] = self.date.isoformat() if self.date else None
-        return content
 
 
 def check_zero_offset(value: object, *, where: str) -> None:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import ClassVar
 
 import av.error
 
 from flagdata.core.files.addresses import local_path
 from flagdata.core.findings import Finding
-from flagdata.core.json_values import json_values
 from flagdata.errors import TimeError
 from flagdata.ingest.camera.camera_options import CameraOptions
 from flagdata.ingest.camera.chapters import chapter_of
@@ -19,7 +18,6 @@ from flagdata.ingest.camera.picture_geometry import upright_size
 from flagdata.ingest.camera.recording_start import Start, find_start
 from flagdata.ingest.camera.stream import open_source
 from flagdata.ingest.camera.video_container import check_file, open_container, packets
-from flagdata.timebase import iso
 
 _LOOKED_THROUGH = 1000
 """Packets among which a picture comes, be the file damaged: more than lie between key frames."""
@@ -54,17 +52,11 @@ class CameraProbe:
     duration: float
     start: Start | None
     findings: tuple[Finding, ...]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values, the start as ISO 8601 text."""
-        fields = {k: v for k, v in asdict(self).items() if k not in ("start", "findings")}
-        return {
-            **fields,
-            "start": iso(self.start.instant) if self.start else None,
-            "start_from": self.start.source if self.start else None,
-            "start_sigma": self.start.sigma if self.start else None,
-            "findings": json_values(self.findings),
-        }
+    JSON_NAMES: ClassVar = (
+        *("container", "codec", "pixel_format", "width", "height", "rotation", "interlaced"),
+        *("rate", "variable_rate", "shortest", "longest", "frames", "duration"),
+        *("start=start.text", "start_from=start.source", "start_sigma=start.sigma", "findings"),
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

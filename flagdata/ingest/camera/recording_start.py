@@ -30,6 +30,11 @@ class Start:
     sigma: float | None
     findings: tuple[Finding, ...] = ()
 
+    @property
+    def text(self) -> str:
+        """The instant in ISO 8601."""
+        return iso(self.instant)
+
 
 UNKNOWN = 946_684_800 * NANOSECONDS
 """2000-01-01T00:00:00Z: the start of a recording whose start time is unknown, given by --start

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime as dt
 import json
 import math
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 from flagdata.core.json_values import json_values
+from flagdata.errors import RefusedError
 
 
 class Side(StrEnum):
@@ -53,6 +55,33 @@ def test_arrays_numbers_and_places_are_plain_and_what_is_not_finite_is_null() ->
     assert found == {"a": [[1.0, None]], "2": 7, "p": "a/b"}
     assert json.loads(json.dumps(found, allow_nan=False)) == found
     assert type(json_values(np.bool_(True))) is bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bounded:
+    inner: Inner | None
+    note: str = ""
+    later: bool = False
+    rows: tuple[int, ...] = ()
+    JSON_NAMES: ClassVar = ("share=inner.share", "note", "later", "rows")
+    JSON_OPTIONAL: ClassVar = frozenset({"later", "rows"})
+
+
+def test_what_lies_within_a_part_is_stated_and_null_where_the_part_is() -> None:
+    inner = Inner(side=Side.LEFT, share=0.5)
+    assert json_values(Bounded(inner=inner)) == {"share": 0.5, "note": ""}
+    assert json_values(Bounded(inner=None)) == {"share": None, "note": ""}
+
+
+def test_what_is_optional_is_stated_where_it_says_something() -> None:
+    found = json_values(Bounded(inner=None, later=True, rows=(0,)))
+    assert found == {"share": None, "note": "", "later": True, "rows": [0]}
+
+
+def test_dates_are_iso_text_and_errors_state_their_parts() -> None:
+    assert json_values(dt.date(2026, 5, 1)) == "2026-05-01"
+    error = RefusedError("a", where="b", fix="c")
+    assert json_values(error) == {"kind": "refused", "what": "a", "where": "b", "fix": "c"}
 
 
 def test_a_type_without_a_form_is_refused() -> None:

@@ -62,7 +62,7 @@ def test_each_clip_is_on_the_side_that_it_states() -> None:
     assert {side: set(on) for side, on in found.artifacts.items()} == {
         side: {clip.id for clip in clips if clip.side == side} for side in COUNTS
     }
-    assert found.as_dict() == {
+    assert found.statement == {
         "rule": "stated",
         "datasets": ["made"],
         "sides": {

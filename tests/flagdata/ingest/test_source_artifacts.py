@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flagdata.core.json_values import json_values
 from flagdata.core.provenance import file_hash
 from flagdata.core.schema import Kind
 from flagdata.errors import ConflictError, InputError, NotFoundError, TimeError
@@ -234,7 +235,7 @@ name = "mine"
     assert first.artifact.object is not None
     record = Record.open(lake.object_path(first.artifact.object))
     assert record.attachment("mine.recipe.toml") == recipe.read_bytes()
-    assert str(tmp_path) not in json.dumps(first.as_dict())
+    assert str(tmp_path) not in json.dumps(json_values(first))
     recipe.write_text(text.format(unit="km/h"))
     second = ingest_wind(lake, wind_log, WindIngest(wind=WindOptions(recipe=str(recipe))))
     assert second.artifact.id != first.artifact.id

@@ -18,6 +18,7 @@ from deltalake import DeltaTable
 from flagdata.core.files.checksums import content_hash
 from flagdata.core.files.durable import HEAL
 from flagdata.core.findings import Severity
+from flagdata.core.json_values import json_values
 from flagdata.core.schema import CATALOG, Kind
 from flagdata.errors import ConflictError, CorruptError, UsageError
 from flagdata.lake import Artifact, Lake, Log, collect, doctor, verify_catalog
@@ -149,7 +150,7 @@ def test_the_error_of_a_damaged_log_entry_names_it(lake: Lake) -> None:
     fresh = Lake.open(lake.path)
     with pytest.raises(CorruptError) as caught:
         fresh.rows()
-    assert caught.value.as_dict() == {
+    assert json_values(caught.value) == {
         "kind": "corrupt",
         "what": f"the log entry {entry.name} is damaged",
         "where": str(entry),

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flagdata.core.json_values import json_values
 from flagdata.errors import CorruptError
 from measure.refine import DrawnView, Evaluator, FilmCamera, FixedView, Simulator, fingerprint
 from measure.refine.target_view import of_parameters
@@ -95,7 +96,7 @@ def test_an_unknown_view_is_drawn_anew_for_each_clip(simulator: Simulator, tmp_p
 
 
 def test_a_recordings_own_view_is_read_from_its_parameters(view: FixedView) -> None:
-    stated = {f"render.{name}": value for name, value in view.zeta.as_dict().items()}
+    stated = {f"render.{name}": value for name, value in json_values(view.zeta).items()}
     camera = {"camera.rate_factor": 19.0, "camera.read_noise": 1.0, "camera.shot_noise": 2.0}
     found = of_parameters({**stated, **camera, "area_weight": 0.1}, where="test")
     assert found is not None

@@ -11,6 +11,7 @@ import pytest
 
 import flagdata
 from flagdata.core.arrays import FloatArray, UInt8Array
+from flagdata.core.json_values import json_values
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.lake import Lake
 from models.training import (
@@ -160,7 +161,7 @@ def test_what_happens_to_films_shapes_their_inputs_and_the_recipes_hash(
     )
     assert dusky.identity()["augment"] == {"dusk": {"share": 1.0, "low": 0.3, "high": 0.6}}
     assert "augment" not in recipe(extra="variants = 2\n").identity()
-    assert "conditioned" not in recipe(extra="variants = 2\n").cropping.as_dict()
+    assert "conditioned" not in json_values(recipe(extra="variants = 2\n").cropping)
     entries, variant = np.arange(6), np.zeros(6, dtype=np.int64)
     one, other = (
         films(lake_path, tmp_path, of).batch(entries, variant).numpy() for of in (plain, dusky)

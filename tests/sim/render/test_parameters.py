@@ -9,6 +9,7 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
+from flagdata.core.json_values import json_values
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.recipes.typed_tables import Range
 from sim.assets import BACKGROUNDS, TEXTURES, Assets
@@ -87,7 +88,7 @@ def test_a_seed_gives_one_draw_and_a_changed_range_moves_no_other_parameter() ->
     changed = prior.with_quantities({"sun_height": Range(low=1.0, high=2.0)}, source="a test").draw(
         7, Assets()
     )
-    before, after = prior.draw(7, Assets()).as_dict(), changed.as_dict()
+    before, after = json_values(prior.draw(7, Assets())), json_values(changed)
     assert {name for name in before if before[name] != after[name]} == {"sun_height"}
 
 

@@ -12,6 +12,7 @@ from multiprocessing import get_context
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Protocol
 
+from flagdata.core.json_values import json_values
 from flagdata.core.rng import child_seed
 from flagdata.errors import FlagdataError
 from measure.verdict import Verdict
@@ -133,7 +134,12 @@ def _judge(folder: ChallengeFolder, fitter: Fitter, name: str, seed: int) -> Fil
     except FlagdataError as error:
         seconds = time.monotonic() - began
         return Filing(
-            name=name, data=data, seed=seed, verdict=None, refusal=error.as_dict(), seconds=seconds
+            name=name,
+            data=data,
+            seed=seed,
+            verdict=None,
+            refusal=json_values(error),
+            seconds=seconds,
         )
     seconds = time.monotonic() - began
     return Filing(

@@ -31,6 +31,7 @@ from typing import Any
 import numpy as np
 
 import flagdata.ingest.anemometer as package
+from flagdata.core.json_values import json_values
 from flagdata.errors import FlagdataError
 from flagdata.ingest import WindOptions
 from flagdata.ingest.anemometer import anemometer_log as module
@@ -58,7 +59,7 @@ def _record_calls(folder: Path) -> None:
             if options.recipe and Path(options.recipe).is_file()
             else None
         )
-        given = {name: value for name, value in options.as_dict().items() if value is not None}
+        given = {name: value for name, value in json_values(options).items() if value is not None}
         if options.limits != Limits():
             given["limits"] = dataclasses.asdict(options.limits)
         if recipe is not None:

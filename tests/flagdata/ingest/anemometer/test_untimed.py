@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields
 from functools import reduce
 from operator import xor
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flagdata.core.json_values import json_values
 from flagdata.errors import FlagdataError, UsageError
 from flagdata.ingest import WindOptions, read_log
 from flagdata.record.signals import WindLog
@@ -83,8 +85,12 @@ def test_a_stream_without_a_time_says_what_is_needed(log_file: Write) -> None:
 
 
 def test_options_without_a_rate_keep_their_hash() -> None:
-    assert "rate" not in WindOptions().as_dict()
-    assert WindOptions(rate=2.0, start=_START).as_dict()["rate"] == 2.0
+    assert "rate" not in json_values(WindOptions())
+    assert json_values(WindOptions(rate=2.0, start=_START))["rate"] == 2.0
+
+
+def test_all_options_but_limits_shape_the_hash() -> None:
+    assert {*WindOptions.JSON_NAMES, "limits"} == {one.name for one in fields(WindOptions)}
 
 
 def test_generated_stamps_give_no_finding() -> None:

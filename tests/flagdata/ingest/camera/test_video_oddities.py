@@ -14,6 +14,7 @@ import pytest
 from PIL import Image
 
 from flagdata.core.findings import Severity
+from flagdata.core.json_values import json_values
 from flagdata.errors import InputError, NotFoundError, TimeError, UsageError
 from flagdata.ingest import CameraOptions, CropBox, open_camera, probe
 from tests.flagdata.ingest.camera.conftest import PLAIN, START, number_of, write_video
@@ -139,7 +140,7 @@ def test_a_probe_describes_the_file_without_needing_a_start(cfr60: Path) -> None
     assert seen.duration == pytest.approx(119 / 60)
     assert not seen.variable_rate
     assert seen.start is None
-    assert seen.as_dict()["start"] is None
+    assert json_values(seen)["start"] is None
 
 
 def test_a_transport_stream_joined_in_the_middle_keeps_time_from_its_first_packet(
