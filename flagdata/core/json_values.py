@@ -21,8 +21,6 @@ from enum import Enum
 from pathlib import PurePath
 from typing import Any
 
-import numpy as np
-
 
 def json_values(value: Any) -> Any:
     """Returns a value as JSON has it: objects, lists, texts, numbers, true, false and null.
@@ -39,8 +37,6 @@ def json_values(value: Any) -> Any:
             return value
         case float():
             return value if math.isfinite(value) else None
-        case np.generic() | np.ndarray():
-            return json_values(value.tolist())
         case PurePath():
             return str(value)
         case dt.date():
@@ -49,6 +45,8 @@ def json_values(value: Any) -> Any:
             return {str(json_values(key)): json_values(one) for key, one in value.items()}
         case list() | tuple():
             return [json_values(one) for one in value]
+        case _ if callable(listed := getattr(value, "tolist", None)):  # of numpy, not loaded for it
+            return json_values(listed())
         case _ if names := _names(value):
             optional = getattr(type(value), "JSON_OPTIONAL", ())
             entries = ((key, json_values(_part(value, path))) for key, path in names.items())

@@ -16,9 +16,8 @@ import pytest
 
 from flagdata.core.findings import Severity
 from flagdata.errors import ConflictError
-from flagdata.lake import Lake, attempts, collect, doctor, object_names, verify
+from flagdata.lake import Lake, Log, attempts, collect, doctor, object_names, verify
 from flagdata.lake.commits import Change, commit
-from flagdata.lake.delta_log import Log
 from tests.flagdata.lake.conftest import put_text
 
 NOW = timedelta(0)
