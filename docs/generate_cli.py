@@ -1,5 +1,5 @@
-"""The reference of the command line, docs/cli.md, from the commands themselves: `python -m
-docs.generate_cli`."""
+"""The reference of the command line, docs/cli.md and a page a group of verbs beside it, from the
+commands themselves: `python -m docs.generate_cli`."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from flagdata.cli import GROUPS, VERBS, root
 from flagdata.verbs.verb_options import LongCommand
 
 PAGE = Path(__file__).with_name("cli.md")
+FOLDER = Path(__file__).with_name("cli")
 _HEAD = """\
 # Commands
 
-This page is generated from the commands; `flagdata help VERB` prints the same. `flagdata catalog` lists the names of
+These pages are generated from the commands; `flagdata help VERB` prints the same. `flagdata catalog` lists the names of
 scenes, effects, materials, sensors, data sets and models that commands and recipes take.
 
 Results go to stdout and everything else to stderr. With `--json`, before or after the command's name, the
@@ -38,18 +39,25 @@ def commands() -> Iterator[tuple[str, click.Command]]:
             yield f"flagdata {verb} {name}", below
 
 
-def reference() -> str:
-    """The page."""
-    parts = [_HEAD, "| | command | what it does |\n|---|---|---|"]
+def pages() -> dict[Path, str]:
+    """The pages with their text: the list of all commands, and one page a group."""
+    listed = [_HEAD, "| | command | what it does |\n|---|---|---|"]
+    found: dict[Path, str] = {}
     for group, (title, verbs) in GROUPS.items():
-        rows = [f"[`{verb}`](#flagdata-{verb}) | {about} |" for verb, (_, about) in verbs.items()]
+        rows = [
+            f"[`{verb}`](cli/{group}.md#flagdata-{verb}) | {about} |"
+            for verb, (_, about) in verbs.items()
+        ]
         starts = (f"**{group}**: {title}", *[""] * (len(rows) - 1))
-        parts[-1] += "".join(
+        listed[-1] += "".join(
             f"\n| {start} | {row}" for start, row in zip(starts, rows, strict=True)
         )
-    parts[-1] += "\n"
-    parts += [_section(name, command) for name, command in commands()]
-    return "\n".join(parts)
+        head = f"# Commands: {title}\n\n[All commands](../cli.md), and what they have in common.\n"
+        sections = [
+            _section(name, command) for name, command in commands() if name.split(" ")[1] in verbs
+        ]
+        found[FOLDER / f"{group}.md"] = "\n".join([head, *sections])
+    return {PAGE: "\n".join(listed) + "\n"} | found
 
 
 def _section(name: str, command: click.Command) -> str:
@@ -112,4 +120,6 @@ def _cell(text: str) -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(reference(), encoding="utf-8")
+    FOLDER.mkdir(exist_ok=True)
+    for path, text in pages().items():
+        path.write_text(text, encoding="utf-8")

@@ -1,18 +1,29 @@
-"""The page of the effects, docs/effects.md, from their registries: `python -m
-docs.generate_effects`."""
+"""The pages of the effects, docs/effects.md and the folder beside it, from their registries:
+`python -m docs.generate_effects`."""
 
 from __future__ import annotations
 
 import inspect
 import math
 import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
-from flagdata.recipes.registry import Registry
 from sim.effects import EFFECTS, SENSOR_EFFECTS
+from sim.effects.effect import (
+    ClothEffect,
+    Effect,
+    FlowEffect,
+    ForceEffect,
+    PressureEffect,
+    WindEffect,
+)
 from sim.effects.parameter import Parameter, Parametrised
+from sim.effects.sensor import AnemometerEffect, CameraEffect, ClockEffect
 
 PAGE = Path(__file__).with_name("effects.md")
+FOLDER = Path(__file__).with_name("effects")
 _HEAD = """\
 # Effects
 
@@ -28,25 +39,95 @@ the simulator's compiled kernel, each in a library that is built when the effect
 That holds for [an effect of your own](extending.md#an-effect) too. Where anything that acts has no C++, all that acts
 beside the base model runs by torch, at three to ten times the base model's time.
 """
+Shown = Mapping[str, type[Parametrised]]
 
 
-def reference() -> str:
-    """The page."""
-    on_cloth = "Forces, and changes of the wind, the cloth and its attachments."
-    on_sensor = "What anemometers, clocks and cameras do to an observation."
-    return "\n".join(
-        [
-            _HEAD,
-            f"## On the cloth\n\n{on_cloth}\n",
-            *_sections(EFFECTS),
-            f"## On the observation\n\n{on_sensor}\n",
-            *_sections(SENSOR_EFFECTS),
-        ]
+@dataclass(frozen=True)
+class Family:
+    """Effects on a page of their own.
+
+    Attributes:
+        name: of the page's file.
+        title: of the page.
+        about: what they have in common.
+        kinds: classes, one of which each effect derives from first.
+        more: names of others that belong here.
+    """
+
+    name: str
+    title: str
+    about: str
+    kinds: tuple[type[Parametrised], ...]
+    more: tuple[str, ...] = ()
+
+
+FAMILIES = (
+    Family(
+        "forces",
+        "Forces of the air",
+        "Forces on the faces of the cloth, and factors on the base model's force.",
+        (ForceEffect, PressureEffect),
+        ("wagner-lag",),
+    ),
+    Family(
+        "wind", "Wind", "Changes of the wind that blows on the cloth.", (WindEffect, FlowEffect)
+    ),
+    Family(
+        "cloth",
+        "Cloth and attachment",
+        "Changes of the cloth itself, and of how it is held.",
+        (ClothEffect, Effect),
+    ),
+    Family(
+        "anemometers",
+        "Anemometers",
+        "What an anemometer and its place do to the wind that it logs.",
+        (AnemometerEffect,),
+    ),
+    Family(
+        "clocks-and-cameras",
+        "Clocks and cameras",
+        "What clocks and cameras do to an observation.",
+        (ClockEffect, CameraEffect),
+    ),
+)
+
+
+def pages() -> dict[Path, str]:
+    """The pages with their text: the list of all effects, and one page a family."""
+    groups = [(family, _members(family)) for family in FAMILIES]
+    rows = [
+        _row(family, name, effect) for family, found in groups for name, effect in found.items()
+    ]
+    listed = f"{_HEAD}\n| family | effect | what it is |\n|---|---|---|\n" + "\n".join(rows) + "\n"
+    return {PAGE: listed} | {
+        FOLDER / f"{family.name}.md": _page(family, found) for family, found in groups
+    }
+
+
+def _members(family: Family) -> Shown:
+    others = {name for one in FAMILIES if one is not family for name in one.more}
+    return {
+        name: registry[name]
+        for registry in (EFFECTS, SENSOR_EFFECTS)
+        for name in registry
+        if name not in others and (name in family.more or registry[name].__mro__[1] in family.kinds)
+    }
+
+
+def _row(family: Family, name: str, effect: type[Parametrised]) -> str:
+    about = inspect.getdoc(sys.modules[effect.__module__]) or ""
+    first = _plain(about.split("\n\n")[0])
+    link = f"[`{name}`](effects/{family.name}.md#{name})"
+    return f"| {family.title} | {link} | {first} |"
+
+
+def _page(family: Family, effects: Shown) -> str:
+    head = (
+        f"# Effects: {family.title.lower()}\n\n{family.about} This page is generated from the library; "
+        "[effects](../effects.md) lists all, and says what null value, prior, strength and shape mean.\n"
     )
-
-
-def _sections(effects: Registry) -> list[str]:
-    return [_section(name, effects[name]) for name in effects]
+    return "\n".join([head, *(_section(name, effect) for name, effect in effects.items())])
 
 
 def _section(name: str, effect: type[Parametrised]) -> str:
@@ -56,7 +137,7 @@ def _section(name: str, effect: type[Parametrised]) -> str:
     parameters = effect.parameters().items()
     return "\n".join(
         [
-            f"### {name}\n",
+            f"## {name}\n",
             f"{_plain(about.split(chr(10) * 2)[0])}\n",
             f"{_plain(equation)}\n",
             "| parameter | role | unit | prior | null value |",
@@ -102,4 +183,6 @@ def _plain(text: str) -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(reference(), encoding="utf-8")
+    FOLDER.mkdir(exist_ok=True)
+    for path, text in pages().items():
+        path.write_text(text, encoding="utf-8")

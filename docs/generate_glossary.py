@@ -121,10 +121,11 @@ QUANTITIES = (
 )
 
 
-def reference() -> str:
-    """The page."""
+def pages() -> dict[Path, str]:
+    """The page with its text."""
     terms = [f"**{term}**\n: {meaning}\n" for term, meaning in GLOSSARY.items()]
-    return "\n".join([_HEAD, _QUANTITIES + "".join(map(_row, QUANTITIES)), "## Terms\n", *terms])
+    parts = [_HEAD, _QUANTITIES + "".join(map(_row, QUANTITIES)), "## Terms\n", *terms]
+    return {PAGE: "\n".join(parts)}
 
 
 def _row(quantity: Quantity) -> str:
@@ -140,4 +141,4 @@ def _row(quantity: Quantity) -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(reference(), encoding="utf-8")
+    PAGE.write_text(pages()[PAGE], encoding="utf-8")

@@ -106,7 +106,7 @@ def sources() -> dict[str, list[Line]]:
     found = {
         str(path.relative_to(ROOT)): list(lines_of_page(path.read_text(encoding="utf-8")))
         for path in pages
-        if "cli" not in path.relative_to(DOCS.parent).as_posix()  # of what the help is
+        if "cli" not in (path.stem, path.parent.name)  # made of the help
     }
     for path in sorted(DOCS.rglob("*.ipynb")):
         name = str(path.relative_to(ROOT))

@@ -25,12 +25,12 @@ def test_the_forces_counted_on_markers_are_those_of_the_readme() -> None:
     (result,) = re.findall(
         r"^\| forces missing from the cloth model \| [^|]+ \| ([^|]+) \|$", readme, re.MULTILINE
     )
-    assert f"of markers | {result} |" in text("closing-the-loop.md")
+    assert f"of markers | {result} |" in text("reading-a-verdict.md")
 
 
 def test_the_verdicts_on_another_simulator_are_those_of_their_sheets() -> None:
     page, nulls, effects = (
-        text("closing-the-loop.md"),
+        text("reading-a-verdict.md"),
         sheet("validate-foreign-nulls"),
         sheet("validate-foreign-effects"),
     )
@@ -84,4 +84,61 @@ def test_the_gain_of_a_refinement_is_that_of_the_sheet() -> None:
     assert (
         f"the median error is {refined['wind_error'][0]:.2f} m/s beside the network's "
         f"{alone['wind_error'][0]:.2f}"
-    ) in text("measure.md")
+    ) in text("refining.md")
+
+
+def rows_of_the_readme() -> dict[str, str]:
+    """Returns the results of README's table by what they are of."""
+    readme = (DOCS.parent / "README.md").read_text(encoding="utf-8")
+    return dict(re.findall(r"^\| ([^|]+) \| [^|]+ \| ([^|]+) \|$", readme, re.MULTILINE))
+
+
+def score(name: str) -> dict[str, tuple[int, int]]:
+    """Returns hits and count of the shares of a scored challenge."""
+    path = DOCS / "results" / name / "challenge-score.json"
+    shares = json.loads(path.read_text(encoding="utf-8"))["shares"]
+    return {key: (share["hits"], share["count"]) for key, share in shares.items()}
+
+
+def test_the_films_of_the_readme_are_those_of_their_sheets() -> None:
+    rows, films = rows_of_the_readme(), sheet("validate-films")
+    for row, weight in (("wind from a film", "open"), ("the same, area weight given", "stated")):
+        errors, refused = films["errors"]["coverage"][weight], films["refused"]["coverage"]
+        covered = errors["covered"]
+        assert f"median error {errors['median_error']:.2f} m/s, {covered['hits']} of" in rows[row]
+        assert f"of {covered['count']} in their" in rows[row]
+        assert rows[row].endswith(f"; {refused['hits']} refused")
+    too_low = films["errors"]["coverage"]["open"]["too_low"]
+    assert f", {too_low} too low;" in rows["wind from a film"]
+    counts = sheet("validate-no-flag")["counts"].values()
+    refused, drawn = (sum(one[key] for one in counts) for key in ("refused", "films"))
+    assert rows["films without a flag on a pole"] == (
+        f"{refused} refused, {drawn - refused} answered"
+    )
+    judged = sheet("validate-gate-films")["halves"]["judging"]
+    assert rows["films with a defect"] == (
+        f"{judged['refused']['hits']} of {judged['refused']['count']} refused, "
+        f"{judged['right_first']['hits']} of them with the true reason first"
+    )
+    errors = sheet("validate-weighed")["films"]
+    assert rows["area weight, wind known"].startswith(
+        f"median error {100 * errors['median_error']:.0f} %, {errors['held']} of "
+    )
+
+
+def test_the_verdicts_of_the_readme_are_those_of_their_sheets() -> None:
+    rows = rows_of_the_readme()
+    for row, name in (
+        ("forces missing from the cloth model", "challenge-registered"),
+        ("the same, from films", "challenge-films-3"),
+        ("the same, from films of three minutes", "challenge-films-long"),
+    ):
+        alarms, nulls = score(name)["false positives on nulls"]
+        found, hidden = score(name)["detected: one effect"]
+        named, _ = score(name)["true effect among those named"]
+        assert f"{alarms or 'no'} false alarm" in rows[row]
+        assert (
+            f" in {nulls}; of {hidden} hidden forces {found} detected, {named} named" in rows[row]
+        )
+    false, claims = score("challenge-registered")["false discoveries among claims"]
+    assert rows["named forces that did not act"] == f"{false} of {claims}"

@@ -109,7 +109,7 @@ def test_every_command_of_closing_the_loop_runs(
     monkeypatch.setattr("measure.nulls.bank.build", first_kind)
     monkeypatch.chdir(folder)
     shell = Shell(patch=monkeypatch)
-    for command in commands("closing-the-loop.md"):
+    for command in commands("loop-markers.md"):
         shell.run(command)
     speeds = [[round(r.wind.speed, 1) for r in experiment.recordings] for experiment in judged]
     assert speeds == [[4.0, 6.0], [4.0, 8.0], [5.3, 5.3], [4.0, 6.0]]
@@ -123,7 +123,7 @@ def test_every_command_of_closing_the_loop_runs(
 
 def test_the_recipe_of_the_page_is_read(folder: Path, tmp_path: Path) -> None:
     shutil.copy(folder / "tracks.csv", tmp_path)
-    (text,) = blocks("closing-the-loop.md", "toml")
+    (text,) = blocks("loop-markers.md", "toml")
     path = tmp_path / "flag.toml"
     path.write_text(text, encoding="utf-8")
     recipe = load(path)

@@ -22,12 +22,14 @@ from tests.docs.pages import DOCS, Shell, blocks, commands, files
 from tests.drawn.field import DrawnRecipe, write_drawn_film, write_drawn_log
 from tests.drawn.flag import DrawnFlag
 
-OF_INFERENCE = {"closing-the-loop.md", "proposals.md"}
+OF_INFERENCE = {"loop-markers.md", "proposals.md"}
 """Pages whose commands take minutes each; tests/docs/test_loop_pages.py runs them without the
 inference."""
 AFTER_START = (
     "alignment.md",
     "measure.md",
+    "long-films.md",
+    "hanging-cloth.md",
     "anemometer.md",
     "versions-and-recovery.md",
     "object-storage.md",
@@ -121,7 +123,7 @@ def test_every_command_of_a_page_that_goes_on_from_the_start_runs(
     enter(folder, monkeypatch, page)
     if page == "object-storage.md":
         request.getfixturevalue("bucket_folder")
-    if page == "measure.md":
+    if page == "long-films.md":
         withdraw_all_but(4, folder / "field.lake", "kind = 'clip' and wind between 4 and 5")
     assert any(run_page(page, monkeypatch))
 

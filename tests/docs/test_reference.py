@@ -32,8 +32,11 @@ from tests.flagdata.ingest.anemometer.test_silent_errors import KINDS
 )
 def test_a_generated_page_is_that_of_the_code(module: object) -> None:
     name = module.__name__  # type: ignore[attr-defined]
-    fresh = module.reference() == module.PAGE.read_text(encoding="utf-8")  # type: ignore[attr-defined]
-    assert fresh, f"write the page anew: python -m {name}"
+    pages = module.pages()  # type: ignore[attr-defined]
+    stale = [path for path, text in pages.items() if path.read_text(encoding="utf-8") != text]
+    assert stale == [], f"write them anew: python -m {name}"
+    folders = {path.parent for path in pages} - {DOCS}
+    assert {path for folder in folders for path in folder.iterdir()} <= set(pages)
 
 
 def test_every_call_has_an_example_of_ten_lines_at_most_and_words_for_every_argument() -> None:
@@ -68,10 +71,11 @@ def test_every_command_and_every_option_has_a_sentence() -> None:
 
 
 def test_every_effect_and_each_of_its_parameters_is_on_the_page() -> None:
-    page = generate_effects.PAGE.read_text(encoding="utf-8")
+    page = "".join(path.read_text(encoding="utf-8") for path in (DOCS / "effects").glob("*.md"))
     for name in (*EFFECTS, *SENSOR_EFFECTS):
         effect = EFFECTS[name] if name in EFFECTS else SENSOR_EFFECTS[name]
-        section = page.split(f"\n### {name}\n")[1].split("\n### ")[0]
+        _, section = page.split(f"\n## {name}\n")
+        section = section.split("\n## ")[0]
         for label, entry in effect.parameters().items():
             (row,) = [line for line in section.splitlines() if line.startswith(f"| `{label}` |")]
             cells = [cell.strip() for cell in row.strip("|").split(" | ")]

@@ -11,7 +11,8 @@ from tests.docs.pages import DOCS
 MEAN = 18
 MOST = 35
 LONGER = {"card-flag.md", "cli.md", "effects.md"}
-"""Pages of longer sentences: one reports a study, two are generated from docstrings and help."""
+"""Pages of longer sentences: one reports a study, two are generated from docstrings and help, as
+those in folders are."""
 PAGES = sorted(path.name for path in DOCS.glob("*.md") if path.name not in LONGER)
 _CODE = re.compile(r"^( *)```.*?^\1```$|^\$\$.*?^\$\$$", re.DOTALL | re.MULTILINE)
 _PARAGRAPH = re.compile(r"\n\s*\n|\n(?=\s*(?:[-*] |\d+\. |: ))")

@@ -24,7 +24,7 @@ def test_the_stored_verdict_is_worded_as_the_program_words_it_now(stored: Verdic
     assert stored.words == " ".join([lead(stored), *by_draw(stored.test)])
 
 
-@pytest.mark.parametrize("page", ["closing-the-loop.md", "notebooks/close-the-loop.ipynb"])
+@pytest.mark.parametrize("page", ["loop-markers.md", "notebooks/close-the-loop.ipynb"])
 def test_a_verdict_on_a_page_is_the_stored_one_line_by_line(page: str, stored: Verdict) -> None:
     text = (DOCS / page).read_text(encoding="utf-8")
     if page.endswith(".ipynb"):
