@@ -19,8 +19,8 @@ def propose(chosen: Proposing) -> Iterator[Result]:
 
     RECIPE.toml is one of `flagdata close-loop` that names its recordings. Terms are sought in a
     part of them; up to three become an effect, written as a module with its contract tests; the
-    rest of the recordings decide: errors must fall, and below those of as many terms of another
-    direction. proposal/proposals.json records what was tried. Run it where close-loop says "none of
+    rest of the recordings decide: errors must fall, and fall further than with as many unrelated
+    terms. proposal/proposals.json records what was tried. Run it where close-loop says "none of
     the library"; where it says "partly explained", name what it found with --known. --effect tests
     such a file on other recordings, beside the terms as controls.
 

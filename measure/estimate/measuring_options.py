@@ -73,7 +73,7 @@ class Options:
         return stated_values
 
     def known(self, sizes: Sizes, model: Estimator) -> tuple[Known, ...]:
-        """Returns the same at each size considered, as of a flag of the network's own size.
+        """Returns the constraints, scaled to the network's flag size, for each candidate size.
 
         Raises:
             UsageError: a quantity that the model does not estimate, or a statement beyond what it

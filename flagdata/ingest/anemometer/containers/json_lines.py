@@ -48,7 +48,7 @@ def as_table(source: TextFile) -> TableText:
             where=str(source.path),
             fix="check that the logger recorded anything",
         )
-    findings = [Finding.of("json-lines", "lines are counted with the names as the first")]
+    findings = [Finding.of("json-lines", "line numbers count the heading as line 1")]
     if left_out:
         message = f"{left_out} lines are no JSON object; left out"
         findings.append(

@@ -58,7 +58,7 @@ KINDS: Mapping[str, tuple[str, Mapping[str, object], str]] = {
             f'{{"time": "2026-05-01T12:00:{s:02d}Z", "wind_speed (m/s)": {4 + s % 5}}}\n' for s in S
         ),
         {},
-        "lines are counted with the names as the first",
+        "line numbers count the heading as line 1",
     ),
     "north-mark": (LINES, {}, "north"),
     "no-stamp": (LINES + gill(1) + "\n", {}, "1 readings without a stamp; left out"),
