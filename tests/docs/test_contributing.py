@@ -4,6 +4,8 @@ walked."""
 from __future__ import annotations
 
 import inspect
+import json
+import math
 import re
 import shutil
 import subprocess
@@ -13,16 +15,26 @@ from collections.abc import Callable, Iterator
 from importlib.util import find_spec, module_from_spec, spec_from_file_location
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from docs.generate_effects import pages
+from measure.observables.observable import WindowReading
+from measure.observables.observables_table import ObservableTable
 from sim.effects import EFFECTS
 from tests.contract import test_effects
 from tests.contract.test_effect_parameters import lacking
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
-WALKS = ("An effect", "A log format", "A verb", "A network", "A renderer")
+WALKS = (
+    "An effect",
+    "A log format",
+    "A verb",
+    "A question to a recording",
+    "A network",
+    "A renderer",
+)
 LINES = 60
 """Of a page."""
 
@@ -100,6 +112,36 @@ def test_the_effect_of_the_walk_keeps_the_contract(fringe: str) -> None:
     assert list(lacking(EFFECTS[fringe])) == []
     about = "## fringe\n\nDrag of a fringe of threads on the cloth.\n"
     assert any(about in text for text in pages().values())
+
+
+def test_the_question_of_the_walk_is_answered_without_a_renderer_of_its_own(
+    tmp_path: Path,
+) -> None:
+    file, name = tmp_path / "flapping_answer.py", "measure/flapping/flapping_answer.py"
+    file.write_text(block(name), encoding="utf-8")
+    spec = spec_from_file_location("flapping_answer", file)
+    assert spec is not None
+    assert spec.loader is not None
+    made = module_from_spec(spec)
+    spec.loader.exec_module(made)
+    seen = (1.0, 1.2, 1.1, 1.4, 1.3)
+    readings = [WindowReading(value=one) for one in seen]
+    readings.append(WindowReading(value=math.nan, reason="no-silhouette"))
+    table = ObservableTable(
+        film="flag.mp4",
+        length=1.5,
+        height=1.0,
+        seconds=2.5,
+        time=np.arange(len(readings)) * 2.5,
+        readings={"frequency": tuple(readings)},
+    )
+    answer = made.answer_flapping(table)
+    assert len(answer.sentence.split()) < 25
+    assert answer.sentence.startswith("The flag flaps 1.2 times a second")
+    assert json.loads(json.dumps(answer.document))["frequency"]["value"] == 1.2
+    assert {answer.sentence, "5 of 6", "1.40"} <= set(re.findall(r">([^<>]+)<", answer.page))
+    assert "<svg" in answer.page
+    assert answer.sentence in answer._repr_html_()
 
 
 FORMATS = "flagdata/ingest/anemometer/formats"
