@@ -41,7 +41,7 @@ def render_answer(answer: Answer) -> str:
 
 
 def _kind_of(part: Part) -> str:
-    """Tells how a part is shown."""
+    """Returns how a part is shown."""
     match part:
         case Table():
             return "table"
