@@ -6,7 +6,16 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
+from typing import ClassVar
+
+READ_AS = {"rad": ("°", 180 / math.pi), "N·m": ("µN·m", 1e6)}
+"""Unit → the unit in which people read it, and the factor to it; of all others they are the
+same."""
+
+
+def unit_as_read(unit: str) -> tuple[str, float]:
+    """Returns the unit in which people read numbers of a unit, and the factor to it."""
+    return READ_AS.get(unit, (unit, 1.0))
 
 
 class Bound(StrEnum):
@@ -27,6 +36,8 @@ class Span:
         bound: None of an interval with two ends.
         estimated: whether draws beyond the range are impossible, so that their mean is an estimate.
     """
+
+    JSON_NAMES: ClassVar[tuple[str, ...]] = ("interval", "level", "bound")
 
     low: float
     high: float
@@ -56,18 +67,14 @@ class Span:
         """The level as it is printed: 90 %."""
         return f"{self.level * 100:.3g} %"
 
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values: the interval, whose end is null where nothing bounds it, its level,
-        and its bound."""
-        return {
-            "interval": self.ends(),
-            "level": self.level,
-            "bound": None if self.bound is None else self.bound.value,
-        }
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Both ends, of a bound one at infinity or where the quantity ends."""
+        return self.low, self.high
 
     def ends(self) -> list[float | None]:
         """Returns both ends as JSON values; None for one at infinity."""
-        return [end if math.isfinite(end) else None for end in (self.low, self.high)]
+        return [end if math.isfinite(end) else None for end in self.interval]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,6 +93,20 @@ class Quantity:
         given: whether it was given.
         information: what the recording adds [nat]; None where that is not counted.
     """
+
+    JSON_NAMES: ClassVar[tuple[str, ...]] = (
+        "unit",
+        "value",
+        "sigma",
+        "interval",
+        "level",
+        "bound",
+        "assumed",
+        "information",
+        "constrained",
+        "given",
+    )
+    JSON_OPTIONAL: ClassVar[tuple[str, ...]] = ("assumed", "information")
 
     name: str
     unit: str
@@ -119,8 +140,13 @@ class Quantity:
 
     @property
     def suffix(self) -> str:
-        """The unit behind a number, with the space before it."""
-        return "" if self.unit == "1" else f" {self.unit}"
+        """The unit in which people read it, behind a number, with the space before it."""
+        unit, _ = unit_as_read(self.unit)
+        return {"1": "", "°": "°"}.get(unit, f" {unit}")
+
+    def write(self, number: float) -> str:
+        """Writes a number of it to three digits, in the unit in which people read it."""
+        return f"{number * unit_as_read(self.unit)[1]:.3g}"
 
     @property
     def text(self) -> str:
@@ -128,11 +154,11 @@ class Quantity:
         recording adds nothing to it.
         """
         if not self.constrained or (self.value is None and not self.is_bound):
-            return self._assumed_text
+            return self._unknown_text
         if self.value is None:
-            return f"{self.span.word(_short, self.suffix)}, {self.span.percent}"
-        low, high = map(_short, self.interval)
-        return f"{_short(self.value)} [{low}, {high}]{self.suffix}"
+            return f"{self.span.word(self.write, self.suffix)}, {self.span.percent}"
+        low, high = map(self.write, self.interval)
+        return f"{self.write(self.value)} [{low}, {high}]{self.suffix}"
 
     @property
     def text_with_level(self) -> str:
@@ -141,28 +167,16 @@ class Quantity:
         return f"{self.text}, {self.span.percent}" if is_interval else self.text
 
     @property
-    def _assumed_text(self) -> str:
+    def assumed_text(self) -> str:
+        """What was assumed of it or given, "0.05 to 0.45 kg/m²"; empty where nothing had to be."""
+        if self.assumed is None:
+            return ""
+        low, high = map(self.write, self.assumed)
+        return f"{low if low == high else f'{low} to {high}'}{self.suffix}"
+
+    @property
+    def _unknown_text(self) -> str:
         if self.assumed is None:
             return "not determined"
-        low, high = map(_short, self.assumed)
-        assumed = f"{low if low == high else f'{low} to {high}'}{self.suffix}"
+        assumed = self.assumed_text
         return f"{assumed}, as given" if self.given else f"not determined (assumed: {assumed})"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values; an end of the interval that nothing bounds is null."""
-        assumed = {} if self.assumed is None else {"assumed": list(self.assumed)}
-        information = {} if self.information is None else {"information": self.information}
-        return {
-            "unit": self.unit,
-            "value": self.value,
-            "sigma": self.sigma,
-            **self.span.as_dict(),
-            **assumed,
-            **information,
-            "constrained": self.constrained,
-            "given": self.given,
-        }
-
-
-def _short(number: float) -> str:
-    return f"{number:.3g}"

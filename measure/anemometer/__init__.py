@@ -18,7 +18,11 @@ from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from measure.anemometer.networks import Network, gate_beside, network
-    from measure.anemometer.reading_calibration import Calibrated, Recording, calibrate_reading
+    from measure.anemometer.reading_calibration import (
+        ReadingCalibration,
+        Recording,
+        calibrate_reading,
+    )
     from measure.anemometer.window_features import Features, Place
 
 __getattr__ = lazy_exports(__name__, __file__)

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from flagdata.core.findings import quality_flags
+from flagdata.core.json_values import json_values
 from flagdata.core.provenance import canonical
 from flagdata.core.schema import Kind
 from flagdata.core.workload import one_thread
@@ -26,7 +27,7 @@ from measure.anemometer.reading_calibration import (
     ANSWER,
     ENOUGH,
     LEAST,
-    Calibrated,
+    ReadingCalibration,
     Recording,
     calibrate_reading,
     windows_of_recording,
@@ -39,7 +40,7 @@ from measure.film.similarity import FlagSize
 from models.conditioning.conditioning import VERSION as CONDITIONED
 
 
-def artifact(result: Calibrated, name: str, reading: FilmReading) -> Artifact:
+def artifact(result: ReadingCalibration, name: str, reading: FilmReading) -> Artifact:
     """Builds the row of a reading model, without its object.
 
     Args:
@@ -54,7 +55,7 @@ def artifact(result: Calibrated, name: str, reading: FilmReading) -> Artifact:
     return Artifact(
         kind=Kind.MEASUREMENT,
         name=name,
-        parents=[recording.identity for recording in result.recordings],
+        parents=[recording.artifact for recording in result.recordings],
         recipe={
             CALIBRATED: ANSWER,
             "features": VERSION,
@@ -66,11 +67,13 @@ def artifact(result: Calibrated, name: str, reading: FilmReading) -> Artifact:
             **reading.recipe(),
         },
         quality=quality_flags(result.findings),
-        report=canonical({"schema": "flagdata.anemometer-report/1", **result.as_dict()}),
+        report=canonical({"schema": "flagdata.anemometer-report/1", **json_values(result)}),
     )
 
 
-def keep(lake: Lake, result: Calibrated, name: str, reading: FilmReading, *, branch: str) -> Placed:
+def keep(
+    lake: Lake, result: ReadingCalibration, name: str, reading: FilmReading, *, branch: str
+) -> Placed:
     """Commits a reading model where it is new, see `flagdata.lake.results`.
 
     Raises:
@@ -79,7 +82,7 @@ def keep(lake: Lake, result: Calibrated, name: str, reading: FilmReading, *, bra
     return results.keep(
         lake,
         artifact(result, name, reading),
-        lambda staged: write(staged, result.model, result.as_dict()),
+        lambda staged: write(staged, result.model, json_values(result)),
         f"calibrate {name}",
         branch=branch,
     )
@@ -96,7 +99,7 @@ class Made:
     """
 
     name: str
-    result: Calibrated
+    result: ReadingCalibration
     placed: Placed | None
 
     @property
@@ -104,9 +107,10 @@ class Made:
         """Its id in the lake; None where it is not to be there."""
         return None if self.placed is None else self.placed.artifact.id
 
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values."""
-        return {"name": self.name, "artifact": self.artifact, **self.result.as_dict()}
+    @property
+    def document(self) -> dict[str, Any]:
+        """Everything as JSON values."""
+        return {"name": self.name, "artifact": self.artifact, **json_values(self.result)}
 
 
 @one_thread()

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flagdata.core.arrays import BoolArray, FloatArray
 from flagdata.core.findings import Finding
-from flagdata.core.json_values import json_values
 from flagdata.errors import InputError, RefusedError
 from flagdata.record.signals import Sensor
 from measure.anemometer.intervals import half_width
@@ -51,15 +50,24 @@ class Recording:
     """A film and the log beside it, looked at.
 
     Attributes:
-        name, identity: of the artifact.
+        name, artifact: of the recording in the lake, and its id.
         features: of the film's windows.
         log: its times since the film's first frame.
         sensor: that logged.
         findings: on the film.
     """
 
+    JSON_NAMES: ClassVar[tuple[str, ...]] = (
+        "name",
+        "artifact",
+        "windows",
+        "anemometer=sensor.name",
+        "accuracy=sensor.accuracy",
+        "distance_constant=sensor.distance_constant",
+    )
+
     name: str
-    identity: str
+    artifact: str
     features: Features
     log: Log
     sensor: Sensor
@@ -71,6 +79,11 @@ class Recording:
         starts = self.features.starts
         return self.features.whole & self.log.covers(starts, starts + self.features.layout.step)
 
+    @property
+    def windows(self) -> int:
+        """How many are usable."""
+        return int(self.usable.sum())
+
     def winds(self, offset: float) -> FloatArray:
         """Computes the log's mean over each window, (w,) [m/s], with the log `offset` seconds later
         than its stamps."""
@@ -79,24 +92,43 @@ class Recording:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Calibrated:
+class ReadingCalibration:
     """A reading model and what it rests on.
 
     Attributes:
         model: the reading model.
         recordings: that it was fitted to.
-        offset: by which the logs are later than their stamps, as fitted [s].
-        clock: prior standard uncertainty of that [s].
-        uncalibrated: RMSE of the network's own wind against the log over the same windows [m/s].
+        clock_offset: by which the logs are later than their stamps, as fitted [s].
+        clock_sigma: prior standard uncertainty of that [s].
+        uncalibrated_rmse: of the network's own wind against the log over the same windows [m/s].
         level: of the intervals that are stated.
         findings: on films, log and fit.
     """
 
+    JSON_NAMES: ClassVar[tuple[str, ...]] = (
+        "sentence",
+        "network=model.network",
+        "flag_size=model.size.sides",
+        "window=model.step",
+        "windows",
+        "range=model.range",
+        "rmse=model.rmse",
+        "uncalibrated_rmse",
+        "level",
+        "half_width",
+        "clock_offset",
+        "clock_sigma",
+        "penalty=model.ridge.penalty",
+        "features=model.names",
+        "recordings",
+        "findings",
+    )
+
     model: ReadingModel
     recordings: tuple[Recording, ...]
-    offset: float
-    clock: float
-    uncalibrated: float
+    clock_offset: float
+    clock_sigma: float
+    uncalibrated_rmse: float
     level: float
     findings: tuple[Finding, ...]
 
@@ -112,42 +144,15 @@ class Calibrated:
         return (
             f"reads the wind of {self.model.step:.2g} s to {self.model.rmse:.2f} m/s (RMSE in "
             "blocks of time that were "
-            f"left out, n = {len(self.model.winds)} windows; {self.level:.0%} within "
+            f"left out, n = {self.windows} windows; {self.level:.0%} within "
             f"±{self.half_width:.2f} m/s) "
-            f"between {low:.1f} and {high:.1f} m/s; the network alone {self.uncalibrated:.2f} m/s"
+            f"between {low:.1f} and {high:.1f} m/s; the network alone {self.uncalibrated_rmse:.2f} m/s"
         )
 
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values."""
-        model, (low, high) = self.model, self.model.range
-        return {
-            "sentence": self.sentence,
-            "network": model.network,
-            "flag_size": [model.size.length, model.size.height],
-            "window": model.step,
-            "windows": len(model.winds),
-            "range": [low, high],
-            "rmse": model.rmse,
-            "uncalibrated_rmse": self.uncalibrated,
-            "level": self.level,
-            "half_width": _plain(self.half_width),
-            "clock_offset": self.offset,
-            "clock_sigma": self.clock,
-            "penalty": model.ridge.penalty,
-            "features": list(model.names),
-            "recordings": [
-                {
-                    "name": recording.name,
-                    "artifact": recording.identity,
-                    "windows": int(recording.usable.sum()),
-                    "anemometer": recording.sensor.name,
-                    "accuracy": recording.sensor.accuracy,
-                    "distance_constant": recording.sensor.distance_constant,
-                }
-                for recording in self.recordings
-            ],
-            "findings": json_values(self.findings),
-        }
+    @property
+    def windows(self) -> int:
+        """How many it was fitted to."""
+        return len(self.model.winds)
 
 
 def windows_of_recording(
@@ -195,7 +200,7 @@ def windows_of_recording(
         )
     return Recording(
         name=film.name,
-        identity=subject.artifact.id,
+        artifact=subject.artifact.id,
         features=features,
         log=log.undo_lag(),
         sensor=wind.sensor,
@@ -205,7 +210,7 @@ def windows_of_recording(
 
 def calibrate_reading(
     recordings: Sequence[Recording], *, network: Network, size: FlagSize, level: float
-) -> Calibrated:
+) -> ReadingCalibration:
     """Fits a reading model.
 
     Raises:
@@ -278,13 +283,13 @@ def calibrate_reading(
         familiar=Familiar.of(plain, checked.predicted, blocks),
         places=tuple(recording.features.place for recording in recordings),
     )
-    return Calibrated(
+    return ReadingCalibration(
         model=model,
         recordings=tuple(recordings),
-        offset=offset,
-        clock=clock,
+        clock_offset=offset,
+        clock_sigma=clock,
         level=level,
-        uncalibrated=_uncalibrated_error_of(recordings, usable, logged),
+        uncalibrated_rmse=_uncalibrated_error_of(recordings, usable, logged),
         findings=(
             *(f for recording in recordings for f in recording.findings),
             *_notices(recordings, count * step, offset, clock),
@@ -382,7 +387,3 @@ def _notices(
             )
         )
     return findings
-
-
-def _plain(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -10,6 +10,7 @@ from flagdata.packages.lazy import lazy_exports
 if TYPE_CHECKING:
     from measure.cloth.blown_wind import Log
     from measure.cloth.calibrate_call import folder_of, options_of, sources_of
+    from measure.cloth.calibration_answer import phrase_quantity, table_of_quantities
     from measure.cloth.close_films import simulations_of
     from measure.cloth.cloth_calibration import Calibration, calibrate, quantity
     from measure.cloth.cloth_posterior import weigh_cloths
@@ -58,6 +59,7 @@ if TYPE_CHECKING:
         constant_wind,
         usable,
     )
+    from measure.cloth.posterior_chart import posterior_panel
     from measure.cloth.score_test import Judged, directions, judge, score
     from measure.cloth.sight import Sight
     from measure.cloth.simulations import Simulations, of_base, of_nulls, sights_of

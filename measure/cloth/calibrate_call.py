@@ -17,7 +17,8 @@ from flagdata.dataset.lake_source import lake_of
 from flagdata.errors import InputError, UnknownNameError, UsageError
 from flagdata.lake import Lake
 from flagdata.verbs.shared_options import ATTACHMENTS
-from measure.cloth.cloth_calibration import Calibration, calibrate
+from measure.cloth.calibration_answer import answer_of_calibration
+from measure.cloth.cloth_calibration import calibrate
 from measure.cloth.design import FAR, CalibrationOptions
 from measure.cloth.flag_prior import AZIMUTH, ELEVATION, Uncertain, fabric, stated_angle
 from measure.cloth.flag_recordings import Opened, Sources, open_recording
@@ -129,7 +130,7 @@ def calibrate_arrays(chosen: Calibrating) -> Calibrated:
         workers=chosen.workers,
         left_out=gathered.left_out,
     )
-    return _answer(calibration)
+    return answer_of_calibration(calibration)
 
 
 def of_arrays(columns: Arrays, *, name: str) -> tuple[Observed, ...]:
@@ -157,20 +158,6 @@ def of_arrays(columns: Arrays, *, name: str) -> tuple[Observed, ...]:
     names = sorted(values)
     identity = array_hash({"columns": names}, [values[key] for key in names])
     return of_columns(table, name=name, identity=identity, wind_log=None)
-
-
-def _answer(calibration: Calibration) -> Calibrated:
-    quantities = {quantity.name: quantity for quantity in calibration.cloth}
-    return Calibrated(
-        sentence=calibration.sentence,
-        level=calibration.options.level,
-        quantities=quantities,
-        draws={name: calibration.draws.cloth[name] for name in quantities},
-        withheld=calibration.withheld,
-        stated=calibration.stated,
-        findings=calibration.findings,
-        document=calibration.as_dict(),
-    )
 
 
 def _attachment(name: str | None) -> str:

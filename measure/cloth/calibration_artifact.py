@@ -32,7 +32,7 @@ def artifact(calibration: Calibration, reading: FilmReading, parents: tuple[str,
         reading: how films were read.
         parents: artifacts that the recordings were read from; none for tables.
     """
-    values = {q.name: q.value for q in calibration.cloth if q.value is not None}
+    values = {q.name: q.value for q in calibration.cloth.values() if q.value is not None}
     sources = [recording.observed.source for recording in calibration.recordings]
     spans = [
         [recording.observed.first, recording.observed.duration]
@@ -55,7 +55,7 @@ def artifact(calibration: Calibration, reading: FilmReading, parents: tuple[str,
             **calibration.options.recipe(),
         },
         quality=quality_flags(calibration.findings),
-        report=canonical({"schema": "flagdata.calibrate-report/1", **calibration.as_dict()}),
+        report=canonical({"schema": "flagdata.calibrate-report/1", **calibration.document}),
     )
 
 
@@ -84,13 +84,13 @@ def write(path: Path, calibration: Calibration) -> None:
     import zarr
 
     group = zarr.open_group(path, mode="w-", zarr_format=3)
-    names = [q.name for q in calibration.cloth]
+    names = list(calibration.cloth)
     group.update_attributes(
         {
             _HEAD: {"format": _FORMAT},
             "quantities": names,
             "observables": list(OBSERVED),
-            "answer": calibration.as_dict(),
+            "answer": calibration.document,
         }
     )
     if calibration.withheld is None:

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from flagdata.core.arrays import BoolArray, FloatArray, IntArray
 from flagdata.core.findings import Finding, Severity
 from flagdata.core.json_values import json_values
 from flagdata.core.rng import child_seed, stream
+from flagdata.core.stated import Stated
 from flagdata.core.workload import one_thread
 from measure.cloth.cloth_posterior import Posterior, Sight, posterior, weigh_cloths
 from measure.cloth.design import CalibrationOptions, designs_of, simulated_values
@@ -63,17 +64,13 @@ class Check:
 
     Attributes:
         count: of them.
-        contained: of them, those whose area weight lies in its interval.
-        error: median error of its value, as a share.
+        held: of them, those whose area weight lies in its interval.
+        median_error: of its value, as a share.
     """
 
     count: int
-    contained: int
-    error: float
-
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values."""
-        return {"count": self.count, "held": self.contained, "median_error": self.error}
+    held: int
+    median_error: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,7 +86,19 @@ class Fitted:
         deviations: (2·observable,) summaries less those that the answer predicts, in their standard
             deviations.
         failed: simulations that diverged or hardly show the flag.
+        place: gain, azimuth and elevation by their names.
     """
+
+    JSON_NAMES: ClassVar[tuple[str, ...]] = (
+        "name=observed.name",
+        "source=observed.source",
+        "windows",
+        "wind_speed",
+        "misfit",
+        "failed",
+        "observables",
+        "place",
+    )
 
     observed: Observed
     low: FloatArray
@@ -99,6 +108,22 @@ class Fitted:
     misfit: float
     deviations: FloatArray
     failed: int
+    place: Mapping[str, Quantity]
+
+    @property
+    def windows(self) -> int:
+        """How many there are."""
+        return len(self.observed.readings)
+
+    @property
+    def wind_speed(self) -> float:
+        """The log's mean over all windows [m/s]."""
+        return float(self.observed.speed.mean())
+
+    @property
+    def observables(self) -> tuple[str, ...]:
+        """Names of those that the answer rests on."""
+        return tuple(name for name, used in zip(OBSERVED, self.used, strict=True) if used)
 
     @property
     def unlike(self) -> str | None:
@@ -126,17 +151,27 @@ class Calibration:
     Attributes:
         options: how it was calibrated.
         draws: of the posterior.
-        cloth: area weight, bending and damping.
-        places: for each recording gain, azimuth and elevation.
+        cloth: area weight, bending and damping by their names.
         recordings: in order.
         check: on simulations left out.
         findings: what a reader has to know.
     """
 
+    JSON_NAMES: ClassVar[tuple[str, ...]] = (
+        "sentence",
+        "cloth",
+        "recordings",
+        "area_weight_stated",
+        "withheld",
+        "close_loop",
+        "check",
+        "level",
+        "findings",
+    )
+
     options: CalibrationOptions
     draws: Posterior
-    cloth: tuple[Quantity, ...]
-    places: tuple[tuple[Quantity, ...], ...]
+    cloth: Mapping[str, Quantity]
     recordings: tuple[Fitted, ...]
     check: Check
     findings: tuple[Finding, ...] = field(default_factory=tuple)
@@ -144,7 +179,17 @@ class Calibration:
     @property
     def weight(self) -> Quantity:
         """Returns the area weight."""
-        return self.cloth[0]
+        return self.cloth[CLOTH[0].name]
+
+    @property
+    def level(self) -> float:
+        """Returns the level of the intervals."""
+        return self.options.level
+
+    @property
+    def windows(self) -> int:
+        """Returns how many windows all recordings have."""
+        return sum(recording.windows for recording in self.recordings)
 
     @property
     def withheld(self) -> str | None:
@@ -159,13 +204,30 @@ class Calibration:
         )
 
     @property
-    def stated(self) -> str | None:
-        """Returns the area weight as `flagdata measure --area-weight` takes it; None where it is
-        not determined or a bound."""
+    def stated(self) -> Stated | None:
+        """Returns the area weight as users state it, to four digits; None where it is not
+        determined or a bound."""
         weight = self.weight
         if weight.value is None or weight.sigma is None:
             return None
-        return f"{weight.value:.4g}±{weight.sigma:.2g}"
+        value = float(f"{weight.value:.4g}")
+        return Stated(low=value, high=value, sigma=float(f"{weight.sigma:.2g}"))
+
+    @property
+    def area_weight_stated(self) -> str | None:
+        """Returns the same as `flagdata measure --area-weight` takes it."""
+        return None if self.stated is None else self.stated.text
+
+    @property
+    def close_loop(self) -> Mapping[str, str] | None:
+        """Returns what a recipe of `flagdata close-loop` takes of the answer."""
+        stated = self.area_weight_stated
+        return None if stated is None else {"area-weight": stated}
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """Returns everything as JSON values, as `flagdata calibrate --json` writes it."""
+        return {**json_values(self), "options": self.options.recipe()}
 
     @property
     def weighs(self) -> bool:
@@ -177,7 +239,7 @@ class Calibration:
         """Returns the answer in words."""
         weight = self.weight
         level = f"{self.options.level * 100:.3g} %"
-        windows = sum(len(recording.observed.readings) for recording in self.recordings)
+        windows = self.windows
         if self.withheld is not None:
             return f"area weight: withheld, since no simulated flag looks like {self.withheld}"
         if weight.is_bound:
@@ -198,35 +260,6 @@ class Calibration:
             f"area weight {weight.value:.3f} kg/m² [{low:.3f}, {high:.3f}] {level}, n = {windows} "
             "windows"
         )
-
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values."""
-        return {
-            "sentence": self.sentence,
-            "cloth": {q.name: q.as_dict() for q in self.cloth},
-            "recordings": [
-                {
-                    "name": recording.observed.name,
-                    "source": recording.observed.source,
-                    "windows": len(recording.observed.readings),
-                    "wind_speed": float(recording.observed.speed.mean()),
-                    "misfit": recording.misfit,
-                    "failed": recording.failed,
-                    "observables": [
-                        name for name, used in zip(OBSERVED, recording.used, strict=True) if used
-                    ],
-                    "place": {q.name: q.as_dict() for q in view},
-                }
-                for recording, view in zip(self.recordings, self.places, strict=True)
-            ],
-            "area_weight_stated": self.stated,
-            "withheld": self.withheld,
-            "close_loop": None if self.stated is None else {"area-weight": self.stated},
-            "check": self.check.as_dict(),
-            "options": self.options.recipe(),
-            "level": self.options.level,
-            "findings": json_values(self.findings),
-        }
 
 
 @one_thread()
@@ -378,18 +411,13 @@ def _answer_of(
         draws=draws,
         recordings=fitted,
         check=check_coverage(simulations, options),
-        cloth=tuple(quantity(q, draws.cloth[q.name], options.level) for q in CLOTH),
-        places=tuple(
-            tuple(quantity(q, view[q.name], options.level) for q in _uncertain_places(options))
-            for view in draws.places
-        ),
+        cloth=_quantities(CLOTH, draws.cloth, options.level),
     )
     findings = (*left_out, *_findings(calibration))
     if calibration.withheld is not None:
         assumed = np.linspace(0.0, 1.0, 1001)
-        calibration = replace(
-            calibration, cloth=tuple(quantity(q, q.at(assumed), options.level) for q in CLOTH)
-        )
+        prior = {q.name: q.at(assumed) for q in CLOTH}
+        calibration = replace(calibration, cloth=_quantities(CLOTH, prior, options.level))
     return replace(calibration, findings=findings)
 
 
@@ -413,6 +441,12 @@ def quantity(about: Uncertain, draws: FloatArray, level: float) -> Quantity:
         assumed=(assumed[0], assumed[1]),
         constrained=determined and (interval.estimated or interval.bound is not Bound.NOTHING),
     )
+
+
+def _quantities(
+    several: Sequence[Uncertain], draws: Mapping[str, FloatArray], level: float
+) -> Mapping[str, Quantity]:
+    return {about.name: quantity(about, draws[about.name], level) for about in several}
 
 
 def check_coverage(recordings: Sequence[_Simulated], options: CalibrationOptions) -> Check:
@@ -452,8 +486,8 @@ def check_coverage(recordings: Sequence[_Simulated], options: CalibrationOptions
         errors.extend(np.abs(middle / truth - 1).tolist())
     return Check(
         count=len(errors),
-        contained=contained,
-        error=float(np.median(errors)) if errors else math.nan,
+        held=contained,
+        median_error=float(np.median(errors)) if errors else math.nan,
     )
 
 
@@ -507,6 +541,7 @@ def _fitted_values(
         misfit=float((1 + (distance >= distance_observed).sum()) / (1 + len(distance))),
         deviations=deviations,
         failed=int((~np.isfinite(summaries[:, used]).all(axis=1)).sum()),
+        place=_quantities(_uncertain_places(options), posterior_draws.places[index], options.level),
     )
 
 
@@ -524,16 +559,18 @@ def _findings(calibration: Calibration) -> tuple[Finding, ...]:
     if not calibration.draws.together:
         findings.append(TAKEN_APART)
     check, level = calibration.check, calibration.options.level
-    if check.contained < check.count * level - 2.6 * math.sqrt(check.count * level * (1 - level)):
+    if check.held < check.count * level - 2.6 * math.sqrt(check.count * level * (1 - level)):
         text = (
-            f"of {check.count} simulations left out, the intervals of {check.contained} contain "
+            f"of {check.count} simulations left out, the intervals of {check.held} contain "
             "the area weight, where "
             f"{check.count * level:.0f} are expected: they are too narrow"
         )
         fix = "give more simulations with --simulations"
         findings.append(Finding.of("narrow-intervals", text, fix=fix))
     findings.extend(_leaning(calibration))
-    undetermined = [q.name.replace("_", " ") for q in calibration.cloth if not q.constrained]
+    undetermined = [
+        q.name.replace("_", " ") for q in calibration.cloth.values() if not q.constrained
+    ]
     if undetermined:
         text = f"{', '.join(undetermined)}: the posterior is the prior's, so that no value is given"
         findings.append(Finding.of("not-determined", text))
@@ -555,7 +592,8 @@ def _unlike(recording: Fitted) -> str:
 def _leaning(calibration: Calibration) -> list[Finding]:
     """Quantities of which only a bound is known."""
     findings = []
-    for quantity, about in zip(calibration.cloth, CLOTH, strict=True):
+    for about in CLOTH:
+        quantity = calibration.cloth[about.name]
         if not quantity.is_bound or about.ends is None:
             continue
         most = quantity.bound is Bound.MOST

@@ -27,6 +27,7 @@ from flagdata.core import workload
 from flagdata.core.arrays import FloatArray, IntArray, read_arrays
 from flagdata.core.console import say_beside_bars
 from flagdata.core.files.outputs import rewrite
+from flagdata.core.json_values import json_values
 from flagdata.core.provenance import canonical, digest
 from flagdata.core.rng import child_seed, stream
 from flagdata.errors import CorruptError, InputError
@@ -205,8 +206,8 @@ class CalibrationOptions:
         return {
             "flag_size": [self.flag.length, self.flag.height],
             "attachment": self.flag.attachment,
-            "azimuth": self.azimuth.prior.as_dict(),
-            "elevation": self.elevation.prior.as_dict(),
+            "azimuth": json_values(self.azimuth.prior),
+            "elevation": json_values(self.elevation.prior),
             "distance": self.distance,
             "simulations": self.simulations,
             "level": self.level,

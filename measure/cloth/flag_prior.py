@@ -60,9 +60,6 @@ class Normal:
         """Quantiles of shares in (0, 1)."""
         return self.mean + self.sigma * ndtri(np.clip(share, 1e-6, 1 - 1e-6))
 
-    def as_dict(self) -> dict[str, float | str]:
-        return {"mean": self.mean, "sigma": self.sigma}
-
 
 @dataclass(frozen=True, kw_only=True)
 class Among:
@@ -81,9 +78,6 @@ class Among:
         scaled = np.minimum(share, np.nextafter(1.0, 0.0)) * len(self.places)
         part = scaled.astype(np.int64)
         return (np.array(self.places)[part] + scaled - part) / self.count
-
-    def as_dict(self) -> dict[str, int | list[int]]:
-        return {"places": list(self.places), "count": self.count}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,7 +3,7 @@ anemometer."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +17,7 @@ from flagdata.core.printable import SHORT
 from flagdata.core.shell import command_line
 from flagdata.errors import InputError, RefusedError, UsageError
 from flagdata.examples import check_without_lake
+from flagdata.timebase import iso
 from flagdata.verbs.shared_options import FLAG, HOW, WRITTEN, Keeping, Shared
 from flagdata.verbs.verb_options import (
     AsJson,
@@ -29,10 +30,11 @@ from flagdata.verbs.verb_options import (
 )
 
 if TYPE_CHECKING:
+    from flagdata.answer import Section
+    from flagdata.answer.calibrated import Calibrated
     from flagdata.lake import Lake
     from measure.anemometer.making import Made
     from measure.cloth.cloth_calibration import Calibration
-    from measure.estimate.measurement_page import Section
     from measure.film.film_source import FilmReading
     from measure.film.similarity import FlagSize
 
@@ -115,6 +117,10 @@ def calibrate(chosen: CalibrateCommand) -> None:
       flagdata calibrate drapes/up drapes/down --area-weight 0.192±0.004
     """
     _check_only(chosen)
+    if chosen.report is not None:
+        from flagdata.core.files.outputs import check_file
+
+        check_file(chosen.report, command="calibrate")
     if chosen.area_weight is not None:
         _drapes(chosen)
         return
@@ -124,16 +130,12 @@ def calibrate(chosen: CalibrateCommand) -> None:
             where="--flag-size",
             fix="give length x height in metres, as in 1.5x1.0",
         )
-    from flagdata.core.files.outputs import check_file, write_file
-
-    if chosen.report is not None:
-        check_file(chosen.report, command="calibrate")
     if chosen.lake is None:
         check_without_lake(*chosen.recordings)
     from flagdata.lake.results import place_result
     from measure.cloth.calibrate_call import folder_of, options_of, sources_of
+    from measure.cloth.calibration_answer import answer_of_calibration
     from measure.cloth.calibration_artifact import artifact, keep
-    from measure.cloth.calibration_page import calibration_page as page
     from measure.cloth.cloth_calibration import calibrate as calibrated
     from measure.cloth.design import announce_simulations
     from measure.cloth.numerics import FLAGS, effort
@@ -152,7 +154,7 @@ def calibrate(chosen: CalibrateCommand) -> None:
         anemometer = _anemometer(chosen, size, reading, lake)
     if weighable is None:
         if anemometer is not None:
-            _report(anemometer, chosen.report, as_json=chosen.as_json)
+            _answer_by_reading(chosen, anemometer)
         return
     workers = chosen.processes
     with progress(None, label="observe", unit="window") as advance:
@@ -179,28 +181,27 @@ def calibrate(chosen: CalibrateCommand) -> None:
         wanted = place_result(
             lake, artifact(calibration, reading, parents), branch=chosen.branch
         ).artifact.id
-    text = (
-        None
-        if chosen.report is None
-        else page(calibration, _provenance(calibration, wanted), sections=_sections(anemometer))
+    answer = answer_of_calibration(
+        calibration,
+        artifact=wanted,
+        recorded=_dates(lake, parents, at=chosen.version),
+        others=_sections(anemometer),
+        further={
+            "artifact": wanted,
+            "anemometer": None if anemometer is None else anemometer.document,
+        },
     )
-    placed_row = None
+    text = None if chosen.report is None else answer.page
+    published = None
     if lake is not None and wanted is not None:
         placed_row = keep(lake, calibration, reading, parents, branch=chosen.branch)
         say(f"{wanted[:SHORT]}  measurement, {placed_row.sentence}")
-    if chosen.report is not None and text is not None:
-        new = placed_row is not None and placed_row.new
-        with following(f"the calibration {wanted}", "writing its report") if new else nullcontext():
-            write_file(chosen.report, text, command="calibrate")
-            say(f"report: {chosen.report}")
+        published = f"the calibration {wanted}" if placed_row.new else None
+    _write_report(chosen, text, published)
     if chosen.as_json:
-        anemometer_answer = None if anemometer is None else anemometer.as_dict()
-        document(
-            "calibrate",
-            {**calibration.as_dict(), "artifact": wanted, "anemometer": anemometer_answer},
-        )
+        document("calibrate", answer.document)
     else:
-        _print(calibration, verbose=chosen.verbose)
+        _print(answer, verbose=_fit_lines(calibration) if chosen.verbose else ())
     if not calibration.weighs:
         raise click.exceptions.Exit(RefusedError.exit_code)
 
@@ -229,6 +230,7 @@ _OF_DRAPES = {
     "workers",
     "cache",
     "as_json",
+    "report",
 }
 
 
@@ -251,19 +253,15 @@ def _check_only(chosen: CalibrateCommand) -> None:
 
 def _drapes(chosen: CalibrateCommand) -> None:
     """Finds and reports the cloth of drapes."""
-    from measure.cloth.calibration_page import shown_quantity as shown
-    from measure.drape.drape_answer import read_drapes
+    from measure.drape.drape_answer import answer_of_drapes, read_drapes
 
     with progress(chosen.simulations, label="drape", unit="drape") as advance:
-        found = read_drapes(chosen, workers=chosen.processes, advance=advance)
+        answer = answer_of_drapes(read_drapes(chosen, workers=chosen.processes, advance=advance))
+    _write_report(chosen, None if chosen.report is None else answer.page, None)
     if chosen.as_json:
-        document("calibrate", {**found.as_dict(), "artifact": None, "anemometer": None})
+        document("calibrate", {**answer.document, "artifact": None, "anemometer": None})
         return
-    echo(found.sentence)
-    for quantity in found.cloth:
-        echo(_line(shown(quantity)))
-    for finding in found.findings:
-        say_finding(finding)
+    _print(answer)
 
 
 def _anemometer(
@@ -316,89 +314,78 @@ def _anemometer(
 def _sections(anemometer: Made | None) -> tuple[Section, ...]:
     if anemometer is None:
         return ()
-    from measure.anemometer.anemometer_section import section
+    from measure.anemometer.reading_answer import reading_section
 
-    return (section(anemometer.result),)
+    return (reading_section(anemometer.result),)
 
 
-def _report(anemometer: Made, report: Path | None, *, as_json: bool) -> None:
-    """Report a reading model that was made alone."""
-    from flagdata.core.files.outputs import write_file
-    from measure.anemometer.anemometer_section import page
+def _answer_by_reading(chosen: CalibrateCommand, anemometer: Made) -> None:
+    """Reports a reading model that was made alone."""
+    from measure.anemometer.reading_answer import answer_of_reading
 
-    if report is not None:
-        rows = {
-            recording.name: f"recording {recording.identity}"
-            for recording in anemometer.result.recordings
-        }
-        rows |= {
-            "network": f"{anemometer.result.model.network}, SHA-256 "
-            f"{anemometer.result.model.identity}"
-        }
-        rows |= {} if anemometer.artifact is None else {"artifact": anemometer.artifact}
-        text = page(anemometer.result, anemometer.name, rows)
-        with following(f"the reading model {anemometer.artifact}", "writing its report"):
-            write_file(report, text, command="calibrate")
-            say(f"report: {report}")
-    if as_json:
-        document("calibrate", {"anemometer": anemometer.as_dict()})
+    answer = answer_of_reading(anemometer)
+    text = None if chosen.report is None else answer.page
+    _write_report(chosen, text, f"the reading model {anemometer.artifact}")
+    if chosen.as_json:
+        document("calibrate", answer.document)
     else:
         echo(anemometer.result.sentence)
 
 
-def _provenance(calibration: Calibration, artifact: str | None) -> dict[str, str]:
-    rows = {
-        f"recording {number}": f"{recording.observed.name}, from {recording.observed.first:g} s "
-        "on, "
-        f"{recording.observed.source}"
-        for number, recording in enumerate(calibration.recordings, start=1)
-    }
-    rows |= {
-        name.replace("_", " "): str(value) for name, value in calibration.options.recipe().items()
-    }
-    rows |= {
-        about.name: about.degrees
-        for about in (calibration.options.azimuth, calibration.options.elevation)
-    }
-    return rows if artifact is None else {**rows, "artifact": artifact}
+def _dates(lake: Lake | None, parents: Sequence[str], *, at: str) -> Mapping[str, str]:
+    """Returns when the recordings of a lake were made."""
+    if lake is None:
+        return {}
+    starts = [lake.artifact(parent, at=at).start for parent in parents]
+    dates = [f"{iso(start)[:16].replace('T', ' ')} UTC" for start in starts if start is not None]
+    return {"recorded": ", ".join(dates)} if dates else {}
 
 
-def _line(row: Mapping[str, str]) -> str:
-    """Returns a quantity in one line."""
-    value = "not determined"
-    if row["value"]:
-        value = f"{row['value']} {row['interval']} {row['unit']}"
-    elif row["bounded"]:
-        value = f"{row['interval']} {row['unit']}, {row['level']}"
-    return f"{row['name']}: {value} (assumed: {row['assumed']})"
+def _write_report(chosen: CalibrateCommand, text: str | None, published: str | None) -> None:
+    """Writes the page, if one is wanted.
+
+    Args:
+        published: what stays published where the page cannot be written.
+    """
+    if chosen.report is None or text is None:
+        return
+    from flagdata.core.files.outputs import write_file
+
+    with nullcontext() if published is None else following(published, "writing its report"):
+        write_file(chosen.report, text, command="calibrate")
+        say(f"report: {chosen.report}")
 
 
-def _print(calibration: Calibration, *, verbose: bool) -> None:
-    from measure.cloth.calibration_page import shown_quantity as shown
-
-    echo(calibration.sentence)
-    for quantity in calibration.cloth[1:]:
-        echo(_line(shown(quantity)))
-    if verbose:
-        _print_fit(calibration)
-    for finding in calibration.findings:
+def _print(answer: Calibrated, *, verbose: Sequence[str] = ()) -> None:
+    """Prints the answer's line, and a line for each quantity that it does not state."""
+    line = answer.document["sentence"]
+    echo(line)
+    for name, one in answer.quantities.items():
+        title = name.replace("_", " ")
+        if line.startswith(title):
+            continue
+        value = one.text_with_level if one.constrained else "not determined"
+        echo(f"{title}: {value} (assumed: {one.assumed_text})")
+    for text in verbose:
+        say(f"  {text}")
+    for finding in answer.findings:
         say_finding(finding)
-    if calibration.stated is not None:
-        say(f"for flagdata measure: {command_line('--area-weight', calibration.stated)}")
+    if answer.document.get("close_loop") is not None and answer.stated is not None:
+        say(f"for flagdata measure: {command_line('--area-weight', answer.stated)}")
 
 
-def _print_fit(calibration: Calibration) -> None:
-    from measure.cloth.calibration_page import shown_quantity as shown
-
-    for recording, place_quantities in zip(calibration.recordings, calibration.places, strict=True):
-        fitted = ", ".join(
-            f"{row['name']} {row['interval']} {row['unit']}".strip()
-            for row in map(shown, place_quantities)
-        )
-        say(f"  {recording.observed.name}: {fitted}")
+def _fit_lines(calibration: Calibration) -> list[str]:
+    """Describes the places that were fitted, and how simulations left out were weighed."""
+    lines = [
+        f"{recording.observed.name}: "
+        + ", ".join(f"{name} {one.text}" for name, one in recording.place.items())
+        for recording in calibration.recordings
+    ]
     check = calibration.check
-    say(
-        f"  intervals of {check.contained} of {check.count} simulations left out contain their "
-        "weight, median error "
-        f"{check.error:.1%}"
-    )
+    return [
+        *lines,
+        (
+            f"intervals of {check.held} of {check.count} simulations left out contain their weight, "
+            f"median error {check.median_error:.1%}"
+        ),
+    ]

@@ -87,7 +87,7 @@ def report(measured: Measurement) -> Mapping[str, Any]:
         "schema": "flagdata.measure-report/2",
         "sentence": measured.sentence,
         "model": measured.model,
-        "quantities": {q.name: q.as_dict() for q in measured.quantities},
+        "quantities": {q.name: json_values(q) for q in measured.quantities},
         "gate": measured.verdict.as_dict(),
         "combined": measured.combined,
         "findings": json_values(measured.notices(anyway=True)),

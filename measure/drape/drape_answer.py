@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
-from flagdata.answer import Quantity
+from flagdata.answer import Figure, Head, Quantity, Section, Table, Tone
 from flagdata.answer.calibrated import Calibrated
+from flagdata.answer.charts import Chart
 from flagdata.api.measuring_verbs import Calibrating
 from flagdata.core.arrays import FloatArray
 from flagdata.core.files.addresses import local_path
@@ -21,12 +22,20 @@ from flagdata.core.stated import Stated
 from flagdata.errors import InputError, NotFoundError, RefusedError, UsageError
 from flagdata.ingest.meshes import read_obj
 from flagdata.recipes.typed_tables import Range, Scale
-from measure.cloth import Uncertain, folder_of, quantity
+from measure.cloth import (
+    Uncertain,
+    folder_of,
+    phrase_quantity,
+    posterior_panel,
+    quantity,
+    table_of_quantities,
+)
 from measure.drape.drape_shape import place_scan, shape_of
 from measure.drape.drape_simulation import ANISOTROPY, BENDING_LENGTH, SHEAR, simulated_drapes
 from measure.drape.fit import UNLIKE, Face, Fit, Model, Surface, fit_drapes, together
 from sim.cloth.mesh import Mesh
 from sim.cloth.scene import GRAVITY
+from sim.run.cusick_drape import DISC, PEDESTAL
 
 _LOST = 0.03
 """Share of the area from which on a scan that lacks it is reported."""
@@ -43,26 +52,63 @@ class Draped:
         area_weight: as it was stated [kg/m²].
         faces: the drapes of one face, or of two.
         fit: of all of them as of one cloth.
-        cloth: bending length and bending of the mean of warp and weft, their ratio's logarithm,
-            shear over weight.
+        cloth: by their names bending length and bending of the mean of warp and weft, their ratio's
+            logarithm, shear over weight.
+        about: the same before the drapes, with the priors.
         draws: name → (n,) of the posterior.
         findings: what a reader has to know.
         level: of the intervals.
     """
 
+    JSON_NAMES: ClassVar[tuple[str, ...]] = (
+        "sentence",
+        "cloth",
+        "drapes=faces",
+        "area_weight_stated=stated",
+        "direction_deg=direction",
+        "misfit=fit.tail",
+        "effective_draws=fit.effective",
+        "findings",
+    )
+
     area_weight: Stated
     faces: tuple[Face, ...]
     fit: Fit
-    cloth: tuple[Quantity, ...]
+    cloth: Mapping[str, Quantity]
+    about: tuple[Uncertain, ...]
     draws: Mapping[str, FloatArray]
     level: float
     findings: tuple[Finding, ...] = field(default_factory=tuple)
 
     @property
+    def bending(self) -> Quantity:
+        """Returns the bending."""
+        return self.cloth["bending"]
+
+    @property
+    def length(self) -> Quantity:
+        """Returns the bending length."""
+        return self.cloth[BENDING_LENGTH.name]
+
+    @property
+    def count(self) -> int:
+        """Returns the number of drapes."""
+        return sum(face.count for face in self.faces)
+
+    @property
+    def stated(self) -> Any:
+        """Returns the weight as JSON states it."""
+        return self.area_weight.recipe()
+
+    @property
+    def direction(self) -> float:
+        """Returns that of the stiffer thread [°]."""
+        return float(np.degrees(self.fit.direction))
+
+    @property
     def sentence(self) -> str:
         """Returns the answer in words."""
-        count = len(together(self.faces).specimen)
-        length, bending, *_ = self.cloth
+        count, length, bending = self.count, self.length, self.bending
         if bending.value is None:
             phrase = length.span.word(lambda value: f"{value * 1e3:.1f}", " mm")
             return f"bending length {phrase}, {length.span.percent}, n = {count} drapes"
@@ -72,27 +118,6 @@ class Draped:
             f"= {count} drapes "
             f"at {self.area_weight.text} kg/m²"
         )
-
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values."""
-        return {
-            "sentence": self.sentence,
-            "cloth": {about.name: about.as_dict() for about in self.cloth},
-            "drapes": [
-                {
-                    "count": len(face.specimen),
-                    "drape_coefficient": float(face.shapes[:, 0].mean()),
-                    "folds": float(face.shapes[:, 4].mean()),
-                    "area": float(face.shapes[:, 6].mean()),
-                }
-                for face in self.faces
-            ],
-            "area_weight_stated": self.area_weight.recipe(),
-            "direction_deg": float(np.degrees(self.fit.direction)),
-            "misfit": self.fit.tail,
-            "effective_draws": self.fit.effective,
-            "findings": json_values(self.findings),
-        }
 
 
 def face_of(folder: Path, *, first: int = 0) -> Face:
@@ -175,16 +200,98 @@ def calibrate_drapes(chosen: Calibrating) -> Calibrated:
     Raises:
         FlagdataError: see `read_drapes`.
     """
-    found = read_drapes(chosen, workers=chosen.workers)
+    return answer_of_drapes(read_drapes(chosen, workers=chosen.workers))
+
+
+def answer_of_drapes(found: Draped) -> Calibrated:
+    """Returns what drapes answer, as all renderers take it."""
     return Calibrated(
-        sentence=found.sentence,
-        level=found.level,
-        quantities={about.name: about for about in found.cloth},
-        draws=found.draws,
-        withheld=None,
-        stated=found.area_weight.text,
+        question="calibrate",
+        subject=f"{found.count} drapes",
+        sentence=_phrase(found),
+        tone=Tone.OPEN if found.bending.value is None else Tone.SETTLED,
+        quantities=found.cloth,
         findings=found.findings,
-        document=found.as_dict(),
+        document=json_values(found),
+        head=Head(
+            figures=[
+                Figure(
+                    title="How the cloth can bend, before and after the drapes",
+                    content=lambda: _chart(found, (found.about[0],), width=4.8),
+                    width=460,
+                )
+            ],
+            facts={
+                "drapes": ", ".join(str(face.count) for face in found.faces),
+                "area weight": f"{found.area_weight.text} kg/m², as stated",
+                "disc and pedestal": f"{2e3 * DISC:.0f} mm over {2e3 * PEDESTAL:.0f} mm",
+                "stiffer thread": f"at {found.direction:.0f}° in the flat cloth",
+            },
+            limits=[f"{one.what[:1].upper()}{one.what[1:]}." for one in found.findings],
+        ),
+        make_sections=lambda: [_cloth_section(found), _drapes_section(found)],
+        level=found.level,
+        draws=found.draws,
+        stated=found.area_weight.text,
+    )
+
+
+def _phrase(found: Draped) -> str:
+    if found.bending.value is None:
+        length = found.length
+        bound = length.span.word(lambda value: f"{value * 1e3:.1f}", " mm")
+        return f"The cloth's bending length is {bound}, with {length.span.percent} probability."
+    return f"The cloth's bending stiffness is {phrase_quantity(found.bending)}."
+
+
+def _chart(found: Draped, several: Sequence[Uncertain], *, width: float) -> Chart:
+    panels = [
+        posterior_panel(about, found.cloth[about.name], found.draws[about.name])
+        for about in several
+    ]
+    return Chart(rows=[panels], width=width, height=2.9)
+
+
+def _cloth_section(found: Draped) -> Section:
+    return Section(
+        title="The cloth",
+        parts=[
+            table_of_quantities("quantity", found.cloth),
+            Figure(
+                title="What each quantity can be, before and after the drapes",
+                content=lambda: _chart(found, found.about, width=9.2),
+                caption="The prior gives each bar the same share.",
+            ),
+        ],
+        anchor="cloth",
+        folded=True,
+    )
+
+
+def _drapes_section(found: Draped) -> Section:
+    return Section(
+        title="What the drapes show",
+        parts=[
+            Table(
+                columns=("face", "drapes", "drape coefficient", "folds", "area of the flat cloth"),
+                rows=[
+                    (
+                        str(number),
+                        str(face.count),
+                        f"{face.drape_coefficient:.3f}",
+                        f"{face.folds:.1f}",
+                        f"{face.area:.1%}",
+                    )
+                    for number, face in enumerate(found.faces, start=1)
+                ],
+            ),
+            (
+                f"Of simulated drapes of this cloth a share of {found.fit.tail:.2g} look as unusual. "
+                f"The answer rests on {found.fit.effective:.0f} independent draws."
+            ),
+        ],
+        anchor="drapes",
+        folded=True,
     )
 
 
@@ -233,7 +340,8 @@ def answer_of(
         area_weight=area_weight,
         faces=tuple(faces),
         fit=fit,
-        cloth=tuple(quantity(one, draws[one.name], level) for one in reported),
+        about=reported,
+        cloth={one.name: quantity(one, draws[one.name], level) for one in reported},
         draws={one.name: draws[one.name] for one in reported},
         level=level,
         findings=(*_lost(faces), *_few(fit), *_differ(surface, faces, seed=seed)),

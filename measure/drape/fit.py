@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import ClassVar
 
 import numpy as np
 from scipy.stats import chi2
@@ -82,8 +83,30 @@ class Face:
             independent ones.
     """
 
+    JSON_NAMES: ClassVar[tuple[str, ...]] = ("count", "drape_coefficient", "folds", "area")
+
     shapes: FloatArray
     specimen: IntArray
+
+    @property
+    def count(self) -> int:
+        """Of drapes."""
+        return len(self.specimen)
+
+    @property
+    def drape_coefficient(self) -> float:
+        """Mean of the drapes."""
+        return float(self.shapes[:, 0].mean())
+
+    @property
+    def folds(self) -> float:
+        """Mean number."""
+        return float(self.shapes[:, 4].mean())
+
+    @property
+    def area(self) -> float:
+        """Mean, over that of the flat cloth."""
+        return float(self.shapes[:, 6].mean())
 
     def of(self, specimens: Sequence[int]) -> Face:
         """Selects some pieces of cloth."""
@@ -111,7 +134,7 @@ class Face:
     def lost(self) -> float:
         """Returns the share of the area that the scans lack in the mean, below 0 where they have
         too much."""
-        return 1 - float(self.shapes[:, 6].mean())
+        return 1 - self.area
 
 
 def together(faces: Sequence[Face]) -> Face:

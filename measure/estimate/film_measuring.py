@@ -130,7 +130,7 @@ class Measurement:
             "options": {**self.options.recipe(), "seed": self.options.seed},
             "gate": self.verdict.as_dict(),
             "sentence": self.sentence if reported else None,
-            "quantities": {q.name: q.as_dict() for q in self.quantities} if reported else None,
+            "quantities": {q.name: json_values(q) for q in self.quantities} if reported else None,
             "windows": [window.as_dict() for window in self.windows] if reported else None,
             "combined": self.combined,
             "dependence": {

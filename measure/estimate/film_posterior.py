@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from flagdata.answer import Quantity
 from flagdata.core.arrays import Float32Array, FloatArray
 from flagdata.core.findings import Finding
+from flagdata.core.json_values import json_values
 from flagdata.core.rng import child_seed, stream
 from flagdata.core.stated import Stated
 from measure.estimate.combine import OWN, Dependence, combine_windows, effective
@@ -67,7 +68,7 @@ class WindowAnswer:
             "start": self.start,
             "end": self.end,
             "p": self.p,
-            "quantities": {quantity.name: quantity.as_dict() for quantity in self.quantities},
+            "quantities": {quantity.name: json_values(quantity) for quantity in self.quantities},
         }
 
 

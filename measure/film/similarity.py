@@ -120,6 +120,11 @@ class FlagSize:
             )
         return cls(length=float(match[1]), height=float(match[2]))
 
+    @property
+    def sides(self) -> tuple[float, float]:
+        """Length and height [m]."""
+        return self.length, self.height
+
     def __post_init__(self) -> None:
         if not (_SHORTEST <= self.length <= _LONGEST and _SHORTEST <= self.height <= _LONGEST):
             raise UsageError(

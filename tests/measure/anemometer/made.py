@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 from flagdata.core.arrays import FloatArray
 from flagdata.core.rng import stream
 from flagdata.record.signals import Sensor
-from measure.anemometer import Calibrated, Features, Place, Recording, calibrate_reading
+from measure.anemometer import Features, Place, ReadingCalibration, Recording, calibrate_reading
 from measure.cloth import Log
 from measure.film import FlagSize, WindowLayout
 
@@ -104,13 +104,13 @@ def recording(
     log = Log(times=samples - late, speed=read, clock=clock)
     return Recording(
         name="made",
-        identity="a" * 32,
+        artifact="a" * 32,
         features=features(wind, seed=seed),
         log=log,
         sensor=Sensor(name="cup", accuracy=0.2),
     )
 
 
-def model(*recordings: Recording) -> Calibrated:
+def model(*recordings: Recording) -> ReadingCalibration:
     """Calibrated on recordings, by default one of four minutes."""
     return calibrate_reading(recordings or (recording(),), network=NETWORK, size=SIZE, level=0.9)

@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 from flagdata.core.findings import Finding, Severity
+from flagdata.core.json_values import json_values
 from flagdata.core.stated import Stated
 from flagdata.errors import CorruptError, UsageError
-from measure.anemometer import Calibrated, Features, Place, anemometer_measuring
+from measure.anemometer import Features, Place, ReadingCalibration, anemometer_measuring
 from measure.anemometer.novelty import Compared
 from measure.anemometer.reading_model_folder import read, write
 from measure.estimate import Measurement, Options, beside
@@ -32,12 +33,12 @@ def bare(where: Place) -> Place:
 
 
 @pytest.fixture(scope="module")
-def found() -> Calibrated:
+def found() -> ReadingCalibration:
     return model()
 
 
 @pytest.fixture
-def measure(found: Calibrated, monkeypatch: pytest.MonkeyPatch) -> Measure:
+def measure(found: ReadingCalibration, monkeypatch: pytest.MonkeyPatch) -> Measure:
     """Measure a film of these features."""
     estimator: Any = SimpleNamespace(targets=(TARGETS["wind_speed"],))
 
@@ -56,7 +57,7 @@ def measure(found: Calibrated, monkeypatch: pytest.MonkeyPatch) -> Measure:
 
 
 def test_the_same_flag_on_another_day_is_read_window_by_window(
-    measure: Measure, found: Calibrated
+    measure: Measure, found: ReadingCalibration
 ) -> None:
     wind = gusts(120.0, seed=21)
     own = measure(features(wind, seed=21))
@@ -93,7 +94,9 @@ def test_another_flag_or_place_is_refused_with_its_figure(
     assert f"{own.verdict.reasons[0].value:.2f}" in own.verdict.sentence
 
 
-def test_a_film_of_few_windows_is_no_more_another_flag_than_a_long_one(found: Calibrated) -> None:
+def test_a_film_of_few_windows_is_no_more_another_flag_than_a_long_one(
+    found: ReadingCalibration,
+) -> None:
     """The mean of three windows scatters by 1/√3 of a window's scatter or more, which is no shift;
     a shift of one feature of six by four deviations is √(16/6) in each."""
     shifts = []
@@ -110,7 +113,9 @@ def test_a_film_of_few_windows_is_no_more_another_flag_than_a_long_one(found: Ca
     )
 
 
-def test_a_short_calibration_does_not_recognise_the_flag_and_says_so(found: Calibrated) -> None:
+def test_a_short_calibration_does_not_recognise_the_flag_and_says_so(
+    found: ReadingCalibration,
+) -> None:
     few = replace(
         found.model.familiar, distances=found.model.familiar.distances[:17]
     )  # of six features, three each
@@ -164,7 +169,9 @@ def test_a_brighter_day_is_the_same_place(measure: Measure) -> None:
     ).verdict.refused
 
 
-def test_winds_beyond_the_calibration_are_reported(measure: Measure, found: Calibrated) -> None:
+def test_winds_beyond_the_calibration_are_reported(
+    measure: Measure, found: ReadingCalibration
+) -> None:
     times, speed = gusts(120.0, seed=21)
     own = measure(features((times, speed + 3.0), seed=21))
     (beyond,) = (one for one in own.findings if one.kind == "beyond-calibration")
@@ -183,8 +190,8 @@ def test_options_of_networks_are_refused(measure: Measure) -> None:
         measure(own, options=Options(step=0.6))
 
 
-def test_a_model_is_the_same_once_it_was_stored(found: Calibrated, tmp_path: Path) -> None:
-    write(tmp_path / "model.zarr", found.model, found.as_dict())
+def test_a_model_is_the_same_once_it_was_stored(found: ReadingCalibration, tmp_path: Path) -> None:
+    write(tmp_path / "model.zarr", found.model, json_values(found))
     again = read(tmp_path / "model.zarr")
     own = features(gusts(120.0, seed=21), seed=21)
     np.testing.assert_array_equal(

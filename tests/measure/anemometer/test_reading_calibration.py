@@ -84,7 +84,7 @@ def test_intervals_contain_the_wind_and_the_error_is_that_of_the_features() -> N
     truth = np.array([speed[(times >= a) & (times < a + STEP)].mean() for a in later.starts])
     read = found.model.read(found.model.used(later))
     assert np.sqrt(np.mean((read - truth) ** 2)) < 1.5 * best
-    assert found.uncalibrated > 4 * found.model.rmse
+    assert found.uncalibrated_rmse > 4 * found.model.rmse
     logged = recording(seed=11).winds(0.0)
     held = np.abs(read - logged) <= found.half_width
     assert 0.82 <= held.mean() <= 0.97  # 200 windows, of which neighbours are alike
@@ -92,10 +92,10 @@ def test_intervals_contain_the_wind_and_the_error_is_that_of_the_features() -> N
 
 def test_a_clock_that_is_off_is_found_within_its_uncertainty() -> None:
     found = model(recording(late=0.8, clock=0.5))
-    assert found.offset == pytest.approx(0.75, abs=0.3)
-    assert model(recording(late=0.0, clock=0.5)).offset == pytest.approx(0.0, abs=0.3)
+    assert found.clock_offset == pytest.approx(0.75, abs=0.3)
+    assert model(recording(late=0.0, clock=0.5)).clock_offset == pytest.approx(0.0, abs=0.3)
     exact = model(recording(late=0.8))
-    assert (exact.offset, exact.clock) == (0.0, 0.0)
+    assert (exact.clock_offset, exact.clock_sigma) == (0.0, 0.0)
 
 
 def test_two_recordings_are_taken_together_and_share_no_neighbours() -> None:

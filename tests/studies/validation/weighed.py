@@ -46,6 +46,7 @@ import numpy as np
 import torch
 
 from flagdata.core.arrays import FloatArray, IntArray
+from flagdata.core.json_values import json_values
 from flagdata.core.rng import stream
 from measure.cloth import (
     MEASURED,
@@ -397,7 +398,7 @@ def weigh(
         "withheld": answer.withheld,
         "damping": truth["damping"],
         "code": truth["code"],
-        "check": answer.check.as_dict(),
+        "check": json_values(answer.check),
     }
 
 

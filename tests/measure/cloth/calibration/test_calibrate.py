@@ -33,7 +33,7 @@ from measure.cloth import (
 )
 from measure.cloth import cloth_calibration as module
 from measure.cloth import observed_recording as observed
-from measure.cloth.calibration_page import calibration_page as written
+from measure.cloth.calibration_answer import answer_of_calibration
 from tests.measure.cloth.calibration.conftest import readings
 from tests.studies.validation.looks import share, vtk
 
@@ -96,7 +96,7 @@ def test_the_weight_is_known_as_well_as_twice_the_gain(plain: Calibration) -> No
 
 
 def test_damping_is_determined_and_bending_is_not(plain: Calibration) -> None:
-    _, bending, damping = plain.cloth
+    _, bending, damping = plain.cloth.values()
     assert bending.value is None
     assert damping.value == pytest.approx(0.01, rel=0.15)
     assert any(
@@ -108,14 +108,14 @@ def test_damping_is_determined_and_bending_is_not(plain: Calibration) -> None:
 def test_a_second_recording_with_an_error_of_its_own_narrows_the_weight(plain: Calibration) -> None:
     one, two = plain, _found(_observed(0.17), _observed(0.17, seed=10))
     assert _spread(two) / _spread(one) == pytest.approx(_sigma(2) / _sigma(1), rel=0.15)
-    assert len(two.places) == 2
+    assert len(two.recordings) == 2
 
 
 def test_simulations_left_out_lie_in_their_intervals(plain: Calibration) -> None:
     check = plain.check
     assert check.count == 48
-    assert 34 <= check.contained <= 48  # so few walkers leave 0.8 to 0.9
-    assert 0.01 < check.error < 0.08
+    assert 34 <= check.held <= 48  # so few walkers leave 0.8 to 0.9
+    assert 0.01 < check.median_error < 0.08
 
 
 @pytest.mark.usefixtures("cheap")
@@ -127,12 +127,12 @@ def test_the_weight_of_a_flag_that_no_simulation_looks_like_is_withheld(plain: C
     found = _found(other)
     (finding,) = [one for one in found.findings if one.kind == "unlike-simulations"]
     assert "frequency" in finding.what.partition("too large")[0]
-    assert [one.value for one in found.cloth] == [None, None, None]
+    assert [one.value for one in found.cloth.values()] == [None, None, None]
     np.testing.assert_allclose(
         found.weight.interval, found.weight.assumed, rtol=1e-3
     )  # what was assumed, no number
     assert found.stated is None
-    assert (found.as_dict()["close_loop"], found.as_dict()["area_weight_stated"]) == (None, None)
+    assert (found.close_loop, found.area_weight_stated) == (None, None)
     assert found.sentence.startswith(
         "area weight: withheld, since no simulated flag looks like strange: frequency"
     )
@@ -148,7 +148,7 @@ def test_a_recording_unlike_all_simulations_is_left_out_and_the_others_weigh_the
     found = _found(*good, Observed(name="strange", source="x", readings=strange, log=good[0].log))
     assert found.withheld is None
     assert found.weight.value == pytest.approx(0.17, rel=0.1)
-    assert len(found.recordings) == len(found.places) == 2
+    assert len(found.recordings) == 2
     (left,) = [one for one in found.findings if one.kind == "left-out"]
     assert left.what.startswith("no simulated flag looks like strange (p = ")
     assert "frequency" in left.what.partition("too large")[0]
@@ -169,7 +169,7 @@ def test_of_a_cloth_beyond_the_prior_a_bound_is_reported_and_no_number(
     )  # beyond the prior, and not left out
     assert found.sentence.startswith(f"area weight {words}")
     assert " kg/m², 95 %, n = 48 windows" in found.sentence
-    said = found.as_dict()
+    said = found.document
     weight = said["cloth"]["area_weight"]
     assert (weight["value"], weight["sigma"], weight["constrained"], weight["level"]) == (
         None,
@@ -194,10 +194,12 @@ def test_of_a_cloth_beyond_the_prior_a_bound_is_reported_and_no_number(
 
 @pytest.mark.usefixtures("cheap")
 def test_a_bound_has_no_settled_box_and_no_line_to_copy_on_its_page(plain: Calibration) -> None:
-    page = written(_found(_observed(0.045)), {})
-    assert '<p class="verdict open"><b>area weight at most 0.0' in page
-    assert "--area-weight" not in page
-    assert '<p class="verdict settled"><b>area weight 0.1' in written(plain, {})
+    bounded = answer_of_calibration(_found(_observed(0.045)))
+    assert '<p class="verdict open"><b>The cloth weighs at most 0.0' in bounded.page
+    assert "--area-weight" not in bounded.page
+    page = answer_of_calibration(plain).page
+    assert '<p class="verdict settled"><b>The cloth weighs 0.1' in page
+    assert str(plain.area_weight_stated) in page
 
 
 def _uniform(low: float, high: float, *, stated: bool) -> Uncertain:
@@ -253,10 +255,11 @@ def test_windows_lie_about_what_simulations_of_the_answer_show(plain: Calibratio
 
 def test_the_answer_is_stated_as_measure_takes_it(plain: Calibration) -> None:
     assert plain.stated is not None
-    stated = parse(plain.stated)
+    stated = parse(str(plain.area_weight_stated))
+    assert stated == plain.stated
     assert stated.low == pytest.approx(plain.weight.value, rel=1e-3)
     assert stated.sigma == pytest.approx(plain.weight.sigma, rel=0.05)
-    assert parse(plain.as_dict()["close_loop"]["area-weight"]).low == pytest.approx(
+    assert parse(plain.document["close_loop"]["area-weight"]).low == pytest.approx(
         plain.weight.value, rel=1e-3
     )
 
@@ -327,7 +330,7 @@ def test_rows_of_one_place_share_the_anemometers_gain() -> None:
     shared = _found(*together)
     assert _spread(shared) / 0.17 == pytest.approx(_sigma(1), rel=0.2)
     assert _spread(_found(*apart)) / 0.17 == pytest.approx(_sigma(3), rel=0.2)
-    assert len({place[0].value for place in shared.places}) == 1
+    assert len({one.place["gain"].value for one in shared.recordings}) == 1
     assert "constant-wind" not in {finding.kind for finding in shared.findings}
 
 
