@@ -106,7 +106,7 @@ class Quantity:
         "constrained",
         "given",
     )
-    JSON_OPTIONAL: ClassVar[tuple[str, ...]] = ("assumed", "information")
+    JSON_OPTIONAL: ClassVar = frozenset({"assumed", "information"})
 
     name: str
     unit: str

@@ -60,6 +60,11 @@ class Finding:
             fix=fix,
         )
 
+    @property
+    def sentence(self) -> str:
+        """What was found, as a sentence of its own."""
+        return f"{self.what[:1].upper()}{self.what[1:]}."
+
 
 _KINDS = {
     Severity.NOTE: """

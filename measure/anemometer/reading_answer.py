@@ -40,11 +40,7 @@ def answer_of_reading(made: Made) -> Answer:
             figures=[_film(result), _both_winds(result)],
             facts=_facts(result),
             limits=[
-                *(
-                    f"{one.what[:1].upper()}{one.what[1:]}."
-                    for one in result.findings
-                    if one.severity is not Severity.NOTE
-                ),
+                *(one.sentence for one in result.findings if one.severity is not Severity.NOTE),
                 "It reads this flag from this place.",
             ],
             remarks=[

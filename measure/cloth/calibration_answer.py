@@ -133,11 +133,7 @@ def _facts(calibration: Calibration) -> dict[str, str]:
 
 
 def _limits(calibration: Calibration) -> list[str]:
-    warnings = [
-        f"{one.what[:1].upper()}{one.what[1:]}." if not one.what.endswith(".") else one.what
-        for one in calibration.findings
-        if one.severity is not Severity.NOTE
-    ]
+    warnings = [one.sentence for one in calibration.findings if one.severity is not Severity.NOTE]
     return warnings[:_LIMITS]
 
 

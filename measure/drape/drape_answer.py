@@ -227,7 +227,7 @@ def answer_of_drapes(found: Draped) -> Calibrated:
                 "disc and pedestal": f"{2e3 * DISC:.0f} mm over {2e3 * PEDESTAL:.0f} mm",
                 "stiffer thread": f"at {found.direction:.0f}° in the flat cloth",
             },
-            limits=[f"{one.what[:1].upper()}{one.what[1:]}." for one in found.findings],
+            limits=[one.sentence for one in found.findings],
         ),
         make_sections=lambda: [_cloth_section(found), _drapes_section(found)],
         level=found.level,
