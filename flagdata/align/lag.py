@@ -149,7 +149,6 @@ class LagEstimate:
         offset: [s]; NaN where there is no peak at all.
         sigma: standard uncertainty, all parts [s].
         sigma_statistical: the part that a longer recording would shrink [s].
-        interval: 90 % [s].
         at: instant on the camera's clock at which it holds, mid-overlap [UTC ns].
         confidence: probability that the peak is neither an accident nor a rival's; the interval is
             given that.
@@ -163,7 +162,6 @@ class LagEstimate:
     offset: float
     sigma: float
     sigma_statistical: float
-    interval: tuple[float, float]
     at: int
     confidence: float
     correlation: float
@@ -171,6 +169,13 @@ class LagEstimate:
     bins: int
     findings: tuple[Finding, ...]
     curve: LagCurve
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Its 90 % interval [s], without ends where there is no peak."""
+        if not math.isfinite(self.sigma):
+            return -math.inf, math.inf
+        return self.offset - NINETY * self.sigma, self.offset + NINETY * self.sigma
 
     @property
     def is_accepted(self) -> bool:
@@ -225,7 +230,6 @@ def estimate_offset(
         offset=offset,
         sigma=sigma,
         sigma_statistical=statistical,
-        interval=(offset - NINETY * sigma, offset + NINETY * sigma),
         at=bins.middle(best),
         confidence=(1 - chance) * mass,
         correlation=peak.correlation,
@@ -390,7 +394,6 @@ def _nothing(bins: LagBins, search: LagSearch, findings: tuple[Finding, ...]) ->
         offset=math.nan,
         sigma=math.inf,
         sigma_statistical=math.inf,
-        interval=(-math.inf, math.inf),
         at=bins.first,
         confidence=0.0,
         correlation=math.nan,

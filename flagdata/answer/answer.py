@@ -20,8 +20,9 @@ from flagdata.core.findings import Finding
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-Cell: TypeAlias = "str | Markup | Quantity | None"
-"""A cell of a table: text, a part of a page, a quantity with its interval, or nothing."""
+Cell: TypeAlias = "str | Markup | Quantity | Sequence[str] | None"
+"""A cell of a table: text, a part of a page, a quantity with its interval, lines of which the first
+is the value and the others belong to it, or nothing."""
 
 
 class Tone(StrEnum):

@@ -49,7 +49,8 @@ class Line:
     Attributes:
         x, y: (n,).
         label: in the legend; none where it is empty.
-        marker: of each point, as matplotlib names it ("o", "s", "D").
+        marker: of each point: "o" a disc, "s" a square, "D" a diamond, "^" a triangle; none where it
+            is empty.
     """
 
     x: Numbers
@@ -164,6 +165,21 @@ class Cells:
     label: str = ""
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Cloud:
+    """Points that are coloured by a value.
+
+    Attributes:
+        x, y, values: (n,).
+        label: of the palette's bar.
+    """
+
+    x: Numbers
+    y: Numbers
+    values: Numbers
+    label: str
+
+
 @dataclass(frozen=True, kw_only=True)
 class Across:
     """A line at one value, over the whole panel.
@@ -207,7 +223,7 @@ class Note:
     """Whether the text ends there, and does not begin."""
 
 
-Mark: TypeAlias = Line | Band | Dots | Bins | Bars | Cells | Across | Shade | Note
+Mark: TypeAlias = Line | Band | Dots | Bins | Bars | Cells | Cloud | Across | Shade | Note
 
 
 @dataclass(frozen=True, kw_only=True)

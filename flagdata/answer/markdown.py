@@ -5,6 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from flagdata.answer.answer import Cell
+from flagdata.answer.quantity import Quantity
+
 _ESCAPED = str.maketrans(
     {sign: f"&#{ord(sign)};" for sign in "|`*\\"} | {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
 )
@@ -19,11 +22,19 @@ def plain(text: str) -> str:
     return " ".join(text.split()).translate(_ESCAPED).replace("](", "&#93;(")
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[str | Sequence[str]]]) -> str:
-    """Writes a table, its cells as text; a cell of several lines is a sequence of them."""
+def table(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
+    """Writes a table, its cells as text."""
 
-    def cell(content: str | Sequence[str]) -> str:
-        return plain(content) if isinstance(content, str) else "<br>".join(map(plain, content))
+    def cell(content: Cell) -> str:
+        match content:
+            case None:
+                return ""
+            case str():
+                return plain(content)
+            case Quantity():
+                return plain(content.text_with_level)
+            case _:
+                return "<br>".join(map(plain, content))
 
     lines = [head, ["---"] * len(head), *(map(cell, row) for row in rows)]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)

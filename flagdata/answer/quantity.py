@@ -157,13 +157,16 @@ class Quantity:
             return self._unknown_text
         if self.value is None:
             return f"{self.span.word(self.write, self.suffix)}, {self.span.percent}"
+        if self.bound is Bound.NOTHING:
+            return f"{self.write(self.value)}{self.suffix}, no interval"
         low, high = map(self.write, self.interval)
         return f"{self.write(self.value)} [{low}, {high}]{self.suffix}"
 
     @property
     def text_with_level(self) -> str:
         """The same, with the level of an interval too."""
-        is_interval = self.constrained and self.value is not None
+        is_known = self.bound is not Bound.NOTHING
+        is_interval = self.constrained and self.value is not None and is_known
         return f"{self.text}, {self.span.percent}" if is_interval else self.text
 
     @property

@@ -22,6 +22,7 @@ from flagdata.verbs.shared_options import AtVersion, Computed, OnBranch, OnLake,
 from flagdata.verbs.verb_options import argument, make_call, option, options
 
 if TYPE_CHECKING:
+    from flagdata.answer.answer import Answer
     from flagdata.core.stated import Stated
     from flagdata.lake import Lake
 
@@ -212,16 +213,18 @@ class Evaluating(OfInputs, Shared):
 
 
 @make_call(Evaluating)
-def evaluate(chosen: Evaluating) -> Mapping[str, Any]:
+def evaluate(chosen: Evaluating) -> Answer:
     """Judges trained networks on one side of a data set and writes the table, as `flagdata
     evaluate` does.
 
     ```python
     judged = flagdata.evaluate(["flow", "sdn"], lake="lake", at="v1", out="evaluation")
+    judged.quantities["rmse"]  # of the model that reads the wind best
+    judged.document["models"]  # all scores, as the JSON file has them
     ```
 
     Returns:
-        What `flagdata evaluate --json` prints.
+        The answer; its `document` is what `flagdata evaluate --json` prints.
 
     Raises:
         InputError: films too short or too slow for a network, or that state none of its targets.

@@ -3,7 +3,6 @@ no other."""
 
 from __future__ import annotations
 
-import re
 from itertools import count
 
 from markupsafe import Markup, escape
@@ -63,8 +62,7 @@ def _draw(figure: Figure, name: str) -> Markup:
     if isinstance(content, Chart):
         from flagdata.pages.chart_drawing import svg
 
-        title = Markup('role="img" aria-label="{}"').format(figure.title)
-        return Markup(re.sub("<svg", lambda _: f"<svg {title}", svg(content, name=name), count=1))
+        return svg(content, name=name, title=figure.title)
     if isinstance(content, Markup):
         return content
     width = "" if figure.width is None else Markup(' width="{}"').format(figure.width)

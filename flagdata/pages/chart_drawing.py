@@ -29,6 +29,7 @@ from flagdata.answer.charts import (
     Bins,
     Cells,
     Chart,
+    Cloud,
     Colour,
     Dots,
     Line,
@@ -81,9 +82,13 @@ _STYLE: dict[Any, Any] = {
 _LEGEND_COLUMNS = 4
 
 
-def svg(chart: Chart, *, name: str) -> Markup:
-    """Draws a chart as an element of a page, whose ids begin with `name`, so that several fit into
-    one page."""
+def svg(chart: Chart, *, name: str, title: str = "") -> Markup:
+    """Draws a chart as an element of a page.
+
+    Args:
+        name: with which its ids begin, so that several fit into one page.
+        title: what it shows, for who does not see it.
+    """
     target = io.StringIO()
     with mpl.rc_context(_STYLE):
         _draw(chart).savefig(target, format="svg", transparent=True, metadata={"Date": None})
@@ -93,7 +98,8 @@ def svg(chart: Chart, *, name: str) -> Markup:
     text = re.sub(r"(\bid=\"|url\(#|href=\"#)", rf"\g<1>{name}-", text)
     for colour, value in _VALUES.items():
         text = text.replace(value, f"var(--{colour.value}, {value})")
-    return Markup(text)
+    about = Markup('<svg role="img" aria-label="{}"').format(title)
+    return about + Markup(text.removeprefix("<svg"))
 
 
 def png(chart: Chart, *, dpi: float = 110) -> bytes:
@@ -329,8 +335,20 @@ def _(mark: Cells, axes: Axes) -> None:
     shaded.set_clim(low, high)
     axes.grid(visible=False)
     if mark.label:
-        bar = axes.figure.colorbar(shaded, ax=axes, label=mark.label)
-        bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
+        _draw_palette(axes, shaded, mark.label)
+
+
+@_draw_mark.register
+def _(mark: Cloud, axes: Axes) -> None:
+    points = axes.scatter(
+        mark.x, mark.y, c=mark.values, s=9, cmap="viridis", linewidths=0, rasterized=True
+    )
+    _draw_palette(axes, points, mark.label)
+
+
+def _draw_palette(axes: Axes, shaded: Any, label: str) -> None:
+    bar = axes.figure.colorbar(shaded, ax=axes, label=label)
+    bar.outline.set_visible(False)  # pyright: ignore[reportCallIssue]
 
 
 @_draw_mark.register

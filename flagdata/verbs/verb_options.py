@@ -32,7 +32,7 @@ import textwrap
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import closing
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
-from typing import Any, ParamSpec, TypeVar, dataclass_transform
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, dataclass_transform
 
 import click
 from click.core import ParameterSource
@@ -40,6 +40,9 @@ from click.core import ParameterSource
 from flagdata.core.console import document, say
 from flagdata.errors import FlagdataError
 from flagdata.recipes.retired_names import warn_of_old_name
+
+if TYPE_CHECKING:
+    from flagdata.answer.answer import Answer
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -423,11 +426,13 @@ class Result:
         tag: of its JSON document, see `flagdata.core.console.document`.
         content: of it.
         exit_code: of the command.
+        answer: what the call returns in place of the content, of a question.
     """
 
     tag: str
     content: Mapping[str, Any]
     exit_code: int = 0
+    answer: Answer | None = None
 
 
 _NOTHING = Result("", {})
@@ -462,9 +467,10 @@ def verb(
                 sys.exit(result.exit_code)
 
         @functools.wraps(run)
-        def result(chosen: Any) -> Mapping[str, Any]:
+        def result(chosen: Any) -> Any:
             with closing(run(chosen)) as steps:  # type: ignore[type-var]  a generator
-                return next(steps, _NOTHING).content
+                made = next(steps, _NOTHING)
+            return made.content if made.answer is None else made.answer
 
         bases: Any = (form, AsJson)
         shown = command(options(type(run.__name__, bases, {"__module__": run.__module__})))(

@@ -1,9 +1,14 @@
-"""What the demonstration's first page shows of a step, and of what was hidden."""
+"""What the demonstration shows of a step, and of what was hidden; its answer is made of these."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+
+from markupsafe import Markup
+
+from flagdata.answer.answer import Answer, Figure, Head, Part, Section, Table, Tone
 
 
 class Judgement(StrEnum):
@@ -31,8 +36,7 @@ class Card:
         title: of the step.
         done: what was done, in a sentence or two.
         found: what came out, as the command printed it; empty where nothing is to be said.
-        picture: a data URL; empty for none.
-        alt: what the picture shows.
+        figure: that shows it; None for none.
         page: a page of the folder that has more; empty for none.
         commands: that were typed.
         seconds: that it took.
@@ -42,8 +46,7 @@ class Card:
     title: str
     done: str
     found: str
-    picture: str
-    alt: str
+    figure: Figure | None
     page: str
     commands: tuple[str, ...]
     seconds: float
@@ -65,3 +68,93 @@ class Truth:
     true: str
     found: str
     judgement: Judgement
+
+
+_SHOWN = 2  # figures on the first screen
+_ABOUT = (
+    "A flag was simulated on a mesh and in time steps that no later step uses. What is in no file "
+    "was sought by the commands below, as for a recording of one's own."
+)
+
+
+def demonstration_answer(cards: Sequence[Card], *, seconds: float) -> Answer:
+    """Returns how much of what no file states was found.
+
+    Args:
+        cards: of the steps, in their order.
+        seconds: that all of it took.
+    """
+    truths = [truth for card in cards for truth in card.truths]
+    figures = [card.figure for card in cards if card.figure is not None]
+    shown = figures if len(figures) <= _SHOWN else [figures[0], figures[-1]]
+    return Answer(
+        question="demo",
+        subject="A flag, a film and an anemometer",
+        sentence=_sentence(truths),
+        tone=_tone(truths),
+        head=Head(
+            figures=shown,
+            facts={
+                **({cards[0].title: cards[0].done} if cards else {}),
+                "steps": str(len(cards)),
+                "took": f"{seconds // 60:.0f} min {seconds % 60:.0f} s",
+            },
+            limits=[
+                f"{truth.what}: {truth.judgement.value}"
+                for truth in truths
+                if truth.judgement not in (Judgement.RIGHT, Judgement.OPEN)
+            ],
+            remarks=[_ABOUT],
+        ),
+        make_sections=lambda: [*_sections(cards, truths, shown)],
+    )
+
+
+def _sentence(truths: Sequence[Truth]) -> str:
+    judged = [truth for truth in truths if truth.judgement is not Judgement.OPEN]
+    right = sum(truth.judgement is Judgement.RIGHT for truth in judged)
+    if not judged:
+        return "What no file states was sought, and stands beside the truth"
+    if len(judged) == 1:
+        return f"What no file states was {'found' if right else 'not found'}: {judged[0].what}"
+    return f"Of {len(judged)} things that no file states {right or 'none'} were found"
+
+
+def _tone(truths: Sequence[Truth]) -> Tone:
+    judgements = {truth.judgement for truth in truths}
+    if Judgement.MISSED in judgements:
+        return Tone.MISSED
+    return Tone.SETTLED if judgements <= {Judgement.RIGHT, Judgement.OPEN} else Tone.OPEN
+
+
+def _sections(
+    cards: Sequence[Card], truths: Sequence[Truth], shown: Sequence[Figure]
+) -> Iterator[Section]:
+    if truths:
+        rows = [(one.what, one.true, one.found, one.judgement.value) for one in truths]
+        yield Section(
+            title="The truth beside what was found",
+            parts=[Table(columns=("", "true", "found", ""), rows=rows)],
+            anchor="truth",
+        )
+    for number, card in enumerate(cards, start=1):
+        yield Section(
+            title=f"{number}. {card.title}",
+            parts=[*_parts(card, shown)],
+            anchor=f"step-{number}",
+            folded=True,
+        )
+
+
+def _parts(card: Card, shown: Sequence[Figure]) -> Iterator[Part]:
+    yield card.done
+    if card.figure is not None and card.figure not in shown:
+        yield card.figure
+    if card.found:
+        yield Markup("<pre>{}</pre>").format(card.found)
+    if card.page:
+        yield Markup('<p><a href="{}">The page of this step</a></p>').format(card.page)
+    if card.commands:
+        typed = Markup("<br>").join(Markup("<code>{}</code>").format(one) for one in card.commands)
+        yield Markup('<p class="small">{}</p>').format(typed)
+    yield f"It took {card.seconds:.0f} s."

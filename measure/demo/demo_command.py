@@ -1,34 +1,19 @@
 """`flagdata demo`: the main job end to end on data made on the spot, by the same commands a user
-types.
-
-The demonstration's first page: a card a step, and the truth beside what was found.
-"""
+types."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 
 import click
 
 from flagdata.core.console import LocalPath, document, say
-from flagdata.core.provenance import code_version
 from flagdata.errors import UsageError
-from flagdata.pages.render import render
 from flagdata.verbs.verb_options import AsJson, command, option, options
-from measure.demo.demo_cards import Card
+from measure.demo.demo_cards import demonstration_answer
 from measure.demo.transcript import Transcript
-
-
-def write_index(folder: Path, cards: Sequence[Card], *, seconds: float) -> Path:
-    """Write `index.html` into `folder`; it links to the other pages there."""
-    target = folder / "index.html"
-    values = {"cards": cards, "seconds": seconds, "version": f"flagdata {code_version()}"}
-    target.write_text(render("measure.demo", "index.html.j2", values), encoding="utf-8")
-    return target
-
 
 SCHEMA = "flagdata.demo/1"
 """Of its folder's manifest."""
@@ -111,7 +96,8 @@ def demo(chosen: Showing) -> None:
             if story is Story.FULL:
                 weighing_step(shell, recording)
                 loop_step(shell, recording)
-        write_index(scratch, shell.cards, seconds=time.monotonic() - began)
+        answer = demonstration_answer(shell.cards, seconds=time.monotonic() - began)
+        (scratch / "index.html").write_text(answer.page, encoding="utf-8")
     if chosen.as_json:
         document("demo", {"page": str(out / "index.html")})
     else:

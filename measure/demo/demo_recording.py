@@ -46,6 +46,8 @@ START = datetime(2026, 5, 14, 9, 30, tzinfo=UTC)
 """When the camera starts, by its own clock."""
 AIR_RATE = 10.0
 """Hz, at which the air is sampled."""
+SIZE = "1.5x1.0"
+"""Of the flag, as its maker states it [m]."""
 MATERIAL = "camel-ponte-roma"
 """Whose measured tables the flag's cloth has, bent more or less easily."""
 _SETTLE = 5.0  # s that are simulated before the first frame

@@ -4,29 +4,37 @@ findings and the commands, in one file."""
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
+from markupsafe import Markup
 
 import flagdata
-from flagdata.core.clock_model import ClockModel
-from flagdata.core.provenance import code_version
+from flagdata.align.session_chart import HEIGHTS, session_panels
+from flagdata.answer.answer import Answer, Figure, Gallery, Head, Section, Table, Tone
+from flagdata.answer.charts import Axis, Band, Chart, Colour, Line, Panel
+from flagdata.core.clock_model import NINETY, ClockModel
 from flagdata.core.schema import CLIP_FRAMES, FRAME_RATE
+from flagdata.dataset.pairs import Pairs
 from flagdata.dataset.sample import Sample
 from flagdata.lake import Lake
-from flagdata.pages.page_pictures import data_url, figure_url, moving
-from flagdata.pages.render import render
+from flagdata.pages.page_pictures import data_url, moving
 from flagdata.record import Record
-from flagdata.timebase import NANOSECONDS
-from measure.demo.demo_recording import AIR_RATE, BEFORE, Recording
+from flagdata.record.signals import WindAverage
+from flagdata.timebase import NANOSECONDS, iso
+from measure.demo.demo_recording import AIR_RATE, BEFORE, SIZE, Recording
 from models.maps.spectral_layer import SpectralDecomposition
 
 _SHOWN = 6
-_Z90 = 1.6449  # half-width of a 90 % interval of a Gaussian, in σ
+_SIDE = 240  # px of a clip
+_ABOUT_MOTION = (
+    "Dominant motion: the peak frequency of the spectral decomposition layer (Runia et al. 2020, "
+    "section 5), weighted by its power over the picture; its resolution at 30 frames is 0.83 Hz."
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,47 +56,83 @@ class Recovered:
         return self.low <= self.truth <= self.high
 
 
-def write_page(
-    folder: Path,
-    *,
-    recording: Recording,
-    at: str,
-    transcript: Sequence[tuple[str, str]],
-    seconds: float,
-) -> Path:
-    """Write `recording.html` (self-contained) into `folder` from the lake inside it; returns its
-    path."""
+def recording_answer(
+    folder: Path, *, recording: Recording, at: str, transcript: Sequence[tuple[str, str]]
+) -> Answer:
+    """Returns on which clock film and log are, from the lake in the folder, with the pairs that
+    were made of them."""
     lake = Lake.open(folder / "lake")
     (row,) = lake.rows("kind = 'recording'", at=at).to_pylist()
     record = Record.open(lake.object_path(row["object"]))
+    logged = record.wind_1hz()
+    if logged is None:
+        raise ValueError("a recording of the demonstration holds wind")
     pairs = flagdata.open(folder / "lake").pairs(where="kind = 'clip'", at=at, seed=0)
+    clock = compare_clock(row, recording.clock_offset)
+    first = int(record.frame_times[0])
+    minutes = len(record.frame_times) / FRAME_RATE / 60
+    return Answer(
+        question="demo",
+        subject="A film and a log on one clock",
+        sentence=f"The log's clock is {clock.offset:+.2f} s "
+        f"[{clock.low:+.2f}, {clock.high:+.2f}] from the camera's, 90 %; the true difference is "
+        f"{clock.truth:+.2f} s",
+        tone=Tone.SETTLED if clock.covered else Tone.MISSED,
+        head=Head(
+            figures=[_session(record, logged), _wind_figure(logged, lake, at, recording, first)],
+            facts={
+                "film": f"{minutes:.2g} min from {iso(first)[:16]}Z, a "
+                f"simulated flag of {SIZE.replace('x', ' m × ')} m",
+                "clock": f"confidence {clock.confidence:.3f}; neither file states the difference",
+                "log": f"a cup anemometer, {len(logged.time)} one-second means",
+            },
+            limits=["The gap in the log and the stretch in which it stuck are left out of means."],
+        ),
+        make_sections=lambda: [*_sections(folder, lake, at, pairs, transcript)],
+    )
+
+
+def _sections(
+    folder: Path, lake: Lake, at: str, pairs: Pairs, transcript: Sequence[tuple[str, str]]
+) -> Iterator[Section]:
     order = np.argsort([pairs[i].wind for i in range(len(pairs))])
-    samples = [
-        pairs[int(i)] for i in order[np.linspace(0, len(order) - 1, _SHOWN).round().astype(int)]
+    places = order[np.linspace(0, len(order) - 1, _SHOWN).round().astype(int)]
+    refused = (
+        f"; {len(pairs.refused)} refused, the first because {'; '.join(pairs.refused[0].reasons)}"
+        if pairs.refused
+        else ""
+    )
+    counted = (
+        f"{len(pairs)} pairs of {CLIP_FRAMES} frames at {FRAME_RATE} Hz{refused}. {len(places)} of "
+        "them, by wind:"
+    )
+    yield Section(
+        title="Clips and their ground truth",
+        parts=[
+            counted,
+            Gallery(figures=[_clip(pairs[int(i)]) for i in places]),
+            _ABOUT_MOTION,
+        ],
+        anchor="clips",
+    )
+    picture = data_url((folder / "alignment.png").read_bytes(), "image/png")
+    yield Section(
+        title="How the clocks were compared",
+        parts=[Figure(title="Motion and wind, and the correlation against lag", content=picture)],
+        anchor="alignment",
+        folded=True,
+    )
+    yield Section(
+        title="What the ingest found",
+        parts=[Table(columns=("source", "", "finding"), rows=_findings(lake, at))],
+        anchor="ingest",
+        folded=True,
+    )
+    typed = [
+        Markup("<pre><b>$ {}</b>\n{}</pre>").format(command, printed)
+        for command, printed in transcript
     ]
-    wind_image, caption = _wind_plot(record, lake, at, recording)
-    target = folder / "recording.html"
-    values = {
-        "minutes": f"{len(record.frame_times) / FRAME_RATE / 60:.2g}",
-        "seconds": seconds,
-        "clock": compare_clock(row, recording.clock_offset),
-        "images": {
-            "wind": wind_image,
-            "alignment": data_url((folder / "alignment.png").read_bytes(), "image/png"),
-        },
-        "wind_caption": caption,
-        "counts": {
-            "pairs": len(pairs),
-            "refused": len(pairs.refused),
-            "reason": "; ".join(pairs.refused[0].reasons) if pairs.refused else "",
-        },
-        "clips": [_clip_card(sample) for sample in samples],
-        "findings": _findings(lake, at),
-        "transcript": transcript,
-        "version": f"flagdata {code_version()}",
-    }
-    target.write_text(render("measure.demo", "page.html.j2", values), encoding="utf-8")
-    return target
+    yield Section(title="What was typed", parts=typed, anchor="commands", folded=True)
 
 
 def compare_clock(recording: dict[str, Any], truth: float) -> Recovered:
@@ -98,7 +142,7 @@ def compare_clock(recording: dict[str, Any], truth: float) -> Recovered:
     middle = (recording["start"] + recording["end"]) // 2
     device = middle - round(recording["clock_offset"] * NANOSECONDS)
     offset = (int(clock.to_common(device)) - device) / NANOSECONDS
-    half = _Z90 * float(clock.sigma(device))
+    half = NINETY * float(clock.sigma(device))
     return Recovered(
         offset=offset,
         low=offset - half,
@@ -108,15 +152,15 @@ def compare_clock(recording: dict[str, Any], truth: float) -> Recovered:
     )
 
 
-def _clip_card(sample: Sample) -> dict[str, Any]:
-    return {
-        "image": moving(sample.clip[0].numpy(), rate=FRAME_RATE, side=200),
-        "wind": sample.wind,
-        "sigma": sample.wind_sigma,
-        "clock_sigma": sample.clock_sigma,
-        "coverage": sample.coverage,
-        "frequency": dominant_frequency(sample.clip),
-    }
+def _clip(sample: Sample) -> Figure:
+    return Figure(
+        title="clip",
+        content=moving(sample.clip[0].numpy(), rate=FRAME_RATE, side=200),
+        caption=f"{sample.wind:.2f} ± {sample.wind_sigma:.2f} m/s (minute mean, 1 σ); clock σ "
+        f"{sample.clock_sigma:.2f} s, coverage {100 * sample.coverage:.0f} %; dominant motion "
+        f"{dominant_frequency(sample.clip):.1f} Hz",
+        width=_SIDE,
+    )
 
 
 def dominant_frequency(clip: torch.Tensor) -> float:
@@ -127,56 +171,63 @@ def dominant_frequency(clip: torch.Tensor) -> float:
     return float((power * frequency).sum() / power.sum())
 
 
-def _wind_plot(record: Record, lake: Lake, at: str, recording: Recording) -> tuple[str, str]:
-    from matplotlib.figure import Figure
+def _session(record: Record, logged: WindAverage) -> Figure:
+    when, blowing = session_panels(record.frame_times, logged, clock="the common clock")
+    return Figure(
+        title="When camera and anemometer ran",
+        content=Chart(rows=[[when], [blowing]], heights=HEIGHTS),
+    )
 
-    logged = record.wind_1hz()
-    if logged is None:
-        raise ValueError("a recording of the demonstration holds wind")
-    zero = int(record.frame_times[0])
+
+def _wind_figure(
+    logged: WindAverage, lake: Lake, at: str, recording: Recording, zero: int
+) -> Figure:
+    """Shows the winds from the first frame on, `zero` [UTC ns]."""
     clips = lake.rows("kind = 'clip'", at=at, columns=["end", "wind", "wind_sigma"]).to_pylist()
     ends = np.array([(clip["end"] - zero) / NANOSECONDS for clip in clips])
     wind = np.array([np.nan if clip["wind"] is None else clip["wind"] for clip in clips])
     sigma = np.array([np.nan if clip["wind"] is None else clip["wind_sigma"] for clip in clips])
-    figure = Figure(figsize=(9.5, 3.4), layout="constrained")
-    axes = figure.subplots()
     truth = np.arange(len(recording.wind)) / AIR_RATE - BEFORE
-    axes.plot(truth, recording.wind, color="0.82", linewidth=0.6, label="true wind at the flag")
-    axes.plot(
-        (logged.time - zero) / NANOSECONDS,
-        logged.speed,
-        color="#2b6f8f",
-        linewidth=0.8,
-        label="anemometer, 1 Hz",
+    panel = Panel(
+        marks=[
+            Line(
+                x=truth,
+                y=recording.wind,
+                colour=Colour.RULE,
+                width=0.6,
+                label="true wind at the flag",
+            ),
+            Line(
+                x=(logged.time - zero) / NANOSECONDS,
+                y=logged.speed,
+                colour=Colour.LOG,
+                width=0.8,
+                label="anemometer, 1 Hz",
+            ),
+            Band(x=ends, low=wind - sigma, high=wind + sigma, colour=Colour.FILM, opacity=0.35),
+            Line(
+                x=ends,
+                y=wind,
+                colour=Colour.FILM,
+                width=1.4,
+                label="ground truth of the clips (minute mean ± σ)",
+            ),
+        ],
+        x=Axis(label="time since the first frame [s]", limits=(truth[0], truth[-1])),
+        y=Axis(label="wind speed [m/s]", limits=(0, None)),
     )
-    axes.fill_between(ends, wind - sigma, wind + sigma, color="#c4622d", alpha=0.35, linewidth=0)
-    axes.plot(
-        ends,
-        wind,
-        color="#c4622d",
-        linewidth=1.4,
-        label="ground truth of the clips (minute mean ± σ)",
+    return Figure(
+        title="Wind speed against time",
+        content=Chart(rows=[[panel]], height=3.2),
+        caption=f"{len(clips)} clips of {CLIP_FRAMES} frames.",
     )
-    axes.set(
-        xlabel="time since the first frame [s]",
-        ylabel="wind speed [m/s]",
-        xlim=(truth[0], truth[-1]),
-        ylim=(0, None),
-    )
-    axes.legend(loc="lower right", fontsize=8, ncols=3)
-    caption = (
-        f"{len(logged.time)} one-second means on the common clock; the gap and the stretch that "
-        "stuck are left out of "
-        f"the averages. {len(clips)} clips of {CLIP_FRAMES} frames."
-    )
-    return figure_url(figure, dpi=130), caption
 
 
-def _findings(lake: Lake, at: str) -> list[dict[str, Any]]:
-    findings = []
+def _findings(lake: Lake, at: str) -> list[tuple[str, str, str]]:
+    found = []
     for row in lake.rows(
         "kind in ('camera', 'wind')", at=at, columns=["source_name", "report"]
     ).to_pylist():
         report = json.loads(row["report"])
-        findings += [{"source": row["source_name"], **finding} for finding in report["findings"]]
-    return findings
+        found += [(row["source_name"], one["severity"], one["what"]) for one in report["findings"]]
+    return found

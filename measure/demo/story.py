@@ -14,10 +14,12 @@ from typing import Any
 import av
 import numpy as np
 
+from flagdata.answer.answer import Figure
+from flagdata.answer.charts import Axis, Chart, Colour, Dots, Line, Panel
 from flagdata.core.console import progress, say
 from flagdata.core.workload import cores
 from flagdata.lake import Lake
-from flagdata.pages.page_pictures import data_url, figure_url, moving
+from flagdata.pages.page_pictures import data_url, moving
 from measure.commands.measurement_artifact import read
 from measure.demo.demo_cards import Card, Judgement, Truth
 from measure.demo.demo_recording import (
@@ -25,17 +27,16 @@ from measure.demo.demo_recording import (
     BEFORE,
     CLOCK_SIGMA,
     SCALE_SIGMA,
+    SIZE,
     Acting,
     Recording,
     RecordingRecipe,
     make_recording,
 )
-from measure.demo.recording_page import compare_clock, write_page
+from measure.demo.recording_page import compare_clock, recording_answer
 from measure.demo.transcript import Transcript
 from measure.verdict.verdict_record import Conclusion
 
-SIZE = "1.5x1.0"
-"""Of the flag, as its maker states it [m]."""
 SIMULATIONS = 64
 """Flags that are simulated to weigh the cloth: the fewest that the command takes."""
 WEIGHED = 40.0
@@ -47,6 +48,8 @@ _REFUSED = (
     "The estimate from motion and gusts was refused, for the reason above the picture.\n"
     "So the difference was given that somebody read off the two displays:\n"
 )
+_PAGE = "recording.html"
+_SIDE = 320  # px of the film
 _SHOWN = 50  # frames of the film's moving picture
 _CLIPS = 2.4  # s from one window of the wind series to the next
 
@@ -55,7 +58,6 @@ def field_steps(shell: Transcript, seed: int) -> Recording:
     """Goes from nothing to a film and a log on one clock, pairs of them, and the wind estimated
     from the film."""
     recording = _film(shell, RecordingRecipe(seed=seed))
-    began = time.monotonic()
     done = "Each file was identified, with the reason; for the log a sensor recipe was drafted."
     with _Step(shell, "What are these files?", done) as step:
         step.found = _head(shell.show("ingest", "--sniff", "flag.mp4", "anemometer.csv"), 6)
@@ -78,14 +80,11 @@ def field_steps(shell: Transcript, seed: int) -> Recording:
         ):
             step.found += _head(shell.show("ingest", *arguments, "--lake", "lake"), 6)
     _align_step(shell, recording)
-    page = write_page(
-        shell.folder,
-        recording=recording,
-        at="demo",
-        transcript=tuple(shell.entries),
-        seconds=time.monotonic() - began,
+    answer = recording_answer(
+        shell.folder, recording=recording, at="demo", transcript=tuple(shell.entries)
     )
-    shell.cards[-1] = replace(shell.cards[-1], page=page.name)
+    (shell.folder / _PAGE).write_text(answer.page, encoding="utf-8")
+    shell.cards[-1] = replace(shell.cards[-1], page=_PAGE)
     _measure_step(shell, recording)
     return recording
 
@@ -224,15 +223,14 @@ class _Step:
 
     Attributes:
         found: what the card shows as its result.
-        picture: a data URL.
+        figure: what it shows.
     """
 
-    def __init__(
-        self, shell: Transcript, title: str, done: str, *, alt: str = "", page: str = ""
-    ) -> None:
-        self._shell, self._title, self._done, self._alt, self._page = shell, title, done, alt, page
+    def __init__(self, shell: Transcript, title: str, done: str, *, page: str = "") -> None:
+        self._shell, self._title, self._done, self._page = shell, title, done, page
         self._began, self._typed = time.monotonic(), len(shell.entries)
-        self.found, self.picture = "", ""
+        self.found = ""
+        self.figure: Figure | None = None
         self._truths: list[Truth] = []
 
     def took(self, printed: str | None) -> None:
@@ -264,8 +262,7 @@ class _Step:
                     title=self._title,
                     done=self._done,
                     found=self.found.strip(),
-                    picture=self.picture,
-                    alt=self._alt,
+                    figure=self.figure,
                     page=self._page,
                     commands=typed,
                     seconds=time.monotonic() - self._began,
@@ -282,12 +279,14 @@ def _film(shell: Transcript, recipe: RecordingRecipe) -> Recording:
         "cup anemometer's log "
         "is a CSV file in km/h."
     )
-    with _Step(shell, "A film and a log", done, alt="The film") as step:
+    with _Step(shell, "A film and a log", done) as step:
         with progress(
             2 * round(recipe.duration * recipe.rate), label="film", unit="frame"
         ) as advance:
             recording = make_recording(recipe, shell.folder, workers=cores(), advance=advance)
-        step.picture = _moving(recording.video, recipe.rate)
+        step.figure = Figure(
+            title="The film", content=_moving(recording.video, recipe.rate), width=_SIDE
+        )
     return recording
 
 
@@ -298,9 +297,7 @@ def _align_step(shell: Transcript, recording: Recording) -> None:
         "give the offset of the two clocks, if they agree clearly enough; with it, each clip of "
         "the film has its wind."
     )
-    with _Step(
-        shell, "On one clock, in pairs", done, alt="Motion and wind on one clock, and the evidence"
-    ) as step:
+    with _Step(shell, "On one clock, in pairs", done) as step:
         artifacts = {
             row["kind"]: row["artifact"] for row in shell.read("ls", "--lake", "lake")["artifacts"]
         }
@@ -320,7 +317,10 @@ def _align_step(shell: Transcript, recording: Recording) -> None:
         where = "kind = 'clip' and wind between 4 and 6"
         shell.show("query", "--where", where, "--limit", "5", "--at", "demo", "--lake", "lake")
         shell.show("verify", "--lake", "lake")
-        step.picture = data_url((shell.folder / "alignment.png").read_bytes(), "image/png")
+        step.figure = Figure(
+            title="Motion and wind on one clock, and the evidence",
+            content=data_url((shell.folder / "alignment.png").read_bytes(), "image/png"),
+        )
         (row,) = Lake.open(shell.folder / "lake").rows("kind = 'recording'", at="demo").to_pylist()
         clock = compare_clock(row, recording.clock_offset)
         inferred = Judgement.RIGHT if clock.covered else Judgement.MISSED
@@ -334,8 +334,7 @@ def _align_step(shell: Transcript, recording: Recording) -> None:
 
 def _measure_step(shell: Transcript, recording: Recording) -> None:
     done = "From the film alone, a network that was trained on simulated flags estimates the wind."
-    alt = "The wind read off the film, beside the log and the true wind"
-    with _Step(shell, "Wind from the film", done, alt=alt, page="measured.html") as step:
+    with _Step(shell, "Wind from the film", done, page="measured.html") as step:
         printed = shell.attempt(
             "measure",
             "flag",
@@ -350,7 +349,10 @@ def _measure_step(shell: Transcript, recording: Recording) -> None:
         )
         step.took(None if printed is None else _first(printed))
         if printed is not None:
-            step.picture = _series(shell.folder / "lake", recording)
+            step.figure = Figure(
+                title="The wind read off the film, beside the true wind",
+                content=_series(shell.folder / "lake", recording),
+            )
         mean = float(_wind_of_film(recording).mean())
         step.beside("mean wind at the flag", f"{mean:.2f} m/s", _judgement(step.found, mean))
 
@@ -361,36 +363,27 @@ def _wind_of_film(recording: Recording) -> np.ndarray[tuple[int], np.dtype[np.fl
     return recording.wind[first : len(recording.wind) - first]
 
 
-def _series(lake_path: Path, recording: Recording) -> str:
-    from matplotlib.figure import Figure
-
+def _series(lake_path: Path, recording: Recording) -> Chart:
     lake = Lake.open(lake_path)
     (measured,) = lake.rows("kind = 'measurement'").to_pylist()
     _, columns = read(lake.object_path(measured["object"]))
     time_, value, low, high = (columns[name] for name in ("time", "wind", "low", "high"))
-    figure = Figure(figsize=(9.5, 3.2), layout="constrained")
-    axes = figure.subplots()
     wind = _wind_of_film(recording)
-    axes.plot(
-        np.arange(len(wind)) / AIR_RATE,
-        wind,
-        color="0.75",
-        linewidth=0.8,
-        label="true wind at the flag",
+    panel = Panel(
+        marks=[
+            Line(
+                x=np.arange(len(wind)) / AIR_RATE,
+                y=wind,
+                colour=Colour.QUIET,
+                width=0.8,
+                label="true wind at the flag",
+            ),
+            Dots(x=time_, y=value, low=low, high=high, label="read off the film, 90 %", size=3.0),
+        ],
+        x=Axis(label="time since the first frame [s]"),
+        y=Axis(label="wind speed [m/s]", limits=(0, None)),
     )
-    axes.errorbar(
-        time_,
-        value,
-        np.abs(np.stack([value - low, high - value])),
-        fmt="o",
-        markersize=3,
-        linewidth=0.8,
-        color="#c4622d",
-        label="read off the film, 90 %",
-    )
-    axes.set(xlabel="time since the first frame [s]", ylabel="wind speed [m/s]", ylim=(0, None))
-    axes.legend(loc="lower right", fontsize=8, ncols=2)
-    return figure_url(figure, dpi=110)
+    return Chart(rows=[[panel]], height=3.2)
 
 
 def _moving(video: Path, rate: int) -> str:
@@ -401,7 +394,7 @@ def _moving(video: Path, rate: int) -> str:
             frames.append(frame.to_ndarray(format="rgb24"))
             if len(frames) == 2 * _SHOWN:
                 break
-    return moving(np.stack(frames[::2]), rate=rate / 2, side=320)
+    return moving(np.stack(frames[::2]), rate=rate / 2, side=_SIDE)
 
 
 def _judgement(text: str, true: float) -> Judgement:

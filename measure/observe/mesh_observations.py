@@ -7,14 +7,14 @@ Material points of a moving mesh whose topology may change: where they are in ea
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flagdata.core.arrays import Float32Array, FloatArray, IntArray
+from flagdata.core.arrays import Float32Array, FloatArray
 from flagdata.core.findings import Finding
 from flagdata.core.schema import Kind
 from flagdata.core.units import unit as length_unit
@@ -26,79 +26,7 @@ from flagdata.timebase import NANOSECONDS
 from measure.observe.cloth_mesh import VERTICES, model_mesh, outline
 from measure.observe.describing import of_arcsim, of_simulation
 from measure.observe.observation import Known, Observation
-
-_PAIRS = 1_000_000  # of points and faces that are compared at a time
-# barycentric: how far beyond its face, as a share of it, a point still counts as on the cloth
-_SLACK = 1e-3
-
-
-@dataclass(frozen=True, kw_only=True)
-class Location:
-    """Points on a triangulated cloth.
-
-    Attributes:
-        corners: (point, 3) vertices of the face that each lies in.
-        weights: (point, 3) barycentric coordinates in it, which sum to 1.
-    """
-
-    corners: IntArray
-    weights: FloatArray
-
-    def of(self, values: FloatArray) -> FloatArray:
-        """Interpolates values (vertex, …) at the points, (point, …), linear in each face."""
-        return np.einsum("pc,pc...->p...", self.weights, values[self.corners])
-
-
-def locate(rest: FloatArray, faces: IntArray, points: FloatArray, *, where: str) -> Location:
-    """Finds the faces in which points of the flat cloth lie, and where in them.
-
-    Args:
-        rest: (vertex, 2) [m].
-        faces: (face, 3), of either orientation; those without area are passed over.
-        points: (point, 2) [m].
-
-    Raises:
-        InputError: a point that no face holds.
-    """
-    a, b, c = (rest[faces[:, i]] for i in range(3))
-    doubled = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    has_area = np.abs(doubled) > 1e-9 * np.abs(doubled).max(initial=0.0)
-    if not has_area.any():
-        raise InputError(
-            "no face has an area in the rest shape",
-            where=where,
-            fix="export texture coordinates anew",
-        )
-    a, b, c, faces, doubled = (
-        a[has_area],
-        b[has_area],
-        c[has_area],
-        faces[has_area],
-        doubled[has_area],
-    )
-    containing = np.empty(len(points), dtype=np.int64)
-    weights = np.empty((len(points), 3))
-    step = max(1, _PAIRS // len(faces))
-    for first in range(0, len(points), step):
-        subset = points[first : first + step]
-        second = _cross(subset[:, None] - a, c - a) / doubled
-        third = _cross(b - a, subset[:, None] - a) / doubled
-        inside = np.minimum(np.minimum(second, third), 1 - second - third)
-        best = inside.argmax(axis=1)
-        rows = np.arange(len(subset))
-        worst = float(inside[rows, best].min())
-        if worst < -_SLACK:
-            lost = first + int(inside[rows, best].argmin())
-            u, v = points[lost]
-            raise InputError(
-                f"the point (u, v) = ({u:.4g}, {v:.4g}) m is on no face of the cloth",
-                where=where,
-                fix="give points within the rest shape, in its own coordinates",
-            )
-        containing[first : first + step] = best
-        second, third = second[rows, best], third[rows, best]
-        weights[first : first + step] = np.stack([1 - second - third, second, third], axis=1)
-    return Location(corners=faces[containing], weights=weights)
+from sim.cloth.material_points import Location, locate
 
 
 def sample(sequence: MeshSequence | RaggedMeshSequence, points: FloatArray) -> FloatArray:
@@ -124,10 +52,6 @@ def sample(sequence: MeshSequence | RaggedMeshSequence, points: FloatArray) -> F
             last = (mesh.rest, mesh.faces)
         positions[index] = location.of(mesh.positions.astype(np.float64))
     return positions
-
-
-def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
 MARKERS = 1000

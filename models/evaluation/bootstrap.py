@@ -11,10 +11,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 
+from flagdata.answer.quantity import Bound, Quantity, Span
 from flagdata.core.arrays import FloatArray, IntArray
 from flagdata.errors import InputError
 
@@ -24,35 +25,35 @@ DRAWS = 2000
 
 @dataclass(frozen=True, kw_only=True)
 class ScoreEstimate:
-    """A score and its interval.
+    """A score, and what it rests on.
 
     Attributes:
-        value: of the data; NaN where it is undefined (a correlation with a constant).
-        low, high: percentile interval of `LEVEL`; NaN with fewer than two groups, which say nothing
-            about others.
+        quantity: of the data, with its percentile interval of `LEVEL`; without a value where it is
+            undefined (a correlation with a constant), and without ends with fewer than two groups,
+            which say nothing about others.
         clips, groups: how many the value rests on.
     """
 
-    value: float
-    low: float
-    high: float
+    JSON_NAMES: ClassVar = ("value", "interval", "level", "clips", "groups")
+
+    quantity: Quantity
     clips: int
     groups: int
 
     @property
-    def has_interval(self) -> bool:
-        """Returns whether it has an interval."""
-        return math.isfinite(self.low) and math.isfinite(self.high)
+    def value(self) -> float:
+        """Of the data; NaN where it is undefined."""
+        return math.nan if self.quantity.value is None else self.quantity.value
 
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values; null for what is not known."""
-        return {
-            "value": self.value if math.isfinite(self.value) else None,
-            "interval": [self.low, self.high] if self.has_interval else None,
-            "level": LEVEL,
-            "clips": self.clips,
-            "groups": self.groups,
-        }
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """Returns its ends; None where nothing is known of them."""
+        return None if self.quantity.bound is Bound.NOTHING else self.quantity.interval
+
+    @property
+    def level(self) -> float:
+        """Returns the level of the interval."""
+        return self.quantity.level
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -115,17 +116,35 @@ def ratio(upper: FloatArray, lower: FloatArray) -> FloatArray:
     return np.divide(upper, lower, out=np.full(np.shape(upper), np.nan), where=lower > 0)
 
 
-def estimate(values: FloatArray, *, clips: int, groups: int) -> ScoreEstimate:
+def estimate(
+    values: FloatArray, *, name: str, unit: str = "1", clips: int, groups: int
+) -> ScoreEstimate:
     """Returns the interval of values (1 + draws,), of which the first is the data's.
 
     Draws in which the score is undefined (none of a bin's groups occurs) are left out.
+
+    Args:
+        name, unit: of the score.
+        clips, groups: that the values rest on.
     """
     drawn = values[1:][np.isfinite(values[1:])]
-    if groups < 2 or drawn.size == 0:
-        return ScoreEstimate(
-            value=float(values[0]), low=math.nan, high=math.nan, clips=clips, groups=groups
-        )
-    low, high = np.quantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
-    return ScoreEstimate(
-        value=float(values[0]), low=float(low), high=float(high), clips=clips, groups=groups
+    known = groups >= 2 and drawn.size > 0
+    ends = (
+        np.quantile(drawn, [(1 - LEVEL) / 2, (1 + LEVEL) / 2]) if known else (-math.inf, math.inf)
     )
+    value = float(values[0])
+    span = Span(
+        low=float(ends[0]),
+        high=float(ends[1]),
+        level=LEVEL,
+        bound=None if known else Bound.NOTHING,
+        estimated=False,
+    )
+    quantity = Quantity(
+        name=name,
+        unit=unit,
+        value=value if math.isfinite(value) else None,
+        sigma=float(drawn.std()) if known else None,
+        span=span,
+    )
+    return ScoreEstimate(quantity=quantity, clips=clips, groups=groups)

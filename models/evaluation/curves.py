@@ -4,41 +4,53 @@ saw."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from flagdata.errors import InputError
+from models.evaluation.bootstrap import ScoreEstimate
 
 
 @dataclass(frozen=True, kw_only=True)
 class LearningPoint:
-    """RMSE of wind speed [m/s] after training on so many sequences, with its interval."""
+    """RMSE of wind speed after training on so many sequences.
+
+    Attributes:
+        score: [m/s].
+    """
+
+    JSON_NAMES: ClassVar = ("label", "sequences", "rmse", "interval")
 
     label: str
     sequences: int
-    rmse: float
-    interval: tuple[float, float]
+    score: ScoreEstimate
 
     def __post_init__(self) -> None:
-        _check(
-            f"learning curve of {self.label!r}",
-            self.sequences,
-            "sequences",
-            self.rmse,
-            self.interval,
-        )
+        _check(f"learning curve of {self.label!r}", self.sequences, "sequences", self.score)
+
+    @property
+    def rmse(self) -> float:
+        """Returns the score's value."""
+        return self.score.value
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """Returns the score's interval."""
+        return self.score.interval
 
 
 @dataclass(frozen=True, kw_only=True)
 class FramesPoint:
-    """Triplet accuracy of a model that sees so many frames, with its interval."""
+    """Triplet accuracy of a model that sees so many frames."""
+
+    JSON_NAMES: ClassVar = ("label", "frames", "accuracy", "interval")
 
     label: str
     frames: int
-    accuracy: float
-    interval: tuple[float, float]
+    score: ScoreEstimate
 
     def __post_init__(self) -> None:
         where = f"triplet accuracy of {self.label!r} against frames"
-        _check(where, self.frames, "frames", self.accuracy, self.interval)
+        _check(where, self.frames, "frames", self.score)
         if self.accuracy > 1:
             raise InputError(
                 f"the triplet accuracy is {self.accuracy:g}, above 1",
@@ -46,12 +58,22 @@ class FramesPoint:
                 fix="give a share, not per cent",
             )
 
+    @property
+    def accuracy(self) -> float:
+        """Returns the score's value."""
+        return self.score.value
 
-def _check(where: str, size: int, noun: str, value: float, interval: tuple[float, float]) -> None:
-    low, high = interval
-    if size < 1 or not 0 <= value < float("inf") or not low <= high:
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """Returns the score's interval."""
+        return self.score.interval
+
+
+def _check(where: str, size: int, noun: str, score: ScoreEstimate) -> None:
+    low, high = score.quantity.interval
+    if size < 1 or not 0 <= score.value < float("inf") or not low <= high:
         raise InputError(
-            f"{value:g} [{low:g}, {high:g}] at {size} {noun} is no score with its interval",
+            f"{score.value:g} [{low:g}, {high:g}] at {size} {noun} is no score with its interval",
             where=where,
             fix=f"give a positive number of {noun}, a finite score and the lower end of the "
             "interval first",

@@ -55,15 +55,10 @@ def triplet_accuracies(
             triplets.accuracy_values(embed_entries(run.learners[0], clips), chosen, resamples)
             for run in runs
         ]
-        accuracy = estimate(np.mean(values, axis=0), clips=len(clips), groups=resamples.groups)
-        points.append(
-            FramesPoint(
-                label=first.name,
-                frames=count,
-                accuracy=accuracy.value,
-                interval=(accuracy.low, accuracy.high),
-            )
+        accuracy = estimate(
+            np.mean(values, axis=0), name="triplets", clips=len(clips), groups=resamples.groups
         )
+        points.append(FramesPoint(label=first.name, frames=count, score=accuracy))
     return points
 
 

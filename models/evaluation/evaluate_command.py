@@ -59,7 +59,6 @@ def evaluate(chosen: Evaluating) -> Iterator[Result]:
     """
     from flagdata.dataset.lake_source import open_source
     from models.evaluation import evaluation_report
-    from models.evaluation.evaluation import as_document
 
     out = local_path(chosen.out)
     evaluation_report.check(out, name=chosen.name)
@@ -76,11 +75,11 @@ def evaluate(chosen: Evaluating) -> Iterator[Result]:
         frames=chosen.frames,
         linear=chosen.linear,
     )
-    page, text, data = evaluation_report.write(evaluation, out, name=chosen.name)
-    yield Result("evaluation", as_document(evaluation))
+    answer = evaluation_report.write(evaluation, out, name=chosen.name)
+    yield Result("evaluation", answer.document, answer=answer)
     echo_lines(evaluation_report.markdown(evaluation))
-    for written in (page, text, data):
-        say(str(written))
+    for written in evaluation_report.names(chosen.name):
+        say(str(out / written))
 
 
 def refuse_learned(
@@ -470,15 +469,10 @@ def _points(learned: Sequence[tuple[int, Predictions]]) -> list[LearningPoint]:
             continue
         rmse = estimate(
             SCORES["rmse"].values(run, WIND, resamples),
+            name="rmse",
+            unit="m/s",
             clips=len(run.group),
             groups=resamples.groups,
         )
-        points.append(
-            LearningPoint(
-                label=run.label,
-                sequences=sequences,
-                rmse=rmse.value,
-                interval=(rmse.low, rmse.high),
-            )
-        )
+        points.append(LearningPoint(label=run.label, sequences=sequences, score=rmse))
     return points

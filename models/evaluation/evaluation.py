@@ -4,8 +4,8 @@ made of."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from flagdata.core.findings import Finding, Severity
 from flagdata.core.json_values import json_values
 from flagdata.errors import UnknownNameError
 from models.evaluation import paper, score_table, triplets
-from models.evaluation.bootstrap import DRAWS, Resamples
+from models.evaluation.bootstrap import DRAWS, Resamples, ScoreEstimate
 from models.evaluation.curves import FramesPoint, LearningPoint
 from models.evaluation.linear import Readout
 from models.evaluation.predictions import WIND, Predictions
@@ -49,7 +49,7 @@ class CalibrationCurve:
 
     label: str
     target: str
-    curve: tuple[Coverage, ...]
+    coverage: tuple[Coverage, ...]
     ranks: RankHistogram
 
 
@@ -58,16 +58,28 @@ class Expected:
     """Expected coverage of all targets together (TARP)."""
 
     label: str
-    curve: tuple[Coverage, ...]
+    coverage: tuple[Coverage, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Read:
     """The linear readout of a model's embedding on some data set."""
 
+    JSON_NAMES: ClassVar = ("label", "data", "components", "pearson")
+
     label: str
     data: str
     readout: Readout
+
+    @property
+    def components(self) -> int:
+        """Returns how many principal components were kept."""
+        return self.readout.components
+
+    @property
+    def pearson(self) -> dict[str, ScoreEstimate]:
+        """Returns Pearson's r of each target."""
+        return dict(zip(self.readout.targets, self.readout.pearson, strict=True))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -215,7 +227,7 @@ def evaluate(
             CalibrationCurve(
                 label=label,
                 target=target,
-                curve=coverage(of, target, resamples, levels=_LEVELS),
+                coverage=coverage(of, target, resamples, levels=_LEVELS),
                 ranks=rank_histogram(of, target),
             )
             for label, of in with_samples.items()
@@ -224,7 +236,7 @@ def evaluate(
         expected=tuple(
             Expected(
                 label=label,
-                curve=tarp(of, resamples, generator=rng.stream(seed, "evaluation", "tarp")),
+                coverage=tarp(of, resamples, generator=rng.stream(seed, "evaluation", "tarp")),
             )
             for label, of in varied.items()
         ),
@@ -260,69 +272,23 @@ def as_document(evaluation: Evaluation) -> dict[str, Any]:
         "seed": evaluation.seed,
         "clips": evaluation.clips,
         "groups": evaluation.groups,
-        "models": [row.as_dict() for row in evaluation.rows],
-        "targets": [row.as_dict() for row in evaluation.targets],
+        "models": json_values(evaluation.rows),
+        "targets": json_values(evaluation.targets),
         "reference": evaluation.reference,
-        "differences": [difference.as_dict() for difference in evaluation.differences],
-        "wind_errors": [
-            {
-                "label": of.label,
-                "bins": [
-                    {
-                        "low": b.low,
-                        "high": b.high,
-                        "rmse": b.rmse.as_dict(),
-                        "bias": b.bias.as_dict(),
-                    }
-                    for b in of.bins
-                ],
-            }
-            for of in evaluation.wind_errors
-        ],
-        "calibration": [
-            {
-                "label": of.label,
-                "target": of.target,
-                "coverage": _curve(of.curve),
-                "ranks": asdict(of.ranks),
-            }
-            for of in evaluation.calibrations
-        ],
-        "tarp": [{"label": of.label, "coverage": _curve(of.curve)} for of in evaluation.expected],
-        "learning": [asdict(point) for point in evaluation.learning],
-        "frames": [asdict(point) for point in evaluation.frames],
-        "linear": [
-            {
-                "label": of.label,
-                "data": of.data,
-                "components": of.readout.components,
-                "pearson": {
-                    target: r.as_dict()
-                    for target, r in zip(of.readout.targets, of.readout.pearson, strict=True)
-                },
-            }
-            for of in evaluation.reads
-        ],
-        "t_sne": None
-        if evaluation.layout is None
-        else {
-            "label": evaluation.layout.label,
-            "places": evaluation.layout.places.tolist(),
-            "wind": evaluation.layout.wind.tolist(),
-        },
+        "differences": json_values(evaluation.differences),
+        "wind_errors": json_values(evaluation.wind_errors),
+        "calibration": json_values(evaluation.calibrations),
+        "tarp": json_values(evaluation.expected),
+        "learning": json_values(evaluation.learning),
+        "frames": json_values(evaluation.frames),
+        "linear": json_values(evaluation.reads),
+        "t_sne": json_values(evaluation.layout),
         "paper": {
             "warning": paper.WARNING,
-            "flagsim": [
-                {**asdict(row), "bound": row.bound, "breaks_bound": row.breaks_bound}
-                for row in paper.FLAGSIM
-            ],
+            "flagsim": json_values(paper.FLAGSIM),
             "triplets": [
                 {"frames": frames, "accuracy": accuracy} for frames, accuracy in paper.TRIPLETS
             ],
         },
         "findings": json_values(evaluation.findings),
     }
-
-
-def _curve(curve: tuple[Coverage, ...]) -> list[dict[str, Any]]:
-    return [{"level": point.level, "share": point.share.as_dict()} for point in curve]

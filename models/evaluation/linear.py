@@ -90,6 +90,7 @@ def bouman(
             SCORES["pearson"].value(
                 resamples.sums(SCORES["pearson"].terms(truth[:, i], predicted[:, i]))
             ),
+            name="pearson",
             clips=len(truth),
             groups=resamples.groups,
         )

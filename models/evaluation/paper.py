@@ -8,6 +8,7 @@ Runia et al., Cloth in the Wind, CVPR 2020: the supplement's table of wind speed
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from models.evaluation.scores import rmse_bound
 
@@ -16,6 +17,8 @@ from models.evaluation.scores import rmse_bound
 class Quoted:
     """A row of the paper's table: its input (frames × height × width), RMSE and Acc@0.5 as
     printed."""
+
+    JSON_NAMES: ClassVar = ("model", "input_size", "rmse", "accuracy", "bound", "breaks_bound")
 
     model: str
     input_size: str

@@ -9,6 +9,7 @@ random nor biased by a small s.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,16 +70,27 @@ class RankHistogram:
         share: of the clips, each group weighing the same, in each bin; 1 / bins if calibrated. A
             hump says that the distributions are too wide, a trough that they are too narrow, a
             slope that they are biased.
-        low, high: where `BAND` of the shares of a calibrated model lie at least, bin by bin:
-            binomial with one clip a group. Means over a group's clips vary less, however they
-            depend on each other.
+        band: where `BAND` of the shares of a calibrated model lie at least, bin by bin: binomial
+            with one clip a group. Means over a group's clips vary less, however they depend on each
+            other.
         groups: how many sequences.
     """
 
+    JSON_NAMES: ClassVar = ("share", "low", "high", "groups")
+
     share: tuple[float, ...]
-    low: float
-    high: float
+    band: tuple[float, float]
     groups: int
+
+    @property
+    def low(self) -> float:
+        """Returns the lower end of the band."""
+        return self.band[0]
+
+    @property
+    def high(self) -> float:
+        """Returns its upper end."""
+        return self.band[1]
 
     @property
     def outside(self) -> int:
@@ -138,7 +150,8 @@ def coverage(
 def _coverage_of(level: float, shares: list[FloatArray], resamples: Resamples) -> Coverage:
     values = np.mean([_mean(share, resamples) for share in shares], axis=0)
     return Coverage(
-        level=level, share=estimate(values, clips=len(shares[0]), groups=resamples.groups)
+        level=level,
+        share=estimate(values, name="coverage", clips=len(shares[0]), groups=resamples.groups),
     )
 
 
@@ -163,8 +176,7 @@ def rank_histogram(
         share=tuple(
             float(share) for share in (np.diff(below, axis=0) / size[index]).sum(axis=1) / groups
         ),
-        low=float(low) / groups,
-        high=float(high) / groups,
+        band=(float(low) / groups, float(high) / groups),
         groups=groups,
     )
 

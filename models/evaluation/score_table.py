@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 
@@ -16,14 +16,18 @@ from flagdata.errors import InputError
 from models.evaluation.bootstrap import LEVEL, Resamples, ScoreEstimate, estimate
 from models.evaluation.predictions import AREA_WEIGHT, WIND, Predictions
 from models.evaluation.predictive_calibration import LEVELS, coverage_values
-from models.evaluation.scores import SCORES, rmse_bound
+from models.evaluation.scores import OF_UNIT, SCORES, rmse_bound
 from models.evaluation.triplets import accuracy_values
+from models.networks.targets import TARGETS
 
 Values = Mapping[str, FloatArray]
 """Metric → (1 + draws,): its value in the data, then in each draw of sequences."""
 
 OF_TARGETS = ("rmse", "relative_error", "bias", "r_squared", "pearson")
 """Scores that are shown of every target."""
+_UNITS = {"rmse": "m/s", "bias": "m/s"}
+"""Of the metrics of the table that are no ratios."""
+_UNIT_OF = {target.name: target.unit for target in TARGETS.values()}
 _NONE = "–"
 
 
@@ -44,6 +48,18 @@ class Row:
         note: input size, epochs, what differs from the paper.
     """
 
+    JSON_NAMES: ClassVar = (
+        "label",
+        "run",
+        "runs",
+        "scores",
+        "range_of_runs",
+        "bound",
+        "parameters",
+        "milliseconds",
+        "note",
+    )
+
     label: str
     run: int | None
     runs: int
@@ -54,21 +70,10 @@ class Row:
     milliseconds: float
     note: str
 
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values."""
-        return {
-            "label": self.label,
-            "run": self.run,
-            "runs": self.runs,
-            "scores": {name: score.as_dict() for name, score in self.scores.items()},
-            "range_of_runs": {
-                name: list(ends) for name, ends in self.spread.items() if np.isfinite(ends).all()
-            },
-            "bound": self.bound,
-            "parameters": self.parameters,
-            "milliseconds": self.milliseconds,
-            "note": self.note,
-        }
+    @property
+    def range_of_runs(self) -> dict[str, tuple[float, float]]:
+        """Returns the spread of the metrics that all runs have."""
+        return {name: ends for name, ends in self.spread.items() if np.isfinite(ends).all()}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,16 +84,13 @@ class TargetRow:
     target: str
     scores: dict[str, ScoreEstimate]
 
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values."""
-        scores = {name: score.as_dict() for name, score in self.scores.items()}
-        return {"label": self.label, "target": self.target, "scores": scores}
-
 
 @dataclass(frozen=True, kw_only=True)
 class Difference:
     """A model's score less the reference's on the same draws of sequences; means over runs of
     both."""
+
+    JSON_NAMES: ClassVar = ("label", "reference", "metric", "difference", "apart")
 
     label: str
     reference: str
@@ -98,17 +100,8 @@ class Difference:
     @property
     def apart(self) -> bool:
         """Returns whether the interval of the difference leaves out zero."""
-        return self.difference.has_interval and not self.difference.low <= 0 <= self.difference.high
-
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values."""
-        return {
-            "label": self.label,
-            "reference": self.reference,
-            "metric": self.metric,
-            "difference": self.difference.as_dict(),
-            "apart": self.apart,
-        }
+        ends = self.difference.interval
+        return ends is not None and not ends[0] <= 0 <= ends[1]
 
 
 def models(predictions: Sequence[Predictions]) -> dict[str, tuple[Predictions, ...]]:
@@ -242,7 +235,13 @@ def _row(
         run=run,
         runs=runs,
         scores={
-            name: estimate(draws, clips=predictions.clips, groups=resamples.groups)
+            name: estimate(
+                draws,
+                name=name,
+                unit=_UNITS.get(name, "1"),
+                clips=predictions.clips,
+                groups=resamples.groups,
+            )
             for name, draws in values.items()
         },
         spread=spread,
@@ -270,7 +269,13 @@ def target_rows(runs: tuple[Predictions, ...], resamples: Resamples) -> tuple[Ta
             for name in OF_TARGETS
         }
         scores = {
-            name: estimate(np.mean(of, axis=0), clips=runs[0].clips, groups=resamples.groups)
+            name: estimate(
+                np.mean(of, axis=0),
+                name=name,
+                unit=_UNIT_OF[target] if name in OF_UNIT else "1",
+                clips=runs[0].clips,
+                groups=resamples.groups,
+            )
             for name, of in values.items()
         }
         scored.append(TargetRow(label=runs[0].label, target=target, scores=scores))
@@ -292,7 +297,11 @@ def differences(
             reference=reference,
             metric=metric,
             difference=estimate(
-                scores[metric] - values[reference][metric], clips=clips, groups=groups
+                scores[metric] - values[reference][metric],
+                name=metric,
+                unit=_UNITS.get(metric, "1"),
+                clips=clips,
+                groups=groups,
             ),
         )
         for label, scores in values.items()
@@ -325,12 +334,10 @@ def cell(score: ScoreEstimate | None, digits: int) -> tuple[str, ...]:
     """Formats a value, and its interval where it has one."""
     if score is None:
         return (_NONE,)
-    if not score.has_interval:
+    if score.interval is None:
         return (number(score.value, digits), "no interval: one sequence")
-    return (
-        number(score.value, digits),
-        f"[{number(score.low, digits)}, {number(score.high, digits)}]",
-    )
+    low, high = score.interval
+    return (number(score.value, digits), f"[{number(low, digits)}, {number(high, digits)}]")
 
 
 def _scored_cells(metric: str, digits: int) -> Callable[[Row], tuple[str, ...]]:
@@ -356,9 +363,9 @@ def _coverage(row: Row) -> tuple[str, ...]:
         return (_NONE,)
     values = " / ".join(number(100 * score.value, 0) for score in scores if score is not None)
     ends = [
-        f"{number(100 * s.low, 0)}–{number(100 * s.high, 0)}"
+        "–".join(number(100 * end, 0) for end in s.interval)
         for s in scores
-        if s is not None and s.has_interval
+        if s is not None and s.interval is not None
     ]
     return (values, f"[{', '.join(ends)}]") if ends else (values,)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -89,6 +90,8 @@ SCORES: dict[str, Score] = {
 "bias" is the mean of estimate less truth; "relative_error" is the RMSE over the standard deviation
 of the truth over the clips tested, which is 1 for a constant prediction of their mean, and equals
 √(1 - R²)."""
+OF_UNIT = ("rmse", "bias")
+"""Scores that have the unit of their target."""
 
 
 def rmse_bound(accuracy: float) -> float:
@@ -113,13 +116,28 @@ def rmse_bound(accuracy: float) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class BinError:
-    """Errors of clips whose true wind lies in a bin [m/s]: `low` belongs to it, `high` to the last
-    bin only."""
+    """Errors of clips by their true wind.
 
-    low: float
-    high: float
+    Attributes:
+        wind: ends of the bin [m/s]; the lower belongs to it, the upper to the last bin only.
+        rmse, bias: of its clips [m/s].
+    """
+
+    JSON_NAMES: ClassVar = ("low", "high", "rmse", "bias")
+
+    wind: tuple[float, float]
     rmse: ScoreEstimate
     bias: ScoreEstimate
+
+    @property
+    def low(self) -> float:
+        """Returns where the bin begins."""
+        return self.wind[0]
+
+    @property
+    def high(self) -> float:
+        """Returns where it ends."""
+        return self.wind[1]
 
 
 def error_against(
@@ -143,10 +161,9 @@ def error_against(
         bias = np.mean([ratio(s[:, 1], s[:, 0]) for s in sums], axis=0)
         errors.append(
             BinError(
-                low=float((first + number) * width),
-                high=float((first + number + 1) * width),
-                rmse=estimate(rmse, clips=clips, groups=groups),
-                bias=estimate(bias, clips=clips, groups=groups),
+                wind=(float((first + number) * width), float((first + number + 1) * width)),
+                rmse=estimate(rmse, name="rmse", unit="m/s", clips=clips, groups=groups),
+                bias=estimate(bias, name="bias", unit="m/s", clips=clips, groups=groups),
             )
         )
     return tuple(errors)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.util
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -25,6 +26,8 @@ CLIPS = 2000
 class TsneLayout:
     """Places (n, 2) of clips in the plane and their true wind (n,) [m/s], of `clips` that were
     tested."""
+
+    JSON_NAMES: ClassVar = ("label", "places", "wind")
 
     label: str
     places: FloatArray

@@ -1,11 +1,12 @@
-"""Progress of a training: losses by epoch, the best of them, and their curves as a picture."""
+"""Progress of a training: losses by epoch, the best of them, and their curves as a chart."""
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from typing import Any
+
+from flagdata.answer.charts import Axis, Chart, Colour, Dots, Line, Mark, Panel
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,32 +72,26 @@ class LossCourse:
             ]
         )
 
-    def picture(self) -> bytes:
-        """Draws the losses and the learning rate against the epoch: a PNG."""
-        from matplotlib.figure import Figure
-
-        figure = Figure(figsize=(7, 3.6), dpi=110, layout="constrained")
-        axes = figure.subplots()
+    def chart(self) -> Chart:
+        """Shows the losses, and below them the learning rate, by the epoch."""
         numbers = [epoch.number + 1 for epoch in self.epochs]
-        axes.plot(numbers, [epoch.train for epoch in self.epochs], label="training")
-        axes.plot(numbers, [epoch.validation for epoch in self.epochs], label="validation")
+        marks: list[Mark] = [
+            Line(
+                x=numbers,
+                y=[epoch.train for epoch in self.epochs],
+                colour=Colour.QUIET,
+                label="training",
+            ),
+            Line(x=numbers, y=[epoch.validation for epoch in self.epochs], label="validation"),
+        ]
         if (best := self.best) is not None:
-            axes.plot(
-                [best.number + 1],
-                [best.validation],
-                "o",
-                color="C1",
-                label=f"best, epoch {best.number + 1}",
-            )
-        axes.set_xlabel("epoch")
-        axes.set_ylabel("loss")
-        axes.grid(alpha=0.3)
-        rates = axes.twinx()
-        rates.plot(
-            numbers, [epoch.rate for epoch in self.epochs], color="0.6", linewidth=1, linestyle=":"
+            label = f"best, epoch {best.number + 1}"
+            marks.append(Dots(x=[best.number + 1], y=[best.validation], label=label, size=6.0))
+        rate = Line(x=numbers, y=[epoch.rate for epoch in self.epochs], colour=Colour.QUIET)
+        return Chart(
+            rows=[
+                [Panel(marks=marks, y=Axis(label="loss"))],
+                [Panel(marks=[rate], x=Axis(label="epoch"), y=Axis(label="learning rate"))],
+            ],
+            heights=(2.8, 1.3),
         )
-        rates.set_ylabel("learning rate (dotted)")
-        axes.legend()
-        out = io.BytesIO()
-        figure.savefig(out, format="png")
-        return out.getvalue()

@@ -28,9 +28,9 @@ from flagdata.lake.remaking import Remade
 from flagdata.verbs.verb_options import Result, verb
 from models.trained.model_folder import WEIGHTS, write_card, write_tensors
 from models.training.steps import Trained
+from models.training.training_page import PAGE, judge_clips, training_answer
 from models.training.training_recipe import TrainingRecipe
 
-CURVES = "curves.png"
 PARENTS = 100
 """Recordings that a model's row names as what it was made from, at most; their number is in its
 recipe."""
@@ -115,11 +115,15 @@ def publish(
     *,
     batches: dict[str, Any],
     branch: str,
+    page: Callable[[dict[str, Any]], str],
 ) -> tuple[Artifact, dict[str, Any], Remade | None]:
     """Commits a model and returns its row and card; one that is there already is kept, unless its
     object is damaged or
     missing: what was done about that is returned, too. A recording that was withdrawn
     from the branch since the training began is not among its parents.
+
+    Args:
+        page: makes the training's page from the model's card.
 
     Raises:
         FlagdataError: the disk refuses it.
@@ -131,7 +135,7 @@ def publish(
         write_tensors(staged / WEIGHTS, trained.learner.state_dict())
         card = card_of(recipe, data, trained, batches=batches)
         write_card(staged, card)
-        (staged / CURVES).write_bytes(trained.course.picture())
+        (staged / PAGE).write_text(page(card), encoding="utf-8")
         write_sums(staged)
         best = {"epochs": card["epochs"], "best": card["best"], "parameters": card["parameters"]}
         artifact = replace(artifact, object=transaction.put(staged), parameters=canonical(best))
@@ -331,6 +335,7 @@ def train_and_publish(
             ranks.barrier()  # no rank leaves while another still talks to it
         if not first:
             return None
+        judged = judge_clips(recipe, done.learner, training.validation)
         row, card, healed = publish(
             source.lake,
             recipe,
@@ -339,6 +344,7 @@ def train_and_publish(
             done,
             batches=training.batches.state(),
             branch=branch,
+            page=lambda card: training_answer(recipe, card, judged, validation_pairs).page,
         )
         if healed is not None:
             say(said(row.id, healed))

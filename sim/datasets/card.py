@@ -5,35 +5,44 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 from PIL import Image
 
+from flagdata.answer.answer import Answer, Figure, Head, Part, Section, Table
+from flagdata.answer.charts import Axis, Bins, Chart, Panel
 from flagdata.core.arrays import UInt8Array
 from flagdata.core.files.outputs import check_file, rewrite, write_file
+from flagdata.core.json_values import json_values
 from flagdata.core.numbered import by_numbers
-from flagdata.core.provenance import canonical, code_version
+from flagdata.core.provenance import canonical
 from flagdata.core.rng import stream
 from flagdata.core.schema import Kind
 from flagdata.lake import Lake
 from flagdata.pages.page_pictures import still
-from flagdata.pages.render import render
 from flagdata.recipes.documents import column_json
 from flagdata.record import Record
 from flagdata.storage import Place
 from sim.datasets.cast import casts
-from sim.datasets.dataset_recipe import DatasetRecipe
+from sim.datasets.dataset_recipe import DatasetRecipe, Truth
 
 _COMMAND = "build"
 _SHOWN = 24  # pictures of the contact sheet
 _COLUMNS = 6
 _PICTURE = 160  # px
 _BINS = 20
-_BAR = (120, 24)  # px of a histogram
+_IN_A_ROW = 5  # histograms
+_ABOUT_SHEET = "The middle frames of films drawn by chance, as they are stored."
+_ABOUT_THETA = "SI units; over all films, so that a sequence counts as often as it was filmed."
+_TRUTHS = {
+    Truth.STATED: "the simulated wind, exactly",
+    Truth.MEASURED: "the mean of the anemometer's minute, with its uncertainty",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,6 +60,24 @@ class Distribution:
     middle: float
     high: float
     counts: list[int] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeldSide:
+    """What a side holds in the lake.
+
+    Attributes:
+        name: of the side.
+        sequences, sessions, films, clips: how many.
+        wind: least, median and greatest of the clips [m/s]; None where no clip has any.
+    """
+
+    name: str
+    sequences: int
+    sessions: int
+    films: int
+    clips: int
+    wind: tuple[float, float, float] | None
 
 
 def check(path: Path | None) -> None:
@@ -75,26 +102,7 @@ def write_card(
         ConflictError: `path` is there and is no card, or was changed since.
         InputError: its folder is not there or cannot be written.
     """
-    sides, rows = _sides(lake, recipe, branch)
-    parameters = [
-        column_json(row["parameters"], "parameters", artifact=row["artifact"]) for row in rows
-    ]
-    values = {
-        "recipe": recipe,
-        "sides": sides,
-        "version": code_version(),
-        "branch": branch,
-        "sheet": _sheet(lake, recipe, rows),
-        "size": sum(row["object_bytes"] for row in rows),
-        "frames": _frames(recipe),
-        "bar": _BAR,
-        "theta": distributions(parameters, rendered=False),
-        "zeta": distributions(parameters, rendered=True),
-        "names": _names(parameters),
-        "recipe_text": json.dumps(json.loads(canonical(recipe.identity())), indent=1),
-        "dataset": json.dumps(recipe.name, ensure_ascii=False),
-    }
-    text = render("sim.datasets", "card.html.j2", values)
+    text = card_answer(lake, recipe, branch=branch).page
     if path is not None:
         write_file(path, text, command=_COMMAND)
         return path
@@ -104,6 +112,155 @@ def write_card(
     else:
         target.write_bytes(text.encode())
     return target
+
+
+def card_answer(lake: Lake, recipe: DatasetRecipe, *, branch: str = "main") -> Answer:
+    """Returns what a data set holds, how it was made and what it looks like."""
+    sides, rows = _sides(lake, recipe, branch)
+    parameters = [
+        column_json(row["parameters"], "parameters", artifact=row["artifact"]) for row in rows
+    ]
+    size = sum(row["object_bytes"] for row in rows)
+    clips = sum(side.clips for side in sides)
+    known = "is known" if recipe.anemometer.truth == Truth.STATED else "an anemometer measured"
+    sheet = _sheet(lake, recipe, rows)
+    return Answer(
+        question=_COMMAND,
+        subject=f"{recipe.name}: {recipe.title}",
+        sentence=f"{len(rows):,} simulated films with {clips:,} clips whose wind {known}",
+        document=json_values({"name": recipe.name, "recipe_hash": recipe.hash, "sides": sides}),
+        head=Head(
+            figures=[
+                Figure(
+                    title="contact sheet of films",
+                    content=sheet,
+                    caption=_ABOUT_SHEET,
+                    width=_COLUMNS * _PICTURE,
+                )
+            ]
+            if sheet
+            else [],
+            facts={
+                "films": f"{_frames(recipe)}, {size / 1e9:.2f} GB in all",
+                "ground truth": _TRUTHS[recipe.anemometer.truth],
+                "renderer": recipe.renderer,
+                "licence": recipe.licence,
+            },
+        ),
+        make_sections=lambda: [*_sections(recipe, sides, parameters)],
+        provenance={"recipe": recipe.hash, "branch": branch},
+    )
+
+
+def _sections(
+    recipe: DatasetRecipe, sides: Sequence[HeldSide], parameters: Sequence[dict[str, Any]]
+) -> Iterator[Section]:
+    together = ", whole sessions together" if recipe.sessions else ""
+    yield Section(
+        title="Sides",
+        parts=[
+            f"Split by the seed of the mesh sequence{together}; no sequence is on two sides.",
+            _table_of_sides(sides),
+        ],
+        anchor="sides",
+    )
+    yield Section(
+        title="How the sides are read",
+        parts=[_preformatted(_reading(recipe, sides))],
+        folded=True,
+    )
+    for title, about, rendered in (
+        ("What was simulated (θ), and the instruments", _ABOUT_THETA, False),
+        ("How it was filmed (ζ)", "", True),
+    ):
+        parts: list[Part] = [about] if about else []
+        parts += _parts_of(distributions(parameters, rendered=rendered), title)
+        yield Section(title=title, parts=parts, folded=True)
+    names = {
+        name: ", ".join(f"{value} {count}" for value, count in counts)
+        for name, counts in _names(parameters)
+    }
+    yield Section(title="Names", parts=[Table.of_values(names)], folded=True)
+    text = json.dumps(json.loads(canonical(recipe.identity())), indent=1)
+    yield Section(title="Recipe", parts=[_preformatted(text)], folded=True)
+
+
+def _table_of_sides(sides: Sequence[HeldSide]) -> Table:
+    return Table(
+        columns=(
+            "side",
+            "sequences",
+            "sessions",
+            "films",
+            "clips",
+            "wind of clips, least, median, greatest [m/s]",
+        ),
+        rows=[
+            (
+                side.name,
+                str(side.sequences),
+                str(side.sessions or "–"),
+                str(side.films),
+                str(side.clips),
+                "–" if side.wind is None else ", ".join(f"{value:.2f}" for value in side.wind),
+            )
+            for side in sides
+        ],
+    )
+
+
+def _reading(recipe: DatasetRecipe, sides: Sequence[HeldSide]) -> str:
+    """Writes the lines of Python that read the sides."""
+    dataset = json.dumps(recipe.name, ensure_ascii=False)
+    where = "".join(
+        f'    "{side.name}": {{"dataset": {dataset}, "side": "{side.name}"}},\n' for side in sides
+    )
+    return (
+        "import flagdata\nfrom flagdata.dataset import ExplicitSplit\n\n"
+        f"split = ExplicitSplit(where={{\n{where}}})\n"
+        'pairs = flagdata.open("lake").pairs(split="train", split_by=split)'
+    )
+
+
+def _preformatted(text: str) -> Markup:
+    return Markup("<pre>{}</pre>").format(text)
+
+
+def _parts_of(entries: Sequence[Distribution], title: str) -> list[Part]:
+    """Shows histograms, and least, median and greatest of each parameter; what is the same in all
+    films in a sentence."""
+    drawn = [entry for entry in entries if entry.counts is not None]
+    fixed = [f"{entry.name} {entry.low:.4g}" for entry in entries if entry.counts is None]
+    parts: list[Part] = []
+    if drawn:
+        rows = [
+            (entry.name, *(f"{value:.4g}" for value in (entry.low, entry.middle, entry.high)))
+            for entry in drawn
+        ]
+        parts = [
+            Figure(title=f"Histograms: {title}", content=lambda: histograms(drawn)),
+            Table(columns=("parameter", "least", "median", "greatest"), rows=rows),
+        ]
+    if fixed:
+        parts.append(f"The same in all films: {', '.join(fixed)}.")
+    return parts
+
+
+def histograms(entries: Sequence[Distribution]) -> Chart:
+    """Shows how often each value of each parameter is."""
+    panels = [
+        Panel(
+            marks=[Bins(edges=np.linspace(e.low, e.high, len(e.counts) + 1), heights=e.counts)],
+            title=e.name,
+            x=Axis(ticks=[e.low, e.high], texts=[f"{e.low:.3g}", f"{e.high:.3g}"]),
+            y=Axis(ticks=()),
+        )
+        for e in entries
+        if e.counts is not None
+    ]
+    panels += [Panel(marks=(), framed=False)] * (-len(panels) % _IN_A_ROW)
+    rows = [panels[i : i + _IN_A_ROW] for i in range(0, len(panels), _IN_A_ROW)]
+    return Chart(rows=rows, height=1.05)
 
 
 def _frames(recipe: DatasetRecipe) -> str:
@@ -116,9 +273,9 @@ def _frames(recipe: DatasetRecipe) -> str:
 
 def _sides(
     lake: Lake, recipe: DatasetRecipe, branch: str
-) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+) -> tuple[list[HeldSide], list[dict[str, Any]]]:
     """Counts what each side holds, and lists all recordings by name."""
-    sides: list[dict[str, Any]] = []
+    sides: list[HeldSide] = []
     recordings: list[dict[str, Any]] = []
     columns = ["artifact", "name", "seed", "session", "parameters", "object", "object_bytes"]
     for side in recipe.sides:
@@ -132,19 +289,16 @@ def _sides(
             .to_numpy()
         )
         sides.append(
-            {
-                "name": side.name,
-                "sequences": len({row["seed"] for row in rows}),
-                "films": len(rows),
-                "sessions": len({row["session"] for row in rows} - {None}),
-                "clips": len(clips),
-                "seeds": (min(row["seed"] for row in rows), max(row["seed"] for row in rows))
-                if rows
-                else None,
-                "wind": (float(clips.min()), float(np.median(clips)), float(clips.max()))
+            HeldSide(
+                name=side.name,
+                sequences=len({row["seed"] for row in rows}),
+                films=len(rows),
+                sessions=len({row["session"] for row in rows} - {None}),
+                clips=len(clips),
+                wind=(float(clips.min()), float(np.median(clips)), float(clips.max()))
                 if len(clips)
                 else None,
-            }
+            )
         )
         recordings += sorted(rows, key=lambda row: row["name"])
     return sides, recordings

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
 import torch
 from torch import Tensor
 
 from flagdata.errors import InputError
+from sim.cloth.material_points import locate
 from sim.render.rendered_meshes import Frame, Meshes
-
-_INWARD = 1e-5  # share by which a material point on the very edge is moved towards the middle
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -93,23 +91,15 @@ def _step(meshes: Meshes, index: int, other_index: int) -> Tensor:
 
 def _looked_up(frame: Frame, uv: Tensor, *, where: str) -> Tensor:
     """Looks up positions (point, 3) of texture places (point, 2) in a frame."""
-    from matplotlib.tri import Triangulation
-
     places, faces = frame.uv.double().cpu().numpy(), frame.faces.cpu().numpy()
-    points = uv.double().cpu().numpy().copy()
-    finder = Triangulation(places[:, 0], places[:, 1], faces).get_trifinder()
-    face = np.array(finder(points[:, 0], points[:, 1]))
-    edge = face < 0
-    points[edge] += _INWARD * (places.mean(axis=0) - points[edge])
-    face[edge] = finder(points[edge, 0], points[edge, 1])
-    if (face < 0).any():
+    try:
+        found = locate(places, faces, uv.double().cpu().numpy(), where=where)
+    except InputError as error:
         raise InputError(
-            f"{int((face < 0).sum())} places of the cloth in one frame are in no face of the other",
+            f"the cloth of one frame is in no face of the other: {error.what}",
             where=where,
             fix="give frames whose texture places cover the same cloth, or no exposure time",
-        )
-    a, b, c = (places[faces[face, k]] for k in range(3))
-    weights = np.linalg.solve(np.stack([b - a, c - a], axis=2), (points - a)[:, :, None])[:, :, 0]
-    weights = np.concatenate([1 - weights.sum(axis=1, keepdims=True), weights], axis=1)
-    corners = frame.positions[frame.faces[torch.from_numpy(face).to(uv.device).long()]]
-    return (corners * torch.from_numpy(weights).to(corners)[:, :, None]).sum(dim=1)
+        ) from None
+    corners = frame.positions[torch.from_numpy(found.corners).to(uv.device).long()]
+    weights = torch.from_numpy(found.weights).to(corners)
+    return (corners * weights[:, :, None]).sum(dim=1)

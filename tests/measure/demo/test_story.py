@@ -14,9 +14,10 @@ from typing import Any, cast
 
 import pytest
 
+from flagdata.answer import Figure, Tone
 from flagdata.errors import FlagdataError
 from measure.demo import Transcript, story
-from measure.demo.demo_cards import Card, Judgement
+from measure.demo.demo_cards import Card, Judgement, Truth, demonstration_answer
 from measure.demo.demo_recording import Acting
 from measure.demo.recording_page import Recovered
 
@@ -193,3 +194,36 @@ def test_where_the_offset_is_found_none_is_given(aligned: Callable[[], Card]) ->
     (truth,) = card.truths
     assert (truth.true, truth.found) == ("-12.00 s", "-12.30 s [-13.10, -11.50] 90 %")
     assert truth.judgement is Judgement.RIGHT
+
+
+def test_the_first_page_says_how_much_of_what_no_file_states_was_found() -> None:
+    def card(title: str, *judgements: Judgement) -> Card:
+        truths = tuple(
+            Truth(what=f"{title} {one}", true="1", found="1 <b>", judgement=one)
+            for one in judgements
+        )
+        return Card(
+            title=title,
+            done=f"{title} was done.",
+            found="found <i>",
+            figure=Figure(title=f"picture of {title}", content="data:image/png;base64,AAAA"),
+            page="",
+            commands=("flagdata ls",),
+            seconds=3.0,
+            truths=truths,
+        )
+
+    cards = [
+        card("film", Judgement.RIGHT),
+        card("log", Judgement.MISSED),
+        card("wind", Judgement.RIGHT),
+    ]
+    answer = demonstration_answer(cards, seconds=125)
+    assert answer.sentence == "Of 3 things that no file states 2 were found"
+    assert (answer.tone, list(answer.head.limits)) == (Tone.MISSED, ["log missed: missed"])
+    assert answer.head.facts["took"] == "2 min 5 s"
+    page = answer.page
+    assert [page.count(f'alt="picture of {title}"') for title in ("film", "log", "wind")] == [1] * 3
+    assert "<b>" not in page.split("<h2>", 1)[1]
+    assert "<i>" not in page
+    assert demonstration_answer(cards[:1], seconds=1).tone is Tone.SETTLED

@@ -9,7 +9,7 @@ import pytest
 from flagdata.errors import InputError
 from flagdata.lake import RaggedMeshSequence
 from measure.observe import from_sequence, onto, sample
-from measure.observe.mesh_observations import locate
+from sim.cloth.material_points import locate
 from sim.cloth.mesh import Mesh, grid
 
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from flagdata.answer import Quantity, Span
 from models.evaluation import Predictions
+from models.evaluation.bootstrap import LEVEL, ScoreEstimate
 
 
 def generator(seed: int) -> np.random.Generator:
@@ -34,6 +36,13 @@ def of_wind(
         milliseconds=1.5,
         note="made",
     )
+
+
+def score(value: float, low: float, high: float) -> ScoreEstimate:
+    """A score with its interval."""
+    span = Span(low=low, high=high, level=LEVEL, bound=None, estimated=False)
+    quantity = Quantity(name="made", unit="1", value=value, sigma=None, span=span)
+    return ScoreEstimate(quantity=quantity, clips=10, groups=5)
 
 
 def posterior(

@@ -12,14 +12,15 @@ import numpy as np
 import pytest
 from markdown import markdown as render
 
+from flagdata.answer import Tone
 from flagdata.errors import InputError, UnknownNameError
 from models.evaluation import SCORES, Predictions, bouman
 from models.evaluation.curves import FramesPoint, LearningPoint
 from models.evaluation.evaluation import Evaluation, Read, as_document, evaluate
-from models.evaluation.evaluation_report import markdown, page, write
+from models.evaluation.evaluation_report import answer_of, markdown, write
 from models.evaluation.score_table import digits
 from tests.golden_answers import changes
-from tests.models.evaluation.made import generator, of_wind, posterior
+from tests.models.evaluation.made import generator, of_wind, posterior, score
 from tests.refusals import unrefused
 
 GROUP = np.repeat(np.arange(30), 4)
@@ -63,13 +64,10 @@ def found() -> Evaluation:
         seed=0,
         draws=100,
         learning=[
-            LearningPoint(label="SDN", sequences=n, rmse=9 / n, interval=(8 / n, 10 / n))
+            LearningPoint(label="SDN", sequences=n, score=score(9 / n, 8 / n, 10 / n))
             for n in (10, 20)
         ],
-        frames=[
-            FramesPoint(label="SDN", frames=n, accuracy=0.9, interval=(0.88, 0.93))
-            for n in (10, 30)
-        ],
+        frames=[FramesPoint(label="SDN", frames=n, score=score(0.9, 0.88, 0.93)) for n in (10, 30)],
         reads=[Read(label="SDN", data="hanging cloth", readout=readout)],
     )
 
@@ -114,9 +112,9 @@ def test_differences_are_paired_over_the_same_sequences(found: Evaluation) -> No
     (rmse,) = [one for one in pair.differences if one.metric == "rmse"]
     alone = pair.rows[0].scores["rmse"]
     assert (rmse.label, rmse.reference, rmse.apart) == ("A", "B", True)
-    assert [rmse.difference.value, rmse.difference.low, rmse.difference.high] == pytest.approx(
-        [2 / 3 * alone.value, 2 / 3 * alone.low, 2 / 3 * alone.high]
-    )
+    assert alone.interval is not None
+    assert rmse.difference.value == pytest.approx(2 / 3 * alone.value)
+    assert rmse.difference.interval == pytest.approx(tuple(2 / 3 * end for end in alone.interval))
 
 
 def test_a_model_has_no_score_of_what_it_does_not_give(found: Evaluation) -> None:
@@ -171,7 +169,7 @@ def test_few_sequences_a_missing_triplet_and_a_constant_target_are_reported() ->
         "no-tarp",
     }
     json.dumps(as_document(found), allow_nan=False)
-    assert "R²" in page(found)
+    assert "R²" in answer_of(found).page
 
 
 class Links(HTMLParser):
@@ -201,7 +199,7 @@ class Links(HTMLParser):
 
 
 def test_the_page_fetches_nothing_escapes_labels_and_repeats_no_id(found: Evaluation) -> None:
-    html = page(found)
+    html = answer_of(found).page
     links = Links()
     links.feed(html)
     assert links.fetched == []
@@ -234,9 +232,9 @@ def test_names_of_models_and_data_are_text_in_markdown_and_on_the_page() -> None
         reads=[Read(label=BAD, data=BAD, readout=readout)],
     )
     shown = dataclasses.replace(
-        shown, learning=(LearningPoint(label=BAD, sequences=9, rmse=1, interval=(1, 2)),)
+        shown, learning=(LearningPoint(label=BAD, sequences=9, score=score(1, 1, 2)),)
     )
-    for html in (render(markdown(shown), extensions=["tables"]), page(shown)):
+    for html in (render(markdown(shown), extensions=["tables"]), answer_of(shown).page):
         read = Links()
         read.feed(html)
         assert "img" not in read.tags
@@ -248,8 +246,11 @@ def test_names_of_models_and_data_are_text_in_markdown_and_on_the_page() -> None
 
 
 def test_json_and_markdown_hold_the_same_scores(found: Evaluation, tmp_path: Path) -> None:
-    paths = write(found, tmp_path / "results", name="models")
-    assert [path.name for path in paths] == ["models.html", "models.json", "models.md"]
+    folder = tmp_path / "results"
+    answer = write(found, folder, name="models")
+    paths = [folder / name for name in ("models.html", "models.json", "models.md")]
+    assert {path.name for path in folder.iterdir()} >= {path.name for path in paths}
+    assert paths[0].read_text(encoding="utf-8").startswith(answer.page)
     document = json.loads(paths[1].read_text(encoding="utf-8"))
     assert document["schema"] == "flagdata.evaluation/1"
     assert (document["clips"], document["groups"]) == (120, 30)
@@ -272,9 +273,9 @@ def test_the_tables_are_what_they_were(found: Evaluation) -> None:
 
 def test_points_of_curves_that_make_no_sense_are_refused() -> None:
     with pytest.raises(InputError, match="lower end"):
-        LearningPoint(label="a", sequences=10, rmse=0.2, interval=(0.3, 0.1))
+        LearningPoint(label="a", sequences=10, score=score(0.2, 0.3, 0.1))
     with pytest.raises(InputError, match="not per cent"):
-        FramesPoint(label="a", frames=10, accuracy=96.3, interval=(95.0, 97.0))
+        FramesPoint(label="a", frames=10, score=score(96.3, 95.0, 97.0))
 
 
 def test_small_errors_are_shown_to_three_significant_digits() -> None:
@@ -295,3 +296,18 @@ def test_a_warning_of_a_readout_says_of_which_model_and_data_it_is() -> None:
         reads=[Read(label="SDN", data="cloth", readout=readout)],
     )
     assert "**Warning:** SDN on cloth: 1 principal components are kept, not 50" in markdown(shown)
+
+
+def test_the_answer_names_the_model_that_misses_the_wind_least_and_whether_that_is_beyond_chance(
+    found: Evaluation,
+) -> None:
+    answer = answer_of(found)
+    assert answer.sentence.startswith("Of 3 models ours <&> misses the wind least, by 0.103 m/s")
+    assert (answer.tone, len(answer.sentence.split()) < 25) == (Tone.SETTLED, True)
+    assert answer.quantities["rmse"].value == found.rows[3].scores["rmse"].value
+    assert answer.document == as_document(found)
+    twin = dataclasses.replace(run("SDN", 0.3, 1), label="twin")
+    alike = answer_of(evaluate([run("SDN", 0.3, 1), twin], data="made", seed=0, draws=50))
+    assert (alike.tone, "which chance may explain" in alike.sentence) == (Tone.OPEN, True)
+    alone = answer_of(evaluate([run("SDN", 0.3, 1)], data="made", seed=0, draws=50))
+    assert alone.sentence == "SDN misses the wind by 0.254 m/s in the root mean square"

@@ -37,7 +37,8 @@ def test_central_intervals_cover_as_the_gaussian_says(wide: float, shift: float)
         z = stats.norm.ppf((1 + found.level) / 2)
         expected = stats.norm.cdf(shift + wide * z) - stats.norm.cdf(shift - wide * z)
         assert found.share.value == pytest.approx(expected, abs=NOISE)
-        assert found.share.low < found.share.value < found.share.high
+        assert found.share.interval is not None
+        assert found.share.interval[0] < found.share.value < found.share.interval[1]
 
 
 def test_few_draws_do_not_bias_the_coverage_of_a_calibrated_model() -> None:

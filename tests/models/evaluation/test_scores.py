@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from flagdata.core.json_values import json_values
 from flagdata.errors import InputError
 from models.evaluation import SCORES, Resamples, estimate, paper
 from models.evaluation.bootstrap import LEVEL
@@ -79,14 +80,14 @@ def test_the_interval_of_a_mean_over_independent_clips_is_the_gaussian_one() -> 
     resamples = Resamples.of(np.arange(400), generator=generator(1), draws=20_000)
     found = estimate(
         SCORES["bias"].values(of_wind(np.zeros(400), errors), "wind_speed", resamples),
+        name="bias",
+        unit="m/s",
         clips=400,
         groups=400,
     )
     half = stats.norm.ppf((1 + LEVEL) / 2) * errors.std() / 20
     assert found.value == pytest.approx(0, abs=1e-12)
-    assert [found.low, found.high] == pytest.approx(
-        [-half, half], rel=0.04
-    )  # 4 deviations of 0.015/1.645
+    assert found.interval == pytest.approx((-half, half), rel=0.04)  # 4 deviations of 0.015/1.645
 
 
 def test_clips_that_are_copies_within_their_sequence_do_not_narrow_the_interval() -> None:
@@ -117,10 +118,15 @@ def test_a_draw_scores_as_the_clips_of_the_groups_it_holds_do() -> None:
 def test_one_sequence_has_no_interval() -> None:
     resamples = Resamples.of(np.zeros(4, dtype=np.int64), generator=generator(1))
     found = estimate(
-        SCORES["rmse"].values(of_wind(TRUTH, MEAN), "wind_speed", resamples), clips=4, groups=1
+        SCORES["rmse"].values(of_wind(TRUTH, MEAN), "wind_speed", resamples),
+        name="rmse",
+        unit="m/s",
+        clips=4,
+        groups=1,
     )
-    assert not found.has_interval
-    assert found.as_dict()["interval"] is None
+    assert found.interval is None
+    assert json_values(found)["interval"] is None
+    assert found.quantity.text == "0.634 m/s, no interval"
     assert found.value == pytest.approx(math.sqrt(1.61 / 4))
 
 
@@ -137,4 +143,4 @@ def test_errors_against_wind_are_those_of_each_bin_and_its_upper_end_belongs_to_
     ]  # 4.0 ends the last bin
     assert [b.rmse.value for b in bins] == pytest.approx([math.sqrt(0.125), 1.0, math.sqrt(0.1)])
     assert [b.bias.value for b in bins] == pytest.approx([0.35, -1.0, 0.3])
-    assert [b.rmse.has_interval for b in bins] == [True, False, True]
+    assert [b.rmse.interval is not None for b in bins] == [True, False, True]

@@ -101,6 +101,23 @@ def test_a_model_is_an_artifact_with_what_it_came_from(lake: Path) -> None:
     assert not list(Lake.open(lake).object_path(rows[0]["object"]).glob("*.pt"))
 
 
+def test_a_model_has_the_page_of_its_training_with_clips_their_truth_and_what_it_reads(
+    lake: Path,
+) -> None:
+    opened = Lake.open(lake)
+    (row, _) = opened.rows("kind = 'network'").to_pylist()
+    folder = opened.object_path(row["object"])
+    page = (folder / "training.html").read_text(encoding="utf-8")
+    assert "small misses the wind speed of clips that validate by" in page
+    shown = re.findall(r"true (-?[\d.]+) m/s, estimated (-?[\d.]+) \[", page)
+    assert 2 <= len(shown) <= 6
+    assert [float(true) for true, _ in shown] == sorted(float(true) for true, _ in shown)
+    assert page.count("data:image/webp;base64,") == len(shown)
+    assert page.count("<svg ") == 2
+    best = read_card(folder)["best"]
+    assert f"epoch {best['number'] + 1} of 3 was the best" in page
+
+
 def test_a_model_was_made_from_the_recordings_of_both_sides(
     lake: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

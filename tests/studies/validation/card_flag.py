@@ -209,11 +209,15 @@ def root_mean_square(
     resamples = Resamples.of(blocks, generator=stream(seed, "card-flag", "bootstrap"))
     sums = resamples.sums(np.stack([np.square(errors[use]), np.ones(int(use.sum()))], axis=1))
     found = estimate(
-        np.sqrt(ratio(sums[:, 0], sums[:, 1])), clips=int(use.sum()), groups=resamples.groups
+        np.sqrt(ratio(sums[:, 0], sums[:, 1])),
+        name="rmse",
+        unit="m/s",
+        clips=int(use.sum()),
+        groups=resamples.groups,
     )
     return {
         "rmse": found.value,
-        "interval": [found.low, found.high],
+        "interval": found.quantity.span.ends(),
         "rows": found.clips,
         "blocks": found.groups,
         "bias": float(errors[use].mean()),
