@@ -47,7 +47,7 @@ class ScoreEstimate:
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """Returns its ends; None where nothing is known of them."""
+        """Returns its ends; None where the groups are too few for any."""
         return None if self.quantity.bound is Bound.NOTHING else self.quantity.interval
 
     @property

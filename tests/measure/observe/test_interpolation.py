@@ -110,5 +110,5 @@ def test_a_remeshed_cloth_is_followed_at_about_200_points_that_include_its_corne
 
 def test_a_point_off_the_cloth_is_refused():
     mesh = grid(width=1.5, height=1.0, columns=3, rows=2)
-    with pytest.raises(InputError, match=r"\(1.6, 0.5\) m is on no face"):
+    with pytest.raises(InputError, match=r"\(1.6, 0.5\) is on no face"):
         locate(mesh.rest, mesh.faces, np.array([[0.1, 0.1], [1.6, 0.5]]), where="frame 0")
