@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 from flagdata.answer.charts import Chart
 from flagdata.answer.quantity import Quantity
 from flagdata.core.findings import Finding
+from flagdata.core.parts import attribute
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -148,9 +149,7 @@ class Answer:
     @property
     def page(self) -> str:
         """The page, HTML that refers to no other file."""
-        from flagdata.pages.answer_page import render_answer
-
-        return render_answer(self)
+        return attribute("flagdata.pages.answer_page:render_answer")(self)
 
     def save(self, path: Path | str) -> Path:
         """Write the page to a file, in place of an earlier page there. Returns its path.

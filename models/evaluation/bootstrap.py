@@ -34,7 +34,7 @@ class ScoreEstimate:
         clips, groups: how many the value rests on.
     """
 
-    JSON_NAMES: ClassVar = ("value", "interval", "level", "clips", "groups")
+    JSON_NAMES: ClassVar = ("value", "interval", "level=quantity.level", "clips", "groups")
 
     quantity: Quantity
     clips: int
@@ -49,11 +49,6 @@ class ScoreEstimate:
     def interval(self) -> tuple[float, float] | None:
         """Returns its ends; None where the groups are too few for any."""
         return None if self.quantity.bound is Bound.NOTHING else self.quantity.interval
-
-    @property
-    def level(self) -> float:
-        """Returns the level of the interval."""
-        return self.quantity.level
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -18,7 +18,7 @@ class LearningPoint:
         score: [m/s].
     """
 
-    JSON_NAMES: ClassVar = ("label", "sequences", "rmse", "interval")
+    JSON_NAMES: ClassVar = ("label", "sequences", "rmse=score.value", "interval=score.interval")
 
     label: str
     sequences: int
@@ -27,22 +27,12 @@ class LearningPoint:
     def __post_init__(self) -> None:
         _check(f"learning curve of {self.label!r}", self.sequences, "sequences", self.score)
 
-    @property
-    def rmse(self) -> float:
-        """Returns the score's value."""
-        return self.score.value
-
-    @property
-    def interval(self) -> tuple[float, float] | None:
-        """Returns the score's interval."""
-        return self.score.interval
-
 
 @dataclass(frozen=True, kw_only=True)
 class FramesPoint:
     """Triplet accuracy of a model that sees so many frames."""
 
-    JSON_NAMES: ClassVar = ("label", "frames", "accuracy", "interval")
+    JSON_NAMES: ClassVar = ("label", "frames", "accuracy=score.value", "interval=score.interval")
 
     label: str
     frames: int
@@ -51,22 +41,12 @@ class FramesPoint:
     def __post_init__(self) -> None:
         where = f"triplet accuracy of {self.label!r} against frames"
         _check(where, self.frames, "frames", self.score)
-        if self.accuracy > 1:
+        if self.score.value > 1:
             raise InputError(
-                f"the triplet accuracy is {self.accuracy:g}, above 1",
+                f"the triplet accuracy is {self.score.value:g}, above 1",
                 where=where,
                 fix="give a share, not per cent",
             )
-
-    @property
-    def accuracy(self) -> float:
-        """Returns the score's value."""
-        return self.score.value
-
-    @property
-    def interval(self) -> tuple[float, float] | None:
-        """Returns the score's interval."""
-        return self.score.interval
 
 
 def _check(where: str, size: int, noun: str, score: ScoreEstimate) -> None:

@@ -65,16 +65,11 @@ class Expected:
 class Read:
     """The linear readout of a model's embedding on some data set."""
 
-    JSON_NAMES: ClassVar = ("label", "data", "components", "pearson")
+    JSON_NAMES: ClassVar = ("label", "data", "components=readout.components", "pearson")
 
     label: str
     data: str
     readout: Readout
-
-    @property
-    def components(self) -> int:
-        """Returns how many principal components were kept."""
-        return self.readout.components
 
     @property
     def pearson(self) -> dict[str, ScoreEstimate]:

@@ -97,7 +97,7 @@ def linear(evaluation: Evaluation) -> Table | None:
     return Table(
         columns=("model", "data", "components", "quantity", "Pearson r"),
         rows=[
-            (read.label, read.data, str(read.components), target, score_table.cell(r, 3))
+            (read.label, read.data, str(read.readout.components), target, score_table.cell(r, 3))
             for read in evaluation.reads
             for target, r in read.pearson.items()
         ],

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from flagdata.core.arrays import FloatArray, IntArray
 from flagdata.errors import InputError
@@ -56,8 +56,9 @@ def locate(rest: FloatArray, faces: IntArray, points: FloatArray, *, where: str)
             fix="export texture coordinates anew",
         )
     corners, faces = corners[has_area], faces[has_area]
-    near = cKDTree(corners.mean(axis=1)).query(points, k=list(range(1, min(_NEAR, len(faces)) + 1)))
-    containing, weights = _best(corners, points, np.asarray(near[1], dtype=np.int64))
+    count = min(_NEAR, len(faces))
+    _, near = KDTree(corners.mean(axis=1)).query(points, k=count)
+    containing, weights = _best(corners, points, np.reshape(near, (len(points), count)))
     outside = np.flatnonzero(weights.min(axis=1) < 0)
     everywhere = np.arange(len(faces))
     step = max(1, _PAIRS // len(faces))
