@@ -132,7 +132,7 @@ def test_the_question_of_the_walk_is_answered_without_a_renderer_of_its_own(
         length=1.5,
         height=1.0,
         seconds=2.5,
-        time=np.arange(len(readings)) * 2.5,
+        time=np.linspace(0.0, 12.5, len(readings)),
         readings={"frequency": tuple(readings)},
     )
     answer = made.answer_flapping(table)
