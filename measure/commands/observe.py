@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from flagdata.api.measuring_verbs import Observing
 from flagdata.core.console import LocalPath, document, echo, progress, say
+from flagdata.core.json_values import json_values
 from flagdata.core.printable import SHORT
 from flagdata.core.workload import one_thread
 from flagdata.errors import RefusedError, UsageError
@@ -66,13 +67,15 @@ def observe(chosen: ObserveCommand) -> None:
         check_file(chosen.parquet)
     if chosen.picture is not None:
         check_file(chosen.picture, command="observe")
+        from flagdata.pages.chart_drawing import check_format
+
+        check_format(chosen.picture)
     if chosen.zarr is not None:
         check_folder(chosen.zarr)
     if chosen.lake is None:
         check_without_lake(str(chosen.source))
-    from flagdata.pages.page_pictures import png
     from measure.observables.observables_artifact import keep
-    from measure.observables.observables_picture import picture
+    from measure.observables.observables_picture import chart_of_table
 
     lake = chosen.opened()
     table, subject, reading = _table(chosen, lake, at=chosen.version)
@@ -93,9 +96,11 @@ def observe(chosen: ObserveCommand) -> None:
         with fresh_folder(chosen.zarr) as scratch:
             table.write_zarr(scratch)
     if chosen.picture is not None:
-        write_file(chosen.picture, png(picture(table)), command="observe")
+        from flagdata.pages.chart_drawing import encode
+
+        write_file(chosen.picture, encode(chart_of_table(table), chosen.picture), command="observe")
     if chosen.as_json:
-        document("observe", {**table.as_dict(), "artifact": identity})
+        document("observe", {**json_values(table), "artifact": identity})
     else:
         for line in table.lines():
             echo(line)

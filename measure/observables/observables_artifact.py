@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from flagdata.core.json_values import json_values
 from flagdata.core.provenance import canonical
 from flagdata.core.schema import Kind
 from flagdata.lake import Artifact, Lake, results
@@ -38,7 +39,7 @@ def artifact(table: ObservableTable, subject: Subject, options: Mapping[str, Any
         start=start,
         end=end,
         recipe={"observe": VERSION, "conditioned": CONDITIONED, **table.head(), **options},
-        report=canonical(table.as_dict()),
+        report=canonical(json_values(table)),
     )
 
 

@@ -1,42 +1,49 @@
-"""The observables of a film as one picture: each against time, and against the log's wind where
-there is one."""
+"""The observables of a film as one chart: each against time, and against the log's wind where there
+is one."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from flagdata.answer.charts import Axis, Chart, Colour, Dots, Note, Panel
+from flagdata.answer.quantity import unit_as_read
+from flagdata.core.arrays import FloatArray
 from measure.observables.observables_by_name import OBSERVABLES
 from measure.observables.observables_table import ObservableTable
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
-_BLUE, _RUST = "#2b6f8f", "#c4622d"
-
-
-def picture(table: ObservableTable) -> Figure:
-    """Draws a row an observable: over time on the left, over the wind on the right; bars of one
+def chart_of_table(table: ObservableTable) -> Chart:
+    """Makes a row an observable: over time on the left, over the wind on the right; bars of one
     sigma of the pixels."""
-    from matplotlib.figure import Figure
-
-    names = list(table.readings)
-    columns = 1 if table.wind is None else 2
-    figure = Figure(figsize=(4.8 * columns, 1.7 * len(names)), layout="constrained")
-    grid = figure.subplots(len(names), columns, squeeze=False, sharex="col")
-    for row, name in zip(grid, names, strict=True):
-        about, values = OBSERVABLES[name], table.values(name)
-        label = name if about.unit == "1" else f"{name} [{about.unit}]"
-        row[0].errorbar(table.time, values, about.sigma, fmt="o", ms=3, lw=0.8, color=_RUST)
-        row[0].set_ylabel(label, fontsize=8)
+    rows = []
+    for number, name in enumerate(table.readings, start=1):
+        last = number == len(table.readings)
+        panels = [_panel(table, name, table.time, Colour.FILM, _TIME if last else "")]
         if table.wind is not None:
-            row[1].errorbar(table.wind, values, about.sigma, fmt="o", ms=3, lw=0.8, color=_BLUE)
-        for axes in row:
-            axes.tick_params(labelsize=7)
-            if not np.isfinite(values).any():
-                axes.text(0.5, 0.5, "not shown", transform=axes.transAxes, ha="center", fontsize=8)
-    grid[-1][0].set_xlabel("time since the first frame [s]", fontsize=8)
-    if table.wind is not None:
-        grid[-1][1].set_xlabel("wind of the log, mean of the window [m/s]", fontsize=8)
-    return figure
+            panels.append(_panel(table, name, table.wind, Colour.LOG, _WIND if last else ""))
+        rows.append(panels)
+    return Chart(rows=rows, height=1.7, width=4.8 * len(rows[0]))
+
+
+_TIME = "time since the first frame [s]"
+_WIND = "wind of the log, mean of the window [m/s]"
+
+
+def _panel(table: ObservableTable, name: str, x: FloatArray, colour: Colour, label: str) -> Panel:
+    about = OBSERVABLES[name]
+    unit, factor = unit_as_read(about.unit)
+    values, sigma = table.values(name) * factor, about.sigma * factor
+    marks: list[Dots | Note] = [
+        Dots(x=x, y=values, low=values - sigma, high=values + sigma, colour=colour, size=3.0)
+    ]
+    finite = x[np.isfinite(x)]
+    if not np.isfinite(values).any() and len(finite):
+        marks.append(Note(x=float(finite[0]), y=0.0, text="not shown"))
+    title = name if unit == "1" else f"{name} [{unit}]"
+    ends = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
+    margin = 0.03 * max(ends[1] - ends[0], 1e-9)
+    return Panel(
+        marks=marks,
+        title=title,
+        x=Axis(label=label, limits=(ends[0] - margin, ends[1] + margin)),
+    )

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -26,7 +26,6 @@ from measure.observables.watching import Watched
 if TYPE_CHECKING:
     import pyarrow as pa
 
-SCHEMA = "flagdata.observables/1"
 UNSEEN = "no-silhouette"
 """Reason of all observables of a window in which no cloth was found."""
 
@@ -44,6 +43,17 @@ class ObservableTable:
         wind: (w,) of the log, the mean over the window [m/s]; NaN where it was silent. None without
             a log.
     """
+
+    SCHEMA: ClassVar = "flagdata.observables/1"
+    JSON_NAMES: ClassVar = (
+        "schema=SCHEMA",
+        "film",
+        "flag",
+        "window=seconds",
+        "windows",
+        "wind",
+        "observables",
+    )
 
     film: str
     length: float
@@ -134,22 +144,26 @@ class ObservableTable:
     def head(self) -> dict[str, Any]:
         """Describes what the table is of: JSON values."""
         return {
-            "schema": SCHEMA,
+            "schema": self.SCHEMA,
             "film": self.film,
             "flag": [self.length, self.height],
             "window": self.seconds,
         }
 
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values: mean, its standard error and the windows of each observable."""
-        return {
-            **self.head(),
-            "windows": len(self.time),
-            "wind": None
-            if self.wind is None
-            else [None if math.isnan(v) else v for v in self.wind.tolist()],
-            "observables": {name: self._summary(name) for name in self.readings},
-        }
+    @property
+    def flag(self) -> tuple[float, float]:
+        """Length and height [m]."""
+        return self.length, self.height
+
+    @property
+    def windows(self) -> int:
+        """How many there are."""
+        return len(self.time)
+
+    @property
+    def observables(self) -> dict[str, dict[str, Any]]:
+        """Of each observable its mean, its standard error and the windows that show it."""
+        return {name: self._summary(name) for name in self.readings}
 
     def _summary(self, name: str) -> dict[str, Any]:
         values = self.values(name)

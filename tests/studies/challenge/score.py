@@ -31,7 +31,6 @@ from typing import Any
 import numpy as np
 
 from flagdata.errors import RefusedError
-from measure.shares import Share
 from measure.verdict import Conclusion
 from tests.studies.challenge import filing
 from tests.studies.challenge.answer_key import opened
@@ -41,6 +40,7 @@ from tests.studies.challenge.outcome import Outcome
 from tests.studies.challenge.rates import Power
 from tests.studies.challenge.recipe import Kind
 from tests.studies.challenge.true_model import ReferenceErrors
+from tests.studies.shares import Share
 
 ENOUGH = 2.0
 """Times the half-detection strength, from where identification is graded."""

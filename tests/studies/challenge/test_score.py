@@ -10,7 +10,6 @@ import pytest
 
 from flagdata.core.rng import stream
 from flagdata.errors import InputError
-from measure.shares import Share
 from measure.verdict import Candidate, Conclusion, Estimate, Verdict
 from sim.effects import EFFECTS
 from tests.studies.challenge import sheet as sheets
@@ -29,6 +28,7 @@ from tests.studies.challenge.outcome import Outcome
 from tests.studies.challenge.rates import Power
 from tests.studies.challenge.recipe import Kind
 from tests.studies.challenge.score import Sheet, graded
+from tests.studies.shares import Share
 
 LIBRARY = ("lift", "added-mass", "pole-wake", "shear", "full-hoist")
 

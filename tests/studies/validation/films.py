@@ -25,8 +25,8 @@ from measure.anemometer import Network, gate_beside, network
 from measure.estimate import Measurement, Options, measure, of_model
 from measure.film import FilmReading, FlagSize, subjects
 from measure.gate import REASONS, WindowGate
-from measure.shares import Share
 from tests.evidence import ABSENT, REFERENCE
+from tests.studies.shares import Share
 from tests.studies.validation.environments import VTK
 from tests.studies.validation.vtk_films.designs import COMPARED, Design, designs, stressor_of
 from tests.studies.validation.vtk_films.making import FOLDER, make, path_of

@@ -32,9 +32,9 @@ from measure.forecasting import Segments
 from measure.loop import LoopOptions
 from measure.nulls import bank as banks
 from measure.observe import Observed, load, read
-from measure.shares import Share
 from measure.verdict import NOT_REJECTED, Conclusion, Estimate
 from tests.studies.challenge.classes import class_of
+from tests.studies.shares import Share
 from tests.studies.validation.environments import MUJOCO
 from tests.studies.validation.mujoco.experiments import (
     NOISE,

@@ -24,10 +24,10 @@ from flagdata.core.arrays import UInt8Array
 from flagdata.errors import NotFoundError
 from measure.gate import Gate, judge, read
 from measure.gate.window import CONFIDENCE, FALSE_ALARM, Judgement
-from measure.shares import Share
 from models.trained.estimator import SHIPPED, Estimator, load_shipped
 from tests.evidence import ABSENT, REFERENCE
 from tests.studies.gate import FilmsOf, calibrated, data_of, rate_of
+from tests.studies.shares import Share
 from tests.studies.validation.gate_clips import KINDS, made, seed_of
 
 LAKE = "FLAGDATA_LAKE"

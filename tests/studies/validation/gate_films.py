@@ -21,8 +21,8 @@ from measure.anemometer import Network, gate_beside, network
 from measure.estimate import Options
 from measure.film import FlagSize
 from measure.gate import WindowGate
-from measure.shares import Share
 from tests.evidence import ABSENT, REFERENCE
+from tests.studies.shares import Share
 from tests.studies.validation.environments import VTK
 from tests.studies.validation.films import answer
 from tests.studies.validation.vtk_films.defects import DEFECTS, defect, names, tuned

@@ -51,11 +51,11 @@ from measure.observe import (
     observe,
     sheet,
 )
-from measure.shares import Share
 from measure.verdict import CRITERIA, Estimate
 from sim.cloth.material import named_material
 from sim.cloth.mesh import grid
 from sim.wind import VonKarman
+from tests.studies.shares import Share
 from tests.studies.validation.flags_runs import CAMEL
 
 WIDTH, HEIGHT = 1.5, 1.0

@@ -13,8 +13,8 @@ import numpy as np
 from flagdata.core.arrays import FloatArray
 from flagdata.core.console import progress
 from flagdata.core.rng import stream
-from measure.shares import Share
 from sim.cloth.material import Material
+from tests.studies.shares import Share
 from tests.studies.validation.robot_cloth.attribution import (
     Late,
     Round,
