@@ -217,6 +217,7 @@ def _print_table(catalog: pa.Table | Scan, request: Request) -> None:
     from dataclasses import replace
 
     from flagdata.lake.selection import Request, Selection
+    from flagdata.lake.unknown_values import unknown_value
 
     if request.sql is None and request.columns is None:
         kinds = (
@@ -234,7 +235,9 @@ def _print_table(catalog: pa.Table | Scan, request: Request) -> None:
     selection = Selection(catalog, shown)
     result, total = selection.table(), selection.total()
     if not total:
-        say(f"no rows of {Selection(catalog, Request()).total():,} match")
+        unknown = unknown_value(request.where if isinstance(request.where, str) else None, catalog)
+        why = "" if unknown is None else f": {unknown}"
+        say(f"no rows of {Selection(catalog, Request()).total():,} match{why}")
         return
     header = [
         f"{f.name} [{unit}]" if (unit := _unit(f)) and not _is_instant(f) else f.name

@@ -33,6 +33,7 @@ from flagdata.lake import Lake
 from flagdata.lake.label_columns import columns
 from flagdata.lake.lineage import labels_of, with_labels
 from flagdata.lake.selection import Request, Selection
+from flagdata.lake.unknown_values import unknown_value
 from flagdata.recipes.registry import Registry
 
 
@@ -217,6 +218,7 @@ class Prepared:
                 {
                     "schema": "flagdata.export/1",
                     **recipe,
+                    "split": self.source.side,
                     "split_by": self.source.split_by,
                     "at": request.at,
                     "recipe_hash": recipe_hash(recipe),
@@ -269,7 +271,12 @@ def prepare(lake: Lake, request: Export) -> Prepared:
         where = ", ".join(
             f"{name} {value}" for name, value in chosen_by.items() if value is not None
         )
-        raise NotFoundError("no rows match", where=where, fix="try the filter with flagdata query")
+        written = request.where if isinstance(request.where, str) else None
+        raise NotFoundError(
+            "no rows match",
+            where=where,
+            fix=unknown_value(written, catalog) or "try the filter with flagdata query",
+        )
     labels = labels_of(catalog)
     for name, values in columns(with_labels(rows, labels)).items():
         rows = rows.append_column(name, values)
@@ -278,12 +285,18 @@ def prepare(lake: Lake, request: Export) -> Prepared:
         lake=lake,
         rows=rows,
         labels=labels,
-        side=request.split,
+        side=request.split or _side_of_all(rows),
         split_by=None if division is None else division.statement,
     )
     return Prepared(
         request=request, exporter=exporter, version=version, source=source, superseded=replaced
     )
+
+
+def _side_of_all(rows: pa.Table) -> str | None:
+    """Returns the side that all rows state; None where they state several, or some none."""
+    sides = rows["side"].unique().to_pylist()
+    return sides[0] if len(sides) == 1 else None
 
 
 def export(

@@ -173,7 +173,7 @@ class ExportRows:
         lake: that they are in.
         rows: with all columns of `schema.CATALOG`.
         labels: artifact → the user's own values.
-        side: that all rows are on; `None` where none was asked for.
+        side: that all rows are on, since it was asked for or all state it; `None` of a mixture.
         split_by: the rule by which sides were decided, and their sizes, as JSON; `None` where no
             side was asked for and no row states one.
     """

@@ -174,6 +174,8 @@ def test_an_empty_result_is_reported_and_is_no_failure(run: Run) -> None:
     code, out, err = run("--where", "wind > 100")
     assert (code, out) == (0, "")
     assert "no rows of 4 match" in err
+    _, _, err = run("--where", "kind = 'clpi'")
+    assert "no rows of 4 match: no row has kind 'clpi'; did you mean 'clip'?" in err
 
 
 def test_free_sql_is_shown_as_it_is(run: Run) -> None:

@@ -228,6 +228,16 @@ def test_nothing_to_export_is_an_error(known: Any, tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
+def test_a_filter_by_a_value_that_no_row_has_names_the_nearest(known: Any, tmp_path: Path) -> None:
+    for where, said in {
+        "kind = 'clpi'": "no row has kind 'clpi'; did you mean 'clip'",
+        "wind > 0 and name='it''s'": "no row has name 'it''s'".replace("''", "'"),
+    }.items():
+        with pytest.raises(NotFoundError) as refused:
+            export(known.lake, Export(format="parquet", where=where), tmp_path / "out")
+        assert said in str(refused.value.fix).replace('"', "'")
+
+
 def test_an_export_at_a_tag_does_not_see_later_rows(tmp_path: Path) -> None:
     lake = Lake.create(tmp_path / "lake")
     for number in range(2):

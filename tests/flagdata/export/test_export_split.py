@@ -183,3 +183,32 @@ def test_of_two_alignments_of_one_camera_and_wind_log_the_later_is_exported(tmp_
     assert pl.read_parquet(tmp_path / "old" / "rows" / "*.parquet")["artifact"].to_list() == [
         aligned[0].id
     ]
+
+
+def test_a_side_that_a_filter_chose_stands_in_the_manifest(tmp_path: Path) -> None:
+    lake = Lake.create(tmp_path / "lake")
+    with lake.transaction("two films") as tx:
+        for number, side in enumerate(("train", "test")):
+            film = Artifact(
+                kind=Kind.RECORDING, name=f"film {number}", seed=number, dataset="made", side=side
+            )
+            clip = Artifact(
+                kind=Kind.CLIP,
+                name=f"clip {number}",
+                parents=(film.id,),
+                recording=film.id,
+                dataset="made",
+                side=side,
+            )
+            tx.add(film)
+            tx.add(clip)
+    for where, side in {
+        "kind = 'clip' and side = 'train'": "train",
+        "kind = 'clip' and side = 'test'": "test",
+        "kind = 'clip'": None,
+    }.items():
+        manifest = export(
+            lake, Export(format="parquet", where=where), tmp_path / str(side)
+        ).manifest
+        assert manifest["split"] == side
+        assert manifest["split_by"]["rule"] == "stated"
