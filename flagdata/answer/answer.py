@@ -64,7 +64,7 @@ class Figure:
         content: a chart, the address of a picture (which may hold it), or a part of a page, or what
             makes one of these when it is shown.
         caption: below it.
-        width: of a picture [px]; as wide as the page if None.
+        width: of a picture, or the most that a chart is wide [px]; as wide as the page if None.
     """
 
     title: str

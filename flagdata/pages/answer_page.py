@@ -62,7 +62,10 @@ def _draw(figure: Figure, name: str) -> Markup:
     if isinstance(content, Chart):
         from flagdata.pages.chart_drawing import svg
 
-        return svg(content, name=name, title=figure.title)
+        drawn = svg(content, name=name, title=figure.title)
+        if figure.width is None:
+            return drawn
+        return Markup('<div style="max-width: {}px">{}</div>').format(figure.width, drawn)
     if isinstance(content, Markup):
         return content
     width = "" if figure.width is None else Markup(' width="{}"').format(figure.width)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import re
+import textwrap
 from collections.abc import Callable, Sequence
 from functools import singledispatch
 from pathlib import Path
@@ -19,7 +20,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter, NullLocator, StrMethodFormatter
+from matplotlib.ticker import NullLocator, StrMethodFormatter
 
 from flagdata.answer.charts import (
     Across,
@@ -80,6 +81,8 @@ _STYLE: dict[Any, Any] = {
     "legend.frameon": False,
 }
 _LEGEND_COLUMNS = 4
+_NAME = 24
+"""Characters of a line of a bar's name."""
 
 
 def svg(chart: Chart, *, name: str, title: str = "") -> Markup:
@@ -93,8 +96,9 @@ def svg(chart: Chart, *, name: str, title: str = "") -> Markup:
     with mpl.rc_context(_STYLE):
         _draw(chart).savefig(target, format="svg", transparent=True, metadata={"Date": None})
     text = target.getvalue()
-    head, tail = text[text.index("<svg") :].split(">", 1)
-    text = re.sub(r' (width|height)="[^"]*"', "", head) + ">" + tail
+    text = re.sub(r"\s*<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
+    head, tail = text.split(">", 1)
+    text = re.sub(r' (width|height|version|xmlns[^=]*)="[^"]*"', "", head) + ">" + tail
     text = re.sub(r"(\bid=\"|url\(#|href=\"#)", rf"\g<1>{name}-", text)
     for colour, value in _VALUES.items():
         text = text.replace(value, f"var(--{colour.value}, {value})")
@@ -189,7 +193,7 @@ def _set_axis(
         axis.set_minor_locator(NullLocator())
     elif about.logarithmic:
         axis.set_major_formatter(StrMethodFormatter("{x:g}"))
-        axis.set_minor_formatter(NullFormatter())
+        axis.set_minor_locator(NullLocator())
 
 
 def _draw_legend(figure: Figure, drawn: Sequence[Axes]) -> None:
@@ -303,7 +307,8 @@ def _(mark: Bars, axes: Axes) -> None:
         axes.annotate(
             text, (end, at), xytext=(4, 0), textcoords="offset points", va="center", fontsize=8
         )
-    axes.set_yticks(np.arange(count)[::-1], list(mark.names))
+    names = ["\n".join(textwrap.wrap(name, _NAME)) for name in mark.names]
+    axes.set_yticks(np.arange(count)[::-1], names)
     axes.grid(visible=False, axis="y")
 
 

@@ -12,7 +12,7 @@ from flagdata.packages.lazy import lazy_exports
 if TYPE_CHECKING:
     from measure.report.document import as_document, from_document
     from measure.report.lead_sentences import lead
-    from measure.report.report_page import page
+    from measure.report.verdict_answer import answer_of_markers
     from measure.report.verdict_statement import by_draw, with_sentences
 
 __getattr__ = lazy_exports(__name__, __file__)

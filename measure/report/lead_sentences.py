@@ -19,7 +19,14 @@ from measure.report.verdict_sentences import (
     shorten_list,
 )
 from measure.verdict.decided import erring
-from measure.verdict.quantity import known, number, probability, with_level
+from measure.verdict.quantity import (
+    estimate_parts,
+    known,
+    level_text,
+    number,
+    probability,
+    with_level,
+)
 from measure.verdict.verdict_record import Candidate, Conclusion, NullTest, Verdict
 
 _EVIDENCE = ((0.001, "very strong"), (0.01, "strong"), (0.05, "moderate"), (0.1, "weak"))
@@ -54,6 +61,61 @@ def lead(verdict: Verdict) -> str:
             verdict,
         )
     return _add_remainder(f"{_what_was_found(verdict)}; {_strength(verdict)}", verdict)
+
+
+def spoken(verdict: Verdict) -> str:
+    """Writes the verdict in a sentence of fewer than 25 words that can be said aloud."""
+    p = f"p = {probability(verdict.test.p_value.value)}"
+    match verdict.conclusion:
+        case Conclusion.UNTESTED:
+            return (
+                "The base model cannot be tested: there are too few numerical set-ups for the "
+                "level."
+            )
+        case Conclusion.SUFFICIENT if contradicting_findings(verdict):
+            return "The set-up is not as declared, so that this verdict does not count."
+        case Conclusion.SUFFICIENT if erring(verdict):
+            return f"No effect is needed: the base model is not rejected ({p})."
+        case Conclusion.SUFFICIENT:
+            return f"No effect is needed: the base model explains these recordings ({p})."
+        case Conclusion.UNDECIDED:
+            return (
+                f"Nothing is decided: the base model is not rejected ({p}), and not shown to "
+                "suffice."
+            )
+        case Conclusion.OUTSIDE:
+            return f"Something is missing that no effect of the library explains ({p})."
+        case _ if not verdict.named:
+            return f"Something is missing that the library explains in part at most ({p})."
+        case Conclusion.ONE_OF:
+            names = shorten_list([_spoken_name(name) for name in verdict.named])
+            either = " or ".join(filter(None, [", ".join(names[:-1]), names[-1]]))
+            return f"Something was missing: {either}; these recordings do not decide which."
+        case conclusion:
+            names = list_names(shorten_list([_spoken_name(name) for name in verdict.named]))
+            explains = "explain" if len(verdict.named) > 1 else "explains"
+            does = {
+                Conclusion.PARTLY: f"{explains} a part of it",
+                Conclusion.EFFECT: "fits best" if erring(verdict) else f"{explains} it",
+            }[conclusion]
+            return f"Something was missing: {names} {does}{_spoken_strength(verdict)}."
+
+
+def _spoken_name(effect: str) -> str:
+    return effect.replace("-", " ")
+
+
+def _spoken_strength(verdict: Verdict) -> str:
+    """Writes the strength of the one that is named, as a person says it; empty where several are,
+    or it is not known."""
+    named = named_candidates(verdict)
+    if len(named) != 1 or not known(named[0].strength) or named[0].strength.bound == "nothing":
+        return ""
+    (candidate,) = named
+    value, ends = estimate_parts(candidate.strength)
+    interval = f"{ends.strip('[]').replace(', ', ' to ')}, " if ends else ""
+    level = level_text(candidate.strength.level)
+    return f"; its {readable(candidate.parameter)} is {value} ({interval}{level})"
 
 
 def _add_remainder(sentence: str, verdict: Verdict) -> str:

@@ -14,10 +14,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from jinja2.utils import htmlsafe_json_dumps
 from markupsafe import Markup, escape
 
+from flagdata.answer.answer import Figure
 from flagdata.core.arrays import FloatArray, IntArray
-from measure.report.chart import drawing
+from flagdata.pages.render import text_of
 from measure.report.error_maps import on_a_line, triangles
 from measure.verdict.verdict_record import Residual
 
@@ -89,26 +91,121 @@ class MotionClip:
             ELEVATION
         )
 
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values for the player."""
-        size = _finite_reach(self.observed)
-        errors = [p - self.observed for p in (self.before, self.after) if p is not None]
-        reach = max((_finite_reach(e) for e in errors), default=1.0)
-        return {
-            "recording": self.recording,
-            "rate": self.rate,
-            "frames": self.frames,
-            "markers": self.markers,
-            "edges": self.edges.ravel().tolist(),
-            "size": size,
-            "reach": reach,
-            "radius": self.radius,
-            "rise": self.rise,
-            "azimuth": self.azimuth,
-            "factor": self.factor,
-            "observed": _pack_values(self.observed, size),
-            "errors": [_pack_values(e, reach) for e in errors],
-        }
+
+def pack_clip(clip: MotionClip) -> dict[str, Any]:
+    """Packs a stretch for the player, JSON values."""
+    size = _finite_reach(clip.observed)
+    errors = [p - clip.observed for p in (clip.before, clip.after) if p is not None]
+    reach = max((_finite_reach(e) for e in errors), default=1.0)
+    return {
+        "recording": clip.recording,
+        "rate": clip.rate,
+        "frames": clip.frames,
+        "markers": clip.markers,
+        "edges": clip.edges.ravel().tolist(),
+        "size": size,
+        "reach": reach,
+        "radius": clip.radius,
+        "rise": clip.rise,
+        "azimuth": clip.azimuth,
+        "factor": clip.factor,
+        "observed": _pack_values(clip.observed, size),
+        "errors": [_pack_values(e, reach) for e in errors],
+    }
+
+
+def moving_figure(residuals: Sequence[Residual], *, after: str) -> Figure | None:
+    """Makes the player of all recordings that hold a stretch, unseen ones first; None where none
+    does.
+
+    Args:
+        after: what the model after is called, "with lift".
+    """
+    clips = [clip for clip in map(motion, residuals) if clip is not None]
+    clips = sorted(clips, key=lambda clip: not clip.held_out)
+    if not clips:
+        return None
+    first = clips[0]
+    enlarged = (
+        f"with the errors enlarged {first.factor} times at the start"
+        if first.factor > 1
+        else "with the errors as they are"
+    )
+    thinned = [
+        f"{clip.recording}: {clip.frames} of {clip.of_frames} frames, {clip.markers} of "
+        f"{clip.of_markers} markers shown."
+        for clip in clips
+        if clip.markers < clip.of_markers or clip.frames < clip.of_frames
+    ]
+    caption = (
+        f"Grey: the cloth as observed. In colour: predicted from the frames before, {enlarged}."
+    )
+    return Figure(
+        title="The cloth in motion",
+        content=_player(clips, after),
+        caption=" ".join([caption, *thinned]),
+    )
+
+
+_STYLE = """
+#motion { --mesh: #9aa5ab; max-width: 52rem; } #motion.single { max-width: 26rem; }
+@media screen and (prefers-color-scheme: dark) { #motion { --mesh: #6d7a81; } }
+#motion svg { display: block; width: 100%; height: auto; overflow: visible; }
+#motion text { font: 11px system-ui, sans-serif; fill: var(--ink); }
+#motion .mesh { fill: none; stroke-width: .9; stroke: var(--mesh); }
+#motion .mesh.before { stroke: var(--log); } #motion .mesh.after { stroke: var(--film); }
+#motion .controls { display: flex; flex-wrap: wrap; gap: .4rem 1rem; align-items: center;
+  font-size: .85rem; margin: .4rem 0; }
+#motion .controls[hidden] { display: none; }
+#motion label { display: inline-flex; gap: .4rem; align-items: center; }
+#motion button { min-width: 5rem; font: inherit; padding: .2rem .6rem; }
+#motion select { max-width: 12rem; } #motion input { width: 8rem; }
+@media print { #motion .controls { display: none; } }
+"""
+_CONTROLS = Markup(
+    '<div class="controls" hidden>'
+    '<button type="button" data-control="play">Play</button>'
+    '<label>recording <select data-control="recording">{recordings}</select></label>'
+    '<label>frame <input type="range" min="0" max="1" value="0" data-control="frame"></label>'
+    '<label>view from <input type="range" min="-180" max="180" value="0" data-control="turn" '
+    'aria-label="direction of view in degrees"></label>'
+    '<label>errors <select data-control="factor">{factors}</select></label>'
+    '<label>speed <select data-control="speed"><option value="1">1</option>'
+    '<option value="0.25" selected>1/4</option><option value="0.1">1/10</option></select></label>'
+    "</div>"
+)
+_OPTION = Markup('<option value="{}"{}>{}</option>')
+
+
+def _player(clips: Sequence[MotionClip], after: str) -> Markup:
+    """Writes the player as a part of a page, with its style, data and script."""
+    stills = [still(clip, after) for clip in clips]
+    listed = [
+        pack_clip(clip) | {"still": str(drawn)} for clip, drawn in zip(clips, stills, strict=True)
+    ]
+    names = [f"{clip.recording}{', unseen' if clip.held_out else ''}" for clip in clips]
+    recordings = [_OPTION.format(number, "", name) for number, name in enumerate(names)]
+    factors = [
+        _OPTION.format(f, Markup(" selected") if f == clips[0].factor else "", f"× {f}")
+        for f in FACTORS
+    ]
+    controls = _CONTROLS.format(
+        recordings=Markup("").join(recordings), factors=Markup("").join(factors)
+    )
+    data = htmlsafe_json_dumps(
+        {"view": VIEW, "list": listed}, allow_nan=False, separators=(",", ":")
+    )
+    return Markup(
+        '<style>{}</style><div id="motion"{}><div class="stage">{}</div>{}</div>'
+        '<script type="application/json" id="motion-data">{}</script><script>{}</script>'
+    ).format(
+        Markup(_STYLE),
+        Markup(' class="single"') if clips[0].after is None else "",
+        stills[0],
+        controls,
+        data,
+        Markup(text_of("measure.report", "motion.js")),
+    )
 
 
 def motion(residual: Residual) -> MotionClip | None:
@@ -160,18 +257,16 @@ def still(stretch: MotionClip, after_label: str) -> Markup:
         enlarged = stretch.observed[0] + stretch.factor * (predicted[0] - stretch.observed[0])
         centre = (_HALF * (2 * number + 1) + _GAP * number, tall + _HEAD)
         parts.append(
-            f'<text class="label" x="{centre[0] - _HALF + 8:g}" y="14">{escape(heading)}</text>'
+            f'<text x="{centre[0] - _HALF + 8:g}" y="14">{escape(heading)}</text>'
             '<path class="mesh observed" '
             f'd="{_wires(stretch.observed[0], stretch, scale, centre)}"/>'
             f'<path class="mesh {kind}" d="{_wires(enlarged, stretch, scale, centre)}"/>'
         )
     width = 2 * _HALF * len(panels) + _GAP * (len(panels) - 1)
-    return drawing(
-        width,
-        2 * tall + _HEAD + 4,
-        "Observed cloth and predictions",
-        f"a frame of {stretch.recording}",
-        "".join(parts),
+    return Markup(
+        f'<svg role="img" viewBox="0 0 {width:g} {2 * tall + _HEAD + 4:g}" aria-label="'
+        f'Observed cloth and predictions, a frame of {escape(stretch.recording)}">'
+        f"{''.join(parts)}</svg>"
     )
 
 
