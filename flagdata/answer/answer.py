@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -146,7 +147,7 @@ class Answer:
     make_sections: Callable[[], Sequence[Section]] = tuple
     provenance: Mapping[str, str] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def page(self) -> str:
         """The page, HTML that refers to no other file."""
         return attribute("flagdata.pages.answer_page:render_answer")(self)

@@ -13,9 +13,10 @@ from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from measure.closing.close import close_loop
+    from measure.closing.joint_answer import joint_answer
     from measure.closing.joint_verdict import join_verdicts
     from measure.closing.model_recipes import acting
-    from measure.closing.verdict_artifacts import VerdictAnswer, answer_of
+    from measure.closing.verdict_artifacts import ClosedLoop, answer_of
     from measure.closing.verdict_sources import SourceOptions
 
 __getattr__ = lazy_exports(__name__, __file__)

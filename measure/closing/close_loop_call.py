@@ -10,7 +10,6 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flagdata.answer import Bound, Quantity, Span
 from flagdata.answer.closed import Closed
 from flagdata.api.measuring_verbs import Closing
 from flagdata.core.stated import Stated
@@ -22,12 +21,8 @@ from measure.loop.run import LoopOptions
 from measure.nulls.null_plan import FEWEST_NULLS
 from measure.observe import Hold, Observation, Setup, WindTrack, from_arrays, observe, sheet
 from measure.observe.mesh_observations import from_sequence
-from measure.report import verdict_sentences
-from measure.report.document import as_document
-from measure.report.report_page import page
-from measure.report.verdict_words import words
+from measure.report.verdict_answer import answer_of_markers, facts_of
 from measure.verdict.criteria import CRITERIA
-from measure.verdict.verdict_record import Estimate, Verdict
 from sim.cloth.material import MATERIALS, named_material
 
 Recordings: TypeAlias = ArrayLike | MeshSequence | Sequence[ArrayLike | MeshSequence]
@@ -46,9 +41,10 @@ def close_on_arrays(chosen: Closing) -> Closed:
         nulls=FEWEST_NULLS if chosen.nulls is None else chosen.nulls,
     )
     observed = observe(_tracked_observations(chosen), _setup(chosen))
-    return _answer(
-        with_warnings(close_loop(observed.experiment, options), check_findings(observed.findings))
+    verdict = with_warnings(
+        close_loop(observed.experiment, options), check_findings(observed.findings)
     )
+    return answer_of_markers(verdict, facts=facts_of(observed.experiment))
 
 
 def _setup(chosen: Closing) -> Setup:
@@ -126,38 +122,3 @@ def _track(wind: Any) -> WindTrack:
             fix="give a speed, a velocity (x, y, z), or times (n,) and velocities (n, 3)",
         )
     return WindTrack(times=np.zeros(1), velocity=velocity[None])
-
-
-def _answer(verdict: Verdict) -> Closed:
-    strengths = {
-        candidate.effect: _quantity(candidate.parameter, candidate.strength)
-        for candidate in verdict_sentences.named_candidates(verdict)
-    }
-    return Closed(
-        conclusion=verdict.conclusion.value,
-        named=verdict.named,
-        sentence=verdict_sentences.heading(verdict),
-        words=words(verdict),
-        p_value=verdict.test.p_value.value,
-        strengths=strengths,
-        document=as_document(verdict),
-        page=page(verdict),
-    )
-
-
-def _quantity(name: str, strength: Estimate) -> Quantity:
-    bound = None if strength.bound is None else Bound(strength.bound)
-    return Quantity(
-        name=name,
-        unit=strength.unit,
-        value=strength.value if bound is None else None,
-        sigma=None,
-        span=Span(
-            low=strength.low,
-            high=strength.high,
-            level=strength.level,
-            bound=bound,
-            estimated=bound is None,
-        ),
-        constrained=bound is not Bound.NOTHING,
-    )

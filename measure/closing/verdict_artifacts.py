@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from flagdata.answer.closed import Closed
 from flagdata.core.findings import Finding, quality_flags
 from flagdata.core.json_values import json_values
 from flagdata.core.provenance import array_hash, canonical, digest, file_hash
@@ -29,8 +30,7 @@ from measure.nulls.bank import files
 from measure.observe import Experiment
 from measure.observe.trajectory import describe_cloth
 from measure.report.document import as_document, from_document
-from measure.report.report_page import page
-from measure.report.verdict_words import words
+from measure.report.verdict_answer import answer_of_markers, facts_of
 from measure.verdict.verdict_record import Candidate, Verdict
 
 _FORMAT = 1
@@ -53,7 +53,7 @@ class Kept:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class VerdictAnswer:
+class ClosedLoop:
     """A loop that was closed, of whatever kind of recordings, as it is written and kept.
 
     Attributes:
@@ -62,8 +62,7 @@ class VerdictAnswer:
         models: of the verdict.
         effects: whose strengths are kept beside the cloth that was fitted.
         findings: on the recordings.
-        page: the report, HTML.
-        words: the verdict's, for a terminal.
+        answer: the same as an answer.
         recipe: all that went in, JSON values.
         parents: artifacts that the recordings were read from.
         seed: of the verdict.
@@ -74,8 +73,7 @@ class VerdictAnswer:
     models: tuple[NamedModel, ...]
     effects: tuple[Candidate, ...]
     findings: tuple[Finding, ...]
-    page: str
-    words: str
+    answer: Closed
     recipe: Mapping[str, Any]
     parents: tuple[str, ...]
     seed: int
@@ -89,7 +87,7 @@ def answer_of(
     name: str,
     models: tuple[NamedModel, ...],
     findings: tuple[Finding, ...],
-) -> VerdictAnswer:
+) -> ClosedLoop:
     """Makes the answer of a verdict on recordings of markers.
 
     Args:
@@ -109,21 +107,20 @@ def answer_of(
     }
     if options.suspected is not None:  # results that were kept before keep their identity
         recipe["suspected"] = options.suspected.words
-    return VerdictAnswer(
+    return ClosedLoop(
         name=name,
         verdict=verdict,
         models=models,
         effects=acting(verdict),
         findings=findings,
-        page=page(verdict),
-        words=words(verdict),
+        answer=answer_of_markers(verdict, subject=name, facts=facts_of(experiment)),
         recipe=recipe,
         parents=tuple(dict.fromkeys(r.source for r in experiment.recordings if r.source)),
         seed=options.seed,
     )
 
 
-def keep(lake: Lake, answer: VerdictAnswer, *, branch: str = "main") -> Kept:
+def keep(lake: Lake, closed: ClosedLoop, *, branch: str = "main") -> Kept:
     """Publishes a verdict and its models in one commit where it is new, see
     `flagdata.lake.results`.
 
@@ -132,14 +129,14 @@ def keep(lake: Lake, answer: VerdictAnswer, *, branch: str = "main") -> Kept:
     """
     entry = results.keep(
         lake,
-        _measurement(answer),
-        lambda staged: write(staged, answer.verdict, page=answer.page),
-        f"close loop: {answer.name}",
+        _measurement(closed),
+        lambda staged: write(staged, closed.verdict, page=closed.answer.page),
+        f"close loop: {closed.name}",
         branch=branch,
-        derived=lambda verdict: [_model(answer, model, verdict) for model in answer.models],
+        derived=lambda verdict: [_model(closed, model, verdict) for model in closed.models],
     )
     verdict = entry.artifact
-    ids = tuple(_model(answer, model, verdict).id for model in answer.models)
+    ids = tuple(_model(closed, model, verdict).id for model in closed.models)
     models = ids if entry.new else models_of(lake, verdict.id, branch)
     return Kept(measurement=verdict.id, models=models, place=entry)
 
@@ -207,12 +204,12 @@ def fingerprint(experiment: Experiment) -> str:
     return array_hash(content, arrays)
 
 
-def _measurement(answer: VerdictAnswer) -> Artifact:
-    verdict = answer.verdict
+def _measurement(closed: ClosedLoop) -> Artifact:
+    verdict = closed.verdict
     fitted = {p.name: (p.after or p.before).value for p in verdict.parameters}
     fitted |= {
         f"{c.effect}.{c.parameter}": c.strength.value
-        for c in answer.effects
+        for c in closed.effects
         if c.strength.bound is None
     }
     report = {
@@ -222,28 +219,28 @@ def _measurement(answer: VerdictAnswer) -> Artifact:
         "words": verdict.words,
         "p_value": verdict.test.p_value.value,
         "separating": verdict.separating,
-        "findings": json_values(answer.findings),
+        "findings": json_values(closed.findings),
     }
     return Artifact(
         kind=Kind.MEASUREMENT,
-        name=answer.name,
-        parents=answer.parents,
-        recipe=dict(answer.recipe),
-        seed=answer.seed,
+        name=closed.name,
+        parents=closed.parents,
+        recipe=dict(closed.recipe),
+        seed=closed.seed,
         parameters=canonical(fitted),
-        quality=quality_flags(answer.findings),
+        quality=quality_flags(closed.findings),
         report=json.dumps(report, allow_nan=False, ensure_ascii=False),
     )
 
 
-def _model(answer: VerdictAnswer, model: NamedModel, measurement: Artifact) -> Artifact:
+def _model(closed: ClosedLoop, model: NamedModel, measurement: Artifact) -> Artifact:
     effects: Sequence[str] = list(model.content.get("effects", {}))
-    report = {"schema": "flagdata.model-report/1", "words": answer.verdict.words, "findings": []}
+    report = {"schema": "flagdata.model-report/1", "words": closed.verdict.words, "findings": []}
     return Artifact(
         kind=Kind.MODEL,
         name=model.name,
-        parents=(measurement.id, *answer.parents),
-        seed=answer.seed,
+        parents=(measurement.id, *closed.parents),
+        seed=closed.seed,
         recipe={**measurement.recipe, "effects": effects},
         parameters=canonical(model.content),
         report=json.dumps(report, allow_nan=False, ensure_ascii=False),

@@ -16,28 +16,11 @@ from typing import Any
 from flagdata.core.console import document, echo_lines, in_steps, say
 from flagdata.core.files.outputs import write_files
 from flagdata.lake import Lake
-from flagdata.pages.render import render
 from flagdata.recipes.documents import to_toml
+from measure.closing.joint_answer import KINDS, joint_answer
 from measure.closing.joint_verdict import Joint
-from measure.closing.verdict_artifacts import VerdictAnswer, keep
-from measure.report.document import as_document, plain
-from measure.report.report_page import FILTERS, TONES
-from measure.report.verdict_sentences import after_label
-
-
-def joint_page(joint: Joint) -> str:
-    """Renders the page, HTML; it lies beside the folders `markers` and `films`."""
-    kinds = [
-        {
-            "name": name,
-            "verdict": verdict,
-            "after_label": after_label(verdict) if verdict.named else "",
-        }
-        for name, verdict in (("markers", joint.markers), ("films", joint.films))
-    ]
-    values = {"joint": joint, "tone": TONES[joint.conclusion], "kinds": kinds}
-    return render("measure.report", "joint.html.j2", values, filters=FILTERS)
-
+from measure.closing.verdict_artifacts import ClosedLoop, keep
+from measure.report.document import plain
 
 FILES = ("report.html", "verdict.json", "base.toml", "model.toml")
 """What is written; the last one only where an effect was found."""
@@ -45,7 +28,6 @@ FILES = ("report.html", "verdict.json", "base.toml", "model.toml")
 
 JOINT = ("report.html", "verdict.json")
 """What is written of a joint answer, beside a folder a kind."""
-KINDS = ("markers", "films")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,33 +54,35 @@ def conclusion(words: str) -> str:
     return words.partition("\n\n")[0]
 
 
-def deliver(answer: VerdictAnswer, delivery: Delivery) -> None:
+def deliver(closed: ClosedLoop, delivery: Delivery) -> None:
     """Writes an answer's files, keeps it in the lake, and prints it.
 
     Raises:
         FlagdataError: a file or the lake that cannot be written.
     """
-    written = _written(answer, delivery)
+    written = _written(closed, delivery)
     if delivery.as_json:
         written.pop("schema")
         document("verdict", written)
     else:
-        echo_lines(answer.words if delivery.verbose else conclusion(answer.words))
+        words = closed.answer.words
+        echo_lines(words if delivery.verbose else conclusion(words))
 
 
-def deliver_joint(joint: Joint, answers: Sequence[VerdictAnswer], delivery: Delivery) -> None:
+def deliver_joint(joint: Joint, loops: Sequence[ClosedLoop], delivery: Delivery) -> None:
     """Delivers an answer by markers and films, each of which has its folder and its artifacts.
 
     Args:
-        answers: by markers and by films.
+        loops: closed by markers and by films.
 
     Raises:
         FlagdataError: a file or the lake that cannot be written.
     """
     documents = {
-        kind: _written(answer, replace(delivery, out=delivery.out / kind))
-        for kind, answer in zip(KINDS, answers, strict=True)
+        kind: _written(closed, replace(delivery, out=delivery.out / kind))
+        for kind, closed in zip(KINDS, loops, strict=True)
     }
+    answer = joint_answer(joint, *(closed.answer for closed in loops))
     content = {**plain(joint.as_dict()), **documents}
     text = json.dumps(
         {"schema": "flagdata.joint-verdict/1", **content},
@@ -108,27 +92,31 @@ def deliver_joint(joint: Joint, answers: Sequence[VerdictAnswer], delivery: Deli
     )
     write_files(
         delivery.out,
-        dict(zip(JOINT, (joint_page(joint), text + "\n"), strict=True)),
+        dict(zip(JOINT, (answer.page, text + "\n"), strict=True)),
         command="close-loop",
     )
     say(f"wrote {', '.join(str(delivery.out / file) for file in JOINT)}")
     if delivery.as_json:
         document("joint-verdict", content)
     else:
-        echo_lines(textwrap.fill(joint.words, 100))
-        for kind, answer in zip(KINDS, answers, strict=True) if delivery.verbose else ():
-            echo_lines(f"\nBy {kind}:\n{answer.words}")
+        echo_lines(textwrap.fill(answer.words, 100))
+        for kind, closed in zip(KINDS, loops, strict=True) if delivery.verbose else ():
+            echo_lines(f"\nBy {kind}:\n{closed.answer.words}")
 
 
-def _written(answer: VerdictAnswer, delivery: Delivery) -> dict[str, Any]:
+def _written(closed: ClosedLoop, delivery: Delivery) -> dict[str, Any]:
     """Writes and keeps an answer, and returns its document."""
     out, lake = delivery.out, delivery.lake
-    as_written = as_document(answer.verdict)
+    as_written = dict(closed.answer.document)
     content = json.dumps(as_written, indent=1, allow_nan=False)
-    texts = [answer.page, content + "\n", *(to_toml(model.content) for model in answer.models)]
+    texts = [
+        closed.answer.page,
+        content + "\n",
+        *(to_toml(model.content) for model in closed.models),
+    ]
     write_files(out, dict(zip_longest(FILES, texts)), command="close-loop")
     with in_steps(lambda: f"the report and the models in {out}"):
-        published = None if lake is None else keep(lake, answer, branch=delivery.branch)
+        published = None if lake is None else keep(lake, closed, branch=delivery.branch)
     if published is not None:
         as_written["artifacts"] = {
             "measurement": published.measurement,
@@ -138,7 +126,7 @@ def _written(answer: VerdictAnswer, delivery: Delivery) -> dict[str, Any]:
         }
         say(f"measurement {published.measurement}, {published.place.sentence}")
     if published is not None and published.place.new:
-        for model, identity in zip(answer.models, published.models, strict=True):
+        for model, identity in zip(closed.models, published.models, strict=True):
             say(f"model {identity} {model.name}")
-    say(f"wrote {', '.join(str(out / file) for file in FILES[: 2 + len(answer.models)])}")
+    say(f"wrote {', '.join(str(out / file) for file in FILES[: 2 + len(closed.models)])}")
     return as_written

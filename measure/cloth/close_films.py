@@ -14,7 +14,7 @@ from flagdata.errors import UsageError
 from flagdata.lake import Lake
 from measure.closing.model_recipes import NamedModel, acting, acting_effects, fitted_parameters
 from measure.closing.null_options import stage_bars
-from measure.closing.verdict_artifacts import VerdictAnswer
+from measure.closing.verdict_artifacts import ClosedLoop
 from measure.closing.verdict_sources import distinct
 from measure.cloth.calibrate_call import folder_of, options_of, sources_of
 from measure.cloth.design import PAIRS, TOGETHER, announce_simulations, lasting, weighable
@@ -24,7 +24,7 @@ from measure.cloth.films_verdict import verdict_of
 from measure.cloth.flag_simulation import COLUMNS, SETTLE, VERSION, mean_bending
 from measure.cloth.loop import FilmLoopOptions, SolvedLoop, solve
 from measure.cloth.numerics import effort
-from measure.cloth.verdict_page import verdict_page
+from measure.cloth.verdict_page import answer_of_films
 from measure.film.film_source import FilmReading
 from measure.film.similarity import FlagSize
 from measure.forecasting.strengths import Suspicion
@@ -44,7 +44,7 @@ def answer_of(
     models: tuple[NamedModel, ...],
     reading: Mapping[str, Any],
     parents: tuple[str, ...],
-) -> VerdictAnswer:
+) -> ClosedLoop:
     """Makes the answer of films and of tables of observables.
 
     Args:
@@ -62,14 +62,13 @@ def answer_of(
         **reading,
         **outcome.options.recipe(),
     }
-    return VerdictAnswer(
+    return ClosedLoop(
         name=name,
         verdict=verdict,
         models=models,
         effects=acting(verdict)[:1],
         findings=outcome.findings,
-        page=verdict_page(verdict, outcome),
-        words=words(verdict),
+        answer=answer_of_films(verdict, outcome, subject=name, words=words(verdict)),
         recipe=recipe,
         parents=parents,
         seed=outcome.options.calibration.seed,
@@ -149,7 +148,7 @@ def close_films(
     branch: str,
     name: str | None,
     level: float | None,
-) -> VerdictAnswer:
+) -> ClosedLoop:
     """Judges recordings of one flag.
 
     Args:

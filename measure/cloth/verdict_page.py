@@ -1,4 +1,4 @@
-"""The report of a verdict on films as one page that refers to no other file.
+"""A verdict on films as an answer, with its sections.
 
 A window of a film is beside flags that the models simulate in its wind, seen from the fitted place,
 in motion. The models are fitted to the first half of each recording, and the window is of the
@@ -8,17 +8,18 @@ waves differ, and how high the flag flies, how far it reaches and how it beats c
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+from markupsafe import Markup
 
+from flagdata.answer.answer import Cell, Figure, Section, Table
+from flagdata.answer.closed import Closed
 from flagdata.core.arrays import FloatArray, UInt8Array
 from flagdata.core.rng import child_seed, stream
 from flagdata.pages.page_pictures import moving, still
-from flagdata.pages.render import render
 from measure.cloth.calibration_page import Band, against_wind
 from measure.cloth.design import Weighable
 from measure.cloth.films_statement import level_of
@@ -31,8 +32,11 @@ from measure.observables import View
 from measure.observables.film_window import FilmWindow
 from measure.observables.observable import WINDOW
 from measure.observables.tracked_cloth import ClothWindow, edges_of, seen_from
-from measure.report import figures, verdict_sentences
-from measure.report.report_page import FILTERS, TONES, opening
+from measure.report import verdict_cells as cells
+from measure.report import verdict_sections as sections
+from measure.report import verdict_sentences
+from measure.report.verdict_answer import closed, errors_figure
+from measure.report.verdict_sentences import list_names, readable, shorten_list
 from measure.verdict import quantity
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.verdict_record import Verdict
@@ -221,46 +225,231 @@ def _moving(label: str, frames: Sequence[UInt8Array]) -> Moving:
     )
 
 
+def answer_of_films(
+    verdict: Verdict, outcome: SolvedLoop, *, subject: str = "", words: str = ""
+) -> Closed:
+    """Makes the answer of a verdict by films.
+
+    Args:
+        subject: what was judged; the names of the recordings where it is empty.
+        words: the verdict for a terminal.
+    """
+    after = verdict_sentences.after_label(verdict) if verdict.named else ""
+    recordings = outcome.recordings
+    names = [recording.name for recording in recordings]
+    moving = [
+        _moving_figure(outcome, index, after=after)
+        for index in range(len(recordings))
+        if _is_shown(outcome, index)
+    ]
+    errors = errors_figure(verdict, unseen="windows")
+    return closed(
+        verdict,
+        subject=subject or list_names(shorten_list(names)),
+        words=words,
+        figures=[figure for figure in (*moving[:1], errors) if figure is not None],
+        facts=_facts(outcome),
+        make_sections=lambda: _sections(verdict, outcome, moving[1:]),
+    )
+
+
+def _facts(outcome: SolvedLoop) -> dict[str, str]:
+    """Returns what the first screen says of the recordings."""
+    recordings, options = outcome.recordings, outcome.options
+    winds = [f"{one.name} ({one.speed.mean():.1f} m/s)" for one in recordings]
+    flag = options.calibration.flag
+    weight = options.area_weight
+    return {
+        "recordings": list_names(shorten_list(winds)),
+        "windows": ", ".join(str(len(one.readings)) for one in recordings[:_FEW])
+        + f", of {WINDOW:g} s each",
+        "flag": f"{flag.length:g} m × {flag.height:g} m, {flag.attachment}",
+        "area weight": "not weighed"
+        if weight is None
+        else f"{weight[0]:.3g} ± {weight[1]:.1g} kg/m²",
+    }
+
+
+_FEW = 4
+_TRIO = Markup(
+    '<div style="display: grid; gap: .6rem; grid-template-columns: '
+    'repeat(auto-fit, minmax(min(100%, 7rem), 1fr))">{}</div>'
+)
+_COLUMN = Markup(
+    '<figure style="margin: 0"><picture><source media="(prefers-reduced-motion: reduce)" '
+    'srcset="{}"><img alt="{}, in motion" src="{}"></picture>'
+    "<figcaption>{}</figcaption></figure>"
+)
+
+
+def _is_shown(outcome: SolvedLoop, index: int) -> bool:
+    """Returns whether a recording has a film and two halves."""
+    has_halves = any(pair.number == index for pair in outcome.halves)
+    return has_halves and outcome.recordings[index].excerpt is not None
+
+
+def _moving_figure(outcome: SolvedLoop, index: int, *, after: str) -> Figure:
+    """Makes the figure of a recording's film beside what the models simulate."""
+
+    def draw() -> Markup:
+        shown = side_by_side(outcome, index, after=after)
+        columns = () if shown is None else shown.columns
+        return _TRIO.format(
+            Markup("").join(
+                _COLUMN.format(one.first, one.label, one.url, one.label) for one in columns
+            )
+        )
+
+    name = outcome.recordings[index].name
+    models = "each model simulates" if after else "the base model simulates"
+    return Figure(
+        title=f"{name} beside simulations",
+        content=draw,
+        caption=f"{WINDOW:g} s of {name} beside what {models} in the same wind. Single waves differ; "
+        "compare how high the flag flies, how far it reaches and how much it beats.",
+    )
+
+
 _DRAWS = 400
 _BEFORE, _AFTER, _DOT = "#b4531a", "#1f6f9c", "#444444"
 
 
-def verdict_page(verdict: Verdict, outcome: SolvedLoop) -> str:
-    """Writes the page, HTML."""
-    after = verdict_sentences.after_label(verdict) if verdict.named else ""
-    values = {
-        "verdict": verdict,
-        "tone": TONES[verdict.conclusion],
-        **opening(verdict),
-        "test_sentence": verdict_sentences.test_sentence(verdict),
-        "remark": verdict_sentences.test_remark(verdict.test),
-        "named": verdict_sentences.named_candidates(verdict),
-        "after_label": after,
-        "level": level_of(verdict),
-        "has_control": any(quantity.known(c.control) for c in verdict.comparisons),
-        "null": figures.null_distribution(verdict.test),
-        "whole": outcome.judged.scored.whole,
-        "title": lambda c: verdict_sentences.candidate_title(verdict, c),
-        "recordings": [
-            {
-                "name": recording.name,
-                "windows": len(recording.readings),
-                "wind": f"{recording.speed.mean():.1f}",
-                "picture": _against_wind(outcome, number, with_effect=bool(verdict.named)),
-                "beside": side_by_side(outcome, number, after=after),
-            }
-            for number, recording in enumerate(outcome.recordings)
+def _sections(verdict: Verdict, outcome: SolvedLoop, moving: Sequence[Figure]) -> list[Section]:
+    """Makes the sections of a verdict by films.
+
+    Args:
+        moving: figures of further recordings.
+    """
+    made = [sections.verdict_section(verdict)]
+    if moving:
+        made.append(
+            Section(title="Films beside the models", parts=[*moving, _HOW_BESIDE], folded=True)
+        )
+    made.append(_windows(verdict, outcome))
+    if verdict.comparisons:
+        made.append(_errors(verdict))
+    suspected = verdict.test.suspected
+    statistic = (
+        f"The statistic is z of {suspected}, the only direction that is tested, since it was stated "
+        "beforehand."
+        if suspected
+        else "The statistic is the largest z of an effect's direction, or that of the whole misfit "
+        f"({quantity.number(outcome.judged.scored.whole)}), which sees changes along no effect."
+    )
+    made.append(
+        sections.test_section(
+            verdict,
+            f"{statistic} Each z is in standard deviations of null flags of kinds that were left "
+            "out, about their mean.",
+        )
+    )
+    if verdict.power:
+        made.append(sections.power_section(verdict, _HOW_SEEN))
+    if verdict.ranking:
+        made.append(_ranking(verdict))
+    made.append(sections.parameters_section(verdict, title="The cloth"))
+    return [*made, *sections.closing_sections(verdict)]
+
+
+_HOW_BESIDE = (
+    "The models were fitted to the first half of each recording; the window is of the second half. "
+    "They are seen from the fitted place and at the film's scale. Turbulence quicker than the log "
+    "is drawn anew, so that single waves differ."
+)
+_HOW_SEEN = (
+    "The chance of being seen is the share of null flags that are beyond the critical value once "
+    "the effect has moved what they show as it does on average at the expected strength, beyond "
+    "its null value."
+)
+
+
+def _windows(verdict: Verdict, outcome: SolvedLoop) -> Section:
+    """Makes the section of the observables against the wind."""
+    both = (
+        "the base model (brown) and the larger model (blue) show"
+        if verdict.named
+        else "the base model shows"
+    )
+    figures = [
+        Figure(
+            title=f"Observables of windows of {recording.name} against the wind",
+            content=lambda index=index: _against_wind(
+                outcome, index, with_effect=bool(verdict.named)
+            ),
+            caption=f"{recording.name}. Dots: {len(recording.readings)} windows of the film, at a "
+            f"mean wind of {recording.speed.mean():.1f} m/s. Bands: what {both} on average, at "
+            "90 %, without the scatter among windows.",
+        )
+        for index, recording in enumerate(outcome.recordings)
+    ]
+    return Section(title="Observables against the wind", parts=figures, folded=True)
+
+
+def _errors(verdict: Verdict) -> Section:
+    """Makes the section of errors on unseen windows."""
+    has_after = any(quantity.known(c.after) for c in verdict.comparisons)
+    notes = [
+        (
+            "Root mean square error of means over windows that "
+            f"{'neither model was' if has_after else 'the model was not'} fitted to; intervals at "
+            f"{level_of(verdict)} by the scatter of replicates."
+        ),
+        (
+            "Other halves: calibrated on one half of each recording, compared with the other, both "
+            "ways. Recordings left out: calibrated on all others. The scatter of replicates is how far "
+            "simulations of one cloth and view scatter: no model predicts better."
+        ),
+    ]
+    if has_after:
+        notes.append("E_red = (before − after) / (before − scatter).")
+    return sections.errors_section(
+        verdict,
+        title="Before and after, on unseen windows" if has_after else "Error on unseen windows",
+        columns=("observable", "windows", "scatter of replicates"),
+        notes=notes,
+    )
+
+
+def _ranking(verdict: Verdict) -> Section:
+    """Makes the section of the effects that were weighed."""
+    named = verdict_sentences.named_candidates(verdict)
+    rows: list[list[Cell]] = [
+        [
+            cells.name_cell(one.effect, readable(one.parameter), marked=one in named),
+            cells.estimate_cell(one.strength),
+            cells.share_cell(one.probability),
+            cells.number_cell(one.gain),
+            cells.errors_cell(one.z),
+            cells.probability_cell(one.p_value),
+            cells.probability_cell(one.p_family),
+            cells.probability_cell(one.leftover),
+        ]
+        for one in verdict.ranking
+    ]
+    table = Table(
+        columns=[
+            "effect",
+            "strength if it acts",
+            "probability",
+            "log Bayes factor [nat]",
+            "z",
+            "p alone",
+            "p of all",
+            "p remaining",
         ],
-        "provenance": [
-            (name, value if isinstance(value, str) else json.dumps(value))
-            for name, value in {
-                **verdict.provenance.get("options", {}),
-                **verdict.provenance,
-            }.items()
-            if name != "options"
-        ],
-    }
-    return render("measure.report", "films.html.j2", values, filters=FILTERS)
+        rows=rows,
+        caption="Most probable first, in bold those that are named. Intervals at "
+        f"{quantity.level_text(verdict.ranking[0].strength.level)}.",
+    )
+    return Section(title="Effects", parts=[table, _HOW_RANKED], anchor="ranking", folded=True)
+
+
+_HOW_RANKED = (
+    "The probability is given that one effect of the library is missing, each as probable as "
+    "another before. z is how far the recordings lie along the change that the effect makes. p "
+    "alone compares it with that of null flags along the same change, p of all with the largest of "
+    "all changes. p remaining is that of the misfit which remains with this effect."
+)
 
 
 def bands(

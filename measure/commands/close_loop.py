@@ -22,7 +22,7 @@ from measure.cloth.film_options import JudgingFilms, refuse_of_others
 if TYPE_CHECKING:
     from flagdata.core.stated import Stated
     from flagdata.lake import Lake
-    from measure.closing.verdict_artifacts import VerdictAnswer
+    from measure.closing.verdict_artifacts import ClosedLoop
     from measure.closing.verdict_sources import SourceOptions
     from measure.observe import Hold, Setup, Up
     from measure.observe.experiment_recipe import ExperimentRecipe
@@ -205,9 +205,10 @@ def close_loop(chosen: CloseLoopCommand) -> None:
     from flagdata.core.files.outputs import check_files
     from flagdata.dataset.lake_source import lake_of
     from measure.closing.close import close_loop as close
+    from measure.closing.joint_answer import KINDS
     from measure.closing.model_recipes import models
     from measure.closing.verdict_artifacts import answer_of
-    from measure.closing.verdict_output import FILES, JOINT, KINDS, Delivery, deliver, deliver_joint
+    from measure.closing.verdict_output import FILES, JOINT, Delivery, deliver, deliver_joint
     from measure.closing.verdict_sources import read
     from measure.cloth.flag_recordings import films_among
     from measure.forecasting.strengths import Suspicion, on_markers
@@ -263,7 +264,7 @@ def close_loop(chosen: CloseLoopCommand) -> None:
         out=out, lake=lake, branch=branch, as_json=chosen.as_json, verbose=chosen.verbose
     )
 
-    def of_markers(level: float | None) -> tuple[VerdictAnswer, Material]:
+    def of_markers(level: float | None) -> tuple[ClosedLoop, Material]:
         """Returns the answer by markers, and the cloth's nominal material."""
         null_options = nulls_given(recipe, chosen, level=level)
         options = LoopOptions(
@@ -299,7 +300,7 @@ def close_loop(chosen: CloseLoopCommand) -> None:
         )
         return answer, cloth.material
 
-    def of_films(level: float | None) -> VerdictAnswer:
+    def of_films(level: float | None) -> ClosedLoop:
         from measure.cloth.close_films import close_films
 
         return close_films(

@@ -106,9 +106,7 @@ def in_time(residual: Residual, *, after: str) -> Panel:
         (residual.in_time_after, Colour.FILM, after),
     ]
     marks = [
-        Line(
-            x=residual.times, y=np.asarray(course) * in_unit.factor, colour=colour, label=label
-        )
+        Line(x=residual.times, y=np.asarray(course) * in_unit.factor, colour=colour, label=label)
         for course, colour, label in courses
         if course
     ]
@@ -156,9 +154,7 @@ def on_a_line(markers: FloatArray) -> bool:
     return bool(spread[1] <= 1e-6 * spread[0])
 
 
-def _map(
-    markers: FloatArray, values: FloatArray, shade: Shade, title: str, label: str
-) -> Panel:
+def _map(markers: FloatArray, values: FloatArray, shade: Shade, title: str, label: str) -> Panel:
     (left, bottom), (right, top) = markers.min(axis=0).tolist(), markers.max(axis=0).tolist()
     finite = np.isfinite(values)
     low, high = shade.ends
@@ -187,9 +183,7 @@ def _map(
             size=1.2,
         )
     )
-    return Panel(
-        marks=marks, title=title, x=Axis(label="u [m]"), y=Axis(label="v [m]"), equal=True
-    )
+    return Panel(marks=marks, title=title, x=Axis(label="u [m]"), y=Axis(label="v [m]"), equal=True)
 
 
 def _profile(
@@ -199,9 +193,7 @@ def _profile(
     along = np.linalg.norm(markers - markers[:1], axis=1) if len(markers) else np.zeros(0)
     order = np.argsort(along)
     marks: list[Mark] = [Across(y=0.0)] if shade.low < 0 else []
-    marks.append(
-        Line(x=along[order], y=values[order] * shade.in_unit.factor, colour=Colour.LOG)
-    )
+    marks.append(Line(x=along[order], y=values[order] * shade.in_unit.factor, colour=Colour.LOG))
     y = Axis(label=label or f"error [{shade.in_unit.unit}]", limits=shade.ends)
     return Panel(marks=marks, title=title, x=Axis(label="along the markers [m]"), y=y)
 

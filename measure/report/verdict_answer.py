@@ -13,6 +13,7 @@ from markupsafe import Markup
 from flagdata.answer import Bound, Quantity, Span
 from flagdata.answer.answer import Cell, Figure, Head, Part, Section, Table, Tone
 from flagdata.answer.closed import Closed
+from measure.observe.trajectory import Experiment
 from measure.report import verdict_cells as cells
 from measure.report import verdict_sections as sections
 from measure.report import verdict_sentences
@@ -38,7 +39,9 @@ TONES = {
 }
 _CHART = 620
 """Most that a chart is wide which a telephone shows without scrolling [px]."""
-_TERMS = Markup('<span class="small"><a href="#{}">What p, floor and the other terms mean</a></span>')
+_TERMS = Markup(
+    '<span class="small"><a href="#{}">What p, floor and the other terms mean</a></span>'
+)
 
 
 def answer_of_markers(
@@ -81,9 +84,7 @@ def closed(
         candidate.effect: quantity_of(candidate.parameter, candidate.strength)
         for candidate in verdict_sentences.named_candidates(verdict)
     }
-    parameters = {
-        one.name: quantity_of(one.name, one.before) for one in verdict.parameters
-    }
+    parameters = {one.name: quantity_of(one.name, one.before) for one in verdict.parameters}
     return Closed(
         question="close-loop",
         subject=subject,
@@ -139,8 +140,13 @@ def errors_figure(verdict: Verdict, *, unseen: str = "data") -> Figure | None:
     chart = errors_chart(verdict.comparisons, after=after)
     if chart is None:
         return None
+    shares = [
+        f"{one.what}: {100 * one.after.value / one.before.value:.0f} % {after}"
+        for one in verdict.comparisons
+        if quantity.known(one.after) and quantity.known(one.before) and one.before.value > 0
+    ]
     return Figure(
-        title="Errors before and after",
+        title=f"Errors in per cent of the base model's: {'; '.join(shares)}",
         content=chart,
         caption=f"How much it matters: the error on {unseen} that neither model was fitted to.",
         width=_CHART,
@@ -191,6 +197,27 @@ def _recorded(residuals: Sequence[Residual]) -> dict[str, str]:
     if seconds:
         facts["duration"] = ", ".join(f"{number(one, digits=2)} s" for one in seconds[:4])
     return facts
+
+
+def facts_of(experiment: Experiment) -> dict[str, str]:
+    """Returns what the first screen says of the cloth and of the wind's log."""
+    specimen = experiment.specimen
+    weight = number(specimen.material.area_weight)
+    cloth = f"{specimen.material.name}, nominally {weight} kg/m²"
+    known = (
+        f", known to {100 * specimen.area_weight_uncertainty:.2g} %"
+        if specimen.mass_known
+        else ", its mass not known"
+    )
+    gains, directions, clocks = zip(
+        *(recording.wind.uncertainty for recording in experiment.recordings), strict=True
+    )
+    return {
+        "cloth": f"{cloth}{known}; held at {len(specimen.held)} points",
+        "wind's log": f"known to {number(100 * max(gains), digits=2)} % in speed, "
+        f"{number(math.degrees(max(directions)), digits=2)}° in direction and "
+        f"{number(max(clocks), digits=2)} s in time",
+    }
 
 
 def _flatten(values: Mapping[str, Any], prefix: str = "") -> Iterable[tuple[str, str]]:
@@ -247,11 +274,13 @@ def _errors(verdict: Verdict) -> Section:
         e for c in verdict.comparisons for e in (c.before, c.after, c.floor)
     )
     notes = [
-        "Root mean square one-step prediction error on data that "
-        f"{'neither model was' if has_after else 'the model was not'} fitted to; intervals at "
-        f"{level}. The floor is the model's error on data that were simulated from the model "
-        "itself with other numerics. Where errors lie above it, no effect brings them below it; "
-        "where they lie below it, it limits nothing.",
+        (
+            "Root mean square one-step prediction error on data that "
+            f"{'neither model was' if has_after else 'the model was not'} fitted to; intervals at "
+            f"{level}. The floor is the model's error on data that were simulated from the model "
+            "itself with other numerics. Where errors lie above it, no effect brings them below it; "
+            "where they lie below it, it limits nothing."
+        ),
     ]
     if has_after:
         notes.append(
@@ -308,7 +337,9 @@ def _residuals(verdict: Verdict) -> Section:
         "hollow where one was never tracked. The mean error is that of the base model (observed − "
         "predicted; x and y horizontal, z up)."
     )
-    return Section(title="Where and when the model errs", parts=parts, anchor="residual", folded=True)
+    return Section(
+        title="Where and when the model errs", parts=parts, anchor="residual", folded=True
+    )
 
 
 def _ranking(verdict: Verdict) -> Section:
@@ -357,8 +388,10 @@ def _ranking(verdict: Verdict) -> Section:
             _CHART,
         ),
         (
-            "Strength on each recording alone; shaded: the interval of all together; the level "
-            "line: no effect",
+            (
+                "Strength on each recording alone; shaded: the interval of all together; the level "
+                "line: no effect"
+            ),
             strengths_chart(verdict.ranking, title=title),
             None,
         ),

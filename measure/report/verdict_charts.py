@@ -24,7 +24,8 @@ from measure.verdict.verdict_record import Candidate, Comparison, Estimate, Null
 NARROW = 5.2
 """Width of a chart that a telephone shows without scrolling [inch]."""
 _MOST = 8
-"""Comparisons, and strengths by recording, that are drawn: the first ones."""
+"""Comparisons that are drawn: the first ones."""
+_MOST_STRENGTHS = 4
 _MOST_GAINS = 14
 _LONGEST = 250.0
 """Error that is drawn at most, in per cent of the base model's."""
@@ -123,9 +124,7 @@ def null_chart(test: NullTest) -> Chart:
     return Chart(rows=[[panel]], height=3.0, width=7.0)
 
 
-def _histogram(
-    values: Sequence[float], *, logarithmic: bool
-) -> tuple[list[float], list[int]]:
+def _histogram(values: Sequence[float], *, logarithmic: bool) -> tuple[list[float], list[int]]:
     """Edges and counts of equal bins, of the logarithm where the axis shows ratios."""
     taken = [math.log10(v) for v in values] if logarithmic else list(values)
     low, high = min(taken), max(taken)
@@ -192,12 +191,9 @@ def strengths_chart(
     Args:
         title: of an effect.
     """
-    drawn = [
-        one for one in candidates if known(one.strength) and any(map(known, one.by_recording))
-    ]
-    panels = [_strengths_panel(one, title(one)) for one in drawn[:_MOST]]
-    rows = [panels[first : first + 4] for first in range(0, len(panels), 4)]
-    return Chart(rows=rows, height=2.1, legend=False) if rows else None
+    drawn = [one for one in candidates if known(one.strength) and any(map(known, one.by_recording))]
+    panels = [_strengths_panel(one, title(one)) for one in drawn[:_MOST_STRENGTHS]]
+    return Chart(rows=[panels], height=2.1, legend=False) if panels else None
 
 
 def _strengths_panel(candidate: Candidate, title: str) -> Panel:

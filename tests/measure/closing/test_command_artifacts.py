@@ -18,7 +18,7 @@ from flagdata.core.schema import Kind
 from flagdata.errors import CorruptError, InputError
 from flagdata.lake import Artifact, Lake
 from flagdata.recipes.documents import to_toml
-from measure.closing import VerdictAnswer, acting, answer_of
+from measure.closing import ClosedLoop, acting, answer_of
 from measure.closing.model_recipes import models
 from measure.closing.verdict_artifacts import fingerprint, keep, read
 from measure.loop import LoopOptions
@@ -69,7 +69,7 @@ def experiment(
     return Experiment(specimen=specimen, recordings=(recording,))
 
 
-def closed(observed: Experiment, conclusion: Conclusion = Conclusion.EFFECT) -> VerdictAnswer:
+def closed(observed: Experiment, conclusion: Conclusion = Conclusion.EFFECT) -> ClosedLoop:
     found = concluded(conclusion)
     return answer_of(
         found,

@@ -8,12 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flagdata.answer.closed import Closed
 from measure.closing import join_verdicts
+from measure.closing.joint_answer import joint_answer, spoken
 from measure.closing.joint_verdict import Joint, _multiply_likelihoods
-from measure.closing.verdict_output import joint_page
+from measure.report import answer_of_markers
 from measure.report.document import plain
 from measure.verdict import CRITERIA, Conclusion, Estimate, Parameter, Verdict
 from tests.golden_answers import changes
+from tests.measure.report.pages import parsed
 from tests.measure.report.verdicts import verdict
 
 NOMINAL = {"area_weight": 0.2, "bending": 1e-4}
@@ -29,6 +32,11 @@ def judged(conclusion: Conclusion, p: float, *, named: tuple[str, ...] | None = 
     found = verdict(conclusion)
     test = replace(found.test, p_value=replace(found.test.p_value, value=p))
     return replace(found, test=test, named=found.named if named is None else named)
+
+
+def answer_of(found: Joint) -> Closed:
+    """The answer, of which both kinds are shown as those by markers."""
+    return joint_answer(found, answer_of_markers(found.markers), answer_of_markers(found.films))
 
 
 def both(markers: Verdict, films: Verdict) -> Joint:
@@ -64,7 +72,7 @@ def test_the_joint_p_is_twice_the_smaller_and_each_kind_that_rejects_has_its_say
 
 def test_a_joint_answer_that_is_not_decided_has_the_reasons_and_calls_no_effect_needless() -> None:
     found = both(judged(Conclusion.SUFFICIENT, 0.4), judged(Conclusion.UNDECIDED, 0.2))
-    for said in (found.words, joint_page(found)):
+    for said in (found.words, answer_of(found).page):
         assert "Nothing is decided" in said
         assert found.films.open[0] in said
         assert "no effect is needed" not in said
@@ -156,12 +164,27 @@ def test_the_cloth_of_markers_is_brought_to_the_films_units_and_the_page_has_bot
     assert base.apart > 5
     assert with_lift.together.value == pytest.approx(0.2)
     assert with_lift.together.unit == "kg/m²"
-    page = joint_page(found)
+    answer = answer_of(found)
     assert "joint p = 0.020" in found.words
     for text in (
-        "markers/report.html",
-        "films/report.html",
+        "By markers: test against simulated nulls",
+        "By films: test against simulated nulls",
         "area weight, with lift",
         markers.comparisons[0].what,
     ):
-        assert text in page
+        assert text in answer.page
+    read = parsed(answer.page)
+    identities = [e.attributes["id"] for e in read.elements if "id" in e.attributes]
+    assert read.faults == []
+    assert len(identities) == len(set(identities))
+    assert answer.document["markers"]["conclusion"] == "effect"
+    assert answer.strengths["lift"].unit == films.ranking[0].strength.unit
+
+
+@pytest.mark.parametrize("conclusion", list(Conclusion))
+def test_a_joint_answer_can_be_said_aloud(conclusion: Conclusion) -> None:
+    named = {Conclusion.ONE_OF: ("finite-span-loading", "tangential-quadratic-drag", "shear")}
+    found = both(judged(Conclusion.EFFECT, 0.02), judged(Conclusion.EFFECT, 0.02))
+    said = spoken(replace(found, conclusion=conclusion, named=named.get(conclusion, found.named)))
+    assert len(said.split()) < 25
+    assert said.endswith(".")

@@ -27,12 +27,13 @@ from measure.nulls import NullBatch
 from measure.nulls import bank as banks
 from measure.observe import Experiment, Specimen, Trajectory
 from measure.probes import projected_statistics
-from measure.report import as_document, from_document, lead, page
+from measure.report import as_document, from_document, lead
 from measure.report.verdict_words import words
 from measure.verdict import NOT_REJECTED, Conclusion, Verdict, number
 from sim.cloth import Cloth
 from sim.effects import EFFECTS, Effect, ForceEffect, Value, strength
 from sim.workers import Job
+from tests.measure.report.pages import page_of_words
 
 DURATION, NOISE, SPEEDS, KINDS = 4.6, 5e-4, (3.5, 6.0), 9
 
@@ -195,7 +196,7 @@ def test_a_hoist_that_is_attached_is_as_stiff_as_a_bound_and_the_bound_holds(
         == verdict.ranking
     )
     said = f"stiffness at least {number(found.strength.low, digits=2)} N/m² 95 %"
-    for text in (lead(verdict), words(verdict), page(verdict)):
+    for text in (lead(verdict), words(verdict), page_of_words(verdict)):
         assert said.removesuffix(" 95 %") in text.replace("\N{NO-BREAK SPACE}", " ")
     assert said in lead(verdict)
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from html.parser import HTMLParser
+
+from measure.report import answer_of_markers
+from measure.verdict import Verdict
 
 VOID = {"meta", "br", "input", "img", "link", "hr"}
 SELF_CLOSED = {"path", "circle", "rect", "image"}
@@ -66,8 +69,18 @@ class Page(HTMLParser):
         return [e for e in self.elements if name in e.attributes.get("class", "").split()]
 
 
+def page(verdict: Verdict) -> str:
+    """The page of a verdict by markers."""
+    return answer_of_markers(verdict).page
+
+
+def page_of_words(verdict: Verdict) -> str:
+    """The page without the charts of recordings, which take a second each."""
+    return page(replace(verdict, residuals=()))
+
+
 def parsed(html: str) -> Page:
-    page = Page()
-    page.feed(html)
-    page.close()
-    return page
+    read = Page()
+    read.feed(html)
+    read.close()
+    return read

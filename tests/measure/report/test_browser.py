@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from measure.report import page
 from measure.verdict import Conclusion
+from tests.measure.report.pages import page
 from tests.measure.report.verdicts import FULL, verdict, with_holes
 
 BROWSER = next(

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
 
-from measure.report import lead, page
-from measure.report.lead_sentences import evidence, explained_words, p_text
-from measure.verdict import Conclusion, with_level
-from tests.measure.report.pages import parsed
+from measure.report import lead
+from measure.report.lead_sentences import evidence, explained_words, p_text, spoken
+from measure.verdict import Conclusion, Estimate, with_level
+from tests.measure.report.pages import page_of_words, parsed
 from tests.measure.report.verdicts import about, verdict
 
 
@@ -117,13 +118,13 @@ def test_the_page_begins_with_the_sentence_and_what_is_folded_comes_last(
 ) -> None:
     whole = replace(verdict(conclusion), words="")
     whole = replace(whole, words=f"{lead(whole)} More.")
-    html = page(whole)
+    html = page_of_words(whole)
     read = parsed(html)
-    assert read.all("h1")[0].text == lead(whole)
-    open_part = html[html.index("<main>") : html.index("<details")]
-    assert "What speaks against it" in open_part
-    assert "p = " not in open_part
-    assert "<table" not in open_part
+    assert read.classed("verdict")[0].text.strip() == spoken(whole)
+    first_screen = html[html.index("<body>") : html.index("<details")]
+    assert "<li>More.</li>" in first_screen
+    assert "family-wise" not in first_screen
+    assert "<section" not in html
     assert {e.text for e in read.all("dt")} >= {"null", "floor", "E_red", "p"}
 
 
@@ -132,8 +133,26 @@ def test_the_chart_is_in_per_cent_of_the_base_models_error() -> None:
     first = whole.comparisons[0]
     svg = next(
         e
-        for e in parsed(page(whole)).all("svg")
+        for e in parsed(page_of_words(whole)).all("svg")
         if "per cent" in e.attributes.get("aria-label", "")
     )
     share = 100 * first.after.value / first.before.value
     assert f"{first.what}: {share:.0f} % with lift" in svg.attributes["aria-label"]
+
+
+def test_a_verdict_can_be_said_aloud() -> None:
+    """In fewer than 25 words, with a bound in words, whatever is concluded of whatever effects."""
+    whole = verdict(Conclusion.EFFECT)
+    bound = Estimate(
+        value=0.35, low=0.35, high=math.inf, unit="kg/m²", level=0.95, bound="at-least"
+    )
+    rain = replace(whole.ranking[0], effect="wet-mass", parameter="uptake", strength=bound)
+    named = replace(whole, named=("wet-mass",), ranking=(rain,))
+    assert spoken(named) == (
+        "Something was missing: wet mass explains it; its uptake is at least 0.35 kg/m² (95 %)."
+    )
+    many = ("tangential-linear-drag", "finite-span-loading", "shear", "lift", "added-mass")
+    for conclusion in Conclusion:
+        for effects in ((), many[:1], many[:2], many):
+            said = spoken(replace(verdict(conclusion), named=effects))
+            assert len(said.split()) < 25, said

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from measure.report.moving_cloth import ELEVATION, FACTORS, MISSING, motion, still
+from measure.report.moving_cloth import ELEVATION, FACTORS, MISSING, motion, pack_clip, still
 from measure.verdict import Residual
 from tests.measure.report.verdicts import FULL, Size, residual
 
@@ -29,7 +29,7 @@ def test_the_packed_positions_and_errors_are_the_given_ones_to_one_step() -> Non
     given = recording()
     moved = motion(given)
     assert moved is not None
-    data = moved.as_dict()
+    data = pack_clip(moved)
     shape = (moved.frames, moved.markers, 3)
     observed = np.asarray(given.observed)
     seen = unpacked(data["observed"], shape) / STEPS * data["size"]
@@ -46,7 +46,7 @@ def test_a_lost_marker_is_marked_and_not_moved_to_the_middle() -> None:
     frames = [[[math.nan] * 3, *frame[1:]] for frame in given.observed]
     moved = motion(replace(given, observed=frames))
     assert moved is not None
-    packed = unpacked(moved.as_dict()["observed"], (moved.frames, moved.markers, 3))
+    packed = unpacked(pack_clip(moved)["observed"], (moved.frames, moved.markers, 3))
     assert (packed[:, 0] == MISSING).all()
     assert (packed[:, 1:] != MISSING).all()
 

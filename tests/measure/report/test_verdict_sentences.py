@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import pytest
 
-from measure.report import lead, page, verdict_sentences
+from measure.report import lead, verdict_sentences
 from measure.report.verdict_sentences import titles
 from measure.report.verdict_words import words
 from measure.verdict import Conclusion, Estimate, NullTest
+from tests.measure.report.pages import page_of_words
 from tests.measure.report.verdicts import about, verdict
 
 
@@ -175,7 +176,7 @@ def test_the_control_over_all_that_was_left_out_is_summed_up(half: float, compar
         "On recordings left out, tangential-linear-drag instead predicts worse by 0.3"
     )
     assert comparison in summary
-    assert summary in page(whole)
+    assert summary in page_of_words(whole)
     assert summary in " ".join(words(whole).replace("\n    ", " ").split())
     assert verdict_sentences.control_summary(verdict(Conclusion.EFFECT)) == ""
 

@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import pytest
 
-from measure.report import lead, page, verdict_sentences
+from measure.report import lead, verdict_sentences
 from measure.report.verdict_sentences import error_warnings, heading, power_text
 from measure.report.verdict_words import words
 from measure.verdict import NOT_REJECTED, Conclusion, Power, Verdict, erring, undecided_sentences
+from tests.measure.report.pages import page_of_words
 from tests.measure.report.verdicts import about, verdict
 
 SEEN = (0.9, 0.2, 0.4)
@@ -57,7 +58,7 @@ def test_what_is_not_decided_is_reported_with_its_reasons_and_no_effect_is_calle
     said = lead(one)
     assert said.startswith("Nothing is decided: the base model is not rejected, p = ")
     assert one.open[0] in said
-    for text in (said, heading(one), page(one)):
+    for text in (said, heading(one), page_of_words(one)):
         assert "no effect is needed" not in text.lower()
         assert "no effect needed" not in text.lower()
     assert "explains these recordings" not in said + heading(one)
@@ -90,8 +91,8 @@ def test_a_model_that_errs_by_more_than_three_floors_explains_nothing(
             assert "explains" not in said.replace("no effect of the library explains", "")
             (warning,) = error_warnings(one)
             assert f"{one.comparisons[0].what} by 3.1" in warning
-            assert warning in page(one)
-            assert "Nothing that was checked" not in page(one)
+            assert warning in page_of_words(one)
+            assert "Nothing that was checked" not in page_of_words(one)
         else:
             assert error_warnings(one) == []
 
@@ -139,7 +140,7 @@ def test_a_suspicion_is_reported_as_stated_beforehand_and_flags_are_counted_as_w
 def test_the_power_stands_before_the_verdicts_sentence_and_in_a_table() -> None:
     shown = (Power(effect="lift", parameter="coefficient", strength=2.3, unit="1", share=0.9),)
     whole = replace(verdict(Conclusion.SUFFICIENT), power=shown)
-    said, html = words(whole), page(whole)
+    said, html = words(whole), page_of_words(whole)
     mean = (
         "An effect of the strength that is expected of it would be seen with a chance of 0.90 on "
         "average."
@@ -152,13 +153,13 @@ def test_the_power_stands_before_the_verdicts_sentence_and_in_a_table() -> None:
     assert "What would have been seen" in html
     assert "lift (coefficient) 2.3 with 0.90" in " ".join(said.split())
     without = verdict(Conclusion.SUFFICIENT)
-    assert "would be seen with a chance" not in words(without) + page(without)
+    assert "would be seen with a chance" not in words(without) + page_of_words(without)
 
 
 def test_a_page_of_markers_says_that_a_suspicion_was_stated_beforehand() -> None:
     whole = verdict(Conclusion.EFFECT)
-    assert "stated beforehand" not in page(whole)
+    assert "stated beforehand" not in page_of_words(whole)
     whole = replace(whole, test=replace(whole.test, suspected="lift+"))
-    for text in (page(whole), " ".join(words(whole).split())):
+    for text in (page_of_words(whole), " ".join(words(whole).split())):
         assert "along lift+ alone, suspected before the recordings were looked at" in text
-    assert "stated beforehand" in page(whole)
+    assert "stated beforehand" in page_of_words(whole)

@@ -14,8 +14,7 @@ from PIL import Image
 
 from measure.cloth import LEAST_WINDOWS, RATE, Observed, solve, verdict_of
 from measure.cloth.observed_recording import Excerpt
-from measure.cloth.verdict_page import drawn, side_by_side
-from measure.cloth.verdict_page import verdict_page as page
+from measure.cloth.verdict_page import answer_of_films, drawn, side_by_side
 from measure.observables import WINDOW, ClothWindow, FilmWindow
 from sim.cloth.mesh import grid
 from tests.measure.cloth.loop.conftest import options, recording
@@ -120,7 +119,7 @@ def test_the_page_has_the_film_where_there_is_one(cheap: list[int], tmp_path: Pa
     texts = []
     for recordings in ([one], [with_film(one)]):
         outcome = solve(recordings, options(), folder=tmp_path)
-        texts.append(page(verdict_of(outcome), outcome))
+        texts.append(answer_of_films(verdict_of(outcome), outcome).page)
     assert "the film, in motion" not in texts[0]
     assert "the film, in motion" in texts[1]
     assert "base model, in motion" in texts[1]

@@ -10,7 +10,7 @@ import pytest
 from flagdata.errors import UnknownNameError, UsageError
 from measure.cloth import Flag, close_loop, solve, verdict_of, weighable
 from measure.cloth.films_statement import words
-from measure.cloth.verdict_page import verdict_page as page
+from measure.cloth.verdict_page import answer_of_films
 from measure.forecasting import Suspicion
 from measure.verdict import Conclusion
 from tests.measure.cloth.loop.conftest import options, recording
@@ -72,9 +72,12 @@ def test_it_is_tested_alone_and_the_page_and_the_words_say_that_it_was_stated_be
             folder=tmp_path,
         )
         found[text] = verdict_of(outcome)
-        for said in (" ".join(words(found[text]).split()), page(found[text], outcome)):
+        for said in (
+            " ".join(words(found[text]).split()),
+            answer_of_films(found[text], outcome).page,
+        ):
             assert f"along {text}+ alone, suspected before the recordings were looked at" in said
-        assert "stated beforehand" in page(found[text], outcome)
+        assert "stated beforehand" in answer_of_films(found[text], outcome).page
         assert found[text].provenance["options"]["suspected"] == f"{text}+"
     assert found["lift"].named == ("lift",)
     assert found["lift"].test.p_value.value <= 0.05
