@@ -16,14 +16,22 @@ from __future__ import annotations
 import dataclasses
 import datetime as dt
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from enum import Enum
 from pathlib import PurePath
 from typing import Any
 
 
-def json_values(value: Any) -> Any:
+def finite(number: float) -> float | None:
+    """Returns a number as JSON has it; None of one that is not finite."""
+    return number if math.isfinite(number) else None
+
+
+def json_values(value: Any, *, number: Callable[[float], Any] = finite) -> Any:
     """Returns a value as JSON has it: objects, lists, texts, numbers, true, false and null.
+
+    Args:
+        number: how a floating-point number is written.
 
     Raises:
         TypeError: a type that JSON has no form of.
@@ -36,20 +44,24 @@ def json_values(value: Any) -> Any:
         case int():
             return value
         case float():
-            return value if math.isfinite(value) else None
+            return number(value)
         case PurePath():
             return str(value)
         case dt.date():
             return value.isoformat()
         case Mapping():
-            return {str(json_values(key)): json_values(one) for key, one in value.items()}
+            return {
+                str(json_values(key)): json_values(one, number=number) for key, one in value.items()
+            }
         case list() | tuple():
-            return [json_values(one) for one in value]
+            return [json_values(one, number=number) for one in value]
         case _ if callable(listed := getattr(value, "tolist", None)):  # of numpy, not loaded for it
-            return json_values(listed())
+            return json_values(listed(), number=number)
         case _ if names := _names(value):
             optional = getattr(type(value), "JSON_OPTIONAL", ())
-            entries = ((key, json_values(_part(value, path))) for key, path in names.items())
+            entries = (
+                (key, json_values(_part(value, path), number=number)) for key, path in names.items()
+            )
             return {
                 key: one
                 for key, one in entries

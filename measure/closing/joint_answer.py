@@ -36,7 +36,7 @@ def joint_answer(joint: Joint, by_markers: Closed, by_films: Closed) -> Closed:
         quantities=strengths,
         findings=[*by_markers.findings, *by_films.findings],
         document={
-            **plain(joint.as_dict()),
+            **plain(joint),
             **{kind: answer.document for kind, answer in answers.items()},
         },
         head=Head(

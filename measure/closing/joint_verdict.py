@@ -17,8 +17,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
+from typing import ClassVar
 
 from measure.verdict.criteria import CRITERIA
 from measure.verdict.decided import NOT_REJECTED
@@ -62,6 +62,16 @@ class Joint:
         markers, films: the verdicts of each kind, at half of the level.
     """
 
+    JSON_NAMES: ClassVar = (
+        "conclusion",
+        "named",
+        "words",
+        "p_value",
+        "level",
+        "strengths",
+        "cloth",
+    )
+
     conclusion: Conclusion
     named: tuple[str, ...]
     p_value: float
@@ -75,18 +85,6 @@ class Joint:
     def words(self) -> str:
         """The answer in sentences."""
         return " ".join(_sentences(self))
-
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values, without the two verdicts."""
-        return {
-            "conclusion": self.conclusion.value,
-            "named": list(self.named),
-            "words": self.words,
-            "p_value": self.p_value,
-            "level": self.level,
-            "strengths": [asdict(strength) for strength in self.strengths],
-            "cloth": [asdict(quantity) for quantity in self.cloth],
-        }
 
 
 def join_verdicts(

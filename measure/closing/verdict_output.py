@@ -83,7 +83,7 @@ def deliver_joint(joint: Joint, loops: Sequence[ClosedLoop], delivery: Delivery)
         for kind, closed in zip(KINDS, loops, strict=True)
     }
     answer = joint_answer(joint, *(closed.answer for closed in loops))
-    content = {**plain(joint.as_dict()), **documents}
+    content = {**plain(joint), **documents}
     text = json.dumps(
         {"schema": "flagdata.joint-verdict/1", **content},
         indent=1,

@@ -17,6 +17,7 @@ from scipy.special import ndtr
 from flagdata.answer import Bound
 from flagdata.core.arrays import FloatArray
 from flagdata.core.findings import Severity
+from flagdata.core.json_values import json_values
 from flagdata.core.provenance import code_version
 from measure.cloth.design import Weighable
 from measure.cloth.films_statement import state_verdict
@@ -103,7 +104,7 @@ def verdict_of(outcome: SolvedLoop) -> Verdict:
         provenance={
             "seed": options.calibration.seed,
             "code": code_version(),
-            "criteria": replace(CRITERIA, level=options.level).as_dict(),
+            "criteria": json_values(replace(CRITERIA, level=options.level)),
             "options": options.recipe(),
         },
         power=_power(outcome),

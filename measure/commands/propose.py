@@ -8,6 +8,7 @@ from pathlib import Path
 
 from flagdata.api.measuring_verbs import Proposing
 from flagdata.core.console import echo_lines, say
+from flagdata.core.json_values import json_values
 from flagdata.verbs.verb_options import Result, verb
 from measure.closing.null_options import nulls_given, refuse, stage_bars
 
@@ -72,7 +73,7 @@ def propose(chosen: Proposing) -> Iterator[Result]:
     if chosen.effect is None and outcome.strengths:
         spec = effect_file.write(outcome, folder).spec
     proposal_log.add(folder / "proposals.json", outcome, effect=spec)
-    yield Result("proposal", {"effect": spec, **outcome.as_dict()})
+    yield Result("proposal", {"effect": spec, **json_values(outcome)})
     echo_lines(words(outcome))
     if spec:
         say(f"effect {spec}")

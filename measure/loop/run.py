@@ -26,6 +26,7 @@ import numpy as np
 import torch
 
 from flagdata.core.arrays import FloatArray, IntArray
+from flagdata.core.json_values import json_values
 from flagdata.core.provenance import code_version
 from flagdata.core.rng import child_seed
 from flagdata.errors import InputError, UsageError
@@ -548,7 +549,7 @@ def _outcome(
         provenance={
             "seed": options.seed,
             "code": code_version(),
-            "criteria": replace(CRITERIA, level=options.level).as_dict(),
+            "criteria": json_values(replace(CRITERIA, level=options.level)),
             "parents": [r.source for r in setting.experiment.recordings if r.source],
         },
     )

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
 
 from measure.propose.search import Step
 from measure.verdict.verdict_record import Estimate
@@ -183,7 +182,3 @@ class ProposalOutcome:
     tested_on: str
     known: tuple[str, ...]
     seed: int
-
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values: an entry of the proposal log."""
-        return asdict(self)

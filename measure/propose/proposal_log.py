@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from flagdata.core.files.outputs import check_rewrite, rewrite
+from flagdata.core.json_values import json_values
 from flagdata.errors import CorruptError
 from flagdata.recipes.documents import read_json
 from measure.propose.outcome import ProposalOutcome
@@ -54,7 +55,7 @@ def add(path: Path, outcome: ProposalOutcome, *, effect: str) -> None:
     Raises:
         CorruptError: the file is not a proposal log.
     """
-    all_entries = [*entries(path), {"effect": effect, **outcome.as_dict()}]
+    all_entries = [*entries(path), {"effect": effect, **json_values(outcome)}]
     text = json.dumps(
         {"schema": SCHEMA, "entries": all_entries}, indent=1, allow_nan=False, ensure_ascii=False
     )

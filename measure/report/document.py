@@ -17,11 +17,11 @@ import dataclasses
 import math
 import types
 from collections.abc import Mapping
-from enum import StrEnum
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from flagdata.core.json_values import json_values
 from flagdata.errors import InputError
 from measure.verdict.verdict_record import Verdict
 
@@ -34,13 +34,12 @@ _INFINITE = {"Infinity": math.inf, "-Infinity": -math.inf}
 
 def as_document(verdict: Verdict) -> dict[str, Any]:
     """Returns the verdict as JSON values, with its schema tag."""
-    content = plain({**verdict.as_dict(), "residuals": ()})
+    still = dataclasses.replace(verdict, residuals=())
+    content = {"schema": SCHEMA, **plain(still)}
     content["residuals"] = [
-        {
-            **plain({**residual, **dict.fromkeys(_MOVING)}),
-            **{name: _pack_frames(residual[name]) for name in _MOVING},
-        }
-        for residual in map(dataclasses.asdict, verdict.residuals)
+        plain(dataclasses.replace(residual, **dict.fromkeys(_MOVING, ())))
+        | {name: _pack_frames(getattr(residual, name)) for name in _MOVING}
+        for residual in verdict.residuals
     ]
     return content
 
@@ -76,16 +75,14 @@ def _current(candidate: Any) -> Any:
 
 
 def plain(value: Any) -> Any:
-    """Values as JSON has them."""
-    if isinstance(value, StrEnum):
-        return value.value
-    if isinstance(value, float):
-        if math.isnan(value):
-            return None
-        return value if math.isfinite(value) else ("Infinity" if value > 0 else "-Infinity")
-    if isinstance(value, Mapping):
-        return {str(k): plain(v) for k, v in value.items()}
-    return [plain(v) for v in value] if isinstance(value, list | tuple) else value
+    """Returns a value as JSON has it, see `flagdata.core.json_values`, with open ends in words."""
+    return json_values(value, number=_written)
+
+
+def _written(number: float) -> float | str | None:
+    if math.isinf(number):
+        return "Infinity" if number > 0 else "-Infinity"
+    return None if math.isnan(number) else number
 
 
 def _pack_frames(frames: _Moving) -> dict[str, Any]:

@@ -95,7 +95,7 @@ def spoken(verdict: Verdict) -> str:
             names = list_names(shorten_list([_spoken_name(name) for name in verdict.named]))
             explains = "explain" if len(verdict.named) > 1 else "explains"
             does = {
-                Conclusion.PARTLY: f"{explains} a part of it",
+                Conclusion.PARTLY: f"{'removes' if erring(verdict) else explains} a part of it",
                 Conclusion.EFFECT: "fits best" if erring(verdict) else f"{explains} it",
             }[conclusion]
             return f"Something was missing: {names} {does}{_spoken_strength(verdict)}."
@@ -109,7 +109,12 @@ def _spoken_strength(verdict: Verdict) -> str:
     """Writes the strength of the one that is named, as a person says it; empty where several are,
     or it is not known."""
     named = named_candidates(verdict)
-    if len(named) != 1 or not known(named[0].strength) or named[0].strength.bound == "nothing":
+    if (
+        len(verdict.named) != 1
+        or len(named) != 1
+        or not known(named[0].strength)
+        or named[0].strength.bound == "nothing"
+    ):
         return ""
     (candidate,) = named
     value, ends = estimate_parts(candidate.strength)

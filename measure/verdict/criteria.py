@@ -8,8 +8,8 @@ hash.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import asdict, dataclass, fields
+from typing import ClassVar
 
 from scipy.stats import norm
 
@@ -77,6 +77,8 @@ class Criteria:
         UsageError: a level or share that is not between 0 and 1.
     """
 
+    JSON_NAMES: ClassVar[tuple[str, ...]] = ()
+
     level: float = 0.05
     interval: float = 0.9
     fewest_kinds: int = 4
@@ -119,9 +121,8 @@ class Criteria:
         """SHA-256 of all of them, hex."""
         return recipe_hash(hashed_names(asdict(self)))
 
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values, with their hash."""
-        return {**asdict(self), "hash": self.hash}
+
+Criteria.JSON_NAMES = (*(one.name for one in fields(Criteria)), "hash")
 
 
 CRITERIA = Criteria()

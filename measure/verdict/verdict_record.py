@@ -4,7 +4,7 @@ becomes JSON."""
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
@@ -292,7 +292,3 @@ class Verdict:
     open: tuple[str, ...] = ()
     provenance: dict[str, Any] = field(default_factory=dict)
     seconds: float = 0.0
-
-    def as_dict(self) -> dict[str, Any]:
-        """Returns JSON values."""
-        return {"schema": "flagdata.verdict/1", **asdict(self)}

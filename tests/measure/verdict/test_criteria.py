@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from flagdata.core.json_values import json_values
 from flagdata.errors import UsageError
 from measure.verdict import CRITERIA
 from measure.verdict.criteria import Criteria
@@ -149,7 +150,7 @@ def test_what_decides_compares_with_no_number_of_its_own(name: str) -> None:
 
 
 def test_the_hash_is_that_of_the_values() -> None:
-    assert Criteria().hash == CRITERIA.hash == CRITERIA.as_dict()["hash"]
+    assert Criteria().hash == CRITERIA.hash == json_values(CRITERIA)["hash"]
     assert replace(CRITERIA, lead=2.5).hash != CRITERIA.hash
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 
 from measure.report import lead, verdict_sentences
+from measure.report.lead_sentences import spoken
 from measure.report.verdict_sentences import error_warnings, heading, power_text
 from measure.report.verdict_words import words
 from measure.verdict import NOT_REJECTED, Conclusion, Power, Verdict, erring, undecided_sentences
@@ -86,7 +87,7 @@ def test_a_model_that_errs_by_more_than_three_floors_explains_nothing(
         one = with_errors(conclusion, before=9.0 if verdict(conclusion).named else off, after=off)
         one = replace(one, findings=(), words=lead(one))
         assert bool(erring(one)) is errs
-        said = f"{lead(one)} {heading(one)}"
+        said = f"{lead(one)} {heading(one)} {spoken(one)}"
         if errs:
             assert "explains" not in said.replace("no effect of the library explains", "")
             (warning,) = error_warnings(one)
@@ -145,11 +146,9 @@ def test_the_power_stands_before_the_verdicts_sentence_and_in_a_table() -> None:
         "An effect of the strength that is expected of it would be seen with a chance of 0.90 on "
         "average."
     )
-    for text, sentence in (
-        (" ".join(said.split()), whole.words),
-        (html, f"<h1>{lead(whole)}</h1>"),
-    ):
-        assert 0 <= text.index(mean) < text.index(sentence)
+    on_terminal = " ".join(said.split())
+    assert 0 <= on_terminal.index(mean) < on_terminal.index(whole.words)
+    assert f"<li>{mean}</li>" in html
     assert "What would have been seen" in html
     assert "lift (coefficient) 2.3 with 0.90" in " ".join(said.split())
     without = verdict(Conclusion.SUFFICIENT)

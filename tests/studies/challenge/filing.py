@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from flagdata.core.files.outputs import rewrite
+from flagdata.core.json_values import json_values
 from flagdata.core.provenance import file_hash
 from flagdata.errors import ConflictError, CorruptError, RefusedError
 from flagdata.recipes.documents import read_json
+from measure.report.document import SCHEMA
 from measure.verdict import Verdict
 from tests.studies.challenge.folder import ChallengeFolder, write_json
 
@@ -48,7 +49,7 @@ class Filing:
 
 def verdict_json(verdict: Verdict) -> dict[str, Any]:
     """A verdict as JSON, None for numbers that are not finite."""
-    return _finite(verdict.as_dict())
+    return {"schema": SCHEMA, **json_values(verdict)}
 
 
 def file(folder: ChallengeFolder, filing: Filing) -> None:
@@ -124,13 +125,3 @@ def note_opening(folder: ChallengeFolder, names: list[str]) -> None:
     """Keep on record that keys are open, and what had been said by then."""
     verdicts = dict(opened(folder)) | {name: file_hash(folder.verdict(name)) for name in names}
     write_json(folder.opened, {"schema": "flagdata.challenge-opened/1", "verdicts": verdicts})
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {key: _finite(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(entry) for entry in value]
-    return value

@@ -27,6 +27,7 @@ from typing import Any
 
 import numpy as np
 
+from flagdata.core.json_values import json_values
 from measure.closing import close_loop
 from measure.forecasting import Setting
 from measure.loop import LoopOptions
@@ -97,7 +98,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         known: {name: _experiment(runs / "jittered", name, known) for name in CASES}
         for known in KNOWN
     }
-    results: dict[str, Any] = {"criteria": CRITERIA.as_dict()}
+    results: dict[str, Any] = {"criteria": json_values(CRITERIA)}
     setting = Setting.of(experiments[KNOWN[0]]["null"])
     for draw in DRAWS:
         place = out / f"arcsim-jittered-{seed}-{draw}"

@@ -33,6 +33,7 @@ import torch
 from scipy.signal import lfilter
 
 from flagdata.core.arrays import FloatArray
+from flagdata.core.json_values import json_values
 from flagdata.core.rng import child_seed, stream
 from flagdata.errors import InputError
 from measure.cloth import TABLES
@@ -199,7 +200,7 @@ def run(*, seed: int, out: Path) -> dict[str, Any]:
         "nulls": count,
         "stressors": summary(rows),
         "experiments": rows,
-        "criteria": CRITERIA.as_dict(),
+        "criteria": json_values(CRITERIA),
     }
     (out / "validate-stressors.md").write_text(page(found), encoding="utf-8")
     return found
