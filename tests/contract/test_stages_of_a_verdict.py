@@ -51,7 +51,7 @@ def test_every_stage_states_its_purpose() -> None:
 def test_imports_within_functions_and_for_types_count() -> None:
     source = (
         "from typing import TYPE_CHECKING\n"
-        "if TYPE_CHECKING:\n    from measure.report.report_page import page\n"
+        "if TYPE_CHECKING:\n    from measure.report.verdict_answer import closed\n"
         "def late():\n    from measure import closing\n    import measure.nulls.bank\n"
     )
     assert stages_of(imported_names(source)) == {"report", "closing", "nulls"}

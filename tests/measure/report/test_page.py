@@ -124,7 +124,7 @@ def test_the_page_refers_to_no_other_file(whole: Verdict, html: str) -> None:
         assert element.tag not in ("link", "iframe", "object", "embed", "base")
     assert "://" not in html
     assert "@import" not in html
-    assert not re.search(r"url\((?!\s*[\"']?data:)", html)
+    assert not re.search(r"url\((?!\s*[\"']?(?:data:|#))", html)
 
 
 def test_charts_tables_and_controls_have_labels_for_screen_readers(
