@@ -276,11 +276,17 @@ def _reach(values: FloatArray) -> float:
 def numerical_floor(
     setting: Setting, recordings: IntArray, model: Model, *, copies: int, seed: int
 ) -> tuple[IntArray, FloatArray]:
-    """Computes errors of segments simulated from a model by other numerics and predicted by it.
+    """Computes the error that a model makes on data simulated from itself with other numerics.
+
+    Each simulation has the wind, the way it is held and the noise of one recording, and the
+    predictions are made as those of the recordings are.
 
     Args:
-        recordings: of the experiment, in whose winds and by whose ways is simulated.
-        copies: simulations of each.
+        setting: the experiment, and how it is predicted.
+        recordings: (n,) indices of the recordings that are simulated again.
+        model: which is simulated, and then predicts.
+        copies: simulations of each recording.
+        seed: of turbulence and noise.
 
     Returns:
         (segment,) the recording in whose wind it is, and its mean squared distance [m²].

@@ -1,5 +1,5 @@
-"""The model run freely in the winds of recordings, carried as they are, and by how much these
-settle elsewhere."""
+"""Runs the fitted model freely in the recordings' winds, and compares what each hangs and moves
+like on average."""
 
 from __future__ import annotations
 
@@ -22,11 +22,12 @@ than one does."""
 
 
 def settled_off(recordings: Sequence[Trajectory], batch: NullBatch) -> FloatArray:
-    """Computes what recordings settle at less what a model does in the same winds, held where they
-    show it to be held, (recording, quantity).
+    """Computes the mean state of each recording less that of the model, in the same wind and held
+    at the same places, (recording, quantity); quantities and units as of
+    `measure.probes.settled.settling_of`.
 
     Args:
-        batch: the model's cloth, calibrations, winds and effects, one a recording.
+        batch: one run a recording: the model's cloth, calibration, wind and effects.
     """
     count = len(recordings)
     tracks = tuple(recording.track for recording in recordings if recording.track is not None)
@@ -55,8 +56,8 @@ def settled_off(recordings: Sequence[Trajectory], batch: NullBatch) -> FloatArra
 
 
 def mistaken(batch: NullBatch) -> NullBatch:
-    """Moves the batch's calibrations by as much as those of data are off: one draw for its
-    cloth."""
+    """Moves the batch's calibrations by one draw of the errors that a fit to data makes, the same
+    for all of one cloth."""
     rng = stream(batch.seed, "null", "mistaken")
     spread = (CRITERIA.area_weight_between, CRITERIA.bending_between, CRITERIA.damping_factor)
     steps = tuple(float(step) for step in spread * rng.standard_normal(3))

@@ -298,83 +298,180 @@ def weigh(
     """
     null_plan.check(bank, setting)
     bank = bank.plain()
-    parts = split(setting.segments, setting.speeds)
-    null = bank.model(setting.design).under(setting.prior)
     stage("terms", 0, 1)
-    all_segments = ProjectedSegments.of(setting.forecaster, setting.segments, along)
-    projected = all_segments.select(np.flatnonzero(parts.used))
-    speeds = projected.speeds(setting.speeds)
-    tried = _try_terms(projected, null, speeds, candidates, [*acting_columns, *controls])
-    projected_evidence = evidence(tried.statistics, speeds, null)
-    noise = max(segment.noise for segment in projected.segments.items)
-    family = Family.of(bank.nulls, tried.statistics, noise=noise, seed=options.seed)
-    names = tuple(column.name for column in tried.columns)
-    acting = list(range(len(THETA), len(THETA) + len(acting_columns)))
-    proposed = list(range(len(THETA) + len(acting_columns), len(THETA) + len(names)))
-    physical = [
-        column
-        for column in proposed
-        if _admissible(tried.columns[column - len(THETA)], projected_evidence, column, acting)
-    ]
-    pool = [column for column in proposed[len(controls) :] if column in physical]
-    labels = (*(name for name, _, _ in THETA), *names)
-    steps = search(projected_evidence, family, labels, pool, acting=acting, level=options.level)
+    prepared = _prepare(
+        setting,
+        bank,
+        along,
+        candidates,
+        acting_columns=acting_columns,
+        controls=controls,
+        seed=options.seed,
+    )
+    steps = search(
+        prepared.evidence,
+        prepared.family,
+        prepared.labels,
+        prepared.pool,
+        acting=prepared.acting,
+        level=options.level,
+    )
     stage("terms", 1, 1)
     taken = [step for step in steps if step.taken]
-
-    def fit_columns(columns: Sequence[int]) -> FittedModel:
-        linear = projected_evidence.fit(columns)
-        start = [linear.of(column)[0] for column in (*range(len(THETA)), *columns)]
-        return fit(
-            projected,
-            null,
-            speeds,
-            [tried.columns[column - len(THETA)] for column in columns],
-            start,
-        )
-
     strengths: tuple[TermStrength, ...] = ()
     tested = None
     decision, reason = Decision.REJECTED, steps[0].reason if steps else "no term was given"
     if taken:
         stage("test on untouched data", 0, 1)
-        before, after = (
-            fit_columns(acting),
-            fit_columns([*acting, *(step.column for step in taken)]),
+        larger = prepared.fit([*prepared.acting, *(step.column for step in taken)])
+        tested = _retest_against_control(setting, prepared, taken, larger, seed=options.seed)
+        strengths = _strengths(
+            setting, prepared.evidence, prepared.family, taken, prepared.acting, larger
         )
-        kinds = {_kind(tried.columns[step.column - len(THETA)]) for step in taken}
-        unlike = [
-            column for column in physical if _kind(tried.columns[column - len(THETA)]) not in kinds
-        ]
-        instead = wrong(projected_evidence, unlike, [step.column for step in taken], acting)
-        tested = retest(
-            setting,
-            all_segments.whitened(null, setting.speeds),
-            parts.used,
-            before.model,
-            after.model,
-            words=parts.words,
-            seed=options.seed,
-            control=fit_columns([*acting, *instead]).model if instead else None,
-            control_names=[labels[column] for column in instead],
-        )
-        strengths = _strengths(setting, projected_evidence, family, taken, acting, after)
         decision, reason = tested.decision
         stage("test on untouched data", 1, 1)
+    untouched = setting.segments.select(np.flatnonzero(~prepared.parts.used))
     return ProposalOutcome(
         decision=decision,
         reason=reason,
         steps=steps,
-        tried=len(proposed) - len(controls),
-        ranking=_ranking(projected_evidence, family, labels, pool),
+        tried=prepared.tried,
+        ranking=_ranking(prepared.evidence, prepared.family, prepared.labels, prepared.pool),
         strengths=strengths,
         retest=tested,
         level=options.level,
         nulls=bank.words,
-        proposed_from=data_hash(projected.segments),
-        tested_on=data_hash(setting.segments.select(np.flatnonzero(~parts.used))),
+        proposed_from=data_hash(prepared.projected.segments),
+        tested_on=data_hash(untouched),
         known=tuple(column.name for column in acting_columns),
         seed=options.seed,
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Prepared:
+    """What terms are chosen and fitted by: the part of the recordings that a proposal is made from.
+
+    A column is a place in the evidence: first the calibrated parameters, then `effects`.
+
+    Attributes:
+        parts: which segments are for choosing.
+        whole: all segments, projected.
+        projected: those for choosing.
+        null: model of what numerics leave.
+        speeds: (segment,) of the wind, of those for choosing [m/s].
+        effects: what is known to act, the controls, the candidates.
+        evidence: of all columns.
+        family: statistics of all columns in the nulls.
+        acting: columns of what is known to act.
+        physical: columns of controls and candidates whose fitted strength makes sense.
+        pool: those of candidates alone.
+        tried: how many candidates there were.
+    """
+
+    parts: Split
+    whole: ProjectedSegments
+    projected: ProjectedSegments
+    null: NullModel
+    speeds: FloatArray
+    effects: tuple[EffectColumn, ...]
+    evidence: Evidence
+    family: Family
+    acting: list[int]
+    physical: list[int]
+    pool: list[int]
+    tried: int
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of all columns."""
+        return (*(name for name, _, _ in THETA), *(column.name for column in self.effects))
+
+    def effect(self, column: int) -> EffectColumn:
+        """Returns the effect of a column."""
+        return self.effects[column - len(THETA)]
+
+    def fit(self, columns: Sequence[int]) -> FittedModel:
+        """Fits the model that has the effects of these columns."""
+        linear = self.evidence.fit(columns)
+        start = [linear.of(column)[0] for column in (*range(len(THETA)), *columns)]
+        effects = [self.effect(column) for column in columns]
+        return fit(self.projected, self.null, self.speeds, effects, start)
+
+    def control(self, taken: Sequence[Step]) -> list[int]:
+        """Chooses as many columns as were taken, of other kinds and directions."""
+        kinds = {_kind(self.effect(step.column)) for step in taken}
+        unlike = [column for column in self.physical if _kind(self.effect(column)) not in kinds]
+        return wrong(self.evidence, unlike, [step.column for step in taken], self.acting)
+
+
+def _prepare(
+    setting: Setting,
+    bank: NullBank,
+    along: Sequence[Column],
+    candidates: Sequence[EffectColumn],
+    *,
+    acting_columns: Sequence[EffectColumn],
+    controls: Sequence[EffectColumn],
+    seed: int,
+) -> _Prepared:
+    """Divides the recordings, and computes the evidence of all columns on the part for choosing.
+
+    Raises:
+        InputError: too few segments.
+    """
+    parts = split(setting.segments, setting.speeds)
+    null = bank.model(setting.design).under(setting.prior)
+    whole = ProjectedSegments.of(setting.forecaster, setting.segments, along)
+    projected = whole.select(np.flatnonzero(parts.used))
+    speeds = projected.speeds(setting.speeds)
+    tried = _try_terms(projected, null, speeds, candidates, [*acting_columns, *controls])
+    found = evidence(tried.statistics, speeds, null)
+    noise = max(segment.noise for segment in projected.segments.items)
+    first = len(THETA) + len(acting_columns)
+    acting = list(range(len(THETA), first))
+    proposed = list(range(first, len(THETA) + len(tried.columns)))
+    physical = [
+        column
+        for column in proposed
+        if _admissible(tried.columns[column - len(THETA)], found, column, acting)
+    ]
+    return _Prepared(
+        parts=parts,
+        whole=whole,
+        projected=projected,
+        null=null,
+        speeds=speeds,
+        effects=tried.columns,
+        evidence=found,
+        family=Family.of(bank.nulls, tried.statistics, noise=noise, seed=seed),
+        acting=acting,
+        physical=physical,
+        pool=[column for column in proposed[len(controls) :] if column in physical],
+        tried=len(proposed) - len(controls),
+    )
+
+
+def _retest_against_control(
+    setting: Setting, prepared: _Prepared, taken: Sequence[Step], larger: FittedModel, *, seed: int
+) -> Retest:
+    """Tests the larger model on untouched segments, beside the model before and a control.
+
+    Args:
+        larger: the model with what was taken.
+    """
+    instead = prepared.control(taken)
+    control = prepared.fit([*prepared.acting, *instead]).model if instead else None
+    return retest(
+        setting,
+        prepared.whole.whitened(prepared.null, setting.speeds),
+        prepared.parts.used,
+        prepared.fit(prepared.acting).model,
+        larger.model,
+        words=prepared.parts.words,
+        seed=seed,
+        control=control,
+        control_names=[prepared.labels[column] for column in instead],
     )
 
 
