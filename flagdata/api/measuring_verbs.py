@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from flagdata.answer.calibrated import Calibrated
     from flagdata.answer.closed import Closed
     from flagdata.answer.measured import Measured
+    from flagdata.answer.proposed import Proposed
     from flagdata.core.stated import Stated
     from flagdata.ingest.films.film_array import Frames
     from flagdata.lake.catalog_rows import Rows
@@ -384,19 +385,20 @@ class Proposing(ByNulls, NamedLake):
 
 
 @make_call(Proposing)
-def propose(chosen: Proposing) -> Mapping[str, Any]:
+def propose(chosen: Proposing) -> Proposed:
     """An effect that the library lacks, sought in a part of the recordings and tested on the rest.
 
     ```python
     tried = flagdata.propose("flag.toml", known=("lift.coefficient",), workers=2)
-    tried["decision"], tried["reason"], tried["effect"]  # "kept", why, the effect's file and class
+    tried.decision, tried.reason, tried.effect  # "kept", why, the effect's file and class
+    tried.save("proposal.html")
     ```
 
     It simulates null experiments, which takes minutes, and adds what it tried to `proposals.json`
     in the folder `out`.
 
     Returns:
-        What `flagdata propose --json` prints.
+        The outcome, with strengths, page, and as `document` what `flagdata propose --json` prints.
 
     Raises:
         MissingExtraError: torch is not installed.

@@ -21,7 +21,7 @@ from measure.loop.run import LoopOptions
 from measure.nulls.null_plan import FEWEST_NULLS
 from measure.observe import Hold, Observation, Setup, WindTrack, from_arrays, observe, sheet
 from measure.observe.mesh_observations import from_sequence
-from measure.report.verdict_answer import answer_of_markers, facts_of
+from measure.report.verdict_answer import answer_of_markers
 from measure.verdict.criteria import CRITERIA
 from sim.cloth.material import MATERIALS, named_material
 
@@ -44,7 +44,7 @@ def close_on_arrays(chosen: Closing) -> Closed:
     verdict = with_warnings(
         close_loop(observed.experiment, options), check_findings(observed.findings)
     )
-    return answer_of_markers(verdict, facts=facts_of(observed.experiment))
+    return answer_of_markers(verdict, experiment=observed.experiment)
 
 
 def _setup(chosen: Closing) -> Setup:

@@ -30,7 +30,7 @@ from measure.nulls.bank import files
 from measure.observe import Experiment
 from measure.observe.trajectory import describe_cloth
 from measure.report.document import as_document, from_document
-from measure.report.verdict_answer import answer_of_markers, facts_of
+from measure.report.verdict_answer import answer_of_markers
 from measure.verdict.verdict_record import Candidate, Verdict
 
 _FORMAT = 1
@@ -113,7 +113,7 @@ def answer_of(
         models=models,
         effects=acting(verdict),
         findings=findings,
-        answer=answer_of_markers(verdict, subject=name, facts=facts_of(experiment)),
+        answer=answer_of_markers(verdict, subject=name, experiment=experiment),
         recipe=recipe,
         parents=tuple(dict.fromkeys(r.source for r in experiment.recordings if r.source)),
         seed=options.seed,

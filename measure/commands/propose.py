@@ -8,7 +8,6 @@ from pathlib import Path
 
 from flagdata.api.measuring_verbs import Proposing
 from flagdata.core.console import echo_lines, say
-from flagdata.core.json_values import json_values
 from flagdata.verbs.verb_options import Result, verb
 from measure.closing.null_options import nulls_given, refuse, stage_bars
 
@@ -35,7 +34,7 @@ def propose(chosen: Proposing) -> Iterator[Result]:
     from measure.nulls.null_workload import of_recordings
     from measure.observe import experiment_recipe as recipes
     from measure.propose import candidates, effect_file, proposal_log
-    from measure.propose.proposal_words import words
+    from measure.propose.proposal_answer import answer_of
     from measure.propose.term_search import propose as seek
     from measure.propose.terms import dictionary
 
@@ -73,8 +72,9 @@ def propose(chosen: Proposing) -> Iterator[Result]:
     if chosen.effect is None and outcome.strengths:
         spec = effect_file.write(outcome, folder).spec
     proposal_log.add(folder / "proposals.json", outcome, effect=spec)
-    yield Result("proposal", {"effect": spec, **json_values(outcome)})
-    echo_lines(words(outcome))
+    answer = answer_of(outcome, subject=recipe.title, effect=spec)
+    yield Result("proposal", answer.document, answer=answer)
+    echo_lines(answer.words)
     if spec:
         say(f"effect {spec}")
     say(f"wrote {folder / 'proposals.json'}")

@@ -77,6 +77,24 @@ def residual_chart(residual: Residual, *, size: Shade, mean: Shade, after: str) 
 _AXES = tuple(enumerate("xyz"))
 
 
+def effect_chart(residual: Residual) -> Chart | None:
+    """Draws where on the cloth what was added acts: by how much it moves what is predicted, on
+    average over the stretch that the verdict holds; None where nothing was added."""
+    before, after = (
+        np.asarray(positions, dtype=np.float64) for positions in (residual.before, residual.after)
+    )
+    if not before.size or before.shape != after.shape:
+        return None
+    moved = after - before
+    known = np.isfinite(moved)
+    mean = np.where(known, moved, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    mean[~known.any(axis=0)] = np.nan
+    reach = largest(mean.ravel().tolist())
+    parts = [(f"in {axis}", mean[:, i].tolist()) for i, axis in _AXES]
+    shade = Shade(low=-reach, high=reach)
+    return Chart(rows=[maps(residual.markers, parts, shade, "mean change")], height=2.7)
+
+
 def maps(
     markers: Sequence[Sequence[float]],
     parts: Sequence[tuple[str, Sequence[float]]],

@@ -18,9 +18,10 @@ from measure.report import verdict_cells as cells
 from measure.report import verdict_sections as sections
 from measure.report import verdict_sentences
 from measure.report.document import as_document
-from measure.report.error_maps import mean_shade, residual_chart, size_shade
+from measure.report.error_maps import effect_chart, mean_shade, residual_chart, size_shade
 from measure.report.lead_sentences import evidence, explained_words, lead, spoken
 from measure.report.moving_cloth import moving_figure
+from measure.report.recordings_chart import recording_chart
 from measure.report.verdict_charts import errors_chart, gains_chart, strengths_chart, wind_chart
 from measure.report.verdict_sentences import list_names, readable, shorten_list
 from measure.report.verdict_words import words
@@ -45,21 +46,25 @@ _TERMS = Markup(
 
 
 def answer_of_markers(
-    verdict: Verdict, *, subject: str = "", facts: Mapping[str, str] | None = None
+    verdict: Verdict, *, subject: str = "", experiment: Experiment | None = None
 ) -> Closed:
     """Makes the answer of a verdict by markers.
 
     Args:
         subject: what was judged; the names of the recordings where it is empty.
-        facts: that the verdict does not hold: the cloth, the wind's log.
+        experiment: whose cloth, wind and tracks are shown beside; None where a verdict is all
+            that is known.
     """
     return closed(
         verdict,
         subject=subject or list_names(shorten_list([r.recording for r in verdict.residuals])),
         words=words(verdict),
         figures=_head_figures(verdict),
-        facts={**_recorded(verdict.residuals), **(facts or {})},
-        make_sections=lambda: _sections(verdict),
+        facts={
+            **_recorded(verdict.residuals),
+            **({} if experiment is None else _facts_of(experiment)),
+        },
+        make_sections=lambda: _sections(verdict, experiment),
     )
 
 
@@ -199,7 +204,7 @@ def _recorded(residuals: Sequence[Residual]) -> dict[str, str]:
     return facts
 
 
-def facts_of(experiment: Experiment) -> dict[str, str]:
+def _facts_of(experiment: Experiment) -> dict[str, str]:
     """Returns what the first screen says of the cloth and of the wind's log."""
     specimen = experiment.specimen
     weight = number(specimen.material.area_weight)
@@ -236,7 +241,7 @@ def _head_figures(verdict: Verdict) -> list[Figure]:
     return [figure for figure in (moving, errors_figure(verdict)) if figure is not None]
 
 
-def _sections(verdict: Verdict) -> list[Section]:
+def _sections(verdict: Verdict, experiment: Experiment | None) -> list[Section]:
     """Makes the sections of a verdict by markers."""
     made = [sections.verdict_section(verdict)]
     if verdict.comparisons:
@@ -251,13 +256,50 @@ def _sections(verdict: Verdict) -> list[Section]:
     made.append(sections.test_section(verdict, statistic))
     if verdict.power:
         made.append(sections.power_section(verdict, _HOW_SEEN))
+    if acting := _effect_figures(verdict):
+        made.append(
+            Section(title="Where on the cloth it acts", parts=acting, anchor="acts", folded=True)
+        )
     if verdict.residuals:
         made.append(_residuals(verdict))
     if verdict.ranking:
         made.append(_ranking(verdict))
     if verdict.parameters:
         made.append(sections.parameters_section(verdict, title="Parameters of the base model"))
+    if experiment is not None:
+        made.append(_recordings(experiment))
     return [*made, *sections.closing_sections(verdict)]
+
+
+def _effect_figures(verdict: Verdict) -> list[Figure]:
+    """Makes the figures of where what was added acts, a recording each; none where nothing was."""
+    after = verdict_sentences.after_label(verdict)
+    charts = [(one, effect_chart(one)) for one in verdict.residuals]
+    return [
+        Figure(
+            title=f"Where on the cloth it acts, {one.recording}",
+            content=chart,
+            caption=f"{one.recording}: by how much the prediction one step ahead {after} differs "
+            "from the base model's, on average over the frames in motion (x and y horizontal, z "
+            "up).",
+        )
+        for one, chart in charts
+        if chart is not None
+    ]
+
+
+def _recordings(experiment: Experiment) -> Section:
+    """Makes the section of what was recorded."""
+    figures = [
+        Figure(
+            title=f"Markers of {one.name} over time",
+            content=lambda one=one: recording_chart(one),
+            caption=f"{one.name}: {one.positions.shape[1]} markers, "
+            f"{len(one.positions)} frames at {one.rate:g} Hz; the brighter, the further.",
+        )
+        for one in experiment.recordings
+    ]
+    return Section(title="What was recorded", parts=figures, anchor="recordings", folded=True)
 
 
 _HOW_SEEN = (

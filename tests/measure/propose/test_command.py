@@ -97,6 +97,9 @@ def test_the_call_searches_as_the_command_does_and_adds_to_the_same_log(
         == ((known,), NullOptions(nulls=160, level=0.1, seed=seed, workers=2))
     )
     printed = json.loads(typed.out)
-    assert {key: printed[key] for key in called} == json.loads(json.dumps(called))
-    assert (called["decision"], called["effect"], called["seed"]) == ("rejected", "", seed)
+    said = json.loads(json.dumps(called.document))
+    assert {key: printed[key] for key in said} == said
+    assert (called.decision, called.effect, said["seed"]) == ("rejected", "", seed)
+    assert called.sentence == "No effect is proposed: none of 3 terms explains what is missing."
+    assert called.words in called.page
     assert len(json.loads((tmp_path / "proposal" / "proposals.json").read_text())["entries"]) == 2
