@@ -72,7 +72,7 @@ def propose(chosen: Proposing) -> Iterator[Result]:
     if chosen.effect is None and outcome.strengths:
         spec = effect_file.write(outcome, folder).spec
     proposal_log.add(folder / "proposals.json", outcome, effect=spec)
-    answer = answer_of(outcome, subject=recipe.title, effect=spec)
+    answer = answer_of(outcome, subject=Path(chosen.recipe).stem, effect=spec)
     yield Result("proposal", answer.document, answer=answer)
     echo_lines(answer.words)
     if spec:

@@ -22,7 +22,7 @@ def answer_of(outcome: ProposalOutcome, *, subject: str, effect: str) -> Propose
     """Makes the answer of a search.
 
     Args:
-        subject: name of the recipe.
+        subject: what the recordings are called.
         effect: file and class of the effect; empty where no term was taken.
     """
     retest = outcome.retest
