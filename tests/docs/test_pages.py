@@ -28,6 +28,7 @@ inference."""
 AFTER_START = (
     "alignment.md",
     "measure.md",
+    "area-weight.md",
     "long-films.md",
     "hanging-cloth.md",
     "anemometer.md",
