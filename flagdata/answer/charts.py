@@ -268,7 +268,8 @@ class Chart:
     """Panels in rows.
 
     Attributes:
-        rows: of panels; a row may be shorter than another, and its panels are wider then.
+        rows: of panels; a row may be shorter than another, and its panels are wider then. Panels of
+            rows of one length that follow each other are below each other.
         height: of a row [inch].
         widths: shares of the panels of each row; equal where it is empty.
         width: of the whole [inch].

@@ -10,6 +10,7 @@ import re
 import textwrap
 from collections.abc import Callable, Sequence
 from functools import singledispatch
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -149,13 +150,23 @@ def _draw(chart: Chart) -> Figure:
     if chart.title:
         figure.suptitle(chart.title, x=0.01, ha="left", fontsize=10, wrap=True)
     drawn: list[Axes] = []
-    parts = figure.subfigures(len(chart.rows), 1, squeeze=False, height_ratios=heights)[:, 0]
-    for part, row in zip(parts, chart.rows, strict=True):
-        shares = list(chart.widths) if len(chart.widths) == len(row) else [1.0] * len(row)
-        grid = part.subplots(1, len(row), squeeze=False, width_ratios=shares)[0]
-        for axes, panel in zip(grid, row, strict=True):
-            _draw_panel(axes, panel)
-            drawn.append(axes)
+    rows = list(zip(chart.rows, heights, strict=True))
+    grids = [list(alike) for _, alike in groupby(rows, key=lambda row: len(row[0]))]
+    totals = [sum(height for _, height in alike) for alike in grids]
+    parts = figure.subfigures(len(grids), 1, squeeze=False, height_ratios=totals)[:, 0]
+    for part, alike in zip(parts, grids, strict=True):
+        count = len(alike[0][0])
+        grid = part.subplots(
+            len(alike),
+            count,
+            squeeze=False,
+            width_ratios=list(chart.widths) if len(chart.widths) == count else [1.0] * count,
+            height_ratios=[height for _, height in alike],
+        )
+        for line, (row, _) in zip(grid, alike, strict=True):
+            for axes, panel in zip(line, row, strict=True):
+                _draw_panel(axes, panel)
+                drawn.append(axes)
     if chart.legend:
         _draw_legend(figure, drawn)
     return figure

@@ -70,6 +70,12 @@ class Truth:
     judgement: Judgement
 
 
+_LIMITS = {
+    Judgement.MISSED: "what was found does not hold the truth",
+    Judgement.GIVEN: "typed by a person, as the recording does not show it",
+    Judgement.UNDECIDED: "the recording cannot decide it",
+    Judgement.REFUSED: "the step refused, and says why",
+}
 _SHOWN = 2  # figures on the first screen
 _ABOUT = (
     "A flag was simulated on a mesh and in time steps that no later step uses. What is in no file "
@@ -100,9 +106,9 @@ def demonstration_answer(cards: Sequence[Card], *, seconds: float) -> Answer:
                 "took": f"{seconds // 60:.0f} min {seconds % 60:.0f} s",
             },
             limits=[
-                f"{truth.what}: {truth.judgement.value}"
+                f"{truth.what[:1].upper()}{truth.what[1:]}: {_LIMITS[truth.judgement]}."
                 for truth in truths
-                if truth.judgement not in (Judgement.RIGHT, Judgement.OPEN)
+                if truth.judgement in _LIMITS
             ],
             remarks=[_ABOUT],
         ),
@@ -111,13 +117,15 @@ def demonstration_answer(cards: Sequence[Card], *, seconds: float) -> Answer:
 
 
 def _sentence(truths: Sequence[Truth]) -> str:
-    judged = [truth for truth in truths if truth.judgement is not Judgement.OPEN]
+    judged = [one for one in truths if one.judgement not in (Judgement.OPEN, Judgement.GIVEN)]
     right = sum(truth.judgement is Judgement.RIGHT for truth in judged)
     if not judged:
         return "What no file states was sought, and stands beside the truth"
     if len(judged) == 1:
-        return f"What no file states was {'found' if right else 'not found'}: {judged[0].what}"
-    return f"Of {len(judged)} things that no file states {right or 'none'} were found"
+        (one,) = judged
+        return f"What no file states was {'found' if right else 'not found'}: the {one.what}"
+    verb = "was" if right == 1 else "were"
+    return f"Of {len(judged)} things that no file states {right or 'none'} {verb} found"
 
 
 def _tone(truths: Sequence[Truth]) -> Tone:

@@ -30,6 +30,7 @@ from measure.demo.demo_recording import AIR_RATE, BEFORE, SIZE, Recording
 from models.maps.spectral_layer import SpectralDecomposition
 
 _SHOWN = 6
+_HEAD = 5.6  # inch, of a chart beside another
 _SIDE = 240  # px of a clip
 _ABOUT_MOTION = (
     "Dominant motion: the peak frequency of the spectral decomposition layer (Runia et al. 2020, "
@@ -74,21 +75,30 @@ def recording_answer(
     return Answer(
         question="demo",
         subject="A film and a log on one clock",
-        sentence=f"The log's clock is {clock.offset:+.2f} s "
-        f"[{clock.low:+.2f}, {clock.high:+.2f}] from the camera's, 90 %; the true difference is "
-        f"{clock.truth:+.2f} s",
+        sentence=_sentence(clock),
         tone=Tone.SETTLED if clock.covered else Tone.MISSED,
         head=Head(
             figures=[_session(record, logged), _wind_figure(logged, lake, at, recording, first)],
             facts={
                 "film": f"{minutes:.2g} min from {iso(first)[:16]}Z, a "
                 f"simulated flag of {SIZE.replace('x', ' m × ')} m",
-                "clock": f"confidence {clock.confidence:.3f}; neither file states the difference",
+                "clock": f"{clock.offset:+.2f} s [{clock.low:+.2f}, {clock.high:+.2f}], 90 %, "
+                f"truly {clock.truth:+.2f} s; confidence {clock.confidence:.3f}",
                 "log": f"a cup anemometer, {len(logged.time)} one-second means",
             },
             limits=["The gap in the log and the stretch in which it stuck are left out of means."],
         ),
         make_sections=lambda: [*_sections(folder, lake, at, pairs, transcript)],
+    )
+
+
+def _sentence(clock: Recovered) -> str:
+    """Says how the clocks differ, and whether that holds the truth."""
+    side = "ahead of" if clock.offset > 0 else "behind"
+    holds = "holds" if clock.covered else "does not hold"
+    return (
+        f"The log's clock is {abs(clock.offset):.1f} s {side} the camera's; the 90 % interval {holds} "
+        "the truth, which is in neither file"
     )
 
 
@@ -103,7 +113,7 @@ def _sections(
         else ""
     )
     counted = (
-        f"{len(pairs)} pairs of {CLIP_FRAMES} frames at {FRAME_RATE} Hz{refused}. {len(places)} of "
+        f"{len(pairs)} pairs of {CLIP_FRAMES} frames at {FRAME_RATE:g} Hz{refused}. {len(places)} of "
         "them, by wind:"
     )
     yield Section(
@@ -175,7 +185,7 @@ def _session(record: Record, logged: WindAverage) -> Figure:
     when, blowing = session_panels(record.frame_times, logged, clock="the common clock")
     return Figure(
         title="When camera and anemometer ran",
-        content=Chart(rows=[[when], [blowing]], heights=HEIGHTS),
+        content=Chart(rows=[[when], [blowing]], heights=HEIGHTS, width=_HEAD),
     )
 
 
@@ -218,7 +228,7 @@ def _wind_figure(
     )
     return Figure(
         title="Wind speed against time",
-        content=Chart(rows=[[panel]], height=3.2),
+        content=Chart(rows=[[panel]], height=2.9, width=_HEAD),
         caption=f"{len(clips)} clips of {CLIP_FRAMES} frames.",
     )
 

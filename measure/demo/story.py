@@ -383,7 +383,7 @@ def _series(lake_path: Path, recording: Recording) -> Chart:
         x=Axis(label="time since the first frame [s]"),
         y=Axis(label="wind speed [m/s]", limits=(0, None)),
     )
-    return Chart(rows=[[panel]], height=3.2)
+    return Chart(rows=[[panel]], height=3.2, width=5.6)
 
 
 def _moving(video: Path, rate: int) -> str:

@@ -75,6 +75,7 @@ class LossCourse:
     def chart(self) -> Chart:
         """Shows the losses, and below them the learning rate, by the epoch."""
         numbers = [epoch.number + 1 for epoch in self.epochs]
+        ticks = numbers[:: max(1, len(numbers) // 8)]
         marks: list[Mark] = [
             Line(
                 x=numbers,
@@ -90,8 +91,15 @@ class LossCourse:
         rate = Line(x=numbers, y=[epoch.rate for epoch in self.epochs], colour=Colour.QUIET)
         return Chart(
             rows=[
-                [Panel(marks=marks, y=Axis(label="loss"))],
-                [Panel(marks=[rate], x=Axis(label="epoch"), y=Axis(label="learning rate"))],
+                [Panel(marks=marks, x=Axis(ticks=ticks), y=Axis(label="loss"))],
+                [
+                    Panel(
+                        marks=[rate],
+                        x=Axis(label="epoch", ticks=ticks),
+                        y=Axis(label="learning rate"),
+                    )
+                ],
             ],
             heights=(2.8, 1.3),
+            width=5.6,
         )

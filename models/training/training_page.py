@@ -131,7 +131,9 @@ def training_answer(
         )
     return Answer(
         question="train",
-        subject=f"{recipe.name}: {recipe.title}" if recipe.title else recipe.name,
+        subject=recipe.name
+        if recipe.title in ("", recipe.name)
+        else f"{recipe.name}: {recipe.title}",
         sentence=_sentence(recipe, course, judged),
         tone=Tone.SETTLED if course.epochs else Tone.OPEN,
         document=card,
@@ -159,7 +161,7 @@ def _facts(card: dict[str, Any]) -> dict[str, str]:
     return {
         "parameters": f"{card['parameters']:,}",
         "epochs": str(card["epochs"]),
-        "took": f"{card['seconds'] / 60:.1f} min",
+        "took": f"{card['seconds']:,.0f} s",
     }
 
 
@@ -187,6 +189,7 @@ def _scatter(judged: JudgedClips) -> Chart:
             ]
         ],
         height=4.1,
+        width=5.6,
     )
 
 

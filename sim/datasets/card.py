@@ -20,6 +20,7 @@ from flagdata.core.arrays import UInt8Array
 from flagdata.core.files.outputs import check_file, rewrite, write_file
 from flagdata.core.json_values import json_values
 from flagdata.core.numbered import by_numbers
+from flagdata.core.printable import size_text
 from flagdata.core.provenance import canonical
 from flagdata.core.rng import stream
 from flagdata.core.schema import Kind
@@ -141,7 +142,7 @@ def card_answer(lake: Lake, recipe: DatasetRecipe, *, branch: str = "main") -> A
             if sheet
             else [],
             facts={
-                "films": f"{_frames(recipe)}, {size / 1e9:.2f} GB in all",
+                "films": f"{_frames(recipe)}, {size_text(size)} in all",
                 "ground truth": _TRUTHS[recipe.anemometer.truth],
                 "renderer": recipe.renderer,
                 "licence": recipe.licence,

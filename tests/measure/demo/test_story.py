@@ -220,7 +220,10 @@ def test_the_first_page_says_how_much_of_what_no_file_states_was_found() -> None
     ]
     answer = demonstration_answer(cards, seconds=125)
     assert answer.sentence == "Of 3 things that no file states 2 were found"
-    assert (answer.tone, list(answer.head.limits)) == (Tone.MISSED, ["log missed: missed"])
+    assert (answer.tone, list(answer.head.limits)) == (
+        Tone.MISSED,
+        ["Log missed: what was found does not hold the truth."],
+    )
     assert answer.head.facts["took"] == "2 min 5 s"
     page = answer.page
     assert [page.count(f'alt="picture of {title}"') for title in ("film", "log", "wind")] == [1] * 3
