@@ -14,11 +14,11 @@ import numpy as np
 from flagdata.answer.markdown import plain, table
 from flagdata.core.files.outputs import check_files, write_files
 from flagdata.core.provenance import code_version
-from flagdata.pages.page_pictures import png
 from tests.studies.challenge.classes import class_of
 from tests.studies.challenge.rates import Power
 from tests.studies.challenge.recipe import Kind
 from tests.studies.challenge.score import ENOUGH, Sheet
+from tests.studies.figure_bytes import png
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -53,11 +53,11 @@ from flagdata.core.arrays import BoolArray, FloatArray, IntArray
 from flagdata.core.clock_model import NINETY
 from flagdata.core.rng import stream
 from flagdata.core.stated import Stated
-from flagdata.pages.page_pictures import png
 from flagdata.timebase import NANOSECONDS, parse
 from models.evaluation import Resamples, estimate
 from models.evaluation.bootstrap import ratio
 from tests.evidence import ABSENT, REFERENCE
+from tests.studies.figure_bytes import png
 from tests.studies.instruments.disagreement import (
     Disagreement,
     Readings,

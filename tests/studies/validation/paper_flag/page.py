@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from flagdata.core.provenance import code_version
-from flagdata.pages import figure_url
+from flagdata.pages.page_pictures import data_url
 from flagdata.pages.render import render
+from tests.studies.figure_bytes import png
 from tests.studies.validation.paper_flag import plots
 from tests.studies.validation.paper_flag.candidates import Candidate, Shear
 from tests.studies.validation.paper_flag.evidence import NEVER, Kind
@@ -38,7 +39,8 @@ def page(case: Case, seen: Observations, study: Study, verdict: Verdict) -> str:
         "verdict": verdict,
         "words": verdict_words(seen, study, verdict),
         "images": {
-            name: figure_url(figure) for name, figure in zip(_PICTURES, figures, strict=True)
+            name: data_url(png(figure), "image/png")
+            for name, figure in zip(_PICTURES, figures, strict=True)
         },
         "clips": [_clip_row(clip, case) for clip in seen.clips],
         "stretches": [(c.spec.name, c.stretch) for c in seen.clips if c.stretch is not None],
