@@ -161,6 +161,12 @@ def evaluate(
         group, generator=rng.stream(seed, "evaluation", "bootstrap"), draws=draws
     )
     findings: list[Finding] = []
+    if not unseen:
+        text = (
+            "models may have learned from these clips, so that errors are smaller than on others; "
+            "evaluate on another side by --side"
+        )
+        findings.append(_warning("seen-in-training", text))
     chosen = triplets.draw(group, seed=seed) if triplets.possible(group) else None
     if chosen is None:
         findings.append(

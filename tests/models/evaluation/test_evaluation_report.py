@@ -91,6 +91,8 @@ def test_runs_of_one_model_are_pooled_as_their_mean_and_range_and_each_is_shown(
 def test_sequences_that_models_learned_from_are_called_that() -> None:
     known = evaluate([run("SDN", 0.3, 1)], data="made", seed=0, draws=10, unseen=False)
     assert "that models may have learned from" in markdown(known)
+    assert "seen-in-training" in {finding.kind for finding in known.findings}
+    assert "**Warning:** models may have learned from these clips" in markdown(known)
     assert "no model was trained on" in markdown(dataclasses.replace(known, unseen=True))
 
 
