@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 from dataclasses import fields
+from importlib import import_module
 
 import click
 import pytest
 
 import flagdata
 from docs import generate_cli, generate_effects, generate_glossary
+from flagdata.answer import Answer, Quantity
 from flagdata.ingest import FileLayout, QualityRules
 from flagdata.ingest.anemometer.sensor_recipe import (
     MATCH,
@@ -128,3 +131,22 @@ def test_every_table_of_a_sensor_recipe_is_on_the_page() -> None:
 def test_every_kind_of_silent_error_is_on_its_page() -> None:
     page = " ".join((DOCS / "results" / "wind-logs-unseen.md").read_text(encoding="utf-8").split())
     assert [name for name in KINDS if name not in page] == []
+
+
+def test_the_page_of_python_describes_what_an_answer_has() -> None:
+    page = (DOCS / "api.md").read_text(encoding="utf-8")
+    section = page.split("\n## Answers\n")[1].split("\n## ")[0]
+    first, _, table = section.partition("return an answer")
+    names = re.findall(r"`(\w+)`", first)
+    assert len(names) >= 4
+    for name in names:
+        kind = str(inspect.signature(getattr(flagdata, name)).return_annotation)
+        assert issubclass(getattr(import_module(f"flagdata.answer.{kind.lower()}"), kind), Answer)
+    rows = re.findall(r"^\| (`.*) \| (.*) \|$", table, re.MULTILINE)
+    attributes = {one for cell, _ in rows for one in re.findall(r"`(\w+)", cell)}
+    private = {"question", "subject", "head", "make_sections"}
+    assert {one.name for one in fields(Answer)} - private <= attributes
+    assert [one for one in attributes if one not in Answer.__annotations__ | vars(Answer)] == []
+    (of_quantity,) = (text for cell, text in rows if cell == "`quantities`")
+    known = Quantity.__annotations__ | vars(Quantity)
+    assert [one for one in re.findall(r"`(\w+)`", of_quantity) if one not in known] == []
