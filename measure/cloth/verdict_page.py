@@ -16,16 +16,17 @@ import numpy as np
 from markupsafe import Markup
 
 from flagdata.answer.answer import Cell, Figure, Section, Table
+from flagdata.answer.charts import Chart, Colour
 from flagdata.answer.closed import Closed
 from flagdata.core.arrays import FloatArray, UInt8Array
 from flagdata.core.rng import child_seed, stream
 from flagdata.pages.page_pictures import moving, still
-from measure.cloth.calibration_page import Band, against_wind
 from measure.cloth.design import Weighable
 from measure.cloth.films_statement import level_of
 from measure.cloth.flag_simulation import OBSERVED, RATE, FlagBatch
 from measure.cloth.loop import SolvedLoop
 from measure.cloth.model_evidence import Fit, Sight, fit_model, hypothesis
+from measure.cloth.observables_chart import Predicted, chart_against_wind
 from measure.cloth.observed_recording import Observed
 from measure.cloth.simulations import of_recordings
 from measure.observables import View
@@ -311,7 +312,6 @@ def _moving_figure(outcome: SolvedLoop, index: int, *, after: str) -> Figure:
 
 
 _DRAWS = 400
-_BEFORE, _AFTER, _DOT = "#b4531a", "#1f6f9c", "#444444"
 
 
 def _sections(verdict: Verdict, outcome: SolvedLoop, moving: Sequence[Figure]) -> list[Section]:
@@ -489,14 +489,16 @@ def bands(
     return np.asarray(np.quantile(windows, [tail, 0.5, 1 - tail], axis=0))
 
 
-def _against_wind(outcome: SolvedLoop, index: int, *, with_effect: bool) -> str:
-    """Draws each observable of a recording's windows against the wind, with both models' bands."""
+def _against_wind(outcome: SolvedLoop, index: int, *, with_effect: bool) -> Chart:
+    """Makes a chart of a recording's observables against the wind, with both models' bands."""
     recording, sight = outcome.recordings[index], outcome.sights[index]
-    models: list[tuple[Weighable | None, Fit, str]] = [(None, outcome.base, _BEFORE)]
+    models: list[tuple[Weighable | None, Fit, Colour, str]] = [
+        (None, outcome.base, Colour.LOG, "base model")
+    ]
     if with_effect and outcome.best is not None:
-        models.append((*outcome.best, _AFTER))
-    drawn = []
-    for effect, fit, colour in models:
+        models.append((*outcome.best, Colour.FILM, "larger model"))
+    predicted = []
+    for effect, fit, colour, label in models:
         cloth, places, strength = hypothesis(outcome.sights, effect).values(fit.scores[0])
         band = bands(
             sight,
@@ -507,10 +509,10 @@ def _against_wind(outcome: SolvedLoop, index: int, *, with_effect: bool) -> str:
             strength,
             seed=outcome.options.calibration.seed,
         )
-        drawn.append(Band(limits=band, colour=colour))
+        predicted.append(Predicted(limits=band, colour=colour, label=label))
     names = [
         name
         for column, name in enumerate(OBSERVED)
-        if np.isfinite(drawn[0].limits[:, :, column]).all()
+        if np.isfinite(predicted[0].limits[:, :, column]).all()
     ]
-    return against_wind(recording, names, drawn, dots=_DOT, opacity=0.25)
+    return chart_against_wind(recording, names, predicted, dots=Colour.INK)
