@@ -146,8 +146,8 @@ GROUPS: dict[str, tuple[str, dict[str, tuple[str, str]]]] = {
             "export": (
                 "flagdata.commands.export:export",
                 (
-                    "Write WebDataset, Parquet, LeRobot, Zarr, MP4 + CSV, MCAP, CSV of the wind or OBJ "
-                    "folders."
+                    "Write WebDataset, Parquet, LeRobot, Zarr, MP4 + CSV, MCAP, CSV of the wind or "
+                    "OBJ folders."
                 ),
             ),
             "push": ("flagdata.commands.transfer:push", "Move versions to another lake."),

@@ -1,8 +1,8 @@
 """Errors that say what, where and the fix, each with a stable kind.
 
 Every error a user can cause is a `FlagdataError`. The command line prints it as three lines and
-exits with `exit_code`; `--json` prints its `JSON_NAMES`. Programs match on `kind`, an `ErrorKind` that
-never changes once released, not on the wording.
+exits with `exit_code`; `--json` prints its `JSON_NAMES`. Programs match on `kind`, an `ErrorKind`
+that never changes once released, not on the wording.
 """
 
 from __future__ import annotations

@@ -215,7 +215,8 @@ def session_of(pair: Pair, *, session_given: str | None) -> str | None:
     sessions = {artifact.session for artifact in (pair.camera, pair.wind) if artifact.session}
     if len(sessions) > 1:
         raise UsageError(
-            f"camera and wind are of the sessions {pair.camera.session!r} and {pair.wind.session!r}",
+            f"camera and wind are of the sessions {pair.camera.session!r} and "
+            f"{pair.wind.session!r}",
             where=pair.camera.id,
             fix="say by --session which one the recording is of",
         )

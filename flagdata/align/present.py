@@ -48,7 +48,8 @@ def find_made(
                 raise ConflictError(
                     f"the {noun} is there already with the {label} {value!r}",
                     where=artifact.id,
-                    fix=f"leave out --{label}, or take the old one off with flagdata withdraw first",
+                    fix=f"leave out --{label}, or take the old one off with flagdata withdraw "
+                    "first",
                 )
         return present(lake, artifact)
     return ABSENT

@@ -128,7 +128,7 @@ class Kinds(LongCommand):
         commands: the others, by their names.
     """
 
-    commands = {str(one.name): one for one in (film, wind, meshes, markers)}  # noqa: RUF012  of a class, not changed
+    commands = {str(one.name): one for one in (film, wind, meshes, markers)}  # noqa: RUF012
 
     def make_context(
         self,

@@ -493,7 +493,8 @@ def _picture(given: IngestRequest) -> Path | None:
 
 def _with(given: IngestRequest, answers: Answers) -> IngestRequest:
     """The options with the answers that were typed."""
-    return replace(given, wind=replace(given.wind, wind=replace(given.wind.wind, **dict(answers))))  # type: ignore[arg-type]
+    options = replace(given.wind.wind, **dict(answers))  # type: ignore[arg-type]
+    return replace(given, wind=replace(given.wind, wind=options))
 
 
 def _winds(lake: Lake, source: Path, given: IngestRequest) -> tuple[IngestResult, ...]:

@@ -54,5 +54,5 @@ def read_arrays(path: Path, *, what: str, fix: str) -> dict[str, AnyArray]:
                 return {name: np.asarray(content[name]) for name in content.files}
     except (LimitError, FileNotFoundError):
         raise
-    except Exception as error:  # noqa: BLE001  zipfile, zlib and numpy each raise errors of their own kinds
+    except Exception as error:  # noqa: BLE001  zipfile, zlib, numpy: each its own kinds
         raise CorruptError(f"{what} cannot be read: {error}", where=where, fix=fix) from None

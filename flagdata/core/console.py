@@ -247,7 +247,7 @@ def following(published: str, doing: str) -> Iterator[None]:
     """
     try:
         yield
-    except Exception as error:  # noqa: BLE001  whatever it is, the command has done what cannot be undone
+    except Exception as error:  # noqa: BLE001  the command has done what stays done
         reported = foreseen(error)
         _report(
             f"{published} is published, but {doing} failed: {reported.what}",

@@ -3,8 +3,8 @@
 A dataclass becomes an object of its fields. A type of which JSON states other things says so as
 data, in two class variables:
 
-- `JSON_NAMES`: the names of fields and properties, in order; "key=path.of.names" for one that stands
-  under another key or lies within a part. Where a part is null, all within it is.
+- `JSON_NAMES`: the names of fields and properties, in order; "key=path.of.names" for one that
+  stands under another key or lies within a part. Where a part is null, all within it is.
 - `JSON_OPTIONAL`: keys that are left out where they say nothing: null, false, no entries. What came
   after a document was first written is one of these, so that older ones keep their hash.
 

@@ -59,7 +59,8 @@ CHANNELS: dict[str, Channel] = {
         dims=("time",),
         unit="m/s",
         frame="moving platform",
-        about="wind speed an instrument computed as if its moving platform stood still (NMEA MWV,T)",
+        about="wind speed an instrument computed as if its moving platform stood still (NMEA "
+        "MWV,T)",
     ),
     "theoretical_wind_direction": Channel(
         dims=("time",),

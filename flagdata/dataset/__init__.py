@@ -4,7 +4,8 @@
     from flagdata.dataset import Tolerance
 
     lake = flagdata.open("lake")
-    pairs = lake.pairs("wind between 3 and 6", at="v1", split="train", tolerance=Tolerance(coverage=0.9))
+    good = Tolerance(coverage=0.9)
+    pairs = lake.pairs("wind between 3 and 6", at="v1", split="train", tolerance=good)
     for batch in pairs.loader(32, workers=2):
         batch.clip, batch.wind, batch.wind_sigma
 

@@ -134,7 +134,9 @@ def _windows(clips: pa.Table, table: PairTable) -> FloatArray:
     windows = np.array([*windows_of_recipes, math.nan], dtype=np.float64)[
         recipe.indices.fill_null(-1).to_numpy()
     ]
-    row_of_pair = pc.index_in(pa.array(table.artifact), value_set=clips["artifact"])  # type: ignore[attr-defined]
+    row_of_pair = pc.index_in(  # type: ignore[attr-defined]
+        pa.array(table.artifact), value_set=clips["artifact"]
+    )
     return windows[row_of_pair.to_numpy()]
 
 
@@ -147,9 +149,11 @@ def _common(windows: FloatArray) -> float:
     distinct = np.unique(windows[np.isfinite(windows)])
     if len(distinct) > 1:
         raise UsageError(
-            f"the clips have ground truths over {', '.join(f'{window:g}' for window in distinct)} s",
+            f"the clips have ground truths over {', '.join(f'{window:g}' for window in distinct)} "
+            "s",
             where="window",
-            fix="name one: window=SECONDS; the others are then computed anew from the records' wind",
+            fix="name one: window=SECONDS; the others are then computed anew from the records' "
+            "wind",
         )
     return float(distinct[0]) if len(distinct) else TRUTH_WINDOW
 

@@ -337,7 +337,8 @@ class _Hashed:
                     compared.setdefault(side, []).append(origin)
         refuse_leaks(
             compared,
-            fix="leave those that share it out by the filter, or take them off by flagdata withdraw",
+            fix="leave those that share it out by the filter, or take them off by flagdata "
+            "withdraw",
         )
 
 

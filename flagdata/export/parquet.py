@@ -113,7 +113,12 @@ def _part(path: Path, rows: pa.Schema) -> pq.ParquetWriter:
     compression = dict.fromkeys(rows.names, "zstd") | {"frames.list.element": "none"}
     # Pictures do not compress further, and a dictionary of them would only cost memory.
     dictionary = [name for name in rows.names if name not in ("parents", "quality")]
-    return pq.ParquetWriter(path, schema, compression=compression, use_dictionary=dictionary)  # pyright: ignore[reportArgumentType]
+    return pq.ParquetWriter(
+        path,
+        schema,
+        compression=compression,
+        use_dictionary=dictionary,  # pyright: ignore[reportArgumentType]
+    )
 
 
 def part_name(number: int) -> str:

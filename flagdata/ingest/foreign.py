@@ -170,7 +170,8 @@ def _lerobot(folder: Path) -> Examination:
         table = read(
             path, ["episode_index", "frame_index", "timestamp", *([TIME] if timed else [])]
         )
-        for episode in pc.unique(table["episode_index"]).to_pylist():  # pyright: ignore[reportAttributeAccessIssue]
+        episodes = pc.unique(table["episode_index"])  # pyright: ignore[reportAttributeAccessIssue]
+        for episode in episodes.to_pylist():
             rows = table.filter(pc.field("episode_index") == episode)
             stamps = stamps_of(rows, str(path))
             seconds = stamps_of(rows.select(["timestamp"]), str(path)) / NANOSECONDS

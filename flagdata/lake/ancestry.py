@@ -64,8 +64,9 @@ def ancestry(rows_of_ref: pa.Table, artifact: str) -> Ancestry:
         artifact: full id of one of them.
     """
     rows = rows_of_ref.select(_COLUMNS).combine_chunks()
-    children = pc.take(rows["artifact"], pc.list_parent_indices(rows["parents"]))  # type: ignore[attr-defined]
-    pairs = pa.table({"child": children, "parent": pc.list_flatten(rows["parents"])})  # type: ignore[attr-defined]
+    of_child = pc.list_parent_indices(rows["parents"])  # type: ignore[attr-defined]
+    parents = pc.list_flatten(rows["parents"])  # type: ignore[attr-defined]
+    pairs = pa.table({"child": pc.take(rows["artifact"], of_child), "parent": parents})
     above = _reached_steps(pairs, artifact, along=("child", "parent"))
     below = _reached_steps(pairs, artifact, along=("parent", "child"))
     generations = {relative: -steps for relative, steps in _steps(artifact, above).items()}
@@ -107,7 +108,8 @@ def _reached_steps(
 
 
 def _among(column: pa.ChunkedArray, wanted: Collection[str]) -> pa.ChunkedArray:
-    return pc.is_in(column, value_set=pa.array(sorted(wanted), pa.string()))  # type: ignore[attr-defined]
+    names = pa.array(sorted(wanted), pa.string())
+    return pc.is_in(column, value_set=names)  # type: ignore[attr-defined]
 
 
 def _steps(artifact: str, steps: Sequence[tuple[str, str]]) -> dict[str, int]:

@@ -252,7 +252,8 @@ class _Answer:
             block.nbytes > ROW_BYTES or sum(map(_leaves, block.columns)) > ROW_LIMIT
         ):
             raise LimitError(
-                f"one row of the result has more than {ROW_LIMIT:,} values or {ROW_BYTES >> 20} MiB",
+                f"one row of the result has more than {ROW_LIMIT:,} values or {ROW_BYTES >> 20} "
+                "MiB",
                 where=self.question.shown,
                 fix="aggregate in SQL, or unnest its lists: unnest(...)",
             )

@@ -418,7 +418,7 @@ def _sizes_in(folder: Place) -> dict[str, int | None]:
     not there."""
     try:
         if isinstance(folder, Path):
-            return dict.fromkeys(os.listdir(folder))  # noqa: PTH208 — a path for each name takes ten times as long
+            return dict.fromkeys(os.listdir(folder))  # noqa: PTH208 — ten times faster
         return {path.name: path.stat().st_size for path in folder.iterdir()}
     except FileNotFoundError:
         return {}

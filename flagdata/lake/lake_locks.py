@@ -6,14 +6,16 @@ between processes of one machine, and over file systems that carry flock between
 Lustre).
 
     staging/.collect      the lock, taken shared or exclusively behind the turnstile staging/.turn
-    staging/ID/lease      a running transaction, locked by it: its owner, and the objects it holds, a line each
+    staging/ID/lease      a running transaction, locked by it: its owner, and the objects it holds,
+                          a line each
 
 In a bucket no kernel does that. Each lock and note is an object that its holder writes anew every
 few seconds; the store's own clock says when it was written last. One that was not for `LIFE`
 seconds is void. A process that finds one made on its own machine by a process that has ended need
 not wait for that.
 
-    staging/collect       the exclusive lock: taken by `create`, or from a dead holder by a conditional put
+    staging/collect       the exclusive lock: taken by `create`, or from a dead holder by a
+                          conditional put
     staging/shared/ID     a holder of the shared lock
     staging/ID/lease      as on a disk
 

@@ -62,7 +62,9 @@ class Lease:
     @property
     def folder(self) -> Path:
         """Returns the folder in which the transaction writes."""
-        return self._note.folder if isinstance(self._note, FileNote) else self._local.folder  # type: ignore[union-attr]
+        if isinstance(self._note, FileNote):
+            return self._note.folder
+        return self._local.folder  # type: ignore[union-attr]
 
     def hold(self, object_name: str) -> None:
         """Notes that the transaction relies on the object; no collection that has not seen it runs
@@ -122,7 +124,8 @@ def looking(staging: Place) -> AbstractContextManager[object]:
 def leases(staging: Place) -> list[LeaseState]:
     """Lists all staging folders, by name."""
     states, locks = [], locks_of(staging)
-    for folder in sorted(path for path in _entries(staging) if _is_folder(path)):  # type: ignore[type-var]
+    folders = (path for path in _entries(staging) if _is_folder(path))
+    for folder in sorted(folders):  # type: ignore[type-var]
         if folder.name == SHARED or is_beside(folder.name):
             continue
         leased = True

@@ -45,8 +45,11 @@ def condition(values: Values) -> pc.Expression:
 def made_from(rows: pa.Table, artifacts: Collection[str]) -> pa.Table:
     """Selects the rows of which some of `artifacts` are parents, in their order."""
     parents = rows["parents"].combine_chunks()
-    is_made = pc.is_in(pc.list_flatten(parents), value_set=pa.array(sorted(artifacts), pa.string()))  # type: ignore[attr-defined]
-    return rows.take(pc.list_parent_indices(parents).filter(is_made).unique())  # type: ignore[attr-defined]
+    names = pa.array(sorted(artifacts), pa.string())
+    flat = pc.list_flatten(parents)  # type: ignore[attr-defined]
+    is_made = pc.is_in(flat, value_set=names)  # type: ignore[attr-defined]
+    of_row = pc.list_parent_indices(parents)  # type: ignore[attr-defined]
+    return rows.take(of_row.filter(is_made).unique())
 
 
 def _condition(column: str, value: object) -> pc.Expression:

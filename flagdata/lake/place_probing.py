@@ -80,7 +80,8 @@ def _check_names(folder: Path) -> None:
         pass
     else:
         raise lacking(
-            "gives a name that is taken away again, so that writers would lose each other's commits",
+            "gives a name that is taken away again, so that writers would lose each other's "
+            "commits",
             folder,
         )
     try:

@@ -120,7 +120,8 @@ def _check_orphans(lake: Store, view: View, erased: Collection[str]) -> None:
     if orphans := descendants(rows, erased):
         first = rows.filter(pc.field("artifact").isin(sorted(orphans))).to_pylist()[0]
         raise ConflictError(
-            f"{first['kind']} {first['name']!r} of that version was made from what was erased since",
+            f"{first['kind']} {first['name']!r} of that version was made from what was erased "
+            "since",
             where=str(lake.path),
             fix=_NEWER,
         )

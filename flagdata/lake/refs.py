@@ -322,7 +322,8 @@ class Refs:
         strays = [
             path for path in paths if path.suffix != ".json" or not _NAME.fullmatch(path.stem)
         ]
-        return sorted(path for path in strays if not SCRATCH.fullmatch(path.name))  # type: ignore[type-var]
+        found = (path for path in strays if not SCRATCH.fullmatch(path.name))
+        return sorted(found)  # type: ignore[type-var]
 
     def write_files(self) -> None:
         """Write the files of refs anew that do not say what the log says.
@@ -424,7 +425,8 @@ class Refs:
         """Lists the files of refs of a kind. What has no ref's name is none: it may be of any
         program."""
         listed = self._looks.find(kind, lambda: list((self.root / kind).glob("[!.]*.json")))
-        return sorted(path for path in listed if _NAME.fullmatch(path.stem))  # type: ignore[type-var]
+        named = (path for path in listed if _NAME.fullmatch(path.stem))
+        return sorted(named)  # type: ignore[type-var]
 
     @staticmethod
     def _read(path: Place) -> Ref:

@@ -476,7 +476,9 @@ def _stored_rows(lake: Store, version: int) -> pa.Table:
 
 def _keys(rows: pa.Table) -> pa.ChunkedArray:
     """Returns what distinguishes rows: artifact and branch."""
-    return pc.binary_join_element_wise(rows["artifact"], rows["branch"], "/")  # type: ignore[attr-defined]
+    return pc.binary_join_element_wise(  # type: ignore[attr-defined]
+        rows["artifact"], rows["branch"], "/"
+    )
 
 
 def explain_missing(lake: Store, name: str, missing: NotFoundError) -> NotFoundError:

@@ -191,7 +191,8 @@ class Selection:
             cells, size = cells + batch.num_rows * batch.num_columns, size + batch.nbytes
             if self.request.sql is not None and (cells > self._held[0] or size > self._held[1]):
                 raise LimitError(
-                    f"the SQL gives more than {self._held[0]:,} values or {self._held[1] >> 20} MiB",
+                    f"the SQL gives more than {self._held[0]:,} values or {self._held[1] >> 20} "
+                    "MiB",
                     where=self.request.sql,
                     fix="aggregate in SQL, or give a limit; --csv and --arrow write any number",
                 )

@@ -104,7 +104,9 @@ class _Finder:
 class _Loader(SourceFileLoader):
     """Loads a module of a checkout with the names of an installation in its source."""
 
-    def source_to_code(self, data: Any, path: Any, *, _optimize: int = -1) -> Any:  # pyright: ignore[reportIncompatibleMethodOverride]
+    def source_to_code(  # pyright: ignore[reportIncompatibleMethodOverride]
+        self, data: Any, path: Any, *, _optimize: int = -1
+    ) -> Any:
         """Returns the code of the renamed source."""
         return compile(
             rename_packages(decode_source(data), _ROOT),

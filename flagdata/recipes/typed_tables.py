@@ -157,7 +157,8 @@ def read(kind: type[R], content: Any, *, where: str, **computed: Any) -> R:
     """
     content = with_present_keys(content, where=where, keys=getattr(kind, "WAS", {}))
     hints = _hints(kind)
-    keys = {entry.name.replace("_", "-"): entry for entry in fields(kind)}  # pyright: ignore[reportArgumentType]
+    entries = fields(kind)  # pyright: ignore[reportArgumentType]
+    keys = {entry.name.replace("_", "-"): entry for entry in entries}
     types = {
         key: Any if entry.name in computed else hints[entry.name] for key, entry in keys.items()
     }
@@ -355,7 +356,8 @@ def _strip_annotations(kind: Any) -> tuple[Any, list[Any]]:
             kind, *annotations = get_args(kind)
             notes += annotations
         elif NoneType in get_args(kind):
-            kind = Union[tuple(option for option in get_args(kind) if option is not NoneType)]  # noqa: UP007
+            options = tuple(option for option in get_args(kind) if option is not NoneType)
+            kind = Union[options]  # noqa: UP007
         else:
             return kind, notes
 

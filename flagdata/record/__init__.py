@@ -4,9 +4,9 @@
     topic (schema.TOPIC_…)  schema, protobuf                    one message is
     /camera/image           foxglove.CompressedImage            a JPEG, gray
                             or foxglove.CompressedVideo         an H.264 picture, see `video`
-    /wind/samples           flagdata.WindSample                 a sample of the anemometer, flags with it
+    /wind/samples           flagdata.WindSample                 a sample with its flags
     /wind/1hz               flagdata.WindMean                   the mean of a second, with its σ
-    /truth/parameters       flagdata.TruthParameters            what a simulated record was made with
+    /truth/parameters       flagdata.TruthParameters            what a simulation was made with
 
 `log_time` is the record's common clock, `publish_time` the device's own, a message's `timestamp`
 mid-exposure (frames), the sample's instant, or the END of the mean's second, on the common clock;

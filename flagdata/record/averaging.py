@@ -3,14 +3,16 @@
 For the n usable samples v_i of a bin:
 
     speed      v = Σ v_i / n                                          scalar mean
-    direction  atan2(Σ v_i sin θ_i, Σ v_i cos θ_i)                    vector mean, "from", clockwise from north
+    direction  atan2(Σ v_i sin θ_i, Σ v_i cos θ_i)                    vector mean, "from",
+                                                                      clockwise from north
     sigma²     s² / n_eff + a² + q² / 12
 
-s² is the sample variance within the bin, n_eff = n (1 - ρ) / (1 + ρ) the number of independent samples of a
-first-order autoregressive process (Bayley and Hammersley 1946, J. R. Stat. Soc. Suppl. 8:184, for large n), at least
-1, with ρ, the correlation of neighbouring samples, from the von Neumann ratio pooled over all bins:
-ρ = 1 - mean (v_{i+1} - v_i)² / (2 s²), kept within 0 and 1. a is the larger of the sensor's accuracy and its relative
-accuracy × v (systematic: not reduced by averaging; JCGM 100:2008, 4.3), q its resolution (rectangular, 4.3.7).
+s² is the sample variance within the bin, n_eff = n (1 - ρ) / (1 + ρ) the number of independent
+samples of a first-order autoregressive process (Bayley and Hammersley 1946, J. R. Stat. Soc. Suppl.
+8:184, for large n), at least 1, with ρ, the correlation of neighbouring samples, from the von
+Neumann ratio pooled over all bins: ρ = 1 - mean (v_{i+1} - v_i)² / (2 s²), kept within 0 and 1. a
+is the larger of the sensor's accuracy and its relative accuracy × v (systematic: not reduced by
+averaging; JCGM 100:2008, 4.3), q its resolution (rectangular, 4.3.7).
 
 Not included: what the sensor missed while it gave no sample, its response time, its distance from
 the flag, tilt, and clock errors. A bin with one sample has no scatter to see: its sigma is the

@@ -6,9 +6,11 @@ kept in the metadata record "flagdata.checksums": `content` is a JSON document a
 checksum in hexadecimal. It maps each topic to
 
     count      how many messages the channel has
-    heads      over channel id, sequence number, log time and publish time of all its messages, in file order
+    heads      over channel id, sequence number, log time and publish time of all its messages, in
+               file order
     data       over the payloads of all its messages, in file order; not of frames
-    messages   over the payload of each message, eight hexadecimal digits each, in file order; of frames only
+    messages   over the payload of each message, eight hexadecimal digits each, in file order; of
+               frames only
 
 and each metadata record's name to the checksum of its content. Attachments and the summary have
 those of MCAP. Records that were written before there were checksums have none.

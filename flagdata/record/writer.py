@@ -117,7 +117,7 @@ def _tag(number: int, wire: int) -> list[int]:
 
 
 def _number(name: str, kind: object) -> int:
-    fields: Mapping[str, object] = kind.DESCRIPTOR.fields_by_name  # pyright: ignore[reportAttributeAccessIssue]
+    fields: Mapping[str, object] = kind.DESCRIPTOR.fields_by_name  # type: ignore[attr-defined]
     return fields[name].number  # pyright: ignore[reportAttributeAccessIssue]
 
 

@@ -132,7 +132,9 @@ def _client(bucket: str) -> S3Store:
     options = settings()
     return S3Store(
         bucket,
-        config={name: value for name, value in options.items() if name != "aws_allow_http"},  # type: ignore[arg-type]
+        config={  # type: ignore[arg-type]
+            name: value for name, value in options.items() if name != "aws_allow_http"
+        },
         client_options={
             "timeout": timedelta(seconds=REQUEST_TIMEOUT),
             "connect_timeout": timedelta(seconds=CONNECT_TIMEOUT),

@@ -34,7 +34,8 @@ of them 5."""
 _CODE = re.compile(r"<Code>([\w.]+)</Code>|\(code: ([\w.]+)\)")
 _STATUS = re.compile(r"status code[\s:↳]+(\d{3})")
 _REGION = re.compile(
-    r"<Region>([a-z0-9-]+)</Region>|<Endpoint>(?:[^<]*\.)?s3[.-]([a-z]+-[a-z-]+-\d)\.[^<]*</Endpoint>"
+    r"<Region>([a-z0-9-]+)</Region>"
+    r"|<Endpoint>(?:[^<]*\.)?s3[.-]([a-z]+-[a-z-]+-\d)\.[^<]*</Endpoint>"
 )
 _ACTION = re.compile(r"perform[\s:↳]+([\w-]+:\w+)")
 _UNNAMED = {301, 302, 307, 308, 400, 401, 403, 503, 507, None}

@@ -44,7 +44,8 @@ class Duration(click.ParamType):
         seconds = written_seconds(str(value))
         if seconds is None:
             self.fail(
-                f"{value!r} is not a length of time; give a number and ms, s, min, h or d, e.g. 10s",
+                f"{value!r} is not a length of time; give a number and ms, s, min, h or d, e.g. "
+                "10s",
                 param,
                 ctx,
             )

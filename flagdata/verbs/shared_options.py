@@ -185,7 +185,8 @@ class NamedLake:
     """The lake that names recordings and takes results, where there is one."""
 
     lake: AnyLake | None = option(
-        "Where recordings and artifacts are, and where results go: a folder, or s3://bucket/prefix.",
+        "Where recordings and artifacts are, and where results go: a folder, or "
+        "s3://bucket/prefix.",
         default=None,
         type=LakePlace(),
         envvar="FLAGDATA_LAKE",

@@ -44,8 +44,8 @@ ROWS, SECONDS, CHARACTERS = 200, 5.0, 10_000
 EXAMPLES = (
     "select kind, count(*) n, sum(object_bytes) bytes from catalog group by kind order by n desc",
     (
-        "select artifact, name, start_time, wind, wind_sigma from catalog where kind = 'clip' order by "
-        "wind desc"
+        "select artifact, name, start_time, wind, wind_sigma from catalog where kind = 'clip' "
+        "order by wind desc"
     ),
     (
         "select session, day, count(*) clips, round(avg(wind), 2) wind from catalog where kind = "
@@ -186,7 +186,9 @@ def overview(site: Site, *, kind: str | None, name: str | None, page: int) -> st
     counts = {entry["values"]: entry["counts"] for entry in counted.to_pylist()}
     chosen = pc.field("kind") != Kind.CLIP.value if kind is None else pc.field("kind") == kind
     if name:
-        chosen &= pc.match_substring(pc.field("name"), name, ignore_case=True)  # type: ignore[attr-defined]
+        chosen &= pc.match_substring(  # type: ignore[attr-defined]
+            pc.field("name"), name, ignore_case=True
+        )
     # Of a large catalog a filter or sort of whole rows would copy them all.
     listed = rows.select([*_ORDER, "kind", "name"]).append_column(
         "row", pa.array(np.arange(rows.num_rows))
@@ -445,7 +447,9 @@ def _answer(site: Site, text: str) -> PageTable:
         if isinstance(value, str) and len(value) == _ID
     }
     ids = rows["artifact"]
-    named = pc.is_in(ids, value_set=pa.array(sorted(texts), pa.string()))  # type: ignore[attr-defined]
+    named = pc.is_in(  # type: ignore[attr-defined]
+        ids, value_set=pa.array(sorted(texts), pa.string())
+    )
     identities = set(ids.filter(named).to_pylist())
     columns = [[_cell(site, value, identities) for value in column] for column in values]
     return PageTable(

@@ -300,5 +300,5 @@ class _Asked(BaseHTTPRequestHandler):
 
     do_HEAD = do_POST = do_PUT = do_DELETE = do_PATCH = do_OPTIONS = do_GET  # noqa: N815
 
-    def log_message(self, format: str, *args: object) -> None:  # noqa: A002 — as the library names it
+    def log_message(self, format: str, *args: object) -> None:  # noqa: A002 — the library's
         """Logs nothing: the terminal is the user's, and addresses hold the key."""

@@ -142,7 +142,8 @@ class Segments:
             if not cut.enough:
                 needed = 2 * _SHORTEST + (cut.warm + 2) * period
                 raise InputError(
-                    f"{len(frames) * period:.2f} s is too short: at least {needed:.2f} s are needed",
+                    f"{len(frames) * period:.2f} s is too short: at least {needed:.2f} s are "
+                    "needed",
                     where=f"recording {recording.name!r}",
                     fix="record for 10 s or more",
                 )

@@ -131,7 +131,9 @@ class Nulls(StatisticRows):
         return index.reshape(-1)
 
     @classmethod
-    def joined(cls, parts: Sequence[Self]) -> Self:  # pyright: ignore[reportIncompatibleMethodOverride]
+    def joined(  # pyright: ignore[reportIncompatibleMethodOverride]
+        cls, parts: Sequence[Self]
+    ) -> Self:
         """Joins nulls one after another, of as many markers as all have; recordings and numerics
         are those of the parts."""
         least = min(part.statistics.marker_error.shape[1] for part in parts)

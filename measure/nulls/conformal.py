@@ -4,7 +4,8 @@ Recordings of one kind of numerics are alike, so that the number of kinds, and n
 says how rare anything can be. If the data are one more kind that is exchangeable with the K of the
 nulls, and their statistic is one drawn from among those that groups of their kind have, then
 
-    p(t) = (1 + Σ_k s_k(t)) / (K + 1),   s_k(t) the share of the groups of kind k that are at least as far as t,
+    p(t) = (1 + Σ_k s_k(t)) / (K + 1),   s_k(t) the share of the groups of kind k that are at least
+                                         as far as t,
 
 is at most α in a share α of experiments or fewer, whatever the distribution of the statistic within
 kinds and among them (conformal prediction with hierarchical data: Lee, Barber and Willett,

@@ -163,7 +163,8 @@ class NullBatch:
             with suppress(DivergedError):
                 return self._run(flat, attached, *self._method(halvings))
         raise FlagdataError(
-            f"a simulation of nulls diverges, even in steps {2**_HALVINGS} times smaller than usual",
+            f"a simulation of nulls diverges, even in steps {2**_HALVINGS} times smaller than "
+            "usual",
             where=f"{self.calibrations[0]}, stretching × {self.stiffness.stretching:.3g}, winds "
             f"{', '.join(f'{speed:.3g}' for speed in self.speeds)} m/s",
             fix="check the unit of the cloth's stretching (N/m), area weight (kg/m²) and of the "

@@ -1,11 +1,12 @@
 """Narrow lines in the spectra of errors, at frequencies that go with the wind: what sheds vortices
 upwind leaves them.
 
-Forces that come and go within a segment average to nothing along every steady column. A body of width D sheds at
-f = St U/D, St about 0.2 (Roshko, NACA TN 3169, 1954), so f/U is the same in all winds. Each segment's errors, projected
-on cos(π i u/W) along each axis of the world, have a periodogram; its prominence at a reduced frequency is the power
-there over the median of the neighbourhood, and that of some segments is the geometric mean: a line that one of them
-shows alone is none that goes with the wind.
+Forces that come and go within a segment average to nothing along every steady column. A body of
+width D sheds at f = St U/D, St about 0.2 (Roshko, NACA TN 3169, 1954), so f/U is the same in all
+winds. Each segment's errors, projected on cos(π i u/W) along each axis of the world, have a
+periodogram; its prominence at a reduced frequency is the power there over the median of the
+neighbourhood, and that of some segments is the geometric mean: a line that one of them shows alone
+is none that goes with the wind.
 """
 
 from __future__ import annotations

@@ -46,7 +46,8 @@ def contrastive_loss(
     """
     if embedding.ndim != 2 or seed.shape != embedding.shape[:1]:
         raise InputError(
-            f"the embeddings have the shape {tuple(embedding.shape)}, the seeds {tuple(seed.shape)}",
+            f"the embeddings have the shape {tuple(embedding.shape)}, the seeds "
+            f"{tuple(seed.shape)}",
             fix="give (n, dimension) and (n,)",
         )
     if margin <= 0 or (positive_share is not None and not 0 < positive_share < 1):

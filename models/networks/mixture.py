@@ -214,7 +214,8 @@ class MixtureHead(nn.Module):
         super().__init__()
         if min(dimension, targets, components) < 1:
             raise InputError(
-                f"the head has dimension {dimension}, {targets} targets and {components} components",
+                f"the head has dimension {dimension}, {targets} targets and {components} "
+                "components",
                 fix="give at least 1 of each",
             )
         self.targets = targets

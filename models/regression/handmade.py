@@ -83,11 +83,12 @@ def features(frames: Tensor, *, rate: float) -> Tensor:
     contrast or brightness.
 
     Powers are logarithms to base 10 of variances over the clip's own; frequencies in Hz; flows in
-    log10(px/s) and positions and lengths in px, over `SIDE`. Flow is the normal flow of Horn and Schunck (1981),
-    |∂I/∂t| / |∇I|, and the least-squares translation of each frame (Lucas and Kanade, 1981). Coherence and wavenumber
-    [rad/px] are modulus and angle of the cross-spectrum of neighbouring pixels at the dominant frequency: a travelling
-    wave has coherence 1 and its own wavenumber. Horizontal positions, skewness, tilt and wavenumbers keep no sign, so
-    that a mirrored clip has the same features: a wind's speed has no side.
+    log10(px/s) and positions and lengths in px, over `SIDE`. Flow is the normal flow of Horn and
+    Schunck (1981), |∂I/∂t| / |∇I|, and the least-squares translation of each frame (Lucas and
+    Kanade, 1981). Coherence and wavenumber [rad/px] are modulus and angle of the cross-spectrum of
+    neighbouring pixels at the dominant frequency: a travelling wave has coherence 1 and its own
+    wavenumber. Horizontal positions, skewness, tilt and wavenumbers keep no sign, so that a
+    mirrored clip has the same features: a wind's speed has no side.
 
     Args:
         frames: (batch, 1, time, height, width), gray, of any scale, at least 8 frames and 16×16 px.

@@ -35,7 +35,8 @@ _CHECK_TIMEOUT = 120.0  # s; importing Blender from a cold disk
 _TAIL = 2000  # characters of a failed command's output that an error quotes
 _PROBE = """
 import json, os, platform, numpy, bpy
-found = {"blender": bpy.app.version_string, "python": platform.python_version(), "numpy": numpy.__version__}
+found = {"blender": bpy.app.version_string, "python": platform.python_version()}
+found["numpy"] = numpy.__version__
 print("\\n" + json.dumps(found), flush=True)
 os._exit(0)
 """

@@ -7,12 +7,14 @@ nothing but Blender, NumPy and the standard library.
 
 Messages, and their answers:
 
-    scene  → done    engine, width, height, samples, bounces, threads, camera {matrix (4 × 4, camera to world,
-                     looking along its −z, y up), focal, centre [px]}, sun {toward, irradiance [W/m²], angle (its
-                     angular radius) [rad]}, sky (radiance of the surroundings), objects [{name, albedo (linear),
-                     translucency}]; arrays "texture/NAME" (height, width, 3) uint8 sRGB albedo, row 0 on top (v = 1)
-    frame  → picture seed; arrays "positions/NAME" (vertex, 3) [m], "faces/NAME" (face, 3), "uv/NAME" (vertex, 2), v up;
-                     answered by "rgba" (height, width, 4) float32: linear radiance times coverage, coverage
+    scene  → done    engine, width, height, samples, bounces, threads, camera {matrix (4 × 4,
+                     camera to world, looking along its −z, y up), focal, centre [px]}, sun {toward,
+                     irradiance [W/m²], angle (its angular radius) [rad]}, sky (radiance of the
+                     surroundings), objects [{name, albedo (linear), translucency}]; arrays
+                     "texture/NAME" (height, width, 3) uint8 sRGB albedo, row 0 on top (v = 1)
+    frame  → picture seed; arrays "positions/NAME" (vertex, 3) [m], "faces/NAME" (face, 3),
+                     "uv/NAME" (vertex, 2), v up; answered by "rgba" (height, width, 4) float32:
+                     linear radiance times coverage, coverage
     exit   → nothing
 """
 

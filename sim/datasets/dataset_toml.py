@@ -6,16 +6,18 @@ from which each recording draws its own value.
 
     title, licence, seed
     [simulation]  scene: a recipe of `flagdata simulate`, by name or path (.toml)
-    [render]      renderer; prior: a name of catalogs/renders; photos: a folder of backgrounds; and in place of the
-                  prior's own width, height [px], raster-samples, cycles-samples
+    [render]      renderer; prior: a name of catalogs/renders; photos: a folder of backgrounds; and
+                  in place of the prior's own width, height [px], raster-samples, cycles-samples
     [sides.NAME]  sequences, renders; sessions, where sequences are dealt to set-ups
     [sessions]    spread: of the winds of one session about its mean, as a share
-    [groups]      what each batch of the scene draws: height [m], a quantity; of the lists rates [Hz] and attachments
-                  one entry
-    [camera]      coding = "jpeg" | "h264"; jpeg-quality or rate-factor, read-noise, shot-noise: quantities;
-                  frame-slot [B]
-    [anemometer]  truth = "stated" | "measured"; rate [Hz], before [s], noise (a quantity), resolution, accuracy [m/s]
-    [anemometer.effects.NAME]  parameters of a sensor effect: quantities; effects follow one another as in the file
+    [groups]      what each batch of the scene draws: height [m], a quantity; of the lists rates
+                  [Hz] and attachments one entry
+    [camera]      coding = "jpeg" | "h264"; jpeg-quality or rate-factor, read-noise, shot-noise:
+                  quantities; frame-slot [B]
+    [anemometer]  truth = "stated" | "measured"; rate [Hz], before [s], noise (a quantity),
+                  resolution, accuracy [m/s]
+    [anemometer.effects.NAME]  parameters of a sensor effect: quantities; effects follow one another
+                               as in the file
 """
 
 from __future__ import annotations

@@ -53,7 +53,9 @@ EFFECTS = Registry(
     {
         "power-law-drag": "sim.effects.power_law_drag:PowerLawDrag",
         "tangential-linear-drag": "sim.effects.tangential_linear_drag:TangentialLinearDrag",
-        "tangential-quadratic-drag": "sim.effects.tangential_quadratic_drag:TangentialQuadraticDrag",
+        "tangential-quadratic-drag": (
+            "sim.effects.tangential_quadratic_drag:TangentialQuadraticDrag"
+        ),
         "lift": "sim.effects.lift:Lift",
         "added-mass": "sim.effects.added_mass:AddedMass",
         "reactive-loading": "sim.effects.reactive_loading:ReactiveLoading",

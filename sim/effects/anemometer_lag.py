@@ -45,6 +45,7 @@ class AnemometerLag(AnemometerEffect):
         step = torch.diff(time)[:, None]
         slope = torch.diff(speed, dim=0) / step
         memory = torch.exp(-step / lag.clamp(min=_TINY))
-        # m₁ = u₁ − τ s + (m₀ − u₀ + τ s) e^(−h/τ) for the difference e = m − u: e₁ = e₀ k − τ s (1 − k).
+        # m₁ = u₁ − τ s + (m₀ − u₀ + τ s) e^(−h/τ)
+        # for the difference e = m − u: e₁ = e₀ k − τ s (1 − k).
         behind = decaying_sum(memory, -lag * slope * (1 - memory))
         return speed + torch.cat([torch.zeros_like(speed[:1]), behind])

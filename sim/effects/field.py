@@ -218,7 +218,8 @@ class Seen(Flat):
 
     @property
     def rising(self) -> Tensor:
-        """|w·n| (z·n) n: by how much the pressure grows with a wind upward, over twice that wind [m/s]."""
+        """|w·n| (z·n) n: by how much the pressure grows with a wind upward, over twice that wind
+        [m/s]."""
         return self._turning(self.upward)
 
     @property

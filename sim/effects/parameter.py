@@ -159,7 +159,7 @@ class Parametrised:
             UsageError: values for another number of members.
         """
         moved: dict[str, Any] = {}
-        for entry in fields(self):  # pyright: ignore[reportArgumentType]  every subclass is a dataclass
+        for entry in fields(self):  # pyright: ignore[reportArgumentType]  of each subclass
             value = getattr(self, entry.name)
             if not isinstance(value, Tensor):
                 continue
@@ -170,7 +170,9 @@ class Parametrised:
                     fix="give one value, or one for each member",
                 )
             moved[entry.name] = value.to(dtype=dtype, device=device)
-        return replace(self, **moved) if moved else self  # pyright: ignore[reportArgumentType, reportReturnType]
+        if not moved:
+            return self
+        return replace(self, **moved)  # pyright: ignore[reportArgumentType, reportReturnType]
 
     @classmethod
     def drawn(cls, rng: np.random.Generator, *, batch: int) -> Self:

@@ -13,7 +13,7 @@ For a sheet of any shape, with velocity v, unit normal n and air u, let V = (v �
 velocity relative to the air and s = (u − v)_t the air's slip along the sheet. The operator (∂t + U
 ∂x) becomes the air's momentum V followed along the sheet, and the load −m_a (D V) n,
 
-    D V = n·a + ṅ·(v − u) + s·∇_s V + ½ V ∇_s·s                             (u taken as slow: u̇ is left out)
+    D V = n·a + ṅ·(v − u) + s·∇_s V + ½ V ∇_s·s                    (u taken as slow: u̇ is left out)
 
 For v = η_t e_z, n = e_z − η_x e_x, u = U e_x and small slopes the last term is of third order, and
 the others are η_tt + U η_xt + U ∂x(η_t + U η_x): the equation above. The last makes it Lighthill's

@@ -20,7 +20,8 @@ from sim.effects.parameter import Value, strength
 @dataclass(frozen=True, kw_only=True)
 class TiltedPole(Effect):
     """Attachments and start are turned rigidly about the lowest attachment, by the rotation vector
-    ω = lean (z × f) − sway f, with f the horizontal direction from the attachments to the middle of the cloth.
+    ω = lean (z × f) − sway f, with f the horizontal direction from the attachments to the middle of
+    the cloth.
 
     Attributes:
         lean: top toward the fly.

@@ -4,21 +4,23 @@ What a wing sheds into its wake holds its load back. After a sudden start the ci
 φ(τ) of its final one (Wagner, Z. angew. Math. Mech. 5:17, 1925), with τ = 2 U t/L the distance
 travelled in half chords, by Jones' fit
 
-    φ(τ) = 1 − 0.165 exp(−0.0455 τ) − 0.335 exp(−0.3 τ)                    (R. T. Jones, NACA report 681, 1940)
+    φ(τ) = 1 − 0.165 exp(−0.0455 τ) − 0.335 exp(−0.3 τ)         (R. T. Jones, NACA report 681, 1940)
 
 A load F that varies is then held back by two lags,
 
-    L_total = F − s Σ Aᵢ (F − zᵢ),    żᵢ = (2 U/L) bᵢ (F − zᵢ),    A = (0.165, 0.335), b = (0.0455, 0.3)
+    L_total = F − s Σ Aᵢ (F − zᵢ),    żᵢ = (2 U/L) bᵢ (F − zᵢ),
+    A = (0.165, 0.335),    b = (0.0455, 0.3)
 
 which for F switched on at rest (zᵢ = 0) is F (1 − s (1 − φ)). Here F is the base model's normal
 load of each face, ρ |w·n| w·n per area, U its speed relative to the air |w|, and L the length of
 the flat cloth. It is a closure: the wake of one face acts on that face alone, as if all of the
 cloth had its history.
 
-A run begins with zᵢ = 0, as if the air had just begun to move, also where it begins from an observed motion. Of a flag
-that flutters F changes its sign several times within the lags' times L/(2 U bᵢ), 0.5 and 3.3 s at 1.5 m and 5 m/s,
-so that zᵢ stays near the small mean of F: over 0.1 s this start moves the cloth by 0.29 of what the effect does, and
-zᵢ = F by 1.1 of it (`tests/sim/effects/test_wagner_lag.py`).
+A run begins with zᵢ = 0, as if the air had just begun to move, also where it begins from an
+observed motion. Of a flag that flutters F changes its sign several times within the lags' times
+L/(2 U bᵢ), 0.5 and 3.3 s at 1.5 m and 5 m/s, so that zᵢ stays near the small mean of F: over 0.1 s
+this start moves the cloth by 0.29 of what the effect does, and zᵢ = F by 1.1 of it
+(`tests/sim/effects/test_wagner_lag.py`).
 """
 
 from __future__ import annotations

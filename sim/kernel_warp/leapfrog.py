@@ -22,8 +22,9 @@ each of its faces (see `sim.cloth.bending`), so that a face needs of a hinge onl
 """
 
 # The kernel's body is Warp's language, of which its stubs type a part.
-# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false, reportIndexIssue=false
-# pyright: reportAttributeAccessIssue=false, reportInvalidTypeForm=false, reportGeneralTypeIssues=false
+# pyright: reportArgumentType=false, reportCallIssue=false, reportOperatorIssue=false
+# pyright: reportIndexIssue=false, reportAttributeAccessIssue=false
+# pyright: reportInvalidTypeForm=false, reportGeneralTypeIssues=false
 # pyright: reportAssignmentType=false
 
 from __future__ import annotations

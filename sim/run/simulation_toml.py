@@ -4,25 +4,28 @@ All values are SI, angles radians. A *quantity* is a number, or `{ low = …, hi
 "linear" | "log" }`, from which each member draws its own value.
 
     title, seed, count, batch, precision
-    [scene]      shape = "flag" | "hanging-cloth" | "arcsim" | "mesh"; width, height, columns, attachment;
-                 start-noise; file, root, accept (of an ArcSim scene); rest = [[u, v], …], faces, held, anchors =
-                 [[x, y, z], …] (of a mesh); stiffness (of the handles), or rigid = true; evaluation = "arcsim" |
-                 "corrected"; gravity
-    [material]   name (of catalogs/materials), names (of which each member draws one), file (TOML, or ArcSim JSON) or
-                 table (what such a TOML file holds); area-weight, area-weight-factor, stretching-factor,
-                 bending-factor, damping: quantities; bending-factors: a quantity drawn for each of the 15 coefficients
-    [wind]       speed [m/s], toward (where the air goes to, from +x towards +y) [rad], or toward-deg in degrees:
-                 quantities; vertical [m/s]. In place of a steady wind: samples = [[time, x, y, z], …], in s since the
-                 first frame that is kept and m/s; or log (a wind or recording of the lake), log-start (the first
-                 frame that is kept, since the log's first sample [s]), toward (of the log's vector mean, an angle);
-                 beyond = "refuse" | "hold" (what a run longer than the samples gets). With each of them:
-                 force = "quadratic-normal" | "stokes"; density, drag | viscosity
+    [scene]      shape = "flag" | "hanging-cloth" | "arcsim" | "mesh"; width, height, columns,
+                 attachment; start-noise; file, root, accept (of an ArcSim scene); rest = [[u, v],
+                 …], faces, held, anchors = [[x, y, z], …] (of a mesh); stiffness (of the handles),
+                 or rigid = true; evaluation = "arcsim" | "corrected"; gravity
+    [material]   name (of catalogs/materials), names (of which each member draws one), file (TOML,
+                 or ArcSim JSON) or table (what such a TOML file holds); area-weight,
+                 area-weight-factor, stretching-factor, bending-factor, damping: quantities;
+                 bending-factors: a quantity drawn for each of the 15 coefficients
+    [wind]       speed [m/s], toward (where the air goes to, from +x towards +y) [rad], or
+                 toward-deg in degrees: quantities; vertical [m/s]. In place of a steady wind:
+                 samples = [[time, x, y, z], …], in s since the first frame that is kept and m/s; or
+                 log (a wind or recording of the lake), log-start (the first frame that is kept,
+                 since the log's first sample [s]), toward (of the log's vector mean, an angle);
+                 beyond = "refuse" | "hold" (what a run longer than the samples gets). With each of
+                 them: force = "quadratic-normal" | "stokes"; density, drag | viscosity
     [contact]    thickness, stiffness, friction; without the table, layers pass through each other
     [limits]     low, high, sweeps; without the table, strain has no limits
-    [remeshing]  refine-angle, refine-compression, refine-velocity, size-min, size-max, aspect-min; without the table,
-                 the mesh stays as it is; with it, [integrator] is implicit and members are simulated one by one
-    [integrator] name = "symplectic" | "implicit"; step; air-shape (of the implicit); backend = "auto" | "torch" |
-                 "kernel" | "warp"
+    [remeshing]  refine-angle, refine-compression, refine-velocity, size-min, size-max, aspect-min;
+                 without the table, the mesh stays as it is; with it, [integrator] is implicit and
+                 members are simulated one by one
+    [integrator] name = "symplectic" | "implicit"; step; air-shape (of the implicit); backend =
+                 "auto" | "torch" | "kernel" | "warp"
     [time]       settle, frames, rate
     [effects.NAME]  parameters of an effect (quantities, or "prior" for its prior range)
 

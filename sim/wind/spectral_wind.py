@@ -16,7 +16,8 @@ from flagdata.errors import InputError
 class VonKarman:
     """Longitudinal turbulence of the natural wind near the ground.
 
-    One-sided spectrum of the along-wind speed (von Kármán 1948; in this form ESDU 85020 and EN 1991-1-4 literature)::
+    One-sided spectrum of the along-wind speed (von Kármán 1948; in this form ESDU 85020 and EN
+    1991-1-4 literature)::
 
         S(f) = 4 σ² (L/U) / (1 + 70.8 (f L/U)²)^(5/6)        [m²/s]
 

@@ -120,8 +120,9 @@ READER = 3
 gives other times, values or flags, or has other channels. What a TOML file says needs no raise: its
 digest is in the plan.
 
-    2   formats of tables are TOML files; instruments' lines are read where they are whole and stamped; numbers that may
-        mean no value, and directions of 0 that may be calm air, are asked about or reported, and stay as written
+    2   formats of tables are TOML files; instruments' lines are read where they are whole and
+        stamped; numbers that may mean no value, and directions of 0 that may be calm air, are asked
+        about or reported, and stay as written
 """
 
 

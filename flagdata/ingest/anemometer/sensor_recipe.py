@@ -9,11 +9,13 @@ Tables:
     [rows]                    column, value: only rows whose cell is this text are read
     [channels.<channel>]      column, unit, gain, offset, range, convention, rotation, optional,
                               suffix
-    [sensor]                  name, height, distance-constant, averaging, threshold, resolution, accuracy,
-                              accuracy-relative (all SI)
+    [sensor]                  name, height, distance-constant, averaging, threshold, resolution,
+                              accuracy, accuracy-relative (all SI)
     [quality]                 zero-offset, stale-after, frame-rate-of, fault-where-zero
-    [expect]                  confirmed: doubts about a draft that its user has answered (keys of draft/doubts.py)
-    [[check]]                 column, values, about: cells that must be one of these texts, else the row is a fault
+    [expect]                  confirmed: doubts about a draft that its user has answered (keys of
+                              draft/doubts.py)
+    [[check]]                 column, values, about: cells that must be one of these texts, else the
+                              row is a fault
 
 A recipe may leave open what the heading of the file states: see `OpenRecipe`.
 """
@@ -322,11 +324,14 @@ class _SensorTables:
 MATCH = "header first-line within mark cell units groups stacked row averaged starts"
 """Keys of [match], by which the heading of a file is found.
 
-    header          names, each of which is a cell of the heading; within: lines in which the heading is looked for
-    first-line      a pattern at the beginning of the file; mark: one in the heading or above it; row: of the first row
+    header          names, each of which is a cell of the heading; within: lines in which the
+                    heading is looked for
+    first-line      a pattern at the beginning of the file; mark: one in the heading or above it;
+                    row: of the first row
     cell            a pattern of a cell of the heading, with groups "name" and "unit"
     units           whether the line below the heading holds units
-    groups          whether the line above the heading holds what goes before the names; stacked: their first words
+    groups          whether the line above the heading holds what goes before the names; stacked:
+                    their first words
     averaged        whether a row is the average over the distance of the stamps (true)
     starts          a pattern above the heading by which stamps begin the average
 """

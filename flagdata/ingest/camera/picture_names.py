@@ -32,7 +32,10 @@ _FRACTION = 3  # digits from which on a number behind the seconds is a fraction 
 _CLOCK_NUMBER = re.compile(r"\d+")
 _CLOCK = re.compile(
     r"""(?<!\d)
-    (?:(?P<date>(?:19|20)\d\d(?P<sep>[-_.]?)(?:0[1-9]|1[0-2])(?P=sep)(?:0[1-9]|[12]\d|3[01]))(?:at|[-_.\st])*)?
+    (?:
+        (?P<date>(?:19|20)\d\d(?P<sep>[-_.]?)(?:0[1-9]|1[0-2])(?P=sep)(?:0[1-9]|[12]\d|3[01]))
+        (?:at|[-_.\st])*
+    )?
     (?:(?P<h>[01]\d|2[0-3])(?P<m>[0-5]\d)(?P<s>[0-5]\d)(?P<attached>\d*)
      |(?P<hh>[01]?\d|2[0-3])[-_.:h](?P<mm>[0-5]\d)[-_.:m](?P<ss>[0-5]\d)(?!\d))
     (?:\s*(?P<half>[ap]m)\b)?
@@ -116,8 +119,8 @@ def _problem(*, overnight: bool, loose: bool, mark: str | None) -> tuple[str, st
     if overnight:
         return (
             (
-                "the names state times of day of both sides of midnight and no day: their order is not "
-                "known"
+                "the names state times of day of both sides of midnight and no day: their order is "
+                "not known"
             ),
             "put the date before the time in the names, as 20260501_235959",
         )

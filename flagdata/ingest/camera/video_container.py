@@ -57,7 +57,8 @@ def truncation(
     if stream.frames > read:
         return [
             cut_off(
-                f"the file states {stream.frames} frames and holds {read}: it is cut off or damaged",
+                f"the file states {stream.frames} frames and holds {read}: it is cut off or "
+                "damaged",
                 read,
                 stream.frames - read,
             )
@@ -178,7 +179,8 @@ def _of_transport_stream(path: Path) -> list[Finding]:
 # Containers of one file's own frames. Playlists and scripts that name other files or addresses
 # (HLS, DASH, concat, SDP) are not among them.
 _FORMATS = (
-    "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,mpegts,avi,mpeg,mpegvideo,h264,hevc,m4v,mjpeg,mxf,flv,asf,ogg,gif,apng,dv,ivf,"
+    "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,mpegts,avi,mpeg,mpegvideo,h264,hevc,m4v,mjpeg,"
+    "mxf,flv,asf,ogg,gif,apng,dv,ivf,"
     "yuv4mpegpipe,nut,wtv"
 )
 # Raw streams: FFmpeg numbers their frames at 25 Hz, which is nobody's measurement.

@@ -297,7 +297,8 @@ def t_joints(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]
             f"vertex {first}): the cloth is open there",
             count=len(joints[worst]),
             where=f"frame {worst}",
-            fix="split those faces at the vertex, or subdivide both sides alike, and export it anew",
+            fix="split those faces at the vertex, or subdivide both sides alike, and export it "
+            "anew",
         ),
     )
 

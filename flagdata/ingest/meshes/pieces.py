@@ -110,7 +110,8 @@ def slits(sequence: MeshSequence | RaggedMeshSequence) -> tuple[Finding, ...]:
             "there, or a seam that is not closed",
             count=len(vertices),
             where=f"frame {worst}",
-            fix="if it is a seam, merge its vertices by distance before the export; a slit may stay",
+            fix="if it is a seam, merge its vertices by distance before the export; a slit may "
+            "stay",
         ),
     )
 

@@ -45,7 +45,7 @@ def of_numbers(path: Path, present: Sequence[Topic]) -> tuple[Topic, ...]:
             continue
         try:
             first = next(messages(path, topic.name), None)
-        except Exception:  # noqa: BLE001 - a damaged or foreign message is no number; it is named where it is chosen
+        except Exception:  # noqa: BLE001 - no number; it is named where it is chosen
             continue
         if first is not None and any(True for _ in _numbers(first.values)):
             of_numbers.append(topic)

@@ -122,7 +122,8 @@ def since(attributes: Mapping[str, Any], *, where: str) -> Since:
     offset = (int(date["h"] or 0) * 60 + int(date["min"] or 0)) * (-1 if date["sign"] == "-" else 1)
     try:
         parts = (int(date[name] or 0) for name in "YmdHMS")
-        zero = dt.datetime(*parts, tzinfo=dt.timezone(dt.timedelta(minutes=offset)))  # type: ignore[misc]
+        zone = dt.timezone(dt.timedelta(minutes=offset))
+        zero = dt.datetime(*parts, tzinfo=zone)  # type: ignore[misc]
     except ValueError:
         raise TimeError(
             f"the times are in {units!r}, which is no date", where=where, fix=fix
@@ -231,7 +232,7 @@ def open_dataset(path: Path, *, limits: Limits) -> TableText:
         try:
             raw = xarray.open_dataset(stream, decode_cf=False)
             data = xarray.decode_cf(raw, decode_times=False).squeeze()
-        except Exception as error:  # noqa: BLE001 - a damaged file makes its libraries raise anything
+        except Exception as error:  # noqa: BLE001 - libraries raise anything of a damaged file
             message = f"this netCDF or HDF5 file cannot be read: {type(error).__name__}"
             raise InputError(
                 message, where=where, fix="copy it again, or export it as CSV"

@@ -1,8 +1,10 @@
 """What the user gives of a table's columns in one line:
 "date,time,wind_speed[km/h],,wind_direction[deg]".
 
-    ENTRY,ENTRY,…              one entry a column, in the order of the file; a blank entry is a column that is not read
-    COLUMN=ENTRY,COLUMN=ENTRY  or only those that are read, each after its heading or number (from 1)
+    ENTRY,ENTRY,…              one entry a column, in the order of the file; a blank entry is a
+                               column that is not read
+    COLUMN=ENTRY,COLUMN=ENTRY  or only those that are read, each after its heading or number (from
+                               1)
 
 An entry is a channel with its unit in brackets, `wind_direction_to` for a direction that the wind
 blows to, or a part

@@ -4,8 +4,8 @@ its JSON.
     (1502979132.106111) can0 09FD0223#00A50267FE02FFFF
     17:33:21.107 R 09FD0223 00 A5 02 67 FE 02 FF FF
     2016-02-28T19:57:02.364Z,2,130306,130,255,8,f7,df,01,67,00,fa,ff,ff
-    2011-11-24-22:42:04.437 2  36 255 130306 Wind Data:  SID = 177; Wind Speed = 0.92 m/s; Wind Angle = 353.4 deg; …
-    {"timestamp":"…","prio":2,"src":36,"dst":255,"pgn":130306,"description":"Wind Data","fields":{"Wind Speed":0.92,…}}
+    2011-11-24-22:42:04.437 2  36 255 130306 Wind Data:  SID = 177; Wind Speed = 0.92 m/s; …
+    {"timestamp":"…","prio":2,"src":36,"dst":255,"pgn":130306,…,"fields":{"Wind Speed":0.92,…}}
 
 The first is of Linux' candump -L, the second the RAW text of Yacht Devices' gateways, of which the
 user gives the day.
@@ -44,10 +44,12 @@ from flagdata.ingest.anemometer.wind_options import WindOptions
 from flagdata.record.signals import Sensor
 
 _CANDUMP = re.compile(
-    r"\((?P<stamp>\d{10}\.\d{1,9})\)\s+\S+\s+(?P<id>[0-9A-F]{8})#(?P<bytes>(?:[0-9A-F]{2}){0,8})\s*[RT]?"
+    r"\((?P<stamp>\d{10}\.\d{1,9})\)\s+\S+\s+"
+    r"(?P<id>[0-9A-F]{8})#(?P<bytes>(?:[0-9A-F]{2}){0,8})\s*[RT]?"
 )
 _GATEWAY = re.compile(
-    r"(?:(?P<date>\d{4}-\d{2}-\d{2})T)?(?P<stamp>\d{2}:\d{2}:\d{2}\.\d{3})\s+[RT]\s+(?P<id>[0-9A-F]{8})(?P<bytes>(?:\s+[0-9A-F]{2}){0,8})\s*"
+    r"(?:(?P<date>\d{4}-\d{2}-\d{2})T)?(?P<stamp>\d{2}:\d{2}:\d{2}\.\d{3})\s+[RT]\s+"
+    r"(?P<id>[0-9A-F]{8})(?P<bytes>(?:\s+[0-9A-F]{2}){0,8})\s*"
 )
 _WIND = 130306
 _OVER_GROUND = 129026

@@ -5,15 +5,22 @@ of several names a column has, in which unit it is. The formats of catalogs/sens
 recipes of this kind that recognise their files; a user's own is read by `--sensor FILE.toml`.
 Beside the keys of every recipe (see sensor_recipe.py) they have
 
-    described-by        whose description it follows, of a format that was never tested on a real file
+    described-by        whose description it follows, of a format that was never tested on a real
+                        file
     [match]             see recipe.MATCH
-    [facts]             name → pattern with one group, looked for down to the first row; "{name}" in texts stands for it
-    [time] columns      names (those but one may be absent; a group "zone" of the pattern states the zone), or numbers
-    [time] format       a list: the first that most stamps fit, else by the stamps themselves, as where there is none
-    [channels.…]        column: a list of names (the first column with one of them is read), or a number
-    unit = { in = "heading", else = "deg" }     else: where the heading states none; absent: there it is an error
-    unit = { in = "heading", whole = "mph" }    whole: the unit that the instrument counts whole, by which that of a
-                        file that states none is inferred, and confirmed by its user; `--unit` gives it
+    [facts]             name → pattern with one group, looked for down to the first row; "{name}" in
+                        texts stands for it
+    [time] columns      names (those but one may be absent; a group "zone" of the pattern states the
+                        zone), or numbers
+    [time] format       a list: the first that most stamps fit, else by the stamps themselves, as
+                        where there is none
+    [channels.…]        column: a list of names (the first column with one of them is read), or a
+                        number
+    unit = { in = "heading", else = "deg" }     else: where the heading states none; absent: there
+                                                it is an error
+    unit = { in = "heading", whole = "mph" }    whole: the unit that the instrument counts whole, by
+                                                which that of a file that states none is inferred,
+                                                and confirmed by its user; `--unit` gives it
     range               of a column whose unit is in the heading: in SI
 
 A name is the heading's, or a regular expression that fits the whole of it, case ignored.

@@ -3,26 +3,33 @@ the maker's manual.
 
     about, name, line   what the format, the instrument and one of its lines are called in messages
     described-by        the description that it follows; none was tested on a real log
-    frame               pattern of a line, with the groups "body", "sum" (its checksum) and "end" (the mark that ends
-                        it; without that, two digits that look like a checksum may be the status); else all is the body
-    telegrams           patterns of the body, of which the first that fits counts. Groups named as fields hold values;
-                        "status", the instrument's own judgement; "unit", the letter of its unit of speed; "pairs", a
-                        list of names, values and letters of units, which `pair` takes apart
-    begins              pattern of the beginning of a reading, by which a line that fits nothing counts as cut off
+    frame               pattern of a line, with the groups "body", "sum" (its checksum) and "end"
+                        (the mark that ends it; without that, two digits that look like a checksum
+                        may be the status); else all is the body
+    telegrams           patterns of the body, of which the first that fits counts. Groups named as
+                        fields hold values; "status", the instrument's own judgement; "unit", the
+                        letter of its unit of speed; "pairs", a list of names, values and letters of
+                        units, which `pair` takes apart
+    begins              pattern of the beginning of a reading, by which a line that fits nothing
+                        counts as cut off
     before              pattern of what is removed from a line before all this
     clock               pattern of a line by which the instrument states its own time
     checksum, counted   how it is computed, and the texts behind the body that may be counted too
     missing             pattern of a text that means "no value"
     right, invalid      statuses of a sound reading; letter in place of a unit that marks a fault
-    stated-units        letter of the group "unit" → unit of the fields that name none; asks-unit: the user gives it
-                        where no telegram states it
-    needs, fewest       sets of fields one of which a reading has; number of its fields; lacking: else the line is this
-    unread              further names of pairs; where there are any, a line with another is no reading
+    stated-units        letter of the group "unit" → unit of the fields that name none; asks-unit:
+                        the user gives it where no telegram states it
+    needs, fewest       sets of fields one of which a reading has; number of its fields; lacking:
+                        else the line is this
+    unread              further names of pairs; where there are any, a line with another is no
+                        reading
     first-counts        of a name of pairs that comes twice: else the last
-    speed               fields of the horizontal speed: the first that are there; of two, the length of the components
+    speed               fields of the horizontal speed: the first that are there; of two, the length
+                        of the components
     channels            of the reading, in this order
     axes-from-south     whether wind along +x comes from the south mark, and not from the azimuth
-    [sensor], [fields]  the sensor; field → channel (none: it only serves others), unit or letters of units, and factor
+    [sensor], [fields]  the sensor; field → channel (none: it only serves others), unit or letters
+                        of units, and factor
 
 The fields "length" and "elevation" are those of the whole wind vector.
 """

@@ -19,7 +19,8 @@ from flagdata.ingest.anemometer.instants.stamp_text import whole_year
 # hexadecimal digits. What follows P, which makers use for sentences of their own, is theirs:
 # "$PSMDCN,2*19".
 _SENTENCE = re.compile(
-    r"[$!]([A-Z]{2}|[0-9A-F]{2}|P)([A-Z]{3}|(?<=[$!]P)[A-Z0-9]{3,12})((?:,[^,*$!]*)*)(?:\*([0-9A-Fa-f]{2}))?\s*$"
+    r"[$!]([A-Z]{2}|[0-9A-F]{2}|P)([A-Z]{3}|(?<=[$!]P)[A-Z0-9]{3,12})"
+    r"((?:,[^,*$!]*)*)(?:\*([0-9A-Fa-f]{2}))?\s*$"
 )
 _TAG = re.compile(r"^\\([^\\]*)\*([0-9A-Fa-f]{2})\\")
 _TAG_TIME = re.compile(r"(?:^|,)c:(\d{10})(\d{3})?(?:,|$)")

@@ -18,7 +18,8 @@ from flagdata.ingest.anemometer.wind_options import WindOptions
 _LONGEST = 20_000
 """Letters of a heading."""
 _REST = re.compile(
-    r"\s+\d{1,2}:\d{2}(?P<s>:\d{2})?(?P<f>[.,]\d+)?(?P<b>\s*)(?P<p>[AaPp](?:\.?[Mm]\.?)?)?\s*(?P<z>Z|[+-]\d{2}:?\d{2})?$"
+    r"\s+\d{1,2}:\d{2}(?P<s>:\d{2})?(?P<f>[.,]\d+)?(?P<b>\s*)"
+    r"(?P<p>[AaPp](?:\.?[Mm]\.?)?)?\s*(?P<z>Z|[+-]\d{2}:?\d{2})?$"
 )
 
 

@@ -65,7 +65,8 @@ _CTIME = re.compile(
 2018"."""
 _COMPACT = re.compile(
     r"\s*[\"\[(]?(?P<year>(?:19|20)\d{2})(?P<month>\d{2})(?P<day>\d{2})[T _-]?"
-    r"(?P<hour>\d{2}):?(?P<minute>\d{2}):?(?P<second>\d{2}(?:\.\d{1,9})?)(?P<zone>Z|[+-]\d{2}:?\d{2})?[\"\])]?"
+    r"(?P<hour>\d{2}):?(?P<minute>\d{2}):?(?P<second>\d{2}(?:\.\d{1,9})?)"
+    r"(?P<zone>Z|[+-]\d{2}:?\d{2})?[\"\])]?"
     r"[\s,;>|]+(?P<raw>[$!]\S.*)"
 )
 """A stamp without signs between its numbers, before a sentence: "20260501 120000+00:00

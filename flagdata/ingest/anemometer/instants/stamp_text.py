@@ -14,11 +14,16 @@ Names of counts:
     epoch-s, -ms, -us, -ns      Unix time
     labview-s                   seconds since 1904-01-01 in UTC (LabVIEW, timestamps)
     filetime                    tenths of a microsecond since 1601-01-01 in UTC (Windows, FILETIME)
-    ticks                       tenths of a microsecond since year 1, of the wall clock (.NET, DateTime.Ticks)
-    excel-days                  days since 1899-12-30 (ECMA-376, part 1, 18.17.4.1), of the wall clock
-    excel-days-1904             days since 1904-01-01 (the same, workbooks of the 1904 date system), of the wall clock
-    datenum                     days since year 0, 1 January being 1 (MATLAB, datenum), of the wall clock
-    julian-days, -modified      days since noon of -4712-01-01, and since 1858-11-17, of the wall clock
+    ticks                       tenths of a microsecond since year 1, of the wall clock (.NET,
+                                DateTime.Ticks)
+    excel-days                  days since 1899-12-30 (ECMA-376, part 1, 18.17.4.1), of the wall
+                                clock
+    excel-days-1904             days since 1904-01-01 (the same, workbooks of the 1904 date system),
+                                of the wall clock
+    datenum                     days since year 0, 1 January being 1 (MATLAB, datenum), of the wall
+                                clock
+    julian-days, -modified      days since noon of -4712-01-01, and since 1858-11-17, of the wall
+                                clock
     elapsed-s, -ms, -us, -min, -h, -d   since a start that the user gives (see `dates`)
 """
 

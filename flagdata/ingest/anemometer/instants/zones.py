@@ -49,7 +49,8 @@ _STATED = re.compile(
     r"(?<![A-Za-z])(?:time[ _-]?zone(?:[ _]name)?(?:\s*\((?:utc|gmt)\s*[+±]?\s*\))?|(?:utc|gmt)[ "
     r"_-]?(?:time[ _]?)?"
     r"offset|offset[ _](?:from|to)[ _](?:utc|gmt))[\"']?\s*(?:->|[=:,;|\t(]|\s)+\s*[\"']?(?P<zone>"
-    r"[A-Z][A-Za-z]+/[A-Za-z_]+(?:/[A-Za-z_]+)?(?:[+-]\d{1,2})?|(?:UTC|GMT)?\s?[+-]?\d{1,4}(?::?\d{2})?|UTC|GMT|Z)"
+    r"[A-Z][A-Za-z]+/[A-Za-z_]+(?:/[A-Za-z_]+)?(?:[+-]\d{1,2})?"
+    r"|(?:UTC|GMT)?\s?[+-]?\d{1,4}(?::?\d{2})?|UTC|GMT|Z)"
     r"(?![A-Za-z/\d.]|\s?[+±]\s?\))",
     re.IGNORECASE,
 )

@@ -135,8 +135,8 @@ def settle(
     if given_platform == "corrected":
         text, names = (
             (
-                "wind over ground was computed from a moving platform's motion before it was logged, "
-                "as given"
+                "wind over ground was computed from a moving platform's motion before it was "
+                "logged, as given"
             ),
             {},
         )

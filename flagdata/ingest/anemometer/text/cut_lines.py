@@ -45,7 +45,8 @@ class RowReader:
             raise InputError(
                 f"the file ends in line {len(head)}, before its header does",
                 where=str(source.path),
-                fix="check the recipe's preamble and header, or copy the file from the logger again",
+                fix="check the recipe's preamble and header, or copy the file from the logger "
+                "again",
             )
         self.first_line = layout.preamble + layout.header + 1
         self.shift = 0
