@@ -19,7 +19,7 @@ from flagdata.verbs.verb_options import argument, make_call, option, options
 
 if TYPE_CHECKING:
     from flagdata.align.methods import ClockOptions
-    from flagdata.ingest.source_artifacts import IngestResult
+    from flagdata.ingest.artifacts_present import IngestResult
 
 CLOCK = "The clock"
 

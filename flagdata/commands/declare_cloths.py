@@ -43,10 +43,11 @@ def declare_cloths(chosen: DeclaringCloths) -> Iterator[Result]:
       flagdata query --where "kind = 'clip' and session = 'felt'" --lake lake
     """
     from flagdata.align.cloth_recording import cloth_recording
+    from flagdata.ingest.artifacts_present import Labels
     from flagdata.ingest.camera import CameraOptions, parse_crop
     from flagdata.ingest.camera.recording_start import UNKNOWN
     from flagdata.ingest.cloth_films import read_cloths
-    from flagdata.ingest.source_artifacts import CameraIngest, Labels, ingest_camera
+    from flagdata.ingest.source_artifacts import CameraIngest, ingest_camera
     from flagdata.lake.merging import added_since
 
     box, branch = parse_crop(chosen.crop), chosen.branch

@@ -25,9 +25,10 @@ if TYPE_CHECKING:
     from datetime import tzinfo
 
     from flagdata.ingest.anemometer.log_confirmation import Confirm
+    from flagdata.ingest.artifacts_present import Labels
     from flagdata.ingest.markers import MarkerOptions
     from flagdata.ingest.meshes.mesh_artifacts import MeshIngest
-    from flagdata.ingest.source_artifacts import CameraIngest, Labels, WindIngest
+    from flagdata.ingest.source_artifacts import CameraIngest, WindIngest
 
 KINDS: dict[str, tuple[str, type]] = {
     "camera": ("a camera file", FromCamera),
@@ -96,9 +97,10 @@ class IngestRequest:
         Raises:
             UsageError: a value that cannot be read, or options that contradict each other.
         """
+        from flagdata.ingest.artifacts_present import Labels
         from flagdata.ingest.markers import MarkerOptions
         from flagdata.ingest.meshes.mesh_artifacts import MeshIngest
-        from flagdata.ingest.source_artifacts import CameraIngest, Labels, WindIngest
+        from flagdata.ingest.source_artifacts import CameraIngest, WindIngest
 
         several = chosen.sources
         sources = (Path(several),) if isinstance(several, Path | str) else tuple(map(Path, several))

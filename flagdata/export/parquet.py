@@ -116,8 +116,8 @@ def _part(path: Path, rows: pa.Schema) -> pq.ParquetWriter:
     return pq.ParquetWriter(
         path,
         schema,
-        compression=compression,
-        use_dictionary=dictionary,  # pyright: ignore[reportArgumentType]
+        compression=compression,  # pyright: ignore[reportArgumentType]
+        use_dictionary=dictionary,
     )
 
 

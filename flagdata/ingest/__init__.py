@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from flagdata.ingest.anemometer.sniffing import Head
     from flagdata.ingest.anemometer.text.opening import open_text
     from flagdata.ingest.anemometer.wind_options import WindOptions
+    from flagdata.ingest.artifacts_present import IngestResult, Labels
     from flagdata.ingest.camera.camera_options import CameraOptions, CropBox, parse_crop
     from flagdata.ingest.camera.camera_probing import probe
     from flagdata.ingest.camera.stream import open_camera, propose_crop
@@ -49,8 +50,6 @@ if TYPE_CHECKING:
     from flagdata.ingest.records import ingest_record
     from flagdata.ingest.source_artifacts import (
         CameraIngest,
-        IngestResult,
-        Labels,
         WindIngest,
         ingest_camera,
         ingest_wind,

@@ -28,8 +28,8 @@ from flagdata.core.printable import SHORT
 from flagdata.core.schema import CATALOG, TOPIC_IMAGE, TOPIC_WIND, Kind
 from flagdata.dataset.clips import clip_rows
 from flagdata.errors import CorruptError, InputError
+from flagdata.ingest.artifacts_present import IngestResult, Labels, find_same, kept, result_of
 from flagdata.ingest.ingest_report import REPORT_SCHEMA
-from flagdata.ingest.source_artifacts import IngestResult, Labels, find_same, kept, result_of
 from flagdata.ingest.source_file import Source
 from flagdata.lake import Artifact, Lake
 from flagdata.recipes.documents import column_json, from_json

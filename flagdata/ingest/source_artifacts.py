@@ -13,27 +13,36 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import pyarrow.compute as pc
 
 from flagdata.align.paired import PairedClocks, host_clock
 from flagdata.core.findings import Finding, Severity, quality_flags
 from flagdata.core.json_values import json_values
-from flagdata.core.provenance import digest, recipe_hash
+from flagdata.core.provenance import digest
 from flagdata.core.schema import Kind
-from flagdata.errors import ConflictError, FlagdataError, InputError, NothingMeasuredError
+from flagdata.errors import FlagdataError, InputError, NothingMeasuredError
 from flagdata.ingest.anemometer import WindOptions, read_log
 from flagdata.ingest.anemometer.log_confirmation import UNASKED, Confirm, confirm_readings
 from flagdata.ingest.anemometer.samples.neighbours import hours_off
 from flagdata.ingest.anemometer.sensor_recipe import SENSORS
+from flagdata.ingest.artifacts_present import (
+    IngestResult,
+    Labels,
+    check_labels,
+    find,
+    kept,
+    of_source,
+    result_of,
+)
 from flagdata.ingest.before import earlier, other_readings
 from flagdata.ingest.camera import CameraOptions
 from flagdata.ingest.ingest_report import FrameTimes, camera_report, wind_report
 from flagdata.ingest.mcap.bags import is_bag
 from flagdata.ingest.source_file import Source
 from flagdata.lake import Artifact, Lake, Transaction
-from flagdata.lake.remaking import ABSENT, Present, Remade, present
+from flagdata.lake.remaking import Present
 from flagdata.record import Coding, Record, RecordWriter
 from flagdata.record.metadata import CAMERA, PROVENANCE, camera_metadata
 from flagdata.record.signals import WindLog, WindSeries
@@ -46,19 +55,6 @@ NEIGHBOURS = 3
 CROP_PICTURE = "crop.png"
 """Attachment of a camera record whose crop was found from motion: the motion in red, the crop in
 yellow."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Labels:
-    """What people call an artifact; not part of its identity.
-
-    Attributes:
-        name: of the artifact; `None` takes the file's name without its suffix.
-        session: one set-up at one place; its clips are always on the same side of a split.
-    """
-
-    name: str | None = None
-    session: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,29 +87,6 @@ class WindIngest:
                 SENSORS.find(self.wind.recipe).data.decode(errors="replace")
             )
         return {"ingest": "wind", "wind": options}
-
-
-@dataclass(frozen=True, kw_only=True)
-class IngestResult:
-    """What an ingest did.
-
-    Attributes:
-        artifact: as it is in the lake.
-        created: false when it was there already, and its row stayed.
-        report: what was found, see `flagdata.ingest.ingest_report`.
-        healed: what was done where its object was damaged or missing.
-    """
-
-    artifact: Artifact
-    created: bool
-    report: Mapping[str, Any]
-    healed: Remade | None = None
-    JSON_NAMES: ClassVar = (
-        *("artifact=artifact.id", "kind=artifact.kind", "name=artifact.name", "created", "healed"),
-        *("object=artifact.object", "source_name=artifact.source_name"),
-        *("source_hash=artifact.source_hash", "session=artifact.session"),
-        *("quality=artifact.quality", "report"),
-    )
 
 
 def ingest_camera(
@@ -349,7 +322,7 @@ def _read(
         else earlier(lake, artifacts, source.hash, recipe, log.series)
     )
     if same is not None:
-        _check_labels(same, labels)
+        check_labels(same, labels)
         return kept(same)
     findings = (*findings, *_shifted_logs(lake, log.series, labels.session, artifacts))
     findings = (*findings, *other_readings(artifacts, source.hash, recipe))
@@ -370,7 +343,7 @@ def _is_of_another_session(
     """Checks whether the branch has this log for a session, and it is ingested for another one: the
     same constant wind, or counts of seconds from 0, may have been logged beside another film. It is
     another artifact, whose recipe names its session."""
-    rows = lake.rows(at=branch).filter(_same(Kind.WIND, source, recipe)).to_pylist()
+    rows = lake.rows(at=branch).filter(of_source(Kind.WIND, source, recipe)).to_pylist()
     return (
         bool(rows)
         and None not in (labels.session, rows[0]["session"])
@@ -474,75 +447,6 @@ def _shifted_logs(
     return tuple(findings)
 
 
-def find(
-    lake: Lake,
-    kind: Kind,
-    source: Source,
-    recipe: Mapping[str, Any],
-    labels: Labels,
-    *,
-    branch: str,
-) -> Present:
-    """Finds what the branch has of the artifact that this ingest would make.
-
-    Raises:
-        ConflictError: it is there, under another name or session than the one asked for.
-    """
-    return _presence(
-        lake, lake.rows(at=branch).filter(_same(kind, source, recipe)).to_pylist(), labels
-    )
-
-
-def _same(kind: Kind, source: Source, recipe: Mapping[str, Any]) -> pc.Expression:
-    """Builds the condition that the row of an artifact meets that this source and recipe make."""
-    return (
-        (pc.field("kind") == kind.value)
-        & (pc.field("source_hash") == source.hash)
-        & (pc.field("recipe_hash") == recipe_hash(recipe))
-    )
-
-
-def find_same(lake: Lake, artifact: str, labels: Labels, *, branch: str) -> Present:
-    """Finds what the branch has of the artifact of an identity.
-
-    Raises:
-        ConflictError: it is there, under another name or session than the one asked for.
-    """
-    return _presence(lake, lake.rows({"artifact": artifact}, at=branch).to_pylist(), labels)
-
-
-def kept(artifact: Artifact) -> IngestResult:
-    """Returns the result of an ingest that found its artifact in the lake."""
-    return IngestResult(
-        artifact=artifact, created=False, report=json.loads(artifact.report or "{}")
-    )
-
-
-def _presence(lake: Lake, rows: Sequence[Mapping[str, Any]], labels: Labels) -> Present:
-    if not rows:
-        return ABSENT
-    artifact = Artifact.from_row(rows[0])
-    _check_labels(artifact, labels)
-    return present(lake, artifact)
-
-
-def _check_labels(artifact: Artifact, labels: Labels) -> None:
-    """Refuse labels that the artifact, which is there already, does not have."""
-    for label, asked, stored in (
-        ("name", labels.name, artifact.name),
-        ("session", labels.session, artifact.session),
-    ):
-        if asked is not None and asked != stored:
-            raise ConflictError(
-                f"{artifact.source_name} is in the lake with "
-                f"{f'the {label} {stored!r}' if stored else f'no {label}'}, "
-                f"not {asked!r}",
-                where=artifact.id,
-                fix=f"leave out --{label}, or take the old one off with flagdata withdraw and "
-                "ingest again",
-            )
-
-
 def _artifact(
     kind: Kind,
     source: Source,
@@ -573,22 +477,6 @@ def _artifact(
         quality=quality_flags(tuple(findings)),
         report=json.dumps(report, allow_nan=False, ensure_ascii=False),
     )
-
-
-def result_of(
-    transaction: Transaction, artifact: Artifact, report: Mapping[str, Any], labels: Labels
-) -> IngestResult:
-    """Returns what an ingest did whose transaction has ended.
-
-    Raises:
-        ConflictError: another process published it meanwhile, under another name or session than
-            the one asked for.
-    """
-    artifact_in_lake = transaction.result.artifacts[artifact.id]
-    if artifact.id in transaction.result.added:
-        return IngestResult(artifact=artifact_in_lake, created=True, report=report)
-    _check_labels(artifact_in_lake, labels)
-    return replace(kept(artifact_in_lake), healed=transaction.result.healed.get(artifact.id))
 
 
 def _left_whole(path: Path) -> Finding:

@@ -45,16 +45,14 @@ if TYPE_CHECKING:
     from flagdata.lake.lake import Lake
     from flagdata.lake.leases import Lease, collecting
     from flagdata.lake.lineage import labels_of
+    from flagdata.lake.marker_sequences import MarkerSequence, read_markers, write_markers
     from flagdata.lake.merging import difference
     from flagdata.lake.mesh_sequences import (
-        MarkerSequence,
         Mesh,
         MeshSequence,
         RaggedMeshSequence,
         open_meshes,
-        read_markers,
         read_meshes,
-        write_markers,
         write_meshes,
     )
     from flagdata.lake.naming import meant

@@ -20,13 +20,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-import re
 import tempfile
 import threading
 import time
 import uuid
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, TypeVar
@@ -38,9 +36,7 @@ from deltalake import CommitProperties, DeltaTable
 from deltalake.exceptions import CommitFailedError, DeltaError
 
 from flagdata.core.files.durable import (
-    HEAL,
     confirming,
-    disk_errors,
     flush_file,
     flush_folder,
     put_if_absent,
@@ -49,23 +45,21 @@ from flagdata.core.files.durable import (
 from flagdata.core.files.regular_files import is_beside, open_regular
 from flagdata.core.provenance import file_hash
 from flagdata.core.schema import CATALOG, FORMAT_VERSION, catalog_schema
-from flagdata.errors import ConflictError, CorruptError, FlagdataError
+from flagdata.errors import ConflictError, CorruptError
 from flagdata.lake.attempts import Looks, Moved
+from flagdata.lake.catalog_log_errors import DELETE_HINTS, HINT, LogErrors, newer
 from flagdata.lake.delta_log import (
     CHECKPOINT,
     FILE_HASH,
     PREVIOUS_HASH,
     Entry,
     Log,
-    Summaries,
     is_stated,
-    names_in,
 )
+from flagdata.lake.log_summaries import Summaries
 from flagdata.lake.rowfiles import RowFiles, Scan, changed_file, encode_rows
-from flagdata.storage import Place, RemotePath
-from flagdata.storage.connection import delta_options, plain
+from flagdata.storage import Place
 from flagdata.storage.forks import OneProcess
-from flagdata.storage.refusals import refusal
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -112,6 +106,7 @@ class Catalog:
         self._marks = marks
         self._log = path / "_delta_log"
         self._entries = Log(self._log, marks)
+        self._errors = LogErrors(path=path, log=self._log, entries=self._entries)
         self._summaries = Summaries(marks.parent / "history", self._entries)
         self._lock = threading.RLock()
         self.looks = Looks()
@@ -145,7 +140,7 @@ class Catalog:
                     commit_properties=_properties(info),
                 )
             except DeltaError as error:
-                raise self._refusal_of(error) from None
+                raise self._errors.refusal_of(error) from None
             entry = (Path(folder) / "_delta_log" / self._entries.path(0).name).read_bytes()
         if not self._entries.adopt(0, entry):
             raise ConflictError(
@@ -323,7 +318,7 @@ class Catalog:
         try:
             self._open(version).create_checkpoint()
         except DeltaError as error:
-            raise self._refusal_of(error) from None
+            raise self._errors.refusal_of(error) from None
         if isinstance(self._log, Path):
             flush_file(self._log / f"{version:020d}{CHECKPOINT}")
             if (hint := self._log / HINT).exists():
@@ -476,10 +471,6 @@ class Catalog:
         with confirming(f"version {version}", self._entries.path(version)):
             self._entries.acknowledge(version)
 
-    def _options(self) -> dict[str, str] | None:
-        """Returns what the Delta library needs to reach the table; nothing on a disk."""
-        return delta_options() if isinstance(self.path, RemotePath) else None
-
     def _checkpoint(self) -> int:
         """Finds the newest checkpoint's version, by file names: a process may die before
         `_last_checkpoint` is written."""
@@ -498,11 +489,11 @@ class Catalog:
                 isinstance(log_file, Path) and log_file.exists() and not log_file.is_file()
             ):  # of a pipe it would wait for ever
                 message = f"{log_file.name} of the catalog's log is no regular file"
-                raise CorruptError(message, where=str(log_file), fix=_DELETE)
+                raise CorruptError(message, where=str(log_file), fix=DELETE_HINTS)
         noted = self._summaries.checkpoints.get(newest)
         if noted is not None and file_hash(checkpoint) != noted:
             message = "a checkpoint of the catalog's log has changed since it was written"
-            raise CorruptError(message, where=str(checkpoint), fix=_DELETE)
+            raise CorruptError(message, where=str(checkpoint), fix=DELETE_HINTS)
         if newest + 1 < self._summaries.covered:
             history = self.history()
             *_, last = self._entries.entries(
@@ -522,60 +513,12 @@ class Catalog:
                 where=str(self.path),
                 fix="run flagdata doctor: it lists the refs that cannot be read",
             )
-        with self._log_errors(version):
-            table = self._table = self._repeat_reading(lambda: self._at(version))
+        with self._errors.of_version(version):
+            table = self._table = self._errors.repeat_reading(lambda: self._at(version))
         unknown = [f.name for f in table.schema().fields if f.name not in CATALOG]
         if unknown:
             raise newer(f"the catalog has the columns {', '.join(unknown)}", self.path)
         return table
-
-    @contextmanager
-    def _log_errors(self, version: int) -> Iterator[None]:
-        """Turns what the Delta library cannot read of the log into an error that names the entry to
-        blame."""
-        try:
-            yield
-        except (DeltaError, OSError) as error:
-            if isinstance(self._log, RemotePath):
-                if _NO_ANSWER.search(str(error)):
-                    raise self._unreachable(error, self._log) from None
-            elif _SYSTEM_ERROR in str(error):
-                with disk_errors("reading the catalog", self._log):
-                    raise OSError(str(error).splitlines()[0]) from error
-            self._entries.files()  # raises, where an entry is to blame
-            if (odd := next(filter(_UNLISTED.search, names_in(self._log)), None)) is not None:
-                raise CorruptError(
-                    "the catalog's log cannot be listed: the Delta library takes no such name",
-                    where=str(self._log / odd),
-                    fix="move it away: it is no part of the lake",
-                ) from None
-            first = (
-                str(error).splitlines()[0].removeprefix(_KERNEL)
-            )  # without the Delta library's stack
-            first = plain(first) if isinstance(self._log, RemotePath) else first
-            blamed = self._first_unreadable(version)
-            saving = blamed.name.endswith(CHECKPOINT)
-            raise CorruptError(
-                f"{'a checkpoint' if saving else 'an entry'} of the catalog's log cannot be read: "
-                f"{first}",
-                where=str(blamed),
-                fix=f"{_DELETE}; if that does not help, {HEAL}" if saving else HEAL,
-            ) from None
-
-    def _first_unreadable(self, version: int) -> Place:
-        """Finds the entry, or checkpoint, with which the first version begins that the Delta
-        library cannot open."""
-        low, high = 0, version
-        while low < high:
-            middle = (low + high) // 2
-            try:
-                DeltaTable(self.path.as_uri(), version=middle, storage_options=self._options())
-                low = middle + 1
-            except (DeltaError, OSError):
-                high = middle
-        if low in self._entries.checkpoints():
-            return self._log / f"{low:020d}{CHECKPOINT}"
-        return self._entries.path(low)
 
     def _at(self, version: int) -> DeltaTable:
         table = self._table
@@ -584,44 +527,17 @@ class Catalog:
         if table is not None and table.version() < version:
             table.update_incremental()
         if table is None or table.version() != version:
-            table = DeltaTable(self.path.as_uri(), version=version, storage_options=self._options())
+            table = DeltaTable(
+                self.path.as_uri(), version=version, storage_options=self._errors.options
+            )
         return table
-
-    def _repeat_reading(self, reading: Callable[[], T]) -> T:
-        """Repeats what the Delta library reads, which does not ask again where an answer of a store
-        breaks off."""
-        for _ in range(_BROKEN):
-            try:
-                return reading()
-            except (DeltaError, OSError) as error:
-                location = self.path
-                if not isinstance(location, RemotePath) or not _NO_ANSWER.search(str(error)):
-                    raise
-                if not refusal(error, bucket=location.bucket, where=str(location)).passing:
-                    raise
-        return reading()
-
-    def _refusal_of(self, error: DeltaError) -> OSError:
-        """Turns what the Delta library could not write into an error of the system."""
-        if isinstance(self.path, RemotePath):
-            return refusal(error, bucket=self.path.bucket, where=str(self.path))
-        return OSError(str(error))
-
-    def _unreachable(self, error: Exception, log: RemotePath) -> FlagdataError:
-        """Returns the error for a log in a bucket that the Delta library cannot read, without
-        credentials."""
-        self._entries.files()  # raises, where an entry is to blame
-        refused = refusal(error, bucket=log.bucket, where=str(log))
-        return FlagdataError(
-            f"the catalog's log cannot be read: {refused.strerror}", where=str(log), fix=refused.fix
-        )
 
     def _names(self, version: int) -> list[str]:
         """Lists the files of a version, which never change; those of the versions that were asked
         for last are kept."""
         if version not in self._listed:
             table = self._open(version)
-            with self._log_errors(version):
+            with self._errors.of_version(version):
                 names = [Path(uri).name for uri in table.file_uris()]
             self._listed = {**dict(list(self._listed.items())[1 - _LISTED :]), version: names}
         return self._listed[version]
@@ -654,7 +570,7 @@ class Catalog:
         except CommitFailedError:
             raise Moved from None
         except DeltaError as error:
-            raise self._refusal_of(error) from None
+            raise self._errors.refusal_of(error) from None
         self._flush_log(version)
 
     def _flush_log(self, version: int) -> None:
@@ -665,18 +581,6 @@ class Catalog:
 
 
 _FILE_HASH, _PREVIOUS_HASH = (key.removeprefix(_INFO_PREFIX) for key in (FILE_HASH, PREVIOUS_HASH))
-HINT = "_last_checkpoint"
-_DELETE = f"delete {HINT} and *{CHECKPOINT} there: they save time, the .json files hold all"
-_KERNEL = "Kernel error: "
-_SYSTEM_ERROR = "(os error "  # as the Delta library writes it
-_UNLISTED = re.compile(
-    "[\x00-\x1f\x7f\ud800-\udfff]"
-)  # in names of files; the latter stand for what is no UTF-8
-_NO_ANSWER = re.compile(r"Generic S3 error|Error performing [A-Z]+ ")
-"""What it writes where a store refused a request or did not answer; all else concerns what the
-store gave."""
-_BROKEN = 4
-"""How often it is asked again after an answer that broke off."""
 _WRITER = 2
 """Version of Delta's protocol that tables of this package ask of writers; a later one has duties
 unknown here."""
@@ -686,14 +590,4 @@ def _properties(info: Mapping[str, str]) -> CommitProperties:
     return CommitProperties(
         custom_metadata={f"{_INFO_PREFIX}{key}": value for key, value in info.items()},
         max_commit_retries=0,
-    )
-
-
-def newer(why: str, where: Place) -> ConflictError:
-    """Returns the error for a lake of a later format."""
-    return ConflictError(
-        "the lake was written by a newer flagdata than this one, which reads formats up to "
-        f"{FORMAT_VERSION}: {why}",
-        where=str(where),
-        fix="install the newer flagdata",
     )

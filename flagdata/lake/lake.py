@@ -18,7 +18,7 @@ from flagdata.core.files.regular_files import is_beside, open_regular
 from flagdata.core.printable import printable
 from flagdata.core.schema import FORMAT_VERSION
 from flagdata.errors import ConflictError, CorruptError, NotFoundError, UsageError
-from flagdata.lake.catalog import newer
+from flagdata.lake.catalog_log_errors import newer
 from flagdata.lake.delta_log import names_in
 from flagdata.lake.label_columns import Value
 from flagdata.lake.labels import put

@@ -30,13 +30,14 @@ from flagdata.core.files import object_cache
 from flagdata.core.files.durable import disk_errors, flush_folder, make_folders, replace_durably
 from flagdata.core.findings import Finding, Severity
 from flagdata.errors import ConflictError, CorruptError, FlagdataError, NotFoundError
-from flagdata.lake.catalog import HINT
-from flagdata.lake.delta_log import CHECKPOINT, Log, Summaries, summaries_in
+from flagdata.lake.catalog_log_errors import HINT
+from flagdata.lake.delta_log import CHECKPOINT, Log
 from flagdata.lake.deposit import copy_object
 from flagdata.lake.health import object_names, read_refs, verify, verify_catalog
 from flagdata.lake.lake import MARKER, Lake
 from flagdata.lake.lake_layout import FOLDERS, check_own
 from flagdata.lake.leases import Lease, collecting
+from flagdata.lake.log_summaries import Summaries, summaries_in
 from flagdata.lake.marking import Marked
 from flagdata.lake.refs import MAIN, Deletion, Ref, content_of
 from flagdata.lake.removal import find_unfinished

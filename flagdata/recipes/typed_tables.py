@@ -157,8 +157,8 @@ def read(kind: type[R], content: Any, *, where: str, **computed: Any) -> R:
     """
     content = with_present_keys(content, where=where, keys=getattr(kind, "WAS", {}))
     hints = _hints(kind)
-    entries = fields(kind)  # pyright: ignore[reportArgumentType]
-    keys = {entry.name.replace("_", "-"): entry for entry in entries}
+    described = fields(kind)  # pyright: ignore[reportArgumentType]
+    keys = {entry.name.replace("_", "-"): entry for entry in described}
     types = {
         key: Any if entry.name in computed else hints[entry.name] for key, entry in keys.items()
     }

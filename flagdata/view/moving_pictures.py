@@ -17,7 +17,8 @@ from flagdata.core.schema import Kind
 from flagdata.errors import LimitError
 from flagdata.export.export_source import FILMED, entry_of
 from flagdata.lake import Lake
-from flagdata.lake.mesh_sequences import read_markers, read_meshes
+from flagdata.lake.marker_sequences import read_markers
+from flagdata.lake.mesh_sequences import read_meshes
 from flagdata.record import Record
 from flagdata.record.signals import Instants
 from flagdata.record.writer import encode_jpeg

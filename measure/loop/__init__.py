@@ -12,15 +12,10 @@ from flagdata.packages.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from measure.loop.corrective_field import Mode
-    from measure.loop.effect_selection import (
-        GUST_COLUMN,
-        LibraryJudgement,
-        estimate,
-        finalists,
-        judge,
-    )
+    from measure.loop.effect_selection import GUST_COLUMN, LibraryJudgement, finalists, judge
     from measure.loop.run import LoopOptions, LoopOutcome, solve
     from measure.loop.set_up import HOIST
+    from measure.loop.strength_estimates import estimate
     from measure.loop.validation import folds, paired_difference, total_error
 
 __getattr__ = lazy_exports(__name__, __file__)

@@ -14,7 +14,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2, norm
 
 from flagdata.core.arrays import FloatArray, IntArray
 from measure.forecasting.calibrated_parameters import THETA
@@ -23,9 +22,17 @@ from measure.inference.fluctuation import fluctuation, fluctuation_gains
 from measure.inference.segment_evidence import Evidence, gains
 from measure.loop.refit import Refit
 from measure.loop.set_up import HOIST, SetUp, beyond_tolerance, wind_turn
+from measure.loop.strength_estimates import (
+    estimate,
+    heterogeneity,
+    strength,
+    strengths_by_recording,
+)
 from measure.loop.validation import total_error
+from measure.loop.weighed_effects import Weighed, lag_behind, rank_candidates
 from measure.nulls.directions import Move
-from measure.nulls.reference import GUSTS, Reference
+from measure.nulls.null_groups import GUSTS
+from measure.nulls.reference import Reference
 from measure.probes.lines import SpectralLine
 from measure.probes.wind_course import ALONG, Variation
 from measure.verdict.criteria import CRITERIA
@@ -43,40 +50,6 @@ def equivalent(effect: str, strength: Estimate) -> tuple[str, ...]:
     """Effects that no recording of this kind can distinguish from a weighed one: holes in the cloth
     scale the dynamic pressure as the air's density does, but only lower it."""
     return ("porosity",) if effect == "air-density" and strength.value < 0 else ()
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Weighed:
-    """A candidate with what the decision needs.
-
-    Attributes:
-        column: place among the evidence's columns.
-        candidate: as reported.
-        error: standard error of the strength.
-        gains: (segment,) held-out gain.
-        recording: (segment,) of each.
-        admissible: whether the model exists: its strength is one that the effect may have, its
-            cloth stays one, and a wind that fluctuates does it as turbulence does.
-        unlike: why such a model does not exist, beside its strength: how the wind's course differs
-            from that of turbulence, or that a log's direction is within its tolerance; empty where
-            it does.
-        measured: the strength where it is found apart from the other columns; None where it is
-            fitted beside them.
-    """
-
-    column: int
-    candidate: Candidate
-    error: float
-    gains: FloatArray
-    recording: IntArray
-    admissible: bool
-    unlike: str = ""
-    measured: Estimate | None = None
-
-    def passes(self, level: float) -> bool:
-        """Returns whether the model passes its predictive test: what it leaves is what nulls leave,
-        and its strength is the same in all recordings."""
-        return self.candidate.leftover > level and not heterogeneous(self.candidate, level)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -162,7 +135,7 @@ def judge(
             _within(w, direction, declared.tolerance) if w.column == turned_column else w
             for w in candidates
         ]
-    ranking = _rank_candidates(
+    ranking = rank_candidates(
         [*candidates, _gusts(evidence, reference, float(statistics[len(names())]))]
     )
     departing = {
@@ -384,31 +357,6 @@ def _intensity(evidence: Evidence) -> float:
     return 0.0 if variation is None else math.sqrt(max(float(variation.total[ALONG]), 0.0))
 
 
-def heterogeneity(strengths: Sequence[Estimate]) -> float | None:
-    """Computes the p-value of one strength in all recordings, by Cochran's Q (Biometrics 10:101,
-    1954); None of fewer than two.
-
-    A strength is that of a law in the wind: a wind that rises by so many metres a second, fitted as
-    one that rises by an angle, has a larger angle in lighter winds.
-
-    Args:
-        strengths: of each recording alone, with normal intervals.
-    """
-    if len(strengths) < 2:
-        return None
-    values = np.array([s.value for s in strengths])
-    errors = np.array([(s.high - s.low) / 2 / norm.ppf(0.5 + s.level / 2) for s in strengths])
-    weights = errors**-2.0
-    common = (weights * values).sum() / weights.sum()
-    return float(chi2.sf((weights * (values - common) ** 2).sum(), len(strengths) - 1))
-
-
-def heterogeneous(candidate: Candidate, level: float) -> bool:
-    """Returns whether its strength is another in every recording: another law in the wind would be
-    a better one."""
-    return candidate.heterogeneity is not None and candidate.heterogeneity <= level
-
-
 def finalists(judgement: LibraryJudgement) -> tuple[int, ...]:
     """Columns that are refitted: the confidence set, the first by held-out gains, and the largest
     statistics."""
@@ -465,7 +413,7 @@ def _homogeneous_beside(
     """Returns whether a strength is the same in all recordings, where some columns are fitted to
     each."""
     p = heterogeneity(
-        _strengths_by_recording(
+        strengths_by_recording(
             evidence,
             chosen,
             candidate.column,
@@ -481,29 +429,6 @@ def _larger(evidence: Evidence, candidate: Weighed) -> float:
     """Computes by how much a strength's standard error is larger than Σ says when it is fitted
     alone."""
     return candidate.error / evidence.fit([candidate.column]).of(candidate.column)[1]
-
-
-def _strengths_by_recording(
-    evidence: Evidence,
-    chosen: Sequence[int],
-    column: int,
-    *,
-    about: float,
-    larger: float,
-    unit: str,
-) -> tuple[Estimate, ...]:
-    """Estimates the strength of a column in each recording alone, where some columns are fitted to
-    it.
-
-    Args:
-        about: the strength in the model that the evidence is of.
-        larger: by how much its standard errors are larger than Σ says.
-    """
-    strengths: list[Estimate] = []
-    for index in np.unique(evidence.recording):
-        value, claimed = evidence.select(evidence.recording == index).fit(chosen).of(column)
-        strengths.append(estimate(about + value, larger * claimed, unit))
-    return tuple(strengths)
 
 
 def _weigh(
@@ -542,7 +467,7 @@ def _weigh(
     by_recording = (
         ()
         if bounded is not None
-        else _strengths_by_recording(
+        else strengths_by_recording(
             remaining, [column], column, about=about, larger=larger, unit=effect.unit
         )
     )
@@ -608,51 +533,6 @@ def _gusts(evidence: Evidence, reference: Reference, statistic: float) -> Weighe
     )
 
 
-def strength(null: float, coefficient: float, error: float, unit: str) -> Estimate:
-    """Estimates the strength of an effect, by its coefficient beyond null and the standard error
-    that nulls leave.
-
-    What the fit's mesh and a mistold cloth do to an effect is a factor, so that more of the
-    interval lies beyond the strength than between it and the null.
-    """
-    factor, reach = CRITERIA.reach * CRITERIA.strength_factor, CRITERIA.reach * error
-    inward = math.hypot(coefficient * (1 - math.exp(-factor)), reach)
-    outward = math.hypot(coefficient * (math.exp(factor) - 1), reach)
-    low, high = (outward, inward) if coefficient < 0 else (inward, outward)
-    value = null + coefficient
-    return Estimate(
-        value=value, low=value - low, high=value + high, unit=unit, level=CRITERIA.interval
-    )
-
-
-def estimate(value: float, error: float, unit: str) -> Estimate:
-    """Computes a normal interval at the level of all intervals."""
-    return Estimate(
-        value=value,
-        low=value - CRITERIA.reach * error,
-        high=value + CRITERIA.reach * error,
-        unit=unit,
-        level=CRITERIA.interval,
-    )
-
-
-def _rank_candidates(candidates: Sequence[Weighed]) -> list[Weighed]:
-    """Ranks candidates by held-out gain, those first that are admissible."""
-    ordered = sorted(candidates, key=lambda w: (-w.admissible, -w.gains.sum()))
-    return [
-        replace(w, candidate=replace(w.candidate, behind=_behind(ordered[0], w))) for w in ordered
-    ]
-
-
-def _behind(best: Weighed, compared: Weighed) -> float:
-    """Computes standard errors of the paired difference."""
-    if compared is best:
-        return 0.0
-    difference = best.gains - compared.gains
-    error = total_error(difference, best.recording)
-    return float(difference.sum() / error) if error > 0 else 0.0
-
-
 def _reason(best: Weighed, candidate: Weighed, why: str) -> str:
     if why:
         return why
@@ -668,7 +548,7 @@ def _reason(best: Weighed, candidate: Weighed, why: str) -> str:
         return "it predicts unseen recordings no better than the base model"
     if _leads(best.gains, candidate.gains, candidate.recording):
         return (
-            f"{_behind(best, candidate):.1f} standard errors behind {best.candidate.effect} on "
+            f"{lag_behind(best, candidate):.1f} standard errors behind {best.candidate.effect} on "
             "unseen recordings"
         )
     return (

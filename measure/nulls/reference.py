@@ -13,33 +13,31 @@ import numpy as np
 from flagdata.core.arrays import FloatArray, IntArray
 from flagdata.core.rng import stream
 from flagdata.errors import InputError, UsageError
-from measure.forecasting.calibrated_parameters import DAMPING, PRIOR, THETA, Calibration
-from measure.forecasting.regressors import TURNED
+from measure.forecasting.calibrated_parameters import DAMPING, PRIOR, Calibration
 from measure.forecasting.setting import Design
-from measure.inference.fluctuation import fluctuation
-from measure.inference.growth import power
 from measure.inference.random_effect import NullModel, Nulls
 from measure.inference.segment_evidence import Evidence, best_gain
 from measure.nulls.conformal import GroupedConformal, kinds_needed
 from measure.nulls.directions import (
     APPEARS,
-    NOTHING,
     Move,
     moves,
     pull_along,
     pulls_of,
-    shares_of,
     standardise_pulls,
 )
-from measure.nulls.tails import as_normal, freedom
-from measure.probes.lines import Lines, SpectralLine, strongest
-from measure.probes.segment_rows import StatisticRows
+from measure.nulls.null_groups import (
+    GUSTS,
+    NullGroups,
+    UsualStatistics,
+    uncounted_columns,
+    unscaled_drops,
+)
+from measure.nulls.tails import as_normal
+from measure.probes.lines import Lines, SpectralLine
 from measure.verdict.criteria import CRITERIA
 
 _GROUPS = 400
-GUSTS = "air-density.change"
-"""The column that gusts fluctuate along: the scale of the wind's pressure, twice their relative
-intensity."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -147,8 +145,8 @@ class NullBank:
         Raises:
             InputError: no experiment has that many segments, or too few kinds have such noise.
         """
-        plain: list[_NullGroups] = []
-        beside_gusts: list[_NullGroups] = []
+        plain: list[NullGroups] = []
+        beside_gusts: list[NullGroups] = []
         groups: list[_Group] = []
         for left_out in left_out_groups(self.nulls, self.nulls, segments, seed=seed):
             evidence = Evidence.of(
@@ -158,9 +156,9 @@ class NullBank:
                 tuple(sorted(group.tolist())): group for group in left_out.groups
             }.values():
                 picked, first_segment = evidence.select(chosen), left_out.outside.select(chosen[:1])
-                plain.append(_NullGroups.of(picked, self.columns, first_segment))
+                plain.append(NullGroups.of(picked, self.columns, first_segment))
                 beside_gusts.append(
-                    _NullGroups.of(
+                    NullGroups.of(
                         picked.freed(self.columns.index(GUSTS)), self.columns, first_segment
                     )
                 )
@@ -168,9 +166,9 @@ class NullBank:
             groups.append(
                 _Group(evidence=evidence.select(first), own=left_out.outside.select(first[:1]))
             )
-        with_gusts = Reference.of(_NullGroups.joined(beside_gusts), noise)
+        with_gusts = Reference.of(NullGroups.joined(beside_gusts), noise)
         return Reference.of(
-            _NullGroups.joined(plain),
+            NullGroups.joined(plain),
             noise,
             beside_gusts=with_gusts,
             columns=self.columns,
@@ -184,123 +182,6 @@ class _Group:
 
     evidence: Evidence
     own: Nulls
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _NullGroups(StatisticRows):
-    """Statistics of null groups.
-
-    Attributes:
-        shares: (group, column) of `unscaled_drops`.
-        pulls: (group, column, part) of `pulled`.
-        left: (group,) what the base model leaves.
-        gained: (group,) best held-out gains.
-        swings: (group, part) of the wind's course, of no part where it is not looked at.
-        settled: (group, quantity) what recordings settle at, of none where it is not looked at.
-        lines: (group, shape · axis) `strongest`; None where spectra are not looked at.
-        deviations: (group, theta) of the calibrated parameters from the true ones, in standard
-            errors.
-        noise: (group,) of the markers [m].
-        kinds: (group,) of numerics.
-        damping: (group,) logarithm of its ratio to the nominal one.
-    """
-
-    shares: FloatArray
-    pulls: FloatArray
-    left: FloatArray
-    gained: FloatArray
-    swings: FloatArray
-    settled: FloatArray
-    lines: FloatArray | None
-    deviations: FloatArray
-    noise: FloatArray
-    kinds: IntArray
-    damping: FloatArray
-
-    @classmethod
-    def of(cls, evidence: Evidence, columns: tuple[str, ...], segment: Nulls) -> _NullGroups:
-        """Computes the statistics of one group, taken at its true calibration.
-
-        A null's cloth is as far from the nominal one as cloths known to `PRIOR` are. Where the
-        data's is known better, that of a null lies nearer to its nominal one by as much.
-
-        Args:
-            segment: one segment of it.
-        """
-        nominal = -segment.calibration[0] * np.minimum(evidence.prior / PRIOR, 1.0)
-        swing, settles = (
-            np.zeros(0) if values is None else values
-            for values in (evidence.swing, evidence.settles)
-        )
-        return cls(
-            shares=unscaled_drops(evidence, columns)[None],
-            pulls=pulls_of(evidence)[None],
-            left=np.array([evidence.fit(()).remainder]),
-            gained=np.array([best_gain(evidence, without=_uncounted_columns(columns))]),
-            swings=swing[None],
-            settled=settles[None],
-            lines=None if evidence.lines is None else strongest(evidence.lines)[None],
-            deviations=evidence.fit((), centre=nominal).in_errors(range(len(THETA)))[None],
-            noise=segment.noise,
-            kinds=segment.numerics,
-            damping=segment.calibration[:, DAMPING],
-        )
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Usual:
-    """What the statistics of some null groups are like: see `Reference`."""
-
-    spread: FloatArray
-    centre: FloatArray
-    width: FloatArray
-    lines: Lines | None
-    powers: FloatArray
-    degrees: FloatArray
-    pull: FloatArray
-    pull_width: FloatArray
-
-    @classmethod
-    def of(cls, groups: _NullGroups) -> _Usual:
-        lines = None if groups.lines is None else Lines.of(groups.lines)
-        powers = np.array([power(np.abs(swings), groups.damping) for swings in groups.swings.T])
-        roots = _roots(groups, lines, powers)
-        return cls(
-            powers=powers,
-            spread=np.maximum(groups.shares.mean(axis=0), NOTHING),
-            centre=roots.mean(axis=0),
-            width=np.maximum(roots.std(axis=0), np.cbrt(NOTHING)),
-            lines=lines,
-            degrees=freedom(roots),
-            pull=groups.pulls.mean(axis=0),
-            pull_width=groups.pulls.std(axis=0),
-        )
-
-    def pulled(self, pulls: FloatArray) -> FloatArray:
-        """Computes how far each column pulls more than it does in nulls, in their standard
-        deviations, (group, column, part)."""
-        return standardise_pulls(pulls, self.pull, self.pull_width)
-
-    def far(self, groups: _NullGroups) -> FloatArray:
-        """Computes how far groups are from their mean, in deviations by each one's own tail,
-        (group, column + 2 to 11)."""
-        distances = as_normal(
-            (_roots(groups, self.lines, self.powers) - self.centre) / self.width, self.degrees
-        )
-        begin = groups.shares.shape[1] + 2
-        either = slice(begin, begin + groups.swings.shape[1] + groups.settled.shape[1])
-        distances[:, either] = np.abs(distances[:, either])
-        return distances
-
-
-def _roots(groups: _NullGroups, lines: Lines | None, powers: FloatArray) -> FloatArray:
-    swings = groups.swings * np.exp(-np.outer(groups.damping, powers))
-    roots = np.c_[np.cbrt(np.c_[groups.shares, groups.left, groups.gained]), swings, groups.settled]
-    return (
-        roots
-        if lines is None or groups.lines is None
-        else np.c_[roots, lines.standing_out(groups.lines)]
-    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -374,13 +255,13 @@ class Reference:
     beside_gusts: Reference | None = None
     columns: tuple[str, ...] = ()
     groups: tuple[_Group, ...] = ()
-    usual: Mapping[int, _Usual] = field(default_factory=dict)
+    usual: Mapping[int, UsualStatistics] = field(default_factory=dict)
     suspected: tuple[int, int] | None = None
 
     @classmethod
     def of(
         cls,
-        statistics: _NullGroups,
+        statistics: NullGroups,
         noise: float,
         *,
         beside_gusts: Reference | None = None,
@@ -405,12 +286,12 @@ class Reference:
                 where="null bank",
                 fix=f"build a bank of {needed} or more with such noise, or leave it out",
             )
-        usual = _Usual.of(statistics.select(similar))
+        usual = UsualStatistics.of(statistics.select(similar))
         scaled, distances = (
             np.empty_like(statistics.shares),
             np.empty((len(kinds), len(usual.centre))),
         )
-        pulls, usual_of_kind = np.empty_like(statistics.pulls), dict[int, _Usual]()
+        pulls, usual_of_kind = np.empty_like(statistics.pulls), dict[int, UsualStatistics]()
         for kind in np.unique(kinds):
             of_kind = kinds == kind
             similar_noise = (
@@ -421,7 +302,7 @@ class Reference:
             ):  # else no others have such noise
                 similar_noise &= ~of_kind
             usual_of_others = replace(
-                _Usual.of(statistics.select(similar_noise)), degrees=usual.degrees
+                UsualStatistics.of(statistics.select(similar_noise)), degrees=usual.degrees
             )
             scaled[of_kind], distances[of_kind] = (
                 statistics.shares[of_kind] / usual_of_others.spread,
@@ -550,7 +431,7 @@ class Reference:
         """Computes the test's statistic of a null group."""
         usual = self.usual[int(segment.numerics[0])]
         if self.suspected is None:
-            return float(usual.far(_NullGroups.of(evidence, self.columns, segment)).max())
+            return float(usual.far(NullGroups.of(evidence, self.columns, segment)).max())
         return float(pull_along(usual.pulled(pulls_of(evidence)[None]), *self.suspected)[0])
 
     def statistics(
@@ -594,7 +475,7 @@ class Reference:
             float(self._distance(shares, slice(len(shares))).max()),
             float(self._distance(remainder, len(self.spread))),
         )
-        best = best_gain(evidence, chosen, without=_uncounted_columns(columns))
+        best = best_gain(evidence, chosen, without=uncounted_columns(columns))
         gained = float(self._distance(best, len(self.spread) + 1))
         swing, line, settles = self.swing(evidence), self.line(evidence), self.settles(evidence)
         further = [
@@ -672,28 +553,3 @@ class Reference:
         return as_normal(
             (values - self.centre[columns]) / self.width[columns], self.degrees[columns]
         )
-
-
-def _uncounted_columns(columns: tuple[str, ...]) -> list[int]:
-    """Columns whose held-out gains do not count in the test: what a log may be off by within its
-    tolerance gains on recordings whose own log was not fitted."""
-    return [columns.index(TURNED)] if TURNED in columns else []
-
-
-def unscaled_drops(
-    evidence: Evidence, columns: tuple[str, ...], along: Sequence[int] = ()
-) -> FloatArray:
-    """Computes each column's drop over what is left with it in some segments, and the likelihood
-    ratio of gusts; where moments about the pole are looked at, then the same drops of these, and
-    what they leave.
-
-    Args:
-        along: columns that are fitted already.
-    """
-    drops, remainder = evidence.drops(along), evidence.fit(along).remainder
-    gusts = fluctuation(evidence, columns.index(GUSTS), along).likelihood
-    values = np.append(shares_of(drops, remainder), max(gusts, 0.0))
-    if evidence.turning is None:
-        return values
-    drops, remainder = evidence.turning.drops(along), evidence.turning.fit(along).remainder
-    return np.concatenate([values, shares_of(drops, remainder), [remainder]])

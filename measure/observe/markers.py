@@ -10,7 +10,7 @@ from flagdata.core.schema import Kind
 from flagdata.errors import InputError
 from flagdata.ingest.markers import MarkerOptions, read_table
 from flagdata.lake import Artifact, Lake
-from flagdata.lake.mesh_sequences import MarkerSequence, read_markers
+from flagdata.lake.marker_sequences import MarkerSequence, read_markers
 from flagdata.timebase import NANOSECONDS
 from measure.observe.observation import Observation
 

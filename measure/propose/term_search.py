@@ -33,8 +33,8 @@ from measure.forecasting.setting import Setting, Stage
 from measure.inference.random_effect import NullModel
 from measure.inference.segment_evidence import Evidence, gains
 from measure.inference.whitened_misfit import WhitenedMisfit
-from measure.loop.effect_selection import estimate
 from measure.loop.gauss_newton import ROUNDS, STAYS, cut
+from measure.loop.strength_estimates import estimate
 from measure.loop.validation import (
     LeftOut,
     a_segment,

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from measure.loop.effect_selection import heterogeneous
+from measure.loop.strength_estimates import heterogeneous
 from measure.report.verdict_sentences import (
     candidate_title,
     contradicting_findings,

@@ -21,7 +21,7 @@ READER = "flagdata/core/numbered.py"
 BOUNDED = {
     "flagdata/timebase.py": "hours and minutes of two digits, by the pattern of a zone",
     "flagdata/core/scheduling.py": "threads of this process, as the kernel numbers them",
-    "flagdata/ingest/camera/picture_names.py": "hours, minutes, seconds and nanoseconds, by the "
+    "flagdata/ingest/camera/name_clocks.py": "hours, minutes, seconds and nanoseconds, by the "
     "pattern of a clock",
 }
 """Modules that read numbers of names by `int`, with what bounds these."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flagdata.core.arrays import BoolArray, IntArray
 from flagdata.core.findings import Finding, Severity
 from flagdata.core.schema import SampleFlag
-from flagdata.errors import InputError
+from flagdata.errors import InputError, UsageError
 from flagdata.ingest.anemometer.sensor_recipe import QualityRules
 from flagdata.record.signals import Instants, Sensor, Series
 
@@ -194,3 +194,46 @@ def streams(channels: Mapping[str, Series]) -> tuple[tuple[tuple[str, ...], IntA
         names = tuple(sorted(groups[0][0])) if groups else ()
         return ((names, np.arange(n)),)
     return tuple((tuple(sorted(names)), np.flatnonzero(rows)) for names, rows in groups)
+
+
+def with_horizontal(reading: Reading, azimuth: float | None, *, where: str) -> Reading:
+    """Add `wind_speed` = √(x² + y²), and with the azimuth `wind_direction`, where a log has
+    components alone.
+
+    The azimuth is the compass direction the array points to, against +x: wind along +x comes from
+    there. With +z up, +y is 90° to the left of +x, so that the wind comes from azimuth - atan2(y,
+    x) (Campbell Scientific, CSAT3 manual, appendix "Orientation").
+
+    Args:
+        azimuth: [rad, clockwise from true north]; `None` where nobody knows: no direction then.
+
+    Raises:
+        UsageError: an azimuth for a log without components.
+    """
+    channels = reading.channels
+    if not {"wind_x", "wind_y"} <= set(channels) or "wind_speed" in channels:
+        if azimuth is not None:
+            raise UsageError(
+                "an azimuth was given, but the log has no wind components",
+                where=where,
+                fix="leave out --azimuth; a turned vane is a rotation in the recipe",
+            )
+        return reading
+    x, y = channels["wind_x"], channels["wind_y"]
+    added = {"wind_speed": np.hypot(x, y)}
+    text = "wind_speed is √(wind_x² + wind_y²)"
+    fix = None
+    if azimuth is None:
+        text += "; no direction, since the sensor's azimuth is not known"
+        fix = (
+            "give the sensor's azimuth for a direction: --azimuth DEG (270 for x to the east, y to "
+            "the north)"
+        )
+    else:
+        towards = np.mod(azimuth - np.arctan2(y, x), 2 * np.pi)
+        added["wind_direction"] = np.where(
+            added["wind_speed"] == 0, np.nan, towards
+        )  # calm air comes from nowhere
+        text += f", wind_direction is from the azimuth {np.degrees(azimuth):.1f}° given"
+    finding = Finding.of("speed-from-components", text, count=len(x), fix=fix)
+    return replace(reading, channels={**channels, **added}, findings=(*reading.findings, finding))

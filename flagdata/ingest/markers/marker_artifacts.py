@@ -11,12 +11,12 @@ from flagdata.core.files.durable import disk_errors
 from flagdata.core.findings import Finding, quality_flags
 from flagdata.core.json_values import json_values
 from flagdata.core.schema import Kind
+from flagdata.ingest.artifacts_present import IngestResult, Labels, find, kept, result_of
 from flagdata.ingest.ingest_report import REPORT_SCHEMA
 from flagdata.ingest.markers.marker_table import MarkerOptions, read_table
-from flagdata.ingest.source_artifacts import IngestResult, Labels, find, kept, result_of
 from flagdata.ingest.source_file import Source
 from flagdata.lake import Artifact, Lake
-from flagdata.lake.mesh_sequences import MarkerSequence, write_markers
+from flagdata.lake.marker_sequences import MarkerSequence, write_markers
 from flagdata.timebase import NANOSECONDS
 
 

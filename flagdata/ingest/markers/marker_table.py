@@ -26,7 +26,7 @@ from flagdata.core.files.regular_files import check_input
 from flagdata.core.units import unit
 from flagdata.errors import InputError, LimitError, UsageError
 from flagdata.ingest.named_columns import check_columns, small_table_head
-from flagdata.lake.mesh_sequences import MarkerSequence
+from flagdata.lake.marker_sequences import MarkerSequence
 from flagdata.timebase import NANOSECONDS
 
 COLUMNS = ("marker", "u", "v", "x", "y", "z")

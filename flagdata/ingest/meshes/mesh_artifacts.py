@@ -32,10 +32,10 @@ from flagdata.core.provenance import canonical
 from flagdata.core.schema import Kind
 from flagdata.core.units import unit
 from flagdata.errors import InputError, UsageError
+from flagdata.ingest.artifacts_present import IngestResult, Labels, find, kept, result_of
 from flagdata.ingest.ingest_report import REPORT_SCHEMA
 from flagdata.ingest.meshes.folder import read_folder
 from flagdata.ingest.meshes.pieces import in_pieces, slits, weld_vertices
-from flagdata.ingest.source_artifacts import IngestResult, Labels, find, kept, result_of
 from flagdata.ingest.source_file import Source
 from flagdata.lake import Artifact, Lake
 from flagdata.lake.mesh_sequences import Mesh, MeshSequence, RaggedMeshSequence, write_meshes

@@ -362,7 +362,7 @@ def test_a_process_that_died_between_a_checkpoint_and_its_hint_stops_no_commit(l
         count += 1
     log = lake.path / "catalog" / "_delta_log"
     DeltaTable(
-        lake.catalog.path.as_uri(), storage_options=lake.catalog._options()
+        lake.catalog.path.as_uri(), storage_options=lake.catalog._errors.options
     ).create_checkpoint()
     (log / "_last_checkpoint").unlink()
     (left,) = log.glob("*.checkpoint.parquet")

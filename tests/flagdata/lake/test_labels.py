@@ -106,7 +106,7 @@ def test_labels_of_a_branch_stay_there_until_it_is_merged(lake: Lake) -> None:
 def test_the_stored_catalog_stays_what_older_programs_read(lake: Lake) -> None:
     one = put_text(lake, "one")
     lake.label([one.id], {"rating": 4}, "looked at")
-    table = DeltaTable(lake.catalog.path.as_uri(), storage_options=lake.catalog._options())
+    table = DeltaTable(lake.catalog.path.as_uri(), storage_options=lake.catalog._errors.options)
     assert [field.name for field in table.schema().fields] == list(CATALOG)
     assert table.to_pyarrow_table().num_rows == 1
 

@@ -13,7 +13,7 @@ from mcap.well_known import MessageEncoding, SchemaEncoding
 from mcap.writer import CompressionType, Writer
 
 from flagdata.errors import ConflictError
-from flagdata.record import Record, RecordWriter, messages, writer
+from flagdata.record import Record, RecordWriter, message_payloads, messages
 from flagdata.record.mcap_file import McapFile, MessageBlock
 from flagdata.record.signals import Sensor, WindAverage, WindSeries
 from flagdata.record.writer import compress_pieces, pieces_of
@@ -60,14 +60,14 @@ def one_by_one(series: WindSeries) -> list[bytes]:
     return out
 
 
-def rows_of(payloads: writer.Payloads) -> list[bytes]:
+def rows_of(payloads: message_payloads.Payloads) -> list[bytes]:
     return [data[used].tobytes() for data, used in zip(payloads.data, payloads.used, strict=True)]
 
 
 def test_samples_in_bulk_are_protobufs_bytes() -> None:
     series = wind(400)
-    assert rows_of(writer.samples(series, series.time, slice(0, 400))) == one_by_one(series)
-    assert rows_of(writer.samples(series, series.time, slice(17, 40))) == one_by_one(series)[17:40]
+    assert rows_of(message_payloads.samples(series, series.time, slice(0, 400))) == one_by_one(series)
+    assert rows_of(message_payloads.samples(series, series.time, slice(17, 40))) == one_by_one(series)[17:40]
 
 
 def test_a_host_clock_before_1970_is_protobufs_bytes() -> None:
@@ -80,7 +80,7 @@ def test_a_host_clock_before_1970_is_protobufs_bytes() -> None:
         sensor=series.sensor,
         host_time=series.host_time - 2 * START,
     )
-    assert rows_of(writer.samples(early, early.time, slice(0, 40))) == one_by_one(early)
+    assert rows_of(message_payloads.samples(early, early.time, slice(0, 40))) == one_by_one(early)
 
 
 def test_means_in_bulk_are_protobufs_bytes() -> None:
@@ -103,12 +103,12 @@ def test_means_in_bulk_are_protobufs_bytes() -> None:
         )
         messages.set_timestamp(mean.timestamp, int(means.time[i]))
         expected.append(mean.SerializeToString(deterministic=True))
-    assert rows_of(writer.means(means)) == expected
+    assert rows_of(message_payloads.means(means)) == expected
 
 
 def test_a_file_in_bulk_is_the_mcap_librarys() -> None:
     series = wind(400)
-    payloads = writer.samples(series, series.time, slice(0, 400))
+    payloads = message_payloads.samples(series, series.time, slice(0, 400))
     schema = messages.descriptor_set(messages.WindSample)
     theirs, ours = io.BytesIO(), io.BytesIO()
     library = Writer(

@@ -9,7 +9,8 @@ import pytest
 from measure.forecasting import names
 from measure.inference import NullModel
 from measure.loop import GUST_COLUMN, HOIST, estimate, finalists, judge
-from measure.loop.effect_selection import equivalent, strength
+from measure.loop.effect_selection import equivalent
+from measure.loop.strength_estimates import strength
 from measure.nulls import GUSTS, Reference
 from measure.verdict import Conclusion
 from tests.measure.loop.drawn_statistics import EXPECTED, judged, named, seen

@@ -10,7 +10,7 @@ from scipy.stats import kstest, uniform
 
 from flagdata.core.rng import stream
 from measure.loop import estimate
-from measure.loop.effect_selection import heterogeneity
+from measure.loop.strength_estimates import heterogeneity
 
 
 def test_of_two_it_is_the_test_of_their_difference() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from measure.forecasting import THETA, Calibration
-from measure.loop.run import parameters
+from measure.loop.cloth_parameters import parameters
 from measure.verdict import CRITERIA, Parameter
 
 REACH = 1.6448536269514722  # of a normal, 90 % to either side

@@ -3,8 +3,6 @@ is open.
 
 A draft gives no rows. Where nothing is open, its recipe can be read and shown; where anything of it
 is inferred or assumed, what was read counts only when it is confirmed (see `confirm`).
-
-The recipe of a draft as TOML; "?" stands where it is open.
 """
 
 from __future__ import annotations
@@ -13,20 +11,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-import numpy as np
-
 from flagdata.core import compass
-from flagdata.core.units import UNITS, canonical, name_of_unit
+from flagdata.core.units import canonical, name_of_unit
 from flagdata.ingest.anemometer.draft.given_columns import GivenColumns, given_columns
 from flagdata.ingest.anemometer.draft.heading_words import (
-    GUSTS,
     MOVING,
     Meaning,
     fits,
     meaning,
-    named_alike,
 )
 from flagdata.ingest.anemometer.draft.questions import ZONE, Open
+from flagdata.ingest.anemometer.draft.recipe_text import (
+    ChannelText,
+    quote_for_toml,
+    recipe_text,
+    reference,
+)
 from flagdata.ingest.anemometer.draft.table_shape import TableShape, is_missing, is_number, shape_of
 from flagdata.ingest.anemometer.draft.times import (
     TimeFields,
@@ -36,75 +36,10 @@ from flagdata.ingest.anemometer.draft.times import (
     of_columns,
     unread_count,
 )
+from flagdata.ingest.anemometer.draft.wind_questions import ask_about_direction, gust_factor
 from flagdata.ingest.anemometer.instants import dates
 from flagdata.ingest.anemometer.instants.stamp_text import EPOCH
-from flagdata.ingest.anemometer.sensor_recipe import DELIMITERS
 from flagdata.ingest.anemometer.wind_options import WindOptions
-from flagdata.record.signals import Series
-
-
-@dataclass(frozen=True, kw_only=True)
-class ChannelText:
-    """A channel of a recipe: its column by heading or number, its unit, and whether the wind blows
-    that way."""
-
-    column: str | int
-    unit: str
-    towards: bool = False
-
-
-def recipe_text(
-    shape: TableShape,
-    *,
-    time: Sequence[int] | None,
-    form: str | None,
-    zone: str | None,
-    channels: Mapping[str, ChannelText],
-    label: str,
-    missing: Sequence[str],
-) -> str:
-    """Writes the recipe of a table."""
-    delimiter = next(name for name, character in DELIMITERS.items() if character == shape.delimiter)
-    lines = [
-        'name = "drafted"',
-        'about = "drafted from the first lines of the file"',
-        'source = "the file"',
-        "",
-        "[file]",
-        f"delimiter = {quote_for_toml(delimiter)}",
-        f"decimal = {quote_for_toml(shape.decimal)}",
-        f"preamble = {shape.preamble}",
-        f"header = {shape.header}",
-        f"missing = [{', '.join(map(quote_for_toml, missing))}]",
-        "",
-        "[time]",
-    ]
-    columns = ["?"] if time is None else [shape.reference(i) for i in time]
-    lines += [
-        f"columns = [{', '.join(map(reference, columns))}]",
-        f"format = {quote_for_toml(form or '?')}",
-    ]
-    lines += [f"zone = {quote_for_toml(zone)}"] if zone is not None else []
-    for name, channel in channels.items():
-        lines += [
-            "",
-            f"[channels.{name}]",
-            f"column = {reference(channel.column)}",
-            f"unit = {quote_for_toml(channel.unit)}",
-        ]
-        lines += ['convention = "to"'] if channel.towards else []
-    return "\n".join([*lines, "", "[sensor]", f"name = {quote_for_toml(label)}", ""])
-
-
-def quote_for_toml(text: str) -> str:
-    """Quotes a text for TOML."""
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\t", "\\t") + '"'
-
-
-def reference(column: str | int) -> str:
-    """Writes a column for TOML: its heading, or its number."""
-    return str(column) if isinstance(column, int) else quote_for_toml(column)
-
 
 Origin = Literal["stated", "inferred", "assumed", "given"]
 _BESIDE = {
@@ -623,78 +558,3 @@ def _compass(cells: Sequence[str]) -> str | None:
     first = tables[fitting[0]]
     same = all(tables[name].get(cell) == first.get(cell) for name in fitting for cell in filled)
     return fitting[0] if same else "?"
-
-
-_FACTORS = (1.0, 3.2)
-"""Gusts by the mean of their time: below 1 is impossible, above 3.2 no station has it in the mean
-of a log."""
-_APART, _TOGETHER, _LEAST = 30.0, 0.9, 5
-"""Degrees between a direction and its components, length of the mean of unit vectors, and rows that
-show it."""
-
-
-def gust_factor(shape: TableShape, meanings: Sequence[Meaning], speed: int) -> Open | None:
-    """Asks about a speed whose gusts are no gusts of it; `None` where there are none, or they
-    are."""
-    speed_heading = meanings[speed]
-    for index, gust_heading in enumerate(meanings):
-        of_speed = gust_heading.unit is None or fits("wind_speed", gust_heading.unit)
-        if index == speed or not (
-            set(gust_heading.against) & GUSTS
-            and of_speed
-            and named_alike(gust_heading, speed_heading)
-        ):
-            continue
-        mean, gust = _numbers(shape, speed), _numbers(shape, index)
-        present = np.isfinite(mean) & np.isfinite(gust)
-        if present.sum() < _LEAST or mean[present].sum() <= 0:
-            continue
-        scale = (
-            UNITS[gust_heading.unit or "m/s"].scale / UNITS[speed_heading.unit or "m/s"].scale
-            if gust_heading.unit and speed_heading.unit
-            else 1.0
-        )
-        factor = float(scale * gust[present].sum() / mean[present].sum())
-        if not _FACTORS[0] <= factor <= _FACTORS[1]:
-            question = (
-                f"{shape.shown(index)} is {factor:.2g} times {shape.shown(speed)} in the mean; "
-                "gusts are "
-                f"{_FACTORS[0]:g} to {_FACTORS[1]:g} times the wind. Is {shape.shown(speed)} the "
-                "mean wind?"
-            )
-            return Open(key="expect", question=question, example="gust")
-    return None
-
-
-def ask_about_direction(
-    shape: TableShape, axes: tuple[int, int], direction: int, unit: str
-) -> Open | None:
-    """Asks about a direction that components towards east and north beside it contradict.
-
-    Args:
-        axes: columns of the components.
-        unit: of the direction, "deg" or "rad".
-    """
-    x, y, away = (_numbers(shape, index) for index in (*axes, direction))
-    present = np.isfinite(x) & np.isfinite(y) & np.isfinite(away) & (np.hypot(x, y) > 0)
-    if present.sum() < _LEAST:
-        return None
-    from_components = np.arctan2(-x[present], -y[present])
-    mean_turn = np.exp(1j * (UNITS[unit].scale * away[present] - from_components)).mean()
-    degrees = float(np.rad2deg(np.angle(mean_turn)))
-    if abs(mean_turn) >= _TOGETHER and abs(degrees) <= _APART:
-        return None
-    columns = f"{shape.shown(direction)} and the components {', '.join(map(shape.shown, axes))}"
-    how = (
-        f"differ by {degrees:.0f}\N{DEGREE SIGN}"
-        if abs(mean_turn) >= _TOGETHER
-        else "do not turn together"
-    )
-    question = f"{columns} {how}. Does {shape.shown(direction)} say where the wind comes from?"
-    return Open(key="expect", question=question, example="components")
-
-
-def _numbers(shape: TableShape, index: int) -> Series:
-    """Reads (n,) cells of a column in the first rows as numbers; NaN where one is no number."""
-    cells = (cell.replace(",", ".") for cell in shape.column(index))
-    return np.array([float(cell) if is_number(cell) else np.nan for cell in cells])

@@ -30,7 +30,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from itertools import islice
@@ -40,22 +40,24 @@ import numpy as np
 
 from flagdata.core.findings import Finding
 from flagdata.core.schema import CHANNELS
-from flagdata.core.shell import command_line
-from flagdata.core.units import UNITS, name_of_unit, unit
+from flagdata.core.units import unit
 from flagdata.errors import InputError
 from flagdata.ingest.anemometer import sensor_recipe as recipes
 from flagdata.ingest.anemometer.formats.recipe_headings import (
     Column,
     Heading,
+    channel_of,
     find,
     fits,
     stamp_format,
+    unit_of,
+    with_units,
 )
 from flagdata.ingest.anemometer.instants.stamp_text import parse
-from flagdata.ingest.anemometer.log_reading import Reading, followed_finding
+from flagdata.ingest.anemometer.log_reading import Reading, followed_finding, with_horizontal
 from flagdata.ingest.anemometer.sensor_recipe import OpenRecipe, Recipe
 from flagdata.ingest.anemometer.sniffing import Guess, Head
-from flagdata.ingest.anemometer.table.log_table import Table, read_table, with_horizontal
+from flagdata.ingest.anemometer.table.log_table import Table, read_table
 from flagdata.ingest.anemometer.table.rowclock import StatedTime
 from flagdata.ingest.anemometer.text.cut_lines import RowReader, cells_of_lines
 from flagdata.ingest.anemometer.text.text_file import TextFile
@@ -73,9 +75,6 @@ _FIX = (
 )
 _NAMED, _WIDE = 60, 120
 """Columns that are not read which a note names, and letters of each."""
-_WINDS = ("mph", "km/h", "m/s", "kn")
-_ENOUGH = 5
-"""Different speeds above 0 that show the unit which an instrument counts whole."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -222,7 +221,7 @@ def complete(
     at_rows = f"{where}, line {heading.rows + 1}"
     facts = _facts(data, lines[: heading.rows + 1])
     stamped, zone = _time_columns(data["time"], heading, facts, at_rows)
-    columns, units = _with_units(data, heading, rows, facts, stamped, options, where)
+    columns, units = with_units(data, heading, rows, facts, stamped, options, where)
     taken, unread, rivals = _assign_columns(data["channels"], columns, where=where, heading=heading)
     if not rows:
         raise InputError("there are no rows below the heading", where=at_rows, fix="export again")
@@ -351,134 +350,6 @@ def _format(
     )
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Units:
-    """What was found about units: notes, and why one is inferred."""
-
-    notes: tuple[Finding, ...]
-    inferred: str = ""
-
-
-def _unit_of(text: str) -> str | None:
-    """Names the unit that an export spells as `text`; `None` where it is unknown. Inches are of
-    mercury here."""
-    bare = re.sub(r"^\s*[\[(](.*)[\])]\s*$", r"\1", text).strip()
-    return "inHg" if bare.lower() in ("in", "inches") else name_of_unit(bare)
-
-
-def _channel(channels: Mapping[str, Mapping[str, Any]], column: Column) -> str | None:
-    """Finds the channel of a column by its name, or its number where the recipe gives one."""
-    for name, layout in channels.items():
-        wanted = layout["column"]
-        names = wanted if isinstance(wanted, list) else [wanted]
-        if column.number in names or any(
-            isinstance(name, str) and fits(name, column.name) for name in names
-        ):
-            return name
-    return None
-
-
-def _with_units(
-    data: Mapping[str, Any],
-    heading: Heading,
-    rows: Sequence[Sequence[str]],
-    facts: Mapping[str, str],
-    stamped: Iterable[int],
-    options: WindOptions,
-    where: str,
-) -> tuple[list[Column], _Units]:
-    """Reads the units of all columns but those of time."""
-    channels: Mapping[str, Mapping[str, Any]] = data["channels"]
-    if not heading.cells:
-        columns = [
-            Column(number=layout["column"], name=name, unit=layout["unit"])
-            for name, layout in channels.items()
-        ]
-        return columns, _Units(notes=())
-    columns, always = [], [f"{at}={heading.cells[at - 1]}" for at in stamped]
-    strange, repaired, borrowed, inferred = [], [], "", ""
-    for column in heading.columns:
-        channel = _channel(channels, column)
-        if column.number in stamped or channel is None:
-            columns.extend([] if column.number in stamped else [column])
-            continue
-        of_recipe: str | Mapping[str, str] = channels[channel]["unit"]
-        if isinstance(of_recipe, str):
-            columns.append(replace(column, unit=of_recipe))
-            continue
-        cells = [row[column.number - 1] for row in rows if len(row) >= column.number]
-        otherwise, written = of_recipe.get("else", ""), column.unit
-        text, bare = written, written.encode("ascii", "ignore").decode().strip()
-        if _unit_of(written) is None and bare != written and (_unit_of(bare) or not bare):
-            text = bare or otherwise
-            repaired.append(f"{column.name}: {written!r} is read as {_unit_of(text)}")
-        text = text or otherwise.format_map(facts)
-        if otherwise == text == "points" and not any(any(map(str.isalpha, cell)) for cell in cells):
-            text = "deg"
-        if not text and "whole" in of_recipe:
-            speed_cells = [
-                other_column.number - 1
-                for other_column in heading.columns
-                if "speed" in other_column.name.lower()
-            ]
-            speeds = [row[at] for row in rows for at in speed_cells if at < len(row)]
-            inferred_unit = _whole_in(cells, of_recipe["whole"]) or _whole_in(
-                speeds, of_recipe["whole"]
-            )
-            text = options.unit or inferred_unit or ""
-            if not text:
-                message = (
-                    f"the file states no unit of {column.name!r}, and its values do not show one"
-                )
-                fix = "give the one that was set: --unit m/s (or km/h, mph, kn)"
-                raise InputError(message, where=f"{where}, line {heading.at + 1}", fix=fix)
-            if options.unit is None:
-                inferred = (
-                    f"{column.name!r} in {text}: inferred, its values are whole "
-                    f"{of_recipe['whole']} converted"
-                )
-        borrowed = borrowed or (text if not written and "{" in otherwise else "")
-        if otherwise and heading.below:
-            always.append(f"{column.number}={channel}[{otherwise}]")
-            unit_name = _unit_of(text)
-            right = unit_name is not None and unit(unit_name).si == CHANNELS[channel].unit
-            strange.extend([] if right else [f"{column.name} in {written}"])
-        columns.append(replace(column, unit=text))
-    short = len(heading.cells) - len(heading.below)
-    if strange and (short > 0 or any("wind" in strange_text for strange_text in strange)):
-        fewer = f", {short} fewer of them," if short > 0 else ""
-        message = f"the units{fewer} do not stand below their names: {', '.join(strange[:3])}"
-        fix = (
-            "mend the line of units; or, since they are the same in every such file: "
-            f"{command_line('--columns', ','.join(always))}"
-        )
-        raise InputError(message, where=f"{where}, line {heading.at + 2}", fix=fix)
-    notes: list[Finding] = []
-    if borrowed:
-        message = (
-            f"speeds carry no unit: taken to be in {borrowed}, which is stated above the heading"
-        )
-        notes.append(Finding.of("unit-from-preamble", message))
-    if repaired:
-        text = "; ".join(repaired)
-        notes.append(Finding.of("units-repaired", text, count=len(repaired)))
-    return columns, _Units(notes=tuple(notes), inferred=inferred)
-
-
-def _whole_in(cells: Iterable[str], counted: str) -> str | None:
-    """Infers the unit in which all speeds are whole ones of `counted`, to one decimal; `None`
-    unless there is just one."""
-    texts = {cell.strip().replace(",", ".") for cell in cells}
-    speeds = {float(text) for text in texts if re.fullmatch(r"\d{1,3}(\.\d)?", text)} - {0.0}
-    steps = {name: UNITS[counted].scale / UNITS[name].scale for name in _WINDS}
-    fits = [
-        name
-        for name, step in steps.items()
-        if all(abs(round(round(speed / step) * step, 1) - speed) < 0.01 for speed in speeds)
-    ]
-    return fits[0] if len(speeds) >= _ENOUGH and len(fits) == 1 else None
-
-
 def _assign_columns(
     channels: Mapping[str, Mapping[str, Any]],
     columns: Sequence[Column],
@@ -499,7 +370,7 @@ def _assign_columns(
         f"{where}, line {heading.at + 1 + below}" for below in (0, bool(heading.below))
     )
     for column in columns:
-        channel = column.name if not heading.cells else _channel(channels, column)
+        channel = column.name if not heading.cells else channel_of(channels, column)
         if channel is None or channel in taken:
             rival = (
                 channel is not None
@@ -508,7 +379,7 @@ def _assign_columns(
             )
             (rivals if rival else unread).extend([column] if column.name else [])
             continue
-        name = _unit_of(column.unit)
+        name = unit_of(column.unit)
         if name is None or unit(name).si != CHANNELS[channel].unit:
             if channel.startswith("wind_") or not channels[channel].get("optional"):
                 message = f"{column.name!r} is {channel}, but its unit is {column.unit!r}"

@@ -12,10 +12,10 @@ from flagdata.core.arrays import IntArray
 from flagdata.core.findings import Finding
 from flagdata.errors import InputError, UsageError
 from flagdata.ingest.anemometer import sensor_recipe as recipes
-from flagdata.ingest.anemometer.log_reading import Reading
+from flagdata.ingest.anemometer.log_reading import Reading, with_horizontal
 from flagdata.ingest.anemometer.sensor_recipe import Recipe
 from flagdata.ingest.anemometer.sniffing import Guess, Head
-from flagdata.ingest.anemometer.table.log_table import read_table, with_horizontal
+from flagdata.ingest.anemometer.table.log_table import read_table
 from flagdata.ingest.anemometer.table.rowclock import StatedTime
 from flagdata.ingest.anemometer.text.text_file import TextFile
 from flagdata.ingest.anemometer.wind_options import WindOptions

@@ -57,7 +57,7 @@ FORMATS = Registry(
         "delimited": "flagdata.ingest.anemometer.table.delimited:Delimited",
         "nmea": "flagdata.ingest.anemometer.formats.nmea:Nmea",
         "kestrel": "flagdata.ingest.anemometer.formats.described:Kestrel",
-        "nmea-stamped": "flagdata.ingest.anemometer.formats.nmea:StampedNmea",
+        "nmea-stamped": "flagdata.ingest.anemometer.formats.stamped_nmea:StampedNmea",
         "canboat": "flagdata.ingest.anemometer.formats.canboat:Canboat",
         "davis": "flagdata.ingest.anemometer.formats.described:Davis",
         "ecowitt": "flagdata.ingest.anemometer.formats.described:Ecowitt",

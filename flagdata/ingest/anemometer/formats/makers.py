@@ -58,9 +58,8 @@ from flagdata.ingest.anemometer.formats.serial_lines import (
     split_stamp,
     turn_directions,
 )
-from flagdata.ingest.anemometer.log_reading import Reading
+from flagdata.ingest.anemometer.log_reading import Reading, with_horizontal
 from flagdata.ingest.anemometer.sniffing import Guess, Head
-from flagdata.ingest.anemometer.table.log_table import with_horizontal
 from flagdata.ingest.anemometer.text.text_file import TextFile
 from flagdata.ingest.anemometer.wind_options import WindOptions
 from flagdata.recipes.shelves import Shelf, parse_recipe

@@ -5,12 +5,15 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from flagdata.core.findings import Finding, Severity
-from flagdata.errors import TimeError
+from flagdata.core.schema import CHANNELS
+from flagdata.core.shell import command_line
+from flagdata.core.units import UNITS, name_of_unit, unit
+from flagdata.errors import InputError, TimeError
 from flagdata.ingest.anemometer.instants.dates import date_form
 from flagdata.ingest.anemometer.sensor_recipe import DELIMITERS
 from flagdata.ingest.anemometer.wind_options import WindOptions
@@ -199,3 +202,136 @@ def stamp_format(
             what=text,
         ),
     )
+
+
+_WINDS = ("mph", "km/h", "m/s", "kn")
+_ENOUGH = 5
+"""Different speeds above 0 that show the unit which an instrument counts whole."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Units:
+    """What was found about units: notes, and why one is inferred."""
+
+    notes: tuple[Finding, ...]
+    inferred: str = ""
+
+
+def unit_of(text: str) -> str | None:
+    """Names the unit that an export spells as `text`; `None` where it is unknown. Inches are of
+    mercury here."""
+    bare = re.sub(r"^\s*[\[(](.*)[\])]\s*$", r"\1", text).strip()
+    return "inHg" if bare.lower() in ("in", "inches") else name_of_unit(bare)
+
+
+def channel_of(channels: Mapping[str, Mapping[str, Any]], column: Column) -> str | None:
+    """Finds the channel of a column by its name, or its number where the recipe gives one."""
+    for name, layout in channels.items():
+        wanted = layout["column"]
+        names = wanted if isinstance(wanted, list) else [wanted]
+        if column.number in names or any(
+            isinstance(name, str) and fits(name, column.name) for name in names
+        ):
+            return name
+    return None
+
+
+def with_units(
+    data: Mapping[str, Any],
+    heading: Heading,
+    rows: Sequence[Sequence[str]],
+    facts: Mapping[str, str],
+    stamped: Iterable[int],
+    options: WindOptions,
+    where: str,
+) -> tuple[list[Column], _Units]:
+    """Reads the units of all columns but those of time."""
+    channels: Mapping[str, Mapping[str, Any]] = data["channels"]
+    if not heading.cells:
+        columns = [
+            Column(number=layout["column"], name=name, unit=layout["unit"])
+            for name, layout in channels.items()
+        ]
+        return columns, _Units(notes=())
+    columns, always = [], [f"{at}={heading.cells[at - 1]}" for at in stamped]
+    strange, repaired, borrowed, inferred = [], [], "", ""
+    for column in heading.columns:
+        channel = channel_of(channels, column)
+        if column.number in stamped or channel is None:
+            columns.extend([] if column.number in stamped else [column])
+            continue
+        of_recipe: str | Mapping[str, str] = channels[channel]["unit"]
+        if isinstance(of_recipe, str):
+            columns.append(replace(column, unit=of_recipe))
+            continue
+        cells = [row[column.number - 1] for row in rows if len(row) >= column.number]
+        otherwise, written = of_recipe.get("else", ""), column.unit
+        text, bare = written, written.encode("ascii", "ignore").decode().strip()
+        if unit_of(written) is None and bare != written and (unit_of(bare) or not bare):
+            text = bare or otherwise
+            repaired.append(f"{column.name}: {written!r} is read as {unit_of(text)}")
+        text = text or otherwise.format_map(facts)
+        if otherwise == text == "points" and not any(any(map(str.isalpha, cell)) for cell in cells):
+            text = "deg"
+        if not text and "whole" in of_recipe:
+            speed_cells = [
+                other_column.number - 1
+                for other_column in heading.columns
+                if "speed" in other_column.name.lower()
+            ]
+            speeds = [row[at] for row in rows for at in speed_cells if at < len(row)]
+            inferred_unit = _whole_in(cells, of_recipe["whole"]) or _whole_in(
+                speeds, of_recipe["whole"]
+            )
+            text = options.unit or inferred_unit or ""
+            if not text:
+                message = (
+                    f"the file states no unit of {column.name!r}, and its values do not show one"
+                )
+                fix = "give the one that was set: --unit m/s (or km/h, mph, kn)"
+                raise InputError(message, where=f"{where}, line {heading.at + 1}", fix=fix)
+            if options.unit is None:
+                inferred = (
+                    f"{column.name!r} in {text}: inferred, its values are whole "
+                    f"{of_recipe['whole']} converted"
+                )
+        borrowed = borrowed or (text if not written and "{" in otherwise else "")
+        if otherwise and heading.below:
+            always.append(f"{column.number}={channel}[{otherwise}]")
+            unit_name = unit_of(text)
+            right = unit_name is not None and unit(unit_name).si == CHANNELS[channel].unit
+            strange.extend([] if right else [f"{column.name} in {written}"])
+        columns.append(replace(column, unit=text))
+    short = len(heading.cells) - len(heading.below)
+    if strange and (short > 0 or any("wind" in strange_text for strange_text in strange)):
+        fewer = f", {short} fewer of them," if short > 0 else ""
+        message = f"the units{fewer} do not stand below their names: {', '.join(strange[:3])}"
+        fix = (
+            "mend the line of units; or, since they are the same in every such file: "
+            f"{command_line('--columns', ','.join(always))}"
+        )
+        raise InputError(message, where=f"{where}, line {heading.at + 2}", fix=fix)
+    notes: list[Finding] = []
+    if borrowed:
+        message = (
+            f"speeds carry no unit: taken to be in {borrowed}, which is stated above the heading"
+        )
+        notes.append(Finding.of("unit-from-preamble", message))
+    if repaired:
+        text = "; ".join(repaired)
+        notes.append(Finding.of("units-repaired", text, count=len(repaired)))
+    return columns, _Units(notes=tuple(notes), inferred=inferred)
+
+
+def _whole_in(cells: Iterable[str], counted: str) -> str | None:
+    """Infers the unit in which all speeds are whole ones of `counted`, to one decimal; `None`
+    unless there is just one."""
+    texts = {cell.strip().replace(",", ".") for cell in cells}
+    speeds = {float(text) for text in texts if re.fullmatch(r"\d{1,3}(\.\d)?", text)} - {0.0}
+    steps = {name: UNITS[counted].scale / UNITS[name].scale for name in _WINDS}
+    fits = [
+        name
+        for name, step in steps.items()
+        if all(abs(round(round(speed / step) * step, 1) - speed) < 0.01 for speed in speeds)
+    ]
+    return fits[0] if len(speeds) >= _ENOUGH and len(fits) == 1 else None

@@ -15,11 +15,11 @@ from flagdata.ingest.anemometer.draft.drafting import Draft, draft
 from flagdata.ingest.anemometer.draft.heading_words import meaning
 from flagdata.ingest.anemometer.draft.questions import Open, OpenFactsError
 from flagdata.ingest.anemometer.formats.described import column_findings, complete
-from flagdata.ingest.anemometer.log_reading import WIND_CHANNELS, Reading
+from flagdata.ingest.anemometer.log_reading import WIND_CHANNELS, Reading, with_horizontal
 from flagdata.ingest.anemometer.samples import platform
 from flagdata.ingest.anemometer.sensor_recipe import OpenRecipe, Recipe
 from flagdata.ingest.anemometer.sniffing import HEAD_LINES, Guess, Head
-from flagdata.ingest.anemometer.table.log_table import read_table, with_horizontal
+from flagdata.ingest.anemometer.table.log_table import read_table
 from flagdata.ingest.anemometer.table.rowclock import StatedTime
 from flagdata.ingest.anemometer.text.cut_lines import RowReader
 from flagdata.ingest.anemometer.text.text_file import TextFile

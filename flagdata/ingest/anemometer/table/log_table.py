@@ -16,7 +16,7 @@ from flagdata.core.arrays import BoolArray, FloatArray, IntArray, UInt8Array
 from flagdata.core.findings import Finding, Severity
 from flagdata.core.schema import CHANNELS, SampleFlag
 from flagdata.core.units import unit
-from flagdata.errors import InputError, NothingMeasuredError, UnknownNameError, UsageError
+from flagdata.errors import InputError, NothingMeasuredError, UnknownNameError
 from flagdata.ingest.anemometer.instants import dates, zones
 from flagdata.ingest.anemometer.instants.stamp_text import YEARS
 from flagdata.ingest.anemometer.log_reading import WIND_CHANNELS, Reading
@@ -198,20 +198,6 @@ def _still(states: Mapping[str, UInt8Array]) -> dict[str, BoolArray]:
             *(angle for angle in states if angle.startswith(name.replace("speed", "direction"))),
         )
     }
-
-
-def _of_cells(
-    kind: str, severity: Severity, name: str, affected: BoolArray, line: IntArray, text: str
-) -> Finding:
-    """Reports cells of a channel in the rows `affected` (n,)."""
-    count = int(affected.sum())
-    return Finding(
-        kind=kind,
-        severity=severity,
-        count=count,
-        where=f"line {line[affected][0]}",
-        what=f"{count} {text.format(name=name)}",
-    )
 
 
 def _in_degrees(
@@ -487,6 +473,20 @@ def _index(column: str | int, rows: Rows, where: str) -> int:
     return names.index(column)
 
 
+def _of_cells(
+    kind: str, severity: Severity, name: str, affected: BoolArray, line: IntArray, text: str
+) -> Finding:
+    """Reports cells of a channel in the rows `affected` (n,)."""
+    count = int(affected.sum())
+    return Finding(
+        kind=kind,
+        severity=severity,
+        count=count,
+        where=f"line {line[affected][0]}",
+        what=f"{count} {text.format(name=name)}",
+    )
+
+
 def in_si(value: FloatArray, layout: ChannelLayout) -> FloatArray:
     """Cells of a column in SI, by the recipe's calibration; directions still as the vane gives
     them."""
@@ -563,46 +563,3 @@ def refuse_if_most(bad: int, good: int, text: str, where: str) -> None:
             where=where,
             fix="look at it with flagdata ingest --sniff",
         )
-
-
-def with_horizontal(reading: Reading, azimuth: float | None, *, where: str) -> Reading:
-    """Add `wind_speed` = √(x² + y²), and with the azimuth `wind_direction`, where a log has
-    components alone.
-
-    The azimuth is the compass direction the array points to, against +x: wind along +x comes from
-    there. With +z up, +y is 90° to the left of +x, so that the wind comes from azimuth - atan2(y,
-    x) (Campbell Scientific, CSAT3 manual, appendix "Orientation").
-
-    Args:
-        azimuth: [rad, clockwise from true north]; `None` where nobody knows: no direction then.
-
-    Raises:
-        UsageError: an azimuth for a log without components.
-    """
-    channels = reading.channels
-    if not {"wind_x", "wind_y"} <= set(channels) or "wind_speed" in channels:
-        if azimuth is not None:
-            raise UsageError(
-                "an azimuth was given, but the log has no wind components",
-                where=where,
-                fix="leave out --azimuth; a turned vane is a rotation in the recipe",
-            )
-        return reading
-    x, y = channels["wind_x"], channels["wind_y"]
-    added = {"wind_speed": np.hypot(x, y)}
-    text = "wind_speed is √(wind_x² + wind_y²)"
-    fix = None
-    if azimuth is None:
-        text += "; no direction, since the sensor's azimuth is not known"
-        fix = (
-            "give the sensor's azimuth for a direction: --azimuth DEG (270 for x to the east, y to "
-            "the north)"
-        )
-    else:
-        towards = np.mod(azimuth - np.arctan2(y, x), 2 * np.pi)
-        added["wind_direction"] = np.where(
-            added["wind_speed"] == 0, np.nan, towards
-        )  # calm air comes from nowhere
-        text += f", wind_direction is from the azimuth {np.degrees(azimuth):.1f}° given"
-    finding = Finding.of("speed-from-components", text, count=len(x), fix=fix)
-    return replace(reading, channels={**channels, **added}, findings=(*reading.findings, finding))

@@ -12,8 +12,9 @@ import pytest
 from flagdata.core.schema import SampleFlag
 from flagdata.errors import InputError, TimeError, UsageError
 from flagdata.ingest import Head, checksum
-from flagdata.ingest.anemometer.formats.nmea import Nmea, StampedNmea
+from flagdata.ingest.anemometer.formats.nmea import Nmea
 from flagdata.ingest.anemometer.formats.nmea_sentences import ChecksumError, clock, split, tag_time
+from flagdata.ingest.anemometer.formats.stamped_nmea import StampedNmea
 from flagdata.timebase import iso
 from tests.flagdata.ingest.anemometer.cases import sentence
 from tests.flagdata.ingest.anemometer.conftest import read
