@@ -10,7 +10,7 @@ import pytest
 
 from flagdata.core.schema import catalog_schema
 from flagdata.errors import CorruptError
-from flagdata.lake import Lake, Log, catalog, delta_log
+from flagdata.lake import Lake, Log, catalog, log_summaries
 from tests.flagdata.lake.conftest import overwrite
 
 EVERY = 4
@@ -19,7 +19,7 @@ EVERY = 4
 @pytest.fixture(autouse=True)
 def _often(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(catalog, "_TIDY_EVERY", EVERY)
-    monkeypatch.setattr(delta_log, "_MANY", 3)
+    monkeypatch.setattr(log_summaries, "_MANY", 3)
     monkeypatch.setattr(delta_log, "_LARGE", 6 * EVERY)
 
 
