@@ -20,7 +20,7 @@ EVERY = 4
 def _often(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(catalog, "_TIDY_EVERY", EVERY)
     monkeypatch.setattr(log_summaries, "_MANY", 3)
-    monkeypatch.setattr(delta_log, "_LARGE", 6 * EVERY)
+    monkeypatch.setattr(log_summaries, "_LARGE", 6 * EVERY)
 
 
 def commit(lake: Lake, versions: int, message: str) -> None:
