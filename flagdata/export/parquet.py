@@ -117,7 +117,7 @@ def _part(path: Path, rows: pa.Schema) -> pq.ParquetWriter:
         path,
         schema,
         compression=compression,  # pyright: ignore[reportArgumentType]
-        use_dictionary=dictionary,
+        use_dictionary=dictionary,  # pyright: ignore[reportArgumentType]
     )
 
 
