@@ -82,6 +82,11 @@ _STYLE: dict[Any, Any] = {
     "legend.frameon": False,
 }
 _LEGEND_COLUMNS = 4
+_HANDLE, _LETTER = 0.5, 0.066
+"""What an entry of a legend takes beside its text, and a letter of it [inch]."""
+_NARROW = 6.0
+"""Width of a chart [inch] up to which its texts can be read on a telephone; a wider one is scrolled
+there."""
 _NAME = 24
 """Characters of a line of a bar's name."""
 
@@ -103,7 +108,8 @@ def svg(chart: Chart, *, name: str, title: str = "") -> Markup:
     text = re.sub(r"(\bid=\"|url\(#|href=\"#)", rf"\g<1>{name}-", text)
     for colour, value in _VALUES.items():
         text = text.replace(value, f"var(--{colour.value}, {value})")
-    about = Markup('<svg role="img" aria-label="{}"').format(title)
+    kind = Markup(' class="wide"') if chart.width > _NARROW else ""
+    about = Markup('<svg role="img" aria-label="{}"{}').format(title, kind)
     return about + Markup(text.removeprefix("<svg"))
 
 
@@ -213,11 +219,13 @@ def _draw_legend(figure: Figure, drawn: Sequence[Axes]) -> None:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
     if entries:
+        widest = _HANDLE + _LETTER * max(map(len, entries))
+        columns = max(1, min(_LEGEND_COLUMNS, int(figure.get_figwidth() / widest)))
         figure.legend(
             list(entries.values()),
             list(entries),
             loc="outside lower center",
-            ncols=min(_LEGEND_COLUMNS, len(entries)),
+            ncols=min(columns, len(entries)),
             fontsize=8,
         )
 

@@ -19,6 +19,7 @@ from flagdata.answer.charts import (
     Bins,
     Cells,
     Chart,
+    Cloud,
     Colour,
     Dots,
     Line,
@@ -27,6 +28,7 @@ from flagdata.answer.charts import (
     Shade,
 )
 from flagdata.errors import InputError
+from flagdata.pages import chart_drawing
 from flagdata.pages.chart_drawing import check_format, encode, png, svg
 from flagdata.pages.render import text_of
 
@@ -38,6 +40,7 @@ ALL = [
     Across(x=0.5, dashed=True),
     Shade(y=(0.2, 0.4)),
     Note(x=0.1, y=0.1, text="a < b"),
+    Cloud(x=[0, 1], y=[0, 1], values=[3, 4], label="wind [m/s]"),
 ]
 
 
@@ -123,3 +126,33 @@ def test_a_file_has_the_format_of_its_name(tmp_path: Path) -> None:
     assert encode(_chart(*ALL), tmp_path / "a.pdf").startswith(b"%PDF")
     with pytest.raises(InputError, match="no picture of format '.xyz'"):
         check_format(tmp_path / "a.xyz")
+
+
+def test_a_wide_chart_is_scrolled_on_a_telephone_and_a_narrow_one_is_read_there() -> None:
+    wide, narrow = (
+        svg(Chart(rows=[[Panel(marks=[Line(x=[0, 1], y=[0, 1])])]], width=width), name="a")
+        for width in (9.2, 5.6)
+    )
+    assert 'class="wide"' in wide.partition(">")[0]
+    assert "class=" not in narrow.partition(">")[0]
+
+
+def test_panels_below_each_other_begin_at_the_same_place_whatever_their_ticks_are_called() -> None:
+    panels = [
+        Panel(marks=[Line(x=[0, 1], y=[0, 1])], y=Axis(ticks=[0, 1], texts=texts))
+        for texts in (["0", "1"], ["nothing at all", "everything"])
+    ]
+    drawn = chart_drawing._draw(Chart(rows=[[panel] for panel in panels]))
+    drawn.canvas.draw()
+    first, second = (axes.get_position() for axes in drawn.axes)
+    assert first.x0 == pytest.approx(second.x0)
+
+
+def test_a_legend_has_as_many_columns_as_its_texts_leave_room_for() -> None:
+    def columns(*labels: str) -> int:
+        marks = [Line(x=[0, 1], y=[0, 1], label=label) for label in labels]
+        drawn = chart_drawing._draw(Chart(rows=[[Panel(marks=marks)]], width=5.6))
+        return drawn.legends[0]._ncols  # type: ignore[attr-defined]
+
+    assert columns("a", "b", "c") == 3
+    assert columns("the ground truth of all clips, by the minute", "a", "b") == 1
