@@ -124,7 +124,7 @@ def test_a_logarithmic_axis_names_plain_numbers() -> None:
 def test_a_file_has_the_format_of_its_name(tmp_path: Path) -> None:
     assert encode(_chart(*ALL), tmp_path / "a.png").startswith(b"\x89PNG")
     assert encode(_chart(*ALL), tmp_path / "a.pdf").startswith(b"%PDF")
-    with pytest.raises(InputError, match="no picture of format '.xyz'"):
+    with pytest.raises(InputError, match=r"no picture of format '\.xyz'"):
         check_format(tmp_path / "a.xyz")
 
 
