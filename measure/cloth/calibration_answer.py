@@ -42,7 +42,7 @@ def answer_of_calibration(
 
     Args:
         artifact: its id in the lake; None where it is not to be there.
-        recorded: what is known of the recordings beside what a calibration has: their date.
+        recorded: rows about the recordings beside those that a calibration has: their date.
         others: sections of what was made of the same recordings.
         further: JSON values of what was made of them.
     """
