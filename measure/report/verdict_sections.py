@@ -149,7 +149,7 @@ def parameters_section(verdict: Verdict, *, title: str) -> Section:
 
 def closing_sections(verdict: Verdict) -> list[Section]:
     """Makes the sections that end a page: why other effects are not named, what was assumed, what
-    is said of the data, what the terms mean."""
+    was noticed in the data, what the terms mean."""
     sections: list[Section] = []
     if rejected := verdict_sentences.rejected_candidates(verdict):
         rows = [
