@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +12,10 @@ from numpy.typing import NDArray
 from flagdata.core.arrays import Float32Array, FloatArray
 from flagdata.core.html import table
 from flagdata.errors import UsageError
-from flagdata.lake.mesh_sequences import MeshSequence, RaggedMeshSequence
 from flagdata.timebase import NANOSECONDS
+
+if TYPE_CHECKING:
+    from flagdata.lake.mesh_sequences import MeshSequence, RaggedMeshSequence
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -51,6 +54,8 @@ class Simulated:
         Raises:
             UsageError: a mesh that changes from frame to frame.
         """
+        from flagdata.lake.mesh_sequences import MeshSequence
+
         fixed = [member for member in self.members if isinstance(member, MeshSequence)]
         if len(fixed) < len(self.members):
             raise UsageError(
